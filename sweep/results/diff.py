@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -12,7 +11,7 @@ import xarray as xr
 
 from sweep.cells.schema import ANCILLARY, STATUS
 from sweep.errors import SweepError
-from sweep.results.statuses import boxes, cell_values, flag_words
+from sweep.results.statuses import cell_values, flag_words, pieces
 from sweep.words import Table, listed
 
 
@@ -135,25 +134,28 @@ def diff(a: xr.Dataset, b: xr.Dataset | None = None, rtol: float = 0.0) -> Diffe
     total = [math.prod(d[STATUS].shape) for d in (a, b, first)]
     names = [{str(n) for n in d.data_vars} - set(ANCILLARY) for d in (a, b)]
     found = Difference(total[2], total[0] - total[2], total[1] - total[2], tuple(sorted(names[0] ^ names[1])), rtol)
-    for name in (str(n) for n in a.data_vars if str(n) in names[0] & names[1]):
-        distance = found.outputs[name] = Distance()
-        order = (*cells, *(d for d in first[name].dims if d not in cells))
-        for cell, x, y in _pieces(first[name].transpose(*order), second[name].transpose(*order)):
-            apart = _relative(x, y).max(axis=tuple(range(len(cells), x.ndim)), initial=0.0)
+    found.outputs.update({str(name): Distance() for name in a.data_vars if str(name) in names[0] & names[1]})
+    words, compared = [flag_words(d[STATUS]) for d in (first, second)], [*found.outputs, STATUS]
+    for x, y in zip(*(pieces(d[compared], cells) for d in (first, second)), strict=True):
+        for name, distance in found.outputs.items():
+            one, other = x[name].transpose(*cells, ...), y[name]
+            apart = _relative(one.values, other.transpose(*one.dims).values)
+            apart = apart.max(axis=tuple(range(len(cells), one.ndim)), initial=0.0)
             distance.cells += int((apart > rtol).sum())
             if apart.size and apart.max() > distance.largest:
-                distance.largest = float(apart.max())
-                distance.example = _example(first, cell, apart.shape, int(apart.argmax()))
-    words = [flag_words(d[STATUS]) for d in (first, second)]
-    for cell, x, y in _pieces(first[STATUS], second[STATUS].transpose(*cells)):
-        codes = np.stack([x.ravel(), y.ravel()])
+                distance.largest, distance.example = float(apart.max()), _example(x, int(apart.argmax()))
+        codes = np.stack([x[STATUS].values.ravel(), y[STATUS].transpose(*cells).values.ravel()])
         pairs, places, counts = np.unique(codes, axis=1, return_index=True, return_counts=True)
-        for one, other, place, count in zip(*pairs.tolist(), places.tolist(), counts.tolist(), strict=True):
-            if one != other:
-                pair = words[0].get(one, str(one)), words[1].get(other, str(other))
+        for here, there, place, count in zip(*pairs.tolist(), places.tolist(), counts.tolist(), strict=True):
+            if here != there:
+                pair = words[0].get(here, str(here)), words[1].get(there, str(there))
                 found.statuses[pair] = found.statuses.get(pair, 0) + count
-                found.examples.setdefault(pair, _example(first, cell, x.shape, place))
+                found.examples.setdefault(pair, _example(x, place))
     return found
+
+
+def _example(piece: xr.Dataset, place: int) -> str:
+    return "e.g. " + " ".join(f"{name}={value}" for name, value in cell_values(piece, place).items())
 
 
 def two_results(name: str, a: Any, b: Any) -> tuple[xr.Dataset, xr.Dataset]:
@@ -174,16 +176,3 @@ def _relative(x: Any, y: Any) -> Any:
     found[(x == y) | (np.isnan(x) & np.isnan(y))] = 0.0
     found[np.isnan(found)] = np.inf
     return found
-
-
-def _pieces(a: xr.DataArray, b: xr.DataArray) -> Iterator[tuple[list[int], Any, Any]]:
-    """Numbers of both, a few million at a time, and where they begin."""
-    for box in boxes(a.shape):
-        yield [part.start for part in box], a[box].values, b[box].values
-
-
-def _example(dataset: xr.Dataset, first: list[int], shape: tuple[int, ...], place: int) -> str:
-    """A cell, by its place in a piece of a shape that begins at some cell."""
-    at = [start + int(step) for start, step in zip(first, np.unravel_index(place, shape), strict=False)]
-    number = np.ravel_multi_index(at, dataset[STATUS].shape) if at else 0
-    return "e.g. " + " ".join(f"{name}={value}" for name, value in cell_values(dataset, int(number)).items())

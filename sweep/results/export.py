@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
-import functools
 import math
 import os
 from collections.abc import Callable, Iterator, Mapping
@@ -17,7 +17,7 @@ from sweep.cells.reduce import BY_METHOD, BY_STATUS
 from sweep.errors import SweepError, missing
 from sweep.file import disk
 from sweep.file.overwriting import check_target
-from sweep.results.statuses import boxes, flag_words, is_summary
+from sweep.results.statuses import flag_words, is_summary, pieces
 from sweep.words import as_path, cell, listed, require_dataset
 
 EXPORTED = "exported by foliot"
@@ -83,8 +83,8 @@ def export(
         with disk.replacing(target) as part:
             history = [text for text in str(dataset.attrs.get("history", "")).splitlines() if text != EXPORTED]
             whole = _in_float32(dataset) if float32 else dataset
-            writer = functools.partial(PACKED[kind], compress=True) if compress else WRITERS[kind]
-            writer(whole.assign_attrs(history="\n".join([*history, EXPORTED])), part)
+            whole = whole.assign_attrs(history="\n".join([*history, EXPORTED]))
+            WRITERS[kind](whole, part, **({"compress": True} if compress else {}))
     except ImportError as error:
         raise missing(f"{target}: needs {error.name}", "export") from None
     except RuntimeError as error:  # from HDF5
@@ -122,10 +122,8 @@ def _write_csv(dataset: xr.Dataset, path: Path) -> None:
         writer = csv.writer(file, lineterminator="\n")  # faster than that of pandas
         writer.writerow(map(cell, (*whole.coords, *whole.data_vars)))
         for table in _tables(dataset):
-            columns = (column.tolist() for _, column in table.items())
-            numbers = (column.dtype.kind in "fiu" for _, column in table.items())
-            texts = (c if plain else map(cell, c) for c, plain in zip(columns, numbers, strict=True))
-            writer.writerows(zip(*texts, strict=True))
+            columns = [c.tolist() if c.dtype.kind in "fiu" else map(cell, c) for _, c in table.items()]
+            writer.writerows(zip(*columns, strict=True))
 
 
 def _write_parquet(dataset: xr.Dataset, path: Path) -> None:
@@ -136,30 +134,22 @@ def _write_parquet(dataset: xr.Dataset, path: Path) -> None:
         """As parquet wants attributes; flags are words in a table."""
         return {str(name): str(value) for name, value in attrs.items() if name not in ("flag_values", "flag_meanings")}
 
-    variables, writer = flat(dataset).variables, None
-    try:
+    variables, schema = flat(dataset).variables, None
+    with contextlib.ExitStack() as stack:
         for table in _tables(dataset):
-            arrays = [pa.array(column.to_numpy()) for _, column in table.items()]
-            if writer is None:
-                fields = [
-                    pa.field(str(name), array.type, metadata=text(variables[name].attrs))
-                    for name, array in zip(table, arrays, strict=True)
-                ]
+            arrays = {str(name): pa.array(column.to_numpy()) for name, column in table.items()}
+            if schema is None:
+                fields = [pa.field(name, a.type, metadata=text(variables[name].attrs)) for name, a in arrays.items()]
                 schema = pa.schema(fields, metadata=text(dataset.attrs))
-                writer = pq.ParquetWriter(path, schema)
-            writer.write_table(pa.table(arrays, schema=schema))
-    finally:
-        if writer is not None:
-            writer.close()
+                writer = stack.enter_context(pq.ParquetWriter(path, schema))
+            writer.write_table(pa.table(list(arrays.values()), schema=schema))
 
 
 def _tables(dataset: xr.Dataset) -> Iterator[Any]:
     """pandas tables of at most about `ROWS` rows: one for each cell, and place of a trace; flags as words."""
     dataset = flat(dataset)
-    cells = dataset["status"].dims if "status" in dataset else ()
-    dims = list(dict.fromkeys((*cells, *dataset.sizes)))
-    for box in boxes([dataset.sizes[dim] for dim in dims], ROWS):
-        block = dataset.isel(dict(zip(dims, box, strict=True))).load()
+    dims = list(dict.fromkeys((*(dataset["status"].dims if "status" in dataset else ()), *dataset.sizes)))
+    for block in pieces(dataset, dims, ROWS * len(dataset.variables)):
         # a dataset of no dimension has one row
         frame = block.to_dataframe(dim_order=dims) if dims else block.expand_dims("cell").to_dataframe()
         table = frame.reset_index()[[*dataset.coords, *dataset.data_vars]]
@@ -225,12 +215,12 @@ def _write_netcdf(dataset: xr.Dataset, path: Path, compress: bool = False) -> No
     whole.to_netcdf(path, engine="h5netcdf", encoding=encoding)
 
 
-WRITERS: dict[str, Callable[[xr.Dataset, Path], None]] = {
+WRITERS: dict[str, Callable[..., None]] = {
     ".csv": _write_csv,
     ".parquet": _write_parquet,
     ".nc": _write_netcdf,
     ".zarr": _write_zarr,
 }
 """Kinds of file, by suffix."""
-PACKED: dict[str, Callable[..., None]] = {".nc": _write_netcdf, ".zarr": _write_zarr}
+PACKED = (".nc", ".zarr")
 """Those that can be compressed."""

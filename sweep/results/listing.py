@@ -7,10 +7,9 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from kernels.interface import KINDS
 from sweep.errors import SweepError
 from sweep.file.open import changed, open_result
-from sweep.results.statuses import account, kind_of, tally
+from sweep.results.statuses import Account, account, count_statuses
 from sweep.words import Table, as_path
 
 UNFINISHED = re.compile(r"(.+\.(?:h5|nc))\.(?:parts|unfinished)")
@@ -34,6 +33,8 @@ class Listed:
         Share of the cells that are computed.
     statuses : dict of str to int
         Cells of each.
+    account : Account
+        What became of the cells.
     when, version : str
         When it ended, or began where it has not; by which version of foliot.
     fault : str
@@ -45,6 +46,7 @@ class Listed:
     cells: int = 0
     done: float = 0.0
     statuses: dict[str, int] | None = None
+    account: Account | None = None
     when: str = ""
     version: str = ""
     fault: str = ""
@@ -54,8 +56,7 @@ class Listed:
         """Texts below `HEADINGS`."""
         if self.fault:
             return self.path.name, "", "", "", "", "", self.fault
-        found = self.statuses or {}
-        counts = {kind: sum(n for name, n in found.items() if kind_of(name) == kind) for kind in KINDS}
+        counts = self.account.by_kind if self.account else {}
         cells = ", ".join(f"{n:,} {kind}" for kind, n in counts.items() if n)
         done = f"{int(1000 * self.done) / 10:g} %"
         return self.path.name, f"{self.cells:,}", done, cells, self.when[:16], self.version, self.question
@@ -63,9 +64,6 @@ class Listed:
 
 class Listing(tuple[Listed, ...]):
     """Results; printed they are a table, without the columns `LATER`."""
-
-    def __str__(self) -> str:
-        return self.table()
 
     def table(self, complete: bool = False) -> str:
         """The table, by wish with all columns."""
@@ -75,7 +73,7 @@ class Listing(tuple[Listed, ...]):
         rows = [[found.row[i] for i in shown] for found in self]
         return Table(rows, [HEADINGS[i] for i in shown]).text("", complete)
 
-    __repr__ = __str__
+    __str__ = __repr__ = table
 
 
 def list_results(folder: str | os.PathLike[str] = ".") -> Listing:
@@ -107,13 +105,14 @@ def list_results(folder: str | os.PathLike[str] = ".") -> Listing:
 def _listed(path: Path) -> Listed:
     try:
         with open_result(path) as dataset, changed(path):
-            attrs, statuses, cells = dataset.attrs, tally(dataset), account(dataset)
+            attrs, cells = dataset.attrs, account(dataset)
             return Listed(
                 path=path,
                 question=str(attrs.get("question") or attrs.get("title", "")),
                 cells=cells.total,
                 done=(cells.total - cells.pending) / cells.total,
-                statuses=statuses,
+                statuses={count.name: count.cells for count in count_statuses(dataset, examples=False)},
+                account=cells,
                 when=str(attrs.get("end", attrs.get("start", ""))),
                 version=str(attrs.get("versions", "")).partition(",")[0].removeprefix("foliot "),
             )

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import astuple, dataclass, field
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -56,46 +57,6 @@ class Account:
         return f"{self.total:,} cells: " + ", ".join(f"{cells:,} {kind}" for kind, cells in counts.items())
 
 
-def account(dataset: Cells) -> Account:
-    """What became of the cells of a result, of a summary too."""
-    counts = dict.fromkeys(KINDS, 0)
-    for name, cells in tally(dataset).items():
-        counts[kind_of(name)] += cells
-    return Account(*counts.values())
-
-
-def kind_of(name: str) -> str:
-    """The word under which a status is counted."""
-    return (Status[name] if name in Status.__members__ else Status.FAILED).kind
-
-
-def tally(dataset: Cells) -> dict[str, int]:
-    """How many cells have each status that occurs."""
-    if is_summary(dataset):
-        return summed(dataset, BY_STATUS)
-    return {count.name: count.cells for count in count_statuses(dataset)}
-
-
-def is_summary(dataset: Cells) -> bool:
-    """Whether a result holds reductions, not cells."""
-    return BY_STATUS in dataset and STATUS not in dataset
-
-
-def flag_words(variable: xr.DataArray) -> dict[int, str]:
-    """What the codes of a flag variable mean, {} for others; -1 is "none" where the flags do not say."""
-    values = np.atleast_1d(variable.attrs.get("flag_values", ())).tolist()
-    words = dict(zip(values, str(variable.attrs.get("flag_meanings", "")).split(), strict=False))
-    return {-1: "none", **words} if words else {}
-
-
-def summed(dataset: Cells, name: str) -> dict[str, int]:
-    """Cells of each status or method of a summary, over all it keeps; those that do not occur are left out."""
-    counts = dataset[name]
-    words = dataset[str(counts.dims[-1])].values
-    total = counts.values.reshape(-1, len(words)).sum(axis=0)
-    return {str(word): int(n) for word, n in zip(words, total, strict=True) if n}
-
-
 @dataclass(frozen=True)
 class StatusCount:
     """How many cells have a status, and the coordinates of the first of them."""
@@ -111,28 +72,54 @@ class StatusCount:
         return f"{text}, e.g. {cell}" if cell else text
 
 
-def count_statuses(dataset: Cells) -> list[StatusCount]:
+def account(dataset: Cells) -> Account:
+    """What became of the cells of a result, of a summary too."""
+    counts = dict.fromkeys(KINDS, 0)
+    for count in count_statuses(dataset, examples=False):
+        counts[kind_of(count.name)] += count.cells
+    return Account(*counts.values())
+
+
+def kind_of(name: str) -> str:
+    """The word under which a status is counted."""
+    return (Status[name] if name in Status.__members__ else Status.FAILED).kind
+
+
+def is_summary(dataset: Cells) -> bool:
+    """Whether a result holds reductions, not cells."""
+    return BY_STATUS in dataset and STATUS not in dataset
+
+
+def flag_words(variable: xr.DataArray) -> dict[int, str]:
+    """What the codes of a flag variable mean, {} for others; -1 is "none" where the flags do not say."""
+    values = np.atleast_1d(variable.attrs.get("flag_values", ())).tolist()
+    words = dict(zip(values, str(variable.attrs.get("flag_meanings", "")).split(), strict=False))
+    return {-1: "none", **words} if words else {}
+
+
+def count_statuses(dataset: Cells, examples: bool = True) -> list[StatusCount]:
     """Every status that occurs, in the order of its number, with its first cell; OK without one, a summary without any.
 
     Reads a few million cells at a time.
     """
     if is_summary(dataset):
-        found = summed(dataset, BY_STATUS)
-        return [StatusCount(name, cells, sum(found.values())) for name, cells in found.items()]
-    counts, names = _tally(dataset[STATUS]), {int(status): status.name for status in Status}
+        counts = {name: (cells, 0) for name, cells in _summed(dataset, BY_STATUS).items()}
+        examples = False
+    else:
+        names = {int(status): status.name for status in Status}
+        tallied = sorted(_tally(dataset[STATUS]).items())
+        counts = {names.get(code, f"status {code}"): found for code, found in tallied}
     total = sum(cells for cells, _ in counts.values())
     return [
-        StatusCount(
-            names.get(code, f"status {code}"), cells, total, {} if code == Status.OK else cell_values(dataset, first)
-        )
-        for code, (cells, first) in sorted(counts.items())
+        StatusCount(name, cells, total, cell_values(dataset, first) if examples and name != Status.OK.name else {})
+        for name, (cells, first) in counts.items()
     ]
 
 
 def count_methods(dataset: Cells) -> dict[str, int]:
     """How many cells each method solved; those that none did are left out."""
     if is_summary(dataset):
-        return {name: n for name, n in summed(dataset, BY_METHOD).items() if name != "none"}
+        return {name: n for name, n in _summed(dataset, BY_METHOD).items() if name != "none"}
     names = str(dataset[METHOD_USED].attrs["flag_meanings"]).split()[1:]
     counts = _tally(dataset[METHOD_USED])
     return {name: counts[number][0] for number, name in enumerate(names) if number in counts}
@@ -143,6 +130,14 @@ def summary_text(dataset: Cells) -> str:
     used = ", ".join(f"{name} {cells:,}" for name, cells in count_methods(dataset).items())
     others = (str(count) for count in count_statuses(dataset) if count.name != Status.OK.name)
     return "\n".join([f"{account(dataset)}" + (f"; solved by {used}" if used else ""), *others])
+
+
+def _summed(dataset: Cells, name: str) -> dict[str, int]:
+    """Cells of each status or method of a summary, over all it keeps; those that do not occur are left out."""
+    counts = dataset[name]
+    words = dataset[str(counts.dims[-1])].values
+    total = counts.values.reshape(-1, len(words)).sum(axis=0)
+    return {str(word): int(n) for word, n in zip(words, total, strict=True) if n}
 
 
 def _tally(column: xr.DataArray | StoredColumn) -> dict[int, tuple[int, int]]:
@@ -170,21 +165,17 @@ def boxes(shape: Sequence[int], most: int = NUMBERS_AT_ONCE) -> Iterator[tuple[s
         yield tuple(slice(start, start + step) for start, step in zip(corner, steps, strict=True))
 
 
+def pieces(dataset: xr.Dataset, dims: Sequence[Hashable], most: int = NUMBERS_AT_ONCE) -> Iterator[xr.Dataset]:
+    """Parts of a Dataset along some dimensions, in memory, of at most so many numbers altogether; in C order."""
+    sizes = [dataset.sizes[dim] for dim in dims]
+    numbers = sum(variable.size for variable in dataset.data_vars.values()) / max(1, math.prod(sizes))
+    for box in boxes(sizes, max(1, int(most / max(1.0, numbers)))):
+        yield dataset.isel(dict(zip(dims, box, strict=True))).load()
+
+
 def flat_pieces(column: xr.DataArray | StoredColumn | Numbers) -> Iterator[Any]:
     """The cells in C order, a few million at a time."""
     return (np.asarray(column[box]).reshape(-1) for box in boxes(column.shape))
-
-
-def failed_cells(dataset: Cells, most: int) -> list[int]:
-    """Numbers of the first cells that FAILED."""
-    found: list[int] = []
-    done = 0
-    for piece in flat_pieces(dataset[STATUS]):
-        if len(found) >= most:
-            break
-        found += (done + np.flatnonzero(piece == Status.FAILED)).tolist()
-        done += len(piece)
-    return found[:most]
 
 
 def cell_values(dataset: Cells, index: int) -> dict[str, str]:

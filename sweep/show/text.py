@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,8 +18,8 @@ from sweep.results.statuses import (
     cell_values,
     count_methods,
     count_statuses,
-    failed_cells,
     flag_words,
+    flat_pieces,
     is_summary,
     kind_of,
 )
@@ -201,9 +202,17 @@ def _span(values: Any) -> str:
     return " and ".join(filter(None, [" to ".join(ends), "nan" if len(numbers) < len(values) else ""]))
 
 
+def _numbers(dataset: xr.Dataset, status: Status) -> Iterator[int]:
+    """Of the cells that have a status."""
+    done = 0
+    for piece in flat_pieces(dataset[STATUS]):
+        yield from (done + np.flatnonzero(piece == status)).tolist()
+        done += len(piece)
+
+
 def _failed(path: Path, dataset: xr.Dataset) -> Rows:
     """The first cells that FAILED, and what their kernel did, as the log of the run has it."""
     known = reasons(path)
-    for number in list(known)[:MOST_FAILED] if is_summary(dataset) else failed_cells(dataset, MOST_FAILED):
+    for number in itertools.islice(known if is_summary(dataset) else _numbers(dataset, Status.FAILED), MOST_FAILED):
         cell = {} if is_summary(dataset) else cell_values(dataset, number)
         yield f"cell {number}", " ".join(f"{name}={value}" for name, value in cell.items()), known.get(number, "")
