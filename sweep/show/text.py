@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +15,7 @@ from sweep.cells.reduce import BY_METHOD, BY_STATUS
 from sweep.cells.schema import ANCILLARY, METHOD_USED, STATUS
 from sweep.results.statuses import (
     account,
+    boxes,
     cell_values,
     count_methods,
     count_statuses,
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
 
 LARGEST_SCAN = 1 << 28
 """Bytes of an output up to which its smallest and largest value are looked up."""
-CELLS_AT_ONCE = 1 << 22
 MOST_FAILED = 20
 """Cells that FAILED which are reported one by one."""
 
@@ -66,14 +66,14 @@ def settings(dataset: xr.Dataset) -> Table:
         attrs["rtol"] = f"{dataset.attrs['rtol']:g}"
     if "end" in attrs:
         attrs["end"] += f", {float(attrs.get('cells_per_second', math.nan)):,.0f} cells/s"
-    names = {name: name for name in ("kernel", "design", "where", "method", "rtol")}
-    names |= {"start": "started", "end": "ended", "versions": "versions"}
-    return Table((word, attrs[name]) for name, word in names.items() if name in attrs)
+    words = {"start": "started", "end": "ended"}
+    names = ("kernel", "design", "where", "method", "rtol", "start", "end", "versions")
+    return Table((words.get(name, name), attrs[name]) for name in names if name in attrs)
 
 
 def sections(dataset: xr.Dataset) -> list[Table]:
     """Axes, fixed parameters, outputs, statuses and methods of a result, as far as there are any."""
-    columns = dataset.coords
+    columns, over, gone = dataset.coords, [], set()
     if is_summary(dataset):
         cells, over = set(map(str, dataset[BY_STATUS].dims[:-1])), str(dataset.attrs["over"]).split()
         gone = {str(dim) for name in over for dim in dataset[name].dims} | {"cell", "status_name", "method_name"}
@@ -83,29 +83,29 @@ def sections(dataset: xr.Dataset) -> list[Table]:
         for name in (STATUS, METHOD_USED):
             if dataset[name].nbytes <= LARGEST_SCAN:
                 dataset[name].load()  # once, for they are looked at several times
-        cells, over, gone = set(map(str, dataset[STATUS].dims)), [], set()
-        outputs, kind = outputs_of(dataset), "output"
+        cells, outputs, kind = set(map(str, dataset[STATUS].dims)), outputs_of(dataset), "output"
         scanned = dataset.nbytes <= LARGEST_SCAN or "end" in dataset.attrs
     axes = [str(name) for name, c in columns.items() if set(map(str, c.dims)) & cells]
     along = [str(n) for n, c in columns.items() if c.dims == (n,) and n not in cells | gone]
     fixed = [str(n) for n, c in columns.items() if not c.dims or (set(c.dims) <= set(along) and n not in along)]
-    rest = ("unit", "values", "from, to", "meaning")
+
+    def coordinates(names: Sequence[str], word: str, title: str) -> Table:
+        rows = (_coordinate(dataset[name]) for name in names)
+        return Table(rows, (word, "unit", "values", "from, to", "meaning"), title)
+
+    def variables(
+        names: Sequence[str], shown: Callable[[xr.DataArray], str], word: str, head: str, title: str
+    ) -> Table:
+        return Table(
+            (_row(dataset[name], shown(dataset[name])) for name in names), (word, "unit", head, "meaning"), title
+        )
+
     tables = [
-        Table((_coordinate(dataset[name]) for name in names), (word, *rest), title)
-        for title, word, names in (("axes", "axis", axes), ("reduced over", "axis", over))
-    ]
-    tables += [
-        Table(
-            (_row(columns[name], _value(columns[name])) for name in fixed),
-            ("parameter", "unit", "value", "meaning"),
-            "fixed",
-        ),
-        Table((_coordinate(columns[name]) for name in along), ("coordinate", *rest), "along"),
-        Table(
-            (_row(dataset[name], _extent(dataset[name]) if scanned else "") for name in outputs),
-            (kind, "unit", "from, to", "meaning"),
-            f"{kind}s",
-        ),
+        coordinates(axes, "axis", "axes"),
+        coordinates(over, "axis", "reduced over"),
+        variables(fixed, _value, "parameter", "value", "fixed"),
+        coordinates(along, "coordinate", "along"),
+        variables(outputs, _extent if scanned else lambda output: "", kind, "from, to", f"{kind}s"),
         Table(_status_rows(dataset), ("cells", "status", "kind", "meaning, and where"), "status"),
         Table(_method_rows(dataset), ("method", "cells", "share"), "methods used"),
     ]
@@ -152,8 +152,7 @@ def _extent(output: xr.DataArray) -> str:
         return f"{output.sizes[output.dims[-1]]} bins"
     if output.nbytes > LARGEST_SCAN:
         return ""
-    values = output.values[np.isfinite(output.values)]
-    return f"{values.min():.6g} to {values.max():.6g}" if values.size else "no values"
+    return _span(output.values[np.isfinite(output.values)]) or "no values"
 
 
 def _status_rows(dataset: xr.Dataset) -> Rows:
@@ -176,14 +175,12 @@ def _places(dataset: xr.Dataset) -> dict[str, str]:
     """Where on the axes each refusal or remark occurs: 'mu 0.1 to 0.9, R 1'. Reads a few million cells at a time."""
     column = dataset[STATUS]
     hits: dict[int, list[Any]] = {}
-    rows = max(1, CELLS_AT_ONCE // max(1, math.prod(column.shape[1:])))
-    for start in range(0, column.shape[0], rows):
-        piece = column[start : start + rows].values
+    for box in boxes(column.shape):
+        piece = column[box].values
         for code in set(np.unique(piece).tolist()) - {int(Status.OK), int(Status.PENDING)}:
             found = hits.setdefault(code, [np.zeros(n, bool) for n in column.shape])
-            first, *others = np.nonzero(piece == code)
-            for here, places in zip(found, (start + first, *others), strict=True):
-                here[places] = True
+            for here, part, places in zip(found, box, np.nonzero(piece == code), strict=True):
+                here[part.start + places] = True
     axes = [c for c in dataset.coords.values() if set(c.dims) & set(column.dims)]
     texts = {}
     for status in (status for status in Status if status in hits):
