@@ -22,6 +22,8 @@ from sweep.words import Table, cell, did_you_mean, listed, page, paragraph
 if TYPE_CHECKING:
     import xarray as xr
 
+Cells = tuple[list[str], tuple[str, ...]]
+
 MOST_ROWS = 40
 WORST_MISFIT = 0.1
 """Relative distance of a point beyond which a report does not speak of two laws."""
@@ -71,9 +73,9 @@ def pick(dataset: xr.Dataset, choices: Sequence[str]) -> xr.Dataset:
             except ValueError:
                 raise SweepError(f"--at {choice}: expected a number after =") from None
             # six digits are what `sweep show` and `sweep run` print
-            found = np.flatnonzero(np.isclose(values, float(value), rtol=1e-5, atol=0, equal_nan=True))
-            found = found[np.argsort(off[found], kind="stable")]
-            nearest = listed(f"{v:.6g}" for v in values[np.argsort(off)[:2]])
+            order = np.argsort(off, kind="stable")
+            found = order[np.isclose(values[order], float(value), rtol=1e-5, atol=0, equal_nan=True)]
+            nearest = listed(f"{v:.6g}" for v in values[order[:2]])
         else:
             found = np.flatnonzero(values.astype(str) == value)
             nearest = listed(dict.fromkeys(map(str, values)), quote=True)
@@ -159,54 +161,40 @@ def _remark(dataset: xr.Dataset, y: str) -> str:
 
 def laws_text(found: Laws, complete: bool = False) -> str:
     """The laws as people read them: exponents and their intervals; by wish all columns and what they mean."""
-    keep = None if complete else 3
-    rest = ("points", "drift", "residual", f"{found.y} at {found.x} = 1")
-    rows = [(labels, _fit_cells(one)) for fit in found.fits for labels, one in _lines(fit)]
-    texts = [_table(f"{found.y} ~ {found.x}^p", found.fits[0], ("window", "p", "interval", *rest), rows, keep)]
+
+    def table(title: str, of: xr.Dataset, heading: Sequence[str], cells: Sequence[Cells], keep: int | None) -> str:
+        """A row for each line: its place on the other axes, and the first cells of what is fitted."""
+        rows = [(*labels, *row[:keep]) for labels, row in cells]
+        text = Table(rows[:MOST_ROWS], (*_dims(of), *heading[:keep]), title).text()
+        more = len(rows) - MOST_ROWS
+        return text + (f"\n  and {more} more; choose with --at axis=value" if more > 0 else "")
+
+    heading = ("window", "p", "interval", "points", "drift", "residual", f"{found.y} at {found.x} = 1")
+    cells = [(labels, _fit_cells(one)) for fit in found.fits for labels, one in _lines(fit)]
+    texts = [table(f"{found.y} ~ {found.x}^p", found.fits[0], heading, cells, None if complete else 3)]
     if found.bend is not None:
         heading = ("p low", "interval", "p high", "interval", f"{found.x} between", "interval", "bend")
-        rows = [(labels, _bend_cells(one)) for labels, one in _lines(found.bend, "law")]
-        texts.append(_table("two laws with a smooth bend", found.bend, heading, rows, None if complete else 5))
+        cells = [(labels, _bend_cells(one)) for labels, one in _lines(found.bend)]
+        texts.append(table("two laws with a smooth bend", found.bend, heading, cells, None if complete else 5))
     if found.meeting is not None:
-        rows = [(labels, _meeting_cells(one)) for labels, one in _lines(found.meeting)]
-        texts.append(_table("the two laws meet", found.meeting, (found.x, "", found.y), rows))
+        cells = [(labels, _meeting_cells(one)) for labels, one in _lines(found.meeting)]
+        texts.append(table("the two laws meet", found.meeting, (found.x, "", found.y), cells, None))
     return page(*texts, *map(paragraph, (found.remark, found.explanation if complete else REST)))
-
-
-def _table(
-    title: str,
-    of: xr.Dataset,
-    heading: Sequence[str],
-    rows: Sequence[tuple[Sequence[str], Sequence[str]]],
-    keep: int | None = None,
-) -> str:
-    """At most `MOST_ROWS` rows, each of a line's place on the other axes and the first cells of what is fitted."""
-    shown = [(*labels, *cells[:keep]) for labels, cells in rows[:MOST_ROWS]]
-    text = Table(shown, (*_dims(of, "law"), *heading[:keep]), title).text()
-    more = len(rows) - MOST_ROWS
-    return text + (f"\n  and {more} more; choose with --at axis=value" if more > 0 else "")
 
 
 def law_rows(found: Laws) -> Iterator[tuple[str, ...]]:
     """Output, where, exponent, interval and largest distance: a row for one law, two rows for two with a bend."""
-    dims, bend = _dims(found.fits[0]), found.bend
-    for labels, fit in _lines(found.fits[0]):
+    dims, bends = _dims(found.fits[0]), itertools.repeat(None) if found.bend is None else _lines(found.bend)
+    for (labels, fit), bend in zip(_lines(found.fits[0]), bends, strict=False):
         where = ", ".join(f"{dim} = {label}" for dim, label in zip(dims, labels, strict=True))
-        name = f"{found.y} ({where})" if where else found.y
-        both = None if bend is None else bend.sel({d: fit[d] for d in _dims(bend, "law") if d in fit.coords})
-        if both is None or both.exponent.ndim != 1 or both.regimes.item() != 2 or both.residual.item() > WORST_MISFIT:
+        name, both = f"{found.y} ({where})" if where else found.y, None if bend is None else bend[1]
+        if both is None or both.regimes.item() != 2 or both.residual.item() > WORST_MISFIT:
             window, exponent, interval, _, _, residual, _ = _fit_cells(fit)
             yield name, f"{found.x} {window}", exponent, interval, residual
             continue
-        cells = _bend_cells(both)
-        for sign, exponent, interval in (("<<", *cells[:2]), (">>", *cells[2:4])):
-            yield (
-                name,
-                f"{found.x} {sign} {both.crossover.item():.3g}",
-                exponent,
-                interval,
-                f"{both.residual.item():.1e}",
-            )
+        cells, meet, residual = _bend_cells(both), f"{both.crossover.item():.3g}", f"{both.residual.item():.1e}"
+        yield name, f"{found.x} << {meet}", *cells[:2], residual
+        yield name, f"{found.x} >> {meet}", *cells[2:4], residual
 
 
 def write_laws(found: Laws, path: Path) -> None:
@@ -232,17 +220,17 @@ def _write(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
         writer.writerows([cell(row.get(name, "")) for name in names] for row in rows)
 
 
-def _dims(dataset: xr.Dataset, *without: str) -> list[str]:
-    return [str(dim) for dim in dataset.sizes if dim not in without]
+def _dims(dataset: xr.Dataset) -> list[str]:
+    return [str(dim) for dim in dataset.sizes if dim != "law"]
 
 
 def _numbers(one: xr.Dataset) -> dict[str, Any]:
     return {str(name): variable.item() for name, variable in one.data_vars.items()}
 
 
-def _lines(dataset: xr.Dataset, *without: str) -> Iterator[tuple[list[str], xr.Dataset]]:
+def _lines(dataset: xr.Dataset) -> Iterator[tuple[list[str], xr.Dataset]]:
     """Each line's place on the other axes, as people write it (a number where it has no name), and what is of it."""
-    dims = _dims(dataset, *without)
+    dims = _dims(dataset)
     for position in itertools.product(*(range(dataset.sizes[dim]) for dim in dims)):
         places = dict(zip(dims, position, strict=True))
         one = dataset.isel(places)
@@ -278,8 +266,7 @@ def _bend_cells(bend: xr.Dataset) -> tuple[str, ...]:
     if bend.regimes.item() != 2:
         return *("-",) * 4, "one law does as well", "-", "-"
     cells = []
-    for law in ("low", "high"):
-        one = bend.sel(law=law)
+    for one in (bend.sel(law=law) for law in ("low", "high")):
         cells += [f"{one.exponent.item():.6g}", _interval(one.exponent_low.item(), one.exponent_high.item())]
     place = _interval(bend.crossover_low.item(), bend.crossover_high.item())
     width = f"{bend.width.item():.2g} decades wide, residual {bend.residual.item():.1e}"
