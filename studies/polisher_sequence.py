@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from _common import Groups, Statement, compared, read_result, report
+from _polishing import KEPT, POINTS, area, best_settings, disc, least, one_setting, unevenness
 
 import sweep
 
@@ -29,29 +30,15 @@ TOOLS = (
 
 NOTES = """\
 unevenness: standard deviation over the area, over the mean; allowed: 1e-6 of the conditions of an optimum, 1e-9 m of a
-length found by roots, 2 % of A0's slopes over 5 cm of throw; 1e-5 between mirrored
-machines, 1e-3 if the work turns the other way, against which the arm goes to and fro alike
+length found by roots, 2 % of A0's slopes over 1 mm of throw
 """
-
-
-def weights(ds: xr.Dataset) -> np.ndarray:
-    """Share of the area at each radius, by trapezoids."""
-    area = ds.radius.values.copy()
-    area[-1] *= 0.5
-    return area / area.sum()
-
-
-def unevenness(profile: np.ndarray, weight: np.ndarray) -> float:
-    """Standard deviation over the area, over the mean."""
-    mean = float((profile * weight).sum())
-    return math.sqrt(float(((profile - mean) ** 2 * weight).sum())) / mean
 
 
 def mixture(ds: xr.Dataset) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Profiles of mean 1, one a row; the shares of the wear by each; the mixed profile."""
     from scipy.optimize import nnls
 
-    weight = weights(ds)
+    weight = area(ds.radius)
     rows = ds.wear.stack(setting=("e", "w_x")).transpose("setting", "radius").values
     rows = rows / (rows * weight).sum(axis=1, keepdims=True)
     root = np.sqrt(weight)
@@ -62,20 +49,18 @@ def mixture(ds: xr.Dataset) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def optimum(ds: xr.Dataset) -> list[Statement]:
     """What a sequence gains over one setting, and whether it is the best."""
-    weight = weights(ds)
+    weight = area(ds.radius)
     rows, shares, mixed = mixture(ds)
-    singles = np.array([unevenness(row, weight) for row in rows])
-    kept = singles[rows[:, 0] >= 0.5].min()
     scale = float((mixed * weight).sum() / (mixed**2 * weight).sum())
     slope = rows @ ((scale * mixed - 1) * weight)  # of the sum of squares, 0 where a share is above 0
     used = shares > 1e-9
     worst = max(float(abs(slope[used]).max()), float(-slope[~used].min(initial=0.0)))
-    best, hole = unevenness(mixed, weight), float(rows[singles.argmin(), 0])
+    best, alone = float(unevenness(mixed, weight)), one_setting(ds)
+    single = best_settings(ds)[0].uneven
     return [
-        Statement("best single setting", "-", f"{singles.min():.1%}, centre {hole:.2f}", None, hole < 0.5),
-        Statement("best single setting without a hole", "-", f"{kept:.1%}", None, bool(0.2 < kept < 0.4)),
+        *alone,
         Statement("best sequence", "-", f"{best:.1%}, centre {mixed[0]:.2f}, {used.sum()} settings", None,
-                  bool(best < kept / 3 and 0.5 < mixed[0] < 1.5)),
+                  bool(best < single / 10 and least(mixed, weight, ds.radius.values) > KEPT)),
         Statement("  conditions of an optimum", "0", "largest breach", worst, worst < 1e-6),
         *[Statement(f"  {s:.0%} of the wear at", "", where) for s, where in steps(ds, shares)],
     ]  # fmt: skip
@@ -117,26 +102,24 @@ def correction(ds: xr.Dataset) -> list[Statement]:
     ]  # fmt: skip
 
 
-def mirrored(ds: xr.Dataset) -> list[Statement]:
-    """Type B with b on the other side, and all turning the other way, is type A in a mirror."""
-    fixed = {name: float(ds[name]) for name in
-             ("b", "d", "f", "L", "tool_a", "tool_b", "preston", "pressure", "omega", "Omega", "b_angle")}  # fmt: skip
-    along, axes = {"radius": ds.radius.values[::10]}, {"e": [0.1], "w_x": [0.53]}
-    profiles = []
-    for kind, sign in (("A", 1.0), ("B", -1.0), ("B same way", -1.0)):
-        turned = {"b_angle": sign * fixed["b_angle"]}
-        if kind == "B":
-            turned |= {"omega": -fixed["omega"], "Omega": -fixed["Omega"]}
-        study = sweep.study(
-            kernel="polisher_wear", axes=axes, fixed=fixed | turned | {"type": kind[0]}, along=along, rtol=1e-7
-        )
-        profiles.append(sweep.run(study).wear.values.ravel())
-    off = float(abs(profiles[1] / profiles[0] - 1).max())
-    other = float(abs(profiles[2] / profiles[0] - 1).max())
+def turning(ds: xr.Dataset) -> list[Statement]:
+    """What it matters which way the work turns, on type A; type B is type A in a mirror, which is no finding."""
+    names = ("b", "d", "f", "L", "tool_a", "tool_b", "preston", "pressure", "omega", "b_angle")
+    fixed = {**{name: float(ds[name]) for name in names}, "type": "A", "e": 0.1, "w_x": 0.53}
+    spin = float(ds.Omega)
+    both = sweep.run(
+        kernel="polisher_wear", axes={"Omega": [spin, -spin]}, fixed=fixed, along={"radius": ds.radius.values[::10]}
+    )
+    off = float(abs(both.wear[1] / both.wear[0] - 1).max())
+    # the way out takes the crank from one dead point to the other, the way back the rest of its turn
+    b, d, f, e = fixed["b"], fixed["d"], float(ds.f), 0.1
+    dead = [math.acos((b * b + (f + s * e) ** 2 - d * d) / (2 * b * (f + s * e))) for s in (1, -1)]
+    out = 0.5 + (dead[1] - dead[0]) / (2 * math.pi)
     return [
-        Statement("type B in the mirror of type A: wear", "the same", "largest deviation", off, off < 1e-5),
-        Statement("type B, motor and work turning as those of A", "the same", "largest deviation", other, other < 1e-3),
-    ]
+        Statement("share of the crank's turn in which the arm goes out", "", f"{out:.3f}", None, abs(out - 0.5) > 1e-3),
+        Statement("  so the wear changes where the work turns the other way", "> 0.1 %", f"{off:.2%}", None,
+                  1e-3 < off < 0.05),
+    ]  # fmt: skip
 
 
 def figure(ds: xr.Dataset) -> Any:
@@ -176,7 +159,7 @@ def draw_machines(axes: Any, ds: xr.Dataset) -> None:
         axes.plot([end[0], pin[0]], [end[1], pin[1]], "--", color=COLOURS[k], label=f"coupler, type {kind}")
     axes.plot([0, b], [0, 0], "o", color="black", markersize=4, label="pivot, motor")
     axes.set(xlabel="$x$ [m]", ylabel="$y$ [m]", xlim=(-0.25, 0.95), ylim=(-0.19, 0.53))
-    axes.set_aspect("equal", "datalim")
+    axes.set_aspect("equal", "box")
     axes.legend(loc="upper center", fontsize=6.5, ncols=2)
 
 
@@ -196,7 +179,7 @@ def draw_tools(axes: Any) -> None:
     axes.plot([], [], color=COLOURS[0], label="known")
     axes.plot([], [], color=COLOURS[1], label="unknown")
     axes.set(xlim=(-5.6, 18.8), ylim=(-10.7, 3.6), xlabel="across [half widths]", ylabel="along [half widths]")
-    axes.set_aspect("equal", "datalim")
+    axes.set_aspect("equal", "box")
     axes.legend(loc="lower center", ncols=2, fontsize=7, title="$n, m$ of the paper's tools", title_fontsize=7)
 
 
@@ -204,14 +187,17 @@ def draw_profiles(axes: Any, ds: xr.Dataset) -> None:
     """The best profiles of one setting, and of the sequence."""
     from sweep.show.charts import COLOURS
 
-    weight = weights(ds)
-    rows, _, mixed = mixture(ds)
-    singles = np.array([unevenness(row, weight) for row in rows])
-    full = np.where(rows[:, 0] >= 0.5, singles, math.inf)
-    r = 1e3 * ds.radius.values
-    shown = {"one setting": rows[singles.argmin()], "one, without a hole": rows[full.argmin()], "sequence": mixed}
-    for k, (name, row) in enumerate(shown.items()):
-        axes.plot(r, row, color=COLOURS[k], label=f"{name}, {100 * unevenness(row, weight):.1f} %")
+    (bored, best), wear = best_settings(ds), disc(ds)
+    fine, coarse = np.linspace(0.0, float(ds.radius[-1]), POINTS), ds.radius.values
+    shown = {
+        "one setting": (fine, np.asarray(wear(bored.e, float(ds.L) + bored.offset))),
+        "one, without a hole": (fine, np.asarray(wear(best.e, float(ds.L) + best.offset))),
+        "sequence": (coarse, mixture(ds)[2]),
+    }
+    for k, (name, (radius, row)) in enumerate(shown.items()):
+        weight = area(radius)
+        text = f"{name}, {100 * float(unevenness(row, weight)):.1f} %"
+        axes.plot(1e3 * radius, row / (row * weight).sum(), color=COLOURS[k], label=text)
     axes.set(xlabel="radius [mm]", ylabel="wear over its mean [1]", xlim=(0, 100), ylim=(0, 2))
     axes.legend(loc="upper right", fontsize=7)
 
@@ -235,7 +221,7 @@ def conclude(path: str) -> tuple[Groups, list[str], Any]:
     groups = {
         "Sequences of settings": optimum(ds),
         "Another throw about the same middle": correction(ds),
-        "Type B": mirrored(ds),
+        "The way the work turns": turning(ds),
     }
     return groups, [NOTES], lambda: figure(ds)
 

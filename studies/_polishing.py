@@ -1,0 +1,111 @@
+"""What studies of a polishing machine share: how uneven a profile of wear is, and the best that one setting can do."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from _common import Statement
+
+import sweep
+
+KEPT = 0.5
+"""Least wear, over the mean, of the inner half of a workpiece without a hole."""
+POINTS = 101
+"""Radii of a profile that is optimised: a hole may be a ring of a millimetre beside the centre."""
+
+
+def area(radius: Any) -> Any:
+    """The share of the area at each of evenly spaced radii from the centre to the rim, by trapezoids of 2 pi r."""
+    found = np.array(radius, float)
+    found[-1] *= 0.5
+    return found / found.sum()
+
+
+def unevenness(profile: Any, weight: Any) -> Any:
+    """Standard deviation over the area, over the mean, of profiles (..., radius)."""
+    mean = (profile * weight).sum(-1, keepdims=True)
+    return np.sqrt((((profile / mean) - 1.0) ** 2 * weight).sum(-1))
+
+
+def least(profile: Any, weight: Any, radius: Any) -> Any:
+    """The least wear of the inner half of the radius, over the mean: a small one is a hole."""
+    return profile[..., radius <= 0.5 * radius[-1]].min(-1) / (profile * weight).sum(-1)
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One throw and offset [m] with the unevenness, and the least wear of the inner half over the mean."""
+
+    e: float
+    offset: float
+    uneven: float
+    least: float
+
+    def __str__(self) -> str:
+        place = f"e = {100 * self.e:.2f} cm, offset {1000 * self.offset:.1f} mm"
+        return f"{self.uneven:.1%} at {place}, least {self.least:.2f}"
+
+
+def disc(ds: xr.Dataset) -> Callable[[Any, Any], Any]:
+    """Profiles of a round tool on the machine of a result, as a function of throw and place of the workpiece [m]."""
+    names = ("b", "d", "f", "omega", "b_angle", "L", "Omega", "tool_a", "preston", "pressure")
+    fixed = {name: float(ds[name]) for name in names}
+    solve = sweep.solver(
+        {
+            "kernel": "polisher_wear",
+            "outputs": ["wear"],
+            "rtol": 1e-6,
+            "axes": {"e": [0.1], "w_x": [fixed["L"]]},
+            "fixed": {**fixed, "type": "A", "tool_b": fixed["tool_a"], "tool_n": 2.0},
+            "along": {"radius": np.linspace(0.0, float(ds.radius[-1]), POINTS)},
+        }
+    )
+    return lambda e, w_x: solve(e=e, w_x=w_x).wear
+
+
+def best_settings(ds: xr.Dataset) -> tuple[Setting, Setting]:
+    """The most even setting of a disc, optimised over throw and offset: whatever it leaves, and without a hole.
+
+    An offset evens the wear until the tool no longer reaches the middle, so the best without a hole lies where the
+    least of the inner half is `KEPT` of the mean: a root in the offset for each throw, the least over throws of these.
+    """
+    from scipy.optimize import brentq, minimize, minimize_scalar
+
+    wear, place, radius = disc(ds), float(ds.L), np.linspace(0.0, float(ds.radius[-1]), POINTS)
+    weight = area(radius)
+
+    def setting(e: float, offset: float) -> Setting:
+        profile = np.asarray(wear(e, place + offset))
+        return Setting(e, offset, float(unevenness(profile, weight)), float(least(profile, weight, radius)))
+
+    def border(e: float) -> Setting:
+        return setting(e, brentq(lambda offset: setting(e, offset).least - KEPT, 0.02, 0.05, xtol=1e-8))
+
+    free = minimize(lambda x: setting(*x).uneven, (0.09, 0.04), method="Nelder-Mead", options={"xatol": 1e-6})
+    throw = minimize_scalar(lambda e: border(e).uneven, bounds=(0.06, 0.12), method="bounded", options={"xatol": 1e-6})
+    return setting(*free.x), border(throw.x)
+
+
+def one_setting(ds: xr.Dataset) -> list[Statement]:
+    """What one setting of a disc can do at best, with and without a hole; a fine grid has nothing better."""
+    bored, best = best_settings(ds)
+    e, w_x = np.meshgrid(
+        best.e + np.linspace(-0.01, 0.01, 11), float(ds.L) + best.offset + np.linspace(-4e-3, 1e-3, 21)
+    )
+    radius = np.linspace(0.0, float(ds.radius[-1]), POINTS)
+    weight = area(radius)
+    profiles = disc(ds)(e, w_x)
+    kept = unevenness(profiles, weight)[least(profiles, weight, radius) >= KEPT].min()
+    off = float(kept / best.uneven - 1.0)
+    return [
+        Statement("disc, one setting, optimised: the most even has a hole", "", str(bored), None, bored.least < KEPT),
+        Statement(
+            "disc, one setting, optimised, without a hole", "", str(best), None,
+            bool(bored.uneven < best.uneven < 1.1 * bored.uneven),
+        ),
+        Statement("  best of 231 settings around it on a grid, over that", "1", f"{1 + off:.4f}", off, 0 <= off < 0.01),
+    ]  # fmt: skip
