@@ -27,7 +27,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, compared, differing, read_result, report
+from _common import Groups, Statement, compared, read_result, report
 
 import sweep
 
