@@ -12,6 +12,11 @@ switch follows from the balance of energy, friction of degree n taking abs(v)^(n
     s = (sum n lambda_n + lambda_impact)/(2 + sum n lambda_n),                                           (1)
 
 n = 1 for viscous and 0 for dry friction: 1/3, 1/2 and 0 where one of them takes all. At weak drive s = 1/(1 + alpha).
+
+Answer: with a light wheel the turn from 1/3 to 1/2 lies where the wheel would be thrown back by more than half a
+pitch, out of mesh; there the equations go on and no clock does. In mesh a light wheel comes near 1/3 and never back to
+1/2, and a wheel heavy enough to stay in mesh at any drive, from about a sixth of the foliot's inertia on, never comes
+below .43: no clock of the grid shows both. A clock with a light wheel loses most to viscous and least to impacts.
 """
 
 from __future__ import annotations
@@ -29,6 +34,8 @@ import sweep
 
 STRONG = 1e4
 """alpha from which (1) is held to 0.015, what is left of the drop and of a swing that is not endless."""
+MESH = 0.5
+"""Recoil of the wheel, in tooth pitches, beyond which the pallet is no longer between its two teeth."""
 HALFWAY = {"-1 and -1/2": 0.75, "-1/3 and -1/2": 5 / 12}
 
 NOTES = """\
@@ -137,6 +144,50 @@ def turns(ds: xr.Dataset) -> list[Statement]:
     ]  # fmt: skip
 
 
+def in_mesh(ds: xr.Dataset) -> list[Statement]:
+    """How far the exponent goes, without dry friction, where the recoil leaves the wheel in mesh, kappa by kappa."""
+    smooth = ds.isel(R_v=0)
+    s = smooth.s.where(smooth.pitches <= MESH)
+    least, where = s.min("tau"), s.fillna(np.inf).argmin("tau")
+    behind = s.where(s.tau > s.tau.isel(tau=where)).max("tau")
+    light = int(np.argmin(abs(smooth.kappa.values - 0.01)))
+    stays = np.flatnonzero(np.isfinite(s.isel(tau=-2).values))
+    first = int(stays[0])
+    thirds, returned = least.values < 0.38, behind.values > 0.49
+    turn = passages(smooth, HALFWAY["-1/3 and -1/2"]).values
+    recoil = [
+        float(np.interp(np.log(a), np.log(smooth.alpha), smooth.pitches.isel(I_c=k)))
+        for k, a in enumerate(turn) if np.isfinite(a) and smooth.kappa[k] < 0.05
+    ]  # fmt: skip
+    at = [f"{float(x):.3f} at alpha = {float(a):.3g}" for x, a in zip(least, smooth.alpha.isel(tau=where), strict=True)]
+    end, text = float(s[first, -2]), f"{min(recoil):.2g} to {max(recoil):.2g}"
+    heavy = f"kappa = {float(smooth.kappa[first]):.2g}"
+    dips = bool(least[first] > 0.43 and abs(end - 0.5) < 0.01)
+    both = int((thirds & returned).sum())
+    return [
+        Statement("recoil where s rises through 5/12, kappa < .05 [pitches]", "", text, None, min(recoil) > MESH),
+        Statement("  so in mesh s of kappa = .01 is at least", "> 1/3", at[light], None, bool(least[light] > 0.35)),
+        Statement(
+            f"{heavy} stays in mesh at any drive: least s, strongest", ", 1/2", f"{at[first]}, {end:.3f}", None, dips
+        ),
+        Statement("clocks that have s < .38 and come back to s > .49", "0", f"{both} of {len(s)}", None, not both),
+    ]
+
+
+def answer(ds: xr.Dataset) -> list[Statement]:
+    """What part of such a clock's losses is which, and the exponent it has."""
+    clock = clock_like(ds)
+    shares = {name: float(clock[name]) for name in ("viscous", "dry", "impact")}
+    text = ", ".join(f"{name} {share:.0%}" for name, share in shares.items())
+    what = f"kappa = .01, alpha = {float(clock.alpha):.3g}, recoil of {float(clock.pitches):.2g} pitch"
+    viscous = shares["viscous"] > shares["dry"] > shares["impact"]
+    return [
+        Statement(f"{what}: losses", "viscous most, impact least", text, None, viscous),
+        Statement("  its exponent, between those of friction alone", "1/3 to 1", f"{float(clock.s):.3f}", None,
+                  bool(1 / 3 < clock.s < 0.5)),
+    ]  # fmt: skip
+
+
 def by_shares(ds: xr.Dataset) -> list[Statement]:
     """Theory (1) at strong drive, and how far it is off at weaker."""
     off = abs(ds.s - law(ds))
@@ -174,6 +225,8 @@ def statements(ds: xr.Dataset, wheel: xr.Dataset) -> Groups:
         "Energy": balance(ds),
         "Ends": ends(ds),
         "Where exponents turn": turns(ds),
+        f"In mesh: recoil of at most {MESH:g} pitch": in_mesh(ds),
+        "A clock with a light wheel": answer(ds),
         "By the shares of the losses": by_shares(ds),
         "Friction on the wheel": on_the_wheel(ds, wheel),
     }
@@ -205,7 +258,7 @@ def draw_plane(page: Any, axes: Any, ds: xr.Dataset) -> None:
     )
     lines = axes.contour(alpha, kappa, s, levels=[0.36, 5 / 12, 0.75], colors="white", linewidths=0.8)
     axes.clabel(lines, fmt={0.36: "0.36", 5 / 12: "5/12", 0.75: "3/4"}, fontsize=7, inline_spacing=2)
-    hatch(axes, alpha, kappa, (ds.pitches > 0.5).values, "////", "0.85")
+    hatch(axes, alpha, kappa, (ds.pitches > MESH).values, "////", "0.85")
     axes.set(xlim=(alpha[1], alpha[-2]), ylim=(kappa[0], kappa[-1]))
     axes.set(xlabel=r"drive, $\alpha$ [1]", ylabel=r"wheel over foliot, $\kappa$ [1]")
     direct_label(axes, 2e4, 3e-3, "recoil over 1/2 pitch", fontsize=7)
