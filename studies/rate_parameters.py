@@ -32,7 +32,8 @@ NAMES = {"mu": "torque", "a": "friction", "phi0": "switching angle", "e": "resti
 
 NOTES = """\
 Friction decides nothing where the period falls as mu^(-1/2): more of it lowers the speed and the amplitude alike, so
-that a shorter way is gone more slowly in the same time. Who wants a steady rate there looks after the torque and the pallets, not after the oil."""
+that a shorter way is gone more slowly in the same time. Who wants a steady rate there looks after the torque and the
+pallets, not after the oil."""
 
 
 def read(path: str) -> xr.Dataset:
