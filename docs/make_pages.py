@@ -142,7 +142,7 @@ def _chart(name: str, folder: Path) -> Path | None:
         except sweep.SweepError as reason:
             print(f"no picture of {name}: {reason}")
             return None
-        sweep.plot(found, path)
+        sweep.plot(found, path, force=True)
     return path
 
 

@@ -11,7 +11,7 @@ import os
 import sys
 from collections.abc import Sequence
 
-from sweep.command import explore, laws, look, offer, run, write
+from sweep.command import look, solve
 from sweep.command.options import command, option
 from sweep.command.outcome import Outcome, explained
 from sweep.command.reading import say
@@ -29,7 +29,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = parser().parse_args(argv)
     ended = _ended(arguments)
     if getattr(arguments, "notify", None):
-        run.notify(arguments, ended)
+        solve.notify(arguments, ended)
     pool = sys.modules.get("sweep.runs.pool")
     if argv is None and pool is not None and pool.endless.is_set():
         # a kernel that never ends would keep Python from ending; a program that calls this is not ours to end
@@ -43,7 +43,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _ended(arguments: argparse.Namespace) -> Outcome:
     """Does what is asked, and says what became of it."""
     try:
-        outcome: Outcome = arguments.function(arguments) or Outcome(COMPLETE, "")
+        outcome: Outcome = arguments.command.run(arguments) or Outcome(COMPLETE, "")
         if sys.stdout is not None:  # closed by whoever has started us
             sys.stdout.flush()
         return outcome
@@ -73,10 +73,9 @@ def completion(arguments: argparse.Namespace) -> None:
 COMMANDS = {
     made.function.__name__.strip("_"): made
     for made in (
-        *(offer.kernels, offer.studies),
-        *(explore.plan, run.run, look.show, look.cell, look.check, look.list_, look.verify, look.diff),
-        *(look.plot, look.view, look.report),
-        *(laws.fit, explore.refine, explore.chart, write.export, write.join, completion),
+        *(look.kernels, look.studies, solve.plan, solve.run, look.show, solve.cell, solve.check, look.list_),
+        *(look.verify, look.diff, look.plot, look.view, look.report, look.fit, solve.refine, solve.chart),
+        *(look.export, look.join, completion),
     )
 }
 """In the order in which `sweep --help` names them."""
@@ -97,8 +96,8 @@ def parser() -> argparse.ArgumentParser:
         text = one.function.__doc__ or ""
         short = text[0].lower() + text[1:].rstrip(".")
         made = commands.add_parser(name, help=short, description=text, epilog=f"example: {one.example}")
-        made.set_defaults(function=one.function)
-        for names, keys in one.options:
+        made.set_defaults(command=one)
+        for names, keys, *_ in one.options:
             made.add_argument(*names, **keys)
     return top
 

@@ -1,4 +1,7 @@
-"""Commands that look at results: show, cell, check, verify, list, diff, plot, view, report."""
+"""Commands that look at results and write what they show: show, verify, list, diff, plot, view, report, fit, export.
+
+Also those that have no result yet: kernels and studies that come with foliot.
+"""
 
 from __future__ import annotations
 
@@ -7,27 +10,50 @@ import sys
 from pathlib import Path
 
 from sweep.command import options as o
-from sweep.command.options import command, option
-from sweep.command.outcome import Outcome
-from sweep.command.reading import check_target_of, in_units_of, opened, result_of, say
+from sweep.command.options import command, option, switch
+from sweep.command.outcome import DIFFERENT, Outcome
+from sweep.command.reading import opened, say
 from sweep.errors import COMPLETE, SweepError
-from sweep.words import paragraph
 
-DIFFERENT = 1
-"""As `diff` of files says it."""
+
+@command(
+    "sweep kernels foliot --study foliot.toml",
+    option("name", "describe this one", metavar="NAME", nargs="?"),
+    option("--study", "write a study of it to begin with", metavar="FILE.toml", type=Path),
+    *(o.FORCE, o.ALLOW_IMPORT, switch("--all", "parameters, outputs and methods of all kernels, and all statuses")),
+)
+def kernels(arguments: argparse.Namespace) -> None:
+    """What can be swept: parameters, units, outputs, methods."""
+    from sweep.show.kernels import catalogue_text, kernels, write_starter
+
+    name, path = arguments.name, arguments.study
+    if path and not name:
+        raise SweepError("--study: name a kernel as well, e.g. sweep kernels foliot --study foliot.toml")
+    if path:
+        write_starter(name, path, arguments.allow_import, arguments.force)
+    say(path or (kernels(name, arguments.allow_import) if name else catalogue_text(arguments.all)))
+
+
+@command("sweep studies foliot_scaling", option("name", "of the study to copy", metavar="NAME", nargs="?"), o.FORCE)
+def studies(arguments: argparse.Namespace) -> None:
+    """The studies that come with foliot; with a name: copy it here to work on."""
+    from sweep.show.studies import copy_study, studies_text
+
+    name = arguments.name
+    say("\n".join(map(str, copy_study(name, force=arguments.force))) if name else studies_text())
 
 
 @command(
     "sweep show foliot.h5",
     o.RESULT,
-    o.switch("--follow", "then print the run's log until it ends, on any machine that sees it"),
+    switch("--follow", "then print the run's log until it ends, on any machine that sees it"),
 )
 def show(arguments: argparse.Namespace) -> None:
     """What is in a result, how much is done, what became of its cells."""
     from sweep.show.follow import follow
     from sweep.show.text import result_text
 
-    with result_of(arguments) as dataset:
+    with opened(arguments) as dataset:
         say(result_text(arguments.result, dataset))
     for line in follow(arguments.result) if arguments.follow else ():
         say(line)
@@ -43,36 +69,6 @@ def verify(arguments: argparse.Namespace) -> None:
     if not verdict.whole:
         raise SweepError(str(verdict))
     say(verdict)
-
-
-@command(
-    "sweep check foliot.h5 --sample 200",
-    o.RESULT,
-    option("--sample", "cells at most; default: 200", metavar="N", type=int, default=200),
-    option("--seed", "draws other cells; default: 0", metavar="N", type=int, default=0),
-    *(o.UNFINISHED, o.ALLOW_IMPORT),
-)
-def check(arguments: argparse.Namespace) -> Outcome:
-    """Solve some OK cells again by another method and compare; exit status 1 if one is beyond its rtol."""
-    from sweep.explore.recheck import check
-    from sweep.study.read import study
-
-    with result_of(arguments) as dataset:
-        found = check(dataset, study(dataset, allow_import=arguments.allow_import), arguments.sample, arguments.seed)
-    say(paragraph(str(found)))
-    return Outcome(DIFFERENT if found.beyond else COMPLETE, str(found))
-
-
-@command("sweep cell foliot.h5 mu=0.1", o.RESULT, option("at", metavar="AXIS=VALUE", nargs="*"), o.ALLOW_IMPORT)
-def cell(arguments: argparse.Namespace) -> None:
-    """One cell: its values, what its status means, and what each method says of it."""
-    from sweep.explore.one_cell import report_cell
-    from sweep.show.laws import pick
-    from sweep.study.read import study
-
-    with result_of(arguments) as dataset:
-        found = report_cell(pick(dataset, arguments.at), study(dataset, allow_import=arguments.allow_import))
-    say(found)
 
 
 @command(
@@ -98,7 +94,7 @@ def diff(arguments: argparse.Namespace) -> Outcome:
     """In what two results differ: cells, statuses, how far; exit status 1 if they do."""
     from sweep.results.diff import diff
 
-    with opened(arguments.result) as a, opened(arguments.other) as b:
+    with opened(arguments) as a, opened(arguments, "other") as b:
         found = diff(a, b, arguments.rtol)
     say(found)
     return Outcome(COMPLETE if found.same else DIFFERENT, str(found))
@@ -107,46 +103,130 @@ def diff(arguments: argparse.Namespace) -> Outcome:
 @command(
     "sweep plot foliot.h5 --y period --unit period=hour",
     o.RESULT,
-    o.output("FILE.png", "default: the result's name with _plot.png, here; or .svg, .pdf"),
+    o.output("FILE.png", "default: the result's name with _plot.png, here; or .svg, .pdf", "_plot.png"),
     *(o.FORCE, o.OUTPUT_Y, option("--x", "default: the longest axis", metavar="AXIS"), o.AT, o.UNITS),
 )
 def plot(arguments: argparse.Namespace) -> None:
     """A figure of one output."""
-    from sweep.show.laws import pick
     from sweep.show.plot import plot
 
-    target = arguments.output or Path(f"{arguments.result.stem}_plot.png")
-    check_target_of(arguments, target)
-    with result_of(arguments) as dataset:
-        plot(in_units_of(pick(dataset, arguments.at), arguments.unit), target, y=arguments.y, x=arguments.x)
-    say(target)
+    with opened(arguments) as dataset:
+        plot(dataset, arguments.output, y=arguments.y, x=arguments.x, force=True)
+    say(arguments.output)
 
 
 @command(
     "sweep view foliot.h5",
     o.RESULT,
     option("--port", "of this machine; default: a free one", metavar="N", type=int, default=0),
-    o.switch("--no-browser", "only print the address of the page"),
+    switch("--no-browser", "only print the address of the page"),
 )
 def view(arguments: argparse.Namespace) -> None:
     """Look at a result in the browser: any two axes, sliders for the others."""
     from sweep.view.page import serve
 
-    with result_of(arguments):
+    with opened(arguments):
         serve(arguments.result, arguments.port, not arguments.no_browser)
 
 
 @command(
     "sweep report foliot.h5",
     o.RESULT,
-    o.output("FILE.html", "default: the result's name with .html, here"),
+    o.output("FILE.html", "default: the result's name with .html, here", ".html"),
     *(o.FORCE, o.UNITS, o.UNFINISHED),
 )
 def report(arguments: argparse.Namespace) -> None:
     """One self-contained page of HTML: figures, exponents, provenance."""
     from sweep.show.page import write_page
 
-    target = arguments.output or Path(f"{arguments.result.stem}.html")
-    check_target_of(arguments, target)
-    with result_of(arguments) as dataset:
-        say(write_page(in_units_of(dataset, arguments.unit), arguments.result, target))
+    with opened(arguments) as dataset:
+        say(write_page(dataset, arguments.result, arguments.output))
+
+
+@command(
+    "sweep fit foliot.h5 --x mu --y period --window 1e-3 1e-1",
+    o.RESULT,
+    o.OUTPUT_Y,
+    option("--x", metavar="AXIS", required=True),
+    option(
+        "--window",
+        "part of the axis to fit over; if given twice, also where the two laws meet",
+        nargs=2,
+        type=float,
+        metavar=("LO", "HI"),
+        action="append",
+        default=[],
+    ),
+    option("--confidence", "of the intervals; default: 0.95", type=float, default=0.95, metavar="SHARE"),
+    option(
+        "--noise",
+        "whether the values scatter, or how; default: as tests find",
+        choices=("yes", "no", "even", "uneven", "correlated", "outliers"),
+    ),
+    switch("--compare", "which law: one, two or three power laws, an offset, a correction, an exponential ..."),
+    o.output("FILE.csv|.png", "also write the table; with --compare, .png, .svg or .pdf is a picture of all laws"),
+    *(o.FORCE, o.AT, o.UNFINISHED, switch("--all", "all columns, and what they mean")),
+)
+def fit(arguments: argparse.Namespace) -> None:
+    """Exponent of a power law with its interval, and where two laws meet."""
+    from sweep.explore.scattered import on_lines
+    from sweep.show import laws
+    from sweep.show.plot import plot
+
+    target, windows = arguments.output, arguments.window
+    with opened(arguments) as dataset:
+        part = on_lines(dataset, arguments.x)
+        if arguments.compare:
+            compared = laws.comparison(part, arguments.y, arguments.x, windows)
+        else:
+            noise = {"yes": True, "no": False}.get(arguments.noise, arguments.noise)
+            found = laws.laws(part, arguments.y, arguments.x, windows, arguments.confidence, noise)
+    say(laws.comparison_text(compared, arguments.all) if arguments.compare else laws.laws_text(found, arguments.all))
+    if target:
+        if not arguments.compare:
+            laws.write_laws(found, target)
+        elif target.suffix.lower() == ".csv":
+            laws.write_comparison(compared, target)
+        else:
+            plot(compared, target, force=True)
+        say(target)
+
+
+@command(
+    "sweep export foliot.h5 -o foliot.csv --where \"status == 'OK' and mu < 1\"",
+    o.RESULT,
+    o.output("FILE.csv|.parquet|.nc|.zarr", required=True),
+    o.FORCE,
+    option("--where", "only cells for which this holds, e.g. \"status == 'OK' and R < 0.1\"", metavar="CONDITION"),
+    switch("--compress", "of netCDF4 and zarr: smaller, every bit kept"),
+    switch("--float32", "of netCDF4 and zarr: outputs with 24 bits of precision"),
+    *(o.UNITS, o.UNFINISHED),
+)
+def export(arguments: argparse.Namespace) -> None:
+    """Write a result as csv, parquet, netCDF4 or zarr."""
+    from sweep.results.export import export
+
+    keys = {name: getattr(arguments, name) for name in ("force", "compress", "float32")}
+    with opened(arguments) as dataset:
+        say(export(dataset, arguments.output, **keys))
+
+
+@command(
+    "sweep join low.h5 high.h5 -o both.h5",
+    *(o.RESULT, o.OTHER),
+    o.output("JOINED.h5", checked=False, required=True),
+    o.FORCE,
+    option("--axis", 'name of a new axis, e.g. "version"', metavar="NAME"),
+    option("--labels", "its values; default: the names of the files", metavar="LABEL", nargs=2),
+)
+def join(arguments: argparse.Namespace) -> None:
+    """Two results of one kernel as one, longer along an axis or along a new one."""
+    from sweep.explore.join import join
+    from sweep.results.statuses import summary_text
+
+    paths = [arguments.result, arguments.other]
+    labels = arguments.labels or [path.stem if len({p.stem for p in paths}) > 1 else str(path) for path in paths]
+    with opened(arguments) as a, opened(arguments, "other") as b:
+        found = join(a, b, arguments.output, axis=arguments.axis, labels=labels, force=arguments.force)
+    with found:
+        say(f"{arguments.output}: {summary_text(found)}")

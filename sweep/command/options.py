@@ -1,4 +1,4 @@
-"""How a command is declared: a function whose docstring is its help, what may stand behind its name, an example."""
+"""How a command is declared: a function whose docstring is its help, an example, and what may stand behind its name."""
 
 from __future__ import annotations
 
@@ -13,10 +13,12 @@ Function = Callable[[argparse.Namespace], Outcome | None]
 
 
 class Option(NamedTuple):
-    """What argparse's `add_argument` takes."""
+    """What argparse's `add_argument` takes; of a target also how its default ends, and whether it may be there."""
 
     names: tuple[str, ...]
     keys: dict[str, Any]
+    ending: str | None = None
+    checked: bool = False
 
 
 class Command(NamedTuple):
@@ -25,6 +27,19 @@ class Command(NamedTuple):
     function: Function
     example: str
     options: tuple[Option, ...]
+
+    def run(self, arguments: argparse.Namespace) -> Outcome | None:
+        """Does it, unless it would overwrite what is there without --force, or what it reads. Raises SweepError."""
+        from sweep.file.overwriting import check_target
+
+        target = next((option for option in self.options if option.ending is not None), None)
+        if target is not None:
+            read = [getattr(arguments, name) for name in ("result", "other", "study") if name in arguments]
+            given = arguments.output
+            arguments.output = given or (Path(f"{read[0].stem}{target.ending}") if target.ending else None)
+            if given or (target.ending and target.checked):
+                check_target(arguments.output, force=arguments.force or not target.checked, read=read)
+        return self.function(arguments)
 
 
 def command(example: str, *options: Option) -> Callable[[Function], Command]:
@@ -47,15 +62,18 @@ def several(name: str, text: str, metavar: str) -> Option:
     return option(name, text, metavar=metavar, nargs="+", action="extend", default=[])
 
 
-def output(metavar: str, text: str | None = None, required: bool = False) -> Option:
-    """Where a command writes."""
-    return option("-o --output", text, metavar=metavar, type=Path, required=required)
+def output(metavar: str, text: str | None = None, ending: str = "", checked: bool = True, **keys: Any) -> Option:
+    """Where a command writes: by default here, under the name of what it reads and an ending, if there is one.
+
+    What is there already is overwritten with --force alone; where it is not `checked`, the command itself looks at it.
+    """
+    return Option(("-o", "--output"), {"help": text, "metavar": metavar, "type": Path, **keys}, ending, checked)
 
 
 STUDY = option("study", metavar="STUDY.toml", type=Path)
 RESULT = option("result", metavar="OUT.h5", type=Path)
-OUTPUT_Y = option("--y", "default: the first output; of a scene of one's own its interval", metavar="OUTPUT")
 OTHER = option("other", metavar="OTHER.h5", type=Path)
+OUTPUT_Y = option("--y", "default: the first output; of a scene of one's own its interval", metavar="OUTPUT")
 ALLOW_IMPORT = switch("--allow-import", 'allow a kernel "module:NAME" of your own')
 FORCE = switch("--force", "overwrite what is there")
 UNFINISHED = switch("--unfinished", "take what there is of a result that is not complete yet")

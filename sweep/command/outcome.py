@@ -6,6 +6,9 @@ from typing import NamedTuple
 
 from sweep.errors import FAULT, INCOMPLETE, INTERRUPTED, MISTAKE, Incomplete, SweepError
 
+DIFFERENT = 1
+"""Exit status of commands that compare, as `diff` of files says it."""
+
 
 class Outcome(NamedTuple):
     """How a command ended: its exit status, and what is said of it."""

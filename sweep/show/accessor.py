@@ -45,11 +45,11 @@ class SweepAccessor:
     def __init__(self, dataset: xr.Dataset) -> None:
         self._dataset = dataset
 
-    def plot(self, path: str | os.PathLike[str] | None = None, *, y: str | None = None, x: str | None = None) -> Any:
+    def plot(self, path: str | os.PathLike[str] | None = None, **keys: Any) -> Any:
         """The figure of one output: as `sweep.plot`, logarithmic along axes whose grid is."""
         from sweep.show.plot import plot
 
-        return plot(self._dataset, path, y=y, x=x)
+        return plot(self._dataset, path, **keys)
 
     def in_units(self, units: Mapping[str, str] | None = None, **more: str) -> xr.Dataset:
         """The Dataset with some variables in other units: as `sweep.in_units`, e.g. `A0="degree"`."""

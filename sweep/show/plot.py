@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import os
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from sweep.errors import SweepError
+from sweep.file.overwriting import check_target
 from sweep.show.charts import COLOURS, DASHES, new_figure, precision_figure, result_figure, save, style
 from sweep.show.view import label
 from sweep.words import require_dataset
@@ -19,7 +21,12 @@ MOST_LAWS = 6
 
 
 def plot(
-    dataset: xr.Dataset, path: str | os.PathLike[str] | None = None, *, y: str | None = None, x: str | None = None
+    dataset: xr.Dataset,
+    path: str | os.PathLike[str] | None = None,
+    *,
+    y: str | None = None,
+    x: str | None = None,
+    force: bool = False,
 ) -> Any:
     """Picture of a result, of the chart that `work_precision` made, or of the laws that `compare_laws` tried.
 
@@ -39,11 +46,13 @@ def plot(
     x : str, optional
         Axis of a result, or coordinate along the cells of a zip design. Default: what a trace runs along, else the
         longest.
+    force : bool
+        Overwrite a file that is there.
 
     Raises
     ------
     SweepError
-        If there is no such output or axis, or the file cannot be written.
+        If there is no such output or axis, or the file is there already or cannot be written.
 
     Examples
     --------
@@ -53,6 +62,8 @@ def plot(
     >>> chart = sweep.plot(sweep.work_precision(study, methods=["closed", "asymptotic"], tolerances=[1e-6]))
     """
     require_dataset("plot", dataset)
+    if path is not None:
+        check_target(Path(path), force=force)
     drawn = precision_figure if "reference" in dataset.attrs else laws_figure if "chosen" in dataset.attrs else None
     if drawn and (y or x):
         raise SweepError("y and x choose what is shown of a result; this Dataset has one picture, without them")

@@ -1,0 +1,207 @@
+"""Commands that solve cells: plan, run, refine, chart, check, cell."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from sweep.command import options as o
+from sweep.command.options import command, option, switch
+from sweep.command.outcome import DIFFERENT, Outcome, explained
+from sweep.command.reading import opened, say, solving, study_from
+from sweep.errors import CELLS_FAILED, COMPLETE, EXIT_CODES, INCOMPLETE, SweepError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from sweep.file.stored import Stored
+    from sweep.study.model import Study
+
+NOTIFY_SECONDS = 60
+"""What the command of --notify may take."""
+RUN_OPTIONS = ("cluster", "force", "extend", "until", "retry_failed", "repair")
+"""Options of `run` that are arguments of the function of that name."""
+
+
+@command("sweep plan foliot_scaling.toml", o.STUDY, *o.SOLVING)
+def plan(arguments: argparse.Namespace) -> None:
+    """Cells, bytes, memory and a timed forecast, before anything runs."""
+    from sweep.explore.plan import plan
+    from sweep.runs.progress import Progress
+
+    study = study_from(arguments)
+    found = plan(study, note=Progress(1, sys.stderr, "plan").note, **solving(arguments, study))
+    say(found)
+    if found.warnings:
+        raise SweepError("\n".join(f"{arguments.study}: {text}" for text in found.warnings))
+
+
+@command(
+    "sweep run foliot_scaling.toml --until 07:00",
+    o.STUDY,
+    o.output("OUT.h5", "default: the study's name with .h5, here", ".h5", checked=False),
+    switch("--force", "overwrite the result of another study"),
+    switch("--extend", "of a result of the same study with fewer values on its axes, compute the new cells only"),
+    switch("--repair", "of a result that is damaged on the disk, compute the damaged cells again and nothing else"),
+    option(
+        "--cluster",
+        "compute on the workers of a dask scheduler, e.g. tcp://10.0.0.1:8786, instead of here",
+        metavar="ADDRESS",
+    ),
+    option("--until", "stop within seconds of it, with exit status 3; the same command continues", metavar="07:00"),
+    *o.SOLVING,
+    switch("--retry-failed", "of a complete result, compute the cells that FAILED again"),
+    option("--notify", "run this at the end; $SWEEP_EXIT and $SWEEP_SUMMARY say how it ended", metavar="COMMAND"),
+    switch("--log-json", "the log, OUT.h5.log, as JSON, an object a line"),
+)
+def run(arguments: argparse.Namespace) -> Outcome:
+    """Compute a study, or continue where it stopped."""
+    study, target = study_from(arguments), arguments.output
+    from sweep.runs.log import log, log_path, logging_to
+
+    path = log_path(target) if target.parent.is_dir() else None
+    with contextlib.ExitStack() as stack:
+        try:
+            stack.enter_context(logging_to(path, arguments.log_json))
+        except OSError as fault:
+            raise SweepError(f"{target} cannot be written with its log beside it, {path}: {fault.strerror}") from None
+        try:
+            outcome = _computed(arguments, study, target)
+        except BaseException as error:
+            told = explained(error)
+            log(f"ended with {told.code}: {told.text}", "end", exit=told.code)
+            raise
+        log(f"ended with {outcome.code}: {outcome.text}", "end", exit=outcome.code)
+    return outcome
+
+
+def _computed(arguments: argparse.Namespace, study: Study, target: Path) -> Outcome:
+    """Runs, and says what became of all cells."""
+    from sweep.results.statuses import account, summary_text
+    from sweep.runs.run import complete, is_begun
+
+    def identity() -> tuple[int, int] | None:
+        """What changes when the output is written anew."""
+        try:
+            return target.stat().st_mtime_ns, target.stat().st_ino
+        except OSError:
+            return None
+
+    before = identity()
+    options = {name: getattr(arguments, name) for name in RUN_OPTIONS}
+    whole = complete(study, target, **options, **solving(arguments, study))
+    if not whole and not is_begun(target):
+        say(text := f"{target}: unfinished; no cell is computed yet")
+        return Outcome(INCOMPLETE, text)
+    state = "unfinished; " if not whole else "done before; " if before and identity() == before else ""
+    if state:
+        from sweep.file.open import open_result, open_unfinished
+
+        result: xr.Dataset | Stored = open_result(target) if whole else open_unfinished(target)
+    else:  # written just now: read without xarray, which takes longer to load than a small run
+        from sweep.file.stored import Stored
+
+        result = Stored(target, study)
+    with result as found:
+        text = f"{target}: {state}{summary_text(found)}"
+        failed = account(found).failed
+    say(text)
+    return Outcome(INCOMPLETE if not whole else CELLS_FAILED if failed else COMPLETE, text)
+
+
+def notify(arguments: argparse.Namespace, ended: Outcome) -> None:
+    """Runs the command of --notify, which finds how the run ended in its environment."""
+    told = {
+        "SWEEP_OUTPUT": str(arguments.output),
+        "SWEEP_EXIT": str(ended.code),
+        "SWEEP_MEANING": EXIT_CODES.get(ended.code, ""),
+        "SWEEP_SUMMARY": ended.text,
+    }
+    try:
+        subprocess.run(arguments.notify, shell=True, env={**os.environ, **told}, timeout=NOTIFY_SECONDS, check=True)
+    except (OSError, ValueError, subprocess.SubprocessError) as fault:
+        say(f"--notify: {fault}", sys.stderr)
+
+
+@command(
+    "sweep refine foliot.h5 --y period --tolerance 1e-3 -o fine.h5",
+    o.RESULT,
+    option("--y", metavar="OUTPUT", nargs="+", required=True),
+    option("--tolerance", "relative, e.g. 1e-3", metavar="SHARE", type=float, required=True),
+    o.output("REFINED.h5", checked=False, required=True),
+    o.FORCE,
+    option("--most-cells", "altogether; default: 1000000", metavar="N", type=int, default=1_000_000),
+    *o.SOLVING,
+)
+def refine(arguments: argparse.Namespace) -> None:
+    """Add cells to a result where it bends, until it can be interpolated."""
+    from sweep.explore.refine import refine
+
+    with opened(arguments) as dataset:
+        study = study_from(arguments, dataset)
+        keys = {"most_cells": arguments.most_cells, "force": arguments.force, **solving(arguments, study)}
+        found = refine(dataset, arguments.y, arguments.tolerance, path=arguments.output, study=study, **keys)
+    say(f"{arguments.output}: {found}")
+
+
+@command(
+    "sweep chart foliot_scaling.toml --rtol 1e-6 1e-9",
+    o.STUDY,
+    o.output("FILE.png", "default: the study's name with _chart.png, here", "_chart.png"),
+    o.FORCE,
+    option("--methods", "default: auto and all that can do the study", metavar="METHOD", nargs="+"),
+    option("--rtol", "default: 1e-3 to 1e-13", metavar="RTOL", nargs="+", type=float),
+    option("--cells", "of the study at most; default: 1024", metavar="N", type=int, default=1024),
+    option("--reference", "method taken as true; default: the one with the smallest bound", metavar="METHOD"),
+    o.ALL,
+    *o.SOLVING[1:],
+)
+def chart(arguments: argparse.Namespace) -> None:
+    """Error against time of every method of a kernel, on the cells of a study or a result."""
+    from sweep.explore.work_precision import TOLERANCES, precision_text, work_precision
+    from sweep.runs.progress import Progress
+    from sweep.show.plot import plot
+
+    if arguments.study.suffix == ".h5":
+        with opened(arguments, "study") as dataset:
+            study = study_from(arguments, dataset)
+    else:
+        study = study_from(arguments)
+    keys = {name: getattr(arguments, name) for name in ("methods", "cells", "reference")}
+    keys |= {"tolerances": arguments.rtol or TOLERANCES, "note": Progress(1, sys.stderr, "chart").note}
+    found = work_precision(study, **keys, **solving(arguments, study))
+    say(precision_text(found, arguments.all))
+    plot(found, arguments.output, force=True)
+    say(arguments.output)
+
+
+@command(
+    "sweep check foliot.h5 --sample 200",
+    o.RESULT,
+    option("--sample", "cells at most; default: 200", metavar="N", type=int, default=200),
+    option("--seed", "draws other cells; default: 0", metavar="N", type=int, default=0),
+    *(o.UNFINISHED, o.ALLOW_IMPORT),
+)
+def check(arguments: argparse.Namespace) -> Outcome:
+    """Solve some OK cells again by another method and compare; exit status 1 if one is beyond its rtol."""
+    from sweep.explore.recheck import check
+    from sweep.words import paragraph
+
+    with opened(arguments) as dataset:
+        found = check(dataset, study_from(arguments, dataset), arguments.sample, arguments.seed)
+    say(paragraph(str(found)))
+    return Outcome(DIFFERENT if found.beyond else COMPLETE, str(found))
+
+
+@command("sweep cell foliot.h5 mu=0.1", o.RESULT, option("at", metavar="AXIS=VALUE", nargs="*"), o.ALLOW_IMPORT)
+def cell(arguments: argparse.Namespace) -> None:
+    """One cell: its values, what its status means, and what each method says of it."""
+    from sweep.explore.one_cell import report_cell
+
+    with opened(arguments) as dataset:
+        say(report_cell(dataset, study_from(arguments, dataset)))
