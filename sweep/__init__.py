@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -36,40 +38,12 @@ if TYPE_CHECKING:
     from sweep.show.plot import plot as plot
     from sweep.study.toml import to_toml as to_toml
 
-_PUBLIC = {
-    "study.read": ("study",),
-    "study.toml": ("to_toml",),
-    "explore.plan": ("plan",),
-    "runs.run": ("run",),
-    "file.open": ("open_result",),
-    "file.verify": ("verify",),
-    "results.filter": ("where",),
-    "results.units": ("in_units",),
-    "results.export": ("export",),
-    "results.diff": ("diff",),
-    "results.listing": ("list_results",),
-    "explore.join": ("join",),
-    "show.kernels": ("kernels",),
-    "explore.solver": ("solver",),
-    "explore.refine": ("refine",),
-    "explore.scattered": ("interpolated",),
-    "explore.work_precision": ("work_precision",),
-    "explore.sensitivity": ("sensitivity",),
-    "explore.scaling": ("scaling",),
-    "laws.exponents": ("local_exponent", "where_exponent"),
-    "laws.maps": ("exponent_map",),
-    "laws.lines": ("fit_exponent",),
-    "laws.two_laws": ("fit_two_laws",),
-    "laws.asymptote": ("fit_correction",),
-    "laws.compare": ("compare_laws",),
-    "laws.collapse": ("fit_collapse",),
-    "show.plot": ("plot",),
-    "errors": ("StudyError", "SweepError"),
+_HOMES = {"study": "sweep.study"} | {
+    name: home
+    for home, name in re.findall(r"^    from ([\w.]+) import (\w+) as", Path(__file__).read_text(), re.MULTILINE)
 }
-_WITHOUT_DATASETS = {"study", "to_toml", "plan", "kernels", "solver", "StudyError", "SweepError"}
-"""Names that take and give no Dataset; with any other one xarray is needed, and Datasets get `ds.sweep`."""
-_HOMES = {name: home for home, names in _PUBLIC.items() for name in names}
-"""Public names and the modules they live in; a module is imported when one of its names is first used."""
+"""Public names and the modules they live in: the lines above, which only type checkers run; a module is imported when
+one of its names is first used."""
 
 __all__ = list(_HOMES)
 
@@ -77,14 +51,12 @@ __all__ = list(_HOMES)
 def __getattr__(name: str) -> Any:
     if name not in _HOMES:
         raise AttributeError(f"module 'sweep' has no attribute {name!r}")
-    if name not in _WITHOUT_DATASETS:
-        import_module("sweep.show.accessor")
     # what a notebook shows of a study needs to know what a run takes, which is above the study
     import_module("sweep.study.model").Study._repr_html_ = lambda study: import_module(
         "sweep.show.notebook"
     ).study_html(study)
     # the room of that name is the function as well, and stays what `sweep.study.read` and its like begin with
-    return import_module("sweep.study") if name == "study" else getattr(import_module(f"sweep.{_HOMES[name]}"), name)
+    return import_module("sweep.study") if name == "study" else getattr(import_module(_HOMES[name]), name)
 
 
 def __dir__() -> list[str]:

@@ -32,7 +32,7 @@ class Blocks:
     partition : Partition
     columns : tuple of Column
         What a block fills.
-    rows : RowBlocks
+    rows : Partition
         The cells of each row.
     """
 
@@ -55,7 +55,7 @@ class Blocks:
 
     def cells(self, block: int) -> tuple[int, int]:
         """The cells of a block."""
-        return self.rows.cells(*self.bounds(block))
+        return self.rows.bounds(*self.bounds(block))
 
     def label(self, block: int) -> str:
         """How a block is called in messages."""
@@ -104,10 +104,8 @@ def sampled_by(solver: SolveCells, study: Study, clock: Callable[[], float]) -> 
     """A timed sample of the grid, by the seconds of a clock. Raises SweepError where the kernel always fails."""
     with faults_reported(f"{study.kernel_name}: the kernel failed"):
         warm(solver, study)
-        sample = take_sample(solver, columns(study), row_blocks(study).size, clock)
-        if study.summary is not None:
-            sample = replace(sample, costs=sample.costs + seconds_a_cell(study))
-        return sample
+        sample = take_sample(solver, columns(study), Grid(study).size, clock)
+        return sample if study.summary is None else replace(sample, costs=sample.costs + seconds_a_cell(study))
 
 
 def warm(solver: SolveCells, study: Study) -> None:
@@ -115,7 +113,7 @@ def warm(solver: SolveCells, study: Study) -> None:
 
     Corners come last, where cells are bad most often.
     """
-    last = row_blocks(study).size - 1
+    last = Grid(study).size - 1
     several = study.method == "auto" or "method" in study.axes
     for index in dict.fromkeys((last // 2, 0, last) if several else (last // 2,)):
         with tolerated():

@@ -56,16 +56,16 @@ def fingerprint(study: Study) -> dict[str, str]:
 def difference(old: Mapping[str, str], new: Mapping[str, str]) -> list[str]:
     """What two fingerprints differ in, a line each: 'axes.mu: was 401 values ..., now 101 values ...'."""
     names = [name for name in {**new, **old} if old.get(name) != new.get(name)]
+    lines = []
     # the digest of the whole study tells nothing where its parts do
-    return [_change(name, old.get(name), new.get(name)) for name in names if name != "study" or names == ["study"]]
-
-
-def _change(name: str, old: str | None, new: str | None) -> str:
-    if name.startswith(SOURCE) or name == "study":  # a digest tells a reader nothing
-        return f"{name}: {'new' if old is None else 'gone' if new is None else 'changed'}"
-    if old is None or new is None:
-        return f"{name}: new, {new}" if old is None else f"{name}: gone, was {old}"
-    return f"{name}: was {old}, now {new}"
+    for name in (name for name in names if name != "study" or names == ["study"]):
+        was, now = old.get(name), new.get(name)
+        if name.startswith(SOURCE) or name == "study":  # a digest tells a reader nothing
+            lines.append(f"{name}: {'new' if was is None else 'gone' if now is None else 'changed'}")
+        else:
+            change = f"was {was}, now {now}" if was is not None else f"new, {now}"
+            lines.append(f"{name}: {change if now is not None else f'gone, was {was}'}")
+    return lines
 
 
 def _said(study: Study) -> dict[str, str]:
@@ -104,21 +104,16 @@ def _own_packages(module: str) -> list[str]:
     What is Python's, or installed from a distribution, is left out.
     """
     python, installed = Path(os.__file__).parent, {"site-packages", "dist-packages"}
-
-    def is_own(place: str) -> bool:
-        path = Path(place).resolve()
-        return path.is_dir() and not installed.intersection(path.parts) and python not in (path, *path.parents)
-
-    finder = ModuleFinder([*filter(is_own, sys.path)], excludes=["kernels", "sweep"])
+    places = ((place, Path(place).resolve()) for place in sys.path)
+    own = [
+        place
+        for place, path in places
+        if path.is_dir() and not installed.intersection(path.parts) and not path.is_relative_to(python)
+    ]
+    finder = ModuleFinder(own, excludes=["kernels", "sweep"])
     with contextlib.suppress(ImportError):  # where it is installed, or typed at the prompt
         finder.import_hook(module)
     return sorted({name.partition(".")[0] for name in (module, *finder.modules)} - {"kernels", "sweep"})
-
-
-@cache
-def _as_begun(name: str) -> str:
-    """Digest of the sources of one of our packages, as this process began with them."""
-    return _digest(name)
 
 
 def _digest(name: str) -> str:
@@ -129,14 +124,15 @@ def _digest(name: str) -> str:
         spec = None
     if spec is None or spec.origin in ("built-in", "frozen"):
         return ""
-    places = spec.submodule_search_locations
     files = [Path(spec.origin)] if spec.origin else []
-    if places is not None:
+    if (places := spec.submodule_search_locations) is not None:
         files = sorted(path for place in places for path in Path(place).rglob("*.py"))
-    whole = hashlib.sha256()
-    for path in files:
-        whole.update(hashlib.sha256(path.read_bytes()).digest())
-    return whole.hexdigest() if files else ""
+    digests = b"".join(hashlib.sha256(path.read_bytes()).digest() for path in files)
+    return hashlib.sha256(digests).hexdigest() if files else ""
+
+
+_as_begun = cache(_digest)
+"""Of one of our packages, as this process began with it."""
 
 
 @cache

@@ -50,10 +50,10 @@ def output_schema(study: Study, fingerprint: Mapping[str, str]) -> Schema:
 
 def gathered(study: Study, rows: Rows) -> dict[str, Any]:
     """The output's columns of the groups that `rows`, whole groups of them, are of."""
-    per_group = row_blocks(study).per_group
-    split = {name: column.reshape(-1, per_group, *column.shape[1:]) for name, column in rows.items()}
+    per_row = row_blocks(study).per_row
+    split = {name: column.reshape(-1, per_row, *column.shape[1:]) for name, column in rows.items()}
     merged = {name: column[:, 0].copy() for name, column in split.items()}
-    for place in range(1, per_group):
+    for place in range(1, per_row):
         merge(merged, {name: column[:, place] for name, column in split.items()})
     return {name: np.ascontiguousarray(values) for name, values, _, _ in _variables(study, merged)}
 

@@ -150,7 +150,7 @@ def reduced(study: Study, cell: int, rows: int, cells: Cells) -> Rows:
 def seconds_a_cell(study: Study) -> float:
     """What reducing a cell takes, tried on as many whole row blocks as a strip holds, or on as much of one."""
     blocks = row_blocks(study)
-    length = min(blocks.length, _strip_cells(study))
+    length = min(blocks.cells, _strip_cells(study))
     rows = min(_strip_cells(study), blocks.size) // length
     cells = _zeros(study, rows * length)
     return min(timeit.repeat(lambda: reduced(study, 0, rows, cells), number=1, repeat=3)) / cells.number

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sweep.cells.partition import Partition, RowBlocks, boxes
+from sweep.cells.partition import Partition, boxes
 from sweep.cells.schema import Column, cells_of
 from sweep.errors import SweepError
 
@@ -65,9 +65,9 @@ class Sample:
 
     def weights(self, partition: Partition, first: Callable[[Any], Any] | None = None) -> Any:
         """Estimated seconds of every block; `first` tells the first cells of rows where a row is more than a cell."""
-        edges = partition.edges
-        starts, stops = (found := edges if first is None else first(edges))[:-1], found[1:]
-        return np.interp((starts + stops) / 2, self.positions, self.costs) * (stops - starts)
+        edges = partition.first(np.arange(partition.count + 1, dtype=np.int64))
+        edges = edges if first is None else first(edges)
+        return np.interp((edges[:-1] + edges[1:]) / 2, self.positions, self.costs) * np.diff(edges)
 
 
 UNSAMPLED = Sample(np.zeros(1), np.ones(1), 1)
@@ -80,86 +80,70 @@ def take_sample(solver: SolveCells, columns: Sequence[Column], size: int, clock:
     A probe has few enough cells for 64 of them in the budget, and enough to see past the cost of a call. Probes that
     fail are left out. Raises what the kernel does where all fail.
     """
-    probing = _Probing(solver, columns, size, clock or time.perf_counter)
-    cells, lanes = 1, None
-    alone = taken = probing.anywhere(1)
-    if taken < 2 * PROBE_SECONDS:  # what is met for the first time matters in it
-        alone = taken = min(taken, probing.anywhere(1))
-    if size > 1 and taken > PROBE_SECONDS and (taken > max(BUDGET) / 4 or size <= 50 * LANES):
-        # cells are dear, or dear and few: where two take as long as one, 32 will
-        lanes = probing.anywhere(2) < 1.5 * taken
-        cells = max(1, min(LANES, size // 4)) if lanes else 1
-    else:
-        more = LANES
-        while (cells == 1 or taken <= PROBE_SECONDS) and size >= (4 if cells == 1 else POSITIONS) * more:
-            cells, taken, more = more, probing.anywhere(more), 4 * more
-    probes = probing.everywhere(cells)
-    if not probes and cells > 1:  # a bad cell spoils a probe of many
-        cells, lanes = 1, None
-        probes = probing.everywhere(cells)
-    if not probes:
-        raise probing.fault
-    costs = np.array([probes[start] / cells for start in sorted(probes)])
-    return Sample(np.array(sorted(probes)), costs, cells, lanes, max(0.0, alone - float(np.min(costs))))
+    clock = clock or time.perf_counter
+    made: dict[int, dict[int, float]] = {}
+    faults: list[Exception] = []
 
-
-class _Probing:
-    """Makes probes, and keeps their seconds by how many cells they have and where they begin."""
-
-    def __init__(self, solver: SolveCells, columns: Sequence[Column], size: int, clock: Clock) -> None:
-        self._solver, self._columns, self._size, self._clock = solver, columns, size, clock
-        self._made: dict[int, dict[int, float]] = {}
-        self._failed = 0
-        self.fault: Exception = RuntimeError("no cell was tried")
-
-    def anywhere(self, cells: int) -> float:
-        """Seconds that some cells in the middle of the grid take, or elsewhere where these fail."""
-        found = (self._probe(start, cells) for start in (*self._places(1, cells), *self._places(PLACES, cells)))
-        return next((seconds for seconds in found if seconds is not None), math.inf)
-
-    def everywhere(self, cells: int) -> dict[int, float]:
-        """Seconds of probes all over the grid, by their first cell; a dear one that was made before is among them."""
-        probes = {start: seconds for start, seconds in self._made.get(cells, {}).items() if seconds >= DEAR}
-        spent = sum(probes.values())
-        planned = self._places(max(1, min(POSITIONS, self._size // (4 * cells))), cells)
-        # where all of these fail, others are looked at until one does not
-        for turn, start in enumerate((*planned, *self._places(PLACES, cells))):
-            if probes:
-                run = spent / (len(probes) * cells) * self._size
-                if turn >= len(planned) or spent > max(BUDGET[0], min(BUDGET[1], run / 100), SHARE * run):
-                    break
-            seconds = self._probe(start, cells)
-            spent += FAILED_PROBE if seconds is None else seconds
-            if seconds is not None:
-                probes[start] = seconds
-        return probes
-
-    def _probe(self, start: int, cells: int) -> float | None:
-        """Seconds of so many cells; None where the kernel fails. Raises what it does where it always fails."""
-        arrays = {column.name: column.empty(cells) for column in self._columns}
-        begun = self._clock()
-        with tolerated() as faults:
-            self._solver.solve(start, cells_of(arrays))
-            seconds = self._clock() - begun
-            self._made.setdefault(cells, {})[start] = seconds
+    def probe(start: int, cells: int) -> float | None:
+        """Seconds of so many cells; None where the kernel fails."""
+        arrays = {column.name: column.empty(cells) for column in columns}
+        begun = clock()
+        with tolerated() as fault:
+            solver.solve(start, cells_of(arrays))
+            seconds = made.setdefault(cells, {})[start] = clock() - begun
             return seconds
-        self.fault, self._failed = faults[0], self._failed + 1
-        if not self._made and self._failed >= MOST_FAILED:
-            raise self.fault
+        faults.extend(fault)
+        if not made and len(faults) >= MOST_FAILED:
+            raise faults[-1]
         return None
 
-    def _places(self, count: int, cells: int) -> list[int]:
-        """First cells of probes, from the middle on, so that every beginning of the list is spread over the grid."""
-        bits = max(1, (count - 1).bit_length())
-        turned = (int(f"{i:0{bits}b}"[::-1], 2) for i in range(1 << bits))
-        middles = [(2 * ((i + count // 2) % count) + 1) * self._size // (2 * count) for i in turned if i < count]
-        return [min(max(middle - cells // 2, 0), self._size - cells) for middle in middles]
+    def anywhere(cells: int) -> float:
+        """Seconds that some cells in the middle of the grid take, or elsewhere where these fail."""
+        starts = (*_places(size, 1, cells), *_places(size, PLACES, cells))
+        return next((taken for start in starts if (taken := probe(start, cells)) is not None), math.inf)
+
+    cells, lanes, alone = 1, None, anywhere(1)
+    if alone < 2 * PROBE_SECONDS:  # what is met for the first time matters in it
+        alone = min(alone, anywhere(1))
+    if size > 1 and alone > PROBE_SECONDS and (alone > max(BUDGET) / 4 or size <= 50 * LANES):
+        # cells are dear, or dear and few: where two take as long as one, 32 will
+        lanes = anywhere(2) < 1.5 * alone
+        cells = max(1, min(LANES, size // 4)) if lanes else 1
+    else:
+        taken, more = alone, LANES
+        while (cells == 1 or taken <= PROBE_SECONDS) and size >= (4 if cells == 1 else POSITIONS) * more:
+            cells, taken, more = more, anywhere(more), 4 * more
+    for count in dict.fromkeys((cells, 1)):  # a bad cell spoils a probe of many
+        # a dear probe that was made before is among them
+        probes = {start: seconds for start, seconds in made.get(count, {}).items() if seconds >= DEAR}
+        spent, planned = sum(probes.values()), _places(size, max(1, min(POSITIONS, size // (4 * count))), count)
+        # where all that are planned fail, others are looked at until one does not
+        for turn, start in enumerate((*planned, *_places(size, PLACES, count))):
+            run = spent / (len(probes) * count) * size if probes else math.inf
+            most = max(BUDGET[0], min(BUDGET[1], run / 100), SHARE * run)
+            if probes and (turn >= len(planned) or spent > most):
+                break
+            seconds = probe(start, count)
+            spent += FAILED_PROBE if seconds is None else seconds
+            probes |= {} if seconds is None else {start: seconds}
+        if probes:
+            costs = np.array([probes[start] / count for start in sorted(probes)])
+            lanes = lanes if count == cells else None
+            return Sample(np.array(sorted(probes)), costs, count, lanes, max(0.0, alone - float(np.min(costs))))
+    raise faults[-1]
+
+
+def _places(size: int, count: int, cells: int) -> list[int]:
+    """First cells of probes, from the middle on, so that every beginning of the list is spread over the grid."""
+    bits = max(1, (count - 1).bit_length())
+    turned = (int(f"{i:0{bits}b}"[::-1], 2) for i in range(1 << bits))
+    middles = [(2 * ((i + count // 2) % count) + 1) * size // (2 * count) for i in turned if i < count]
+    return [min(max(middle - cells // 2, 0), size - cells) for middle in middles]
 
 
 def partition(sample: Sample, size: int, cell_bytes: float, workers: int) -> Partition:
     """Blocks of about 1/200 of each worker's share, within bounds of time, bytes and number."""
-    cost = max(sample.cost, 1e-12)
-    shortest, longest = BLOCK_SECONDS
+    cost, (shortest, longest) = max(sample.cost, 1e-12), BLOCK_SECONDS
     seconds = max(cost * size / (200 * workers), shortest)
     # by the cheapest probe: on a busy machine some take ten times as long as they should, and blocks would be short
     worth_a_call = CALLS * sample.call / max(float(np.min(sample.costs)), 1e-12)
@@ -170,11 +154,10 @@ def partition(sample: Sample, size: int, cell_bytes: float, workers: int) -> Par
     elif sample.cells < LANES and sample.lanes is None:
         cells = max(cells, min(LANES, size / (4 * workers)))
     cells = max(1, math.floor(cells), -(-size // MOST_BLOCKS))
-    whole_lanes = cells if cells < LANES else -(-cells // LANES) * LANES
-    return Partition(size, min(whole_lanes, size))
+    return Partition(size, min(cells if cells < LANES else -(-cells // LANES) * LANES, size))
 
 
-def row_partition(sample: Sample, rows: RowBlocks, shape: tuple[int, ...], row_bytes: float, workers: int) -> Partition:
+def row_partition(sample: Sample, rows: Partition, shape: tuple[int, ...], row_bytes: float, workers: int) -> Partition:
     """The same of rows, which stand in a box of this shape."""
     blocks = partition(sample, rows.size, row_bytes / rows.mean, workers)
     return boxes(shape, math.ceil(blocks.cells / rows.mean), LANES if rows.mean == 1 else 1)

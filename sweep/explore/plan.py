@@ -243,7 +243,7 @@ def _forecast(study: Study, sample: Sample, workers: int, folder: Path, solver: 
         shape=dict(zip(grid.dims, grid.shape, strict=True)),
         outputs=study.outputs,
         blocks=blocks.count,
-        cells_per_block=rows.cells(0, blocks.cells)[1],
+        cells_per_block=rows.bounds(0, blocks.cells)[1],
         workers=workers,
         output_bytes=output,
         memory_bytes=2 * workers * (blocks.cells * row_bytes + strip_bytes(study)),

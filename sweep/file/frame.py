@@ -72,7 +72,7 @@ def cuts_of(study: Study, schema: Schema, blocks: Partition) -> dict[str, Cut]:
         return {"cells": Cut(schema.columns, schema.grid.shape, blocks)}
     rows, columns = row_blocks(study), part_columns(study)
     row_bytes = sum(column.cell_bytes for column in columns)
-    groups = boxes(schema.grid.shape, GATHERED_BYTES // (row_bytes * rows.per_group))
+    groups = boxes(schema.grid.shape, GATHERED_BYTES // (row_bytes * rows.per_row))
     return {"rows": Cut(columns, (rows.count,), blocks), "cells": Cut(schema.columns, schema.grid.shape, groups)}
 
 

@@ -203,6 +203,6 @@ class _Stored:
     def gathered(self, file: StoredFile, block: int) -> dict[str, Any]:
         """A block of a summary's output, from its rows."""
         first, last = file.tables["cells"].blocks.bounds(block)
-        per_group = row_blocks(self._study).per_group
-        rows = {name: c[first * per_group : last * per_group] for name, c in file.columns("rows").items()}
+        per_row = row_blocks(self._study).per_row
+        rows = {name: c[first * per_row : last * per_row] for name, c in file.columns("rows").items()}
         return gathered(self._study, rows)

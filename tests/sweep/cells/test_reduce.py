@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from running import quiet, same
 from toy_studies import build
 
-from sweep.cells.partition import RowBlocks, row_blocks
+from sweep.cells.partition import Partition, row_blocks
 from sweep.cells.reduce import tree_sum
 
 EVERYTHING = ["min", "max", "mean", "argmin", "argmax", "histogram"]
@@ -66,7 +66,7 @@ def test_the_tree_sum_is_right_to_twice_the_digits(numbers):
     data=st.data(),
 )
 def test_strips_cover_the_rows_and_are_cut_at_the_same_places(groups, group, length, room, data):
-    blocks = RowBlocks(groups, group, min(length, group))
+    blocks = Partition(groups * group, min(length, group), group)
     edges = [blocks.first(row) for row in range(blocks.count + 1)]
     assert edges[-1] == blocks.size
     assert all(b > a for a, b in itertools.pairwise(edges))
@@ -90,5 +90,5 @@ def test_of_equal_extremes_the_first_cell_is_told():
     speeds = np.arange(3000.0, 0.0, -1.0)
     study = build(axes={"height": [2.0], "v0": speeds}, method="rough", rtol=0.9, summary={})
     found = quiet(study)
-    assert row_blocks(study).per_group > 1
+    assert row_blocks(study).per_row > 1
     assert (found.fall_time_argmin_v0, found.fall_time_argmax_v0) == (3000.0, 3000.0)

@@ -117,6 +117,13 @@ def logged(k, text=None):
     return f"2026-01-01 00:00:{k % 60:02}  {text or f'line {k}'}\n"
 
 
+@pytest.mark.parametrize("heights", [[2.0], [2.0, 2.0 + 1e-9]])
+def test_an_output_of_one_value_is_told_as_one_number(heights):
+    text = result_text("x.h5", sweep.run(build(axes={"height": heights}), progress=False))
+    assert "  0.63866  " in text.partition("outputs")[2]
+    assert "0.63866 to" not in text
+
+
 @pytest.fixture
 def log(tmp_path):
     return tmp_path / "x.h5.log"
