@@ -25,16 +25,7 @@ SolveBlock = Callable[[int, int, Mapping[str, Any], Any], None]
 
 
 class Blocks:
-    """The rows of a study, cut into blocks.
-
-    Attributes
-    ----------
-    partition : Partition
-    columns : tuple of Column
-        What a block fills.
-    rows : Partition
-        The cells of each row.
-    """
+    """The rows of a study, cut into blocks: their `partition`, the `columns` they fill, the cells of each of `rows`."""
 
     def __init__(self, study: Study, partition: Partition) -> None:
         self.partition, self.columns, self.rows = partition, part_columns(study), row_blocks(study)
@@ -73,20 +64,13 @@ def row_shape(study: Study) -> tuple[int, ...]:
 
 
 def block_solver(study: Study, solver: SolveCells | None = None) -> SolveBlock:
-    """Computes rows into the columns of a block; of cells, only those wanted (None: all). For one thread at a time.
-
-    Parameters
-    ----------
-    solver : SolveCells, optional
-        What solves cells; default: `Solver`.
-    """
+    """Computes rows into the columns of a block; of cells, only those wanted (None: all). For one thread at a time."""
     from sweep.cells.solve import Solver
 
     solver = solver or Solver(study)
     if study.summary is not None:
         reducer = Reducer(study, solver)
         return lambda start, stop, arrays, wanted: reducer.solve(start, stop, arrays)
-
     return lambda start, stop, arrays, wanted: solver.solve(start, cells_of(arrays), wanted)
 
 

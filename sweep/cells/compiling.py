@@ -75,22 +75,9 @@ work_clock = WorkClock()
 
 
 class Compiling:
-    """Watches the first calls of a kernel's functions.
+    """Watches the first calls of a kernel's functions, and notes a line while one is compiled.
 
-    Parameters
-    ----------
-    kernel : Kernel
-    name : str
-        As the study has it.
-    note : callable, optional
-        Tells a line.
-
-    Attributes
-    ----------
-    kernel : Kernel
-        The same, watched.
-    seconds : dict of str to float
-        What compiling took, by method, where it took longer than that.
+    `kernel` is the same, watched; `seconds` is what compiling took, by method, where it took longer than is told.
     """
 
     def __init__(self, kernel: Kernel, name: str, note: Callable[[str], None] | None = None) -> None:

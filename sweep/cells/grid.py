@@ -19,15 +19,7 @@ Floats = NDArray[np.float64]
 
 
 class Box:
-    """Places in C order.
-
-    Attributes
-    ----------
-    dims : tuple of str
-    shape : tuple of int
-    size : int
-        Number of places.
-    """
+    """Places in C order: names and lengths of the dimensions, and the number of places."""
 
     def __init__(self, dims: tuple[str, ...], shape: tuple[int, ...]) -> None:
         self.dims, self.shape, self.size = dims, shape, math.prod(shape)
@@ -54,15 +46,7 @@ class Grid(Box):
         return found | {k: self.study.axes[name].values for k, name in self._varying.items()}
 
     def columns(self, start: int, stop: int, out: Sequence[Floats]) -> None:
-        """Write the varying parameters of the cells `start` to `stop`.
-
-        Parameters
-        ----------
-        start, stop : int
-            0 <= start <= stop <= size.
-        out : sequence of ndarray, each of shape (>= stop - start, ...)
-            One column per parameter of the kernel, in its order; constant ones are left alone.
-        """
+        """Write the varying parameters of the cells `start` to `stop` into columns, one per parameter of the kernel."""
         for place, name in self._varying.items():
             out[place][: stop - start] = self.column(name, start, stop)
 

@@ -87,15 +87,7 @@ def merge(into: Rows, other: Mapping[str, Any]) -> None:
 
 
 class Reducer:
-    """Solves row blocks and reduces each to a row, for one thread at a time.
-
-    Parameters
-    ----------
-    study : Study
-        With a summary.
-    solver : SolveCells
-        What solves cells.
-    """
+    """Solves row blocks of a study with a summary and reduces each to a row, for one thread at a time."""
 
     def __init__(self, study: Study, solver: SolveCells) -> None:
         self.study, self.row_blocks, self.solver = study, row_blocks(study), solver

@@ -38,18 +38,9 @@ class Absent(NamedTuple):
 
 
 class Turn(NamedTuple):
-    """A method's turn.
+    """A method's turn: its position, and what must hold in a cell for it, but for what holds in all cells.
 
-    Attributes
-    ----------
-    number : int
-        Position of the method.
-    absent : tuple of Absent
-        What must hold in a cell for the method to do it; what holds in all cells is left out.
-    sooner : callable or None
-        `Method.sooner`, where the method has two turns.
-    early : bool
-        Whether it is the first of the two.
+    Where it has two turns, by `Method.sooner`, also whether this is the first of the two.
     """
 
     number: int

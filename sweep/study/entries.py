@@ -150,7 +150,7 @@ def _list(entry: Entry, field: Field) -> Floats:
             values[i] = _number(item, field)
         except ValueError as error:
             bad.append(Mistake(f"{entry.where}[{i}]", str(error)))
-    entry.mistakes.found += bad[:MOST_BAD_VALUES]
+    entry.mistakes.extend(bad[:MOST_BAD_VALUES])
     if len(bad) > MOST_BAD_VALUES:
         entry.wrong(f"and {len(bad) - MOST_BAD_VALUES} more like these")
     return NONE if bad else values

@@ -92,7 +92,7 @@ def _kernel(keys: Entry, source: str, allow_import: bool) -> Kernel:
         return found
     elif meant := nearest(entry.value, catalogue.KERNELS) if ":" not in str(entry.value) else "":
         return catalogue.get(meant)
-    raise StudyError(source, keys.mistakes.found)
+    raise StudyError(source, keys.mistakes)
 
 
 def _outputs(keys: Entry, kernel: Kernel) -> tuple[str, ...]:
@@ -118,11 +118,8 @@ def _fixed(keys: Entry, kernel: Kernel, axes: Mapping[str, Axis]) -> Fixed:
         if field := field_of(entry, name, kernel):
             before = len(keys.mistakes)
             given[name] = quantity(entry, field)
-            bad = [v for v in _outside(given[name], field) if v != field.default]
-            if bad and len(keys.mistakes) == before:
-                unit = f" {field.unit}" if field.unit != "1" else ""
-                wanted = f"{'a whole number ' * field.integer}{limits(field) or 'a number'}{unit}"
-                entry.wrong(f"expected {wanted}, found {bad[0]:.6g}{unit}")
+            if len(keys.mistakes) == before:
+                _check_limits(entry, given[name], field)
         if name in axes:
             entry.wrong(f"{name} is an axis as well; keep one of the two")
     return given
@@ -138,7 +135,7 @@ def _along(keys: Entry, kernel: Kernel, outputs: Sequence[str]) -> dict[str, Flo
     needed = {dim: o.name for o in kernel.outputs if o.name in outputs for dim in o.dims}
     along: dict[str, Floats] = {}
     for field in kernel.along:
-        entry, before, values = table[field.name], len(mistakes), frozen([])
+        entry, values = table[field.name], frozen([])
         if field.name in table:
             said = entry.value
             if isinstance(said, Mapping) and set(said) == {"num"} and math.isfinite(field.upper - field.lower):
@@ -146,23 +143,25 @@ def _along(keys: Entry, kernel: Kernel, outputs: Sequence[str]) -> dict[str, Flo
                 counted = field.integer and isinstance(said["num"], int)
                 last = min(field.upper, field.lower + said["num"] - 1) if counted else field.upper
                 entry = replace(entry, value={"spacing": "linear", "start": field.lower, "stop": last, **said})
-            values = axis(entry, field).values
-            bad = _outside(values, field)
-            if len(bad) and len(mistakes) == before:
-                kind = "whole numbers" if field.integer else "values"
-                entry.wrong(f"expected {kind} from {field.lower:g} to {field.upper:g}, found {bad[0]:g}")
+            before, values = len(mistakes), axis(entry, field).values
+            if len(mistakes) == before:
+                _check_limits(entry, values, field, finite=True)
         elif field.name in needed and field.name not in mistakes.meant and not mistakes.unread:
             entry.wrong(f"missing; output {needed[field.name]} needs it, e.g. num = 200")
         along[field.name] = values if field.name in needed else frozen([])
     return along
 
 
-def _outside(values: float | Floats, field: Field) -> Floats:
-    """Those of some values that are outside of the limits of their field, or not whole where they should be."""
-    values = np.atleast_1d(values)
+def _check_limits(entry: Entry, found: float | Floats, field: Field, finite: bool = False) -> None:
+    """A mistake where some values are outside of the limits of their field, or not whole where they should be."""
+    values = np.atleast_1d(found)
     inside = (values > field.lower if field.open_lower else values >= field.lower) & (values <= field.upper)
-    found: Floats = values[~(inside & ((np.round(values) == values) | (not field.integer)))]
-    return found
+    inside &= ((np.round(values) == values) | (not field.integer)) & (np.isfinite(values) | (not finite))
+    bad = values[~inside & (values != field.default)]
+    if len(bad):
+        unit = f" {field.unit}" if field.unit != "1" else ""
+        wanted = f"{'a whole number ' * field.integer}{limits(field) or 'a number'}{unit}"
+        entry.wrong(f"expected {wanted}, found {bad[0]:.6g}{unit}")
 
 
 def _complete(keys: Entry, kernel: Kernel, axes: Mapping[str, Axis], given: Fixed) -> tuple[Fixed, dict[str, str]]:

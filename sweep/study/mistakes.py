@@ -20,54 +20,35 @@ T = TypeVar("T")
 U = TypeVar("U")
 
 
-class Mistakes:
+class Mistakes(list[Mistake]):
     """All that is wrong with one study.
 
-    Attributes
-    ----------
-    found : list of Mistake
-    unread : bool
-        Whether something that holds others was no table, so that what stands in it is not known to be missing.
-    meant : set of str
-        Parameters and coordinates that misspelt names are taken for.
+    `unread`: something that holds others was no table, so that what stands in it is not known to be missing. `meant`:
+    parameters and coordinates that misspelt names are taken for.
     """
 
     def __init__(self) -> None:
-        self.found: list[Mistake] = []
-        self.unread = False
-        self.meant: set[str] = set()
-
-    def __len__(self) -> int:
-        return len(self.found)
+        self.unread, self.meant = False, set[str]()
 
     def add(self, where: str, message: str) -> None:
-        self.found.append(Mistake(where, message))
+        self.append(Mistake(where, message))
 
     def good(self, *places: str) -> bool:
         """Whether nothing is wrong at these places and in what stands below them, so that they can be compared."""
         below = tuple(f"{place}{sign}" for place in places for sign in ".[")
-        return not any(m.where in places or m.where.startswith(below) for m in self.found)
+        return not any(m.where in places or m.where.startswith(below) for m in self)
 
     def raise_if_any(self, source: str) -> None:
         """Raises StudyError with all mistakes of what is called `source`."""
-        if self.found:
-            raise StudyError(source, self.found)
+        if self:
+            raise StudyError(source, self)
 
 
 @dataclass(frozen=True)
 class Entry:
-    """What a study says at one place.
+    """What a study says at one place, such as "axes.mu.values[2]", or as a whole; None where it says nothing.
 
-    Attributes
-    ----------
-    value : object
-        None where it says nothing.
-    where : str
-        "axes.mu.values[2]"; "" for the whole study.
-    mistakes : Mistakes
-        What is wrong goes there.
-    folder : Path
-        Names of files are relative to it.
+    What is wrong goes to `mistakes`; names of files are relative to the `folder`.
     """
 
     value: Any

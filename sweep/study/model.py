@@ -64,15 +64,9 @@ class Axis:
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Axes that are swept by one design.
+    """Axes that are swept by one design, and the options of a sampled one: n, seed, scramble.
 
-    Attributes
-    ----------
-    design : str
-        "product": each axis has a dimension of its own; else they run along one, value by value.
-    axes : tuple of str
-    options : mapping
-        Of a sampled design: n, seed, scramble.
+    In a "product" each axis has a dimension of its own; else they run along one, value by value.
     """
 
     design: str
@@ -84,14 +78,8 @@ class Block:
 class Summary:
     """What is kept instead of every cell.
 
-    Attributes
-    ----------
-    over : tuple of str
-        Axes that are reduced; the others stay dimensions, and come first in the study's axes.
-    outputs : dict of str to tuple of str
-        Reductions of every output asked for.
-    edges : dict of str to ndarray
-        Bounds of the bins of every histogram, ascending.
+    The axes `over` are reduced; the others stay dimensions, and come first in the study's axes. `outputs` has the
+    reductions of every output asked for, `edges` the bounds of the bins of every histogram, ascending.
     """
 
     over: tuple[str, ...]

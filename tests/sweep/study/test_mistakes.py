@@ -82,7 +82,7 @@ studies/fall.toml: 14 mistakes
         ("axes.height = [1]\nfixed.rtol = 1", "fixed.rtol", "at the top"),
         ("axes.height = [1]\nfixed.v0 = -0.5", "fixed.v0", ">= 0 m/s"),
         ("axes.height = [1]\nfixed.g = 0", "fixed.g", "> 0 m/s^2"),
-        ("axes.height = [1]\nalong.phase = [0, 2]", "along.phase", "from 0 to 1"),
+        ("axes.height = [1]\nalong.phase = [0, 2]", "along.phase", ">= 0, <= 1"),
         ("axes.height = [1]\nalong.r.num = 5", "along.r", "it has phase"),
         ('design = "zip"\naxes.height = [1, 2]\naxes.v0 = [1, 2, 3]', "axes", "equal length"),
         ("axes.height.file = '../b.csv'", "axes.height.file", "outside"),

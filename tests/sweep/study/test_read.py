@@ -86,7 +86,7 @@ def test_python_and_toml_give_the_same_study_with_numbers_of_its_own(read):
 def test_a_coordinate_that_counts_takes_the_first_whole_numbers():
     keys = {"kernel": "foliot_start", "axes": {"mu": [1.0]}, "fixed": {"phi0": 1, "a": 1}}
     assert sweep.study(**keys, along={"flip": {"num": 4}}).along["flip"].tolist() == [1.0, 2.0, 3.0, 4.0]
-    with pytest.raises(sweep.StudyError, match="whole numbers"):
+    with pytest.raises(sweep.StudyError, match="a whole number >= 1"):
         sweep.study(**keys, along={"flip": [1, 2.5]})
 
 
