@@ -39,7 +39,7 @@ myst_heading_anchors = 3
 nb_execution_mode = "cache"
 nb_execution_cache_path = str(HERE / "_build" / "notebooks")
 nb_execution_raise_on_error = True
-nb_execution_timeout = 120
+nb_execution_timeout = 600  # a page may compile a kernel first
 nb_merge_streams = True
 
 numpydoc_show_class_members = False
