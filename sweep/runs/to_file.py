@@ -6,10 +6,8 @@ import contextlib
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
-import numpy as np
-
 from sweep.cells.fingerprint import difference
-from sweep.cells.output_schema import gathered, part_columns
+from sweep.cells.output_schema import gathered
 from sweep.cells.partition import row_blocks
 from sweep.errors import SweepError
 from sweep.file import disk
@@ -133,23 +131,16 @@ def _take_up(store: Store, task: Task) -> None:
     if left is None:
         store.discard()
         return
-    table, columns = left.tables[left.work], part_columns(task.study)
-    fits = [(p.name, np.dtype(p.dtype), p.shape) for p in table.places] == [
-        (c.name, np.dtype(c.dtype), c.shape) for c in columns
-    ] and table.blocks.size == row_blocks(task.study).count
-    ours = left.fingerprint == dict(task.fingerprint)
-    if fits and ours:
+    if left.fingerprint == dict(task.fingerprint):
         store.resume(left)
-    elif task.force:
-        left.close()
-        store.discard()
-    elif ours:
-        raise SweepError(f"{task.output}: its unfinished result is not what its study makes; give it up with --force")
-    else:
+        return
+    left.close()
+    if not task.force:
         raise SweepError(
             f"{store.path}: the unfinished result of another study or version; finish that one first, choose another "
             f"name, or give it up with --force\n{_changes(left.fingerprint, task)}"
         )
+    store.discard()
 
 
 def _begin(store: Store, loop: Loop, reused: Reused | Precomputed | None, shared: bool) -> None:
