@@ -83,35 +83,26 @@ def run(arguments: argparse.Namespace) -> Outcome:
 def _computed(arguments: argparse.Namespace, study: Study, target: Path) -> Outcome:
     """Runs, and says what became of all cells."""
     from sweep.results.statuses import account, summary_text
-    from sweep.runs.run import complete, is_begun
+    from sweep.runs.run import complete
 
-    def identity() -> tuple[int, int] | None:
-        """What changes when the output is written anew."""
-        try:
-            return target.stat().st_mtime_ns, target.stat().st_ino
-        except OSError:
-            return None
-
-    before = identity()
     options = {name: getattr(arguments, name) for name in RUN_OPTIONS}
-    whole = complete(study, target, **options, **solving(arguments, study))
-    if not whole and not is_begun(target):
+    ending = complete(study, target, **options, **solving(arguments, study))
+    if ending == "not begun":
         say(text := f"{target}: unfinished; no cell is computed yet")
         return Outcome(INCOMPLETE, text)
-    state = "unfinished; " if not whole else "done before; " if before and identity() == before else ""
-    if state:
-        from sweep.file.open import open_result, open_unfinished
-
-        result: xr.Dataset | Stored = open_result(target) if whole else open_unfinished(target)
-    else:  # written just now: read without xarray, which takes longer to load than a small run
+    if ending == "complete":  # read without xarray, which takes longer to load than a small run
         from sweep.file.stored import Stored
 
-        result = Stored(target, study)
+        result: xr.Dataset | Stored = Stored(target, study)
+    else:
+        from sweep.file.open import open_result, open_unfinished
+
+        result = open_unfinished(target) if ending == "unfinished" else open_result(target)
     with result as found:
-        text = f"{target}: {state}{summary_text(found)}"
+        text = f"{target}: {'' if ending == 'complete' else f'{ending}; '}{summary_text(found)}"
         failed = account(found).failed
     say(text)
-    return Outcome(INCOMPLETE if not whole else CELLS_FAILED if failed else COMPLETE, text)
+    return Outcome(INCOMPLETE if ending == "unfinished" else CELLS_FAILED if failed else COMPLETE, text)
 
 
 def notify(arguments: argparse.Namespace, ended: Outcome) -> None:

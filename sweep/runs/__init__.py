@@ -1,7 +1,7 @@
 """One run of a study, here or on a cluster: a loop has an executor compute blocks, which go into a sink.
 
 Others may use
-    `run`       run, complete, is_begun, store_cells
+    `run`       run, complete, store_cells
     `isolate`   Processes: cells solved in processes of their own
     `pool`      cores, whole_number, endless
     `progress`  Progress: how far it is, and how long it will take

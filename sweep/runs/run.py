@@ -6,7 +6,6 @@ import contextlib
 import os
 from collections.abc import Mapping
 from datetime import datetime
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 import numpy as np
@@ -16,13 +15,12 @@ from sweep.cells.output_schema import gathered
 from sweep.cells.partition import row_blocks
 from sweep.errors import SweepError
 from sweep.file.open import in_memory, memory, open_result, open_unfinished
-from sweep.file.store import unfinished_of
 from sweep.runs.bench import Found
 from sweep.runs.extend import TAKEN_OVER, Precomputed
 from sweep.runs.loop import Loop
 from sweep.runs.pool import CtrlC
 from sweep.runs.task import Task, joined
-from sweep.runs.to_file import run_to_file
+from sweep.runs.to_file import Ending, run_to_file
 from sweep.study.keys import KEYS
 from sweep.study.read import Given
 from sweep.study.read import study as as_study
@@ -117,21 +115,15 @@ def run(
     task = Task(as_study(study, **keys), path, **options)
     if path is None:
         return _run_in_memory(task)
-    if run_to_file(task):
-        return open_result(task.output)
-    if not is_begun(task.output):
+    ending = run_to_file(task)
+    if ending == "not begun":
         raise SweepError("until: the time was up before the first cell could be computed")
-    return open_unfinished(task.output)
+    return open_unfinished(task.output) if ending == "unfinished" else open_result(task.output)
 
 
-def complete(study: Study, path: str | os.PathLike[str], **options: Any) -> bool:
-    """Runs as `run` does, and opens nothing; False where the time was up before the end."""
+def complete(study: Study, path: str | os.PathLike[str], **options: Any) -> Ending:
+    """Runs as `run` does, and opens nothing."""
     return run_to_file(Task(study, path, **options))
-
-
-def is_begun(output: Path) -> bool:
-    """Whether there is a sweep that writes an output, and has not ended."""
-    return unfinished_of(Path(os.path.realpath(output))).exists()
 
 
 def store_cells(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import Any
+from typing import Any, Literal
 
 from sweep.cells.fingerprint import difference
 from sweep.cells.output_schema import gathered
@@ -31,18 +31,22 @@ EXTENDABLE = (
 )
 
 
-def run_to_file(task: Task, precomputed: Precomputed | None = None) -> bool:
-    """False where the time was up before the end. Raises SweepError, KeyboardInterrupt, Terminated."""
+Ending = Literal["done before", "complete", "unfinished", "not begun"]
+"""What became of an output: the last two where the time was up before the end, or before the first block."""
+
+
+def run_to_file(task: Task, precomputed: Precomputed | None = None) -> Ending:
+    """Continues, begins or leaves alone what is there. Raises SweepError, KeyboardInterrupt, Terminated."""
     left = unfinished_of(task.output).exists() or lock_of(task.output).exists()
     if not left and _is_complete(task):
-        return True
+        return "done before"
     with opened(task.output) as store, contextlib.ExitStack() as stack:
         # looked at again, for another run may have ended before this one had the lock
         if _is_complete(task):
             found = _found(store, task)
             if found is not None and found.fingerprint == dict(task.fingerprint):
                 store.discard()
-            return True
+            return "done before"
         _take_up(store, task)
         to_do = store.file is None or bool(store.missing())
         reused: Reused | Precomputed | None = precomputed
@@ -60,7 +64,7 @@ def run_to_file(task: Task, precomputed: Precomputed | None = None) -> bool:
             loop = Loop(task, ctrl_c, cluster, partition, to_do and precomputed is None, reused)
         except TimeUp as reason:
             task.note(f"stopped before the first block, for {reason}")
-            return False
+            return "not begun" if store.file is None else "unfinished"
         stack.enter_context(contextlib.closing(loop))
         progress = loop.begin(range(loop.blocks.count) if store.file is None else store.missing())
         loop.log_begin()
@@ -74,7 +78,7 @@ def run_to_file(task: Task, precomputed: Precomputed | None = None) -> bool:
                 damaged = store.finish(loop.endings(), None if task.study.summary is None else sink.gathered)
                 if not damaged:
                     progress.end()
-                    return True
+                    return "complete"
                 for block in damaged:
                     loop.again(block)
         except (KeyboardInterrupt, Terminated, TimeUp) as reason:
@@ -83,7 +87,7 @@ def run_to_file(task: Task, precomputed: Precomputed | None = None) -> bool:
             kept = f"{store.count} of {loop.blocks.count} blocks are kept"
             progress.note(f"{why}; {kept}, run the same command again to continue")
             if isinstance(reason, TimeUp):
-                return False
+                return "unfinished"
             raise
     raise SweepError(f"{store.path}: what is written there comes back damaged again and again; the disk is failing")
 
