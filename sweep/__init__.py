@@ -44,6 +44,8 @@ _HOMES = {"study": "sweep.study"} | {
 }
 """Public names and the modules they live in: the lines above, which only type checkers run; a module is imported when
 one of its names is first used."""
+_WITHOUT_DATASETS = {"study", "to_toml", "plan", "kernels", "solver", "StudyError", "SweepError"}
+"""Names that take and give no Dataset; with any other one xarray is needed, and Datasets get `ds.sweep`."""
 
 __all__ = list(_HOMES)
 
@@ -51,6 +53,8 @@ __all__ = list(_HOMES)
 def __getattr__(name: str) -> Any:
     if name not in _HOMES:
         raise AttributeError(f"module 'sweep' has no attribute {name!r}")
+    if name not in _WITHOUT_DATASETS:
+        import_module("sweep.show.accessor")
     # what a notebook shows of a study needs to know what a run takes, which is above the study
     import_module("sweep.study.model").Study._repr_html_ = lambda study: import_module(
         "sweep.show.notebook"

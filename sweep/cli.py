@@ -74,8 +74,8 @@ COMMANDS = {
     made.function.__name__.strip("_"): made
     for made in (
         *(look.kernels, look.studies, solve.plan, solve.run, look.show, solve.cell, solve.check, look.list_),
-        *(look.verify, look.diff, look.plot, look.view, look.report, look.fit, solve.refine, solve.chart),
-        *(look.export, look.join, completion),
+        *(look.verify, look.diff, look.plot, look.view, look.report, look.fit, look.exponent, look.sensitivity),
+        *(solve.refine, solve.chart, look.export, look.join, completion),
     )
 }
 """In the order in which `sweep --help` names them."""

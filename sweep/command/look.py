@@ -1,4 +1,5 @@
-"""Commands that look at results and write what they show: show, verify, list, diff, plot, view, report, fit, export.
+"""Commands that look at results and write what they show: show, verify, list, diff, plot, view, report, fit, exponent,
+sensitivity, export.
 
 Also those that have no result yet: kernels and studies that come with foliot.
 """
@@ -12,7 +13,7 @@ from pathlib import Path
 from sweep.command import options as o
 from sweep.command.options import command, option, switch
 from sweep.command.outcome import DIFFERENT, Outcome
-from sweep.command.reading import opened, say
+from sweep.command.reading import opened, say, tell
 from sweep.errors import COMPLETE, SweepError
 
 
@@ -60,7 +61,7 @@ def show(arguments: argparse.Namespace) -> None:
         sys.stdout.flush()
 
 
-@command("sweep verify foliot.h5", o.RESULT)
+@command("sweep verify foliot.h5", o.RESULT, o.JSON)
 def verify(arguments: argparse.Namespace) -> None:
     """Check a result's checksums, whether it is finished or not."""
     from sweep.file.verify import verify
@@ -68,19 +69,20 @@ def verify(arguments: argparse.Namespace) -> None:
     verdict = verify(arguments.result)
     if not verdict.whole:
         raise SweepError(str(verdict))
-    say(verdict)
+    tell(arguments, verdict)
 
 
 @command(
     "sweep list results",
     option("folder", "default: here", metavar="FOLDER", type=Path, nargs="?", default=Path()),
-    o.ALL,
+    *(o.ALL, o.JSON),
 )
 def list_(arguments: argparse.Namespace) -> None:
     """The results in a folder: cells, how much is done, statuses, question."""
     from sweep.results.listing import list_results
 
-    say(list_results(arguments.folder).table(arguments.all))
+    found = list_results(arguments.folder)
+    tell(arguments, found, found.table(arguments.all))
 
 
 @command(
@@ -89,6 +91,7 @@ def list_(arguments: argparse.Namespace) -> None:
     option(
         "--rtol", "relative differences up to this count as equal; default: 0", metavar="SHARE", type=float, default=0.0
     ),
+    o.JSON,
 )
 def diff(arguments: argparse.Namespace) -> Outcome:
     """In what two results differ: cells, statuses, how far; exit status 1 if they do."""
@@ -96,7 +99,7 @@ def diff(arguments: argparse.Namespace) -> Outcome:
 
     with opened(arguments) as a, opened(arguments, "other") as b:
         found = diff(a, b, arguments.rtol)
-    say(found)
+    tell(arguments, found)
     return Outcome(COMPLETE if found.same else DIFFERENT, str(found))
 
 
@@ -165,7 +168,7 @@ def report(arguments: argparse.Namespace) -> None:
     ),
     switch("--compare", "which law: one, two or three power laws, an offset, a correction, an exponential ..."),
     o.output("FILE.csv|.png", "also write the table; with --compare, .png, .svg or .pdf is a picture of all laws"),
-    *(o.FORCE, o.AT, o.UNFINISHED, switch("--all", "all columns, and what they mean")),
+    *(o.FORCE, o.AT, o.UNFINISHED, switch("--all", "all columns, and what they mean"), o.JSON),
 )
 def fit(arguments: argparse.Namespace) -> None:
     """Exponent of a power law with its interval, and where two laws meet."""
@@ -181,7 +184,10 @@ def fit(arguments: argparse.Namespace) -> None:
         else:
             noise = {"yes": True, "no": False}.get(arguments.noise, arguments.noise)
             found = laws.laws(part, arguments.y, arguments.x, windows, arguments.confidence, noise)
-    say(laws.comparison_text(compared, arguments.all) if arguments.compare else laws.laws_text(found, arguments.all))
+    if arguments.compare:
+        tell(arguments, compared, laws.comparison_text(compared, arguments.all))
+    else:
+        tell(arguments, found, laws.laws_text(found, arguments.all))
     if target:
         if not arguments.compare:
             laws.write_laws(found, target)
@@ -189,7 +195,43 @@ def fit(arguments: argparse.Namespace) -> None:
             laws.write_comparison(compared, target)
         else:
             plot(compared, target, force=True)
-        say(target)
+        say(target, sys.stderr if arguments.json else None)
+
+
+@command(
+    "sweep exponent foliot.h5 --x mu --y period",
+    *(o.RESULT, o.OUTPUT_Y, option("--x", metavar="AXIS", required=True)),
+    o.output("FILE.png", "also a picture; or .svg, .pdf"),
+    *(o.FORCE, o.AT, o.UNFINISHED, switch("--all", "every point, not a dozen of each line"), o.JSON),
+)
+def exponent(arguments: argparse.Namespace) -> None:
+    """The local exponent of an output along an axis, with its error."""
+    from sweep.explore.scattered import on_lines
+    from sweep.laws.exponents import local_exponent
+    from sweep.show import laws
+    from sweep.show.plot import plot
+
+    with opened(arguments) as dataset:
+        y = laws.output_of(dataset, arguments.y)
+        found = local_exponent(on_lines(dataset, arguments.x)[y], arguments.x, error=True)
+    tell(arguments, found, laws.exponents_text(found, arguments.x, arguments.all))
+    if arguments.output:
+        plot(found, arguments.output, y="exponent", x=arguments.x, force=True)
+        say(arguments.output, sys.stderr if arguments.json else None)
+
+
+@command(
+    "sweep sensitivity saltelli.h5 --y period",
+    *(o.RESULT, o.OUTPUT_Y, o.JSON),
+)
+def sensitivity(arguments: argparse.Namespace) -> None:
+    """Which axes of a design "saltelli" or "morris" decide an output."""
+    from sweep.explore.sensitivity import sensitivity
+    from sweep.show import laws
+
+    with opened(arguments) as dataset:
+        found = sensitivity(dataset, laws.output_of(dataset, arguments.y))
+    tell(arguments, found, laws.sensitivity_text(found))
 
 
 @command(

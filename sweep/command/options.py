@@ -78,6 +78,7 @@ ALLOW_IMPORT = switch("--allow-import", 'allow a kernel "module:NAME" of your ow
 FORCE = switch("--force", "overwrite what is there")
 UNFINISHED = switch("--unfinished", "take what there is of a result that is not complete yet")
 ALL = switch("--all", "all columns of the table")
+JSON = switch("--json", "as JSON, for programs; a number that is none is null")
 AT = several("--at", "pick one value of another axis", "AXIS=VALUE")
 UNITS = several("--unit", "give a variable in another unit, e.g. A0=degree e=mm wear=mm/hour", "NAME=UNIT")
 SOLVING = (

@@ -1,11 +1,15 @@
-"""What commands read: opened, checked, and reported where it cannot be."""
+"""What commands read, opened and checked; and what they say, to people or with --json to programs."""
 
 from __future__ import annotations
 
 import argparse
 import contextlib
+import dataclasses
+import enum
+import json
+import math
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
@@ -68,3 +72,32 @@ def say(text: object, file: TextIO | None = None) -> None:
     from sweep.words import printable
 
     print(printable(str(text)), file=file)
+
+
+def tell(arguments: argparse.Namespace, found: Any, text: object = None) -> None:
+    """Prints what was found: as people read it, or with --json all of it."""
+    if arguments.json:
+        print(json.dumps(plain(found), ensure_ascii=False, indent=1))
+    else:
+        say(found if text is None else text)
+
+
+def plain(value: Any) -> Any:
+    """A finding as JSON has it: records and Datasets are objects, statuses words, and what is not finite null."""
+    if isinstance(value, enum.Enum):
+        return value.name
+    if value is None or isinstance(value, str | bool | int):
+        return value
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if hasattr(value, "to_dict"):
+        return plain(value.to_dict())
+    if hasattr(value, "tolist"):
+        return plain(value.tolist())
+    if dataclasses.is_dataclass(value):
+        return {field.name: plain(getattr(value, field.name)) for field in dataclasses.fields(value)}
+    if hasattr(value, "_asdict"):
+        return plain(value._asdict())
+    if isinstance(value, Mapping):
+        return {str(name): plain(one) for name, one in value.items()}
+    return [plain(one) for one in value] if isinstance(value, list | tuple | set) else str(value)

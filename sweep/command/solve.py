@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from sweep.command import options as o
 from sweep.command.options import command, option, switch
 from sweep.command.outcome import DIFFERENT, Outcome, explained
-from sweep.command.reading import opened, say, solving, study_from
+from sweep.command.reading import opened, say, solving, study_from, tell
 from sweep.errors import CELLS_FAILED, COMPLETE, EXIT_CODES, INCOMPLETE, SweepError
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ RUN_OPTIONS = ("cluster", "force", "extend", "until", "retry_failed", "repair")
 """Options of `run` that are arguments of the function of that name."""
 
 
-@command("sweep plan foliot_scaling.toml", o.STUDY, *o.SOLVING)
+@command("sweep plan foliot_scaling.toml", o.STUDY, *o.SOLVING, o.JSON)
 def plan(arguments: argparse.Namespace) -> None:
     """Cells, bytes, memory and a timed forecast, before anything runs."""
     from sweep.explore.plan import plan
@@ -36,7 +36,7 @@ def plan(arguments: argparse.Namespace) -> None:
 
     study = study_from(arguments)
     found = plan(study, note=Progress(1, sys.stderr, "plan").note, **solving(arguments, study))
-    say(found)
+    tell(arguments, found)
     if found.warnings:
         raise SweepError("\n".join(f"{arguments.study}: {text}" for text in found.warnings))
 
@@ -149,7 +149,7 @@ def refine(arguments: argparse.Namespace) -> None:
     option("--rtol", "default: 1e-3 to 1e-13", metavar="RTOL", nargs="+", type=float),
     option("--cells", "of the study at most; default: 1024", metavar="N", type=int, default=1024),
     option("--reference", "method taken as true; default: the one with the smallest bound", metavar="METHOD"),
-    o.ALL,
+    *(o.ALL, o.JSON),
     *o.SOLVING[1:],
 )
 def chart(arguments: argparse.Namespace) -> None:
@@ -166,9 +166,9 @@ def chart(arguments: argparse.Namespace) -> None:
     keys = {name: getattr(arguments, name) for name in ("methods", "cells", "reference")}
     keys |= {"tolerances": arguments.rtol or TOLERANCES, "note": Progress(1, sys.stderr, "chart").note}
     found = work_precision(study, **keys, **solving(arguments, study))
-    say(precision_text(found, arguments.all))
+    tell(arguments, found, precision_text(found, arguments.all))
     plot(found, arguments.output, force=True)
-    say(arguments.output)
+    say(arguments.output, sys.stderr if arguments.json else None)
 
 
 @command(
@@ -176,7 +176,7 @@ def chart(arguments: argparse.Namespace) -> None:
     o.RESULT,
     option("--sample", "cells at most; default: 200", metavar="N", type=int, default=200),
     option("--seed", "draws other cells; default: 0", metavar="N", type=int, default=0),
-    *(o.UNFINISHED, o.ALLOW_IMPORT),
+    *(o.UNFINISHED, o.ALLOW_IMPORT, o.JSON),
 )
 def check(arguments: argparse.Namespace) -> Outcome:
     """Solve some OK cells again by another method and compare; exit status 1 if one is beyond its rtol."""
@@ -185,14 +185,17 @@ def check(arguments: argparse.Namespace) -> Outcome:
 
     with opened(arguments) as dataset:
         found = check(dataset, study_from(arguments, dataset), arguments.sample, arguments.seed)
-    say(paragraph(str(found)))
+    tell(arguments, found, paragraph(str(found)))
     return Outcome(DIFFERENT if found.beyond else COMPLETE, str(found))
 
 
-@command("sweep cell foliot.h5 mu=0.1", o.RESULT, option("at", metavar="AXIS=VALUE", nargs="*"), o.ALLOW_IMPORT)
+@command(
+    "sweep cell foliot.h5 mu=0.1",
+    *(o.RESULT, option("at", metavar="AXIS=VALUE", nargs="*"), o.ALLOW_IMPORT, o.JSON),
+)
 def cell(arguments: argparse.Namespace) -> None:
     """One cell: its values, what its status means, and what each method says of it."""
     from sweep.explore.one_cell import report_cell
 
     with opened(arguments) as dataset:
-        say(report_cell(dataset, study_from(arguments, dataset)))
+        tell(arguments, report_cell(dataset, study_from(arguments, dataset)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 CLOSER = 100.0
 """A second opinion is asked for at rtol over this."""
 GOOD = 10.0
-"""It counts where its own error is below rtol over this."""
+"""Its own error is to be below rtol over this, or where none is, below rtol."""
 CONFIDENCE = 0.95
 
 
@@ -60,7 +61,7 @@ class Checked:
             + (" (which does not see a fault that both runs have)" if same else "")
         ]
         if self.judged < self.sample:
-            lines.append(f"not judged: {self.sample - self.judged:,}, which no method solves so closely")
+            lines.append(f"not judged: {self.sample - self.judged:,}, which no method solves to rtol once more")
         if self.judged:
             found = f"{self.beyond:,} of {self.judged:,}" if self.beyond else "none"
             share = f"; of all OK cells at most {100 * self.limit:.2g} %, with {100 * CONFIDENCE:g} % confidence"
@@ -135,9 +136,9 @@ def _second_opinions(alone: Sequence[Study], used: Sequence[str]) -> dict[int, t
     able = [[study.kernel.methods[k].name for k in usable_methods(study)] for study in alone]
     # those that say what they are right to come first, and the method that solved a cell last
     methods = sorted(alone[0].kernel.methods, key=lambda m: m.bound is None and not m.estimates)
-    turns = [(method.name, False) for method in methods] + [(method.name, True) for method in methods]
+    turns = itertools.product((GOOD, 1.0), (False, True), (method.name for method in methods))
     found: dict[int, tuple[str, float, dict[str, Any]]] = {}
-    for name, last in turns:
+    for good, last, name in turns:
         for rtol in {study.rtol for study in alone}:
             todo = [
                 i
@@ -149,7 +150,7 @@ def _second_opinions(alone: Sequence[Study], used: Sequence[str]) -> dict[int, t
             cells = solved_by(together([alone[i] for i in todo]), name, max(rtol / CLOSER, SMALLEST_RTOL))
             for row, i in enumerate(todo):
                 status, error = cells.status[row], float(cells.error[row])
-                if status in (Status.OK, Status.INACCURATE) and error <= rtol / GOOD:
+                if status in (Status.OK, Status.INACCURATE) and error <= rtol / good:
                     found[i] = name, error, {output: column[row] for output, column in cells.outputs.items()}
     return found
 

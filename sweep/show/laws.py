@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 Cells = tuple[list[str], tuple[str, ...]]
 
 MOST_ROWS = 40
+POINTS = 12
+"""Local exponents of a line that are printed."""
 WORST_MISFIT = 0.1
 """Relative distance of a point beyond which a report does not speak of two laws."""
 RULED_OUT = 10.0
@@ -182,6 +184,27 @@ def laws_text(found: Laws, complete: bool = False) -> str:
     return page(*texts, *map(paragraph, (found.remark, found.explanation if complete else REST)))
 
 
+def exponents_text(found: xr.Dataset, x: str, complete: bool = False) -> str:
+    """Local exponents with their errors, a row a point: about `POINTS` of each line, by wish all."""
+    rows, along = [], str(found[x].dims[0])
+    for labels, line in _lines(found, along):
+        here = line.where(line.exponent.notnull(), drop=True)
+        for point in range(0, here.sizes[along], 1 if complete else max(1, -(-here.sizes[along] // POINTS))):
+            at, exponent, error = (float(here[name][point]) for name in (x, "exponent", "exponent_error"))
+            rows.append((*labels, f"{at:.6g}", f"{exponent:.6g}", f"{error:.1e}"))
+    return Table(rows, (*_dims(found, along), x, "exponent", "error"), str(found.exponent.attrs["long_name"])).text()
+
+
+def sensitivity_text(found: xr.Dataset) -> str:
+    """Indices of `sensitivity`, a row a parameter."""
+    names = [str(name) for name in found.data_vars]
+    rows = [
+        (str(one), *(f"{found[name].sel(parameter=one).item():.4g}" for name in names))
+        for one in found.parameter.values
+    ]
+    return Table(rows, ("parameter", *(name.replace("_", " ") for name in names))).text()
+
+
 def law_rows(found: Laws) -> Iterator[tuple[str, ...]]:
     """Output, where, exponent, interval and largest distance: a row for one law, two rows for two with a bend."""
     dims, bends = _dims(found.fits[0]), itertools.repeat(None) if found.bend is None else _lines(found.bend)
@@ -220,17 +243,17 @@ def _write(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
         writer.writerows([cell(row.get(name, "")) for name in names] for row in rows)
 
 
-def _dims(dataset: xr.Dataset) -> list[str]:
-    return [str(dim) for dim in dataset.sizes if dim != "law"]
+def _dims(dataset: xr.Dataset, along: str = "law") -> list[str]:
+    return [str(dim) for dim in dataset.sizes if dim != along]
 
 
 def _numbers(one: xr.Dataset) -> dict[str, Any]:
     return {str(name): variable.item() for name, variable in one.data_vars.items()}
 
 
-def _lines(dataset: xr.Dataset) -> Iterator[tuple[list[str], xr.Dataset]]:
+def _lines(dataset: xr.Dataset, along: str = "law") -> Iterator[tuple[list[str], xr.Dataset]]:
     """Each line's place on the other axes, as people write it (a number where it has no name), and what is of it."""
-    dims = _dims(dataset)
+    dims = _dims(dataset, along)
     for position in itertools.product(*(range(dataset.sizes[dim]) for dim in dims)):
         places = dict(zip(dims, position, strict=True))
         one = dataset.isel(places)
