@@ -142,15 +142,14 @@ def refine(
     Raises
     ------
     SweepError
-        The dataset is no finished product of one to five number axes, nor refined before; an output is not there or
-        runs along something; `path` is not to be written.
+        The dataset is no finished product of number axes, nor refined before; an output is not there or runs along
+        something; `path` is not to be written.
 
     Examples
     --------
-    >>> import numpy as np
     >>> import sweep
-    >>> foliot = {"kernel": "foliot", "outputs": ["period"], "fixed": {"phi0": 1.0, "a": 1.0}}
-    >>> ds = sweep.run(**foliot, axes={"mu": np.geomspace(0.1, 10.0, 5)})
+    >>> keys = {"outputs": ["period"], "axes": {"mu": [0.1, 0.3, 1.0, 3.0, 10.0]}, "fixed": {"phi0": 1.0, "a": 1.0}}
+    >>> ds = sweep.run(kernel="foliot", **keys)
     >>> sweep.refine(ds, "period", 1e-3).complete
     True
     """
@@ -182,10 +181,10 @@ def refine(
     whole = of(dict(zip(cells.axes, cells.values[order].T, strict=True)), "product" if len(cells.axes) == 1 else "zip")
     arrays = {name: cells.column(name)[order] for name in (*study.outputs, *ANCILLARY)}
     attrs = {REFINED_TO: json.dumps(dict.fromkeys(names, tolerance))}
-    if target is None or rounds is None:
+    if target is None:
         return report(cells, in_memory(cell_schema(whole, {}), arrays).assign_attrs(attrs))
     found = report(cells, store_cells(whole, target, arrays, force, attrs=attrs))
-    shutil.rmtree(rounds, ignore_errors=True)
+    shutil.rmtree(rounds, ignore_errors=True)  # type: ignore[arg-type]
     return found
 
 

@@ -143,15 +143,7 @@ def work_precision(
     if isolate or cell_timeout is not None:
         part = _without_failing(part, ["auto", *able], cell_timeout, note)
     against = _given(part, truth) if truth is not None else _best(part, [reference] if reference else able)
-
-    shape = len(names), len(tolerances)
-    rows = [_measured(part, name, rtol, against) for name in names for rtol in tolerances]
-    columns = {key: np.array([row[key] for row in rows]).reshape(shape) for key in rows[0]}
-    columns["seconds"] = _seconds(part, names, tolerances)
-    found = xr.Dataset(coords={"method": names, "rtol": tolerances})
-    for key, values in columns.items():
-        attrs = {"units": "s" if key == "seconds" else "1", "long_name": LONG_NAMES[key]}
-        found[key] = ("method", "rtol"), values, attrs
+    found = _table(part, names, tolerances, against)
     missing = _missing(part, able) if methods is None else []
     return found.assign_attrs(
         title=part.title,
@@ -340,6 +332,17 @@ def _errors(outputs: Mapping[str, Any], reference: Mapping[str, Any]) -> Any:
         off = np.where((values == true) | (np.isnan(values) & np.isnan(true)), 0.0, off)
         worst = np.maximum(worst, np.where(np.isnan(off), np.inf, off).max(axis=rest, initial=0.0))
     return worst
+
+
+def _table(study: Study, names: Sequence[str], tolerances: Sequence[float], against: _Reference) -> xr.Dataset:
+    """Everything that is measured, over methods and tolerances."""
+    rows = [_measured(study, name, rtol, against) for name in names for rtol in tolerances]
+    columns = {key: np.array([row[key] for row in rows]).reshape(len(names), -1) for key in rows[0]}
+    found = xr.Dataset(coords={"method": names, "rtol": tolerances})
+    for key, values in {**columns, "seconds": _seconds(study, names, tolerances)}.items():
+        attrs = {"units": "s" if key == "seconds" else "1", "long_name": LONG_NAMES[key]}
+        found[key] = ("method", "rtol"), values, attrs
+    return found
 
 
 def _measured(study: Study, name: str, rtol: float, against: _Reference) -> dict[str, Any]:
