@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -46,27 +46,28 @@ class KernelPage:
         return head + "".join(table.html() for table in self._tables())
 
     def _tables(self) -> list[Table]:
-        kernel = self.kernel
+        kernel, methods = self.kernel, []
+        for method in kernel.methods:
+            cannot = f"; cannot do {listed(method.excludes)}" if method.excludes else ""
+            lacks = f"; does not give {listed(method.lacks)}" if method.lacks else ""
+            error = "states its error" if method.bound else "keeps rtol"
+            methods.append((method.name, error, method.doc + cannot + lacks))
         parameters = [
             (*_unit(f), limits(f), _default(f), f.doc + _along(f, ", one for each ")) for f in kernel.parameters
         ]
-        outputs = [(*_unit(f), _along(f, "along "), f.doc) for f in kernel.outputs]
-        methods = [
-            (
-                method.name,
-                "states its error" if method.bound else "keeps rtol",
-                method.doc
-                + (f"; cannot do {listed(method.excludes)}" if method.excludes else "")
-                + (f"; does not give {listed(method.lacks)}" if method.lacks else ""),
-            )
-            for method in kernel.methods
-        ]
         cheapest = 'methods, cheapest first; "auto" takes the first whose error bound meets rtol'
-        shared = [(*_unit(f), limits(f), f.doc) for f in kernel.along]
         return [
             Table(parameters, ("parameter", "unit", "allowed", "default", "meaning"), "parameters"),
-            Table(outputs, ("output", "unit", "", "meaning"), "outputs"),
-            Table(shared, ("coordinate", "unit", "allowed", "meaning"), "coordinates that all cells share"),
+            Table(
+                ((*_unit(f), _along(f, "along "), f.doc) for f in kernel.outputs),
+                ("output", "unit", "", "meaning"),
+                "outputs",
+            ),
+            Table(
+                ((*_unit(f), limits(f), f.doc) for f in kernel.along),
+                ("coordinate", "unit", "allowed", "meaning"),
+                "coordinates that all cells share",
+            ),
             Table(methods, ("method", "error", "how"), cheapest),
         ]
 
@@ -165,7 +166,7 @@ def starter(name: str, kernel: Kernel | None = None) -> str:
     values = {p.name: kernel.example.get(p.name, 1.0) for p in kernel.parameters}
     question = f"{kernel.doc[0].upper()}{_first(kernel)[1:]}: how does it change with its parameters?"
     lines = [f"# {question}", f'kernel = "{name}"', ""]
-    lines += [f"[axes.{first.name}]", *_axis(first, values[first.name])]
+    lines += [f"[axes.{first.name}]", *_spacing(first, values[first.name])]
     fixed = [p for p in kernel.parameters if p is not first and (p.default is None or p.name in kernel.example)]
     lines += ["", "[fixed]"] if fixed else []
     for field in fixed:
@@ -174,31 +175,27 @@ def starter(name: str, kernel: Kernel | None = None) -> str:
         entry = f'"{next(iter(field.choices))}"' if field.choices else f'{{ value = {text}, unit = "{field.unit}" }}'
         lines.append(f"{field.name} = {entry}")
     for field in kernel.along:
-        lines += ["", f"[along.{field.name}]", *_range(field)]
+        lines += ["", f"[along.{field.name}]", *_spacing(field)]
     return "\n".join(lines) + "\n"
 
 
-def _axis(field: Field, middle: Any) -> Iterable[str]:
-    if field.choices:
+def _spacing(field: Field, middle: Any = None) -> list[str]:
+    """Values of an axis around a middle one, or without one of a coordinate that all cells share."""
+    unit = field.unit
+    if middle is not None and field.choices:
         return [f"values = [{quoted(field.choices)}]"]
     if field.integer:
-        return [f"values = [{', '.join(f'{max(field.lower, 1) + i:g}' for i in range(3))}]"]
-    if field.unit == "m":  # machines keep their kind when a length is changed by a fifth, not by ten
-        return _spaced("linear", 0.8 * middle, 1.2 * middle, 41, "m")
-    return _spaced("log", middle / 10, middle * 10, 41, field.unit)
-
-
-def _range(field: Field) -> Iterable[str]:
-    if field.integer:
-        return ["num = 10"]
-    if field.unit == "rad" and field.upper - field.lower > 2 * math.pi:
-        return _spaced("linear", 0, 360, 181, "degree")
-    if math.isfinite(field.upper - field.lower):
+        least = max(field.lower, 1)
+        return ["num = 10"] if middle is None else [f"values = [{least:g}, {least + 1:g}, {least + 2:g}]"]
+    if middle is not None:  # machines keep their kind when a length is changed by a fifth, not by ten
+        ends = ("linear", 0.8 * middle, 1.2 * middle, 41) if unit == "m" else ("log", middle / 10, middle * 10, 41)
+    elif unit == "rad" and field.upper - field.lower > 2 * math.pi:
+        ends, unit = ("linear", 0, 360, 181), "degree"
+    elif math.isfinite(field.upper - field.lower):
         return ["num = 200"]
-    return _spaced("linear", 0, 0.1, 51, "m") if field.unit == "m" else _spaced("log", 0.1, 100, 200, field.unit)
-
-
-def _spaced(spacing: str, start: float, stop: float, num: int, unit: str) -> list[str]:
+    else:
+        ends = ("linear", 0, 0.1, 51) if unit == "m" else ("log", 0.1, 100, 200)
+    spacing, start, stop, num = ends
     return [f'spacing = "{spacing}"', f"start = {start:g}", f"stop = {stop:g}", f"num = {num}", f'unit = "{unit}"']
 
 
