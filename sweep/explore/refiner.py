@@ -35,7 +35,7 @@ the result stretch it by all of its cells."""
 LESSENING = 0.5
 """Share of how far a cell is off the line between those that it was put between, compared with the cell that it
 descends from, as many cuts ago as there are axes: of a smooth output it is a quarter."""
-CUTS, STAYS, JUMP = 6, 0.6, 0.2
+CUTS, STAYS, JUMP = 6, 0.9, 0.2
 """Cuts after which values change as much from cell to cell as before, which is so at poles: in the latter half of them
 by more than this share of what they did in the first one; and at most once less than that share of the change lies on
 one side of the cell put between two others, as at a jump."""
@@ -190,7 +190,10 @@ class Refiner:
         return cells
 
     def _is_at_pole(self, height: Array) -> NDArray[np.bool_]:
-        """Whether cuts have lessened nothing on the way to a cell, although there is no jump."""
+        """Whether cuts have lessened nothing on the way to a cell, although there is no jump.
+
+        The first cells, which were put between none, count as jumps: nothing is known yet.
+        """
         cells, found = np.arange(len(height)), []
         with np.errstate(invalid="ignore"):
             halves = np.sort(abs(height[:, None] - height[self.origins]), axis=1)

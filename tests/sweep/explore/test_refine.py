@@ -135,14 +135,15 @@ def test_where_values_scatter_no_more_cells_are_added_and_the_scatter_is_told():
     height = np.linspace(1.0, 2.0, 5000)
     off = abs(np.interp(height, found.dataset.height, found.dataset.fall_time) - curve(height))
     assert off.max() < 1.5e-2
-    quiet = sweep.refine(**shaped(lambda height: np.sin(40 * height) + 2, np.linspace(1, 2, 9)), tolerance=1e-2)
-    assert (quiet.noise, quiet.complete) == (0, True)
+    for quiet in (lambda height: np.sin(40 * height) + 2, lambda height: abs(height - 1.3719) ** 0.5 - 0.5):
+        found = sweep.refine(**shaped(quiet, np.linspace(1, 2, 9)), tolerance=5e-4)
+        assert (found.noise, found.complete) == (0, True)
 
 
 @pytest.mark.parametrize("pole", [lambda x: 1 / abs(x), lambda x: 1 / x, lambda x: 1 / x**2])
 def test_beside_a_pole_cells_are_few_and_elsewhere_the_tolerance_is_met(pole):
     found = sweep.refine(**shaped(lambda height: pole(height - 1.3719), np.linspace(1, 2, 9)), tolerance=1e-2)
-    assert found.added < 125  # of one sign 250 to 320 where edges are cut as often as at a jump
+    assert found.added < 180  # of one sign 250 to 320 where edges are cut as often as at a jump
     assert found.jumps > 0
     assert not found.complete
     assert (found.noise, found.error <= 1e-2) == (0, True)
