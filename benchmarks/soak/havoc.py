@@ -79,7 +79,7 @@ def damage(rng, path, strange):
     if kind in ("flip", "zeroed"):
         length = 1 if kind == "flip" else 512
         at = rng.randrange(len(content) - length)
-        if not finished and ending - length < at < ending + ENDING_BYTES + 4:
+        if not finished and ending - length < at < ending + ENDING_BYTES:
             return damage(rng, path, strange)  # what is written over at the end
         content[at : at + length] = bytes(length) if kind == "zeroed" else [content[at] ^ 1 << rng.randrange(8)]
     elif kind in ("cut", "empty", "missing"):

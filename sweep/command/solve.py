@@ -19,7 +19,7 @@ from sweep.errors import CELLS_FAILED, COMPLETE, EXIT_CODES, INCOMPLETE, SweepEr
 if TYPE_CHECKING:
     import xarray as xr
 
-    from sweep.file.stored import Stored
+    from sweep.file.reading import StoredFile
     from sweep.study.model import Study
 
 NOTIFY_SECONDS = 60
@@ -91,9 +91,9 @@ def _computed(arguments: argparse.Namespace, study: Study, target: Path) -> Outc
         say(text := f"{target}: unfinished; no cell is computed yet")
         return Outcome(INCOMPLETE, text)
     if ending == "complete":  # read without xarray, which takes longer to load than a small run
-        from sweep.file.stored import Stored
+        from sweep.file.reading import StoredFile
 
-        result: xr.Dataset | Stored = Stored(target, study)
+        result: xr.Dataset | StoredFile = StoredFile(target)
     else:
         from sweep.file.open import open_result, open_unfinished
 

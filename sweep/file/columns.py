@@ -10,6 +10,7 @@ from xarray.backends import BackendArray, BackendEntrypoint
 from xarray.core import indexing
 
 from sweep.file.foreign import changed_attrs
+from sweep.file.layout import study_apart
 from sweep.file.reading import Changed, Numbers, StoredFile
 
 
@@ -30,32 +31,41 @@ class Result(BackendEntrypoint):
 
     def open_dataset(self, filename_or_obj: Any, *, drop_variables: Any = None) -> xr.Dataset:
         """Raises SweepError when damaged numbers are read; OSError, ValueError and their like at once."""
-        path, file = Path(filename_or_obj), None
+        path = Path(filename_or_obj)
         try:
             file = StoredFile(path)
-            attrs = file.ending
         except Changed:
-            attrs = changed_attrs(path)
-        plain = xr.open_dataset(
-            path, engine="h5netcdf", cache=False, decode_times=False, decode_timedelta=False,
-            drop_variables=drop_variables, phony_dims="access",
-        )  # fmt: skip
-        plain.attrs.update({name: attrs[name] for name in ("created", "end", "cells_per_second") if name in attrs})
-        if file is None:
-            # h5netcdf takes the first axis, too, to be over a dimension that it makes up
-            odd = any(str(dim).startswith("phony_dim") for dim in plain.sizes)
-            if odd or not {v.dtype.kind for v in plain.data_vars.values()} <= set("fiu"):
-                plain.close()
-                raise ValueError("something in it is no number, or over no dimension of its own")
-            return plain
+            return _changed(path)
         columns = {}
         for name, numbers in file.columns().items():
-            like = plain.variables[name]
             chunks = (*numbers.table.box, *numbers.place.shape)
-            encoding = {"preferred_chunks": dict(zip(map(str, like.dims), chunks, strict=True))}
-            columns[name] = xr.Variable(like.dims, indexing.LazilyIndexedArray(Column(numbers)), like.attrs, encoding)
-        found = plain.assign(columns).assign_coords({name: c.load() for name, c in plain.coords.items()})
-        found.encoding = dict(plain.encoding)
-        plain.close()
+            encoding = {"preferred_chunks": dict(zip(numbers.dims, chunks, strict=True))}
+            lazy = indexing.LazilyIndexedArray(Column(numbers))
+            columns[name] = xr.Variable(numbers.dims, lazy, dict(numbers.attrs), encoding)
+        coords = {name: (c.dims, c.values, dict(c.attrs)) for name, c in file.coords.items()}
+        found = xr.Dataset(columns, coords, file.attrs)
+        found.encoding["source"] = str(path)
         found.set_close(file.close)
         return found
+
+
+def _changed(path: Path) -> xr.Dataset:
+    """As HDF5 finds it, which alone checks it."""
+    attrs = changed_attrs(path)
+    found = xr.open_dataset(
+        path, engine="h5netcdf", cache=False, decode_times=False, decode_timedelta=False, phony_dims="access"
+    )
+    # h5netcdf takes the first axis, too, to be over a dimension that it makes up
+    odd = any(str(dim).startswith("phony_dim") for dim in found.sizes)
+    if odd or not {v.dtype.kind for v in found.data_vars.values()} <= set("fiu"):
+        found.close()
+        raise ValueError("something in it is no number, or over no dimension of its own")
+    # words as fixed-width text, as in a Dataset that was never in a file
+    words = {name: c for name, c in found.coords.items() if c.dtype.kind not in "fi"}
+    plain = found.assign_coords({name: (c.dims, c.values.astype(str), c.attrs) for name, c in words.items()})
+    plain.attrs.update({name: attrs[name] for name in ("created", "end", "cells_per_second") if name in attrs})
+    values = {str(name): c.values for name, c in plain.coords.items()}
+    plain.attrs["study_json"] = study_apart(plain.attrs["study_json"], values, together=True)
+    plain.encoding = dict(found.encoding)
+    plain.set_close(found.close)
+    return plain

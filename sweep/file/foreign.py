@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import contextlib
-import json
 import math
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from sweep.cells.reduce import BY_STATUS
 from sweep.cells.schema import STATUS
-from sweep.file.layout import ENDING, chunks_of
-from sweep.file.reading import attrs_of
+from sweep.file.layout import ENDING
+from sweep.file.reading import ending_of
 
 MOST_COMPRESSED = 1100
 """Bytes that gzip makes of one, at most."""
@@ -34,15 +34,22 @@ def changed_attrs(output: Path) -> dict[str, Any]:
 
     with h5py.File(output, "r") as file:
         _check_own(file, output.stat().st_size)
-        attrs = attrs_of(file)
+        found = [_attrs(file), *(_attrs(file[name]) for name in file)]
+        attrs = found[0]
         attrs["study_json"], attrs["fingerprint"], file[STATUS if STATUS in file else BY_STATUS]
-        for own in (attrs, *(attrs_of(file[name]) for name in file)):
-            if not all(isinstance(own[name], str) for name in TEXTS if name in own):
-                raise TypeError("an attribute is no text")
+        if not all(isinstance(own[name], str) for own in found for name in TEXTS if name in own):
+            raise TypeError("an attribute is no text")
         float(attrs.get("rtol", 0.0))
-        with contextlib.suppress(OSError, KeyError, ValueError):
-            attrs |= json.loads(file[ENDING][()].tobytes())
-    return attrs
+        return attrs | (ending_of(file[ENDING][()].tobytes()) if ENDING in file else {})
+
+
+def _attrs(thing: Any) -> dict[str, Any]:
+    """Attributes of what h5py has opened: texts as str, a single number as such."""
+    found = {}
+    for name, value in thing.attrs.items():
+        single = value.item() if isinstance(value, np.ndarray) and value.size == 1 else value
+        found[name] = single.decode() if isinstance(single, bytes) else single
+    return found
 
 
 def _check_own(group: Any, size: int, inner: bool = False) -> None:
@@ -65,8 +72,10 @@ def _check_own(group: Any, size: int, inner: bool = False) -> None:
             raise ValueError(f"{name} has more numbers than the file has room for")
         # HDF5 2.0 reads beyond the end of chunks that are smaller than they say, and crashes where axes are missing
         whole = thing.dtype.itemsize * math.prod(thing.chunks or ()) + 4 * thing.fletcher32
-        plain = thing.chunks and not thing.compression and thing.scaleoffset is None
-        if plain and any(chunk.filter_mask or chunk.size != whole for chunk in chunks_of(thing)):
+        chunks: list[Any] = []
+        if thing.chunks and not thing.compression and thing.scaleoffset is None:
+            thing.id.chunk_iter(chunks.append)
+        if any(chunk.filter_mask or chunk.size != whole for chunk in chunks):
             raise ValueError(f"{name} has chunks that are too short")
         if "DIMENSION_LIST" in thing.attrs and thing.attrs.get_id("DIMENSION_LIST").shape != (thing.ndim,):
             raise ValueError(f"{name} has not the dimensions that it says")

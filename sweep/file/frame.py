@@ -1,20 +1,19 @@
 """A result before its first number: HDF5 makes all of it, and says of each chunk where it is.
 
-First come names, attributes and coordinates, the head of the file, in which HDF5 checks every byte that it reads: texts
-have a fixed length and stand in object headers, coordinates are one chunk with a checksum each, single numbers stand in
-headers too. Then HDF5 is told to find a place for each chunk of the outputs. The zeros that it writes there are kept
-from the disk: instead, each chunk of statuses says PENDING, and behind each other chunk stands a checksum that is
-wrong, so that nobody takes what is not computed yet for numbers.
+HDF5 checks every byte of names, attributes and coordinates that it reads: texts have a fixed length and stand in object
+headers, coordinates are one chunk with a checksum each, single numbers stand in headers too. The zeros that it writes
+over the chunks of outputs are kept from the disk: instead, each chunk of statuses says PENDING, and behind each other
+chunk stands a checksum that is wrong, so that nobody takes what is not computed yet for numbers.
 """
 
 from __future__ import annotations
 
 import io
-import json
 import math
 import os
 import secrets
-from collections.abc import Iterator, Mapping
+import tempfile
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -27,7 +26,19 @@ from sweep.cells.partition import Partition, box_shape, boxes, row_blocks
 from sweep.cells.schema import STATUS, Column, Coordinate, Schema
 from sweep.file import disk
 from sweep.file.fletcher import checksum
-from sweep.file.layout import BYTES, ENDING, ENDING_BYTES, GROUP, PIECE, SEAL, Place, Seal, digest_of, gaps, tables_of
+from sweep.file.layout import (
+    BYTES,
+    ENDING,
+    ENDING_BYTES,
+    GROUP,
+    PIECE,
+    SEAL,
+    Contents,
+    Place,
+    Table,
+    sealed,
+    study_apart,
+)
 
 if TYPE_CHECKING:
     from sweep.study.model import Study
@@ -39,10 +50,8 @@ SHARED_WORTH_A_PAGE = PAGE
 """so do shorter ones, where several machines write."""
 GATHERED_BYTES = 8 << 20
 """Bytes of the rows that are reduced to groups at a time."""
-LONGEST = 60_000
-"""Bytes of an attribute that HDF5 keeps in an object header; a longer text it keeps where it has no checksum."""
 COMPACT = 1 << 15
-"""Attributes up to which they are all kept there."""
+"""Attributes up to which HDF5 keeps them in an object header."""
 WRONG = b"\xff" * 4
 """A checksum that zeros have not."""
 
@@ -78,7 +87,7 @@ def cuts_of(study: Study, schema: Schema, blocks: Partition) -> dict[str, Cut]:
 
 def expected_size(schema: Schema, cuts: Mapping[str, Cut]) -> int:
     """Bytes that a result will take, but for some thousands: its names, what HDF5 says of each chunk, the chunks."""
-    size = (14 << 10) + sum(len(str(text)) for text in schema.attrs.values())
+    size = (14 << 10) + sum(len(str(text)) for text in _attrs(schema).values())
     size += sum(np.asarray(coordinate.values).nbytes for coordinate in schema.coordinates)
     for cut in cuts.values():
         for column in cut.columns:
@@ -86,6 +95,12 @@ def expected_size(schema: Schema, cuts: Mapping[str, Cut]) -> int:
             paged = -(-chunk // PAGE) * PAGE if chunk >= WORTH_A_PAGE else chunk
             size += cut.blocks.count * (paged + BYTES + 16)
     return size
+
+
+def _attrs(schema: Schema) -> dict[str, Any]:
+    """Attributes of the file, whose study refers to long coordinates."""
+    values = {c.name: np.asarray(c.values) for c in schema.coordinates}
+    return {**schema.attrs, "study_json": study_apart(schema.attrs["study_json"], values)}
 
 
 def create(path: Path, schema: Schema, cuts: Mapping[str, Cut], shared: bool = False) -> None:
@@ -104,25 +119,20 @@ def create(path: Path, schema: Schema, cuts: Mapping[str, Cut], shared: bool = F
     ------
     OSError
     """
-    image, key = _Image(), secrets.token_bytes(BYTES)
-    _describe(image, schema, cuts)
-    head = image.size
-    with _opened(image, SHARED_WORTH_A_PAGE if shared else WORTH_A_PAGE) as file:
-        _allocate(file, image, cuts)
-        tables, ending = tables_of(file, key), int(file[ENDING].id.get_chunk_info(0).byte_offset)
-    fd = disk.open_file(path, os.O_CREAT | os.O_TRUNC | os.O_RDWR)
-    try:
-        disk.reserve(fd, image.size + SEAL.size)
-        for at, page in image.pages.items():
-            disk.write_all(fd, (page[: image.size - at],), at)
-        for place in (place for table in tables.values() for place in table.places if place.check):
-            _write_pending(fd, place)
-        disk.write_all(fd, (WRONG,), ending + ENDING_BYTES)
-        rest = digest_of(fd, gaps(tables.values(), ending, head, image.size))
-        disk.write_all(fd, (SEAL.pack(*Seal(head, digest_of(fd, [(0, head)]), rest, key)),), image.size)
-        disk.fsync(fd)
-    finally:
-        os.close(fd)
+    with _Image() as image:
+        contents = _laid_out(image, schema, cuts, SHARED_WORTH_A_PAGE if shared else WORTH_A_PAGE)
+        end = os.fstat(image.fileno()).st_size
+        fd = disk.open_file(path, os.O_CREAT | os.O_TRUNC | os.O_RDWR)
+        try:
+            disk.reserve(fd, end + len(contents.to_json()) + SEAL.size)
+            for at, piece in image.pieces(end):
+                disk.write_all(fd, (piece,), at)
+            for place in (place for table in contents.tables.values() for place in table.places if place.check):
+                _write_pending(fd, place)
+            disk.write_all(fd, (sealed(fd, contents, end),), end)
+            disk.fsync(fd)
+        finally:
+            os.close(fd)
 
 
 def _write_pending(fd: int, place: Place) -> None:
@@ -133,113 +143,85 @@ def _write_pending(fd: int, place: Place) -> None:
         piece = words.tobytes() + checksum(words, place.size)
     elif size < PAGE:
         piece = bytes(place.size) + WRONG
-    starts = place.at + (size - len(piece))
-    for run in np.split(starts, np.flatnonzero(np.diff(starts) != len(piece)) + 1):
-        some = max(1, PIECE // len(piece))
-        for k in range(0, len(run), some):
-            disk.write_all(fd, (piece * len(run[k : k + some]),), int(run[k]))
+    starts = (place.at + (size - len(piece))).tolist()
+    some = max(1, PIECE // size) if place.step == len(piece) else 1
+    for chunks in (starts[:1], *(starts[k : k + some] for k in range(1, len(starts), some))):
+        disk.write_all(fd, (piece * len(chunks),), chunks[0])
 
 
-class _Image(io.RawIOBase):
-    """The file as HDF5 writes it, in memory, but for chunks of zeros.
-
-    Attributes
-    ----------
-    pages : dict of int to bytearray
-        What was written, by where it begins.
-    size : int
-    chunk : int
-        Bytes of the chunks that are left out.
-    """
+class _Image(io.FileIO):
+    """The file as HDF5 writes it, in memory, but for chunks of zeros, which take none."""
 
     def __init__(self) -> None:
-        self.pages: dict[int, bytearray] = {}
-        self.size, self.chunk, self._at = 0, -1, 0
-
-    def seek(self, offset: int, whence: int = 0) -> int:
-        self._at = offset + (self.size if whence == os.SEEK_END else 0)
-        return self._at
-
-    def tell(self) -> int:
-        return self._at
-
-    def truncate(self, size: int | None = None) -> int:
-        self.size = self._at if size is None else size
-        return self.size
-
-    def readinto(self, buffer: Any) -> int:
-        for page, here, there in self._pieces(len(buffer)):
-            buffer[there] = page[here]
-        return len(buffer)
+        with tempfile.TemporaryFile() as other:
+            super().__init__(os.memfd_create("result") if hasattr(os, "memfd_create") else os.dup(other.fileno()), "r+")
+        self.chunk = 0
+        """Bytes of the chunks that are left out."""
 
     def write(self, piece: Any) -> int:
         # HDF5 writes nothing else of a chunk's length that begins with zeros: its tables begin with addresses
-        if len(piece) == self.chunk and bytes(piece[:BYTES]) == bytes(BYTES):
-            self._at += len(piece)
-        else:
-            for page, here, there in self._pieces(len(piece)):
-                page[here] = piece[there]
-        self.size = max(self.size, self._at)
-        return len(piece)
+        count = len(piece)
+        if count == self.chunk > BYTES and bytes(piece[:BYTES]) == bytes(BYTES):
+            self.seek(count, os.SEEK_CUR)
+            return count
+        left = memoryview(piece)
+        while left:
+            left = left[super().write(left) :]
+        return count
 
-    def _pieces(self, count: int) -> Iterator[tuple[bytearray, slice, slice]]:
-        """So many bytes from here on: a page, where they are in it, and which of them they are."""
-        begin, end = self._at, self._at + count
-        while self._at < end:
-            page = self._at // PAGE * PAGE
-            stop = min(end, page + PAGE)
-            yield (
-                self.pages.setdefault(page, bytearray(PAGE)),
-                slice(self._at - page, stop - page),
-                slice(self._at - begin, stop - begin),
-            )
-            self._at = stop
+    def pieces(self, end: int) -> Any:
+        """What was written, piece by piece: where it begins, and its bytes."""
+        at = 0
+        while at < end:
+            try:
+                at = os.lseek(self.fileno(), at, os.SEEK_DATA)
+            except OSError:  # nothing but what is left out follows
+                return
+            stop = min(os.lseek(self.fileno(), at, os.SEEK_HOLE), at + PIECE)
+            yield at, os.pread(self.fileno(), stop - at, at)
+            at = stop
 
 
-def _opened(image: _Image, aligned: int = 0) -> Any:
-    """The file for h5py, made anew where nothing is to be aligned; objects of so many bytes begin on a page."""
+def _laid_out(image: _Image, schema: Schema, cuts: Mapping[str, Cut], aligned: int) -> Contents:
+    """Has HDF5 write all that is no number, and find a place for each number; objects of so many bytes are aligned."""
+    import h5netcdf
     import h5py
     from h5py import h5f, h5fd, h5p
 
     access, made = h5p.create(h5p.FILE_ACCESS), h5p.create(h5p.FILE_CREATE)
     access.set_fclose_degree(h5f.CLOSE_STRONG)
     access.set_libver_bounds(h5f.LIBVER_V110, h5f.LIBVER_V110)
+    access.set_alignment(aligned, PAGE)
     access.set_fileobj_driver(h5fd.fileobj_driver, image)
-    if aligned:
-        access.set_alignment(aligned, PAGE)
-        return h5py.File(h5f.open(b"result", h5f.ACC_RDWR, access))
+    # each thing behind the last one, so that chunks are at equal distances
+    made.set_file_space_strategy(h5f.FSPACE_STRATEGY_NONE, False, 1)
     made.set_attr_phase_change(COMPACT, 0)
     made.set_attr_creation_order(h5p.CRT_ORDER_TRACKED | h5p.CRT_ORDER_INDEXED)
     made.set_link_creation_order(h5p.CRT_ORDER_TRACKED | h5p.CRT_ORDER_INDEXED)
-    return h5py.File(h5f.create(b"result", h5f.ACC_TRUNC, made, access))
-
-
-def _describe(image: _Image, schema: Schema, cuts: Mapping[str, Cut]) -> None:
-    """Writes the head of the file: names, attributes, coordinates, and columns that have no place yet."""
-    import h5netcdf
-
-    with _opened(image) as plain, h5netcdf.File(plain, "r+") as file:
+    with (
+        h5py.File(h5f.create(b"result", h5f.ACC_TRUNC, made, access)) as plain,
+        h5netcdf.File(plain, "r+") as file,
+    ):
         # xarray's way to mark what belongs to the coordinates of all variables
         away = [c.name for c in schema.coordinates if c.dims and not set(c.dims) & {c.name, *schema.grid.dims}]
-        _say(file, {**schema.attrs, **({"coordinates": " ".join(away)} if away else {})})
+        _say(file, {**_attrs(schema), **({"coordinates": " ".join(away)} if away else {})})
         file.dimensions = schema.sizes
         for coordinate in schema.coordinates:
             _write_coordinate(file, plain, coordinate)
         group = file.create_group(GROUP)
         group.dimensions.update({"byte": BYTES, "character": ENDING_BYTES})
+        about = "when the run ended, and how fast it was: JSON, and its xxh3_128 digest"
+        _say(group.create_variable("ending", ("character",), "u1", dcpl=_properties()), {"long_name": about})
         for name, cut in cuts.items():
             lengths = {f"{name}_block": cut.blocks.count, f"{name}_column": len(cut.columns)}
             group.dimensions.update(lengths)
             digests = group.create_variable(f"{name}_digests", (*lengths, "byte"), "u1", dcpl=_properties())
-            columns = json.dumps([[column.name for column in cut.columns], len(cut.grid)])
-            about = "xxh3_128 of each chunk of each column, zeros where it is not computed yet"
-            _say(digests, {"long_name": about, "columns": columns})
-        ending = group.create_variable("ending", ("character",), "S1", dcpl=_properties((ENDING_BYTES,)))
-        _say(ending, {"long_name": "when the run ended, and how fast it was, as JSON"})
+            _say(digests, {"long_name": "xxh3_128 of each chunk of each column, zeros where it is not computed yet"})
         for column in schema.columns:
             dims = (*schema.grid.dims, *column.dims)
-            properties = _properties(cuts["cells"].chunk(column))
-            variable = file.create_variable(column.name, dims, column.dtype, dcpl=properties)
+            variable = file.create_variable(
+                column.name, dims, column.dtype, dcpl=_properties(cuts["cells"].chunk(column))
+            )
             away = [c.name for c in schema.coordinates if c.dims != (c.name,) and set(c.dims) <= set(dims)]
             _say(variable, {**column.attrs, **({"coordinates": " ".join(away)} if away else {})})
         if "rows" in cuts:
@@ -250,6 +232,12 @@ def _describe(image: _Image, schema: Schema, cuts: Mapping[str, Cut]) -> None:
             for column in cut.columns:
                 own = (f"{column.name} {k}" for k in range(len(column.shape)))
                 rows.create_variable(column.name, ("row", *own), column.dtype, dcpl=_properties(cut.chunk(column)))
+        key, tables = secrets.token_hex(BYTES), {}
+        for name, cut in cuts.items():
+            places = tuple(_placed(plain if name == "cells" else plain[name], image, cut, c) for c in cut.columns)
+            digests = int(plain[f"{GROUP}/{name}_digests"].id.get_offset())
+            tables[name] = Table(name, cut.grid, cut.blocks, places, digests, key)
+        return Contents(tables, int(plain[ENDING].id.get_offset()))
 
 
 def _write_coordinate(file: Any, plain: Any, coordinate: Coordinate) -> None:
@@ -285,11 +273,11 @@ def _properties(chunk: tuple[int, ...] | None = None) -> Any:
     properties.set_fill_time(h5d.FILL_TIME_NEVER)
     if chunk == ():
         properties.set_layout(h5d.COMPACT)
-    elif chunk:
+        return properties
+    properties.set_alloc_time(h5d.ALLOC_TIME_LATE if chunk else h5d.ALLOC_TIME_EARLY)
+    if chunk:
         properties.set_chunk(chunk)
         properties.set_fletcher32()
-    if chunk != ():
-        properties.set_alloc_time(h5d.ALLOC_TIME_LATE)
     return properties
 
 
@@ -298,22 +286,29 @@ def _say(thing: Any, attrs: Mapping[str, Any]) -> None:
     import h5py
 
     for name, value in attrs.items():
-        text = value.encode() if isinstance(value, str) else b""
-        if isinstance(value, str) and len(text) <= LONGEST:
+        if isinstance(value, str):
+            text = value.encode()
             value = np.array(text, h5py.string_dtype("utf-8", max(2, len(text))))
         thing.attrs[name] = value
 
 
-def _allocate(file: Any, image: _Image, cuts: Mapping[str, Cut]) -> None:
-    """Has HDF5 find a place for each number and digest."""
-    for name, cut in cuts.items():
-        file[f"{GROUP}/{name}_digests"][0, 0, 0] = 0
-        for column in cut.columns:
-            dataset = file[column.name if name == "cells" else f"rows/{column.name}"]
-            if dataset.chunks:
-                image.chunk = math.prod(dataset.chunks) * dataset.dtype.itemsize + len(WRONG)
-                dataset.id.write_direct_chunk((0,) * dataset.ndim, bytes(image.chunk))
-            else:
-                dataset[()] = np.nan if dataset.dtype.kind == "f" else -1
-    image.chunk = ENDING_BYTES + len(WRONG)
-    file[ENDING].id.write_direct_chunk((0,), bytes(image.chunk))
+def _placed(group: Any, image: _Image, cut: Cut, column: Column) -> Place:
+    """Has HDF5 find a place for each chunk of a column. Raises OSError where it places them in another way."""
+    dataset, count = group[column.name], cut.blocks.count
+    size = column.cell_bytes * math.prod(box_shape(cut.grid, cut.blocks.cells))
+    if dataset.chunks is None:
+        dataset[()] = np.nan if dataset.dtype.kind == "f" else -1
+        first = int(dataset.id.get_offset())
+        return Place(column.name, dataset.dtype.str, column.shape, size, 0, 1, first, first, 0)
+    image.chunk = size + len(WRONG)
+    group.file.flush()  # so that nothing comes between the chunks
+    dataset.id.write_direct_chunk((0,) * dataset.ndim, bytes(image.chunk))
+    counts = [-(-n // length) for n, length in zip(dataset.shape, dataset.chunks, strict=True)]
+    corners = np.array(np.unravel_index(np.minimum((0, 1, 2, count - 1), count - 1), counts)).T * dataset.chunks
+    infos = [dataset.id.get_chunk_info_by_coord(tuple(corner)) for corner in corners.tolist()]
+    first, second, third, last = (int(info.byte_offset) for info in infos)
+    step = third - second
+    # each chunk takes no less than a step, so that they are at equal distances if they are so in sum
+    if last != second + max(0, count - 2) * step or count != math.prod(counts):
+        raise OSError(f"HDF5 has not placed the chunks of {column.name} one behind the other")
+    return Place(column.name, dataset.dtype.str, column.shape, size, len(WRONG), count, first, second, step)

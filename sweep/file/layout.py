@@ -1,43 +1,42 @@
-"""Where the numbers of a result stand, and the seal behind its last byte.
+"""Where the numbers of a result stand, and the seal behind the last byte of HDF5 that says so.
 
-The numbers of a column stand in chunks, one a block, each with HDF5's checksum behind it. Digests of all chunks are in
-a table in the file, a row of them for each block; a row of zeros is a block that is not done. The seal is
+The numbers of a column stand in chunks, one a block, each with HDF5's checksum behind it. HDF5 places the chunks of a
+column at equal distances, but for the first one. Digests of all chunks are in a dataset of the file, a row of them for
+each block; a row of zeros is a block that is not done. The seal is
 
-    head          int64: bytes from the beginning of the file to the first chunk, in which HDF5 keeps its structure
-    head digest   xxh3 (128 bits) of these
-    rest digest   of all other bytes that are in no chunk
-    key           random: of this file alone
+    contents   JSON: tables of columns with the places of their chunks, and the random key of this file
+    digest     xxh3 (128 bits) of all bytes that are in no chunk, no digest and not the ending, and of the contents
+    length     int64: bytes of the contents
     MAGIC
 
-A program that changes the file by HDF5 cuts the seal off. HDF5 is let loose on nothing but what has one, or ends where
-HDF5 left it: in a damaged structure HDF5 may loop for ever.
+A program that changes the file by HDF5 cuts the seal off. HDF5 is let loose on nothing but what is sealed, or ends
+where HDF5 left it: in a damaged structure HDF5 may loop for ever.
 """
 
 from __future__ import annotations
 
 import itertools
 import json
-import math
 import os
 import re
 import struct
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import xxhash
 
-from sweep.cells.partition import Partition
+from sweep.cells.partition import Partition, box_shape
 from sweep.errors import SweepError
 from sweep.file import disk
 from sweep.file.fletcher import checksum
 
 FORMAT = 4
 MAGIC = b"foliot format %d\n" % FORMAT
-SEAL = struct.Struct(f"<q16s16s16s{len(MAGIC)}s")
+SEAL = struct.Struct(f"<16sq{len(MAGIC)}s")
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 """How files of HDF5 begin,"""
 FILE_END = slice(28, 36)
@@ -46,57 +45,17 @@ BYTES = 16
 """Of a digest."""
 PIECE = 8 << 20
 """Bytes read at a time."""
-ENDING_BYTES = 128
-"""Of the text that is written when all is done."""
-TABLES, GROUP, ENDING = ("cells", "rows"), "integrity", "integrity/ending"
+LONG = 1 << 14
+"""Bytes of a coordinate from which on the study in the file refers to it."""
+GROUP, ENDING, ENDING_BYTES = "integrity", "integrity/ending", 128
+"""The group of digests, and in it what is written when all is done: JSON, and its digest."""
 DAMAGE = (OSError, EOFError, LookupError, ValueError, TypeError, AttributeError, RuntimeError)
 """What comes of reading a damaged file."""
 
 
-class Seal(NamedTuple):
-    """What stands behind the last byte of HDF5."""
-
-    head: int
-    head_digest: bytes
-    rest_digest: bytes
-    key: bytes
-    magic: bytes = MAGIC
-
-
-def read_seal(fd: int, path: Path) -> Seal | None:
-    """The seal of a file whose head is as it was written; None where another program has changed the file.
-
-    Raises
-    ------
-    OSError, EOFError
-    ValueError
-        It is no file of HDF5, was cut, or its head is damaged.
-    SweepError
-        It is of another format.
-    """
-    size = os.fstat(fd).st_size
-    begin = read_bytes(fd, 0, min(size, FILE_END.stop))
-    tail = read_bytes(fd, size - SEAL.size, size) if size > SEAL.size else b""
-    if not begin.startswith(SIGNATURE):
-        raise ValueError("it is no file of HDF5")
-    whole = begin[8:9] < b"\2" or int.from_bytes(begin[FILE_END], "little") == size
-    if tail.endswith(MAGIC):
-        seal = Seal(*SEAL.unpack(tail))
-        if 0 < seal.head <= size and digest_of(fd, [(0, seal.head)]) == seal.head_digest:
-            return seal
-    elif re.search(rb"foliot format \d\n$", tail):
-        raise SweepError(
-            f"{path}: a result of another format; this version of foliot reads format {FORMAT} alone; open it with the "
-            "version that wrote it, or compute it again under another name"
-        )
-    elif whole:
-        return None
-    raise ValueError("its structure is damaged, or its end is missing, as in a copy that was interrupted")
-
-
 @dataclass(frozen=True, eq=False)
 class Place:
-    """Where a column is.
+    """Where the chunks of a column are.
 
     Attributes
     ----------
@@ -105,8 +64,10 @@ class Place:
         Of a cell.
     size, check : int
         Bytes of a chunk, and of the checksum behind it; a single number has none.
-    at : ndarray of int64, shape (blocks,)
-        Where each chunk begins.
+    count : int
+        Chunks.
+    first, second, step : int
+        Where the first one and the second one begin, and how far each other one is from the one before.
     """
 
     name: str
@@ -114,7 +75,19 @@ class Place:
     shape: tuple[int, ...]
     size: int
     check: int
-    at: Any
+    count: int
+    first: int
+    second: int
+    step: int
+
+    @cached_property
+    def at(self) -> Any:
+        """Where each chunk begins: ndarray of int64, shape (count,)."""
+        return np.append(self.first, self.second + self.step * np.arange(self.count - 1, dtype=np.int64))
+
+    def room(self, block: int) -> int:
+        """Bytes of a chunk with its checksum, and up to the next chunk where that follows."""
+        return self.step if 0 < block < self.count - 1 else self.size + self.check
 
     def empty(self, cells: int) -> Any:
         """An uninitialised array of so many cells."""
@@ -129,45 +102,37 @@ class Table:
     ----------
     name : str
         "cells": the output's columns; of a summary also "rows", which they are made of.
-    grid, box : tuple of int
-        The shape in which the cells stand, and that of a block.
+    grid : tuple of int
+        The shape in which the cells stand.
+    blocks : Partition
+        How the cells are cut into blocks.
     places : tuple of Place
     digests : int
         Where the digests begin, shape (blocks, columns, 16).
-    key : bytes
+    key : str
         Of the file.
     """
 
     name: str
     grid: tuple[int, ...]
-    box: tuple[int, ...]
+    blocks: Partition
     places: tuple[Place, ...]
     digests: int
-    key: bytes
+    key: str
 
-    @cached_property
-    def blocks(self) -> Partition:
-        """How the cells are cut into blocks."""
-        inner = 1
-        for length, some in zip(reversed(self.grid), reversed(self.box), strict=True):
-            if some < length:
-                return Partition(math.prod(self.grid), inner * some, inner * length)
-            inner *= length
-        return Partition(inner, inner)
+    @property
+    def box(self) -> tuple[int, ...]:
+        """The shape of a block."""
+        return box_shape(self.grid, self.blocks.cells)
 
     @property
     def row_bytes(self) -> int:
         """Bytes of the digests of a block."""
         return BYTES * len(self.places)
 
-    def spans(self) -> Any:
-        """Begin and end of every chunk and of the digests, shape (n, 2)."""
-        own = np.array([[self.digests, self.digests + self.blocks.count * self.row_bytes]], np.int64)
-        return np.concatenate([own, *(np.stack([p.at, p.at + p.size + p.check], axis=1) for p in self.places)])
-
     def digest(self, number: int, block: int, *pieces: Any) -> bytes:
         """Digest of a chunk of a column: of all its bytes, and of whose and which it is."""
-        state = xxhash.xxh3_128(self.key + self.name.encode() + struct.pack("<qi", block, number))
+        state = xxhash.xxh3_128(f"{self.key} {self.name}".encode() + struct.pack("<qi", block, number))
         for piece in pieces:
             state.update(disk.as_bytes(piece))
         return state.digest()
@@ -180,7 +145,7 @@ class Table:
             if place.check:
                 behind = bytes(place.size - array.nbytes) + checksum(array, place.size)
             disk.write_all(fd, (array, behind), int(place.at[block]))
-            row += self.digest(number, block, array, behind)
+            row += self.digest(number, block, array, behind, bytes(place.room(block) - place.size - place.check))
         return row
 
     def read(self, fd: int, number: int, block: int, digest: bytes, out: Any = None) -> Any:
@@ -192,7 +157,7 @@ class Table:
         """
         place, (start, stop) = self.places[number], self.blocks.bounds(block)
         found = place.empty(stop - start) if out is None else out
-        behind = bytearray(place.size + place.check - found.nbytes)
+        behind = bytearray(place.room(block) - found.nbytes)
         try:
             disk.read_all(fd, (found, behind), int(place.at[block]))
         except (OSError, EOFError):
@@ -213,49 +178,101 @@ class Table:
             disk.write_all(fd, (rows,), self.digests + blocks[0] * self.row_bytes)
 
 
-def tables_of(file: Any, key: bytes) -> dict[str, Table]:
-    """The tables of a result that h5py has opened: HDF5 knows the place of every chunk."""
-    found = {}
-    for name in TABLES:
-        if f"{GROUP}/{name}_digests" not in file:
-            continue
-        digests, group = file[f"{GROUP}/{name}_digests"], file if name == "cells" else file[name]
-        names, depth = json.loads(digests.attrs["columns"])
-        places: list[Place] = []
-        columns = [group[name] for name in names]
-        for column in columns:
-            size = column.dtype.itemsize * math.prod(column.chunks or ())
-            starts = [c.byte_offset for c in chunks_of(column)] if column.chunks else [column.id.get_offset()]
-            shape, check, at = column.shape[depth:], 4 if column.chunks else 0, np.array(starts, np.int64)
-            places.append(Place(column.name.split("/")[-1], column.dtype.str, shape, size, check, at))
-        grid, box = columns[0].shape[:depth], (columns[0].chunks or ())[:depth]
-        found[name] = Table(name, grid, box, tuple(places), int(digests.id.get_offset()), key)
-    return found
+@dataclass(frozen=True, eq=False)
+class Contents:
+    """What a seal tells: the tables by name, and where the ending is."""
+
+    tables: dict[str, Table]
+    ending: int
+
+    def structure(self, end: int) -> Iterator[tuple[int, int]]:
+        """Begin and end of all that HDF5 has written before `end` beside chunks, digests and the ending."""
+        spans = [(self.ending, self.ending + ENDING_BYTES), (end, end)]
+        for table in self.tables.values():
+            spans.append((table.digests, table.digests + table.blocks.count * table.row_bytes))
+            for place in table.places:
+                last = place.second + (place.count - 2) * place.step
+                more = [(place.second, last + place.size + place.check)] if place.count > 1 else []
+                spans += [(place.first, place.first + place.size + place.check), *more]
+        begin = 0
+        for start, stop in sorted(spans):
+            if begin < start:
+                yield begin, start
+            begin = max(begin, stop)
+
+    def to_json(self) -> bytes:
+        """As it stands in the seal."""
+        return json.dumps({"tables": [asdict(table) for table in self.tables.values()], "ending": self.ending}).encode()
+
+    @classmethod
+    def from_json(cls, text: bytes) -> Contents:
+        """What `to_json` wrote. Raises ValueError, KeyError and their like."""
+        keys = json.loads(text)
+        tables = {}
+        for table in keys["tables"]:
+            places = tuple(Place(**{**place, "shape": tuple(place["shape"])}) for place in table.pop("places"))
+            grid, blocks = tuple(table.pop("grid")), Partition(**table.pop("blocks"))
+            tables[table["name"]] = Table(grid=grid, blocks=blocks, places=places, **table)
+        return cls(tables, keys["ending"])
 
 
-def chunks_of(dataset: Any) -> list[Any]:
-    """Place and size of every chunk of a dataset, as h5py tells them."""
-    found: list[Any] = []
-    dataset.id.chunk_iter(found.append)
-    return found
+def sealed(fd: int, contents: Contents, end: int) -> bytes:
+    """The seal of a file that HDF5 has written up to `end`. Raises OSError, EOFError."""
+    text = contents.to_json()
+    return text + SEAL.pack(_digest(fd, contents, end, text), len(text), MAGIC)
 
 
-def gaps(tables: Iterable[Table], ending: int, begin: int, end: int) -> Iterator[tuple[int, int]]:
-    """What lies between two places of the file and is no chunk, no digest and no ending."""
-    spans = np.concatenate([*(table.spans() for table in tables), [[ending, ending + ENDING_BYTES + 4], [end, end]]])
-    spans = spans[np.argsort(spans[:, 0], kind="stable")]
-    starts = np.append(begin, spans[:-1, 1])
-    apart = starts < spans[:, 0]
-    return zip(starts[apart].tolist(), spans[apart, 0].tolist(), strict=True)
+def read_seal(fd: int, path: Path) -> tuple[Contents, bytes] | None:
+    """What a file holds whose structure is as it was written, and its seal; None: another program has changed it.
+
+    Raises
+    ------
+    OSError, EOFError
+    ValueError, KeyError and their like
+        It is no file of HDF5, was cut, or its structure is damaged.
+    SweepError
+        It is of another format.
+    """
+    size = os.fstat(fd).st_size
+    begin = read_bytes(fd, 0, min(size, FILE_END.stop))
+    tail = read_bytes(fd, size - SEAL.size, size) if size > SEAL.size else b""
+    if not begin.startswith(SIGNATURE):
+        raise ValueError("it is no file of HDF5")
+    if tail.endswith(MAGIC):
+        digest, length, _ = SEAL.unpack(tail)
+        if 0 < length <= size - SEAL.size:
+            end = size - SEAL.size - length
+            text = read_bytes(fd, end, end + length)
+            contents = Contents.from_json(text)
+            if _digest(fd, contents, end, text) == digest:
+                return contents, text + tail
+    elif re.search(rb"foliot format \d\n$", tail):
+        raise SweepError(
+            f"{path}: a result of another format; this version of foliot reads format {FORMAT} alone; open it with the "
+            "version that wrote it, or compute it again under another name"
+        )
+    elif begin[8:9] < b"\2" or int.from_bytes(begin[FILE_END], "little") == size:
+        return None
+    raise ValueError("its structure is damaged, or its end is missing, as in a copy that was interrupted")
 
 
-def digest_of(fd: int, regions: Iterable[tuple[int, int]]) -> bytes:
-    """Digest of the bytes of some regions. Raises OSError, EOFError."""
+def _digest(fd: int, contents: Contents, end: int, text: bytes) -> bytes:
+    """Digest of the structure and the contents. Raises OSError, EOFError."""
     state = xxhash.xxh3_128()
-    for begin, end in regions:
-        for at in range(begin, end, PIECE):
-            state.update(read_bytes(fd, at, min(at + PIECE, end)))
+    for start, stop in contents.structure(end):
+        for at in range(start, stop, PIECE):
+            state.update(read_bytes(fd, at, min(at + PIECE, stop)))
+    state.update(text)
     return state.digest()
+
+
+def study_apart(text: str, coordinates: Mapping[str, Any], together: bool = False) -> str:
+    """The JSON of a study in which long arrays that are coordinates stand as their names; `together`: undone."""
+    for name, values in coordinates.items():
+        if values.dtype == np.float64 and values.nbytes >= LONG and (together is (f'"float64":"@{name}"' in text)):
+            ends = f'"float64":"{values.tobytes().hex()}"', f'"float64":"@{name}"'
+            text = text.replace(*(reversed(ends) if together else ends))
+    return text
 
 
 def read_bytes(fd: int, begin: int, end: int) -> bytes:

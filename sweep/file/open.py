@@ -98,9 +98,8 @@ def _open(place: Path, strict: bool = False) -> xr.Dataset:
 
     try:
         large = place.stat().st_size > MEMORY_SHARE * memory()
-        found = xr.open_dataset(os.fspath(place), engine=Result, chunks="auto" if large else None)
-        if "end" not in found.attrs:
-            with contextlib.suppress(Changed), StoredFile(place) as file:
+        with contextlib.suppress(Changed), StoredFile(place) as file:
+            if not file.ending:
                 if place.suffix != unfinished_of(place).suffix:
                     raise OSError("what was written at its end is damaged")
                 left, count = int((~file.done[file.work]).sum()), file.tables[file.work].blocks.count
@@ -109,13 +108,9 @@ def _open(place: Path, strict: bool = False) -> xr.Dataset:
                     raise SweepError(f"{place}: unfinished, {missing}; run its sweep again to continue")
                 if file.work == "rows":
                     return _of_rows(file)
+        return xr.open_dataset(os.fspath(place), engine=Result, chunks="auto" if large else None)
     except DAMAGE as fault:
         raise unreadable(place, fault) from None
-    # words as fixed-width text, as in a Dataset that was never in a file
-    words = {name: c for name, c in found.coords.items() if c.dtype.kind not in "fi"}
-    plain = found.assign_coords({name: (c.dims, c.values.astype(str), c.attrs) for name, c in words.items()})
-    plain.set_close(found.close)
-    return plain
 
 
 def _of_rows(file: StoredFile) -> xr.Dataset:

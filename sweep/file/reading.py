@@ -1,6 +1,7 @@
 """Numbers of a result, finished or not, that are compared with their digests before they are handed out.
 
-HDF5 is asked where they are, once; then chunks are read from their places by any thread.
+The seal tells where they are; then chunks are read from their places by any thread. HDF5 is asked for nothing but
+names, attributes and coordinates, and not before they are wanted.
 """
 
 from __future__ import annotations
@@ -9,24 +10,26 @@ import itertools
 import json
 import math
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
+from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
+import xxhash
 
 from kernels.interface import Status
-from sweep.cells.schema import METHOD_USED, STATUS
+from sweep.cells.schema import METHOD_USED, STATUS, Coordinate
 from sweep.errors import SweepError
 from sweep.file import disk
-from sweep.file.fletcher import checksum
-from sweep.file.layout import ENDING, ENDING_BYTES, SEAL, Seal, digest_of, gaps, read_bytes, read_seal, tables_of
+from sweep.file.layout import BYTES, ENDING_BYTES, read_bytes, read_seal, study_apart
 
 READERS = 4
 """Threads that read a large piece,"""
 LARGE = 32 << 20
 """of so many bytes."""
+WHOLE = slice(None)
 
 
 class Changed(ValueError):
@@ -36,11 +39,11 @@ class Changed(ValueError):
 class StoredFile:
     """A result of this program, open for reading. To be used with `with`.
 
+    Of a column or a coordinate `file[name]` gives `dims`, `attrs`, and its numbers as `values` or by indices.
+
     Attributes
     ----------
     path : Path
-    attrs : dict
-        Of the file; texts as str.
     tables : dict of str to Table
     work : str
         Name of the table that is computed: "rows" of a summary, else "cells".
@@ -48,6 +51,8 @@ class StoredFile:
         Which blocks of a table have digests.
     ending : dict of str to str
         What is known at the end, empty before; what is missing or damaged is then handed out as NaN and PENDING.
+    seal : bytes
+        Behind the last byte of HDF5.
 
     Raises
     ------
@@ -60,28 +65,21 @@ class StoredFile:
     """
 
     def __init__(self, path: Path) -> None:
-        import h5py
-
         self.path, self.fd = path, disk.open_file(path, os.O_RDONLY)
         try:
-            seal = read_seal(self.fd, path)
-            if seal is None:
+            found = read_seal(self.fd, path)
+            if found is None:
                 raise Changed(f"{path}: was changed by another program")
-            self.seal: Seal = seal
-            with h5py.File(path, "r") as file:
-                self.attrs = attrs_of(file)
-                self.tables = tables_of(file, seal.key)
-                self.ending_at = int(file[ENDING].id.get_chunk_info(0).byte_offset)
-            self.work = "rows" if "rows" in self.tables else "cells"
+            contents, self.seal = found
+            self.tables, self.ending_at = contents.tables, contents.ending
+            self.ending = ending_of(read_bytes(self.fd, self.ending_at, self.ending_at + ENDING_BYTES))
             self._digests = {name: table.read_digests(self.fd) for name, table in self.tables.items()}
-            text = read_bytes(self.fd, self.ending_at, self.ending_at + ENDING_BYTES + 4)
-            whole = checksum(text[:ENDING_BYTES], ENDING_BYTES) == text[ENDING_BYTES:] and any(text)
-            self.ending: dict[str, str] = json.loads(text[:ENDING_BYTES]) if whole else {}
         except BaseException:
             self.close()
             raise
-        self._sound = {name: np.zeros(table.blocks.count, bool) for name, table in self.tables.items()}
+        self.work = "rows" if "rows" in self.tables else "cells"
         self.done = {name: digests.any(axis=2).all(axis=1) for name, digests in self._digests.items()}
+        self._sound = {name: np.zeros_like(done) for name, done in self.done.items()}
 
     def __enter__(self) -> StoredFile:
         return self
@@ -101,15 +99,9 @@ class StoredFile:
         if fd >= 0:
             os.close(fd)
 
-    @property
-    def fingerprint(self) -> dict[str, str]:
-        """Of the study."""
-        return dict(json.loads(self.attrs["fingerprint"]))
-
     def read(self, name: str, number: int, block: int, out: Any = None) -> Any:
         """The cells of a block of a column, into `out` where it is given; None where they are not what was written."""
-        digest = bytes(self._digests[name][block, number])
-        return self.tables[name].read(self.fd, number, block, digest, out)
+        return self.tables[name].read(self.fd, number, block, bytes(self._digests[name][block, number]), out)
 
     def is_sound(self, name: str, block: int) -> bool:
         """Whether all columns of a block are there and as they were written; looked at once."""
@@ -123,15 +115,52 @@ class StoredFile:
             if self.read(name, number, block) is None:
                 yield block, number
 
-    def rest_is_sound(self) -> bool:
-        """Whether all that is no number, no digest and not the head is as it was written. Raises OSError, EOFError."""
-        end = os.fstat(self.fd).st_size - SEAL.size
-        rest = gaps(self.tables.values(), self.ending_at, self.seal.head, end)
-        return digest_of(self.fd, rest) == self.seal.rest_digest
+    @cached_property
+    def _described(self) -> tuple[dict[str, Any], dict[str, tuple[tuple[str, ...], dict[str, Any]]], dict[str, Any]]:
+        """Attributes of the file; dimensions and attributes of each variable; coordinates. Raises one of DAMAGE."""
+        import h5netcdf
+
+        about, coords = {}, {}
+        with h5netcdf.File(self.path, "r") as file:
+            for name, variable in file.variables.items():
+                attrs, dims = dict(variable.attrs), tuple(variable.dimensions)
+                attrs.pop("coordinates", None)
+                if attrs.pop("_Encoding", None):
+                    words, dims = variable[...], dims[:-1]
+                    values = np.char.decode(words.view(f"S{words.shape[-1]}").reshape(words.shape[:-1]), "utf-8")
+                    coords[name] = Coordinate(name, dims, values, attrs)
+                elif name not in {place.name for place in self.tables["cells"].places}:
+                    coords[name] = Coordinate(name, dims, np.asarray(variable[...]), attrs)
+                about[name] = dims, attrs
+            attrs = {name: value for name, value in file.attrs.items() if name != "coordinates"}
+        own = {name: coordinate.values for name, coordinate in coords.items()}
+        study = {"study_json": study_apart(attrs["study_json"], own, together=True)}
+        return {**attrs, **study, **self.ending}, about, coords
+
+    @property
+    def attrs(self) -> dict[str, Any]:
+        """Attributes of the file, and what is known at the end; texts as str."""
+        return dict(self._described[0])
+
+    @property
+    def coords(self) -> dict[str, Coordinate]:
+        """Its coordinates."""
+        return dict(self._described[2])
+
+    @property
+    def fingerprint(self) -> dict[str, str]:
+        """Of the study."""
+        return dict(json.loads(self.attrs["fingerprint"]))
 
     def columns(self, name: str = "cells") -> dict[str, Numbers]:
         """The columns of a table."""
         return {p.name: Numbers(self, name, k) for k, p in enumerate(self.tables[name].places)}
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._described[1]
+
+    def __getitem__(self, name: str) -> Any:
+        return self._described[2][name] if name in self._described[2] else self.columns()[name]
 
 
 class Numbers:
@@ -153,41 +182,57 @@ class Numbers:
     def __reduce__(self) -> Any:
         return Numbers, (self.file, self.name, self.number)
 
+    @property
+    def dims(self) -> tuple[str, ...]:
+        """Its dimensions, of a column of the output."""
+        return self.file._described[1][self.place.name][0]
+
+    @property
+    def attrs(self) -> Mapping[str, Any]:
+        """Its attributes, of a column of the output."""
+        return self.file._described[1][self.place.name][1]
+
+    @property
+    def values(self) -> Any:
+        """All its numbers."""
+        return self[()]
+
     def __getitem__(self, key: Any) -> Any:
         """By what is given for each dimension, or for the first ones. Raises SweepError where damaged."""
         key = key if isinstance(key, tuple) else (key,)
         key = (*(k for k in key if k is not Ellipsis), *[slice(None)] * len(self.shape))[: len(self.shape)]
         grid, box = self.table.grid, self.table.box
-        wanted = [np.arange(n)[k] for n, k in zip(grid, key, strict=False)]
-        out = np.empty((*(places.size for places in wanted), *self.place.shape), self.dtype)
-        parts = list(itertools.product(*(_parts(*axis) for axis in zip(wanted, grid, box, strict=True))))
+        wanted = [np.atleast_1d(np.arange(n)[k]) for n, k in zip(grid, key, strict=False)]
+        out = np.empty((*map(len, wanted), *self.place.shape), self.dtype)
         counts = [-(-n // length) for n, length in zip(grid, box, strict=True)]
 
-        def fill(part: tuple[_Part, ...]) -> None:
-            number = 0
-            for axis, count in zip(part, counts, strict=True):
-                number = number * count + axis.box
-            here: Any = (*(axis.here for axis in part), ...)
+        def fill(part: tuple[tuple[int, int, Any, slice], ...]) -> None:
+            """Reads what is wanted of one block."""
+            block = 0
+            for (at, _, _, _), count in zip(part, counts, strict=True):
+                block = block * count + at
+            shape = (*(length for _, length, _, _ in part), *self.place.shape)
+            here: Any = (*(here for _, _, _, here in part), ...)
             view = out[here]
-            lengths = [axis.length for axis in part]
-            if view.flags.c_contiguous and all(axis.whole for axis in part):
-                self._read(number, view.reshape(math.prod(lengths), *self.place.shape))
+            if view.flags.c_contiguous and all(there is WHOLE for _, _, there, _ in part):
+                self._read(block, view.reshape(-1, *self.place.shape))
                 return
-            cells = self._block(number).reshape(*lengths, *self.place.shape)
-            for k, axis in enumerate(part):
-                cells = cells[(*[slice(None)] * k, axis.there)]
+            cells = self._block(block).reshape(shape)
+            for k, (_, _, there, _) in enumerate(part):
+                cells = cells[(*[WHOLE] * k, there)]
             view[...] = cells
 
+        parts = list(itertools.product(*map(_parts, wanted, grid, box)))
         if out.nbytes >= LARGE and len(parts) > 1:
             with ThreadPoolExecutor(READERS) as pool:
                 list(pool.map(fill, parts))
         else:
             for part in parts:
                 fill(part)
-        kept = [places.size for places in wanted if places.ndim]
-        found = out.reshape((*kept, *self.place.shape))
+        found = out[tuple(0 if isinstance(k, int | np.integer) else WHOLE for k in key[: len(grid)])]
+        kept = found.ndim - len(self.place.shape)
         for k in reversed(range(len(grid), len(key))):
-            found = found[(*[slice(None)] * (len(kept) + k - len(grid)), key[k])]
+            found = found[(*[WHOLE] * (kept + k - len(grid)), key[k])]
         return found
 
     def _block(self, block: int) -> Any:
@@ -217,35 +262,27 @@ class Numbers:
         out[...] = {STATUS: int(Status.PENDING), METHOD_USED: -1}.get(self.place.name, math.nan)
 
 
-class _Part(NamedTuple):
-    """What is wanted of one box along an axis: its number and length, places in it, and their places in the answer."""
-
-    box: int
-    length: int
-    there: Any
-    here: slice
-    whole: bool
-
-
-def _parts(wanted: Any, size: int, length: int) -> list[_Part]:
-    """The parts of some places along an axis of a size that is cut into boxes of a length."""
-    wanted = np.atleast_1d(wanted)
-    ends = [*(np.flatnonzero(np.diff(wanted // length)) + 1).tolist(), wanted.size]
+def _parts(wanted: Any, size: int, length: int) -> list[tuple[int, int, Any, slice]]:
+    """What is wanted of each box of an axis of a size: the box and its length, places in it and in the answer."""
+    ends = [*(np.flatnonzero(np.diff(wanted // length)) + 1).tolist(), len(wanted)]
     found, start = [], 0
-    for stop in ends if wanted.size else ():
+    for stop in ends if len(wanted) else ():
         box = int(wanted[start]) // length
         there, own = wanted[start:stop] - box * length, min(length, size - box * length)
-        straight = bool((np.diff(there) == 1).all())
-        inside = slice(int(there[0]), int(there[-1]) + 1) if straight else there
-        found.append(_Part(box, own, inside, slice(start, stop), straight and stop - start == own))
+        if (np.diff(there) == 1).all():
+            there = WHOLE if len(there) == own else slice(int(there[0]), int(there[-1]) + 1)
+        found.append((box, own, there, slice(start, stop)))
         start = stop
     return found
 
 
-def attrs_of(thing: Any) -> dict[str, Any]:
-    """Attributes of what h5py has opened: texts as str, a single number as such."""
-    found = {}
-    for name, value in thing.attrs.items():
-        single = value.item() if isinstance(value, np.ndarray) and value.size == 1 else value
-        found[name] = single.decode() if isinstance(single, bytes) else single
-    return found
+def ending_of(text: bytes) -> dict[str, str]:
+    """What was written at the end of a run; empty where that has not come, or is damaged."""
+    said = text[: ENDING_BYTES - BYTES]
+    return dict(json.loads(said)) if xxhash.xxh3_128_digest(said) == text[-BYTES:] else {}
+
+
+def ending_text(texts: Mapping[str, str]) -> bytes:
+    """What `ending_of` reads; zeros of nothing."""
+    said = json.dumps(dict(texts)).encode().ljust(ENDING_BYTES - BYTES)
+    return said + xxhash.xxh3_128_digest(said) if texts else bytes(ENDING_BYTES)

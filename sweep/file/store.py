@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import contextlib
 import itertools
-import json
 import os
 import threading
 import time
@@ -27,10 +26,9 @@ import numpy as np
 from sweep.cells.schema import Schema
 from sweep.errors import Incomplete, SweepError
 from sweep.file import disk
-from sweep.file.fletcher import checksum
-from sweep.file.frame import PAGE, WRONG, Cut, create
-from sweep.file.layout import DAMAGE, ENDING_BYTES, SEAL, Table
-from sweep.file.reading import StoredFile
+from sweep.file.frame import PAGE, Cut, create
+from sweep.file.layout import DAMAGE, Table
+from sweep.file.reading import StoredFile, ending_text
 
 SYNC_BYTES = 64 << 20
 """Bytes after which blocks are brought to the disk,"""
@@ -84,9 +82,9 @@ class Shared:
 
 def _is_sealed(fd: int, size: int, seal: bytes) -> bool:
     """Whether a file of a size ends with a seal."""
-    tail = bytearray(SEAL.size)
+    tail = bytearray(len(seal))
     try:
-        disk.read_all(fd, (tail,), size - SEAL.size)
+        disk.read_all(fd, (tail,), size - len(seal))
     except (OSError, EOFError):
         return False
     return bytes(tail) == seal
@@ -126,10 +124,7 @@ class Store:
         if not self.path.exists():
             return None
         try:
-            file = StoredFile(self.path)
-            if file.rest_is_sound():
-                return file
-            file.close()
+            return StoredFile(self.path)
         except DAMAGE as fault:
             if isinstance(fault, OSError) and fault.errno:
                 raise disk.refusal(fault, self.path) from fault
@@ -165,7 +160,7 @@ class Store:
         with disk.refusing(self.path):
             self._fd = disk.open_file(self.path, os.O_RDWR)
             self._size = os.fstat(self._fd).st_size
-        self.file, self._done, self._seal = file, file.done[file.work].copy(), SEAL.pack(*file.seal)
+        self.file, self._done, self._seal = file, file.done[file.work].copy(), file.seal
 
     def _check_own(self) -> None:
         """Raises Incomplete where another program has cut the file or written to it: not a byte of ours goes there."""
@@ -311,9 +306,7 @@ class Store:
     def _end(self, texts: Mapping[str, str]) -> None:
         """Writes what is known at the end; nothing: takes back that the run has ended. Raises OSError."""
         assert self.file is not None
-        text = json.dumps(dict(texts)).encode().ljust(ENDING_BYTES) if texts else bytes(ENDING_BYTES)
-        behind = checksum(text, ENDING_BYTES) if texts else WRONG
-        disk.write_all(self._fd, (text, behind), self.file.ending_at)
+        disk.write_all(self._fd, (ending_text(texts),), self.file.ending_at)
 
     def reopen(self, damaged: Iterable[int]) -> None:
         """Takes a finished result up again, some blocks of which are to be computed again. Raises SweepError."""

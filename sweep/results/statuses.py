@@ -17,10 +17,9 @@ from sweep.cells.schema import METHOD_USED, STATUS
 if TYPE_CHECKING:
     import xarray as xr
 
-    from sweep.file.reading import Numbers
-    from sweep.file.stored import Stored, StoredColumn
+    from sweep.file.reading import Numbers, StoredFile
 
-    Cells: TypeAlias = xr.Dataset | Stored
+    Cells: TypeAlias = xr.Dataset | StoredFile
 
 NUMBERS_AT_ONCE = 1 << 22
 
@@ -140,7 +139,7 @@ def _summed(dataset: Cells, name: str) -> dict[str, int]:
     return {str(word): int(n) for word, n in zip(words, total, strict=True) if n}
 
 
-def _tally(column: xr.DataArray | StoredColumn) -> dict[int, tuple[int, int]]:
+def _tally(column: xr.DataArray | Numbers) -> dict[int, tuple[int, int]]:
     """How many cells have each code, and the number of the first of them."""
     found: dict[int, tuple[int, int]] = {}
     done = 0
@@ -173,7 +172,7 @@ def pieces(dataset: xr.Dataset, dims: Sequence[Hashable], most: int = NUMBERS_AT
         yield dataset.isel(dict(zip(dims, box, strict=True))).load()
 
 
-def flat_pieces(column: xr.DataArray | StoredColumn | Numbers) -> Iterator[Any]:
+def flat_pieces(column: xr.DataArray | Numbers) -> Iterator[Any]:
     """The cells in C order, a few million at a time."""
     return (np.asarray(column[box]).reshape(-1) for box in boxes(column.shape))
 

@@ -57,7 +57,8 @@ def test_the_size_of_a_result_is_known_before_it_is_computed(tmp_path, cells):
     study = toy_studies.build(**keys)
     schema = output_schema(study, {})
     found = expected_size(schema, cuts_of(study, schema, boxes(schema.grid.shape, cells)))
-    run(tmp_path / "out.h5", cells, **keys).close()
+    with run(tmp_path / "out.h5", cells, **keys) as ds:
+        assert sweep.study(ds, allow_import=True) == study
     assert (tmp_path / "out.h5").stat().st_size == pytest.approx(found, rel=0.05)
 
 

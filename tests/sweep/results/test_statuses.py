@@ -11,7 +11,7 @@ from toy_studies import build
 import sweep
 from kernels.interface import Status
 from sweep.cli import main
-from sweep.file.stored import Stored
+from sweep.file.reading import StoredFile
 from sweep.results.statuses import (
     account,
     count_statuses,
@@ -93,7 +93,7 @@ STUDIES = {
 def test_a_run_counts_the_cells_of_its_file_as_their_reader_does(tmp_path, name):
     study, output = build(**STUDIES[name]), tmp_path / "out.h5"
     sweep.run(study, output, progress=False).close()
-    with Stored(output, study) as found, sweep.open_result(output) as dataset:
+    with StoredFile(output) as found, sweep.open_result(output) as dataset:
         assert summary_text(found) == summary_text(dataset)
         assert count_statuses(found) == count_statuses(dataset)
         assert account(found).refused > 0
