@@ -9,8 +9,7 @@ import xarray as xr
 from xarray.backends import BackendArray, BackendEntrypoint
 from xarray.core import indexing
 
-from sweep.file.foreign import changed_attrs
-from sweep.file.layout import study_apart
+from sweep.file.foreign import changed_result
 from sweep.file.reading import Changed, Numbers, StoredFile
 
 
@@ -35,37 +34,13 @@ class Result(BackendEntrypoint):
         try:
             file = StoredFile(path)
         except Changed:
-            return _changed(path)
+            return changed_result(path)
         columns = {}
         for name, numbers in file.columns().items():
-            chunks = (*numbers.table.box, *numbers.place.shape)
-            encoding = {"preferred_chunks": dict(zip(numbers.dims, chunks, strict=True))}
+            chunks = dict(zip(numbers.dims, (*numbers.table.box, *numbers.place.shape), strict=True))
             lazy = indexing.LazilyIndexedArray(Column(numbers))
-            columns[name] = xr.Variable(numbers.dims, lazy, dict(numbers.attrs), encoding)
-        coords = {name: (c.dims, c.values, dict(c.attrs)) for name, c in file.coords.items()}
-        found = xr.Dataset(columns, coords, file.attrs)
+            columns[name] = xr.Variable(numbers.dims, lazy, dict(numbers.attrs), {"preferred_chunks": chunks})
+        found = xr.Dataset(columns, {name: (c.dims, c.values, c.attrs) for name, c in file.coords.items()}, file.attrs)
         found.encoding["source"] = str(path)
         found.set_close(file.close)
         return found
-
-
-def _changed(path: Path) -> xr.Dataset:
-    """As HDF5 finds it, which alone checks it."""
-    attrs = changed_attrs(path)
-    found = xr.open_dataset(
-        path, engine="h5netcdf", cache=False, decode_times=False, decode_timedelta=False, phony_dims="access"
-    )
-    # h5netcdf takes the first axis, too, to be over a dimension that it makes up
-    odd = any(str(dim).startswith("phony_dim") for dim in found.sizes)
-    if odd or not {v.dtype.kind for v in found.data_vars.values()} <= set("fiu"):
-        found.close()
-        raise ValueError("something in it is no number, or over no dimension of its own")
-    # words as fixed-width text, as in a Dataset that was never in a file
-    words = {name: c for name, c in found.coords.items() if c.dtype.kind not in "fi"}
-    plain = found.assign_coords({name: (c.dims, c.values.astype(str), c.attrs) for name, c in words.items()})
-    plain.attrs.update({name: attrs[name] for name in ("created", "end", "cells_per_second") if name in attrs})
-    values = {str(name): c.values for name, c in plain.coords.items()}
-    plain.attrs["study_json"] = study_apart(plain.attrs["study_json"], values, together=True)
-    plain.encoding = dict(found.encoding)
-    plain.set_close(found.close)
-    return plain

@@ -4,26 +4,20 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from sweep.cells.reduce import BY_STATUS
-from sweep.cells.schema import STATUS
 from sweep.file.layout import ENDING
-from sweep.file.reading import ending_of
+from sweep.file.reading import ending_of, study_together
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 MOST_COMPRESSED = 1100
 """Bytes that gzip makes of one, at most."""
-TEXTS = (
-    *("title", "question", "kernel", "design", "where", "method", "study", "study_json", "fingerprint", "versions"),
-    *("start", "created", "end", "over", "units", "long_name", "flag_meanings"),
-)
-"""Attributes that are text wherever they stand."""
 
 
-def changed_attrs(output: Path) -> dict[str, Any]:
-    """Attributes of a result that another program has changed, and what is known at the end of its run.
+def changed_result(path: Path) -> xr.Dataset:
+    """A result as HDF5 finds it.
 
     Raises
     ------
@@ -31,25 +25,33 @@ def changed_attrs(output: Path) -> dict[str, Any]:
         It is no result any more, or HDF5 would be led to other files, beyond the memory, or astray.
     """
     import h5py
+    import xarray as xr
 
-    with h5py.File(output, "r") as file:
-        _check_own(file, output.stat().st_size)
-        found = [_attrs(file), *(_attrs(file[name]) for name in file)]
-        attrs = found[0]
-        attrs["study_json"], attrs["fingerprint"], file[STATUS if STATUS in file else BY_STATUS]
-        if not all(isinstance(own[name], str) for own in found for name in TEXTS if name in own):
-            raise TypeError("an attribute is no text")
-        float(attrs.get("rtol", 0.0))
-        return attrs | (ending_of(file[ENDING][()].tobytes()) if ENDING in file else {})
-
-
-def _attrs(thing: Any) -> dict[str, Any]:
-    """Attributes of what h5py has opened: texts as str, a single number as such."""
-    found = {}
-    for name, value in thing.attrs.items():
-        single = value.item() if isinstance(value, np.ndarray) and value.size == 1 else value
-        found[name] = single.decode() if isinstance(single, bytes) else single
-    return found
+    with h5py.File(path, "r") as file:
+        _check_own(file, path.stat().st_size)
+        ending = ending_of(file[ENDING][()].tobytes()) if ENDING in file else {}
+    found = xr.open_dataset(
+        path, engine="h5netcdf", cache=False, decode_times=False, decode_timedelta=False, phony_dims="access"
+    )
+    try:
+        # h5netcdf takes the first axis, too, to be over a dimension that it makes up
+        if any(str(dim).startswith("phony_dim") for dim in found.sizes):
+            raise ValueError("something in it is over no dimension of its own")
+        numbers = all(v.dtype.kind in "fiu" for v in found.data_vars.values())
+        texts = [found.attrs[name] for name in ("study_json", "fingerprint", "start")]
+        texts += [v.attrs[name] for v in found.variables.values() for name in ("units", "long_name") if name in v.attrs]
+        if not numbers or not all(isinstance(text, str) for text in texts):
+            raise TypeError("something in it is no number, or no text")
+        # words as fixed-width text, as in a Dataset that was never in a file
+        words = {name: c for name, c in found.coords.items() if c.dtype.kind not in "fi"}
+        plain = found.assign_coords({name: (c.dims, c.values.astype(str), c.attrs) for name, c in words.items()})
+        plain.attrs.update(ending, study_json=study_together(found.attrs["study_json"], plain.coords))
+    except BaseException:
+        found.close()
+        raise
+    plain.encoding = dict(found.encoding)
+    plain.set_close(found.close)
+    return plain
 
 
 def _check_own(group: Any, size: int, inner: bool = False) -> None:

@@ -23,10 +23,11 @@ import numpy as np
 from kernels.interface import Status
 from sweep.cells.output_schema import part_columns
 from sweep.cells.partition import Partition, box_shape, boxes, row_blocks
-from sweep.cells.schema import STATUS, Column, Coordinate, Schema
+from sweep.cells.schema import STATUS, Column, Schema
 from sweep.file import disk
 from sweep.file.fletcher import checksum
 from sweep.file.layout import (
+    ARRAY,
     BYTES,
     ENDING,
     ENDING_BYTES,
@@ -37,7 +38,6 @@ from sweep.file.layout import (
     Place,
     Table,
     sealed,
-    study_apart,
 )
 
 if TYPE_CHECKING:
@@ -52,6 +52,8 @@ GATHERED_BYTES = 8 << 20
 """Bytes of the rows that are reduced to groups at a time."""
 COMPACT = 1 << 15
 """Attributes up to which HDF5 keeps them in an object header."""
+LONG = 1 << 14
+"""Bytes of a coordinate to which the study in the file refers."""
 WRONG = b"\xff" * 4
 """A checksum that zeros have not."""
 
@@ -99,8 +101,11 @@ def expected_size(schema: Schema, cuts: Mapping[str, Cut]) -> int:
 
 def _attrs(schema: Schema) -> dict[str, Any]:
     """Attributes of the file, whose study refers to long coordinates."""
-    values = {c.name: np.asarray(c.values) for c in schema.coordinates}
-    return {**schema.attrs, "study_json": study_apart(schema.attrs["study_json"], values)}
+    study = schema.attrs["study_json"]
+    for c in schema.coordinates:
+        if np.asarray(c.values).nbytes >= LONG:
+            study = study.replace(ARRAY % c.values.tobytes().hex(), ARRAY % f"@{c.name}")
+    return {**schema.attrs, "study_json": study}
 
 
 def create(path: Path, schema: Schema, cuts: Mapping[str, Cut], shared: bool = False) -> None:
@@ -198,87 +203,78 @@ def _laid_out(image: _Image, schema: Schema, cuts: Mapping[str, Cut], aligned: i
     made.set_attr_phase_change(COMPACT, 0)
     made.set_attr_creation_order(h5p.CRT_ORDER_TRACKED | h5p.CRT_ORDER_INDEXED)
     made.set_link_creation_order(h5p.CRT_ORDER_TRACKED | h5p.CRT_ORDER_INDEXED)
-    with (
-        h5py.File(h5f.create(b"result", h5f.ACC_TRUNC, made, access)) as plain,
-        h5netcdf.File(plain, "r+") as file,
-    ):
-        # xarray's way to mark what belongs to the coordinates of all variables
-        away = [c.name for c in schema.coordinates if c.dims and not set(c.dims) & {c.name, *schema.grid.dims}]
-        _say(file, {**_attrs(schema), **({"coordinates": " ".join(away)} if away else {})})
+    with h5py.File(h5f.create(b"result", h5f.ACC_TRUNC, made, access)) as plain, h5netcdf.File(plain, "r+") as file:
+        # xarray's way to mark what belongs to the coordinates of all variables, and of one
+        shared = [c.name for c in schema.coordinates if c.dims and not set(c.dims) & {c.name, *schema.grid.dims}]
+        _say(file, {**_attrs(schema), **({"coordinates": " ".join(shared)} if shared else {})})
         file.dimensions = schema.sizes
         for coordinate in schema.coordinates:
-            _write_coordinate(file, plain, coordinate)
+            values, dims, attrs = np.asarray(coordinate.values), coordinate.dims, dict(coordinate.attrs)
+            if values.dtype.kind == "U":  # as characters, as netCDF has them
+                words = np.array([word.encode() for word in values.ravel()])
+                values = words.view("S1").reshape(*values.shape, words.dtype.itemsize)
+                dims, attrs = (*dims, f"string{words.dtype.itemsize}"), {**attrs, "_Encoding": "utf-8"}
+                if dims[-1] not in file.dimensions:
+                    file.dimensions[dims[-1]] = words.dtype.itemsize
+            if dims:
+                _say(
+                    file.create_variable(coordinate.name, dims, values.dtype, data=values, dcpl=_how(values.shape)),
+                    attrs,
+                )
+                continue
+            # h5py and h5netcdf would not keep a single number in its object header
+            space, kind = h5py.h5s.create(h5py.h5s.SCALAR), h5py.h5t.py_create(values.dtype)
+            single = h5py.Dataset(h5py.h5d.create(plain.id, coordinate.name.encode(), kind, space, _how(())))
+            single[()] = values
+            _say(single, attrs)
         group = file.create_group(GROUP)
         group.dimensions.update({"byte": BYTES, "character": ENDING_BYTES})
         about = "when the run ended, and how fast it was: JSON, and its xxh3_128 digest"
-        _say(group.create_variable("ending", ("character",), "u1", dcpl=_properties()), {"long_name": about})
+        _say(group.create_variable("ending", ("character",), "u1", dcpl=_how(None)), {"long_name": about})
         for name, cut in cuts.items():
             lengths = {f"{name}_block": cut.blocks.count, f"{name}_column": len(cut.columns)}
             group.dimensions.update(lengths)
-            digests = group.create_variable(f"{name}_digests", (*lengths, "byte"), "u1", dcpl=_properties())
-            _say(digests, {"long_name": "xxh3_128 of each chunk of each column, zeros where it is not computed yet"})
+            about = "xxh3_128 of each chunk of each column, zeros where it is not computed yet"
+            digests = group.create_variable(f"{name}_digests", (*lengths, "byte"), "u1", dcpl=_how(None))
+            _say(digests, {"long_name": about})
         for column in schema.columns:
             dims = (*schema.grid.dims, *column.dims)
-            variable = file.create_variable(
-                column.name, dims, column.dtype, dcpl=_properties(cuts["cells"].chunk(column))
-            )
-            away = [c.name for c in schema.coordinates if c.dims != (c.name,) and set(c.dims) <= set(dims)]
-            _say(variable, {**column.attrs, **({"coordinates": " ".join(away)} if away else {})})
+            beside = [c.name for c in schema.coordinates if c.dims != (c.name,) and set(c.dims) <= set(dims)]
+            variable = file.create_variable(column.name, dims, column.dtype, dcpl=_how(cuts["cells"].chunk(column)))
+            _say(variable, {**column.attrs, **({"coordinates": " ".join(beside)} if beside else {})})
         if "rows" in cuts:
             rows, cut = file.create_group("rows"), cuts["rows"]
-            rows.dimensions = {"row": cut.blocks.size} | {
-                f"{c.name} {k}": n for c in cut.columns for k, n in enumerate(c.shape)
-            }
+            rows.dimensions["row"] = cut.blocks.size
             for column in cut.columns:
-                own = (f"{column.name} {k}" for k in range(len(column.shape)))
-                rows.create_variable(column.name, ("row", *own), column.dtype, dcpl=_properties(cut.chunk(column)))
+                own = {f"{column.name} {k}": length for k, length in enumerate(column.shape)}
+                rows.dimensions.update(own)
+                rows.create_variable(column.name, ("row", *own), column.dtype, dcpl=_how(cut.chunk(column)))
         key, tables = secrets.token_hex(BYTES), {}
         for name, cut in cuts.items():
             places = tuple(_placed(plain if name == "cells" else plain[name], image, cut, c) for c in cut.columns)
-            digests = int(plain[f"{GROUP}/{name}_digests"].id.get_offset())
-            tables[name] = Table(name, cut.grid, cut.blocks, places, digests, key)
+            at = int(plain[f"{GROUP}/{name}_digests"].id.get_offset())
+            tables[name] = Table(name, cut.grid, cut.blocks, places, at, key)
         return Contents(tables, int(plain[ENDING].id.get_offset()))
 
 
-def _write_coordinate(file: Any, plain: Any, coordinate: Coordinate) -> None:
-    """In one chunk with a checksum; words as characters, as netCDF has them; a single number in its object header."""
-    import h5py
-
-    values, dims, attrs = np.asarray(coordinate.values), coordinate.dims, dict(coordinate.attrs)
-    if values.dtype.kind == "U":
-        words = np.array([word.encode() for word in values.ravel()])
-        values = words.view("S1").reshape(*values.shape, words.dtype.itemsize)
-        dims, attrs = (*dims, f"string{words.dtype.itemsize}"), {**attrs, "_Encoding": "utf-8"}
-        if dims[-1] not in file.dimensions:
-            file.dimensions[dims[-1]] = words.dtype.itemsize
-    if dims:
-        properties = _properties(values.shape)
-        _say(file.create_variable(coordinate.name, dims, values.dtype, data=values, dcpl=properties), attrs)
-        return
-    space, kind = h5py.h5s.create(h5py.h5s.SCALAR), h5py.h5t.py_create(values.dtype)
-    made = h5py.Dataset(h5py.h5d.create(plain.id, coordinate.name.encode(), kind, space, _properties(())))
-    made[()] = values
-    _say(made, attrs)
-
-
-def _properties(chunk: tuple[int, ...] | None = None) -> Any:
+def _how(chunk: tuple[int, ...] | None) -> Any:
     """How HDF5 makes a dataset: in chunks with a checksum; (): in its object header; None: in one piece, without.
 
     An output that is a single number is in one piece in any case: h5py gives it no properties.
     """
     from h5py import h5d, h5p
 
-    properties = h5p.create(h5p.DATASET_CREATE)
-    properties.set_attr_phase_change(COMPACT, 0)
-    properties.set_fill_time(h5d.FILL_TIME_NEVER)
+    how = h5p.create(h5p.DATASET_CREATE)
+    how.set_attr_phase_change(COMPACT, 0)
+    how.set_fill_time(h5d.FILL_TIME_NEVER)
     if chunk == ():
-        properties.set_layout(h5d.COMPACT)
-        return properties
-    properties.set_alloc_time(h5d.ALLOC_TIME_LATE if chunk else h5d.ALLOC_TIME_EARLY)
+        how.set_layout(h5d.COMPACT)
+        return how
+    how.set_alloc_time(h5d.ALLOC_TIME_LATE if chunk else h5d.ALLOC_TIME_EARLY)
     if chunk:
-        properties.set_chunk(chunk)
-        properties.set_fletcher32()
-    return properties
+        how.set_chunk(chunk)
+        how.set_fletcher32()
+    return how
 
 
 def _say(thing: Any, attrs: Mapping[str, Any]) -> None:

@@ -45,10 +45,10 @@ BYTES = 16
 """Of a digest."""
 PIECE = 8 << 20
 """Bytes read at a time."""
-LONG = 1 << 14
-"""Bytes of a coordinate from which on the study in the file refers to it."""
 GROUP, ENDING, ENDING_BYTES = "integrity", "integrity/ending", 128
 """The group of digests, and in it what is written when all is done: JSON, and its digest."""
+ARRAY = '"float64":"%s"'
+"""An array in the JSON of a study: as hexadecimal digits, or @ and the name of the coordinate that it is."""
 DAMAGE = (OSError, EOFError, LookupError, ValueError, TypeError, AttributeError, RuntimeError)
 """What comes of reading a damaged file."""
 
@@ -264,15 +264,6 @@ def _digest(fd: int, contents: Contents, end: int, text: bytes) -> bytes:
             state.update(read_bytes(fd, at, min(at + PIECE, stop)))
     state.update(text)
     return state.digest()
-
-
-def study_apart(text: str, coordinates: Mapping[str, Any], together: bool = False) -> str:
-    """The JSON of a study in which long arrays that are coordinates stand as their names; `together`: undone."""
-    for name, values in coordinates.items():
-        if values.dtype == np.float64 and values.nbytes >= LONG and (together is (f'"float64":"@{name}"' in text)):
-            ends = f'"float64":"{values.tobytes().hex()}"', f'"float64":"@{name}"'
-            text = text.replace(*(reversed(ends) if together else ends))
-    return text
 
 
 def read_bytes(fd: int, begin: int, end: int) -> bytes:

@@ -16,7 +16,7 @@ from sweep.cells.partition import row_blocks
 from sweep.cells.reduce import pending
 from sweep.cells.schema import Schema
 from sweep.errors import SweepError
-from sweep.file.foreign import changed_attrs
+from sweep.file.foreign import changed_result
 from sweep.file.layout import DAMAGE
 from sweep.file.reading import Changed, StoredFile
 from sweep.file.store import unfinished_of
@@ -144,7 +144,8 @@ def stored_fingerprint(output: Path) -> dict[str, str]:
             with StoredFile(output) as file:
                 return file.fingerprint
         except Changed:
-            return dict(json.loads(changed_attrs(output)["fingerprint"]))
+            with changed_result(output) as found:
+                return dict(json.loads(found.attrs["fingerprint"]))
     except DAMAGE as fault:
         raise unreadable(output, fault) from None
 

@@ -23,7 +23,7 @@ from kernels.interface import Status
 from sweep.cells.schema import METHOD_USED, STATUS, Coordinate
 from sweep.errors import SweepError
 from sweep.file import disk
-from sweep.file.layout import BYTES, ENDING_BYTES, read_bytes, read_seal, study_apart
+from sweep.file.layout import ARRAY, BYTES, ENDING_BYTES, read_bytes, read_seal
 
 READERS = 4
 """Threads that read a large piece,"""
@@ -133,9 +133,8 @@ class StoredFile:
                     coords[name] = Coordinate(name, dims, np.asarray(variable[...]), attrs)
                 about[name] = dims, attrs
             attrs = {name: value for name, value in file.attrs.items() if name != "coordinates"}
-        own = {name: coordinate.values for name, coordinate in coords.items()}
-        study = {"study_json": study_apart(attrs["study_json"], own, together=True)}
-        return {**attrs, **study, **self.ending}, about, coords
+        study = study_together(attrs["study_json"], coords)
+        return {**attrs, "study_json": study, **self.ending}, about, coords
 
     @property
     def attrs(self) -> dict[str, Any]:
@@ -274,6 +273,14 @@ def _parts(wanted: Any, size: int, length: int) -> list[tuple[int, int, Any, sli
         found.append((box, own, there, slice(start, stop)))
         start = stop
     return found
+
+
+def study_together(text: str, coords: Mapping[Any, Any]) -> str:
+    """The JSON of a study, with the numbers of the coordinates to which it refers in the file."""
+    for name, coordinate in coords.items():
+        if (named := ARRAY % f"@{name}") in text:
+            text = text.replace(named, ARRAY % coordinate.values.tobytes().hex())
+    return text
 
 
 def ending_of(text: bytes) -> dict[str, str]:

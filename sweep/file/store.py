@@ -15,6 +15,7 @@ import itertools
 import os
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
@@ -27,15 +28,11 @@ from sweep.cells.schema import Schema
 from sweep.errors import Incomplete, SweepError
 from sweep.file import disk
 from sweep.file.frame import PAGE, Cut, create
-from sweep.file.layout import DAMAGE, Table
+from sweep.file.layout import DAMAGE, Table, read_bytes
 from sweep.file.reading import StoredFile, ending_text
 
-SYNC_BYTES = 64 << 20
-"""Bytes after which blocks are brought to the disk,"""
 SYNC_SECONDS = 0.2
-"""or time, where that comes first."""
-LOOK_SECONDS = 1.0
-"""How often it is looked whether the file is still in its place."""
+"""How often blocks are brought to the disk, and it is looked whether the file is still in its place."""
 
 Gather = Callable[[StoredFile, int], Mapping[str, Any]]
 """Makes a block of the output of a summary from its rows."""
@@ -59,12 +56,14 @@ class Shared:
     ----------
     path : str
         Where the process that has the lock sees it.
+    size : int
     seal : bytes
-        Of this file; another process that finds it in a file of this path sees the same file.
+        At the end of this file; another process that finds it in a file of this path sees the same file.
     table : Table
     """
 
     path: str
+    size: int
     seal: bytes
     table: Table
 
@@ -74,20 +73,17 @@ class Shared:
             fd = disk.open_file(self.path, os.O_RDWR)
         except OSError:
             return None
-        if _is_sealed(fd, os.fstat(fd).st_size, self.seal):
+        if self.is_same(fd):
             return fd
         os.close(fd)
         return None
 
-
-def _is_sealed(fd: int, size: int, seal: bytes) -> bool:
-    """Whether a file of a size ends with a seal."""
-    tail = bytearray(len(seal))
-    try:
-        disk.read_all(fd, (tail,), size - len(seal))
-    except (OSError, EOFError):
-        return False
-    return bytes(tail) == seal
+    def is_same(self, fd: int) -> bool:
+        """Whether an open file still is the one: not cut, and its end not overwritten."""
+        try:
+            return read_bytes(fd, self.size - len(self.seal), self.size) == self.seal
+        except (OSError, EOFError):
+            return False
 
 
 class Store:
@@ -105,11 +101,9 @@ class Store:
         self.output, self.path = output, unfinished_of(output)
         self.temporary = self.path.with_name(self.path.name + ".tmp")
         self.file: StoredFile | None = None
-        self._fd, self._size, self._seal, self._looked = -1, 0, b"", 0.0
-        self._done = np.zeros(0, bool)
-        self._waiting: dict[int, bytes] = {}
-        self._unsynced, self._synced = 0, time.monotonic()
-        self._turn, self._committing = threading.Lock(), threading.Lock()
+        self._fd, self._done = -1, np.zeros(0, bool)
+        self._waiting: deque[tuple[int, bytes]] = deque()
+        self._synced, self._committing = time.monotonic(), threading.Lock()
         self._checked: Future[list[int]] | None = None
         self._closing = threading.Event()
 
@@ -159,22 +153,16 @@ class Store:
     def _open(self, file: StoredFile) -> None:
         with disk.refusing(self.path):
             self._fd = disk.open_file(self.path, os.O_RDWR)
-            self._size = os.fstat(self._fd).st_size
-        self.file, self._done, self._seal = file, file.done[file.work].copy(), file.seal
+        self.file, self._done = file, file.done[file.work].copy()
+        self._shared = Shared(str(self.path), os.fstat(self._fd).st_size, file.seal, self.table)
 
-    def _check_own(self) -> None:
-        """Raises Incomplete where another program has cut the file or written to it: not a byte of ours goes there."""
-        if not _is_sealed(self._fd, self._size, self._seal):
-            self._waiting = {}
+    def _check(self) -> None:
+        """Raises Incomplete where the file is not what it was, or not where it was: not a byte of ours goes there."""
+        if not self._shared.is_same(self._fd):
             raise Incomplete(
                 f"{self.path}: was cut or overwritten by another program while the run wrote to it, and cannot be "
                 "continued; remove it and run the same command again"
             )
-
-    def _check_there(self) -> None:
-        """Raises Incomplete where the file is not what it was, or not where it was."""
-        self._looked = time.monotonic()
-        self._check_own()
         ours = os.fstat(self._fd)
         try:
             if os.path.samestat(self.path.stat(), ours):
@@ -202,25 +190,17 @@ class Store:
     def put(self, index: int, arrays: Mapping[str, Any]) -> None:
         """Writes a block; it is acknowledged by `tick`, with others. Raises SweepError."""
         with disk.refusing(self.path):
-            digests = self.table.write(self._fd, index, arrays)
-        with self._turn:
-            self._waiting[index] = digests
-            self._unsynced += sum(array.nbytes for array in arrays.values())
+            self._waiting.append((index, self.table.write(self._fd, index, arrays)))
 
     def take(self, index: int, digests: bytes) -> None:
         """Acknowledges a block that another process has written and synced. Raises SweepError."""
         if len(digests) != self.table.row_bytes:
             raise SweepError(f"{self.path}: a worker has written something else than it was asked for")
-        with self._turn:
-            self._waiting[index] = digests
+        self._waiting.append((index, digests))
 
     def tick(self) -> None:
         """Acknowledges what is written, if it is time to. Raises SweepError."""
-        if time.monotonic() - self._looked >= LOOK_SECONDS:
-            self._check_there()
-        with self._turn:
-            due = self._unsynced >= SYNC_BYTES or time.monotonic() - self._synced >= SYNC_SECONDS
-        if due and self._waiting and self._committing.acquire(blocking=False):
+        if time.monotonic() - self._synced >= SYNC_SECONDS and self._committing.acquire(blocking=False):
             try:
                 self._commit()
             finally:
@@ -234,10 +214,9 @@ class Store:
                 disk.sync_numbers(self._fd)
 
     def _commit(self) -> None:
-        self._check_own()
-        with self._turn:
-            waiting, self._waiting = self._waiting, {}
-            self._unsynced, self._synced = 0, time.monotonic()
+        self._check()
+        self._synced = time.monotonic()
+        waiting = dict(self._waiting.popleft() for _ in range(len(self._waiting)))
         with disk.refusing(self.path):
             if waiting:
                 disk.sync_numbers(self._fd)
@@ -271,7 +250,6 @@ class Store:
             Blocks that turned out to be damaged, which have to be computed again first.
         """
         with disk.refusing(self.output):
-            self._check_there()
             self.commit()
             found = self.damaged()
             if not found and gather is not None:
@@ -324,9 +302,7 @@ class Store:
 
     def shared(self) -> Shared | None:
         """What another process needs to write blocks to the file; None where blocks of two would share a page."""
-        if any((place.at % PAGE).any() for place in self.table.places):
-            return None
-        return Shared(str(self.path), self._seal, self.table)
+        return None if any((place.at % PAGE).any() for place in self.table.places) else self._shared
 
     def discard(self) -> None:
         """Removes what is there. Raises SweepError."""

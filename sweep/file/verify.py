@@ -9,10 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from sweep.cells.partition import Partition
 from sweep.errors import SweepError
-from sweep.file.foreign import changed_attrs
-from sweep.file.layout import DAMAGE
+from sweep.file.foreign import changed_result
+from sweep.file.layout import DAMAGE, Table
 from sweep.file.open import OF_DAMAGE, unreadable
 from sweep.file.reading import Changed, StoredFile
 from sweep.file.store import unfinished_of
@@ -68,65 +67,59 @@ def verify(path: str | os.PathLike[str]) -> Verdict:
     place = output if output.exists() else unfinished_of(output)
     if not place.exists():
         raise SweepError(f"{output}: no such file, and no sweep that writes it")
-    structure = "its structure is damaged, or it is not the result of a sweep"
+    if not place.is_file():
+        raise unreadable(place, ValueError("it is no regular file"))
     try:
-        if not place.is_file():
-            raise unreadable(place, ValueError("it is no regular file"))
-        with StoredFile(place) as file:
-            return _verdict(output, file, place == output)
-    except Changed:
         try:
-            changed_attrs(place)
-        except DAMAGE:
-            return Verdict(output, False, "", (structure,))
-        return Verdict(output, False, "", ("was changed by another program, which left its digests out",))
+            with StoredFile(place) as file:
+                return _verdict(output, file)
+        except Changed:
+            changed_result(place).close()
+            return Verdict(output, False, "", ("was changed by another program, which left its digests out",))
     except DAMAGE as fault:
         if isinstance(fault, OSError) and fault.errno and fault.errno not in OF_DAMAGE:
             raise unreadable(place, fault) from None
         text = (str(fault).splitlines() or [type(fault).__name__])[0]
+        structure = "its structure is damaged, or it is not the result of a sweep"
         return Verdict(output, False, "", (f"{structure} ({text})",))
 
 
-def _verdict(output: Path, file: StoredFile, ended: bool) -> Verdict:
-    """Compares all digests; `ended`: the file has the name of a finished result. Raises one of DAMAGE."""
-    size, table = file.path.stat().st_size, file.tables[file.work]
-    beside = "damaged beside the outputs' numbers: in attributes, coordinates or its structure"
-    if ended and not file.ending:
-        return Verdict(output, False, f"{size:,} bytes checked", (beside,))
+def _verdict(output: Path, file: StoredFile) -> Verdict:
+    """Compares all digests. Raises one of DAMAGE."""
+    checked = f"{file.path.stat().st_size:,} bytes checked"
+    if file.path == output and not file.ending:
+        return Verdict(output, False, checked, ("what was written at its end is damaged",))
     findings: list[str] = []
-    blocks: tuple[int, ...] = ()
+    damaged: dict[str, list[int]] = {}
     # the columns of a summary are made at its end
     for name in file.tables if file.ending else (file.work,):
-        wanted = range(len(file.done[name])) if file.ending else np.flatnonzero(file.done[name]).tolist()
-        bad = list(file.damaged(name, wanted))
-        for number, place in enumerate(file.tables[name].places):
-            runs = _runs(file.tables[name].blocks, [block for block, column in bad if column == number])
-            told = [f"{place.name}: damaged between its cells {start:,} and {stop:,}" for start, stop in runs]
-            findings += _shortened(told, f"{place.name}: damaged in {{}} more places")
-        if name == file.work:
-            blocks = tuple(sorted({block for block, _ in bad}))
+        table, done = file.tables[name], file.done[name]
+        bad = list(file.damaged(name, range(len(done)) if file.ending else np.flatnonzero(done).tolist()))
+        damaged[name] = sorted({block for block, _ in bad})
+        for number, place in enumerate(table.places):
+            told = (
+                f"{place.name}: damaged between its cells {{:,}} and {{:,}}",
+                f"{place.name}: damaged in {{}} more places",
+            )
+            findings += _told(*told, table, [block for block, column in bad if column == number])
     if file.ending:
-        checked = f"{size:,} bytes checked"
-        return Verdict(output, not findings, checked, tuple(findings), blocks if findings else None)
+        blocks = tuple(damaged[file.work]) if findings else None
+        return Verdict(output, not findings, checked, tuple(findings), blocks)
     done = file.done[file.work]
-    missing = [table.blocks.bounds(block) for block in np.flatnonzero(~done).tolist()]
-    told = [f"missing: {file.work} {start:,} to {stop:,}" for start, stop in missing]
-    findings += _shortened(told, "missing: {} more")
+    missing = np.flatnonzero(~done).tolist()
+    findings += _told(f"missing: {file.work} {{:,}} to {{:,}}", "missing: {} more", file.tables[file.work], missing)
     findings = findings or ["all blocks are there, but it has not ended; run the sweep again to finish"]
     checked = f"unfinished, {int(done.sum()):,} of {done.size:,} blocks there and checked"
     return Verdict(output, False, checked, tuple(findings))
 
 
-def _runs(blocks: Partition, bad: list[int]) -> Iterator[tuple[int, int]]:
-    """The first and the last cell but one of damaged blocks, neighbouring ones together."""
-    for some in np.split(np.array(bad, np.int64), np.flatnonzero(np.diff(bad) > 1) + 1) if bad else ():
-        yield blocks.bounds(int(some[0]))[0], blocks.bounds(int(some[-1]))[1]
-
-
-def _shortened(lines: list[str], more: str) -> list[str]:
-    """The first lines, and how many more there are."""
-    left = len(lines) - MOST_TOLD
-    return lines if left <= 0 else [*lines[:MOST_TOLD], more.format(f"{left:,}")]
+def _told(text: str, more: str, table: Table, blocks: list[int]) -> Iterator[str]:
+    """A line for each run of blocks, with its first cell and the last but one; of many, how many there are more."""
+    runs = np.split(np.array(blocks, np.int64), np.flatnonzero(np.diff(blocks) > 1) + 1) if blocks else []
+    for run in runs[:MOST_TOLD]:
+        yield text.format(table.blocks.bounds(int(run[0]))[0], table.blocks.bounds(int(run[-1]))[1])
+    if len(runs) > MOST_TOLD:
+        yield more.format(f"{len(runs) - MOST_TOLD:,}")
 
 
 def check_whole(output: Path) -> None:
