@@ -12,8 +12,7 @@ import io
 import math
 import os
 import secrets
-import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -124,20 +123,19 @@ def create(path: Path, schema: Schema, cuts: Mapping[str, Cut], shared: bool = F
     ------
     OSError
     """
-    with _Image() as image:
-        contents = _laid_out(image, schema, cuts, SHARED_WORTH_A_PAGE if shared else WORTH_A_PAGE)
-        end = os.fstat(image.fileno()).st_size
-        fd = disk.open_file(path, os.O_CREAT | os.O_TRUNC | os.O_RDWR)
-        try:
-            disk.reserve(fd, end + len(contents.to_json()) + SEAL.size)
-            for at, piece in image.pieces(end):
-                disk.write_all(fd, (piece,), at)
-            for place in (place for table in contents.tables.values() for place in table.places if place.check):
-                _write_pending(fd, place)
-            disk.write_all(fd, (sealed(fd, contents, end),), end)
-            disk.fsync(fd)
-        finally:
-            os.close(fd)
+    image = _Image()
+    contents = _laid_out(image, schema, cuts, SHARED_WORTH_A_PAGE if shared else WORTH_A_PAGE)
+    fd = disk.open_file(path, os.O_CREAT | os.O_TRUNC | os.O_RDWR)
+    try:
+        disk.reserve(fd, image.size + len(contents.to_json()) + SEAL.size)
+        for at, page in image.pages.items():
+            disk.write_all(fd, (page[: image.size - at],), at)
+        for place in (place for table in contents.tables.values() for place in table.places if place.check):
+            _write_pending(fd, place)
+        disk.write_all(fd, (sealed(fd, contents, image.size),), image.size)
+        disk.fsync(fd)
+    finally:
+        os.close(fd)
 
 
 def _write_pending(fd: int, place: Place) -> None:
@@ -154,37 +152,56 @@ def _write_pending(fd: int, place: Place) -> None:
         disk.write_all(fd, (piece * len(chunks),), chunks[0])
 
 
-class _Image(io.FileIO):
-    """The file as HDF5 writes it, in memory, but for chunks of zeros, which take none."""
+class _Image(io.RawIOBase):
+    """The file as HDF5 writes it, in memory, but for chunks of zeros.
+
+    Attributes
+    ----------
+    pages : dict of int to bytearray
+        What was written, by where it begins.
+    size : int
+    chunk : int
+        Bytes of the chunks that are left out.
+    """
 
     def __init__(self) -> None:
-        with tempfile.TemporaryFile() as other:
-            super().__init__(os.memfd_create("result") if hasattr(os, "memfd_create") else os.dup(other.fileno()), "r+")
-        self.chunk = 0
-        """Bytes of the chunks that are left out."""
+        self.pages: dict[int, bytearray] = {}
+        self.size = self.chunk = self._at = 0
+
+    def seek(self, offset: int, whence: int = 0) -> int:
+        self._at = offset + (self.size if whence == os.SEEK_END else 0)
+        return self._at
+
+    def tell(self) -> int:
+        return self._at
+
+    def truncate(self, size: int | None = None) -> int:
+        self.size = self._at if size is None else size
+        return self.size
+
+    def readinto(self, buffer: Any) -> int:
+        for page, here, there in self._pieces(len(buffer)):
+            buffer[there] = page[here]
+        return len(buffer)
 
     def write(self, piece: Any) -> int:
         # HDF5 writes nothing else of a chunk's length that begins with zeros: its tables begin with addresses
-        count = len(piece)
-        if count == self.chunk > BYTES and bytes(piece[:BYTES]) == bytes(BYTES):
-            self.seek(count, os.SEEK_CUR)
-            return count
-        left = memoryview(piece)
-        while left:
-            left = left[super().write(left) :]
-        return count
+        if len(piece) == self.chunk and bytes(piece[:BYTES]) == bytes(BYTES):
+            self._at += len(piece)
+        else:
+            for page, here, there in self._pieces(len(piece)):
+                page[here] = piece[there]
+        self.size = max(self.size, self._at)
+        return len(piece)
 
-    def pieces(self, end: int) -> Any:
-        """What was written, piece by piece: where it begins, and its bytes."""
-        at = 0
-        while at < end:
-            try:
-                at = os.lseek(self.fileno(), at, os.SEEK_DATA)
-            except OSError:  # nothing but what is left out follows
-                return
-            stop = min(os.lseek(self.fileno(), at, os.SEEK_HOLE), at + PIECE)
-            yield at, os.pread(self.fileno(), stop - at, at)
-            at = stop
+    def _pieces(self, count: int) -> Iterator[tuple[bytearray, slice, slice]]:
+        """So many bytes from here on: a page, where they are in it, and which of them they are."""
+        begin, end = self._at, self._at + count
+        while self._at < end:
+            page = self._at // PAGE * PAGE
+            start, self._at = self._at, min(end, page + PAGE)
+            here = slice(start - page, self._at - page)
+            yield self.pages.setdefault(page, bytearray(PAGE)), here, slice(start - begin, self._at - begin)
 
 
 def _laid_out(image: _Image, schema: Schema, cuts: Mapping[str, Cut], aligned: int) -> Contents:
