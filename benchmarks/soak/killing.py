@@ -329,7 +329,7 @@ def _note_acknowledged(told):
     real = Store._commit
 
     def noting(self):
-        blocks = list(self._waiting)
+        blocks = [index for index, _ in list(self._waiting)]
         real(self)
         if blocks:
             os.write(told, f"{json.dumps([str(self.path), blocks])}\n".encode())
