@@ -28,13 +28,11 @@ import distributed
 
 from sweep.cells.block import Blocks, warm
 from sweep.cells.fingerprint import difference, fingerprint
-from sweep.cells.partition import Partition
 from sweep.cells.solve import Solver
 from sweep.errors import Incomplete, SweepError
 from sweep.file import disk
-from sweep.file.store import Shared
 from sweep.runs.bench import POISONED, Bench, Done, Found, Masks
-from sweep.runs.isolate import Processes, kernel_paths
+from sweep.runs.isolate import Processes
 from sweep.runs.log import log
 from sweep.study.model import Study
 
@@ -90,16 +88,8 @@ class Cluster:
                 self._note("the cluster has no workers; waiting for the first")
         self.threads, self._asked = threads, time.monotonic()
 
-    def begin(
-        self,
-        study: Study,
-        fingerprint: Mapping[str, str],
-        partition: Partition,
-        shared: Shared | None,
-        isolated: tuple[float | None, float] | None,
-    ) -> None:
-        """What the workers are to compute; as `Remote`, which dask makes where it is needed."""
-        words = study.to_json(), dict(fingerprint), partition, shared, kernel_paths(study), isolated
+    def begin(self, *words: Any) -> None:
+        """Tells the workers what is to be computed, as `Remote` takes it, which dask makes where it is needed."""
         self._remote = self._client.submit(Remote, *words, pure=False)
 
     def submit(self, masks: Masks) -> Future[Answer]:

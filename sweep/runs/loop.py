@@ -26,7 +26,7 @@ from sweep.errors import SweepError
 from sweep.file.store import Shared
 from sweep.runs.bench import POISONED, Bench, Found, Masks
 from sweep.runs.extend import Precomputed, Reused
-from sweep.runs.isolate import Processes
+from sweep.runs.isolate import Processes, kernel_paths
 from sweep.runs.log import log
 from sweep.runs.pool import CtrlC, TimeUp, endless, passed
 from sweep.runs.progress import Progress, from_everywhere
@@ -164,9 +164,10 @@ class Loop:
         cluster, processes = self._cluster, self._processes
         bench = Bench(self.task.study, self.blocks, sink.put, sink.room, processes)
         if cluster is not None:
+            study, seen = self.task.study, shared if self._reused is None else None
             isolated = None if processes is None else (processes.limit, processes.cost)
-            seen = shared if self._reused is None else None
-            cluster.begin(self.task.study, self.task.fingerprint, self.blocks.partition, seen, isolated)
+            words = study.to_json(), dict(self.task.fingerprint), self.blocks.partition, seen
+            cluster.begin(*words, kernel_paths(study), isolated)
         queue, lost = deque(from_everywhere(jobs)), Counter[int]()
         most = max(1, TASK_BYTES // max(1, self.blocks.partition.cells * self.blocks.row_bytes))
         under_way: dict[Future[Any], Masks] = {}
