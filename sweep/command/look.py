@@ -10,6 +10,7 @@ import argparse
 import sys
 from pathlib import Path
 
+import sweep
 from sweep.command import options as o
 from sweep.command.options import command, option, switch
 from sweep.command.outcome import DIFFERENT, Outcome
@@ -25,14 +26,14 @@ from sweep.errors import COMPLETE, SweepError
 )
 def kernels(arguments: argparse.Namespace) -> None:
     """What can be swept: parameters, units, outputs, methods."""
-    from sweep.show.kernels import catalogue_text, kernels, write_starter
+    from sweep.show.kernels import catalogue_text, write_starter
 
     name, path = arguments.name, arguments.study
     if path and not name:
         raise SweepError("--study: name a kernel as well, e.g. sweep kernels foliot --study foliot.toml")
     if path:
         write_starter(name, path, arguments.allow_import, arguments.force)
-    say(path or (kernels(name, arguments.allow_import) if name else catalogue_text(arguments.all)))
+    say(path or (sweep.kernels(name, arguments.allow_import) if name else catalogue_text(arguments.all)))
 
 
 @command("sweep studies foliot_scaling", option("name", "of the study to copy", metavar="NAME", nargs="?"), o.FORCE)
@@ -64,9 +65,7 @@ def show(arguments: argparse.Namespace) -> None:
 @command("sweep verify foliot.h5", o.RESULT, o.JSON)
 def verify(arguments: argparse.Namespace) -> None:
     """Check a result's checksums, whether it is finished or not."""
-    from sweep.file.verify import verify
-
-    verdict = verify(arguments.result)
+    verdict = sweep.verify(arguments.result)
     if not verdict.whole:
         raise SweepError(str(verdict))
     tell(arguments, verdict)
@@ -79,9 +78,7 @@ def verify(arguments: argparse.Namespace) -> None:
 )
 def list_(arguments: argparse.Namespace) -> None:
     """The results in a folder: cells, how much is done, statuses, question."""
-    from sweep.results.listing import list_results
-
-    found = list_results(arguments.folder)
+    found = sweep.list_results(arguments.folder)
     tell(arguments, found, found.table(arguments.all))
 
 
@@ -95,10 +92,8 @@ def list_(arguments: argparse.Namespace) -> None:
 )
 def diff(arguments: argparse.Namespace) -> Outcome:
     """In what two results differ: cells, statuses, how far; exit status 1 if they do."""
-    from sweep.results.diff import diff
-
     with opened(arguments) as a, opened(arguments, "other") as b:
-        found = diff(a, b, arguments.rtol)
+        found = sweep.diff(a, b, arguments.rtol)
     tell(arguments, found)
     return Outcome(COMPLETE if found.same else DIFFERENT, str(found))
 
@@ -111,11 +106,8 @@ def diff(arguments: argparse.Namespace) -> Outcome:
 )
 def plot(arguments: argparse.Namespace) -> None:
     """A figure of one output."""
-    from sweep.show.plot import plot
-
     with opened(arguments) as dataset:
-        plot(dataset, arguments.output, y=arguments.y, x=arguments.x, force=True)
-    say(arguments.output)
+        sweep.plot(dataset, arguments.output, y=arguments.y, x=arguments.x, force=True)
 
 
 @command(
@@ -143,7 +135,7 @@ def report(arguments: argparse.Namespace) -> None:
     from sweep.show.page import write_page
 
     with opened(arguments) as dataset:
-        say(write_page(dataset, arguments.result, arguments.output))
+        write_page(dataset, arguments.result, arguments.output)
 
 
 @command(
@@ -174,28 +166,23 @@ def fit(arguments: argparse.Namespace) -> None:
     """Exponent of a power law with its interval, and where two laws meet."""
     from sweep.explore.scattered import on_lines
     from sweep.show import laws
-    from sweep.show.plot import plot
 
     target, windows = arguments.output, arguments.window
     with opened(arguments) as dataset:
         part = on_lines(dataset, arguments.x)
-        if arguments.compare:
-            compared = laws.comparison(part, arguments.y, arguments.x, windows)
-        else:
+        if not arguments.compare:
             noise = {"yes": True, "no": False}.get(arguments.noise, arguments.noise)
             found = laws.laws(part, arguments.y, arguments.x, windows, arguments.confidence, noise)
-    if arguments.compare:
-        tell(arguments, compared, laws.comparison_text(compared, arguments.all))
-    else:
-        tell(arguments, found, laws.laws_text(found, arguments.all))
-    if target:
-        if not arguments.compare:
-            laws.write_laws(found, target)
-        elif target.suffix.lower() == ".csv":
-            laws.write_comparison(compared, target)
-        else:
-            plot(compared, target, force=True)
-        say(target, sys.stderr if arguments.json else None)
+            tell(arguments, found, laws.laws_text(found, arguments.all))
+            if target:
+                laws.write_laws(found, target)
+            return
+        compared = laws.comparison(part, arguments.y, arguments.x, windows)
+    tell(arguments, compared, laws.comparison_text(compared, arguments.all))
+    if target and target.suffix.lower() == ".csv":
+        laws.write_comparison(compared, target)
+    elif target:
+        sweep.plot(compared, target, force=True)
 
 
 @command(
@@ -207,30 +194,23 @@ def fit(arguments: argparse.Namespace) -> None:
 def exponent(arguments: argparse.Namespace) -> None:
     """The local exponent of an output along an axis, with its error."""
     from sweep.explore.scattered import on_lines
-    from sweep.laws.exponents import local_exponent
     from sweep.show import laws
-    from sweep.show.plot import plot
 
     with opened(arguments) as dataset:
         y = laws.output_of(dataset, arguments.y)
-        found = local_exponent(on_lines(dataset, arguments.x)[y], arguments.x, error=True)
+        found = sweep.local_exponent(on_lines(dataset, arguments.x)[y], arguments.x, error=True)
     tell(arguments, found, laws.exponents_text(found, arguments.x, arguments.all))
     if arguments.output:
-        plot(found, arguments.output, y="exponent", x=arguments.x, force=True)
-        say(arguments.output, sys.stderr if arguments.json else None)
+        sweep.plot(found, arguments.output, y="exponent", x=arguments.x, force=True)
 
 
-@command(
-    "sweep sensitivity saltelli.h5 --y period",
-    *(o.RESULT, o.OUTPUT_Y, o.JSON),
-)
+@command("sweep sensitivity saltelli.h5 --y period", o.RESULT, o.OUTPUT_Y, o.JSON)
 def sensitivity(arguments: argparse.Namespace) -> None:
     """Which axes of a design "saltelli" or "morris" decide an output."""
-    from sweep.explore.sensitivity import sensitivity
     from sweep.show import laws
 
     with opened(arguments) as dataset:
-        found = sensitivity(dataset, laws.output_of(dataset, arguments.y))
+        found = sweep.sensitivity(dataset, laws.output_of(dataset, arguments.y))
     tell(arguments, found, laws.sensitivity_text(found))
 
 
@@ -246,11 +226,9 @@ def sensitivity(arguments: argparse.Namespace) -> None:
 )
 def export(arguments: argparse.Namespace) -> None:
     """Write a result as csv, parquet, netCDF4 or zarr."""
-    from sweep.results.export import export
-
     keys = {name: getattr(arguments, name) for name in ("force", "compress", "float32")}
     with opened(arguments) as dataset:
-        say(export(dataset, arguments.output, **keys))
+        sweep.export(dataset, arguments.output, **keys)
 
 
 @command(
@@ -263,12 +241,11 @@ def export(arguments: argparse.Namespace) -> None:
 )
 def join(arguments: argparse.Namespace) -> None:
     """Two results of one kernel as one, longer along an axis or along a new one."""
-    from sweep.explore.join import join
     from sweep.results.statuses import summary_text
 
     paths = [arguments.result, arguments.other]
     labels = arguments.labels or [path.stem if len({p.stem for p in paths}) > 1 else str(path) for path in paths]
     with opened(arguments) as a, opened(arguments, "other") as b:
-        found = join(a, b, arguments.output, axis=arguments.axis, labels=labels, force=arguments.force)
+        found = sweep.join(a, b, arguments.output, axis=arguments.axis, labels=labels, force=arguments.force)
     with found:
         say(f"{arguments.output}: {summary_text(found)}")

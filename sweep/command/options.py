@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from sweep.command.outcome import Outcome
+from sweep.command.reading import say
 
 Function = Callable[[argparse.Namespace], Outcome | None]
 
@@ -29,7 +31,10 @@ class Command(NamedTuple):
     options: tuple[Option, ...]
 
     def run(self, arguments: argparse.Namespace) -> Outcome | None:
-        """Does it, unless it would overwrite what is there without --force, or what it reads. Raises SweepError."""
+        """Does it, unless it would overwrite what is there without --force, or what it reads; says what it has written.
+
+        Raises SweepError.
+        """
         from sweep.file.overwriting import check_target
 
         target = next((option for option in self.options if option.ending is not None), None)
@@ -39,7 +44,10 @@ class Command(NamedTuple):
             arguments.output = given or (Path(f"{read[0].stem}{target.ending}") if target.ending else None)
             if given or (target.ending and target.checked):
                 check_target(arguments.output, force=arguments.force or not target.checked, read=read)
-        return self.function(arguments)
+        outcome = self.function(arguments)
+        if target is not None and target.checked and arguments.output is not None:
+            say(arguments.output, sys.stderr if getattr(arguments, "json", False) else None)
+        return outcome
 
 
 def command(example: str, *options: Option) -> Callable[[Function], Command]:

@@ -19,18 +19,16 @@ class Outcome(NamedTuple):
 
 def explained(error: BaseException) -> Outcome:
     """The exit status and the message of a fault."""
-    if isinstance(error, SweepError):
-        return Outcome(INCOMPLETE if isinstance(error, Incomplete) else MISTAKE, str(error))
-    if isinstance(error, KeyboardInterrupt):
-        return Outcome(INTERRUPTED, "stopped")
-    if isinstance(error, SystemExit):
-        return Outcome(error.code if isinstance(error.code, int) else FAULT, "stopped")
-    if isinstance(error, MemoryError):
-        return Outcome(MISTAKE, "out of memory; choose fewer cells, fewer outputs or fewer workers")
-    if isinstance(error, OSError):
-        return Outcome(MISTAKE, f"{error.filename or 'the system'}: {error.strerror or error}")
-    return Outcome(
-        FAULT,
-        f"a fault in foliot: {type(error).__name__}: {error}\n"
-        "Please report it; with SWEEP_TRACEBACK=1 in the environment the same command says where.",
-    )
+    match error:
+        case SweepError():
+            return Outcome(INCOMPLETE if isinstance(error, Incomplete) else MISTAKE, str(error))
+        case KeyboardInterrupt():
+            return Outcome(INTERRUPTED, "stopped")
+        case SystemExit(code=code):
+            return Outcome(code if isinstance(code, int) else FAULT, "stopped")
+        case MemoryError():
+            return Outcome(MISTAKE, "out of memory; choose fewer cells, fewer outputs or fewer workers")
+        case OSError():
+            return Outcome(MISTAKE, f"{error.filename or 'the system'}: {error.strerror or error}")
+    said = "Please report it; with SWEEP_TRACEBACK=1 in the environment the same command says where."
+    return Outcome(FAULT, f"a fault in foliot: {type(error).__name__}: {error}\n{said}")

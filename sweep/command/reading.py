@@ -13,6 +13,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
+import sweep
 from sweep.errors import SweepError
 
 if TYPE_CHECKING:
@@ -41,15 +42,14 @@ def opened(arguments: argparse.Namespace, name: str = "result") -> Iterator[xr.D
 
     Where another program has changed it, what goes wrong with it is reported as that.
     """
-    from sweep.file.open import changed, open_result
-    from sweep.results.units import in_units
+    from sweep.file.open import changed
 
     path: Path = getattr(arguments, name)
     if path.suffix == ".toml":
         raise SweepError(f"{path} is a study, not a result; compute it with: sweep run {path}")
     if not path.exists() and path.with_name(path.name + ".unfinished").exists():
         say(f"{path}: unfinished; cells that are not computed yet are NaN and PENDING", file=sys.stderr)
-    with open_result(path) as found, changed(path):
+    with sweep.open_result(path) as found, changed(path):
         if "end" not in found.attrs and not getattr(arguments, "unfinished", True):
             raise SweepError(f"{path}: unfinished; continue it with sweep run, or take what there is with --unfinished")
         if getattr(arguments, "at", None):
@@ -57,14 +57,12 @@ def opened(arguments: argparse.Namespace, name: str = "result") -> Iterator[xr.D
 
             found = pick(found, arguments.at)
         if getattr(arguments, "where", None):
-            from sweep.results.filter import where
-
-            found = where(found, arguments.where)
+            found = sweep.where(found, arguments.where)
         pairs = [text.partition("=") for text in getattr(arguments, "unit", ())]
         for pair in pairs:
             if not all(pair):
                 raise SweepError(f'--unit: expected NAME=UNIT, found "{"".join(pair)}"; write e.g. --unit A0=degree')
-        yield in_units(found, {name: unit for name, _, unit in pairs}) if pairs else found
+        yield sweep.in_units(found, {name: unit for name, _, unit in pairs}) if pairs else found
 
 
 def say(text: object, file: TextIO | None = None) -> None:

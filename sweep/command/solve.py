@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import sweep
 from sweep.command import options as o
 from sweep.command.options import command, option, switch
 from sweep.command.outcome import DIFFERENT, Outcome, explained
@@ -31,11 +32,10 @@ RUN_OPTIONS = ("cluster", "force", "extend", "until", "retry_failed", "repair")
 @command("sweep plan foliot_scaling.toml", o.STUDY, *o.SOLVING, o.JSON)
 def plan(arguments: argparse.Namespace) -> None:
     """Cells, bytes, memory and a timed forecast, before anything runs."""
-    from sweep.explore.plan import plan
     from sweep.runs.progress import Progress
 
     study = study_from(arguments)
-    found = plan(study, note=Progress(1, sys.stderr, "plan").note, **solving(arguments, study))
+    found = sweep.plan(study, note=Progress(1, sys.stderr, "plan").note, **solving(arguments, study))
     tell(arguments, found)
     if found.warnings:
         raise SweepError("\n".join(f"{arguments.study}: {text}" for text in found.warnings))
@@ -131,12 +131,10 @@ def notify(arguments: argparse.Namespace, ended: Outcome) -> None:
 )
 def refine(arguments: argparse.Namespace) -> None:
     """Add cells to a result where it bends, until it can be interpolated."""
-    from sweep.explore.refine import refine
-
     with opened(arguments) as dataset:
         study = study_from(arguments, dataset)
         keys = {"most_cells": arguments.most_cells, "force": arguments.force, **solving(arguments, study)}
-        found = refine(dataset, arguments.y, arguments.tolerance, path=arguments.output, study=study, **keys)
+        found = sweep.refine(dataset, arguments.y, arguments.tolerance, path=arguments.output, study=study, **keys)
     say(f"{arguments.output}: {found}")
 
 
@@ -154,9 +152,8 @@ def refine(arguments: argparse.Namespace) -> None:
 )
 def chart(arguments: argparse.Namespace) -> None:
     """Error against time of every method of a kernel, on the cells of a study or a result."""
-    from sweep.explore.work_precision import TOLERANCES, precision_text, work_precision
+    from sweep.explore.work_precision import TOLERANCES, precision_text
     from sweep.runs.progress import Progress
-    from sweep.show.plot import plot
 
     if arguments.study.suffix == ".h5":
         with opened(arguments, "study") as dataset:
@@ -165,10 +162,9 @@ def chart(arguments: argparse.Namespace) -> None:
         study = study_from(arguments)
     keys = {name: getattr(arguments, name) for name in ("methods", "cells", "reference")}
     keys |= {"tolerances": arguments.rtol or TOLERANCES, "note": Progress(1, sys.stderr, "chart").note}
-    found = work_precision(study, **keys, **solving(arguments, study))
+    found = sweep.work_precision(study, **keys, **solving(arguments, study))
     tell(arguments, found, precision_text(found, arguments.all))
-    plot(found, arguments.output, force=True)
-    say(arguments.output, sys.stderr if arguments.json else None)
+    sweep.plot(found, arguments.output, force=True)
 
 
 @command(
