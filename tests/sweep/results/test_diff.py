@@ -93,9 +93,14 @@ def test_cells_of_large_results_are_found_wherever_they_are():
     """More than are looked at together."""
     status = np.zeros((3, 2_000_000), np.int8)
     ds = xr.Dataset({"status": (("x", "y"), status)}, {"x": [1.0, 2.0, 3.0], "y": np.arange(2e6)}, {"kernel": "toy"})
+    ds["time"] = ("x", "y"), np.ones(status.shape)
     other = ds.copy(deep=True)
     other.status[2, 7] = Status.BAD_INPUT
-    assert sweep.diff(ds, other).examples["0", str(int(Status.BAD_INPUT))] == "e.g. x=3.0 y=7.0"
+    other.time[0, 5], other.time[2, 9] = 2.0, 1.5
+    found = sweep.diff(ds, other)
+    assert found.examples["0", str(int(Status.BAD_INPUT))] == "e.g. x=3.0 y=7.0"
+    assert (found.outputs["time"].cells, found.outputs["time"].largest) == (2, 0.5)
+    assert found.outputs["time"].example == "e.g. x=1.0 y=5.0"
     assert [(c.cells, c.example) for c in count_statuses(other)] == [(5_999_999, {}), (1, {"x": "3.0", "y": "7.0"})]
 
 
