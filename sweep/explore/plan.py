@@ -225,12 +225,17 @@ def _forecast(study: Study, sample: Sample, workers: int, folder: Path, solver: 
     # blocks are written while others are computed
     seconds = RUN_SECONDS + max(sample.cost * rows.size / min(workers, blocks.count), writing)
 
-    chosen = _chosen(grid, int(min(LOOK_SECONDS, SHARE * seconds) / (sample.cost + sample.call)))
-    cells = empty_cells(study, len(chosen))
+    ends, others = _chosen(grid)
+    cells = empty_cells(study, len(ends) + len(others))
     cells.status[:], cells.used[:] = Status.PENDING, -1
-    for place, number in enumerate(chosen):
+    sampled, until = 0, time.perf_counter() + min(LOOK_SECONDS, SHARE * seconds)
+    for number in (*ends, *others):
+        if sampled >= len(ends) and time.perf_counter() > until:
+            break
         with tolerated():
-            solver.solve(number, cells.rows(slice(place, place + 1)))
+            solver.solve(number, cells.rows(slice(sampled, sampled + 1)))
+        sampled += 1
+    cells = cells.rows(slice(0, sampled))
 
     def counted(numbers: Any, names: dict[int, str]) -> dict[str, float]:
         found, counts = np.unique(numbers, return_counts=True)
@@ -253,12 +258,12 @@ def _forecast(study: Study, sample: Sample, workers: int, folder: Path, solver: 
         seconds=seconds,
         methods=counted(cells.used, {-1: "none", **dict(enumerate(m.name for m in study.kernel.methods))}),
         statuses=counted(cells.status, {int(s): s.name for s in Status}),
-        sampled=len(chosen),
+        sampled=sampled,
     )
 
 
-def _chosen(grid: Grid, most: int) -> list[int]:
-    """Numbers of cells at the ends of axes, and of at most so many others, each drawn from one of equal shares.
+def _chosen(grid: Grid) -> tuple[list[int], list[int]]:
+    """Numbers of cells at the ends of axes, and of others, each drawn from one of equal shares.
 
     The ends are those of every axis, in the middle of the others, and of all axes at once: there a scene is most often
     another one, and so is the method.
@@ -266,10 +271,10 @@ def _chosen(grid: Grid, most: int) -> list[int]:
     last, axis = np.array(grid.shape) - 1, np.eye(len(grid.shape), dtype=bool)
     middle = last // 2
     places = np.concatenate([[0 * last], [last], np.where(axis, 0, middle), np.where(axis, last, middle)])
-    ends = np.ravel_multi_index(tuple(places.T), grid.shape)
+    ends = list(dict.fromkeys(np.ravel_multi_index(tuple(places.T), grid.shape).tolist()))
     rng = np.random.default_rng(0)
-    drawn = (np.arange(DRAWN) + rng.random(DRAWN)) * (grid.size / DRAWN)
-    return list(dict.fromkeys([*ends.tolist(), *rng.permutation(drawn.astype(np.int64))[:most].tolist()]))
+    drawn = rng.permutation(((np.arange(DRAWN) + rng.random(DRAWN)) * (grid.size / DRAWN)).astype(np.int64))
+    return ends, [number for number in dict.fromkeys(drawn.tolist()) if number not in ends]
 
 
 def _disk_speed(folder: Path) -> float:
