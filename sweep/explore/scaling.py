@@ -18,7 +18,7 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -190,18 +190,18 @@ def scaling(study: Given, seconds: float | None = None) -> Scaling:
     one-dimensional in mu, a: only mu/(phi0 a^2) matters; 1 of these axes can be left out; tried on ... cells at random
     """
     study = as_study(study)
-    held = _held(study, seconds)
-    none = (Fraction(0),) * len(held.leading)
-    weights = {name: tuple(row) for name, row in held.weights.items() if any(row)}
+    held, leads, hidden, tried = _held(study, seconds)
+    none = [Fraction(0)] * len(leads)
+    weights = {name: row for name, row in held.items() if any(row)}
     fields = [f.name for f in (*study.kernel.parameters, *study.kernel.along)]
     scaled = [name for name in fields if name in weights]
     arrays = any(field.dims for field in study.kernel.parameters)
     present = [] if arrays else [name for name in scaled if name not in study.along]
-    leading = [name for name in held.leading if name in present]
+    leading = [name for name in leads if name in present]
 
     def against(name: str) -> dict[str, Fraction]:
         """Powers of the leading parameters whose product scales against a field."""
-        return {k: -w for k, w in zip(held.leading, weights.get(name, none), strict=True) if k in leading}
+        return {k: -w for k, w in zip(leads, weights.get(name, none), strict=True) if k in leading}
 
     def group(powers: Mapping[str, Fraction]) -> Group:
         return Group(tuple((name, powers[name]) for name in present if powers.get(name)))
@@ -216,7 +216,7 @@ def scaling(study: Given, seconds: float | None = None) -> Scaling:
         common = math.lcm(*(power.denominator for power in powers.values()))
         groups.append(group({n: p * (common if common <= LARGEST_COMMON else 1) for n, p in powers.items()}))
     # an output that scales with what does not lead cannot be freed of units
-    elsewhere = [k for k, name in enumerate(held.leading) if name not in leading]
+    elsewhere = [k for k, name in enumerate(leads) if name not in leading]
     freed = [o.name for o in study.asked if not any(weights.get(o.name, none)[k] for k in elsewhere)]
     axes = tuple(name for name in study.axes if name in scaled)
 
@@ -230,8 +230,8 @@ def scaling(study: Given, seconds: float | None = None) -> Scaling:
         axes=axes,
         free=rank(scaled) - rank([name for name in scaled if name not in axes]),
         others=tuple(name for name in study.axes if name in fields and name not in axes),
-        hidden=held.hidden,
-        tried=held.cells,
+        hidden=hidden,
+        tried=tried,
     )
 
 
@@ -243,18 +243,10 @@ def advice_on(study: Study | str, seconds: float) -> str:
     return found.advice if found.tried else late
 
 
-class _Held(NamedTuple):
-    """A basis of the scalings that hold: every name's weight in each, which is 1 in one of them for a name that leads
-    it and 0 in the others; how many do not follow from declared units; on how many cells they were tried."""
-
-    weights: dict[str, list[Fraction]]
-    leading: list[str]
-    hidden: int
-    cells: int
-
-
-def _held(study: Study, seconds: float | None) -> _Held:
-    """The scalings that hold on random cells; none, on no cells, where trying them takes longer than some seconds."""
+def _held(study: Study, seconds: float | None) -> tuple[dict[str, list[Fraction]], list[str], int, int]:
+    """A basis of the scalings that hold on random cells: every name's weight in each, and the names that lead them,
+    whose weight is 1 in one and 0 in the others; how many do not follow from declared units; on how many cells they
+    were tried: none where that takes longer than some seconds."""
     study = dataclasses.replace(study, rtol=min(study.rtol, RTOL))
     along = [field for field in study.kernel.along if len(study.along[field.name])]
     fields = [*(field for field in study.kernel.parameters if _is_scalable(study, field)), *along]
@@ -270,7 +262,7 @@ def _held(study: Study, seconds: float | None) -> _Held:
     solved(few)
     cost = (time.perf_counter() - begun) / FEWEST_CELLS
     if seconds is not None and LEAST_SOLVED * cost > max(seconds, LEAST_SECONDS):
-        return _Held({}, [], 0, 0)
+        return {}, [], 0, 0
     affordable = int(max(seconds or SECONDS, LEAST_SECONDS) / (cost * (4 * len(leading) + 16)))
     cells = min(TRIED_CELLS, max(FEWEST_CELLS, affordable))
 
@@ -286,7 +278,7 @@ def _held(study: Study, seconds: float | None) -> _Held:
         if len(more) > by_units and all(trial.holds(row) for row in more):
             rows, leads = more, more_leads
     weights = {name: [_fraction(w) for w in row] for name, row in zip(names, rows.T.tolist(), strict=True)}
-    return _Held(weights, [names[k] for k in leads], len(rows) - by_units, trial.number)
+    return weights, [names[k] for k in leads], len(rows) - by_units, trial.number
 
 
 def _is_scalable(study: Study, field: Field) -> bool:
