@@ -161,7 +161,8 @@ def _second_opinions(alone: Sequence[Study], used: Sequence[str]) -> dict[int, t
 
 def _difference(value: Any, again: Any, size: float) -> float:
     """How far a value is off another one, relative to the largest of it and of `size`."""
-    off = np.where((value == again) | (np.isnan(value) & np.isnan(again)), 0.0, abs(value - again)).max()
+    with np.errstate(invalid="ignore"):  # where both are infinite
+        off = np.where((value == again) | (np.isnan(value) & np.isnan(again)), 0.0, abs(value - again)).max()
     size = max(size, float(np.nanmax(abs(again), initial=0.0)))
     return float(np.nan_to_num(off / size, nan=np.inf)) if off else 0.0
 

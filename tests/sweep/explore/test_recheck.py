@@ -94,3 +94,10 @@ def test_words_traces_and_arrays_are_given_back_as_the_kernel_had_them():
     found = sweep.run(keys).sweep.check()
     assert found.judged == found.sample == 2
     assert found.beyond == 0
+
+
+def test_outputs_that_are_infinite_by_both_methods_agree():
+    fixed = {"I_c": 1e-4, "I_v": 1e-5, "r_c": 0.05, "r_v": 0.01, "teeth": 31, "h": 1e-3, "e": 0.1}
+    found = sweep.run(kernel="impact", axes={"torque": [1e-3, 1e-2]}, fixed=fixed)
+    assert np.isinf(found.impacts).all()
+    assert found.sweep.check().beyond == 0
