@@ -39,16 +39,8 @@ class Done:
 class Bench:
     """Computes blocks in any thread, each with a solver and columns of its own, which are used again.
 
-    Parameters
-    ----------
-    study : Study
-    blocks : Blocks
-    kept : callable
-        Takes the number and the columns of a block that is computed; what it gives goes back.
-    room : callable, optional
-        The columns to fill for a block, where these are not a thread's own.
-    processes : Processes, optional
-        Which solve cells; None: they are solved in this process.
+    `kept` takes the number and the columns of a block that is computed; what it gives goes back. `room` gives the
+    columns to fill, where these are not a thread's own. Cells are solved here, or in `processes` of their own.
     """
 
     def __init__(

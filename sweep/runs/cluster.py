@@ -42,19 +42,10 @@ ASK_SECONDS = 2.0
 
 
 class Cluster:
-    """The workers of a dask scheduler. To be used in a `with` statement.
+    """The workers of a dask scheduler. To be used in a `with` statement. Raises SweepError where none answers.
 
-    Parameters
-    ----------
-    address : str or distributed.Client or a cluster of dask's
-        An address such as "tcp://10.0.0.1:8786", or the path of a scheduler file, `*.json`; a client is not closed.
-    note : callable
-        Told where there are no workers, which is waited for; those of batch systems may take hours.
-
-    Raises
-    ------
-    SweepError
-        No scheduler answers.
+    Its address is "tcp://10.0.0.1:8786", the path of a scheduler file, `*.json`, a cluster of dask's, or a Client,
+    which is not closed. `note` is told where there are no workers, which are waited for: batch systems may take hours.
     """
 
     def __init__(self, address: Any, note: Callable[[str], None]) -> None:
@@ -164,14 +155,9 @@ def _reason(fault: BaseException) -> str:
 class Remote:
     """A run as a worker knows it; where dask moves it to, it is made anew.
 
-    Parameters
-    ----------
-    study : JSON
-    fingerprint : fingerprint of the study where the run was started; a worker with another one refuses
-    partition : how the rows are cut
-    shared : the file that blocks are to be written to; None where their numbers are to be sent
-    paths : where to look for the module of a kernel of the user's own; his study was allowed to run it
-    isolated : limit and cost of `Processes` that solve cells; None: they are solved in the worker's own process
+    Of the study as JSON; its fingerprint where the run was started (a worker with another one refuses); how the rows
+    are cut; the file that blocks are to be written to (None: their numbers are sent); where to look for the module of a
+    kernel of the user's own, whose study was allowed to run it; limit and cost of `Processes` (None: no isolation).
     """
 
     def __init__(self, *words: Any) -> None:

@@ -60,26 +60,10 @@ def has_failed(output: Path) -> bool:
 
 
 class Reused:
-    """The cells of a finished result, in the grid of an extended study.
+    """The cells of a finished result, in the grid of a study whose axes have all its values, in order, and more.
 
-    Parameters
-    ----------
-    output : Path
-        The finished result.
-    study : Study
-        Whose axes have all values of the result's, in the same order, and more.
-    retry : bool
-        It is the same study, and cells that FAILED are computed again.
-
-    Attributes
-    ----------
-    attrs : mapping
-        Further attributes of what is extended.
-
-    Raises
-    ------
-    SweepError
-        The result cannot be read, or an axis lacks some of its values.
+    To `retry`, it is the same study, and cells that FAILED are not known. `attrs` are further attributes of what is
+    extended. Raises SweepError where the result cannot be read, or an axis lacks some of its values.
     """
 
     def __init__(self, output: Path, study: Study, retry: bool = False) -> None:

@@ -50,11 +50,7 @@ MOST_TOLD = 1000
 
 
 class Sink(Protocol):
-    """Where blocks go.
-
-    `room` gives the columns to fill, where these are part of it; `put` takes a block in any thread; `tick` is called
-    now and then.
-    """
+    """Where blocks go: `room` gives the columns to fill, if it has any; `put` takes a block, in any thread."""
 
     @property
     def room(self) -> Callable[[int], Mapping[str, Any]] | None: ...
@@ -63,22 +59,10 @@ class Sink(Protocol):
 
 
 class Loop:
-    """Times a sample of the grid and cuts it into blocks; then computes them.
+    """Times a sample of the grid, where it is to be `sampled`, and cuts it into blocks; then computes them.
 
-    Parameters
-    ----------
-    task : Task
-        What is asked for.
-    ctrl_c : CtrlC
-        Asked now and then.
-    cluster : Cluster, optional
-        Whose workers are to compute; None: threads here.
-    partition : Partition, optional
-        How the rows are cut, where that is settled already.
-    sampled : bool
-        False where nothing is left to compute.
-    reused : Reused or Precomputed, optional
-        Cells that need not be computed.
+    The workers of a `cluster` do so, or threads here. How the rows are cut may be settled already (`partition`), and
+    some cells may be known (`reused`). `ctrl_c` is asked now and then.
     """
 
     def __init__(
@@ -172,8 +156,10 @@ class Loop:
         most = max(1, TASK_BYTES // max(1, self.blocks.partition.cells * self.blocks.row_bytes))
         under_way: dict[Future[Any], Masks] = {}
 
-        def begin(masks: Masks) -> None:
+        def begin(jobs: Iterable[int]) -> None:
             """Submits blocks; those of which all cells are known are put together here."""
+            known = self._reused
+            masks = {job: None if known is None else known.missing(*self.blocks.bounds(job)) for job in jobs}
             if cluster is None or all(mask is not None and not mask.any() for mask in masks.values()):
                 under_way[self._threads.submit(bench.blocks, masks)] = masks
             else:
@@ -187,16 +173,15 @@ class Loop:
                     # short blocks go to a worker elsewhere several at a time, and one by one in the end
                     known = 0.0 if cluster is None else self.progress.block_seconds
                     count = min(TASK_SECONDS / known, most, len(queue) / (2 * self._cores)) if known else 1
-                    masks = {job: self._missing(job) for job in (queue.popleft() for _ in range(max(1, int(count))))}
-                    begin(masks)
+                    begin([queue.popleft() for _ in range(max(1, int(count)))])
                 for future in wait(under_way, TICK, FIRST_COMPLETED).done:
                     masks = under_way.pop(future)
                     if not self._take(future, masks, sink):
-                        for job, mask in masks.items():
+                        for job in masks:
                             lost[job] += 1
                             if lost[job] > MOST_LOST:
                                 raise SweepError(f"{self.blocks.label(job)}: {POISONED}")
-                            begin({job: mask})
+                            begin([job])
                 if cluster is not None:
                     cluster.look()
                 self.progress.crew = self._cores
@@ -209,10 +194,6 @@ class Loop:
                     if future.done():
                         self._take(future, masks, sink)
             raise
-
-    def _missing(self, job: int) -> Any:
-        """Of the cells of a block, which are to be computed; None: all."""
-        return None if self._reused is None else self._reused.missing(*self.blocks.bounds(job))
 
     def _take(self, future: Future[Any], jobs: Iterable[int], sink: Sink) -> bool:
         """Has what a worker sent put into the sink, and tells of cells that FAILED; of too many only how many they are.

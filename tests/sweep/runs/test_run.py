@@ -221,6 +221,7 @@ HEIGHTS, SPEEDS = np.round(np.linspace(-1.0, 9.0, 21), 3), np.array([0.0, 0.5, 3
     ("keys", "word"),
     [
         ({"height": HEIGHTS[1:]}, r"axes\.height"),
+        ({"height": np.append(HEIGHTS[::-1], 20.0)}, "order"),
         ({"height": np.append(HEIGHTS[:-1], np.nextafter(9.0, 10))}, "digit"),
         ({"v0": np.append(np.where(SPEEDS == 0, -0.0, SPEEDS), 2e4)}, r"axes\.v0"),
         ({"fixed": {"g": 1.6}}, "fixed"),
