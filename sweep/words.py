@@ -50,16 +50,9 @@ def width() -> int:
 
 
 class Table:
-    """Rows of texts, one cell below the other; as text for a terminal, as HTML for a page. Nothing where no rows are.
+    """Rows of texts of one length, below headings and a title; as text for a terminal, as HTML for a page.
 
-    Parameters
-    ----------
-    rows : iterable of sequences of str
-        All of one length.
-    headings : sequence of str
-        Of the columns.
-    title : str
-        Stands above the table.
+    Nothing where no rows are.
     """
 
     def __init__(self, rows: Iterable[Sequence[str]], headings: Sequence[str] = (), title: str = "") -> None:
@@ -160,13 +153,11 @@ def duration(seconds: float) -> str:
     if seconds < 9.95:
         return f"{seconds:.1f} s"
     whole = round(seconds)
-    if whole < 60:
-        return f"{whole} s"
-    if whole < 3600:
-        return f"{whole // 60} min {whole % 60:02d} s"
-    if whole < 86400:
+    if whole >= 86400:
+        return f"{whole // 86400} d {whole % 86400 // 3600} h"
+    if whole >= 3600:
         return f"{whole // 3600} h {whole % 3600 // 60:02d} min"
-    return f"{whole // 86400} d {whole % 86400 // 3600} h"
+    return f"{whole // 60} min {whole % 60:02d} s" if whole >= 60 else f"{whole} s"
 
 
 def one_digit(seconds: float) -> str:
@@ -200,19 +191,10 @@ def quantity(count: float) -> str:
 
 
 def require_dataset(name: str, given: Any, maker: str = "", attribute: str = "") -> None:
-    """Refuses what is no Dataset.
+    """Refuses what is no Dataset: a SweepError with the way from what was given to one, where there is a way.
 
-    Parameters
-    ----------
-    name : str
-        The function as users call it, e.g. "export".
-    maker, attribute : str
-        Where not every Dataset will do: the function that makes those that do, and an attribute that only they have.
-
-    Raises
-    ------
-    SweepError
-        With the way from what was given to a Dataset, where there is one.
+    Where not every Dataset will do for the function `name`, `maker` makes those that do, and only they have the
+    `attribute`.
     """
     import xarray as xr  # most of a short run's time
 

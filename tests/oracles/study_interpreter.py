@@ -5,7 +5,7 @@ Reads the keys of a study, `docs/study.md`, and a kernel, `kernels/interface.py`
 
 from fractions import Fraction
 from itertools import product
-from math import inf, isfinite, isnan, nan
+from math import inf, isnan, nan
 
 import numpy as np
 from columns import bounds, called, checked, columns_of, unwritten
@@ -24,17 +24,18 @@ def interpreted(kernel, keys):
         dims |= {n: [n] for n in block["axes"]} if block.get("design", "product") == "product" else together
     axes = {name: values for block in blocks for name, values in block["axes"].items()}
     summary = keys.get("summary", {"over": []})
-    dims = dict(sorted(dims.items(), key=lambda item: item[1][0] in summary.get("over", axes)))
+    over = summary.get("over", axes)
+    dims = dict(sorted(dims.items(), key=lambda item: item[1][0] in over))
     shape = [len(axes[names[0]]) for names in dims.values()]
     places = product(*map(range, shape))
     here = [{n: axes[n][k] for k, names in zip(p, dims.values(), strict=True) for n in names} for p in places]
     cells = [Cell(kernel, keys, values).found() for values in here]
     fields = [f for f in kernel.outputs if f.name in keys["outputs"]]
-    columns = {f.name: (f.dims, np.array([c[f.name] for c in cells])) for f in fields}
-    for name, dtype in (("status", "i1"), ("method_used", "i1"), ("error_bound", "f8")):
-        columns[name] = (), np.array([c[name] for c in cells], dtype)
+    kinds = {f.name: (f.dims, "f8") for f in fields} | {"status": ((), "i1"), "method_used": ((), "i1")}
+    kinds |= {"error_bound": ((), "f8")}
+    columns = {name: (own, np.array([c[name] for c in cells], kind)) for name, (own, kind) in kinds.items()}
     if "summary" in keys:
-        dims = [d for d, names in dims.items() if names[0] not in summary.get("over", axes)]
+        dims = [d for d, names in dims.items() if names[0] not in over]
         shape = shape[: len(dims)]
         columns = summed_up(kernel, fields, summary, columns, here, int(np.prod(shape, dtype=int)))
     return {name: ((*dims, *own), v.reshape((*shape, *v.shape[1:]))) for name, (own, v) in columns.items()}
@@ -45,37 +46,31 @@ class Cell:
 
     def __init__(self, kernel, keys, here):
         given, self.kernel, self.keys = keys.get("fixed", {}) | here, kernel, keys | here
-        numbers = {f.name: [f.choices[given[f.name]] if f.choices else given[f.name]] for f in kernel.parameters
-                   if f.name in given}  # fmt: skip
+        fields = {f.name: f.choices for f in kernel.parameters if f.name in given}
+        numbers = {name: [words[given[name]] if words else given[name]] for name, words in fields.items()}
         self.columns = columns_of(kernel, (), numbers)
         self.p = {f.name: column for f, column in zip(kernel.parameters, self.columns, strict=True)}
-        self.words = {name: column[0] for name, column in self.p.items()}
-        choices = [(f.name, *choice) for f in kernel.parameters for choice in f.choices.items()]
-        self.words |= {name: word for name, word, number in choices if number == self.words[name]}
+        words = {f.name: {number: word for word, number in f.choices.items()} for f in kernel.parameters}
+        self.words = {n: words[n][c[0]] if words[n] else c[0] for n, c in self.p.items()}
         self.rtol = np.array([self.keys.get("rtol", 1e-9)], float)
         self.along = [np.array(keys.get("along", {}).get(f.name, ()), float) for f in kernel.along]
 
     def found(self):
         """Outputs, status, method and error bound, by name."""
-        number, status, error, outputs = self.solved()
-        if status >= 64:  # a refusal
-            outputs, number = unwritten(self.kernel, self.columns, self.along), -1
-        columns = {name: values[0] for name, values in outputs.items()}
-        return columns | {"status": status, "method_used": number, "error_bound": error if status < 64 else nan}
-
-    def solved(self):
-        """(number of the method, status, error, outputs)."""
         numbers, method = {m.name: k for k, m in enumerate(self.kernel.methods)}, self.keys.get("method")
         with np.errstate(all="ignore"):
-            if not eval(self.keys.get("where", "True"), {}, self.words):
-                return -1, Status.NOT_ASKED, nan, None
-            try:
-                status = allowed(checked(self.kernel, *self.columns)[0])
-                if status >= 64:
-                    return -1, status, nan, None
-                return self.ran(numbers[method]) if method in numbers else self.auto()
-            except ZeroDivisionError:  # what our kernels raise
-                return -1, Status.FAILED, nan, None
+            number, status, error, outputs = -1, Status.NOT_ASKED, nan, None
+            if eval(self.keys.get("where", "True"), {}, self.words):
+                try:
+                    status = allowed(checked(self.kernel, *self.columns)[0])
+                    if status < 64:
+                        number, status, error, outputs = self.ran(numbers[method]) if method in numbers else self.auto()
+                except ZeroDivisionError:  # what our kernels raise
+                    status = Status.FAILED
+        if status >= 64:  # a refusal
+            number, error, outputs = -1, nan, unwritten(self.kernel, self.columns, self.along)
+        columns = {name: values[0] for name, values in outputs.items()}
+        return columns | {"status": status, "method_used": number, "error_bound": error}
 
     def bound(self, method):
         """What a method promises: rtol where it holds that by itself, inf where nothing is known."""
@@ -137,9 +132,8 @@ def summed_up(kernel, fields, summary, columns, here, count):
     for f in fields:
         own, values = columns[f.name]
         for name in ("count", *summary["outputs"][f.name]):
-            numbers = [[(values[(k, *i)], k) for k in g] for g in groups for i in np.ndindex(values.shape[1:])]
-            there = [[(number, k) for number, k in some if not isnan(number)] for some in numbers]
-            parts = [reduced(name, some, here, columns, summary, f) for some in there]
+            all_of = [(g, values[(g, *i)]) for g in groups for i in np.ndindex(values.shape[1:])]
+            parts = [reduced(name, g[~np.isnan(v)], v[~np.isnan(v)], here, columns, summary, f) for g, v in all_of]
             for part in parts[0]:
                 column, bins = np.array([p[part] for p in parts]), [f"{f.name}_bin"] * (part == "histogram")
                 found[f"{f.name}_{part}"] = (*own, *bins), column.reshape((count, *values.shape[1:], *column.shape[1:]))
@@ -149,23 +143,20 @@ def summed_up(kernel, fields, summary, columns, here, count):
     return found
 
 
-def reduced(name, cells, here, columns, summary, field):
-    """One reduction of numbers, each with its cell."""
-    numbers = [float(number) for number, _ in cells]
-    if name == "count":
-        return {name: len(cells)}
-    if name in ("min", "max"):
-        return {name: (min if name == "min" else max)(numbers, default=nan)}
-    if name == "mean":
-        total = float(sum(map(Fraction, numbers))) if all(map(isfinite, numbers)) else sum(numbers)
-        return {name: total / len(numbers) if numbers else nan}
+def reduced(name, cells, numbers, here, columns, summary, field):
+    """One reduction of numbers, each of its cell."""
     if name == "histogram":
         edges = summary["edges"][field.name]
-        below, above = sum(v < edges[0] for v in numbers), sum(v > edges[-1] for v in numbers)
+        below, above = (numbers < edges[0]).sum(), (numbers > edges[-1]).sum()
         return {"below": below, name: np.histogram(numbers, edges)[0], "above": above}
-    best = (min if name == "argmin" else max)(cells, key=lambda c: c[0], default=(nan, None))[1]
-    found = {f"{name}_status": Status.PENDING if best is None else columns["status"][1][best]}
-    for axis in summary["over"]:
-        none = "none" if isinstance(here[0][axis], str) else nan
-        found[f"{name}_{axis}"] = none if best is None else here[best][axis]
-    return found
+    if name in ("argmin", "argmax"):
+        best = cells[getattr(np, name)(numbers)] if len(cells) else None
+        found = {f"{name}_status": Status.PENDING if best is None else columns["status"][1][best]}
+        for axis in summary["over"]:
+            none = "none" if isinstance(here[0][axis], str) else nan
+            found[f"{name}_{axis}"] = none if best is None else here[best][axis]
+        return found
+    if name == "mean" and len(cells):
+        exact = np.isfinite(numbers).all()
+        numbers = [(float(sum(map(Fraction, numbers.tolist()))) if exact else sum(numbers.tolist())) / len(cells)]
+    return {name: len(cells) if name == "count" else (max if name == "max" else min)(numbers, default=nan)}
