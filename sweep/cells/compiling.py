@@ -108,14 +108,13 @@ class Compiling:
             if called:
                 function(*columns)
                 return
-            timer = threading.Timer(SILENT_SECONDS, self._tell, [method])
-            timer.daemon = True
-            timer.start()
+            done = threading.Event()
+            threading.Thread(target=self._tell, args=(method, done), daemon=True).start()
             begun, worked = time.perf_counter(), work_clock()
             try:
                 function(*columns)
             finally:
-                timer.cancel()
+                done.set()
                 called = True
                 taken = time.perf_counter() - begun - (work_clock() - worked)
                 if taken > SILENT_SECONDS:
@@ -123,11 +122,14 @@ class Compiling:
 
         return call
 
-    def _tell(self, method: str) -> None:
-        if self._note is not None and work_clock.flag.value:
-            what, table = f"{self._name}.{method}", _table()
-            known = None if table is None else _read(table).get(what)
-            self._note(f"compiling {what} ..." + (f" (about {duration(known)} when last done)" if known else ""))
+    def _tell(self, method: str, done: threading.Event) -> None:
+        """Tells that a function is compiled, if it is before its first call is done."""
+        while self._note is not None and not done.wait(SILENT_SECONDS):
+            if work_clock.flag.value:
+                what, table = f"{self._name}.{method}", _table()
+                known = None if table is None else _read(table).get(what)
+                self._note(f"compiling {what} ..." + (f" (about {duration(known)} when last done)" if known else ""))
+                return
 
 
 def _table() -> Path | None:

@@ -64,7 +64,7 @@ class Condition:
             raise SweepError(f"{self.says}{self.text[:40]}...: is longer than {LONGEST} letters")
         try:
             with np.errstate(all="ignore"):
-                found, _ = self._value(ast.parse(self.text.strip(), mode="eval").body)
+                found, _ = self._value(_parsed(self.text))
         except (SyntaxError, ValueError, RecursionError, MemoryError, ArithmeticError, TypeError):
             raise self.refusal(f"cannot be read; it may hold {GRAMMAR}") from None
         if _kind(found) != "b":
@@ -194,6 +194,7 @@ def cells_where(text: str, kernel: Kernel, settings: Iterable[str], column: Call
     fields = {field.name: field for field in kernel.parameters if not field.dims}
     fields |= {name: setting(name, kernel) for name in settings}
 
+    @functools.cache
     def variable(name: str) -> Any:
         if name not in fields:
             hint = did_you_mean(name, fields) or f"; there are {listed(fields, word='and')}"
@@ -211,4 +212,10 @@ def cells_where(text: str, kernel: Kernel, settings: Iterable[str], column: Call
 
 def names_in(text: str) -> set[str]:
     """The names in a condition."""
-    return {node.id for node in ast.walk(ast.parse(text.strip(), mode="eval")) if isinstance(node, ast.Name)}
+    return {node.id for node in ast.walk(_parsed(text)) if isinstance(node, ast.Name)}
+
+
+@functools.lru_cache(maxsize=16)
+def _parsed(text: str) -> ast.expr:
+    """The expression that a condition is; the same one holds for block after block of a run."""
+    return ast.parse(text.strip(), mode="eval").body

@@ -44,7 +44,7 @@ def quantity(entry: Entry, field: Field) -> float | Floats:
             if "value" in entry:
                 entry.wrong("value and file exclude each other; keep one")
             return frozen(scaled(_columns(entry["file"], field, numbered=False), factor))
-    if array and isinstance(given.value, list | tuple):
+    if array and isinstance(given.value, list | tuple | np.ndarray):
         return frozen(scaled(_list(given, field), factor))
     if isinstance(given.value, list | tuple):
         given.wrong(f"expected a number, found a list; to sweep it, write it under [axes.{field.name}]")
@@ -95,10 +95,11 @@ def axis(entry: Entry, field: Field, shares: Floats | None = None) -> Axis:
 def _factor(entry: Entry, field: Field) -> Decimal | None:
     """What the numbers of an entry are multiplied by, to be in the field's unit."""
 
-    def factor(unit: Any) -> Decimal | None:
-        if field.choices and text(unit):
+    def factor(value: Any) -> Decimal | None:
+        unit = text(value)
+        if field.choices:
             raise ValueError(f"{field.name} takes words, which have no unit; leave it out")
-        return scale(text(unit), field.unit, field.name)
+        return scale(unit, field.unit, field.name)
 
     return entry["unit"].read(None, factor) if "unit" in entry else None
 
@@ -137,13 +138,13 @@ def _spaced(entry: Entry, field: Field, factor: Decimal | None, shares: Floats |
 def _list(entry: Entry, field: Field) -> Floats:
     """A list of numbers or words; none of them if one is bad."""
     found, bad = entry.value, list[Mistake]()
-    if isinstance(found, str | bytes) or not isinstance(found, Sequence):
+    if isinstance(found, str | bytes) or not isinstance(found, Sequence | np.ndarray):
         entry.wrong(f"expected a list, found {show(found)}; write e.g. [1.0, 2.0]")
         return NONE
     if not _allowed_length(entry):
         return NONE
-    if not field.choices and all(type(item) is float for item in found):
-        return np.array(found)
+    if not field.choices and (isinstance(found, np.ndarray) or all(type(item) is float for item in found)):
+        return np.asarray(found)
     values = np.empty(len(found))
     for i, item in enumerate(found):
         try:

@@ -60,9 +60,11 @@ class Entry:
         return key in self.value
 
     def __getitem__(self, key: str | int) -> Entry:
-        """What stands under a key of a table, or at a place of a list; arrays as lists."""
+        """What stands under a key of a table, or at a place of a list; arrays as lists, but for lines of float64."""
         found = self.value[key] if isinstance(key, int) else self.value.get(key)
-        found = np.asarray(found).tolist() if hasattr(found, "__array__") else found
+        if hasattr(found, "__array__"):
+            found = np.asarray(found)
+            found = found if found.ndim == 1 and found.dtype == np.float64 else found.tolist()
         at = f"{self.where}[{key}]" if isinstance(key, int) else f"{self.where}.{key}".removeprefix(".")
         return replace(self, value=found, where=at)
 

@@ -7,6 +7,7 @@ from toy_studies import build
 
 import sweep
 from kernels.interface import Status
+from sweep.cells.sample import sampled
 
 AXES = {"height": [-1.0, 1.0, 2.0, 4.0], "v0": [0.0, 1.0, 3.0]}
 
@@ -38,3 +39,11 @@ def test_a_study_with_a_condition_is_extended(tmp_path):
     other = build(axes={"height": [1.0, 1.2, 2.0, 3.0, 4.0, 5.0]}, where="height > 1.7")
     with pytest.raises(sweep.SweepError, match="where"):
         sweep.run(other, tmp_path / "a.h5", extend=True)
+
+
+def test_a_sample_is_of_cells_that_are_asked_for_where_there_are_any():
+    axes = {"height": [float(h) for h in range(1, 1001)], "v0": [0.0, 1.0]}
+    found = sampled(build(axes=axes, where="height > 990 and v0 > 0.5"), 7).axes
+    assert (found["height"].values > 990).all()
+    assert found["v0"].values.tolist() == [1.0] * 7
+    assert len(sampled(build(axes=axes, where="height < 0"), 7).axes["height"]) == 7

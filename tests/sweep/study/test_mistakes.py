@@ -95,6 +95,12 @@ def test_what_does_not_fit_together_is_told_where_it_stands(mistakes, tmp_path, 
     assert word in found[where]
 
 
+def test_of_many_bad_values_three_are_told_and_the_others_counted(mistakes):
+    found = mistakes("axes.height = ['a', 1, 'b', 'c', 'd', 'e']")
+    assert list(found) == ["axes.height[0]", "axes.height[2]", "axes.height[3]", "axes.height"]
+    assert "2 more" in found["axes.height"]
+
+
 def test_a_misspelt_name_is_checked_as_the_one_that_is_meant():
     with pytest.raises(sweep.StudyError) as caught:
         sweep.study(kernel="folio", axes={"m_u": {"values": [1.0], "unit": "kg"}}, fixed={"phi_0": -1.0, "a": 1.0})
