@@ -88,6 +88,9 @@ def test_the_unit_of_the_field_needs_no_pint_and_malformed_ones_are_refused():
     for text in ("m/", "(((", "m*", "rad s-2", "3 m", "m**m", "m^", "\n", "m;m", "__import__('os')", "💥"):
         with pytest.raises(UnitMistake):
             scale(text, "m", "x")
+    for text, wanted, what in (("degC", "K", "offset"), ("m Hz", "m/s", "Hz inside")):
+        with pytest.raises(UnitMistake, match=what):
+            scale(text, wanted, "x")
 
 
 # sampled designs
