@@ -32,7 +32,7 @@ MEMORY_SHARE = 0.25
 """Results larger than this share of the memory are opened in pieces (dask)."""
 
 
-def open_result(path: str | os.PathLike[str], strict: bool = False) -> xr.Dataset:
+def open_result(path: str | os.PathLike[str], strict: bool = False, *, chunks: Any = None) -> xr.Dataset:
     """The result of a sweep, finished or not.
 
     Cells that are not computed yet are NaN, with status PENDING. Values are read when they are used, and compared with
@@ -44,6 +44,8 @@ def open_result(path: str | os.PathLike[str], strict: bool = False) -> xr.Datase
         The output of a sweep, also while it is not finished.
     strict : bool
         Refuse a sweep that is not finished.
+    chunks : as of `xarray.open_dataset`, optional
+        Dask arrays whatever the size: {} has the chunks of the file, "auto" those that dask likes.
 
     Raises
     ------
@@ -65,7 +67,7 @@ def open_result(path: str | os.PathLike[str], strict: bool = False) -> xr.Datase
         if before is None:
             raise SweepError(f"{output}: no such file, and no sweep that writes it")
         try:
-            found = _open(place, strict)
+            found = _open(place, strict, chunks)
         except SweepError:
             # a sweep that ends, or begins anew, puts another file there meanwhile
             if _identity(place) == before:
@@ -90,7 +92,7 @@ def _identity(path: Path) -> tuple[int, int] | None:
     return found.st_dev, found.st_ino
 
 
-def _open(place: Path, strict: bool = False) -> xr.Dataset:
+def _open(place: Path, strict: bool = False, chunks: Any = None) -> xr.Dataset:
     """A file, whether it is finished or not. Raises SweepError."""
     import xarray as xr
 
@@ -107,8 +109,9 @@ def _open(place: Path, strict: bool = False) -> xr.Dataset:
                 if strict:
                     raise SweepError(f"{place}: unfinished, {missing}; run its sweep again to continue")
                 if file.work == "rows":
-                    return _of_rows(file)
-        return xr.open_dataset(os.fspath(place), engine=Result, chunks="auto" if large else None)
+                    rows = _of_rows(file)
+                    return rows if chunks is None else rows.chunk(chunks)
+        return xr.open_dataset(os.fspath(place), engine=Result, chunks="auto" if large and chunks is None else chunks)
     except DAMAGE as fault:
         raise unreadable(place, fault) from None
 

@@ -1,7 +1,11 @@
 """`sweep check` finds what is beyond rtol, and nothing else; `sweep cell` says of a cell what the result says."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
+import xarray as xr
 from toy_studies import build
 
 import sweep
@@ -101,3 +105,20 @@ def test_outputs_that_are_infinite_by_both_methods_agree():
     found = sweep.run(kernel="impact", axes={"torque": [1e-3, 1e-2]}, fixed=fixed)
     assert np.isinf(found.impacts).all()
     assert found.sweep.check().beyond == 0
+
+
+def test_xarray_opens_a_result_as_one_of_ours(clocks, tmp_path):
+    """`ds.sweep` is there in a program that never imports sweep, and chunks are dask's where they are asked for."""
+    with sweep.run(FOLIOT, tmp_path / "clocks.h5"):
+        pass
+    script = "import xarray as xr; ds = xr.open_dataset('clocks.h5'); print(ds.sweep.check(sample=3).beyond)"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, cwd=tmp_path)
+    assert done.stdout == "0\n"
+    with (
+        xr.open_dataset(tmp_path / "clocks.h5", engine="sweep", drop_variables="amplitude", chunks={}) as ours,
+        sweep.open_result(tmp_path / "clocks.h5", chunks={}) as opened,
+    ):
+        assert ours.chunks == opened.chunks == {"mu": (12,), "R": (2,)}
+        assert ours.period.identical(opened.period)
+        assert "amplitude" not in ours
+        assert opened.period.equals(clocks.period)
