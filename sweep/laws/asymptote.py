@@ -30,7 +30,7 @@ from sweep.laws.curves import (
 from sweep.laws.fits import Found, errors, fitted
 from sweep.laws.lines import check_noise, rounding
 from sweep.laws.loglog import Array, slope_bounds, slopes
-from sweep.laws.noise import BEYOND_DOUBT, RARE, Regression, corrected, noise_size, regress, runs_chance
+from sweep.laws.noise import RARE, UNLIKELY, noise_size, regress, runs_chance
 from sweep.laws.shapes import CORRECTION, LOG_CORRECTION, Law, Parts
 
 FEWEST_POINTS = 8
@@ -193,11 +193,8 @@ def _denied(t: Array, found: Found, word: str, weights: Array | None) -> bool:
         return True
     u = 2 * (t - t[0]) / (t[-1] - t[0]) - 1
     columns = found.jacobian[:, np.isfinite(errors(found))]
-    k = columns.shape[1]
-    columns = np.concatenate([columns, np.polynomial.chebyshev.chebvander(u, 1 + MORE)[:, 2:]], axis=1)
-    deviance = regress(t, columns, found.off[None], word, k).deviance[0]
-    criteria = [corrected(one, t.size, k + 2 + more) for more, one in enumerate(deviance)]
-    return bool(min(criteria[1:]) < criteria[0] - BEYOND_DOUBT)
+    every = np.concatenate([columns, np.polynomial.chebyshev.chebvander(u, 1 + MORE)[:, 2:]], axis=1)
+    return bool(regress(t, every, found.off[None], word, columns.shape[1]).chance[0] < UNLIKELY)
 
 
 def _mixture(
@@ -215,16 +212,14 @@ def _mixture(
         part = regress(t, one.jacobian, one.off[None], "even" if weights is not None else word)
         log = float(part.evidence[0])
         if weights is not None:
-            part = part._replace(error=errors(one, weights)[None, None, :, None], left=MANY)
+            part = part._replace(error=errors(one, weights)[None, :, None], left=MANY)
             log = -0.5 * float((one.off**2 * weights).sum())
         parts.append(part._replace(value=part.value + one.numbers[:, None]))
         evidence.append(log)
     shares = np.exp(np.array(evidence) - max(evidence))
-    both = Regression(
+    both = parts[0]._replace(
         weight=np.concatenate([one.weight * share for one, share in zip(parts, shares / shares.sum(), strict=True)]),
-        value=np.concatenate([one.value for one in parts]),
-        error=np.concatenate([one.error for one in parts]),
-        **{name: getattr(parts[0], name) for name in ("size", "left", "deviance", "evidence")},
+        **{name: np.concatenate([getattr(one, name) for one in parts]) for name in ("value", "error", "share")},
     )
     ends = [float(end[0]) for end in both.interval(2, confidence)]
     slow = fitted(LOG_CORRECTION, t, z, weights, weights is not None)

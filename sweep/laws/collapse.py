@@ -18,7 +18,7 @@ from scipy.special import gammaincc, ndtri
 from sweep.errors import SweepError
 from sweep.laws.curves import check_confidence, check_output, described, log_of, positive_axis, relative_sigma, title
 from sweep.laws.loglog import Array
-from sweep.laws.noise import BEYOND_DOUBT, RARE, ROUNDING, corrected, regress
+from sweep.laws.noise import RARE, ROUNDING, UNLIKELY, regress
 
 
 class Points(NamedTuple):
@@ -222,11 +222,8 @@ def _intervals(
     root, place = points.root, np.arange(float(off.size))
     every = np.column_stack([columns, beside]) * root[:, None]
     found = regress(place, every, (off * root)[None], "even" if known else "correlated", k)
-    numbers = k + 1 + (not known)
-    alone = corrected(found.deviance[0, 0], off.size, numbers)
-    together = corrected(found.deviance[0, -1], off.size, numbers + beside.shape[1])
     smooth = abs(off).max() <= 1e-6 * (1 + np.ptp(points.z))
-    fits = bool(smooth or not together < alone - BEYOND_DOUBT)
+    fits = bool(smooth or not found.chance[0] < UNLIKELY)
     if known:
         fits &= bool(gammaincc((off.size - k) / 2, float(((root * off) ** 2).sum()) / 2) > RARE)
         reach = ndtri((1 + confidence) / 2) * np.sqrt(np.diag(np.linalg.inv(every[:, :k].T @ every[:, :k])))

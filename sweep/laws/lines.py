@@ -28,13 +28,13 @@ from sweep.laws.curves import (
 )
 from sweep.laws.loglog import EPSILON, FEWEST, Array, slope_bounds, slopes, tends
 from sweep.laws.noise import (
-    BEYOND_DOUBT,
     NOISES,
     RARE,
+    UNLIKELY,
     alike,
     corrected,
     inliers,
-    noise_size,
+    noise_share,
     regress,
     runs_chance,
 )
@@ -284,7 +284,7 @@ def _judged(t: Array, z: Array, sigma: Array, bound: Array, given: Given) -> dic
         noisy = (abs(off).max(axis=1) > 8 * rounding(t, z)) & (n > FEWEST)
         if given.noise is None:
             within = bound.any(axis=1) & (abs(off) <= 2 * bound).all(axis=1)
-            noisy &= (size > 8 * rounding(t, z)) & ~within & (noise_size(t, off) > SMOOTH * size)
+            noisy &= (size > 8 * rounding(t, z)) & ~within & (noise_share(t, off) > SMOOTH)
         else:
             noisy &= bool(given.noise)
         _fill(fit, ~noisy, _exact, t, z, off, bound, slope)
@@ -346,9 +346,7 @@ def _noisy(t: Array, z: Array, centre: Array, *, given: Given) -> dict[str, Arra
             off = z[rows] - value @ columns[:, :2].T
             found["fits"][rows] = ~(runs_chance(off) < RARE)
         if powers > 2:
-            n = int(pattern.sum())
-            straight, *bent = (corrected(line.deviance[:, k], n, k + 4) for k in range(3))
-            for row in rows[np.min(bent, axis=0) < straight - BEYOND_DOUBT]:
+            for row in rows[line.chance < UNLIKELY]:
                 ends = _range(t[pattern], z[row, pattern], given.confidence)
                 found["exponent_low"][row], found["exponent_high"][row] = ends
                 found["kind"][row], found["fits"][row] = KINDS.index("bent"), 0

@@ -192,8 +192,9 @@ def _weights(nodes: Array, home: NDArray[np.intp]) -> Array:
     return weights
 
 
-def interpolation_errors(t: Array, z: Array, count: int) -> Array:
-    """How far each point inside (..., n - count) is off the polynomial through `count` neighbours, half on either side.
+def interpolations(t: Array, z: Array, count: int) -> list[Array]:
+    """How far each point inside (..., n - count) is off the polynomial through `count` neighbours, half on either side,
+    and how far it would be if all points were independent noise.
 
     In units that give noise of size 1 the size 1.
     """
@@ -201,8 +202,9 @@ def interpolation_errors(t: Array, z: Array, count: int) -> Array:
     apart = t[nodes][:, :, None] - t[nodes][:, None, :]
     apart[:, np.arange(count + 1), np.arange(count + 1)] = 1.0
     weights = 1.0 / apart.prod(axis=2)
-    found: Array = (weights * z[..., nodes]).sum(axis=-1) / np.sqrt((weights**2).sum(axis=1))
-    return found
+    weights /= np.sqrt((weights**2).sum(axis=1, keepdims=True))
+    parts = weights * z[..., nodes]
+    return [parts.sum(axis=-1), np.sqrt((parts**2).sum(axis=-1))]
 
 
 def tends(t: Array, local: Array, doubt: float) -> tuple[float, float]:

@@ -2,10 +2,9 @@
 
     z = X b + s(t) e,   e_i = phi e_(i-1) + sqrt(1 - phi^2) new_i,   ln s = a u + c |u|,   -1 <= u <= 1     (1)
 
-s is the size of the noise along the window: it may grow to one end (a), to both or to the middle (c). phi, a and c are
-not estimated, since from few points any estimate is off and intervals that take it for true hold 60 to 85 % instead of
-95: the points give each (phi, a, c) of a grid its weight, by restricted likelihood, and intervals are those of the
-mixture. Points far off such noise are left out.
+s is the size of the noise along the window: it may grow to one end (a) or to both (c). phi, a and c are not estimated,
+since from few points any estimate is off and intervals that take it for true hold 60 to 85 % instead of 95: the points
+give each (phi, a, c) of a grid its weight, by restricted likelihood. Points far off such noise are left out.
 """
 
 from __future__ import annotations
@@ -15,12 +14,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr, stdtr, stdtrit
+from scipy.special import fdtrc, ndtr, stdtrit
 
-from sweep.laws.loglog import EPSILON, Array, interpolation_errors
+from sweep.laws.loglog import EPSILON, Array, interpolations
 
-CORRELATIONS = np.concatenate([np.linspace(-0.4, 0.9, 14), [0.93, 0.96, 0.98, 0.99, 0.995]])
-TRENDS, ENDS = np.linspace(-2.4, 2.4, 7), np.array([-1.6, 0.0, 1.6, 3.2])
+CORRELATIONS = np.array([-0.2, 0.0, 0.2, 0.4, 0.6, 0.7, 0.8, 0.85, 0.9, 0.93, 0.96])
+TRENDS, ENDS = np.linspace(-1.6, 1.6, 5), np.array([0.0, 1.6, 3.2])
 """phi, a and c of (1) that are tried; exp(2 * 1.6) is a ratio of 25 between the sizes at both ends."""
 EVEN = np.zeros(1)
 
@@ -36,7 +35,9 @@ NOISES = {
 BEYOND_DOUBT = 10.0
 """Difference of AICc from which on a law is taken instead of a simpler one."""
 RARE = 1e-3
-"""Probability below which a test denies."""
+"""Probability below which a test denies, where the noise is known,"""
+UNLIKELY = 0.01
+"""and where it may be of any kind."""
 ROUNDING = 16 * EPSILON
 """Relative distance of a point from a curve that is none."""
 FAR = 3.5
@@ -46,46 +47,64 @@ LINES = 250
 
 
 class Regression(NamedTuple):
-    """Least squares of lines (m,) on k columns under each noise of the grid: phi first, then a and c (p, s)."""
+    """Least squares of lines (m,) on k columns under each phi of the grid (p,), over all a and c."""
 
     weight: Array
-    """(p, s, m), of sum 1."""
+    """Of each phi (p, m), of sum 1."""
     value: Array
-    """(p, s, k, m)"""
+    """The numbers (p, k, m),"""
     error: Array
-    """(p, s, k, m), standard errors."""
+    """and their standard errors (p, k, m)."""
     size: Array
     """Of the noise at each point (m, n), up to a factor."""
     left: int
     """Degrees of freedom."""
+    share: Array
+    """Of each phi in the level of `interval` (p,): phi = 0 counts whole, more correlation less."""
     deviance: Array
-    """Minus twice the logarithm of the likelihood on the k columns and on one more each (m, ...), under the noise that
-    suits each best; less n ln 2 pi e. What rounding leaves is no distance."""
+    """Minus twice the logarithm of the likelihood (m,), under the noise that suits best; less n ln 2 pi e. What
+    rounding leaves is no distance."""
     evidence: Array
     """Logarithm of the restricted likelihood of each line (m,), summed over the grid."""
+    chance: Array
+    """That the columns behind those that are used tell so much by chance (m,)."""
 
     def mean(self) -> tuple[Array, Array]:
         """The numbers and their standard errors, (m, k) each."""
-        middle = np.einsum("psm,pskm->km", self.weight, self.value)
-        square = np.einsum("psm,pskm->km", self.weight, self.error**2 + (self.value - middle) ** 2)
+        middle = np.einsum("pm,pkm->km", self.weight, self.value)
+        square = np.einsum("pm,pkm->km", self.weight, self.error**2 + (self.value - middle) ** 2)
         return middle.T, np.sqrt(square).T
 
     def interval(self, number: int, confidence: float) -> tuple[Array, Array]:
-        """Ends of the interval of one number (m,): quantiles of a mixture of Student's t, one for each phi."""
-        share = self.weight.sum(axis=1)
-        part = self.weight / np.maximum(share, 1e-300)[:, None]
-        middle = np.einsum("psm,psm->pm", part, self.value[:, :, number])
-        off = self.error[:, :, number] ** 2 + (self.value[:, :, number] - middle[:, None]) ** 2
-        error = np.sqrt(np.einsum("psm,psm->pm", part, off)) + 1e-300
+        """Ends of the interval of one number (m,).
+
+        It holds the values that are denser, in the mixture of Student's t of all phi, than the ends of the intervals
+        of each phi alone are on average, where phi = 0 counts whole and more correlation less. Of all intervals that
+        hold as often beside correlated noise, such are the narrowest beside independent noise (Pratt, 1961).
+        """
+        value, error = self.value[:, number], self.error[:, number] + 1e-300
+        reach = float(stdtrit(self.left, (1 + confidence) / 2))
+        if len(value) == 1:
+            return value[0] - reach * error[0], value[0] + reach * error[0]
+        height, power = self.weight / error, -0.5 * (self.left + 1)
+        level = np.einsum("p,pm->m", self.share, height) * (1 + reach**2 / self.left) ** power
+        best = np.take_along_axis(value, height.argmax(axis=0)[None], axis=0)[0]
         ends = []
-        for chance in ((1 - confidence) / 2, (1 + confidence) / 2):
-            one = middle + error * stdtrit(self.left, chance)
-            below, above = one.min(axis=0), one.max(axis=0)
-            for _ in range(28 if len(one) > 1 else 0):
-                half = 0.5 * (below + above)
-                over = (share * stdtr(self.left, (half - middle) / error)).sum(axis=0) > chance
-                below, above = np.where(over, below, half), np.where(over, half, above)
-            ends.append(0.5 * (below + above))
+        for sign in (-1.0, 1.0):
+
+            def dense(reached: Array, sign: float = sign) -> NDArray[np.bool_]:
+                off = (best + sign * reached - value) / error
+                found: NDArray[np.bool_] = (height * (1 + off**2 / self.left) ** power).sum(axis=0) > level
+                return found
+
+            inside, outside = np.zeros_like(best), np.ptp(value, axis=0) + error.max(axis=0)
+            while (further := dense(outside)).any():
+                outside = np.where(further, 2 * outside, outside)
+            for _ in range(40):
+                half = 0.5 * (inside + outside)
+                in_ = dense(half)
+                inside, outside = np.where(in_, half, inside), np.where(in_, outside, half)
+            ends.append(best + sign * inside)
         return ends[0], ends[1]
 
 
@@ -123,35 +142,52 @@ def regress(t: Array, columns: Array, z: Array, noise: str = "noise", used: int 
     whole, outer = (y**2).sum(axis=1), y[:, 0] ** 2 + y[:, -1] ** 2
     square = whole + one**2 * (whole - outer) - 2 * one * (y[:, 1:] * y[:, :-1]).sum(axis=1)
     squares = np.maximum(square[:, :, None] - np.cumsum(solved**2, axis=2), 1e-28)
-    rounding = (ROUNDING * (1 + abs(z).max(axis=1))) ** 2
-    own = -np.log1p(-(one**2))
-    best = [n * np.log(squares[:, :, j] * scale**2 / n + rounding) + own for j in range(used - 1, k)]
-    deviance = np.stack([one.min(axis=(0, 1)) for one in best], axis=1)
+    own, (flat, cautious) = -np.log1p(-(one**2)), _priors(phi, n)
+    before = -0.5 * own - 0.5 * (steep**2 + round_**2) / 1.6**2
 
+    def weights(count: int, prior: Array) -> Array:
+        """Logarithms of restricted likelihoods on so many columns, with the prior."""
+        determinant = np.log(np.einsum("pskk->psk", factor[:, :, :count, :count])).sum(axis=2)[:, :, None]
+        found: Array = prior[:, None, None] + before - determinant
+        return found - 0.5 * (n - count) * np.log(squares[:, :, count - 1])
+
+    chance = np.ones(len(z))
+    if k > used:
+        log, ratio = weights(k, flat), squares[:, :, used - 1] / squares[:, :, k - 1] - 1
+        weight = np.exp(log - log.max(axis=(0, 1)))
+        beyond = fdtrc(k - used, n - k, ratio * (n - k) / (k - used))
+        chance = (weight * beyond).sum(axis=(0, 1)) / weight.sum(axis=(0, 1))
+
+    rounding = (ROUNDING * (1 + abs(z).max(axis=1))) ** 2
+    deviance = (n * np.log(squares[:, :, used - 1] * scale**2 / n + rounding) + own).min(axis=(0, 1))
     left, inverse = n - used, np.linalg.inv(factor[:, :, :used, :used])
     inside = np.linalg.inv(back[:used, :used]) @ inverse.transpose(0, 1, 3, 2)
     value = (inside @ solved[:, :, :used] * scale) + (np.linalg.inv(back[:used, :used]) @ start[:used])
-    spread = np.sqrt((inside**2).sum(axis=3))
-    error = spread[..., None] * np.sqrt(squares[:, :, used - 1] / max(left, 1))[:, :, None] * scale
-    determinant = np.log(np.einsum("pskk->psk", inverse)).sum(axis=2)[:, :, None]
-    log = -0.5 * own - 0.5 * left * np.log(squares[:, :, used - 1]) + determinant
-    log += (-0.5 * (steep**2 + round_**2) / 1.6**2)[None]
-    if phi.size > 1:
-        log += _prior(n)[:, None, None]
+    variance = (inside**2).sum(axis=3)[..., None] * (squares[:, :, used - 1] / max(left, 1) * scale**2)[:, :, None]
+    log = weights(used, cautious)
     highest = log.max(axis=(0, 1))
     weight = np.exp(log - highest)
-    evidence = highest + np.log(weight.sum(axis=(0, 1))) - left * np.log(scale)
-    weight /= weight.sum(axis=(0, 1))
+    total = weight.sum(axis=(0, 1))
+    weight /= total
+    of_phi = weight.sum(axis=1)
+    part = weight / np.maximum(of_phi, 1e-300)[:, None]
+    middle = np.einsum("psm,pskm->pkm", part, value)
+    error = np.sqrt(np.einsum("psm,pskm->pkm", part, variance + (value - middle[:, None]) ** 2))
     size = 1 / np.einsum("psm,sn->mn", weight, np.exp(-log_size))
-    return Regression(weight, value, error, size, left, deviance, evidence)
+    evidence = highest + np.log(total) - left * np.log(scale)
+    share = np.sqrt(1 - np.maximum(phi, 0.0))
+    return Regression(of_phi, middle, error, size, left, share, deviance, evidence, chance)
 
 
-def _prior(points: int) -> Array:
-    """Of phi: a power of 1/(1 - phi) that few points need for intervals to hold as often as they say, by trial at
-    phi = .9 and 12 to 200 points."""
-    power = min(0.7, max(0.0, 0.36 * math.log(115 / points)))
-    found: Array = np.log(np.gradient(CORRELATIONS)) - power * np.log(1 - CORRELATIONS)
-    return found
+def _priors(phi: Array, points: int) -> tuple[Array, Array]:
+    """Logarithms of weights of phi: flat, and cautious, for intervals. Those give independent noise a part of its own,
+    and much weight to correlations near 1, which few points cannot tell from a slope; by trial at 8 to 200 points."""
+    if phi.size == 1:
+        return np.zeros(1), np.zeros(1)
+    flat = np.gradient(phi)
+    cautious = flat * (1 - phi) ** -(0.3 + 24 / points)
+    alone = min(0.3, 2.3 / points)
+    return np.log(flat), np.log(cautious / cautious.sum() * (1 - alone) + alone * (phi == 0))
 
 
 def inliers(t: Array, columns: Array, z: Array) -> NDArray[np.bool_]:
@@ -187,20 +223,29 @@ def alike(present: NDArray[np.bool_], most: int = LINES) -> list[tuple[NDArray[n
 
 
 def noise_size(t: Array, z: Array) -> Array:
-    """Size of the noise on smooth curves (..., n) without gaps, t rising; of repeated t, that within repetitions.
+    """Size of the noise on smooth curves (..., n) without gaps, t rising; of repeated t, that within repetitions."""
+    found: Array = _off_neighbours(t, z)[:, 0].min(axis=0)
+    return found
 
-    The least of what points are off the polynomials through two, four, six and eight neighbours: noise leaves the same
-    in all, a bend ever less.
-    """
+
+def noise_share(t: Array, off: Array) -> Array:
+    """Share of distances (..., n) from a curve that is noise: 1 where neighbours say nothing of each other."""
+    off_neighbours, alone = _off_neighbours(t, off).swapaxes(0, 1)
+    found: Array = (off_neighbours / np.maximum(alone, 1e-300)).min(axis=0)
+    return found
+
+
+def _off_neighbours(t: Array, z: Array) -> Array:
+    """How far points are off the polynomials through two, four, six and eight neighbours, root mean square, and how far
+    they would be if all were noise; (count, 2, ...). Noise leaves the same in all, a bend ever less."""
     places, which, count = np.unique(t, return_inverse=True, return_counts=True)
     if places.size < t.size:
         off = z - ((z @ np.eye(places.size)[which]) / count)[..., which]
-        within: Array = np.sqrt((off**2).sum(axis=-1) / (t.size - places.size))
-        return within
-    counts = [count for count in (2, 4, 6, 8) if t.size > count + 2]
-    sizes = [np.sqrt(np.mean(interpolation_errors(t, z, count) ** 2, axis=-1)) for count in counts]
-    least: Array = np.min(sizes, axis=0) if sizes else np.full(z.shape[:-1], np.inf)
-    return least
+        pairs = [[off * math.sqrt(t.size / (t.size - places.size)), z]]
+    else:
+        pairs = [interpolations(t, z, count) for count in (2, 4, 6, 8) if t.size > count + 2]
+    found: Array = np.array([[np.sqrt(np.mean(part**2, axis=-1)) for part in pair] for pair in pairs])
+    return found if pairs else np.stack([np.full((1, *z.shape[:-1]), np.inf), np.ones((1, *z.shape[:-1]))], axis=1)
 
 
 def corrected(deviance: Any, points: int, numbers: int) -> Any:
@@ -212,7 +257,7 @@ def corrected(deviance: Any, points: int, numbers: int) -> Any:
 def line_deviance(t: Array, z: Array) -> float:
     """`Regression.deviance` of the straight line through one line (n,), whatever its noise."""
     columns = np.stack([np.ones_like(t), t - t.mean()], axis=1)
-    return min(float(regress(t, columns, z[None]).deviance[0, 0]), _outlying_deviance(columns, z))
+    return min(float(regress(t, columns, z[None]).deviance[0]), _outlying_deviance(columns, z))
 
 
 def _outlying_deviance(columns: Array, z: Array, freedom: float = 3.0) -> float:

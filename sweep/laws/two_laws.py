@@ -263,7 +263,7 @@ def _of_other_bends(
     for found in bends:
         columns = found.jacobian[:, np.isfinite(errors(found))]
         if weights is None and word != "even" and columns.size:
-            deviance = float(regress(t, columns, found.off[None], word).deviance[0, 0])
+            deviance = float(regress(t, columns, found.off[None], word).deviance[0])
             judged.append(float(corrected(deviance, t.size, found.law.numbers + 2)))
         else:
             judged.append(found.aicc)
@@ -323,7 +323,7 @@ def _verdict(t: Array, z: Array, tried: dict[str, Found], weights: Array | None,
         better = three.aicc < nearest.aicc - OTHER_SHAPES and gain(line, three.deviance, 7) > BEYOND_DOUBT
         if better and noisy and weights is None:  # nor with noise of any kind beside two
             columns = nearest.jacobian[:, np.isfinite(errors(nearest))]
-            deviance = float(regress(t, columns, nearest.off[None]).deviance[0, 0])
+            deviance = float(regress(t, columns, nearest.off[None]).deviance[0])
             better = three.aicc < corrected(deviance, n, nearest.law.numbers + 2) - BEYOND_DOUBT
         elif better and not noisy:
             better = float(three.off @ three.off) < SMALLER**2 * min(float(fit.off @ fit.off) for fit in bends)

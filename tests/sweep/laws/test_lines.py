@@ -103,47 +103,49 @@ def test_the_interval_within_error_bounds_is_all_that_they_can_do_to_a_slope(siz
 # kinds of noise
 
 
-PHIS = np.array([*np.arange(-4, 10) / 10, 0.93, 0.96, 0.98, 0.99, 0.995])
+PHIS = np.array([-0.2, 0.0, 0.2, 0.4, 0.6, 0.7, 0.8, 0.85, 0.9, 0.93, 0.96])
+TRENDS, ENDS = np.linspace(-1.6, 1.6, 5), np.array([0, 1.6, 3.2])
 
 
-def mixture(columns, z, phis, trends, ends):
-    """The slope, its error and its distribution over noises, by dense matrices and restricted likelihood."""
+def mixture(columns, z, phis, trends, ends, confidence):
+    """The slope, its error, its density over noises and the density at the ends of its interval, by dense matrices."""
     (n, k), u = columns.shape, np.interp(T, [T[0], T[-1]], [-1, 1])
     logs, values, errors = np.empty((3, len(phis), len(trends) * len(ends)))
-    width = np.gradient(phis) if len(phis) > 1 else np.ones(1)
+    weight = np.gradient(phis) * (1 - phis) ** -(0.3 + 24 / n) if len(phis) > 1 else np.ones(1)
+    weight = weight / weight.sum() * (1 - 2.3 / n) + 2.3 / n * (phis == 0)
     for i, phi in enumerate(phis):
         for j, (a, c) in enumerate((a, c) for a in trends for c in ends):
             size = np.exp(a * u + c * abs(u) - np.mean(a * u + c * abs(u)))
             fit = sm.GLS(z, columns, sigma=np.outer(size, size) * toeplitz(phi ** np.arange(n)) / (1 - phi**2)).fit()
             log = -n / 2 * np.log(1 / (1 - phi**2)) + (n - 1) / -2 * np.log(1 - phi**2)
             log += 0.5 * np.linalg.slogdet(fit.normalized_cov_params)[1] - (n - k) / 2 * np.log(fit.scale)
-            prior = width[i] / (1 - phi) ** min(0.7, 0.36 * np.log(115 / n)) if len(phis) > 1 else 1.0
-            logs[i, j] = log + np.log(prior) - 0.5 * (a**2 + c**2) / 1.6**2
+            logs[i, j] = log + np.log(weight[i]) - 0.5 * (a**2 + c**2) / 1.6**2
             values[i, j], errors[i, j] = fit.params[1], fit.bse[1]
     share = np.exp(logs - logs.max()) / np.exp(logs - logs.max()).sum()
     slope, by_phi = (share * values).sum(), share.sum(axis=1)
     middle = (share * values).sum(axis=1) / by_phi
     one = ((share * (errors**2 + (values - middle[:, None]) ** 2)).sum(axis=1) / by_phi) ** 0.5
     error = (share * (errors**2 + (values - slope) ** 2)).sum() ** 0.5
-    return slope, error, lambda x: by_phi @ stats.t.cdf((x - middle) / one, n - k)
+    end = stats.t.pdf(stats.t.ppf((1 + confidence) / 2, n - k), n - k)
+    level = (by_phi * (1 - np.maximum(phis, 0)) ** 0.5 * end / one).sum()
+    return slope, error, lambda x: (by_phi * stats.t.pdf((x - middle) / one, n - k) / one).sum(), level
 
 
 @pytest.mark.parametrize(
     ("noise", "phis", "trends", "ends"),
     [
         ("even", [0.0], [0.0], [0.0]),
-        ("uneven", [0.0], np.linspace(-2.4, 2.4, 7), np.array([-1.6, 0, 1.6, 3.2])),
+        ("uneven", [0.0], TRENDS, ENDS),
         ("correlated", PHIS, [0.0], [0.0]),
-        (True, PHIS, np.linspace(-2.4, 2.4, 7), np.array([-1.6, 0, 1.6, 3.2])),
+        (True, PHIS, TRENDS, ENDS),
     ],
 )
-def test_the_interval_is_that_of_the_mixture_of_noises_that_the_word_allows(noise, phis, trends, ends):
+def test_the_interval_holds_the_densest_values_over_the_noises_that_the_word_allows(noise, phis, trends, ends):
     z = 1.0 - 0.5 * T + 0.1 * WAVE * np.exp(T - 2.0)
     found = sweep.fit_exponent(curve(z), "x", noise=noise, confidence=0.9)
-    slope, error, below = mixture(sm.add_constant(T), z, np.asarray(phis), trends, ends)
+    slope, error, density, level = mixture(sm.add_constant(T), z, np.asarray(phis), trends, ends, 0.9)
     assert (float(found.exponent), float(found.exponent_error)) == pytest.approx((slope, error), rel=1e-8)
-    ends = below(float(found.exponent_low)), below(float(found.exponent_high))
-    assert ends == pytest.approx((0.05, 0.95), abs=1e-6)
+    assert [density(float(end)) for end in (found.exponent_low, found.exponent_high)] == pytest.approx([level] * 2)
     assert (kind(found), found.attrs["confidence"]) == ("noise" if noise is True else noise, 0.9)
 
 
