@@ -14,33 +14,18 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from scipy.special import gammaincc
 
-from sweep.errors import SweepError
-from sweep.laws.curves import (
-    Window,
-    check_confidence,
-    check_end,
-    described,
-    numbers_by_line,
-    relative_sigma,
-    title,
-    window_logs,
-)
-from sweep.laws.fits import Found, errors, fitted
+from sweep.laws.curves import Window, check_confidence, check_end, described, fits_by_line, in_words, title
+from sweep.laws.fits import Found, fitted
 from sweep.laws.lines import check_noise, rounding
 from sweep.laws.loglog import Array, slope_bounds, slopes
-from sweep.laws.noise import RARE, UNLIKELY, noise_size, regress, runs_chance
-from sweep.laws.shapes import CORRECTION, LOG_CORRECTION, Law, Parts
+from sweep.laws.noise import noise_size, regress
+from sweep.laws.shapes import CORRECTION, LOG_CORRECTION, Law
 
-FEWEST_POINTS = 8
 SCATTERS = 0.3
 """Share of the distances from (1) that is noise between neighbours, from which on they are noise."""
 AS_WELL = 4.0
 """Difference of AICc up to which a logarithmic correction, whose exponent is far harder to tell, is not ruled out."""
-MORE = 3
-"""Polynomials beside (1) that must not describe the points better by far."""
-
 VERDICTS = ("a power law with a correction", "no power law with a correction", "no law at this end")
 NAMES = {
     "exponent": "exponent far out",
@@ -114,49 +99,43 @@ def fit_correction(
     check_confidence(confidence)
     check_end("end", end)
     check_noise(noise, sigma)
-    here, t, logs, _ = window_logs(y, dim, window, repeated=True)
-    ((dimension, _),) = here.items()
     sign = 1.0 if end == "high" else -1.0
-    sigmas = relative_sigma(y, sigma).isel(here)
-    found = numbers_by_line(
-        tuple(NAMES), lambda z, s: _one(sign * t, z, s, sign, confidence, noise), logs, dimension, sigmas
-    )
-    if not bool(found.residual.notnull().any()):
-        raise SweepError(
-            f"a correction to scaling needs at least {FEWEST_POINTS} points of {title(y)}; widen the window"
-        )
-    words = np.array([*VERDICTS, "too few points"])
-    found["verdict"] = found.verdict.dims, words[found.verdict.fillna(-1).astype(np.int64)]
+
+    def one(t: Array, z: Array, weights: Array | None) -> tuple[float, ...]:
+        if end == "low":
+            t, z, weights = -t[::-1], z[::-1], None if weights is None else weights[::-1]
+        return _one(t, z, weights, sign, confidence, noise)
+
+    found = fits_by_line(tuple(NAMES), one, y, dim, window, sigma)
+    found["verdict"] = in_words(found.verdict, VERDICTS)
     law = f"{title(y)} = A {dim}^p (1 + B {dim}^-D), {end} end"
     return described(found, NAMES, {}, {"y": title(y), "x": dim, "law": law}, confidence)
 
 
-@np.errstate(all="ignore")  # what overflows is infinite
-def _one(t: Array, z: Array, sigma: Array, sign: float, confidence: float, noise: bool | str | None) -> Array:
+def _one(
+    t: Array, z: Array, weights: Array | None, sign: float, confidence: float, noise: bool | str | None
+) -> tuple[float, ...]:
     """NAMES of one line; t runs towards the end where (1) is a power law, and exponents take `sign`."""
-    known = bool(np.isfinite(sigma).any())
-    present = np.flatnonzero(np.isfinite(z) & (np.isfinite(sigma) | (not known)))
-    present = present[np.argsort(t[present], kind="stable")]
-    t, z, weights = t[present], z[present], sigma[present] ** -2.0 if known else None
-    found = fitted(CORRECTION, t, z, weights, known) if t.size >= FEWEST_POINTS and np.ptp(t) > 0 else None
+    found = fitted(CORRECTION, t, z, weights)
     if found is None:
-        return np.full(len(NAMES), np.nan)
+        return (math.nan,) * len(NAMES)
     exponent, fade, left = _outer(found, t)
     size = float(np.sqrt(np.mean(found.off**2)))
-    beyond_rounding = size > 8 * rounding(t, z)
-    noisy = known or bool(beyond_rounding and (noise_size(t, found.off) > SCATTERS * size if noise is None else noise))
-    word = noise if isinstance(noise, str) else "noise"
-    fits = True
+    scatters = bool(noise_size(t, found.off) > SCATTERS * size if noise is None else noise)
+    noisy = weights is not None or (scatters and size > float(8 * rounding(t, z)))
+    word, fits = noise if isinstance(noise, str) else "noise", True
     if not noisy:
         low, high = _by_half(t, z, exponent)
     else:
-        fits = not _denied(t, found, word, weights)
-        low, high = _mixture(t, z, found, word, confidence, weights) if fits else (math.nan, math.nan)
+        fits = not found.denied(t, word)
+        low, high = _mixture(t, z, found, word, confidence) if fits else (math.nan, math.nan)
     reached = [sign * one for one in (low, high, exponent)] if fits else [math.nan, math.nan]
     verdict = 1 if not fits else 0 if abs(left) < 1 else 2
-    residual = float(np.expm1(min(abs(found.off).max(), 700.0)))
-    ends = sign * exponent, min(reached), max(reached)
-    return np.array([*ends, verdict, sign * fade, left, residual, noisy, verdict == 0])
+    residual = math.expm1(min(float(abs(found.off).max()), 700.0))
+    return (
+        *(sign * exponent, min(reached), max(reached)),
+        *(verdict, sign * fade, left, residual, float(noisy), float(verdict == 0)),
+    )
 
 
 def _outer(found: Found, t: Array) -> tuple[float, float, float]:
@@ -184,60 +163,45 @@ def _by_half(t: Array, z: Array, exponent: float) -> tuple[float, float]:
     return exponent - reach, exponent + reach
 
 
-def _denied(t: Array, found: Found, word: str, weights: Array | None) -> bool:
-    """Whether the points are not (1) and noise."""
-    if weights is not None:
-        square = float((found.off**2 * weights).sum())
-        return bool(gammaincc((t.size - 4) / 2, square / 2) < RARE or runs_chance(found.off) < RARE)
-    if word == "even" and runs_chance(found.off) < RARE:
-        return True
-    u = 2 * (t - t[0]) / (t[-1] - t[0]) - 1
-    columns = found.jacobian[:, np.isfinite(errors(found))]
-    every = np.concatenate([columns, np.polynomial.chebyshev.chebvander(u, 1 + MORE)[:, 2:]], axis=1)
-    return bool(regress(t, every, found.off[None], word, columns.shape[1]).chance[0] < UNLIKELY)
-
-
-def _mixture(
-    t: Array, z: Array, found: Found, word: str, confidence: float, weights: Array | None
-) -> tuple[float, float]:
+def _mixture(t: Array, z: Array, found: Found, word: str, confidence: float) -> tuple[float, float]:
     """Ends of the interval of the exponent, over all D and noises."""
-    span, parts, evidence = float(t[-1] - t[0]), [], []
+    span, weights, parts, evidence = float(t[-1] - t[0]), found.weights, [], []
+    known = weights is not None
     best = float(np.clip(abs(found.numbers[1]), *FADES))
-    doubt = float(np.nan_to_num(errors(found, weights)[1], posinf=best)) / best
+    doubt = float(np.nan_to_num(found.errors()[1], posinf=best)) / best
     tried = best * np.exp(np.linspace(-6.0, 6.0, 25) * np.clip(doubt, 0.01, 0.5))
     for fade in tried[(tried >= FADES[0]) & (tried <= FADES[1])]:
-        one = fitted(_of_fade(float(fade)), t, z, weights, weights is not None)
-        if one is None or not np.isfinite(one.jacobian).all() or not np.isfinite(errors(one)).all():
+        one = fitted(_of_fade(float(fade)), t, z, weights)
+        if one is None or not np.isfinite(one.jacobian).all() or not np.isfinite(one.errors()).all():
             continue
-        part = regress(t, one.jacobian, one.off[None], "even" if weights is not None else word)
-        log = float(part.evidence[0])
-        if weights is not None:
-            part = part._replace(error=errors(one, weights)[None, :, None], left=MANY)
-            log = -0.5 * float((one.off**2 * weights).sum())
+        part = regress(t, one.jacobian, one.off[None], "even" if known else word)
+        if known:
+            part = part._replace(error=one.errors()[None, :, None], left=MANY)
         parts.append(part._replace(value=part.value + one.numbers[:, None]))
-        evidence.append(log)
+        evidence.append(-0.5 * one.deviance if known else float(part.evidence[0]))
     shares = np.exp(np.array(evidence) - max(evidence))
     both = parts[0]._replace(
         weight=np.concatenate([one.weight * share for one, share in zip(parts, shares / shares.sum(), strict=True)]),
-        **{name: np.concatenate([getattr(one, name) for one in parts]) for name in ("value", "error", "share")},
+        value=np.concatenate([one.value for one in parts]),
+        error=np.concatenate([one.error for one in parts]),
+        share=np.concatenate([one.share for one in parts]),
     )
     ends = [float(end[0]) for end in both.interval(2, confidence)]
-    slow = fitted(LOG_CORRECTION, t, z, weights, weights is not None)
-    if slow is not None and slow.aicc < found.aicc + AS_WELL and np.isfinite(errors(slow)).all():
-        line = regress(t, slow.jacobian, slow.off[None], "even" if weights is not None else word)
-        ends += [float(slow.numbers[3] + end[0]) for end in line.interval(3, confidence)]
+    slow = fitted(LOG_CORRECTION, t, z, weights)
+    if slow is not None and slow.aicc < found.aicc + AS_WELL and np.isfinite(slow.errors()).all():
+        ends += [float(slow.numbers[3] + end[0]) for end in slow.interval(t, [3], word, confidence)]
     return min(ends) / span, max(ends) / span
 
 
 @functools.lru_cache(maxsize=256)
 def _of_fade(fade: float) -> Law:
     """(1) of one D."""
-
-    def parts(q: Array, s: Array, span: float) -> Parts:
-        every = CORRECTION.parts(np.array([q[0], fade]), s, span)
-        return every._replace(shift_by_q=every.shift_by_q[:, :1], columns_by_q=every.columns_by_q[:, :1])
-
-    return CORRECTION._replace(parts=parts, starts=CORRECTION.starts[:1], limits=CORRECTION.limits[:1], numbers=3)
+    return CORRECTION._replace(
+        parts=lambda q, s, span: CORRECTION.parts(np.stack([q[0], np.full_like(q[0], fade)]), s, span),
+        starts=CORRECTION.starts[:1],
+        limits=CORRECTION.limits[:1],
+        numbers=3,
+    )
 
 
 FADES = (0.3, 80.0)

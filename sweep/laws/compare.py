@@ -7,15 +7,14 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from scipy.special import gammaincc
 
 from sweep.errors import SweepError
-from sweep.laws.curves import Window, check_output, relative_sigma, title, window_logs
-from sweep.laws.fits import Found, curve, errors, fitted
+from sweep.laws.curves import FEWEST_OF_LINE, Window, check_output, relative_sigma, title, window_logs
+from sweep.laws.fits import Found, all_fitted, curve
 from sweep.laws.loglog import Array
-from sweep.laws.noise import BEYOND_DOUBT, RARE, corrected, line_deviance, runs_chance
-from sweep.laws.shapes import CORRECTION, LAWS, ONE
-
-FEWEST_POINTS = 8
+from sweep.laws.noise import BEYOND_DOUBT, RARE, runs_chance
+from sweep.laws.shapes import CORRECTION, LAWS
 
 NAMES = {
     "aicc": ("1", "Akaike's criterion, corrected for few points; of one law with the noise that suits it best"),
@@ -79,21 +78,15 @@ def compare_laws(y: xr.DataArray, dim: str, window: Window | None = None, *, sig
     here, t, logs, _ = window_logs(y, dim, window)
     relative = relative_sigma(y, sigma).isel(here).values
     present = np.flatnonzero(np.isfinite(logs.values) & (np.isfinite(relative) | (sigma is None)))
-    if present.size < FEWEST_POINTS:
-        raise SweepError(f"laws are told apart by at least {FEWEST_POINTS} points of {title(y)}, found {present.size}")
+    if present.size < FEWEST_OF_LINE:
+        raise SweepError(f"laws are told apart by at least {FEWEST_OF_LINE} points of {title(y)}, found {present.size}")
     present = present[np.argsort(t[present])]
     t, z = t[present], logs.values[present]
     weights = None if sigma is None else relative[present] ** -2.0
-    tried = [fit for law in LAWS if (fit := fitted(law, t, z, weights, known=weights is not None)) is not None]
-    if weights is None:  # one law with the noise that suits it best
-        deviance = min(line_deviance(t, z), tried[0].deviance)
-        k = ONE.numbers + 1 + (deviance < tried[0].deviance)
-        aicc, bic = float(corrected(deviance, t.size, k)), deviance + k * math.log(t.size)
-        tried[0] = tried[0]._replace(deviance=deviance, aicc=aicc, bic=bic)
-    tried.sort(key=lambda fit: fit.aicc)
-    found = _table(t, z, tried, weights)
+    tried = sorted(all_fitted(LAWS, t, z, weights).values(), key=lambda fit: fit.aicc)
+    found = _table(t, z, tried)
     found.attrs = {"y": title(y), "x": dim, **_verdict(tried)}
-    if not fits(found, found.attrs["chosen"]):
+    if denied(found, found.attrs["chosen"]):
         found.attrs["verdict"] += "; but what it leaves has a shape, so that none of them is the law"
     for name, of in (("x", y[dim]), ("y", y), ("fitted", y)):
         found[name].attrs = {"units": str(of.attrs.get("units", "1"))}
@@ -101,7 +94,7 @@ def compare_laws(y: xr.DataArray, dim: str, window: Window | None = None, *, sig
 
 
 @np.errstate(over="ignore")
-def _table(t: Array, z: Array, tried: list[Found], weights: Array | None) -> xr.Dataset:
+def _table(t: Array, z: Array, tried: list[Found]) -> xr.Dataset:
     span = t[-1] - t[0]
     columns: dict[str, list[Any]] = {
         "aicc": [f.aicc for f in tried],
@@ -111,9 +104,9 @@ def _table(t: Array, z: Array, tried: list[Found], weights: Array | None) -> xr.
         "scatter": [math.sqrt(float(np.mean(f.off**2))) for f in tried],
         "residual": [math.expm1(min(float(abs(f.off).max()), 700.0)) for f in tried],
         "runs": [float(runs_chance(f.off)) for f in tried],
-        "chi_squared": [math.nan if weights is None else _chance(f, weights) for f in tried],
+        "chi_squared": [_chance(f) for f in tried],
         "formula": [f.law.formula for f in tried],
-        "exponents": [_exponents(f, float(span), weights) for f in tried],
+        "exponents": [_exponents(f, float(span)) for f in tried],
     }
     found = xr.Dataset({name: ("law", values) for name, values in columns.items()})
     for name, (units, text) in NAMES.items():
@@ -137,18 +130,18 @@ def _verdict(tried: list[Found]) -> dict[str, Any]:
     return {"chosen": chosen.law.name, "margin": margin, "verdict": text}
 
 
-def _chance(found: Found, weights: Array) -> float:
-    from scipy.special import gammaincc
-
-    square = float((found.off**2 * weights).sum())
+def _chance(found: Found) -> float:
+    if found.weights is None:
+        return math.nan
+    square = float((found.off**2 * found.weights).sum())
     return float(gammaincc((found.off.size - found.law.numbers) / 2, square / 2))
 
 
-def _exponents(found: Found, span: float, weights: Array | None) -> str:
+def _exponents(found: Found, span: float) -> str:
     """The exponents with their standard errors, as of independent noise."""
     names = found.law.exponents or ("p",) * (found.law.name == "offset")
     places = range(found.numbers.size - len(names), found.numbers.size) if found.law.exponents else range(len(names))
-    doubt = errors(found, weights)
+    doubt = found.errors()
     parts = [
         f"{name} = {found.numbers[k] / span:.4g} +- {doubt[k] / span:.1g}"
         for name, k in zip(names, places, strict=True)
@@ -158,7 +151,7 @@ def _exponents(found: Found, span: float, weights: Array | None) -> str:
     return ", ".join(parts) or "none"
 
 
-def fits(found: xr.Dataset, law: str) -> bool:
-    """Whether neither the runs test nor chi-squared denies a law."""
+def denied(found: xr.Dataset, law: str) -> bool:
+    """Whether the runs test or chi-squared denies a law."""
     one = found.sel(law=law)
-    return not (one.runs.item() < RARE or one.chi_squared.item() < RARE)
+    return bool(one.runs.item() < RARE or one.chi_squared.item() < RARE)

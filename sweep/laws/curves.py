@@ -161,18 +161,46 @@ def numbers_along(
     return xr.Dataset({name: numbers.isel(number=k, drop=True) for k, name in enumerate(names)})
 
 
-def numbers_by_line(
-    names: Sequence[str], function: Callable[..., Array], y: xr.DataArray, dimension: str, *others: xr.DataArray
+FEWEST_OF_LINE = 8
+"""Points from which on laws with more numbers than a line are fitted."""
+
+
+def fits_by_line(
+    names: Sequence[str],
+    function: Callable[[Array, Array, Array | None], Sequence[float]],
+    y: xr.DataArray,
+    dim: str,
+    window: Window | None,
+    sigma: Any,
 ) -> xr.Dataset:
-    """As `numbers_along`, of a function of one line (n,) and of the same of the others."""
+    """Numbers that a function of ln x, ln y and weights (n,), x rising and none missing, gives for each line.
 
-    def each(*parts: Array) -> Array:
-        count, n = math.prod(parts[0].shape[:-1]), parts[0].shape[-1]
-        lines = zip(*(np.broadcast_to(part, parts[0].shape).reshape(count, n) for part in parts), strict=True)
-        found = np.array([function(*line) for line in lines])
-        return found.reshape(*parts[0].shape[:-1], len(names))
+    NaN where there are too few points; raises SweepError where that is so of all lines.
+    """
+    here, t, logs, _ = window_logs(y, dim, window, repeated=True)
+    ((dimension, _),) = here.items()
 
-    return numbers_along(names, each, y, dimension, *others)
+    def one(z: Array, errors: Array) -> Array:
+        present = np.flatnonzero(np.isfinite(z) & (np.isfinite(errors) | (sigma is None)))
+        present = present[np.argsort(t[present], kind="stable")]
+        if present.size < FEWEST_OF_LINE or not np.ptp(t[present]) > 0:
+            return np.full(len(names), np.nan)
+        with np.errstate(all="ignore"):  # what overflows is infinite
+            weights = None if sigma is None else errors[present] ** -2.0
+            return np.array(function(t[present], z[present], weights), np.float64)
+
+    errors, axes = relative_sigma(y, sigma).isel(here).compute(), [[dimension], [dimension]]
+    numbers = xr.apply_ufunc(
+        one, logs, errors, input_core_dims=axes, output_core_dims=[["number"]], vectorize=True, keep_attrs=True
+    )
+    if not bool(numbers.notnull().any()):
+        raise SweepError(f"this needs at least {FEWEST_OF_LINE} points of {title(y)} in the window; widen it")
+    return xr.Dataset({name: numbers.isel(number=k, drop=True) for k, name in enumerate(names)})
+
+
+def in_words(codes: xr.DataArray, words: Sequence[str]) -> tuple[Any, NDArray[Any]]:
+    """The words that numbers stand for; NaN is a line of too few points."""
+    return codes.dims, np.array([*words, "too few points"])[codes.fillna(-1).values.astype(np.int64)]
 
 
 def like(given: Any, y: xr.DataArray, what: str) -> xr.DataArray:

@@ -148,8 +148,8 @@ def regress(t: Array, columns: Array, z: Array, noise: str = "noise", used: int 
     def weights(count: int, prior: Array) -> Array:
         """Logarithms of restricted likelihoods on so many columns, with the prior."""
         determinant = np.log(np.einsum("pskk->psk", factor[:, :, :count, :count])).sum(axis=2)[:, :, None]
-        found: Array = prior[:, None, None] + before - determinant
-        return found - 0.5 * (n - count) * np.log(squares[:, :, count - 1])
+        likely = before - determinant - 0.5 * (n - count) * np.log(squares[:, :, count - 1])
+        return prior[:, None, None] + likely  # type: ignore[no-any-return]
 
     chance = np.ones(len(z))
     if k > used:

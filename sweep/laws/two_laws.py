@@ -13,18 +13,14 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from scipy.special import ndtri
 
 from sweep.errors import SweepError
-from sweep.laws.curves import Window, check_confidence, described, numbers_by_line, relative_sigma, title, window_logs
-from sweep.laws.fits import Found, errors, fitted
+from sweep.laws.curves import Window, check_confidence, described, fits_by_line, in_words, title
+from sweep.laws.fits import Found, all_fitted
 from sweep.laws.lines import check_noise, crossover, fit_exponent, rounding
 from sweep.laws.loglog import Array, slopes, tends
-from sweep.laws.noise import BEYOND_DOUBT, corrected, line_deviance, noise_size, regress
-from sweep.laws.shapes import BENDS, OTHER_FUNCTIONS, THREE, TWO
-
-FEWEST_POINTS = 8
-"""Points for the five numbers of (1) and an error bar."""
+from sweep.laws.noise import BEYOND_DOUBT, corrected, noise_size, regress
+from sweep.laws.shapes import BENDS, ONE, OTHER_FUNCTIONS, THREE, TWO
 
 TELLING = 16
 """Points from which noise is told from the misfit of a smooth truth,"""
@@ -154,18 +150,11 @@ def fit_two_laws(
         if window is not None:
             raise SweepError("window does not go with windows, which say where the two lines are")
         return _in_windows(y, dim, windows, confidence=confidence, noise=noise, sigma=sigma)
-    here, t, logs, _ = window_logs(y, dim, window, repeated=True)
-    ((dimension, _),) = here.items()
-    errors = relative_sigma(y, sigma).isel(here)
     names = [f"{name} {law}" for law in LAWS for name in EXPONENTS] + list(OTHERS)
-    found = numbers_by_line(names, lambda z, s: _one(t, z, s, confidence, noise), logs, dimension, errors)
-    if not bool(found.points.notnull().any()):
-        raise SweepError(f"two laws need at least {FEWEST_POINTS} points of {title(y)}, found fewer; widen the window")
+    found = fits_by_line(names, lambda t, z, weights: _one(t, z, weights, confidence, noise), y, dim, window, sigma)
     axis = xr.DataArray(list(LAWS), dims="law", name="law")
     both: dict[str, Any] = {name: xr.concat([found[f"{name} {law}"] for law in LAWS], axis) for name in EXPONENTS}
-    codes = found.verdict.fillna(-1).astype(np.int64)
-    words = np.array([*VERDICTS, "too few points"])
-    both |= {name: found[name] for name in OTHERS} | {"verdict": (codes.dims, words[codes.values])}
+    both |= {name: found[name] for name in OTHERS} | {"verdict": in_words(found.verdict, VERDICTS)}
     place, units = (str(c.attrs.get("units", "1")) for c in (y.coords[dim], y))
     of = dict.fromkeys(("crossover", "crossover_low", "crossover_high"), place) | {"level": units}
     attrs = {"y": title(y), "x": dim, "law": "equation (1) of sweep.laws.two_laws"}
@@ -187,39 +176,31 @@ def _in_windows(y: xr.DataArray, dim: str, windows: tuple[Window, Window], **key
     return found.assign(level=met.ordinate).assign_attrs(met.attrs)
 
 
-@np.errstate(all="ignore")  # what overflows is infinite; a crossover that is not determined reaches there
-def _one(t: Array, z: Array, sigma: Array, confidence: float, noise: bool | str | None) -> Array:
+def _one(t: Array, z: Array, weights: Array | None, confidence: float, noise: bool | str | None) -> list[float]:
     """EXPONENTS of both laws and OTHERS of one line."""
-    known = bool(np.isfinite(sigma).any())
-    present = np.flatnonzero(np.isfinite(z) & (np.isfinite(sigma) | (not known)))
-    if present.size < FEWEST_POINTS or not np.ptp(t[present]) > 0:
-        return np.full(len(LAWS) * len(EXPONENTS) + len(OTHERS), np.nan)
-    present = present[np.argsort(t[present], kind="stable")]
-    t, z, weights = t[present], z[present], sigma[present] ** -2.0 if known else None
-    tried = {law.name: fit for law in (*BENDS, *OTHER_FUNCTIONS, THREE) if (fit := fitted(law, t, z, weights, known))}
-    two = tried[TWO.name]
+    tried = all_fitted((ONE, *BENDS, *OTHER_FUNCTIONS, THREE), t, z, weights)
+    two, known = tried[TWO.name], weights is not None
     size = math.sqrt(float(two.off @ two.off) / (t.size - 5))
     noisy = known or (_is_noise(t, z, two.off, size) if noise is None else bool(noise))
-    rough = noise_size(t, two.off) > SMOOTH_TO * size
     word = noise if isinstance(noise, str) else "noise" if noisy else "even"
-    best, low, high = _intervals(two, t, word, confidence, weights)
-    if noisy or rough:
-        low, high = _of_other_bends(tried, t, word, confidence, weights, low, high)
+    ends = _ends(two, t, word, confidence)  # the numbers, and the ends of their intervals
+    if noisy or noise_size(t, two.off) > SMOOTH_TO * size:
+        ends[1:] = _of_other_bends(tried, t, word, confidence, ends)
     if not noisy:
-        low, high = _widened(t, z, best, low, high)
-    verdict, evidence = _verdict(t, z, tried, weights, noisy)
-    p_low, p_high, places = np.stack([best, low, high], axis=1)
-    q, level = two.numbers[:2], two.numbers[2]
-    places, bend = np.exp(places), [math.exp(q[1]) * float(t[-1] - t[0]) / math.log(10), float(np.exp(level))]
+        ends[1:] = _widened(t, z, *ends)
+    verdict, evidence = _verdict(t, tried, noisy)
+    p_low, p_high, places = ends.T
+    level, places = float(np.exp(two.numbers[2])), np.exp(places)
+    width = math.exp(two.numbers[1]) * float(t[-1] - t[0]) / math.log(10)
     if evidence <= 0 and not noisy:  # straight to rounding: nothing meets anywhere
-        places, bend = np.array([np.nan, 0.0, np.inf]), [np.nan, np.nan]
+        places, width, level = np.array([np.nan, 0.0, np.inf]), math.nan, math.nan
     if VERDICTS[verdict] in ("three laws", "no power law"):
-        p_low, p_high, places, bend = np.full(3, np.nan), np.full(3, np.nan), np.full(3, np.nan), [np.nan, np.nan]
+        p_low, p_high, places = np.full((3, 3), np.nan)
+        width = level = math.nan
     if VERDICTS[verdict] == "no meeting in the window":
         places[0] = np.nan
-    residual = float(np.expm1(min(abs(two.off).max(), 700.0)))
-    rest = [verdict, REGIMES[verdict], evidence, *bend, residual, t.size, noisy]
-    return np.array([*p_low, *p_high, *places, *rest])
+    residual = math.expm1(min(float(abs(two.off).max()), 700.0))
+    return [*p_low, *p_high, *places, verdict, REGIMES[verdict], evidence, width, level, residual, t.size, noisy]
 
 
 def _is_noise(t: Array, z: Array, off: Array, size: float) -> bool:
@@ -235,49 +216,36 @@ def _is_noise(t: Array, z: Array, off: Array, size: float) -> bool:
     return bool((share > SCATTERED and size < 3 * noise_size(t, z)) or (off.size >= TELLING_MEMORY and share > ROUGH))
 
 
-def _intervals(
-    found: Found, t: Array, word: str, confidence: float, weights: Array | None
-) -> tuple[Array, Array, Array]:
-    """Exponents of both laws and ln of where they meet, and the ends of their intervals (3,) each."""
+def _ends(found: Found, t: Array, word: str, confidence: float) -> Array:
+    """Exponents of both laws and ln of where they meet, and the ends of their intervals, (3, 3)."""
     span, which = float(t[-1] - t[0]), [len(found.law.starts) + 1, len(found.law.starts) + 2, 0]
-    factor = np.array([1 / span, 1 / span, span])
-    best = found.numbers[which] * factor + [0.0, 0.0, t[0]]
-    doubt = errors(found, weights)[which]
-    if weights is not None:
-        reach = ndtri((1 + confidence) / 2) * doubt
-        low, high = -reach, reach
-    elif not np.isfinite(doubt).all():
-        low, high = np.where(np.isfinite(doubt), -3 * doubt, -np.inf), np.where(np.isfinite(doubt), 3 * doubt, np.inf)
-    else:
-        line = regress(t, found.jacobian, found.off[None], word)
-        low, high = np.array([line.interval(k, confidence) for k in which])[:, :, 0].T
-    return best, best + np.fmin(low, 0) * factor, best + np.fmax(high, 0) * factor
+    about = np.stack([np.zeros(3), *found.interval(t, which, word, confidence)])
+    ends: Array = (found.numbers[which] + about) * [1 / span, 1 / span, span] + [0.0, 0.0, t[0]]
+    return ends
 
 
-def _of_other_bends(
-    tried: dict[str, Found], t: Array, word: str, confidence: float, weights: Array | None, low: Array, high: Array
-) -> tuple[Array, Array]:
+def _of_other_bends(tried: dict[str, Found], t: Array, word: str, confidence: float, ends: Array) -> Array:
     """Intervals that reach over those of every bend of another shape that the points do not rule out."""
     bends = [tried[law.name] for law in BENDS if law.name in tried]
     judged = []
     for found in bends:
-        columns = found.jacobian[:, np.isfinite(errors(found))]
-        if weights is None and word != "even" and columns.size:
+        columns = found.jacobian[:, np.isfinite(found.errors())]
+        if found.weights is None and word != "even" and columns.size:
             deviance = float(regress(t, columns, found.off[None], word).deviance[0])
             judged.append(float(corrected(deviance, t.size, found.law.numbers + 2)))
         else:
             judged.append(found.aicc)
-    own_low, own_high = low.copy(), high.copy()
+    low, high = ends[1:].copy()
     for found, aicc in zip(bends, judged, strict=True):
         if aicc <= min(judged) + OTHER_SHAPES:
-            _, below, above = _intervals(found, t, word, confidence, weights)
+            _, below, above = _ends(found, t, word, confidence)
             low, high = np.fmin(low, below), np.fmax(high, above)
-    further = BEYOND_SHAPES * max(own_low[2] - low[2], high[2] - own_high[2])
+    further = BEYOND_SHAPES * max(ends[1, 2] - low[2], high[2] - ends[2, 2])
     low[2], high[2] = low[2] - further, high[2] + further
-    return low, high
+    return np.stack([low, high])
 
 
-def _widened(t: Array, z: Array, best: Array, low: Array, high: Array) -> tuple[Array, Array]:
+def _widened(t: Array, z: Array, best: Array, low: Array, high: Array) -> Array:
     """Intervals that reach to where the local exponents tend; of the crossover, to where they are half-way between the
     laws and to where the tangents at the ends of the window meet."""
     first = np.append(True, np.diff(t) > 0)
@@ -294,7 +262,7 @@ def _widened(t: Array, z: Array, best: Array, low: Array, high: Array) -> tuple[
     pairs = [pair for pair in itertools.product(*steep) if pair[0] != pair[1]]
     meetings = [float((z[-1] - z[0] + p * t[0] - q * t[-1]) / (p - q)) for p, q in pairs]
     low[2], high[2] = min(low[2], place, *meetings), max(high[2], place, *meetings)
-    return low, high
+    return np.stack([low, high])
 
 
 def _amplified(t: Array) -> float:
@@ -303,42 +271,30 @@ def _amplified(t: Array) -> float:
     return float(np.sqrt((slopes(near, np.eye(near.size), 5)[:, 0] ** 2).sum()))
 
 
-def _verdict(t: Array, z: Array, tried: dict[str, Found], weights: Array | None, noisy: bool) -> tuple[int, float]:
+def _verdict(t: Array, tried: dict[str, Found], noisy: bool) -> tuple[int, float]:
     """Position in VERDICTS, and by how much two laws are better than a line and than other functions.
 
     By AICc, and BIC for many points. The noise of the line may be of any kind, that of all others is even.
     """
-    n, two = t.size, tried[TWO.name]
-    line = fitted_line(t, z, weights)
-    others = [(fit.deviance, fit.law.numbers) for law in OTHER_FUNCTIONS if (fit := tried.get(law.name))]
+    two, line = tried[TWO.name], tried[ONE.name]
+    bends, others = ([tried[law.name] for law in laws if law.name in tried] for laws in (BENDS, OTHER_FUNCTIONS))
 
-    def gain(simple: tuple[float, int], deviance: float, numbers: int) -> float:
-        by_aicc = float(corrected(simple[0], n, simple[1] + 1) - corrected(deviance, n, numbers + 1))
-        return min(by_aicc, simple[0] - deviance + (simple[1] - numbers) * math.log(n))
+    def gain(simple: Found, better: Found) -> float:
+        return min(simple.aicc - better.aicc, simple.bic - better.bic)
 
-    evidence = min(gain(one, two.deviance, 5) for one in (line, *others))
-    bends = [tried[law.name] for law in BENDS if law.name in tried]
+    evidence = min(gain(one, two) for one in (line, *others))
     if (three := tried.get(THREE.name)) is not None:
-        nearest = min((*bends, *(tried[law.name] for law in OTHER_FUNCTIONS)), key=lambda fit: fit.aicc)
-        better = three.aicc < nearest.aicc - OTHER_SHAPES and gain(line, three.deviance, 7) > BEYOND_DOUBT
-        if better and noisy and weights is None:  # nor with noise of any kind beside two
-            columns = nearest.jacobian[:, np.isfinite(errors(nearest))]
+        nearest = min((*bends, *others), key=lambda fit: fit.aicc)
+        better = three.aicc < nearest.aicc - OTHER_SHAPES and gain(line, three) > BEYOND_DOUBT
+        if better and noisy and two.weights is None:  # nor with noise of any kind beside two
+            columns = nearest.jacobian[:, np.isfinite(nearest.errors())]
             deviance = float(regress(t, columns, nearest.off[None]).deviance[0])
-            better = three.aicc < corrected(deviance, n, nearest.law.numbers + 2) - BEYOND_DOUBT
+            better = three.aicc < corrected(deviance, t.size, nearest.law.numbers + 2) - BEYOND_DOUBT
         elif better and not noisy:
             better = float(three.off @ three.off) < SMALLER**2 * min(float(fit.off @ fit.off) for fit in bends)
         if better:
             return VERDICTS.index("three laws"), evidence
     if evidence > BEYOND_DOUBT:
         return VERDICTS.index("two laws" if 0 <= two.numbers[0] <= 1 else "no meeting in the window"), evidence
-    if max(gain(line, *one) for one in others) > BEYOND_DOUBT:
-        return VERDICTS.index("no power law"), evidence
-    return VERDICTS.index("one law"), evidence
-
-
-def fitted_line(t: Array, z: Array, weights: Array | None) -> tuple[float, int]:
-    """Deviance of one law, and its numbers with those of its noise but one."""
-    if weights is None:
-        return line_deviance(t, z), 3
-    fit = np.polyfit(t, z, 1, w=np.sqrt(weights))
-    return float((weights * (z - np.polyval(fit, t)) ** 2).sum()), 1
+    no_law = max(gain(line, one) for one in others) > BEYOND_DOUBT
+    return VERDICTS.index("no power law" if no_law else "one law"), evidence

@@ -124,9 +124,9 @@ def laws(
     noise: bool | str | None = None,
 ) -> Laws:
     """What `sweep fit` finds; `y` and `noise` as of `output_of` and `fit_exponent`. Raises SweepError."""
-    from sweep.laws.curves import stated_error
+    from sweep.laws.curves import FEWEST_OF_LINE, stated_error
     from sweep.laws.lines import crossover, fit_exponent
-    from sweep.laws.two_laws import FEWEST_POINTS, fit_two_laws
+    from sweep.laws.two_laws import fit_two_laws
 
     y = output_of(dataset, y)
     if len(windows) > 2:
@@ -137,7 +137,7 @@ def laws(
     fits = tuple(fit_exponent(column, x, window, bound=bound, **keys) for window in limits)  # type: ignore[arg-type]
     meeting = crossover(fits[0], fits[1]) if len(fits) == 2 else None
     bend = None
-    if meeting is None and column.sizes[str(column[x].dims[0])] >= FEWEST_POINTS:
+    if meeting is None and column.sizes[str(column[x].dims[0])] >= FEWEST_OF_LINE:
         try:
             bend = fit_two_laws(column, x, limits[0], **keys)  # type: ignore[arg-type]
         except SweepError:  # the window leaves too few points
