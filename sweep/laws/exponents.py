@@ -1,4 +1,4 @@
-"""Scaling laws in results: local exponents, straight lines in log-log, where two laws meet.
+"""Local exponents, and where curves or their exponents pass a value.
 
 Everything here works on plain `xarray` objects along one dimension and keeps all others. `dim` may also name a
 coordinate along a dimension, such as an axis of a zip design: `local_exponent(ds.period, "mu")`.
@@ -6,7 +6,6 @@ coordinate along a dimension, such as an axis of a zip design: `local_exponent(d
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any, Literal, overload
 
 import numpy as np
@@ -24,11 +23,7 @@ from sweep.laws.curves import (
     stated_bound,
     title,
 )
-from sweep.laws.lines import crossover as crossover
-from sweep.laws.lines import fit_exponent as fit_exponent
 from sweep.laws.loglog import EPSILON, Array, brackets, root, slope_errors, slopes
-
-Finder = Callable[[Array, Array, int], tuple[float, float]]
 
 
 @overload
@@ -79,73 +74,15 @@ def local_exponent(y: xr.DataArray, dim: str, *, error: bool = False, bound: Any
     >>> bool((sweep.local_exponent(ds.period, "mu", error=True).exponent_error < 1e-3).all())
     True
     """
-    found = _local(y, dim, lambda t, z: slopes(t, z, 5), "exponent", "local exponent")
+    dimension, x = positive_axis(y, dim)
+    t, logs, name = np.log(x), log_of(y), "" if y.name is None else f"{y.name}_"
+    found = along(lambda z: slopes(t, z, 5), logs, dimension).rename(f"{name}exponent")
+    found.attrs = {"units": "1", "long_name": f"local exponent of {title(y)} in {dim}"}
     if not error:
         return found
-    return xr.Dataset({"exponent": found, "exponent_error": local_exponent_error(y, dim, bound)})
-
-
-def local_exponent_error(y: xr.DataArray, dim: str, bound: Any = None) -> xr.DataArray:
-    """Error bar of the local exponent [1], which knows the sampling and the stated errors, and finds noise by itself.
-
-    It is that of `local_exponent` with `error`: the local exponent by five points is tried by that through seven, and
-    where a bend is within a step, by the slopes of the steps beside it; next to a pole by all steps it is made of.
-
-    Parameters
-    ----------
-    y, dim
-        As of `local_exponent`.
-    bound : number or DataArray, optional
-        Largest relative error of the values. Default: as of `fit_exponent`.
-
-    Raises
-    ------
-    SweepError
-        As `local_exponent`, or `bound` is negative or of another shape.
-    """
-    bounds = stated_bound(y, bound)
-    return _local(y, dim, slope_errors, "exponent_error", "error of the local exponent", bounds)
-
-
-def _local(
-    y: xr.DataArray, dim: str, function: Callable[..., Array], name: str, words: str, *others: xr.DataArray
-) -> xr.DataArray:
-    dimension, x = positive_axis(y, dim)
-    found = along(lambda *lines: function(np.log(x), *lines), log_of(y), dimension, None, *others)
-    found.name = name if y.name is None else f"{y.name}_{name}"
-    found.attrs = {"units": "1", "long_name": f"{words} of {title(y)} in {dim}"}
-    return found
-
-
-def where_value(curve: xr.DataArray, dim: str, value: float, window: Window | None = None) -> xr.Dataset:
-    """Where a curve passes a value: `abscissa` and `abscissa_error`, by interpolation in ln dim.
-
-    The place is the root, between the two points that bracket it, of the polynomial through six neighbours. Its
-    error is the distance to the root with four, plus rounding: an estimate, not a bound.
-
-    Parameters
-    ----------
-    curve : DataArray
-        Any shape, for instance an output `sensitivity`; missing points are left out.
-    dim : str
-        Dimension of `curve`, or 1-D coordinate along one; positive and strictly monotone.
-    value : float
-        In the unit of `curve`.
-    window : (low, high), optional
-        Part of `dim` to look in.
-
-    Raises
-    ------
-    SweepError
-        If the curve does not pass the value, or does so more than once. Along further dimensions such lines are
-        NaN, and it is raised only if all are.
-    """
-
-    def find(t: Array, c: Array, bracket: int) -> tuple[float, float]:
-        fine, coarse = (root(t, c, bracket, value, points) for points in (6, 4))
-        return fine, abs(fine - coarse) + _rounding(t, c, bracket, EPSILON * _largest(c))
-
-    return _where(missing_is_nan(curve), dim, value, window, lambda t, c: c, find)
+    errors = along(lambda z, b: slope_errors(t, z, b), logs, dimension, None, stated_bound(y, bound))
+    errors.attrs = {"units": "1", "long_name": f"error of the local exponent of {title(y)} in {dim}"}
+    return xr.Dataset({"exponent": found, "exponent_error": errors})
 
 
 def where_exponent(
@@ -188,62 +125,36 @@ def where_exponent(
     >>> print(f"{float(sweep.where_exponent(ds.period, 'mu', 2.0, values=True).abscissa):.2f}")
     26.40
     """
-    if values:
-        return where_value(y, dim, value, window)
-
-    def find(t: Array, z: Array, bracket: int) -> tuple[float, float]:
-        sixth, fourth = slopes(t, z, 7), slopes(t, z, 5)
-        fine = root(t, sixth, bracket, value, 6)
-        coarse = [root(t, fourth, i, value, 4) for i in brackets(fourth, value) if abs(i - bracket) <= 1]
-        apart = min((abs(fine - place) for place in coarse), default=float(abs(t[bracket + 1] - t[bracket])))
-        noise = EPSILON * _largest(z) / float(abs(np.diff(t)).min())
-        return fine, apart + _rounding(t, sixth, bracket, noise)
-
-    found = _where(log_of(y), dim, value, window, lambda t, z: slopes(t, z, 7), find)
-    found.abscissa.attrs["long_name"] = f"where the exponent of {title(y)} is {value:g}"
-    return found
-
-
-def _where(
-    curve: xr.DataArray,
-    dim: str,
-    value: float,
-    window: Window | None,
-    seen: Callable[[Array, Array], Array],
-    find: Finder,
-) -> xr.Dataset:
-    """The one passage of each line: `seen` gives what passes `value`, `find` the place and its error in ln dim."""
+    curve = missing_is_nan(y) if values else log_of(y)
     dimension, x = positive_axis(curve, dim)
     inside, t = inside_window(x, window, dim), np.log(x)
+    orders = ((6, 0), (4, 0)) if values else ((6, 7), (4, 5))  # points of the interpolation and of the slopes
 
     def one(z: Array) -> tuple[float, float]:
-        """The place and its error; NaN and the number of places where that is not one."""
-        places = brackets(np.where(inside, seen(t, z), np.nan), value)
-        return find(t, z, places[0]) if len(places) == 1 else (np.nan, len(places))
+        """The place in ln dim and its error; NaN and the number of places where that is not one."""
+        fine, coarse = ((points, slopes(t, z, stencil) if stencil else z) for points, stencil in orders)
+        places = brackets(np.where(inside, fine[1], np.nan), value)
+        if len(places) != 1:
+            return np.nan, len(places)
+        at = places[0]
+        step, rise = float(abs(t[at + 1] - t[at])), float(abs(fine[1][at + 1] - fine[1][at]))
+        found = root(t, fine[1], at, value, fine[0])
+        near = [i for i in brackets(coarse[1], value) if abs(i - at) <= 1]
+        apart = min((abs(found - root(t, coarse[1], i, value, coarse[0])) for i in near), default=step)
+        noise = EPSILON * float(np.nanmax(abs(z))) / (1.0 if values else float(abs(np.diff(t)).min()))
+        return found, apart + noise * step / rise + EPSILON * abs(float(t[at]))
 
-    def all_lines(values: Array) -> Array:
-        lines = np.array([one(z) for z in values.reshape(-1, t.size)])
-        return lines.reshape(*values.shape[:-1], 2)
+    def each(z: Array) -> Array:
+        return np.array([one(line) for line in z.reshape(-1, t.size)]).reshape(*z.shape[:-1], 2)
 
-    numbers = numbers_along(("place", "error"), all_lines, curve, dimension)
+    numbers = numbers_along(("place", "error"), each, curve, dimension)
     place, error = numbers.place, numbers.error
     if not bool(place.notnull().any()):
         count = int(error.max())
         said = f"passes {value:g} {count} times" if count else f"does not pass {value:g}"
         raise SweepError(f"{title(curve)} {said} along {dim} in the window; choose another window")
-    abscissa: xr.DataArray = xr.apply_ufunc(np.exp, place, keep_attrs=True)
-    found = xr.Dataset({"abscissa": abscissa, "abscissa_error": (abscissa * error).where(place.notnull())})
-    units = str(curve.coords[dim].attrs.get("units", "1"))
-    found.abscissa.attrs = {"units": units, "long_name": f"where {title(curve)} is {value:g}"}
+    found = xr.Dataset({"abscissa": np.exp(place), "abscissa_error": (np.exp(place) * error).where(place.notnull())})
+    units, what = str(y.coords[dim].attrs.get("units", "1")), title(y) if values else f"the exponent of {title(y)}"
+    found.abscissa.attrs = {"units": units, "long_name": f"where {what} is {value:g}"}
     found.abscissa_error.attrs = {"units": units, "long_name": "estimated error of the place"}
     return found
-
-
-def _largest(values: Array) -> float:
-    return float(np.nanmax(abs(values)))
-
-
-def _rounding(t: Array, c: Array, bracket: int, noise: float) -> float:
-    """Error in t of a root near `bracket` where the curve carries `noise`."""
-    step, rise = abs(t[bracket + 1] - t[bracket]), abs(c[bracket + 1] - c[bracket])
-    return float(noise * step / rise + EPSILON * abs(t[bracket]))

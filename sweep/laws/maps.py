@@ -10,7 +10,7 @@ import xarray as xr
 
 from sweep.errors import SweepError, missing
 from sweep.laws.curves import check_output, title
-from sweep.laws.exponents import local_exponent, local_exponent_error
+from sweep.laws.exponents import local_exponent
 from sweep.laws.loglog import is_logarithmic
 
 BORDERS = (-1.0, -0.5, -1 / 3)
@@ -51,11 +51,9 @@ def exponent_map(y: xr.DataArray, dim: str, levels: Sequence[float] = BORDERS) -
     >>> sweep.exponent_map(ds.period, "mu").exponent.dims
     ('mu', 'R')
     """
-    field = local_exponent(y, dim)
-    lines = contours(field, levels)
-    names = {str(d): f"{d}_on_border" for d in field.dims}
-    fields = {"exponent": field, "exponent_error": local_exponent_error(y, dim)}
-    return xr.Dataset({**fields, **lines.rename(names).data_vars}, attrs={"y": title(y), "x": dim})
+    local = local_exponent(y, dim, error=True)
+    lines = contours(local.exponent, levels).rename({str(d): f"{d}_on_border" for d in y.dims})
+    return local.assign(lines.data_vars).assign_attrs(y=title(y), x=dim)
 
 
 def contours(field: xr.DataArray, levels: Sequence[float]) -> xr.Dataset:
