@@ -89,23 +89,23 @@ class Regression(NamedTuple):
         height, power = self.weight / error, -0.5 * (self.left + 1)
         level = np.einsum("p,pm->m", self.share, height) * (1 + reach**2 / self.left) ** power
         best = np.take_along_axis(value, height.argmax(axis=0)[None], axis=0)[0]
-        ends = []
-        for sign in (-1.0, 1.0):
+        sides = np.array([[-1.0], [1.0]])
 
-            def dense(reached: Array, sign: float = sign) -> NDArray[np.bool_]:
-                off = (best + sign * reached - value) / error
-                found: NDArray[np.bool_] = (height * (1 + off**2 / self.left) ** power).sum(axis=0) > level
-                return found
+        def dense(reached: Array) -> NDArray[np.bool_]:
+            """Whether values so far below and above the densest noise's own (2, m) are above the level."""
+            off = (best + sides * reached - value[:, None]) / error[:, None]
+            return np.asarray((height[:, None] * (1 + off**2 / self.left) ** power).sum(axis=0) > level)
 
-            inside, outside = np.zeros_like(best), np.ptp(value, axis=0) + error.max(axis=0)
-            while (further := dense(outside)).any():
-                outside = np.where(further, 2 * outside, outside)
-            for _ in range(40):
-                half = 0.5 * (inside + outside)
-                in_ = dense(half)
-                inside, outside = np.where(in_, half, inside), np.where(in_, outside, half)
-            ends.append(best + sign * inside)
-        return ends[0], ends[1]
+        inside = np.zeros((2, best.size))
+        outside = inside + np.ptp(value, axis=0) + error.max(axis=0)
+        while (further := dense(outside)).any():
+            outside = np.where(further, 2 * outside, outside)
+        for _ in range(36):
+            half = 0.5 * (inside + outside)
+            in_ = dense(half)
+            inside, outside = np.where(in_, half, inside), np.where(in_, outside, half)
+        low, high = best + sides * inside
+        return low, high
 
 
 def regress(t: Array, columns: Array, z: Array, noise: str = "noise", used: int | None = None) -> Regression:
