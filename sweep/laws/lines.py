@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 from scipy.special import gammaincc, ndtri, stdtrit
 
 from sweep.errors import SweepError
@@ -19,6 +18,7 @@ from sweep.laws.curves import (
     check_output,
     described,
     ends,
+    in_words,
     log_of,
     numbers_along,
     relative_sigma,
@@ -27,22 +27,12 @@ from sweep.laws.curves import (
     window_logs,
 )
 from sweep.laws.loglog import EPSILON, FEWEST, Array, slope_bounds, slopes, tends
-from sweep.laws.noise import (
-    NOISES,
-    RARE,
-    UNLIKELY,
-    alike,
-    corrected,
-    inliers,
-    noise_share,
-    regress,
-    runs_chance,
-)
+from sweep.laws.noise import NOISES, RARE, UNLIKELY, alike, corrected, inliers, noise_share, regress, runs_chance
 
 METHOD = "least squares in log-log; the interval is of what `kind` says"
 
-KINDS = ("too few points", "not positive", "exact", "bounded", "curved", "bent", "weighted", *NOISES)
-"""What distances from a line are; the first two are of lines that have no exponent."""
+KINDS = ("not positive", "exact", "bounded", "curved", "bent", "weighted", *NOISES)
+"""What distances from a line are; the first is of lines that have no exponent."""
 
 SMOOTH = 0.12
 """Share of the distances from a line that is noise, below which they are a bend and no noise."""
@@ -74,14 +64,6 @@ FIT_NAMES = {
     "limit_high": "to where the local exponent tends above the window; no end of an interval; NaN where there is noise",
 }
 NUMBERS = tuple(name for name in FIT_NAMES if name not in ("verdict", "noisy"))
-
-
-class Given(NamedTuple):
-    """What is known of a fit beforehand."""
-
-    confidence: float
-    noise: bool | str | None
-    sigma: bool
 
 
 def fit_exponent(
@@ -175,9 +157,11 @@ def fit_exponent(
     errors = relative_sigma(y, sigma).isel(here)
     if sigma is not None:
         logs = logs.where(np.isfinite(errors))
-    given = Given(confidence, noise, sigma is not None)
     bounds = stated_bound(y, bound).isel(here)
-    fit = numbers_along(NUMBERS, lambda z, s, b: _lines(t, z, s, b, given), logs, dimension, errors, bounds)
+    known = sigma is not None
+    fit = numbers_along(
+        NUMBERS, lambda z, s, b: _lines(t, z, s, b, known, confidence, noise), logs, dimension, errors, bounds
+    )
     fit["kind"] = fit.kind.where(positive, KINDS.index("not positive"))
     if not bool(fit.exponent.notnull().any()):
         raise SweepError(
@@ -238,74 +222,71 @@ def rounding(t: Array, z: Array) -> Array:
     return found
 
 
-def _lines(t: Array, z: Array, sigma: Array, bound: Array, given: Given) -> Array:
+def _lines(
+    t: Array, z: Array, sigma: Array, bound: Array, known: bool, confidence: float, noise: bool | str | None
+) -> Array:
     """NUMBERS of each line (..., n) of `z`; lines with the same points at once."""
     count = math.prod(z.shape[:-1])
     rows, sigma, bound = (np.broadcast_to(part, z.shape).reshape(count, t.size) for part in (z, sigma, bound))
     found = np.full((len(rows), len(NUMBERS)), np.nan)
     present = np.isfinite(rows)
-    found[:, NUMBERS.index("kind")], found[:, NUMBERS.index("points")] = 0, present.sum(axis=1)
+    found[:, NUMBERS.index("points")] = present.sum(axis=1)
     for pattern, which in alike(present):
         at = np.flatnonzero(pattern)
         at = at[np.argsort(t[at], kind="stable")]
         if at.size >= FEWEST and t[at[0]] < t[at[-1]]:
             row, s, b = (part[np.ix_(which, at)] for part in (rows, sigma, bound))
             with np.errstate(over="ignore", under="ignore"):
-                fit = _judged(t[at], row, s, b, given)
+                fit = _alike(t[at], row, s if known else None, b, confidence, noise)
             found[which] = np.stack([np.broadcast_to(fit[name], which.size) for name in NUMBERS], axis=1)
     return found.reshape(*z.shape[:-1], len(NUMBERS))
 
 
-def _judged(t: Array, z: Array, sigma: Array, bound: Array, given: Given) -> dict[str, Any]:
-    """NUMBERS (m,) of lines z (m, n) without gaps, t rising."""
-    share = sigma**-2.0 if given.sigma else np.ones_like(z)
+def _alike(
+    t: Array, z: Array, sigma: Array | None, bound: Array, confidence: float, noise: bool | str | None
+) -> dict[str, Any]:
+    """NUMBERS (m,) of lines z (m, n) without gaps, t rising: least squares, and then by what the distances are."""
+    share = np.ones_like(z) if sigma is None else sigma**-2.0
     share = share / share.mean(axis=1, keepdims=True)
     centre, level = (share * t).mean(axis=1), (share * z).mean(axis=1)
-    u, n = t - centre[:, None], t.size
+    u, n, least = t - centre[:, None], t.size, 8 * rounding(t, z)
     spread = (share * u * u).sum(axis=1)
     slope = (share * u * (z - level[:, None])).sum(axis=1) / spread
     off = z - level[:, None] - slope[:, None] * u
     size = np.sqrt((share * off * off).sum(axis=1) / max(n - 2, 1))
-    fit = {"exponent": slope, "level": level, "exponent_error": size / np.sqrt(spread), "level_error": size / n**0.5}
+    fit: dict[str, Any] = {name: np.full(len(z), np.nan) for name in NUMBERS}
+    fit |= {"exponent": slope, "level": level, "exponent_error": size / np.sqrt(spread), "level_error": size / n**0.5}
     fit |= {"drift": _drift(u, off, share), "points": n, "low": np.exp(t[0]), "high": np.exp(t[-1])}
-    fit |= {"start": np.exp(z[:, 0]), "stop": np.exp(z[:, -1]), "fits": np.ones(len(z))}
-    fit |= {name: np.full(len(z), np.nan) for name in ("kind", "exponent_low", "exponent_high")}
-    fit |= {"limit_low": np.full(len(z), np.nan), "limit_high": np.full(len(z), np.nan)}
-    noisy = np.zeros(len(z), bool)
-    if given.sigma:
-        off = off / sigma
+    fit |= {"start": np.exp(z[:, 0]), "stop": np.exp(z[:, -1]), "centre": np.exp(centre)}
+    if sigma is not None:
         error = 1 / np.sqrt((sigma**-2 * u * u).sum(axis=1))
-        reach = ndtri((1 + given.confidence) / 2) * error
-        chance = gammaincc((n - 2) / 2, (off**2).sum(axis=1) / 2) if n > 2 else np.ones(len(z))
+        reach = ndtri((1 + confidence) / 2) * error
+        chance = gammaincc((n - 2) / 2, ((off / sigma) ** 2).sum(axis=1) / 2) if n > 2 else np.ones(len(z))
         fit |= {"exponent_error": error, "level_error": (sigma**-2.0).sum(axis=1) ** -0.5}
         fit |= {"exponent_low": slope - reach, "exponent_high": slope + reach}
         fit |= {"kind": KINDS.index("weighted"), "fits": (chance > RARE) & ~(runs_chance(off) < RARE)}
     else:
-        noisy = (abs(off).max(axis=1) > 8 * rounding(t, z)) & (n > FEWEST)
-        if given.noise is None:
+        noisy = (abs(off).max(axis=1) > least) & (n > FEWEST)
+        if noise is None:
             within = bound.any(axis=1) & (abs(off) <= 2 * bound).all(axis=1)
-            noisy &= (size > 8 * rounding(t, z)) & ~within & (noise_share(t, off) > SMOOTH)
+            noisy &= (size > least) & ~within & (noise_share(t, off) > SMOOTH)
         else:
-            noisy &= bool(given.noise)
-        _fill(fit, ~noisy, _exact, t, z, off, bound, slope)
-        _fill(fit, noisy, lambda *parts: _noisy(*parts, given=given), t, z, centre)
+            noisy &= bool(noise)
+        word, parts = noise if isinstance(noise, str) else "noise", []
+        if (which := np.flatnonzero(noisy)).size:
+            parts.append((which, _noisy(t, z[which], centre[which], word, confidence)))
+        if (which := np.flatnonzero(~noisy)).size:
+            parts.append((which, _exact(t, *(part[which] for part in (z, off, bound, slope)))))
+        for which, found in parts:
+            for name, values in found.items():
+                fit[name][which] = values
     level, slope = fit["level"], fit["exponent"]
     residual = np.expm1(np.minimum(abs(z - level[:, None] - slope[:, None] * u).max(axis=1), 700))
     prefactor = np.exp(level - slope * centre)
     relative = np.hypot(fit["level_error"], centre * fit["exponent_error"])
     fit |= {"residual": residual, "prefactor": prefactor, "prefactor_error": prefactor * relative}
-    fit["exponent_low"], fit["exponent_high"] = (
-        np.fmin(fit["exponent_low"], slope),
-        np.fmax(fit["exponent_high"], slope),
-    )
-    return fit | {"centre": np.exp(centre), "level": np.exp(level)}
-
-
-def _fill(fit: dict[str, Any], which: NDArray[np.bool_], function: Any, t: Array, *parts: Array) -> None:
-    """What a function finds of some of the lines."""
-    if which.any():
-        for name, values in function(t, *(part[which] for part in parts)).items():
-            fit[name][which] = values
+    fit |= {"exponent_low": np.fmin(fit["exponent_low"], slope), "exponent_high": np.fmax(fit["exponent_high"], slope)}
+    return fit | {"level": np.exp(level)}
 
 
 def _drift(u: Array, off: Array, share: Array) -> Array:
@@ -321,36 +302,28 @@ def _drift(u: Array, off: Array, share: Array) -> Array:
     return change
 
 
-def _noisy(t: Array, z: Array, centre: Array, *, given: Given) -> dict[str, Array]:
+def _noisy(t: Array, z: Array, centre: Array, word: str, confidence: float) -> dict[str, Array]:
     """Lines beside noise: their numbers, or the range of the slope where they bend."""
-    word = given.noise if isinstance(given.noise, str) else "noise"
     u = 2 * (t - t[0]) / (t[-1] - t[0]) - 1
     powers = 4 if word == "noise" and t.size >= FEWEST_FOR_BEND else 2
     columns = np.polynomial.chebyshev.chebvander(u, powers - 1).astype(np.float64)
     columns[:, 1] = t - centre[0]
     inside = inliers(t, columns[:, :2], z) if word in ("noise", "outliers") else np.ones(z.shape, bool)
-    found = {name: np.empty(len(z)) for name in ("exponent", "level", "exponent_error", "level_error")}
-    found |= {name: np.empty(len(z)) for name in ("exponent_low", "exponent_high", "fits", "kind")}
+    names = ("level", "exponent", "level_error", "exponent_error", "exponent_low", "exponent_high", "fits", "kind")
+    found = np.empty((len(names), len(z)))
     for pattern, rows in alike(inside):
-        part = t[pattern], columns[pattern], z[rows][:, pattern]
-        line = regress(*part, word, 2)
+        line = regress(t[pattern], columns[pattern], z[rows][:, pattern], word, 2)
         # a point that is left out counts as one that is not known
         wider = t.size / pattern.sum()
-        (value, error), (low, high) = line.mean(), line.interval(1, given.confidence)
-        found["level"][rows], found["exponent"][rows] = value.T
-        found["level_error"][rows], found["exponent_error"][rows] = error.T * wider
-        found["exponent_low"][rows] = value[:, 1] + wider * (low - value[:, 1])
-        found["exponent_high"][rows] = value[:, 1] + wider * (high - value[:, 1])
-        found["kind"][rows], found["fits"][rows] = KINDS.index(word), 1
-        if word == "even":
-            off = z[rows] - value @ columns[:, :2].T
-            found["fits"][rows] = ~(runs_chance(off) < RARE)
-        if powers > 2:
-            for row in rows[line.chance < UNLIKELY]:
-                ends = _range(t[pattern], z[row, pattern], given.confidence)
-                found["exponent_low"][row], found["exponent_high"][row] = ends
-                found["kind"][row], found["fits"][row] = KINDS.index("bent"), 0
-    return found
+        (value, error), between = line.mean(), np.array(line.interval(1, confidence))
+        found[:2, rows], found[2:4, rows] = value.T, error.T * wider
+        found[4:6, rows] = value[:, 1] + wider * (between - value[:, 1])
+        off = z[rows] - value @ columns[:, :2].T
+        found[6, rows] = ~(runs_chance(off) < RARE) if word == "even" else 1
+        found[7, rows] = KINDS.index(word)
+        for row in rows[line.chance < UNLIKELY]:
+            found[4:, row] = *_range(t[pattern], z[row, pattern], confidence), 0, KINDS.index("bent")
+    return dict(zip(names, found, strict=True))
 
 
 def _range(t: Array, z: Array, confidence: float) -> tuple[float, float]:
@@ -397,11 +370,10 @@ def _exact(t: Array, z: Array, off: Array, bound: Array, slope: Array) -> dict[s
 
 
 def _describe_fit(fit: xr.Dataset, y: xr.DataArray, dim: str, confidence: float) -> xr.Dataset:
-    kind = np.array(KINDS)[fit.kind.astype(np.int64)]
-    fit["kind"], fit["points"] = (fit.kind.dims, kind), fit.points.astype(np.int64)
-    smooth = fit.kind.isin(["exact", "bounded", "curved"])
+    smooth = fit.kind.isin([KINDS.index(word) for word in ("exact", "bounded", "curved")])
     fit["noisy"] = (~smooth).astype(np.float64).where(fit.fits.notnull())
-    words = np.where(fit.fits == 1, "one power law", np.where(fit.fits == 0, "no power law", kind))
+    fit["kind"], fit["points"] = in_words(fit.kind, KINDS), fit.points.fillna(0).astype(np.int64)
+    words = np.where(fit.fits == 1, "one power law", np.where(fit.fits == 0, "no power law", fit.kind))
     fit["verdict"] = fit.kind.dims, words
     units, place = str(y.attrs.get("units", "1")), str(y.coords[dim].attrs.get("units", "1"))
     of = dict.fromkeys(("prefactor", "prefactor_error", "level", "start", "stop"), units)
