@@ -1,4 +1,4 @@
-"""Lists that tools read name what is there: pinned versions, quick and long tests, wrong behaviours to try."""
+"""Lists name what is there: pinned versions, quick and long tests, wrong behaviours to try, statuses of the page."""
 
 import subprocess
 import sys
@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 from packaging.requirements import Requirement
 from packaging.version import Version
+
+from kernels.interface import Status
 
 ROOT = Path(__file__).parent.parent
 PINS = [line for line in (ROOT / "constraints.txt").read_text().splitlines() if not line.startswith("#")]
@@ -53,3 +55,12 @@ def test_each_wrong_behaviour_can_be_put_into_the_sources():
     command = [sys.executable, "benchmarks/soak/power.py", "--check"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_the_page_of_statuses_has_each_in_the_order_of_its_number():
+    lines = (ROOT / "docs" / "statuses.md").read_text(encoding="utf-8").splitlines()
+    told = [
+        line.split("|")[1].strip() for line in lines if line.startswith("| ") and line.split("|")[1].strip().isupper()
+    ]
+    by_kind = sorted(Status, key=lambda s: (s >= Status.NOT_ASKED, s.kind == "unsolved", s))
+    assert told == [status.name for status in by_kind]
