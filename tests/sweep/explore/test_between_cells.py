@@ -172,6 +172,9 @@ def test_lines_hold_what_was_computed_and_say_how_to_ask_for_others():
     np.testing.assert_array_equal(found.y.values.ravel(), ds.y.values[:25].reshape(5, 5).T.ravel())
     assert "25 of 85 cells lie on 5 lines" in found.attrs["lines"]
     assert "--at b=1.0 (5 cells)" in found.attrs["lines"]
+    # of the first line the ends alone are there
+    later = ds.isel(cell=np.flatnonzero((ds.b > 1) | (ds.a == 1) | (ds.a == 100)))
+    xr.testing.assert_equal(on_lines(later, "a").y, found.y[1:])
     three = on_lines(cells(3), "c")
     assert three.y.dims == ("line", "c")
     assert str(three.line[1].item()) == "a = 1, b = 3.16228"

@@ -7,7 +7,7 @@ from toy_studies import build
 
 import sweep
 from kernels.interface import Status
-from sweep.results.statuses import boxes, count_statuses
+from sweep.results.statuses import boxes, count_statuses, pieces
 
 AXES = {"height": [1.0, 2.0, 4.0], "v0": [0.0, 1.0]}
 
@@ -108,6 +108,12 @@ def test_cells_of_large_results_are_found_wherever_they_are():
 @pytest.mark.parametrize("most", [1, 2, 6, 100])
 def test_boxes_hold_all_places_once_and_in_order(shape, most):
     places = np.arange(np.prod(shape, dtype=int)).reshape(shape)
-    pieces = [places[box].ravel() for box in boxes(shape, most)]
-    assert np.concatenate([[], *pieces]).tolist() == places.ravel().tolist()
-    assert max(map(len, pieces), default=0) <= most
+    found = [places[box].ravel() for box in boxes(shape, most)]
+    assert np.concatenate([[], *found]).tolist() == places.ravel().tolist()
+    assert max(map(len, found), default=0) <= most
+
+
+def test_parts_of_a_dataset_have_no_more_numbers_than_are_to_be_in_memory(result):
+    parts = list(pieces(result, ("height", "v0"), 20))
+    assert [sum(v.size for v in part.data_vars.values()) for part in parts] == [14] * 3
+    xr.testing.assert_equal(xr.concat(parts, "height"), result)
