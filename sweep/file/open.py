@@ -168,19 +168,14 @@ def changed(output: Path) -> Iterator[None]:
         yield
     except (*DAMAGE, ArithmeticError) as fault:
         opened = output if output.exists() else unfinished_of(output)
-        if (isinstance(fault, OSError) and fault.errno) or intact(opened):
-            raise
-        what = f"{type(fault).__name__}: {fault}".splitlines()[0]
-        raise SweepError(f"{output}: was changed by another program, and is no result any more ({what})") from None
-
-
-def intact(path: Path) -> bool:
-    """Whether a file is there, and its structure is as it was written."""
-    try:
-        StoredFile(path).close()
-    except (*DAMAGE, SweepError):
-        return False
-    return True
+        try:
+            StoredFile(opened).close()
+        except (*DAMAGE, SweepError):
+            if isinstance(fault, OSError) and fault.errno:
+                raise fault from None
+            what = f"{type(fault).__name__}: {fault}".splitlines()[0]
+            raise SweepError(f"{output}: was changed by another program, and is no result any more ({what})") from None
+        raise  # the file is as it was written, and the fault is ours
 
 
 def unreadable(output: Path, fault: Exception) -> SweepError:

@@ -18,16 +18,9 @@ def check_target(target: Path, *, force: bool = False, read: Sequence[Path] = ()
     read : paths
         but for these.
     """
-    if any(_same(target, one) for one in read):
+    if target.exists() and any(one.exists() and target.samefile(one) for one in read):
         raise SweepError(f"{target} is what is read; name another file")
     if target.exists() and not force:
         raise SweepError(
             f"{target} is there already; name another file, or overwrite it with --force (Python: force=True)"
         )
-
-
-def _same(one: Path, other: Path) -> bool:
-    try:
-        return one.samefile(other)
-    except OSError:  # one of them is not there
-        return one.resolve() == other.resolve()
