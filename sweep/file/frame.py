@@ -33,9 +33,9 @@ from sweep.file.layout import (
     GROUP,
     PIECE,
     SEAL,
-    Contents,
     Place,
     Table,
+    contents,
     sealed,
 )
 
@@ -124,15 +124,15 @@ def create(path: Path, schema: Schema, cuts: Mapping[str, Cut], shared: bool = F
     OSError
     """
     image = _Image()
-    contents = _laid_out(image, schema, cuts, SHARED_WORTH_A_PAGE if shared else WORTH_A_PAGE)
+    tables, ending = _laid_out(image, schema, cuts, SHARED_WORTH_A_PAGE if shared else WORTH_A_PAGE)
     fd = disk.open_file(path, os.O_CREAT | os.O_TRUNC | os.O_RDWR)
     try:
-        disk.reserve(fd, image.size + len(contents.to_json()) + SEAL.size)
+        disk.reserve(fd, image.size + len(contents(tables, ending)) + SEAL.size)
         for at, page in image.pages.items():
             disk.write_all(fd, (page[: image.size - at],), at)
-        for place in (place for table in contents.tables.values() for place in table.places if place.check):
+        for place in (place for table in tables.values() for place in table.places if place.check):
             _write_pending(fd, place)
-        disk.write_all(fd, (sealed(fd, contents, image.size),), image.size)
+        disk.write_all(fd, (sealed(fd, tables, ending, image.size),), image.size)
         disk.fsync(fd)
     finally:
         os.close(fd)
@@ -204,7 +204,7 @@ class _Image(io.RawIOBase):
             yield self.pages.setdefault(page, bytearray(PAGE)), here, slice(start - begin, self._at - begin)
 
 
-def _laid_out(image: _Image, schema: Schema, cuts: Mapping[str, Cut], aligned: int) -> Contents:
+def _laid_out(image: _Image, schema: Schema, cuts: Mapping[str, Cut], aligned: int) -> tuple[dict[str, Table], int]:
     """Has HDF5 write all that is no number, and find a place for each number; objects of so many bytes are aligned."""
     import h5netcdf
     import h5py
@@ -271,7 +271,7 @@ def _laid_out(image: _Image, schema: Schema, cuts: Mapping[str, Cut], aligned: i
             places = tuple(_placed(plain if name == "cells" else plain[name], image, cut, c) for c in cut.columns)
             at = int(plain[f"{GROUP}/{name}_digests"].id.get_offset())
             tables[name] = Table(name, cut.grid, cut.blocks, places, at, key)
-        return Contents(tables, int(plain[ENDING].id.get_offset()))
+        return tables, int(plain[ENDING].id.get_offset())
 
 
 def _how(chunk: tuple[int, ...] | None) -> Any:

@@ -20,11 +20,11 @@ import json
 import os
 import re
 import struct
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xxhash
@@ -178,52 +178,27 @@ class Table:
             disk.write_all(fd, (rows,), self.digests + blocks[0] * self.row_bytes)
 
 
-@dataclass(frozen=True, eq=False)
-class Contents:
-    """What a seal tells: the tables by name, and where the ending is."""
+class Seal(NamedTuple):
+    """What the seal of a file tells: its tables by name, where the ending is, and all its bytes."""
 
     tables: dict[str, Table]
     ending: int
-
-    def structure(self, end: int) -> Iterator[tuple[int, int]]:
-        """Begin and end of all that HDF5 has written before `end` beside chunks, digests and the ending."""
-        spans = [(self.ending, self.ending + ENDING_BYTES), (end, end)]
-        for table in self.tables.values():
-            spans.append((table.digests, table.digests + table.blocks.count * table.row_bytes))
-            for place in table.places:
-                last = place.second + (place.count - 2) * place.step
-                more = [(place.second, last + place.size + place.check)] if place.count > 1 else []
-                spans += [(place.first, place.first + place.size + place.check), *more]
-        begin = 0
-        for start, stop in sorted(spans):
-            if begin < start:
-                yield begin, start
-            begin = max(begin, stop)
-
-    def to_json(self) -> bytes:
-        """As it stands in the seal."""
-        return json.dumps({"tables": [asdict(table) for table in self.tables.values()], "ending": self.ending}).encode()
-
-    @classmethod
-    def from_json(cls, text: bytes) -> Contents:
-        """What `to_json` wrote. Raises ValueError, KeyError and their like."""
-        keys = json.loads(text)
-        tables = {}
-        for table in keys["tables"]:
-            places = tuple(Place(**{**place, "shape": tuple(place["shape"])}) for place in table.pop("places"))
-            grid, blocks = tuple(table.pop("grid")), Partition(**table.pop("blocks"))
-            tables[table["name"]] = Table(grid=grid, blocks=blocks, places=places, **table)
-        return cls(tables, keys["ending"])
+    text: bytes
 
 
-def sealed(fd: int, contents: Contents, end: int) -> bytes:
+def contents(tables: Mapping[str, Table], ending: int) -> bytes:
+    """What is told of a file in its seal: of so many bytes, whatever stands in the file."""
+    return json.dumps({"tables": [asdict(table) for table in tables.values()], "ending": ending}).encode()
+
+
+def sealed(fd: int, tables: Mapping[str, Table], ending: int, end: int) -> bytes:
     """The seal of a file that HDF5 has written up to `end`. Raises OSError, EOFError."""
-    text = contents.to_json()
-    return text + SEAL.pack(_digest(fd, contents, end, text), len(text), MAGIC)
+    text = contents(tables, ending)
+    return text + SEAL.pack(_digest(fd, tables, ending, end, text), len(text), MAGIC)
 
 
-def read_seal(fd: int, path: Path) -> tuple[Contents, bytes] | None:
-    """What a file holds whose structure is as it was written, and its seal; None: another program has changed it.
+def read_seal(fd: int, path: Path) -> Seal | None:
+    """The seal of a file whose structure is as it was written; None where another program has changed the file.
 
     Raises
     ------
@@ -243,9 +218,13 @@ def read_seal(fd: int, path: Path) -> tuple[Contents, bytes] | None:
         if 0 < length <= size - SEAL.size:
             end = size - SEAL.size - length
             text = read_bytes(fd, end, end + length)
-            contents = Contents.from_json(text)
-            if _digest(fd, contents, end, text) == digest:
-                return contents, text + tail
+            keys, tables = json.loads(text), {}
+            for table in keys["tables"]:
+                places = tuple(Place(**{**place, "shape": tuple(place["shape"])}) for place in table.pop("places"))
+                grid, blocks = tuple(table.pop("grid")), Partition(**table.pop("blocks"))
+                tables[table["name"]] = Table(grid=grid, blocks=blocks, places=places, **table)
+            if _digest(fd, tables, keys["ending"], end, text) == digest:
+                return Seal(tables, keys["ending"], text + tail)
     elif re.search(rb"foliot format \d\n$", tail):
         raise SweepError(
             f"{path}: a result of another format; this version of foliot reads format {FORMAT} alone; open it with the "
@@ -256,12 +235,20 @@ def read_seal(fd: int, path: Path) -> tuple[Contents, bytes] | None:
     raise ValueError("its structure is damaged, or its end is missing, as in a copy that was interrupted")
 
 
-def _digest(fd: int, contents: Contents, end: int, text: bytes) -> bytes:
-    """Digest of the structure and the contents. Raises OSError, EOFError."""
-    state = xxhash.xxh3_128()
-    for start, stop in contents.structure(end):
-        for at in range(start, stop, PIECE):
-            state.update(read_bytes(fd, at, min(at + PIECE, stop)))
+def _digest(fd: int, tables: Mapping[str, Table], ending: int, end: int, text: bytes) -> bytes:
+    """Digest of all before `end` that is no chunk, no digest and not the ending, and of a text. Raises OSError."""
+    spans = [(ending, ending + ENDING_BYTES), (end, end)]
+    for table in tables.values():
+        spans.append((table.digests, table.digests + table.blocks.count * table.row_bytes))
+        for place in table.places:
+            last = place.second + (place.count - 2) * place.step
+            more = [(place.second, last + place.size + place.check)] if place.count > 1 else []
+            spans += [(place.first, place.first + place.size + place.check), *more]
+    state, begin = xxhash.xxh3_128(), 0
+    for start, stop in sorted(spans):
+        for at in range(begin, start, PIECE):
+            state.update(read_bytes(fd, at, min(at + PIECE, start)))
+        begin = max(begin, stop)
     state.update(text)
     return state.digest()
 

@@ -70,8 +70,7 @@ class StoredFile:
             found = read_seal(self.fd, path)
             if found is None:
                 raise Changed(f"{path}: was changed by another program")
-            contents, self.seal = found
-            self.tables, self.ending_at = contents.tables, contents.ending
+            self.tables, self.ending_at, self.seal = found
             self.ending = ending_of(read_bytes(self.fd, self.ending_at, self.ending_at + ENDING_BYTES))
             self._digests = {name: table.read_digests(self.fd) for name, table in self.tables.items()}
         except BaseException:
