@@ -10,7 +10,7 @@ summary, rows of reductions are kept in the same way, and its columns made from 
 yet is PENDING, and an error to whoever asks HDF5 for its numbers. All that reads a result compares it with its digests
 (`reading`).
 
-`open` gives a file as a Dataset (its arrays are `columns`), `stored` what a run says of it without xarray, `verify`
-compares all of it with its digests. All calls that change the disk are in `disk`; `overwriting` keeps files that are
-not ours.
+`open` gives a file as a Dataset (its arrays are `columns`), `verify` compares all of it with its digests; what another
+program has changed is left to HDF5 (`foreign`). All calls that change the disk are in `disk`; `overwriting` keeps files
+that are not ours.
 """
