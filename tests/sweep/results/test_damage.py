@@ -81,6 +81,15 @@ def test_a_flipped_bit_anywhere_is_found_and_a_whole_result_is_whole(any_result)
     assert sweep.verify(path) == before
 
 
+@pytest.mark.parametrize("block", [0, 1])
+def test_a_byte_between_two_chunks_is_not_passed_over(tmp_path, block):
+    """Long chunks begin on a page of the disk, so that there is room before the next one."""
+    path = tmp_path / "out.h5"
+    quiet(tall(18_000), path, block_cells=6000).close()
+    flip(path, place(path, "fall_time", (block + 1) * 6000) - 1)
+    assert not sweep.verify(path).whole
+
+
 @pytest.mark.parametrize("name", ["fall_time", "drop", "status"])
 def test_damaged_cells_are_named(copy, name):
     harm(copy, name, 17)
