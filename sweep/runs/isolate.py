@@ -73,16 +73,17 @@ class Processes:
         self.words = study.to_json(), kernel_paths(study)
         self.most_bytes = MEMORY_SHARE * memory() / count
         self.good: int | None = None  # a cell that is known to end
-        self.over, self.alone = False, threading.Lock()
+        self.over, self.alone, self.dearest = False, threading.Lock(), 0.0
         self.idle: list[Isolated] = []
         self._solvers: list[Isolated] = []
 
     def seconds(self, cells: int) -> float:
         """What some cells may take. One of a sample is not waited for to its end: it is left out, but never FAILED."""
-        one = self.limit or max(CELL_SECONDS, DEARER * self.cost)
+        cost = self.cost or self.dearest
+        one = self.limit or max(CELL_SECONDS, DEARER * cost)
         if cells == 1 and (self.cost or self.good is None):
             return one
-        return min(one, SEVERAL_SECONDS) + SLACK * self.cost * cells
+        return min(one, SEVERAL_SECONDS) + SLACK * cost * cells
 
     def solver(self) -> Isolated:
         """A solver with a process of its own, for one thread at a time; one that is idle, if there is any."""
@@ -132,6 +133,7 @@ class Isolated:
                 if cells.number > 1 or trial == TRIALS:
                     raise
         self.seconds += seconds
+        self._all.dearest = max(self._all.dearest, seconds / cells.number)
         self._all.good = start if self._all.good is None else self._all.good
         found = cells_of(arrays)
         for column, values in zip(
