@@ -60,8 +60,7 @@ class Uneven:
 
     def solve(self, start, cells):
         stop = start + cells.number
-        assert 0 <= start < stop
-        self.ranges.append((start, stop))
+        self.ranges.append((start, stop))  # to be looked at later: a sample tolerates what is raised here
         cells.status[:], cells.used[:] = 0, 1
         self.now += max(self.seconds(k) for k in range(start, stop))
 
@@ -72,6 +71,6 @@ def test_a_sample_of_a_small_grid_stays_inside_it(monkeypatch, size, seconds):
     """Of cells that take no time, or as long together as one alone."""
     solver = Uneven(lambda k: seconds, monkeypatch)
     found = take_sample(solver, COLUMNS, size)
-    assert max(stop for _, stop in solver.ranges) <= size
+    assert all(0 <= start < stop <= size for start, stop in solver.ranges)
     assert sum(stop - start for start, stop in solver.ranges) <= size + 3
     assert (np.diff(found.positions) > 0).all()
