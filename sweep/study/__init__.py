@@ -8,7 +8,7 @@ Others may use
     `mistakes`       Mistakes, gathered and raised together; limits: what a field allows, in words
     `units`          scale, exponents
     `toml`           to_toml: a study as the text of its file
-    `condition`      Condition: read by Python's grammar, never run by it
+    `condition`      Condition, cells_where, names_in: read by Python's grammar, never run by it
     `samples`        what a sampled design is called, and its axes for SALib
 
 `entries` (what stands under a key), `designs`, `summary` and `spacing` are behind `read`.

@@ -6,7 +6,8 @@ import html
 import os
 import re
 import socket
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -150,7 +151,7 @@ class Page:
 
     def _save(self, suffix: str, make: Any) -> Any:
         return pn.widgets.FileDownload(
-            callback=lambda: make(self.dataset, self.choice, *self._ranges()), label=suffix.upper(), min_width=70,
+            callback=lambda: make(self.dataset, self.choice), label=suffix.upper(), min_width=70,
             filename=f"{self.name.rpartition('.')[0] or self.name}_shown.{suffix}", **WIDE,
         )  # fmt: skip
 
@@ -168,7 +169,8 @@ class Page:
         """What the controls say."""
         up = None if self.up.value == ONE_LINE else self.up.value
         held = {dim: int(slider.value) for dim, slider in self.sliders.items()}
-        return Choice(self.output.value, self.x.value, up, held, self.shows.value != "value")
+        ranges = self.picture.ranges if self.picture else (None, None)
+        return Choice(self.output.value, self.x.value, up, held, self.shows.value != "value", *ranges)
 
     def _choose_output(self) -> None:
         """Another output may have other axes; those that are chosen stay if it has them."""
@@ -204,15 +206,12 @@ class Page:
         self.slider_box[:] = list(self.sliders.values())
         self._redraw()
 
-    def _ranges(self) -> tuple[region.Range | None, region.Range | None]:
-        return self.picture.ranges if self.picture else (None, None)
-
     def _redraw(self) -> None:
         """Reads the slice in view and draws it; makes a new figure where axes or scales have changed."""
         choice, scales = self.choice, {name: widget.value for name, widget in self.scales.items()}
         key = (choice.output, choice.x, choice.across, choice.exponent, *scales.values())
         try:
-            found = shown(self.dataset, choice, *(self._ranges() if key == self.key else ()))
+            found = shown(self.dataset, choice if key == self.key else replace(choice, x_range=None, y_range=None))
         except SweepError as error:
             self.note.object = f"<b>{html.escape(str(error))}</b>"
             return
@@ -225,10 +224,9 @@ class Page:
         self.picture.show(found, self.statuses.value)
         self.legend.object = _legend(found) if self.statuses.value else ""
         # what cannot be saved of this slice is grey
-        part = (self.dataset, choice, *self._ranges())
-        self.saves["csv"].disabled = region.rows(*part) > region.MOST_ROWS
+        self.saves["csv"].disabled = region.rows(self.dataset, self.choice) > region.MOST_ROWS
         try:
-            region.study_text(*part)
+            region.study_text(self.dataset, self.choice)
             self.saves["toml"].disabled = False
         except SweepError:
             self.saves["toml"].disabled = True
@@ -249,11 +247,11 @@ class Page:
         self.table.object = Table(row(dataset, at)).html()
 
 
-def _study_file(*region_of: Any) -> BytesIO:
-    return BytesIO(region.study_text(*region_of).encode())
-
-
-FILES = {"png": region.picture, "csv": region.table, "toml": _study_file}
+FILES: dict[str, Callable[[xr.Dataset, Choice], BytesIO]] = {
+    "png": region.picture,
+    "csv": region.table,
+    "toml": lambda dataset, choice: BytesIO(region.study_text(dataset, choice).encode()),
+}
 """What can be saved of what is shown."""
 
 

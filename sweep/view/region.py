@@ -39,19 +39,10 @@ Range = tuple[float, float]
 
 @dataclass(frozen=True)
 class Choice:
-    """What is looked at.
+    """What is looked at: an output, or its local exponent in x, over an axis, or a coordinate along the cells of a zip.
 
-    Attributes
-    ----------
-    output : str
-    x : str
-        Axis, or coordinate along the cells of a zip design, that the picture runs along.
-    across : str, optional
-        The other axis of a map or of a family of lines; None: one line.
-    held : dict of str to int
-        Place of every other axis.
-    exponent : bool
-        Show the local exponent of the output in x instead of the output.
+    `across` is the other axis of a map or of a family of lines, `held` the place of every further one; the ranges are
+    what of x and across is in view, None: all.
     """
 
     output: str
@@ -59,6 +50,8 @@ class Choice:
     across: str | None = None
     held: Mapping[str, int] = field(default_factory=dict)
     exponent: bool = False
+    x_range: Range | None = None
+    y_range: Range | None = None
 
 
 def number_axes(dataset: xr.Dataset, output: str) -> list[str]:
@@ -85,14 +78,14 @@ def other_axes(dataset: xr.Dataset, choice: Choice) -> list[str]:
     return sorted(others, key=lambda dim: (not is_number_axis(column, dim), -dataset.sizes[dim]))
 
 
-def part(dataset: xr.Dataset, choice: Choice, x_range: Range | None = None, y_range: Range | None = None) -> xr.Dataset:
+def part(dataset: xr.Dataset, choice: Choice) -> xr.Dataset:
     """The cells within the ranges of both axes, with all outputs; lazy as the dataset is.
 
     Two more cells on both sides show the spacing. An axis that is not in order is not cut.
     """
-    wanted = {along(dataset, choice.x): None, **({choice.across: y_range} if choice.across else {})}
+    wanted = {along(dataset, choice.x): None, **({choice.across: choice.y_range} if choice.across else {})}
     if choice.x in wanted:
-        wanted[choice.x] = x_range
+        wanted[choice.x] = choice.x_range
     held = {dim: choice.held.get(dim, 0) for dim in other_axes(dataset, choice) if dim != choice.across}
     places = {PLACE + dim: (dim, np.arange(dataset.sizes[dim])) for dim in wanted}
     found = dataset.assign_coords(places).isel(held)
@@ -104,7 +97,7 @@ def part(dataset: xr.Dataset, choice: Choice, x_range: Range | None = None, y_ra
     return found
 
 
-def shown(dataset: xr.Dataset, choice: Choice, x_range: Range | None = None, y_range: Range | None = None) -> View:
+def shown(dataset: xr.Dataset, choice: Choice) -> View:
     """The slice, read; of long axes every second, third ... cell, as many as a picture can show.
 
     Raises
@@ -113,7 +106,7 @@ def shown(dataset: xr.Dataset, choice: Choice, x_range: Range | None = None, y_r
         The exponent is asked for along what is no positive axis.
     """
     names = [choice.output, *([STATUS] if STATUS in dataset else [])]
-    found = view(part(dataset[names], choice, x_range, y_range), choice.output, choice.x)
+    found = view(part(dataset[names], choice), choice.output, choice.x)
     if not choice.exponent:
         return found
     if not found.joined:
@@ -179,11 +172,11 @@ def row(dataset: xr.Dataset, places: Mapping[str, int]) -> list[tuple[str, ...]]
     return rows
 
 
-def picture(dataset: xr.Dataset, choice: Choice, x_range: Range | None, y_range: Range | None) -> BytesIO:
+def picture(dataset: xr.Dataset, choice: Choice) -> BytesIO:
     """The shown slice as a PNG fit for print. Raises SweepError, also where matplotlib is missing."""
     from sweep.show.plot import plot
 
-    found = shown(dataset, choice, x_range, y_range)
+    found = shown(dataset, choice)
     name = str(found.y.name or choice.output)
     columns = {name: found.y}
     if STATUS in dataset:
@@ -191,20 +184,20 @@ def picture(dataset: xr.Dataset, choice: Choice, x_range: Range | None, y_range:
     return _bytes(".png", lambda path: plot(xr.Dataset(columns, attrs=dataset.attrs), path, y=name, x=choice.x))
 
 
-def table(dataset: xr.Dataset, choice: Choice, x_range: Range | None, y_range: Range | None) -> BytesIO:
+def table(dataset: xr.Dataset, choice: Choice) -> BytesIO:
     """All outputs of the shown cells, every one of them, as csv. Raises SweepError where they are too many."""
-    count, cells = rows(dataset, choice, x_range, y_range), part(dataset, choice, x_range, y_range)
+    count, cells = rows(dataset, choice), part(dataset, choice)
+    if count > MOST_ROWS:
+        raise SweepError(f"{count:,} cells are too many for a page; zoom in, or take sweep export, which has no limit")
     dims = {along(dataset, choice.x), choice.across}
     cells = cells[[name for name, column in cells.data_vars.items() if set(column.dims) <= dims]]
     cells = cells.drop_vars([name for name in cells.coords if str(name).startswith(PLACE)])
-    if count > MOST_ROWS:
-        raise SweepError(f"{count:,} cells are too many for a page; zoom in, or take sweep export, which has no limit")
     return _bytes(".csv", lambda path: export(cells, path))
 
 
-def rows(dataset: xr.Dataset, choice: Choice, x_range: Range | None, y_range: Range | None) -> int:
+def rows(dataset: xr.Dataset, choice: Choice) -> int:
     """Lines that the table has."""
-    sizes = part(dataset, choice, x_range, y_range).sizes
+    sizes = part(dataset, choice).sizes
     return math.prod(sizes[dim] for dim in {along(dataset, choice.x), choice.across} if dim)
 
 
@@ -215,7 +208,7 @@ def _bytes(suffix: str, write: Callable[[Path], Any]) -> BytesIO:
         return BytesIO(path.read_bytes())
 
 
-def study_text(dataset: xr.Dataset, choice: Choice, x_range: Range | None, y_range: Range | None) -> str:
+def study_text(dataset: xr.Dataset, choice: Choice) -> str:
     """A study, in TOML, of the shown region alone: as many points on a smaller part of each axis.
 
     Axes that are held become parameters at their value. Numbers are in the units of the kernel's fields.
@@ -230,7 +223,7 @@ def study_text(dataset: xr.Dataset, choice: Choice, x_range: Range | None, y_ran
     study = Study.from_json(str(dataset.attrs["study_json"]), declared=True)
     if study.design != "product":
         raise SweepError("only a product of axes has regions; this study is a list of cells")
-    ranges = {choice.x: x_range, choice.across: y_range}
+    ranges = {choice.x: choice.x_range, choice.across: choice.y_range}
     axes = {name: _narrowed(study, axis, ranges[name]) for name, axis in study.axes.items() if name in ranges}
     held: dict[str, Any] = {}
     for name, axis in study.axes.items():

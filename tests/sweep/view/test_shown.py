@@ -1,5 +1,6 @@
 """What is shown, drawn and saved of a result: its own numbers, and no more of them read than that takes."""
 
+from dataclasses import replace
 from importlib.util import find_spec
 
 import numpy as np
@@ -56,7 +57,7 @@ def test_of_a_long_map_as_many_cells_as_a_picture_can_show_are_read_and_in_a_reg
     found = shown(dataset, Choice("y", "u", "v", {"w": 3}))
     assert found.y.shape == (1250, 2000)
     assert columns["y"].read == 1250 * 2000
-    near = shown(dataset, Choice("y", "u", "v", {"w": 3}), (1000.0, 1099.0), (500.0, 519.0))
+    near = shown(dataset, Choice("y", "u", "v", {"w": 3}, False, (1000.0, 1099.0), (500.0, 519.0)))
     assert near.values("u").tolist() == list(range(997, 1102))
     assert near.values("v").tolist() == list(range(497, 522))
 
@@ -123,7 +124,7 @@ def test_statuses_of_any_kernel_have_colours_of_their_own(dataset):
 
 def test_the_study_of_a_region_is_the_same_scene_on_a_finer_grid(dataset, tmp_path):
     path = tmp_path / "region.toml"
-    path.write_text(region.study_text(dataset, MAP, (0.1, 1.0), (0.5, 3.0)))
+    path.write_text(region.study_text(dataset, replace(MAP, x_range=(0.1, 1.0), y_range=(0.5, 3.0))))
     study = sweep.study(path)
     mu, R = study.axes["mu"], study.axes["R"]
     assert (mu.spacing, mu.values[0], mu.values[-1], len(mu)) == ("log", 0.1, 1.0, 101)
@@ -140,4 +141,4 @@ def test_a_list_of_cells_and_a_result_of_no_known_study_have_no_regions(dataset)
         (bare, MAP, "which study"),
     ):
         with pytest.raises(sweep.SweepError, match=word):
-            region.study_text(found, choice, None, None)
+            region.study_text(found, choice)
