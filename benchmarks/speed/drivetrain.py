@@ -22,8 +22,8 @@ from pathlib import Path
 import numpy as np
 from scipy.linalg import lapack
 
-from kernels.drivetrain._chain_frequencies import frequencies as frequencies_of_group
-from kernels.drivetrain._chain_frequencies import row_at
+from kernels.drivetrain._frequencies import frequencies as frequencies_of_group
+from kernels.drivetrain._frequencies import row_at
 from kernels.drivetrain.receptance import DRIVETRAIN_FRF
 from kernels.lanes.columns import entry, in_groups
 from kernels.lanes.groups import GROUP, cells_at, room

@@ -82,7 +82,7 @@ def mode(n, J, k, h, w, ways, e):
 
 @jit_apart
 def mode_rows(n, J, k, h, w, W, G, ways, e):
-    """Rows W = sqrt(J) x and G = sqrt(k) strains (`_ritz`) of a mode, with sum J x^2 = 1."""
+    """Rows W = sqrt(J) x and G = sqrt(k) strains (`_modes`) of a mode, with sum J x^2 = 1."""
     solid, _, _ = mode(n, J, k, h, w, ways, e)
     unit = 1.0 / sqrt(solid)
     for j in range(n):

@@ -15,17 +15,18 @@ and a root is off by no more than rounding in J, k and h is worth,
 With light damping the real part is that of (x* J x) s^2 + (x* h x) s + x* k x = 0, which has all its digits; near
 critical damping both poles are those of this quadratic.
 
-A modal model (`_modal_receptance`) has (ln D)' = trace of (s^2 + s C + w^2)^-1 (2 s + C); a root lies within 2 p of its
+A modal model (`_modes`) has (ln D)' = trace of (s^2 + s C + w^2)^-1 (2 s + C); a root lies within 2 p of its
 Newton steps.
 Source: Aberth, Math. Comp. 27:339 (1973); Bini & Noferini, Linear Algebra Appl. 439:1130 (2013); (4) by first-order
 perturbation of the quadratic eigenvalue problem, derived here.
 """
 
 from kernels.drivetrain import _holzer
+from kernels.drivetrain._chain import TURN, extremes
 from kernels.drivetrain._holzer import FLEXIBILITY, SHAPE, STRAIN
-from kernels.lanes.jit import jit, jit_apart
+from kernels.lanes.jit import jit_apart
 from kernels.lanes.vectors import exponent, magnitude, pow2, sqrt
-from kernels.maths.small_dense import eliminate, over, size, sort, square, substitute_back
+from kernels.maths.small_dense import eliminate, over, size, square, substitute_back
 
 SWEEP_LIMIT = 300
 """Rounds of corrections of all roots; 4 to 10 are usual."""
@@ -76,16 +77,6 @@ def _approach(newton, model, fixed, s, moved):
     return False
 
 
-@jit
-def _is_larger(s, i, j):
-    return square(s[i]) > square(s[j])
-
-
-@jit
-def _swap(s, i, j):
-    s[i], s[j] = s[j], s[i]
-
-
 @jit_apart
 def _in_pairs(fixed, blur, s, pairs):
     """Real roots, and those with Im > 0 before their conjugates, by rising size; whether these are as many.
@@ -103,8 +94,10 @@ def _in_pairs(fixed, blur, s, pairs):
             count += 1
     complete = count == s.size
     for i in range(s.size):
-        s[i] = pairs[i]
-    sort(fixed, s.size, _is_larger, _swap, s)  # of a pair +Im stays before -Im
+        s[i], j = pairs[i], i
+        while j > fixed and square(s[j - 1]) > square(s[j]):  # of a pair +Im stays before -Im
+            s[j - 1], s[j] = s[j], s[j - 1]
+            j -= 1
     return complete
 
 
@@ -208,11 +201,11 @@ def _refine(n, J, k, h, fixed, s, errors, ways, e):
     for i in range(s.size):
         errors[i] = 0.0
     for i in range(fixed, s.size):
-        twin = -1
+        twin = i
         for j in range(s.size - 1, fixed - 1, -1):
             near = j != i and size(s[i] - s[j]) < _TWIN * magnitude(s[i].real)
             twin = j if near and errors[i] == 0.0 else twin
-        if twin >= 0 and errors[twin] == 0.0:
+        if twin != i and errors[twin] == 0.0:
             error = _refine_twins(n, J, k, h, s, i, twin, ways, e)
             errors[i] = errors[twin] = -error
             worst = max(worst, error)
@@ -229,20 +222,28 @@ def _refine(n, J, k, h, fixed, s, errors, ways, e):
 
 
 @jit_apart
-def damped_poles(n, J, k, h, f, s, room):
-    """All 2 n poles of a chain by rising size, a pair as +Im, -Im; a bound on their relative errors.
+def undamped_poles(chain):
+    """Poles on the imaginary axis."""
+    for i in range(chain.f.size):
+        chain.s[2 * i], chain.s[2 * i + 1] = complex(0.0, TURN * chain.f[i]), complex(0.0, -TURN * chain.f[i])
 
-    f : its natural frequencies w/2 pi
+
+@jit_apart
+def poles_of_chain(chain, n, room):
+    """All 2 n poles of a chain's first n masses by rising size, a pair as +Im, -Im; a bound on their relative errors.
+
     At critical damping two poles hang on half of the digits, as the bound says; abs(s) and damping of both together do
     not. inf where they did not come or cannot be told apart.
     """
-    ground, strongest = k[n - 1] > 0.0, 0.0
-    fixed = 0 if ground else 1 if h[n - 1] > 0.0 else 2
+    J, k, h, f, s = chain
+    s, strongest = s[: 2 * n], extremes(n, h)[1]
+    if not strongest > 0.0:
+        undamped_poles(chain)
+        return 0.0
+    fixed = 0 if k[n - 1] > 0.0 else 1 if h[n - 1] > 0.0 else 2
     for j in range(n):
-        w = 6.283185307179586 * f[j]
-        solid, viscous, _ = _holzer.mode(n, J, k, h, w, room.ways, room.e)
-        _start(n, j, w, 0.5 * viscous / solid, s)
-        strongest = max(strongest, h[j])
+        solid, viscous, _ = _holzer.mode(n, J, k, h, TURN * f[j], room.ways, room.e)
+        _start(n, j, TURN * f[j], 0.5 * viscous / solid, s)
     for i in range(fixed):
         s[i] = 0.0j
     settled = _approach(_newton_of_chain, (n, J, k, h), fixed, s, room.errors)
@@ -269,17 +270,17 @@ def _newton_of_modes(s, model):
 
 
 @jit_apart
-def modal_poles(w, C, p, free, s, room, A, B):
-    """All 2 p poles of a modal model, ordered as `damped_poles` has them; a bound on their relative errors.
+def modal_poles(p, modes, free, s, room):
+    """All 2 p poles of a modal model, ordered as `poles_of_chain` has them; a bound on their relative errors.
 
     `free` : whether mode 0 is a free motion, w = 0: one pole is 0, and a second one if nothing damps it
     """
-    fixed = 0 if not free else 1 if C[0, 0] > 0.0 else 2
+    fixed = 0 if not free else 1 if modes.C[0, 0] > 0.0 else 2
     for i in range(p):
-        _start(p, i, w[i], 0.5 * C[i, i], s)
+        _start(p, i, modes.w[i], 0.5 * modes.C[i, i], s)
     for i in range(fixed):
         s[i] = 0.0j
-    model = p, w, C, A, B
+    model = p, modes.w, modes.C, modes.A, modes.B
     settled, error = _approach(_newton_of_modes, model, fixed, s, room.errors), _MODAL_ROUNDING
     for i in range(fixed, s.size):
         error = max(error, size(_newton_of_modes(s[i], model)) / size(s[i]))
@@ -289,7 +290,7 @@ def modal_poles(w, C, p, free, s, room, A, B):
 
 @jit_apart
 def modal_damping(s, damping):
-    """Per mode the damping ratio -Re s/abs(s), from poles as `damped_poles` gives them.
+    """Per mode the damping ratio -Re s/abs(s), from poles as `poles_of_chain` gives them.
 
     Real poles are taken in pairs in the order of their size: -(s1 + s2)/(2 sqrt(s1 s2)) >= 1; with a pole 0 damping is
     infinite beside another pole, 0 beside another 0.

@@ -30,6 +30,9 @@ Source: Baran & Marchelek, Mechanika Teoretyczna i Stosowana 9 (1971) 201, after
 Wittrick & Williams, Q. J. Mech. Appl. Math. 24:263 (1971); the pivots of b derived here.
 """
 
+from kernels.drivetrain._chain import CHAIN_ROUNDING, Model, off_by
+from kernels.drivetrain._frequencies import natural_frequencies
+from kernels.drivetrain._poles import poles_of_chain
 from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.vectors import magnitude, sqrt
 from kernels.maths import pairs
@@ -168,9 +171,10 @@ def _negatives(x):
 
 
 @jit_apart
-def _count_below(w, J, k, kinds, places, p, J_w, K_w):
+def _count_below(w, p, scene):
     """N of (1) at an angular frequency, and the stiffness at the first mass of the p."""
-    n, count, below = J.size, 0, 0.0j
+    J, k, n, count, below = scene.full.J, scene.full.k, scene.full.J.size, 0, 0.0j
+    kinds, places, J_w, K_w = scene.steps[0], scene.steps[1], scene.room.waves[0], scene.room.waves[1]
     high, low = two_product(w, w)
     w_square = complex(high, low)
     for j in range(n):
@@ -194,7 +198,7 @@ def _count_below(w, J, k, kinds, places, p, J_w, K_w):
 
 
 @jit_apart
-def _find(i, low, high, J, k, kinds, places, p, J_w, K_w):
+def _find(i, low, high, p, scene):
     """The i-th angular frequency from 0, between two others, and one below it and all later ones."""
     at_low, at_high, side = float("nan"), float("nan"), 0
     for attempt in range(STEP_LIMIT):
@@ -208,7 +212,7 @@ def _find(i, low, high, J, k, kinds, places, p, J_w, K_w):
             apart = at_low < 0.0 < at_high or at_high < 0.0 < at_low
             if attempt % 4 == 3 or not apart or not low < w < high:
                 w = 0.5 * (low + high)
-        count, stiffness = _count_below(w, J, k, kinds, places, p, J_w, K_w)
+        count, stiffness = _count_below(w, p, scene)
         if count > i:
             high, at_high = w, stiffness
             at_low *= 0.5 if side > 0 else 1.0
@@ -221,27 +225,72 @@ def _find(i, low, high, J, k, kinds, places, p, J_w, K_w):
 
 
 @jit_apart
-def exact_frequencies(J, k, kinds, places, p, frequency, J_w, K_w):
-    """Fills `frequency` [Hz] with all of them, rising; free at both ends the first is exactly 0.
-
-    `kinds`, `places` : the systems replaced, in order; J_w and K_w have room for n complex numbers each
-    """
-    n, most = J.size, 0.0
+def _merge(p, order, scene):
+    """The chain of p masses by Rivin's steps, which `scene.steps` keeps; the largest h e of merged springs."""
+    full, kept, n, slower = scene.full, scene.kept, scene.full.J.size, 0.0
     for j in range(n):
-        most = max(most, 2.0 * (k[j] + (k[j - 1] if j > 0 else 0.0)) / J[j])
-    high = 1.0001 * sqrt(most)  # Gershgorin
-    low = _LOWEST * high
-    for i in range(n):
-        if i == 0 and not k[n - 1] > 0.0:
-            frequency[i] = 0.0
-        else:
-            w, low = _find(i, low, high, J, k, kinds, places, p, J_w, K_w)
-            frequency[i] = _TURNS * w
+        kept.J[j], kept.k[j], kept.h[j] = full.J[j], full.k[j], full.h[j]
+    for m in range(n, p, -1):
+        scene.steps[0, n - m], scene.steps[1, n - m], late = step(kept.J, kept.k, kept.h, m, order, True)
+        slower = max(slower, late)
+    return slower
 
 
 @jit_apart
-def receptance_of_chain(w, J, k, h, n):
+def rivin(p, order, scene):
+    """The chain at rest alike, of p masses."""
+    slower, kept = _merge(p, order, scene), scene.kept
+    status = natural_frequencies(p, kept.J, kept.k, kept.f, scene.room.work)
+    return Model(p, CHAIN_ROUNDING, slower, 0.0, status)
+
+
+@jit_apart
+def poles_of_both(p, scene):
+    """Those of the chain and of the reduced one; a bound on their relative error, and how many the latter has."""
+    error = poles_of_chain(scene.full, scene.full.J.size, scene.room)
+    return max(error, poles_of_chain(scene.kept, p, scene.room)), 2 * p
+
+
+@jit_apart
+def receptance_of_kept(w, model, scene):
+    """Of the spindle, by the reduced chain."""
+    return receptance_of_chain(w, scene.kept, model.p)
+
+
+@jit_apart
+def exact(p, order, scene):
+    """All frequencies, from p masses that depend on the frequency; how far they are from the full chain's is error.
+
+    They rise; free at both ends the first is exactly 0.
+    """
+    _merge(p, order, scene)
+    J, k, n, most, apart = scene.full.J, scene.full.k, scene.full.J.size, 0.0, 0.0
+    for j in range(n):
+        most = max(most, 2.0 * (k[j] + (k[j - 1] if j > 0 else 0.0)) / J[j])
+    high = 1.0001 * sqrt(most)  # Gershgorin
+    w, low = 0.0, _LOWEST * high
+    for i in range(n):
+        if i > 0 or k[n - 1] > 0.0:
+            w, low = _find(i, low, high, p, scene)
+        scene.kept.f[i] = _TURNS * w
+        off = magnitude(off_by(scene.kept.f[i], scene.full.f[i]))
+        apart = max(apart, off if off >= 0.0 else float("inf"))
+    return Model(p, CHAIN_ROUNDING + apart, 0.0, 0.0, 0.0)
+
+
+@jit_apart
+def poles_of_full(p, scene):
+    """Those of the chain, which are the model's too; a bound on their relative error, and 0: it has none of its own."""
+    error = poles_of_chain(scene.full, scene.full.J.size, scene.room)
+    for i in range(scene.full.s.size):
+        scene.kept.s[i] = scene.full.s[i]
+    return error, 0
+
+
+@jit_apart
+def receptance_of_chain(w, chain, n):
     """Angle of the first of n masses over a torque on it, at the angular frequency w."""
+    J, k, h, _, _ = chain
     below = complex(k[n - 1] - w * w * J[n - 1], w * h[n - 1])
     for j in range(n - 2, -1, -1):
         spring = complex(k[j], w * h[j])
@@ -250,12 +299,11 @@ def receptance_of_chain(w, J, k, h, n):
 
 
 @jit_apart
-def exact_receptance(w, J, k, h, kinds, places, p, J_w, K_w):
-    """As of the full chain, from the p masses that are left of it at that frequency.
-
-    `kinds`, `places` : the systems replaced, in order; J_w and K_w have room for n complex numbers each
-    """
-    n, dangling, w_square = J.size, 0.0j, complex(w * w, 0.0)
+def receptance_of_exact(w, model, scene):
+    """Of the spindle, by the p masses that are left at the angular frequency w."""
+    J, k, h, _, _ = scene.full
+    n, p, dangling, w_square = J.size, model.p, 0.0j, complex(w * w, 0.0)
+    kinds, places, J_w, K_w = scene.steps[0], scene.steps[1], scene.room.waves[0], scene.room.waves[1]
     for j in range(n):
         J_w[j], K_w[j] = complex(J[j], 0.0), complex(k[j], w * h[j])
     for m in range(n, p, -1):

@@ -5,7 +5,7 @@ exp(i w t) at `drive_mass` the angle at `read_mass` is H exp(i w t), with
     (-w^2 J + i w h + k) H = unit torque,  w = 2 pi frequency,                                          (1)
 J diagonal, k and h tridiagonal. The answer to a torque of any size is that times H. k_n = 0 leaves the end free.
 Leaves out: backlash, solid friction, damping that is not viscous. Source: the drivetrain of a milling machine after
-Rivin; how (1) is solved, and the bound by which a cell is called INACCURATE, is told in `_chain_receptance`.
+Rivin; how (1) is solved, and the bound by which a cell is called INACCURATE, is told in `_receptance`.
 
 rtol is of abs(dH)/abs(H) at every frequency: the phase is right to it in radian, the decibel to 8.7 times it.
 At an undamped resonance, and at 0 Hz without a spring to ground, H is infinite: there it is NaN and the cell is
@@ -17,9 +17,9 @@ from collections import namedtuple
 
 import numpy as np
 
-from kernels.drivetrain import _chain_receptance
-from kernels.drivetrain._chain import refusal as chain_refusal
-from kernels.drivetrain._chain_frequencies import row_at
+from kernels.drivetrain._chain import TURN, new_chain, refusal, take_units
+from kernels.drivetrain._frequencies import row_at
+from kernels.drivetrain._receptance import receptance
 from kernels.interface import Field
 from kernels.lanes.codes import BAD_INPUT, INACCURATE, OK, OUT_OF_RANGE, PARTLY_OUT_OF_RANGE
 from kernels.lanes.columns import cell_by_cell
@@ -29,9 +29,9 @@ from kernels.lanes.records import read
 from kernels.lanes.vectors import where
 from kernels.lanes.wiring import kernel, tracing
 from kernels.maths import complex
-from kernels.maths.elementary import is_normal, log
+from kernels.maths.elementary import is_normal, log, scale
 
-_TWO_PI, _DB = 2.0 * math.pi, 20.0 / math.log(10.0)
+_DB = 20.0 / math.log(10.0)
 
 
 @jit_apart
@@ -42,50 +42,37 @@ def _write(i, j, lanes, sound, values, output, rows):
         output[i, j + lane] = rows[lane]
 
 
-@jit
-def _omega(j, frequency, rows):
-    """Angular frequencies j ... j + GROUP - 1, the last one again beyond the end."""
-    for lane in range(GROUP):
-        rows[lane] = frequency[min(j + lane, frequency.size - 1)]
-    return rows[row_at(0)] * _TWO_PI
-
-
 @jit_apart
-def _group(i, j, p, columns, rows):
-    """Outputs at frequencies j ... j + GROUP - 1 of a cell; their largest error, and at how many there are any."""
-    lanes, drive, read = min(GROUP, columns.frequency.size - j), int(p.drive_mass), int(p.read_mass)
-    omega = _omega(j, columns.frequency, rows)
-    re, im, error = _chain_receptance.receptance(p.J.size, p.J, p.k, p.h, omega, drive, read, row_at, rows)
-    amplitude = complex.modulus(re, im)
-    sound = is_normal(amplitude) & (error < math.inf)
-    decibel = _DB * log(where(sound, amplitude, 1.0))
-    _write(i, j, lanes, sound, re, columns.receptance_re, rows)
-    _write(i, j, lanes, sound, im, columns.receptance_im, rows)
-    _write(i, j, lanes, sound, amplitude, columns.amplitude, rows)
-    _write(i, j, lanes, sound, complex.argument(re, im), columns.phase, rows)
-    _write(i, j, lanes, sound, decibel, columns.amplitude_dB, rows)
-    rows[row_at(0)] = where(sound, error, -1.0)
-    largest, given = 0.0, 0
-    for lane in range(lanes):
-        largest = max(largest, rows[lane])
-        given += rows[lane] >= 0.0
-    return largest, given
-
-
-@jit
-def _follow(i, columns, rows):
+def _follow(i, columns, chain, rows):
     """Both ends followed to the inertia that is turned, GROUP frequencies at a time: they share their chain."""
-    p, error, given = read(Drive, columns, i), 0.0, 0
-    for j in range(0, columns.frequency.size, GROUP):
-        worst, there = _group(i, j, p, columns, rows)
-        error, given = max(error, worst), given + there
-    verdict = OK if given == columns.frequency.size else PARTLY_OUT_OF_RANGE
-    columns.status[i] = where(error <= columns.rtol[i], verdict, INACCURATE) if given > 0 else OUT_OF_RANGE
+    p, count, worst, given = read(Drive, columns, i), columns.frequency.size, 0.0, 0
+    e_J, e_k = take_units(p.J, p.k, p.h, chain)
+    for j in range(0, count, GROUP):
+        lanes = min(GROUP, count - j)
+        for lane in range(GROUP):  # the last one again beyond the end
+            rows[lane] = columns.frequency[min(j + lane, count - 1)]
+        w = scale(rows[row_at(0)] * TURN, -0.5 * (e_k - e_J))
+        re, im, e, error = receptance(chain, w, int(p.drive_mass), int(p.read_mass), row_at, rows)
+        re, im = complex.scaled((re, im), e - e_k)
+        amplitude = complex.modulus(re, im)
+        sound = is_normal(amplitude) & (error < math.inf)
+        _write(i, j, lanes, sound, re, columns.receptance_re, rows)
+        _write(i, j, lanes, sound, im, columns.receptance_im, rows)
+        _write(i, j, lanes, sound, amplitude, columns.amplitude, rows)
+        _write(i, j, lanes, sound, complex.argument(re, im), columns.phase, rows)
+        _write(i, j, lanes, sound, _DB * log(where(sound, amplitude, 1.0)), columns.amplitude_dB, rows)
+        rows[row_at(0)] = where(sound, error, -1.0)
+        for lane in range(lanes):
+            worst = max(worst, rows[lane])
+            given += rows[lane] >= 0.0
+    verdict = OK if given == count else PARTLY_OUT_OF_RANGE
+    columns.status[i] = where(worst <= columns.rtol[i], verdict, INACCURATE) if given > 0 else OUT_OF_RANGE
 
 
 @jit
-def _rows(columns):
-    return (np.empty(3 * columns.J.shape[1] * GROUP),)
+def _buffers(columns):
+    n = columns.J.shape[1]
+    return new_chain(n), np.empty(3 * n * GROUP)
 
 
 @jit
@@ -95,7 +82,7 @@ def check(p):
     OUT_OF_RANGE where inertias, or springs, are more than 2^300 apart.
     """
     n = p.J.size
-    return where((p.drive_mass <= n) & (p.read_mass <= n), chain_refusal(n, p.J, p.k), BAD_INPUT)
+    return where((p.drive_mass <= n) & (p.read_mass <= n), refusal(n, p.J, p.k), BAD_INPUT)
 
 
 PARAMETERS = (
@@ -119,7 +106,7 @@ MILLING_MACHINE = {
 DRIVETRAIN_FRF = kernel(
     "drivetrain_frf",
     doc="angle of one inertia of a drivetrain per torque at another, against frequency",
-    source="drivetrain of a milling machine after Rivin; solution and error bound derived in `_chain_receptance`",
+    source="drivetrain of a milling machine after Rivin; solution and error bound derived in `_receptance`",
     parameters=PARAMETERS,
     outputs=(
         Field("receptance_re", "rad/(N m)", "receptance, real part", dims=("frequency",)),
@@ -134,7 +121,7 @@ DRIVETRAIN_FRF = kernel(
     methods=(
         tracing(
             "continued", "the chain followed from both ends at each frequency", _follow,
-            buffers=_rows, loop=cell_by_cell,
+            buffers=_buffers, loop=cell_by_cell,
         ),
     ),
     along=(Field("frequency", "Hz", "frequency of the torque", lower=0.0),),

@@ -14,7 +14,7 @@ until one less would break it; a frequency that is missing breaks it. Errors are
 reductions have all its frequencies, found from the masses that are left; their damping is that of the full chain, their
 J_kept, k_kept, h_kept are those at rest.
 Leaves out: backlash, clearances, gyroscopic and lateral motion, stiffness that varies with the angle.
-Source: Baran & Marchelek, Mechanika Teoretyczna i Stosowana 9 (1971) 201; see the modules `_reduction_...`.
+Source: Baran & Marchelek, Mechanika Teoretyczna i Stosowana 9 (1971) 201; see the modules `_rivin` and `_bases`.
 
 Right to rtol are frequencies, damping (where not, INACCURATE), and errors as differences of what they compare: a
 frequency_error of 1e-6 is one to 1e-6 +- rtol. Only outputs that are asked for decide: at a resonance of damping zeta
@@ -24,13 +24,21 @@ the frf_error of n masses is known to 4e-16 n/zeta, the frequencies to all their
 import math
 from collections import namedtuple
 
-from kernels.drivetrain._chain import MASS_LIMIT, refusal
-from kernels.drivetrain._chain_frequencies import natural_frequencies
-from kernels.drivetrain._error import reduced, whole
-from kernels.drivetrain._modal_masses import TURN
-from kernels.drivetrain._model import CHAIN_ROUNDING, Wanted, off_by, reduced_scene, take_units, whole_scene
-from kernels.drivetrain._poles import modal_damping
-from kernels.drivetrain._reductions import CRAIG_BAMPTON, EXACT, GUYAN, IRS, MODAL, NONE, RIVIN, leaves_chain
+from kernels.drivetrain import _bases, _modes, _rivin
+from kernels.drivetrain._chain import (
+    CHAIN_ROUNDING,
+    MASS_LIMIT,
+    TURN,
+    new_chain,
+    new_room,
+    new_scene,
+    off_by,
+    refusal,
+    take_units,
+)
+from kernels.drivetrain._error import receptance_error, reduce_enough
+from kernels.drivetrain._frequencies import natural_frequencies
+from kernels.drivetrain._poles import modal_damping, poles_of_chain
 from kernels.interface import Field
 from kernels.lanes.codes import BAD_INPUT, DAMPERS_OUT_OF_RANGE, OK
 from kernels.lanes.columns import cell_by_cell
@@ -39,22 +47,6 @@ from kernels.lanes.ranges import partly
 from kernels.lanes.records import largest, read
 from kernels.lanes.wiring import kernel, split, tracing
 from kernels.maths.elementary import in_unit, is_normal, scale
-
-REDUCTIONS = {
-    "none": NONE,
-    "rivin": RIVIN,
-    "guyan": GUYAN,
-    "irs": IRS,
-    "craig_bampton": CRAIG_BAMPTON,
-    "modal": MODAL,
-    "exact": EXACT,
-}
-ORDERS = {"strict": 0, "paper": 1}
-_REDUCTIONS, _ORDERS = float(len(REDUCTIONS)), float(len(ORDERS))
-EVERYTHING = 1e300
-"""Band [Hz] that holds every frequency."""
-SMALL_PHASE = 0.1
-"""w h e up to which (w h e)^2 << 1."""
 
 
 @jit
@@ -65,78 +57,118 @@ def _held(x, e):
 
 
 @jit_apart
-def _clear(i, columns):
-    """Every output of a cell to NaN."""
+def _begin(i, columns, full, room):
+    """Every output of a cell to NaN; the exponents of its units, and the status of the full chain's frequencies."""
     for j in range(columns.J.shape[1]):
         columns.frequency[i, j] = columns.frequency_error[i, j] = columns.damping[i, j] = math.nan
         columns.J_kept[i, j] = columns.k_kept[i, j] = columns.h_kept[i, j] = math.nan
     columns.n_kept[i] = columns.frf_error[i] = columns.valid_to[i] = columns.error[i] = math.nan
+    e_J, e_k = take_units(columns.J[i], columns.k[i], columns.h[i], full)
+    return e_J, e_k, natural_frequencies(full.J.size, full.J, full.k, full.f, room.work)
 
 
 @jit_apart
-def _write_modes(i, columns, count, e, scene):
-    """Frequencies, their errors and the damping, in Hz. Whether all are in range."""
-    fine, full, kept = True, scene.full, scene.kept
+def _write(i, columns, full, kept, e_J, e_k, count, p, slower, frf_error, errors):
+    """Outputs in SI units: `count` frequencies, and where p > 0 the reduced chain; `errors` as of `Outputs`.
+
+    Merged dampers hold up to w h e = SMALL_PHASE, `slower` being the largest h e.
+    """
+    fine, e = True, 0.5 * (e_k - e_J)
     for mode in range(count):
         columns.frequency[i, mode] = _held(kept.f[mode], e)
         columns.frequency_error[i, mode] = off_by(kept.f[mode], full.f[mode])
         fine = fine and columns.frequency[i, mode] >= 0.0
     modal_damping(kept.s[: 2 * count], columns.damping[i])
-    return fine
-
-
-@jit_apart
-def _write_chain(i, columns, p, e_J, e_k, kept):
-    """The reduced chain in SI units. Whether all is in range."""
-    fine = True
     for j in range(p):
         J, k, h = _held(kept.J[j], e_J), _held(kept.k[j], e_k), _held(kept.h[j], 0.5 * (e_J + e_k))
         columns.J_kept[i, j], columns.k_kept[i, j], columns.h_kept[i, j] = J, k, h
         fine = fine and J >= 0.0 and k >= 0.0 and h >= 0.0
-    return fine
+    limit = SMALL_PHASE / (TURN * slower) if slower > 0.0 else math.inf
+    columns.valid_to[i] = scale(limit, e) if slower > 0.0 else columns.f_max[i]
+    columns.frf_error[i], columns.error[i] = frf_error, largest(errors, columns.asked, Outputs, Outputs)
+    verdict = OK if limit >= in_unit(columns.f_max[i], e) else DAMPERS_OUT_OF_RANGE
+    columns.status[i] = partly(fine, verdict)
 
 
 @jit
-def _errors(found):
-    """Bounds of each output: lightly damped, a receptance's error has fewer digits than the frequencies."""
-    chain = CHAIN_ROUNDING
-    return Outputs(found.error, found.error, found.blur, found.choice, found.rounding, chain, chain, chain, chain)
+def _known(error):
+    """A bound on an error; inf for NaN."""
+    return error if error >= 0.0 else math.inf
 
 
-def _filling(solve):
-    """Fills a cell by `solve(wanted, scene)`: the choice of what goes and every loop differ by the cell."""
+def _reducing(name, make, poles, receptance, leaves_chain, has_all):
+    """A solver of one reduction, whose functions are those of `_error` and `poles(p, scene)` of its model.
 
-    @jit
+    It leaves a chain or not, and has all frequencies of the full one however few its masses: where `tol` is to be met,
+    one. Lightly damped, a receptance's error has fewer digits than the frequencies.
+    """
+
+    @jit_apart
     def fill(i, columns, scene):
-        _clear(i, columns)
-        p, full = read(Drivetrain, columns, i), scene.full
-        e_J, e_k = take_units(p.J, p.k, p.h, full)
-        e = 0.5 * (e_k - e_J)
-        wanted = Wanted(p.reduction, p.n_keep, p.tol, in_unit(p.f_max, e), p.order)
-        status = natural_frequencies(p.J.size, full.J, full.k, full.f, scene.spare.work)
+        p, full, kept = read(Drivetrain, columns, i), scene.full, scene.kept
+        e_J, e_k, status = _begin(i, columns, full, scene.room)
         if status > OK:
             columns.status[i] = status
             return
-        found = solve(wanted, scene)
-        if found.status > OK:
-            columns.status[i] = found.status
+        f_max = in_unit(p.f_max, 0.5 * (e_k - e_J))
+        n_keep = 1.0 if has_all and not p.n_keep > 0.0 else p.n_keep
+        model = reduce_enough(make, n_keep, p.tol, f_max, p.order, scene)
+        if model.status > OK:
+            columns.status[i] = model.status
             return
-        fine = _write_modes(i, columns, found.count, e, scene)
-        if leaves_chain(p.reduction):
-            fine = _write_chain(i, columns, found.p, e_J, e_k, scene.kept) and fine
-        limit = SMALL_PHASE / (TURN * found.slower) if found.slower > 0.0 else math.inf
-        verdict = OK if limit >= wanted.f_max else DAMPERS_OUT_OF_RANGE
-        columns.n_kept[i], columns.frf_error[i] = found.p, found.off
-        columns.valid_to[i] = scale(limit, e) if found.slower > 0.0 else p.f_max
-        columns.error[i] = largest(_errors(found), columns.asked, Outputs, Outputs)
-        columns.status[i] = partly(fine, verdict)
+        off, error, rounding = math.nan, _known(model.error), math.inf
+        blur, own_poles = poles(model.p, scene)
+        blur = max(error, _known(blur))
+        if blur < math.inf:
+            off, rounding = receptance_error(f_max, own_poles, receptance, model, scene)
+            rounding = max(blur, _known(rounding))
+        count, chosen = full.J.size if has_all else model.p, 0.0 if n_keep > 0.0 else error
+        errors = Outputs(error, error, blur, chosen, rounding, *_OF_CHAIN)
+        columns.n_kept[i] = model.p
+        p_chain = model.p if leaves_chain else 0
+        _write(i, columns, full, kept, e_J, e_k, count, p_chain, model.slower, off, errors)
 
-    return fill
+    return tracing(name, "", fill, buffers=new_scene, loop=cell_by_cell, estimates=True)
 
 
-WHOLE = tracing("none", "", _filling(whole), buffers=whole_scene, loop=cell_by_cell, estimates=True)
-REDUCED = tracing("reduced", "", _filling(reduced), buffers=reduced_scene, loop=cell_by_cell, estimates=True)
-"""Apart, because whole chains are compiled in a third of the time."""
+@jit_apart
+def _whole(i, columns, full, room):
+    """A chain that stays as it is."""
+    e_J, e_k, status = _begin(i, columns, full, room)
+    if status > OK:
+        columns.status[i] = status
+        return
+    n, blur = full.J.size, max(CHAIN_ROUNDING, _known(poles_of_chain(full, full.J.size, room)))
+    errors = Outputs(CHAIN_ROUNDING, CHAIN_ROUNDING, blur, 0.0, blur, *_OF_CHAIN)
+    columns.n_kept[i] = n
+    _write(i, columns, full, full, e_J, e_k, n, n, 0.0, 0.0 if blur < math.inf else math.nan, errors)
+
+
+@jit_apart
+def _whole_room(columns):
+    n = columns.J.shape[1]
+    return new_chain(n), new_room(n)
+
+
+_OF_CHAIN = (CHAIN_ROUNDING, CHAIN_ROUNDING, CHAIN_ROUNDING, CHAIN_ROUNDING)
+"""Bounds of what merging dampers and masses leaves."""
+_OF_MODES = _modes.poles_of_modes, _modes.receptance_of_modes, False, False
+SOLVERS = (
+    tracing("none", "", _whole, buffers=_whole_room, loop=cell_by_cell, estimates=True),
+    _reducing("rivin", _rivin.rivin, _rivin.poles_of_both, _rivin.receptance_of_kept, True, False),
+    _reducing("guyan", _bases.guyan, *_OF_MODES),
+    _reducing("irs", _bases.irs, *_OF_MODES),
+    _reducing("craig_bampton", _bases.craig_bampton, *_OF_MODES),
+    _reducing("modal", _bases.modal, *_OF_MODES),
+    _reducing("exact", _rivin.exact, _rivin.poles_of_full, _rivin.receptance_of_exact, True, True),
+)
+"""Each is compiled when a cell asks for it first; its machine code is kept by its name."""
+REDUCTIONS = {solver.name: code for code, solver in enumerate(SOLVERS)}
+ORDERS = {"strict": 0, "paper": 1}
+EVERYTHING = 1e300
+"""Band [Hz] that holds every frequency."""
+SMALL_PHASE = 0.1
+"""w h e up to which (w h e)^2 << 1."""
 
 
 @jit
@@ -202,7 +234,7 @@ DRIVETRAIN = kernel(
     methods=(
         split(
             "direct", "frequencies by dqds, reduced models as they are defined", "reduction",
-            {float(code): WHOLE if code == NONE else REDUCED for code in REDUCTIONS.values()},
+            {float(code): solver for code, solver in enumerate(SOLVERS)},
         ),
     ),
     example={"J": (0.25, 0.012, 0.06, 0.98), "k": (7e4, 1.3e4, 2.7e4, 1.2e4), "h": (1.8, 0.4, 1.8, 60.0),

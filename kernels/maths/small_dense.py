@@ -54,37 +54,14 @@ def substitute_back(A, B, column, first, p):
         B[i, column] = over(B[i, column], A[i, i])
 
 
-@jit
-def sort(first, count, exceeds, swap, items, gap=1):
-    """Rising order of what stands at first .. count - 1 by insertion: what is alike keeps its order.
-
-    Parameters
-    ----------
-    exceeds : exceeds(items, i, j), whether what stands at i comes after what stands at j
-    swap : swap(items, i, j)
-    gap : only things that far apart are compared
-    """
-    for i in range(first + gap, count):
-        j = i
-        while j >= first + gap and exceeds(items, j - gap, j):
-            swap(items, j - gap, j)
-            j -= gap
-
-
-@jit
-def _larger(values, i, j):
-    return values[i] > values[j]
-
-
-@jit
-def _swap_values(values, i, j):
-    values[i], values[j] = values[j], values[i]
-
-
 @jit_apart
-def sort_many(values, count):
-    """Rising order of `count` numbers; by Shell's gaps, so that a thousand take some ten thousand steps."""
+def sort(values, count):
+    """Rising order of the first `count` numbers; by Shell's gaps, so that a thousand take some ten thousand steps."""
     gap = count // 2
     while gap > 0:
-        sort(0, count, _larger, _swap_values, values, gap)
+        for i in range(gap, count):
+            j = i
+            while j >= gap and values[j - gap] > values[j]:
+                values[j - gap], values[j] = values[j], values[j - gap]
+                j -= gap
         gap //= 2

@@ -1,0 +1,164 @@
+"""A modal model: p modes of a chain within the span of a basis of shapes, their damping, and the spindle's receptance.
+
+Vectors are rows. Shape i of the basis enters as W_i = sqrt(J) u_i and G_i = sqrt(k) (its strains), so that its mass
+is W_i W_i and its stiffness G_i G_i. By Ritz's method, rotations of pairs of rows, the same in W and G, make first the
+W_i orthonormal, then the G_i orthogonal too (one-sided Jacobi): then w_i = |G_i|, and W_i/sqrt(J) are the modes. No
+product K or M is ever formed, so graded masses and springs lose no digits but those that the basis itself has lost.
+With the shape at the spindle phi_i and the damping c_ij = sum_l h_l d_il d_jl of strains d it moves by
+    q_i'' + sum_j c_ij q_j' + w_i^2 q_i = phi_i M.                                                      (1)
+Source: Demmel & Veselic, SIAM J. Matrix Anal. Appl. 13:1204 (1992).
+"""
+
+from kernels.drivetrain._chain import TURN, extremes
+from kernels.drivetrain._poles import modal_poles, poles_of_chain, undamped_poles
+from kernels.lanes.jit import jit, jit_apart
+from kernels.lanes.vectors import fma, magnitude, sqrt
+from kernels.maths.small_dense import eliminate, substitute_back
+
+SWEEP_LIMIT = 40
+_ORTHOGONAL = 2e-16  # cosine below which two rows are orthogonal, times the root of their length
+_ROUNDING = 4e-16
+
+
+@jit
+def _product(x, y, n):
+    """x y of two rows of n numbers."""
+    total = 0.0
+    for j in range(n):
+        total = fma(x[j], y[j], total)
+    return total
+
+
+@jit_apart
+def _scale_rows(x, y, factor, n):
+    """Two rows times a number, in place."""
+    for j in range(n):
+        x[j] *= factor
+        y[j] *= factor
+
+
+@jit_apart
+def _orthogonalise(rows, others, first, p, n):
+    """Rotates rows first .. p - 1 until they are orthogonal, and `others` alike. Whether that was reached."""
+    small = _ORTHOGONAL * sqrt(1.0 * n)
+    for _ in range(SWEEP_LIMIT):
+        turned = False
+        for i in range(first, p - 1):
+            for j in range(i + 1, p):
+                a, b = _product(rows[i], rows[i], n), _product(rows[j], rows[j], n)
+                d = _product(rows[i], rows[j], n)
+                if magnitude(d) > small * sqrt(a) * sqrt(b):
+                    cotangent = 0.5 * (b - a) / d  # of twice the smaller angle that makes them orthogonal
+                    tangent = 1.0 / (magnitude(cotangent) + sqrt(fma(cotangent, cotangent, 1.0)))
+                    tangent = -tangent if cotangent < 0.0 else tangent
+                    cosine = 1.0 / sqrt(fma(tangent, tangent, 1.0))
+                    sine = cosine * tangent
+                    for both in (rows, others):
+                        for c in range(n):
+                            x, y = both[i, c], both[j, c]
+                            both[i, c] = fma(cosine, x, -(sine * y))
+                            both[j, c] = fma(sine, x, cosine * y)
+                    turned = True
+        if not turned:
+            return True
+    return False
+
+
+@jit_apart
+def _make_orthonormal(W, G, first, p, n):
+    """W to orthonormal rows, G alike; the condition of W's rows as they were, inf if it failed."""
+    for i in range(p):
+        _scale_rows(W[i], G[i], 1.0 / sqrt(_product(W[i], W[i], n)), n)
+    for _ in range(2 * first):  # away from the free motion, which strains nothing
+        for i in range(1, p):
+            d = _product(W[0], W[i], n)
+            for j in range(n):
+                W[i, j] = fma(-d, W[0, j], W[i, j])
+    reached = _orthogonalise(W, G, first, p, n)
+    least, most = 1.0, 1.0
+    for i in range(first, p):
+        size = sqrt(_product(W[i], W[i], n))
+        least, most = min(least, size), max(most, size)
+        _scale_rows(W[i], G[i], 1.0 / size, n)
+    return most / least if reached and least > 0.0 else float("inf")
+
+
+@jit_apart
+def ritz(p, scene):
+    """Rows W and G of p shapes to those of modes, frequencies rising; a bound on the relative error of these.
+
+    With a free end row 0 is a motion that strains nothing (and G[0] is 0); it is then mode 0, w = 0. Of the others each
+    is off by the rounding of every row G_j, of size |G_j|, by its share in the mode.
+    """
+    W, G, w, _, _, before, size, _, _ = scene.modes
+    n = scene.full.J.size
+    first = 0 if scene.full.k[n - 1] > 0.0 else 1
+    condition = _make_orthonormal(W, G, first, p, n)
+    for i in range(p):
+        size[i] = sqrt(_product(G[i], G[i], n))
+        for j in range(n):
+            before[i, j] = W[i, j]
+    reached = _orthogonalise(G, W, first, p, n)
+    w[0], worst = 0.0, 0.0
+    for i in range(first, p):
+        w[i], j = sqrt(_product(G[i], G[i], n)), i
+        while j > first and w[j - 1] > w[j]:
+            w[j - 1], w[j] = w[j], w[j - 1]
+            for c in range(n):
+                W[j - 1, c], W[j, c] = W[j, c], W[j - 1, c]
+                G[j - 1, c], G[j, c] = G[j, c], G[j - 1, c]
+            j -= 1
+    for i in range(p):
+        scene.kept.f[i] = w[i] / TURN
+    for i in range(first, p):
+        blur = 0.0
+        for j in range(first, p):
+            blur = fma(size[j], magnitude(_product(before[j], W[i], n)), blur)
+        worst = max(worst, blur / w[i] if w[i] > 0.0 else float("inf"))
+    return _ROUNDING * condition * worst * sqrt(1.0 * n) if reached else float("inf")
+
+
+@jit_apart
+def poles_of_modes(p, scene):
+    """Those of the chain and of the model; a bound on their relative error, and how many the model has of its own.
+
+    A damper without a spring, at a free end, is strained by its mass's angle. Shapes are right to rounding over the
+    relative distance of two frequencies.
+    """
+    full, kept, modes = scene.full, scene.kept, scene.modes
+    J, k, h, n, gap = full.J, full.k, full.h, full.J.size, 1.0
+    for i in range(p):
+        modes.spindle[i] = modes.W[i, 0] / sqrt(J[0])
+        for j in range(i, p):
+            total = 0.0
+            for c in range(n):
+                if h[c] > 0.0:
+                    by_spring = k[c] > 0.0
+                    strains = modes.G[i, c] * modes.G[j, c] if by_spring else modes.W[i, c] * modes.W[j, c]
+                    total = fma(h[c] / (k[c] if by_spring else J[c]), strains, total)
+            modes.C[i, j] = modes.C[j, i] = total
+    error = poles_of_chain(full, n, scene.room)
+    if not extremes(n, h)[1] > 0.0:
+        undamped_poles(kept)
+        return error, 2 * p
+    for i in range(1, p):
+        gap = min(gap, (kept.f[i] - kept.f[i - 1]) / kept.f[i])
+    blur = modal_poles(p, modes, not k[n - 1] > 0.0, kept.s[: 2 * p], scene.room)
+    return max(error, blur, _ROUNDING * n / gap), 2 * p
+
+
+@jit_apart
+def receptance_of_modes(w, model, scene):
+    """Receptance of the spindle by (1), and what the other modes give way at rest."""
+    p, modes, total = model.p, scene.modes, 0.0j
+    A, B = modes.A, modes.B
+    for i in range(p):
+        for j in range(p):
+            A[i, j] = complex(0.0, w * modes.C[i, j])
+        A[i, i] += (modes.w[i] - w) * (modes.w[i] + w)
+        B[i, 0] = complex(modes.spindle[i], 0.0)
+    eliminate(A, B, p, 1)
+    substitute_back(A, B, 0, 0, p)
+    for i in range(p):
+        total += modes.spindle[i] * B[i, 0]
+    return model.residual + total
