@@ -28,19 +28,7 @@ def to_toml(study: Study) -> str:
     """
     if not isinstance(study, Study):
         raise SweepError(f"sweep.to_toml: expected a Study, found {kind(study)}; sweep.study gives one")
-    keys = study_keys(study)
-    tables = ("axes", "fixed", "along", "summary")
-    lines = [f"{key} = {_value(value)}" for key, value in keys.items() if key not in (*tables, "blocks")]
-    for block in keys.get("blocks", ()):
-        lines += ["", "[[blocks]]", *(f"{key} = {_value(value)}" for key, value in block.items())]
-    for table in tables:
-        if keys.get(table):
-            lines += ["", f"[{table}]", *(f"{_key(name)} = {_value(entry)}" for name, entry in keys[table].items())]
-    return "\n".join(lines) + "\n"
-
-
-def study_keys(study: Study) -> dict[str, Any]:
-    """The keys that `sweep.study` makes the study of."""
+    # the keys that `sweep.study` makes the study of
     found: dict[str, Any] = {"title": study.title, "question": study.question, "kernel": study.kernel_name}
     found |= {name: getattr(study, name) for name in ("method", "rtol") if name not in study.axes}
     found["outputs"] = list(study.outputs)
@@ -68,7 +56,15 @@ def study_keys(study: Study) -> dict[str, Any]:
         edges = {name: values.tolist() for name, values in study.summary.edges.items()}
         outputs = {name: list(reductions) for name, reductions in study.summary.outputs.items()}
         found["summary"] = {"over": list(study.summary.over), "outputs": outputs, "edges": edges}
-    return found
+    # their text: what is no table first
+    tables = ("axes", "fixed", "along", "summary")
+    lines = [f"{key} = {_value(value)}" for key, value in found.items() if key not in (*tables, "blocks")]
+    for block in found.get("blocks", ()):
+        lines += ["", "[[blocks]]", *(f"{key} = {_value(value)}" for key, value in block.items())]
+    for table in tables:
+        if found.get(table):
+            lines += ["", f"[{table}]", *(f"{_key(name)} = {_value(entry)}" for name, entry in found[table].items())]
+    return "\n".join(lines) + "\n"
 
 
 def _value(value: Any) -> str:
