@@ -8,14 +8,10 @@ An author writes functions of one cell, the same source for numbers and for lane
     bound(p) -> error                             a number, or a record with one for each output that the method gives
     fill(i, columns, *buffers)                    for traces, instead of `solve`: writes the rows of cell i itself
 
-Loops, entries with one column a parameter, copies that fill up few cells, the largest bound of what was asked for, and
-NaN for outputs that a method lacks are made here. Names that do not fit the fields are refused: those of the
-parameters when a kernel is declared, those of outputs when a method is compiled, which is at its first call.
-
-What the engine calls is made in three steps. `_Wiring.solved_by` lists the names of the columns as `kernels.interface`
-has them; `_Wiring._body` is the work on one cell, or on WIDTH of them; `_Wiring._entry` makes a function of columns
-that loops this body by `in_lanes`, `cell_by_cell` or `in_groups` of `columns`. Records are read and written by name
-(`records`), so the order of columns is known nowhere else.
+Loops, entries with one column a parameter, copies that fill up few cells, the largest bound of what was asked for,
+scenes without units, and NaN for outputs that a method lacks are made here. Names that do not fit the fields are
+refused: those of the parameters when a kernel is declared, those of outputs when a method is first compiled.
+Records are read and written by name (`records`), so the order of columns is known nowhere else.
 """
 
 import inspect
@@ -32,43 +28,43 @@ from kernels.interface import BoundCell, CheckCell, Field, FillCells, Kernel, Me
 from kernels.lanes import columns as loops
 from kernels.lanes.cache import is_ours
 from kernels.lanes.codes import BAD_INPUT, OK
-from kernels.lanes.columns import entry_of
 from kernels.lanes.jit import jit
 from kernels.lanes.records import largest, named, read, write
 from kernels.lanes.vectors import nearest, where
 
-Buffers = Callable[[], tuple[Any, ...]]
 Loop = Callable[..., None]
 Record = Callable[..., Any]
 """A NamedTuple class."""
-Sooner = Callable[[Any, Any], Any]
-"""Of a record of columns and rtol, in numpy."""
+
+
+@jit
+def nothing() -> tuple[()]:
+    """No buffers."""
+    return ()
 
 
 @dataclass(frozen=True)
-class method:
-    """A method by `solve(p, rtol, *buffers())`, as its author writes it; `kernel` makes a `Method` of it.
+class method(Method):
+    """A `Method` as its author writes it, of one cell; `kernel` makes functions of columns of it.
 
     Parameters
     ----------
+    solve : `solve(p, rtol, *buffers())`
     bound : what `solve` is right to: a number, or `bound(p)`; None where its status says so
-    excludes, lacks, estimates : as in `kernels.interface.Method`
+    sooner : `sooner(p, rtol)` of columns, uncompiled
+    name, doc, excludes, lacks, estimates : as in `kernels.interface.Method`
     buffers : makes a tuple of arrays that a thread's cells use one after the other: `buffers()`, or `buffers(columns)`
     loop : `in_lanes`; `cell_by_cell`, where every search goes its own way
-    sooner : `sooner(p, rtol)` of columns, uncompiled: True where `auto` tries it ahead of the method before it
+    units : (take, put_back) of a method whose scene has no units. `scene, units = take(p)` is what `solve` and `bound`
+        get in place of p, and `put_back(units, outputs, status)` makes outputs and status of what is solved.
     """
 
-    name: str
-    doc: str
-    solve: SolveCell
-    bound: BoundCell | float | None = None
+    solve: SolveCell  # type: ignore[assignment]
+    bound: BoundCell | float | None = None  # type: ignore[assignment]
     _: KW_ONLY
-    excludes: tuple[str, ...] = ()
-    lacks: tuple[str, ...] = ()
-    buffers: Buffers | None = None
+    buffers: Callable[..., tuple[Any, ...]] = nothing
     loop: Loop = loops.in_lanes
-    estimates: bool = False
-    sooner: Sooner | None = None
+    units: tuple[Callable[..., Any], Callable[..., Any]] | None = None
 
 
 @dataclass(frozen=True)
@@ -100,7 +96,7 @@ def kernel(
     source: str,
     parameters: Sequence[Field],
     outputs: Sequence[Field],
-    methods: Sequence[method | split | Method],
+    methods: Sequence[split | Method],
     check: CheckCell | None = None,
     along: Sequence[Field] = (),
     example: Mapping[str, float | Sequence[float]] | None = None,
@@ -124,15 +120,21 @@ def kernel(
     TypeError
         Where the record's fields are not the parameters, or a method lacks what is no output.
     """
-    names = [field.name for field in parameters], [field.name for field in along], [field.name for field in outputs]
-    wiring = _Wiring(name, record, *names, loop)
+    names = [field.name for field in parameters]
+    fields = names if record is None else list(getattr(record, "_fields", ()))
+    if fields != names:
+        raise TypeError(f"{name}: the record has {fields}, the parameters are {names}")
+    record = record or _record("Parameters", names)
+    wiring = _Wiring(name, record, names, [f.name for f in along], [f.name for f in outputs], loop)
+    first = methods[0] if methods else None
+    owner = check or (next(iter(first.solvers.values())) if isinstance(first, split) else first).solve  # type: ignore[union-attr]
     return Kernel(
         name=name,
         doc=doc,
         source=source,
         parameters=tuple(parameters),
         outputs=tuple(outputs),
-        check=wiring.check(check, within(parameters), methods[0]),
+        check=wiring.check(check or _no_more, within(parameters), owner),
         methods=tuple(wiring.solved_by(solver) for solver in methods),
         along=tuple(along),
         example=dict(example or {}),
@@ -151,80 +153,58 @@ def within(fields: Sequence[Field]) -> Callable[[Any], Any]:
 
     NaN and infinite numbers never are; a default always is, at a limit that is open, too.
     """
-    tests = []
+    names, tests = {"nearest": nearest, "inf": math.inf}, []
     for field in fields:
-        p, open_lower = f"p.{field.name}", field.open_lower or field.lower == -math.inf
-        limits = f"{field.lower!r}, {open_lower}, {field.upper!r}, {field.upper == math.inf}"
-        test = f"{'all_inside' if field.dims else 'inside'}({p}, {limits})"
+        above = ">" if field.open_lower or field.lower == -math.inf else ">="
+        below = "<" if field.upper == math.inf else "<="
+        test = f"({{x}} {above} {field.lower!r}) & ({{x}} {below} {field.upper!r})"
         if field.open_lower and field.default is not None:
             default = f"p.{field.default}" if isinstance(field.default, str) else repr(float(field.default))
-            test = f"({test} | equal({p}, {default}))"
-        tests.append(test + (f" & equal({p}, nearest({p}))" if field.integer or field.choices else ""))
-    names = {"inside": _inside, "all_inside": _all_inside, "equal": _equal, "nearest": nearest, "inf": math.inf}
+            test = f"({test} | ({{x}} >= {default}) & ({{x}} <= {default}))"
+        if field.integer or field.choices:
+            test += " & ({x} >= nearest({x})) & ({x} <= nearest({x}))"
+        if field.dims:
+            names[f"all_{field.name}"] = _every(jit(eval(f"lambda x: {test.format(x='x')}", names)))
+            test = f"all_{field.name}({{x}})"
+        tests.append(test.format(x=f"p.{field.name}"))
     made: Callable[[Any], Any] = jit(eval(f"lambda p: {' & '.join(tests)}", names))
     return made
 
 
-@jit
-def _inside(x: Any, lower: float, above: bool, upper: float, below: bool) -> Any:
-    return ((x > lower) if above else (x >= lower)) & ((x < upper) if below else (x <= upper))
+def _record(name: str, fields: Sequence[str]) -> Record:
+    return namedtuple(name, fields)
 
 
-@jit
-def _all_inside(row: Any, lower: float, above: bool, upper: float, below: bool) -> Any:
-    good = True
-    for x in row:
-        good = good & _inside(x, lower, above, upper, below)
-    return good
-
-
-@jit
-def _equal(x: Any, y: Any) -> Any:
-    return (x >= y) & (x <= y)
-
-
-@jit
-def nothing() -> tuple[()]:
-    """No buffers."""
-    return ()
-
-
-def _of_columns(buffers: Any) -> Any:
-    """`buffers` as a function of the columns."""
-    if inspect.signature(buffers).parameters:
-        return buffers
+def _every(test: Any) -> Any:
+    """Whether a test of a number holds for each of a row."""
 
     @jit
-    def made(columns: Any) -> Any:
-        return buffers()
+    def all_of(row: Any) -> Any:
+        good = True
+        for x in row:
+            good = good & test(x)
+        return good
 
-    return made
+    return all_of
 
 
+@dataclass(frozen=True)
 class _Wiring:
     """Makes a kernel's entries; each is a function of its own name, for its machine code is kept by it."""
 
-    def __init__(
-        self,
-        name: str,
-        record: Record | None,
-        parameters: list[str],
-        along: list[str],
-        outputs: list[str],
-        loop: Loop,
-    ) -> None:
-        found = parameters if record is None else list(getattr(record, "_fields", ()))
-        if found != parameters:
-            raise TypeError(f"{name}: the record has {found}, the parameters are {parameters}")
-        self.name, self.record, self.loop = name, record or _record("Parameters", parameters), loop
-        self.parameters, self.along, self.outputs = parameters, along, outputs
+    name: str
+    record: Record
+    parameters: list[str]
+    along: list[str]
+    outputs: list[str]
+    loop: Loop
 
-    def check(self, check: CheckCell | None, allowed: Callable[[Any], Any], of: method | split | Method) -> OnColumns:
-        """Machine code of a check is kept where that of the method `of` is."""
-        record, special = self.record, check or _no_more
+    def check(self, special: CheckCell, allowed: Callable[[Any], Any], owner: Any) -> OnColumns:
+        """Machine code of a check is kept where that of its owner is."""
+        record = self.record
 
         @jit
-        def body(i: Any, columns: Any) -> None:
+        def in_lanes(i: Any, columns: Any) -> None:
             p = read(record, columns, i)
             columns.status[i] = where(allowed(p), special(p), BAD_INPUT)
 
@@ -233,27 +213,27 @@ class _Wiring:
             p = read(record, columns, i)
             columns.status[i] = special(p) if allowed(p) else BAD_INPUT
 
-        body = of_a_cell if self.loop is loops.cell_by_cell else body
-        owner = check or (next(iter(of.solvers.values())) if isinstance(of, split) else of).solve
+        body = of_a_cell if self.loop is loops.cell_by_cell else in_lanes
         return self._entry("check", owner, body, [*self.parameters, "status"], self.loop)
 
-    def solved_by(self, solver: method | split | Method) -> Method:
-        if isinstance(solver, Method):
-            return solver
+    def solved_by(self, solver: split | Method) -> Method:
+        """The method of columns."""
         if isinstance(solver, split):
             estimates = any(each.estimates for each in solver.solvers.values())
             return Method(solver.name, solver.doc, self._split(solver, estimates), estimates=estimates)
+        if not isinstance(solver, method):
+            return solver
         strange = set(solver.lacks) - set(self.outputs) | set(solver.excludes) - set(self.parameters)
         if strange:
             raise TypeError(f"{self.name}.{solver.name} lacks or excludes what there is not: {sorted(strange)}")
         body = solver.solve if isinstance(solver, tracing) else self._body(solver)
-        names = self._names(solver.estimates)
-        solve = self._entry(solver.name, solver.solve, body, names, solver.loop, solver.buffers or nothing)
-        bound, sooner = self._bound(solver), self._sooner(solver.sooner)
-        return Method(solver.name, solver.doc, solve, bound, solver.excludes, solver.lacks, solver.estimates, sooner)
-
-    def _sooner(self, sooner: Sooner | None) -> Callable[..., Any] | None:
-        return None if sooner is None else lambda *columns: sooner(self.record(*columns[:-1]), columns[-1])
+        names, sooner = self._names(solver.estimates), solver.sooner
+        solve = self._entry(solver.name, solver.solve, body, names, solver.loop, solver.buffers)
+        of_record = None if sooner is None else lambda *columns: sooner(self.record(*columns[:-1]), columns[-1])
+        return Method(
+            solver.name, solver.doc, solve, self._bound(solver),
+            solver.excludes, solver.lacks, solver.estimates, of_record,
+        )  # fmt: skip
 
     def _names(self, estimates: bool) -> list[str]:
         """Of the columns that a method is called with."""
@@ -279,23 +259,29 @@ class _Wiring:
 
     def _given(self, solver: method) -> Record:
         """A record of the outputs that the method gives."""
-        return _record("Given", [name for name in self.outputs if name not in solver.lacks])
+        return namedtuple("Given", [name for name in self.outputs if name not in solver.lacks])
 
     def _body(self, solver: method) -> FillCells:
-        record, given, order = self.record, self._given(solver), _record("Order", self.outputs)
-        solve: Any = solver.solve
+        """The work of a method on cell i, or on WIDTH of them."""
+        record, given, order = self.record, self._given(solver), namedtuple("Order", self.outputs)
         none = _record("Lacking", solver.lacks)(*(math.nan for _ in solver.lacks))
+        inner: Any = solver.solve
+        take, put_back = solver.units or (_as_it_is, _with_none)
 
         @jit
         def body(i: Any, columns: Any, *buffers: Any) -> None:
-            outputs, status = solve(read(record, columns, i), columns.rtol[i], *buffers)
+            scene, units = take(read(record, columns, i))
+            solved, verdict = inner(scene, columns.rtol[i], *buffers)
+            outputs, status = put_back(units, solved, verdict)
             write(columns, i, named(given, outputs))
             write(columns, i, none)
             columns.status[i] = status
 
         @jit
         def estimating(i: Any, columns: Any, *buffers: Any) -> None:
-            outputs, errors, status = solve(read(record, columns, i), columns.rtol[i], *buffers)
+            scene, units = take(read(record, columns, i))
+            solved, errors, verdict = inner(scene, columns.rtol[i], *buffers)
+            outputs, status = put_back(units, solved, verdict)
             write(columns, i, named(given, outputs))
             write(columns, i, none)
             columns.error[i] = largest(errors, columns.asked, order, given)
@@ -306,32 +292,45 @@ class _Wiring:
     def _bound(self, solver: method) -> OnColumns | None:
         if solver.bound is None:
             return None
-        names = [*self.parameters, "rtol", *self.along, "asked", "out"]
-        if isinstance(solver.bound, float):
-            return signed(lambda *columns: columns[-1].fill(solver.bound), names)
-        record, bound, order, given = self.record, solver.bound, _record("Order", self.outputs), self._given(solver)
+        names, bound = [*self.parameters, "rtol", *self.along, "asked", "out"], solver.bound
+        if isinstance(bound, float):
+            return signed(lambda *columns: columns[-1].fill(bound), names)
+        record, order, given = self.record, namedtuple("Order", self.outputs), self._given(solver)
+        take, _ = solver.units or (_as_it_is, _with_none)
 
         @jit
         def body(i: Any, columns: Any) -> None:
-            columns.out[i] = largest(bound(read(record, columns, i)), columns.asked, order, given)
+            scene, _ = take(read(record, columns, i))
+            columns.out[i] = largest(bound(scene), columns.asked, order, given)
 
         return self._entry(f"{solver.name}_bound", bound, body, names, self.loop)
 
     def _entry(
-        self,
-        name: str,
-        function: Any,
-        body: Any,
-        names: list[str],
-        loop: Loop,
-        buffers: Buffers = nothing,
+        self, name: str, function: Any, body: Any, names: list[str], loop: Loop, buffers: Any = nothing
     ) -> OnColumns:
-        scope = {"named": named, "COLUMNS": _record("Columns", names), "BODY": body, "LOOP": loop}
-        scope["BUFFERS"] = _of_columns(buffers)
-        made = FunctionType(_all_cells.__code__, scope, name)
+        """A function of columns that loops a body over their cells, called and kept by a name of its own."""
+        of_columns = buffers
+        if not inspect.signature(buffers).parameters:
+
+            @jit
+            def of_columns(columns: Any) -> Any:
+                return buffers()
+
+        scope = {"named": named, "COLUMNS": namedtuple("Columns", names), "BODY": body, "LOOP": loop}
+        made = FunctionType(_all_cells.__code__, scope | {"BUFFERS": of_columns}, name)
         made.__qualname__, made.__module__ = f"{self.name}.{name}", function.__module__
         per_cell = None if loop is loops.cell_by_cell else [n not in self.along and n != "asked" for n in names]
-        return signed(entry_of(made, per_cell, is_ours(function), len(self.parameters)), names)
+        return signed(loops.entry_of(made, per_cell, is_ours(function), len(self.parameters)), names)
+
+
+@jit
+def _as_it_is(p: Any) -> Any:
+    return p, 0.0
+
+
+@jit
+def _with_none(units: Any, outputs: Any, status: Any) -> Any:
+    return outputs, status
 
 
 def signed(function: Any, names: Sequence[str]) -> OnColumns:
@@ -340,10 +339,6 @@ def signed(function: Any, names: Sequence[str]) -> OnColumns:
     function.__signature__ = inspect.Signature([inspect.Parameter(name, kind) for name in names])
     made: OnColumns = function
     return made
-
-
-def _record(name: str, fields: Sequence[str]) -> Record:
-    return namedtuple(name, fields)
 
 
 def _all_cells(*columns: Any) -> None:
