@@ -69,8 +69,9 @@ def log_tail(v):
 
 
 def show(name, doc, coefficients):
-    rows = "\n".join(f"    {float(c)!r}," for c in coefficients)
-    return f'\n{name} = (\n{rows}\n)\n"""{doc}"""\n'
+    numbers = [f"{float(c)!r}," for c in coefficients]
+    rows = "\n".join("    " + " ".join(numbers[j : j + 4]) for j in range(0, len(numbers), 4))
+    return f'\n{name} = (\n{rows}\n)  # fmt: skip\n"""{doc}"""\n'
 
 
 def main():

@@ -13,7 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from kernels.foliot._units import Foliot
-from kernels.foliot.cycle import FOLIOT, check, event_map
+from kernels.foliot._viscous import UNITS, event_map
+from kernels.foliot.cycle import FOLIOT, check
 from kernels.interface import Status
 from kernels.lanes.columns import cell_by_cell
 from kernels.lanes.wiring import kernel, method
@@ -40,7 +41,7 @@ ONE_BY_ONE = kernel(
     outputs=FOLIOT.outputs,
     record=Foliot,
     check=check,
-    methods=(method("map", "one cell at a time", event_map, loop=cell_by_cell),),
+    methods=(method("map", "one cell at a time", event_map, loop=cell_by_cell, units=UNITS),),
 )
 
 

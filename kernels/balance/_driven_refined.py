@@ -57,24 +57,6 @@ class Legs(NamedTuple):
     t3: tuple
 
 
-class Residuals(NamedTuple):
-    """What (1), (2), (3) and the speeds miss by, the speeds, and E, S, S' of the legs, by which the misses change."""
-
-    first: float
-    second: float
-    third: float
-    last: float
-    v1: float
-    v2: float
-    v3: float
-    E1: float
-    S1: float
-    S2: float
-    slope2: float
-    E3: float
-    S3: float
-
-
 @jit
 def _series(y, shares):
     total = shares[0][0] + 0.0 * y[0], shares[0][1] + 0.0 * y[0]
@@ -111,52 +93,52 @@ def _swing(zeta, t):
 
 
 @jit_call
-def _residuals(scene, legs):
-    """The residuals, and the phases squared of the three legs."""
+def _step(scene, legs):
+    """The cycle after a step of Newton, and whether it was the last and there is such a cycle.
+
+    What (1), (2) and (3) miss is mended by changes of t1, t2, t3 that follow a change of f; so the miss of the speeds
+    at the end is a line in that change, known from two.
+    """
     zeta, r, m, beta, w = scene
-    one, two, three = _swing(zeta, legs.t1), _swing(zeta, legs.t2), _swing(-zeta, legs.t3)
+    f, t1, t2, t3 = legs
+    lifts, unit = beta > 0.0, f[0]
+    one, two, three = _swing(zeta, t1), _swing(zeta, t2), _swing(-zeta, t3)
     near, far = two_sum(beta, -r), two_sum(beta, r)
-    f2, g = shifted(near, m), shifted(legs.f, 2.0 * r)
-    v1, v3 = times(legs.f, one.S), times(g, three.S)
+    f2, g = shifted(near, m), shifted(f, 2.0 * r)
+    v1, v3 = times(f, one.S), times(g, three.S)
     v2 = add(times(v1, two.slope), times(f2, two.S))
-    first = add(times(legs.f, one.E), negative(near))[0]
+    first = add(times(f, one.E), negative(near))[0]
     second = add(add(times(f2, two.E), negative(times(v1, two.S))), negative(shifted(f2, -2.0 * beta)))[0]
     third = add(times(g, three.E), negative(far))[0]
     energy = shifted(add(times(v3, v3), negative(times(v2, v2))), -2.0 * w)[0] / (2.0 * v3[0])
-    last = where(beta > 0.0, add(v3, negative(v2))[0], energy)
-    slopes = one.E[0], one.S[0], two.S[0], two.slope[0], three.E[0], three.S[0]
-    return Residuals(first, second, third, last, v1[0], v2[0], v3[0], *slopes), (one.phase, two.phase, three.phase)
+    last = where(lifts, add(v3, negative(v2))[0], energy)
 
-
-@jit
-def _along(scene, at, df):
-    """Changes of t1, t2, t3 that mend all but the last miss where f changes by df, and the last miss after that."""
-    zeta, r, m, beta, _ = scene
-    lifts = beta > 0.0
-    d1, d3 = (at.first + at.E1 * df) / at.v1, (at.third + at.E3 * df) / at.v3
-    dv1 = at.S1 * df + ((beta - r) - 2.0 * zeta * at.v1) * d1
-    dv3 = at.S3 * df + ((beta + r) + 2.0 * zeta * at.v3) * d3
-    d2 = where(lifts, (at.second - at.S2 * dv1) / where(lifts, at.v2, 1.0), 0.0)
-    dv2 = at.slope2 * dv1 + (((m - r) - beta) - 2.0 * zeta * at.v2) * d2
-    return d1, d2, d3, at.last + dv3 - where(lifts, 1.0, at.v2 / at.v3) * dv2
-
-
-@jit_call
-def _step(scene, legs):
-    """The cycle after a step of Newton, and whether it was the last and there is such a cycle."""
-    at, (phase1, phase2, phase3) = _residuals(scene, legs)
-    f, t1, t2, t3 = legs
-    unit = f[0]
-    a1, a2, a3, here = _along(scene, at, 0.0 * scene.zeta)
-    b1, b2, b3, beyond = _along(scene, at, unit)
+    start, slope = (first, second, third, last, v1[0], v2[0], v3[0]), (one, two, three)
+    a1, a2, a3, here = _along(scene, start, slope, 0.0 * zeta)
+    b1, b2, b3, beyond = _along(scene, start, slope, unit)
     share = -here / (beyond - here)
     d1, d2, d3 = a1 + share * (b1 - a1), a2 + share * (b2 - a2), a3 + share * (b3 - a3)
     new = Legs(shifted(f, share * unit), shifted(t1, d1), shifted(t2, d2), shifted(t3, d3))
     least = _SETTLED * (t1[0] + t2[0] + t3[0])
     settled = (magnitude(share) <= _SETTLED) & (magnitude(d1) <= least) & (magnitude(d3) <= least)
-    forwards = (at.v1 > 0.0) & (at.v2 > 0.0) & (at.v3 > 0.0) & (unit > 0.0)
-    once = (phase1 < _HALF_TURN) & (phase2 < _HALF_TURN) & (phase3 < _HALF_TURN)
+    forwards = (v1[0] > 0.0) & (v2[0] > 0.0) & (v3[0] > 0.0) & (unit > 0.0)
+    once = (one.phase < _HALF_TURN) & (two.phase < _HALF_TURN) & (three.phase < _HALF_TURN)
     return new, settled & (magnitude(d2) <= least), forwards & once
+
+
+@jit
+def _along(scene, misses, swings, df):
+    """Changes of t1, t2, t3 that mend all but the last miss where f changes by df, and the last miss after that."""
+    zeta, r, m, beta, _ = scene
+    first, second, third, last, v1, v2, v3 = misses
+    one, two, three = swings
+    lifts = beta > 0.0
+    d1, d3 = (first + one.E[0] * df) / v1, (third + three.E[0] * df) / v3
+    dv1 = one.S[0] * df + ((beta - r) - 2.0 * zeta * v1) * d1
+    dv3 = three.S[0] * df + ((beta + r) + 2.0 * zeta * v3) * d3
+    d2 = where(lifts, (second - two.S[0] * dv1) / where(lifts, v2, 1.0), 0.0)
+    dv2 = two.slope[0] * dv1 + (((m - r) - beta) - 2.0 * zeta * v2) * d2
+    return d1, d2, d3, last + dv3 - where(lifts, 1.0, v2 / v3) * dv2
 
 
 @jit_call

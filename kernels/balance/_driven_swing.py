@@ -156,37 +156,30 @@ def half_swing(scene, p):
     return HalfSwing(gain, noise, kept, lost, time, comes & rise.comes, late, blunt)
 
 
-@jit
-def _start(scene):
-    """Where Newton starts, the least swing, whether the balance swings at all, and whether it does so in range.
-
-    The least p from which it comes to the lift, or to the zero, is 0, or (r - beta)(1 + 1/E) beyond r; the guess is the
-    a of 2 r a + pi zeta a^2 = work, what light losses tend to.
-    """
+@jit_call
+def newton(scene, rtol):
+    """The cycle and its verdict: by (3), or in 32 digits where conditioning leaves less than rtol."""
     zeta, r, m, beta, w = scene
+
+    # the least p from which it comes to the lift, or to the zero, is 0, or (r - beta)(1 + 1/E) beyond r
     creeps, short = zeta >= 1.0, r > beta
     delta, _ = _ringdown.decrement(where(creeps, 0.5, zeta))
     share = where(creeps, 0.0, exp(-delta[0]))
     never = short & not_(share > 1e-300)
     least = where(short, (r - beta) * (1.0 + 1.0 / where(share > 1e-300, share, 1e-300)), 0.0)
     first = _rise(scene, 0.0 * least)
-    impulse_creeps = not_(beta > 0.0) & creeps
-    swings = first.comes & (first.p > least) & not_(never | impulse_creeps)
+    swings = first.comes & (first.p > least) & not_(never | (not_(beta > 0.0) & creeps))
+    low = where(swings, least, 0.0)
+
+    # the start is the a of 2 r a + pi zeta a^2 = work, what light losses tend to
     work = fma(2.0 * m, beta, w)
     guess = 2.0 * work / (2.0 * r + sqrt(4.0 * r * r + 4.0 * math.pi * zeta * work))
     tame = guess < _LARGEST
     guess = guess - beta
-    p = where(guess > first.p, guess, first.p)
-    return where(swings & tame, p, 1.0), where(swings, least, 0.0), swings, tame
+    p = where(swings & tame, where(guess > first.p, guess, first.p), 1.0)
 
-
-@jit
-def _search(scene, p, low, active):
-    """p where the half swing repeats, the least that is seen to gain nothing, and whether that is not settled.
-
-    Newton's steps, bisections where they leave the bracket.
-    """
-    high = 0.0 * p + 1e300
+    # p where the half swing repeats: Newton's steps, bisections where they leave the bracket
+    active, high = swings & tame, 0.0 * p + 1e300
     for _ in range(NEWTON_LIMIT):
         if not any_lane(active):
             break
@@ -200,21 +193,13 @@ def _search(scene, p, low, active):
         settled = inside & ((change <= 1e-9 * p) | (change * swing.lost <= swing.noise))
         p = where(active, new, p)
         active = active & not_(settled)
-    return p, high, active
-
-
-@jit_call
-def newton(scene, rtol):
-    """The cycle and its verdict: by (3), or in 32 digits where conditioning leaves less than rtol."""
-    p, low, swings, tame = _start(scene)
-    p, high, active = _search(scene, p, low, swings & tame)
     swing = half_swing(scene, p)
-    a, time, kept = scene.beta + p, swing.time, swing.kept
+    a, time, kept = beta + p, swing.time, swing.kept
 
     # whether amplitude, time and multiplier are accurate to rtol
     error = swing.noise / swing.lost + 2.3e-16 * a
     of_time = (error * swing.late + swing.blunt) / time
-    of_kept = 2.0 * scene.zeta * of_time * time + 2.0 * error / ((scene.beta - scene.r) + p)
+    of_kept = 2.0 * zeta * of_time * time + 2.0 * error / ((beta - r) + p)
     of_kept = where(kept > 1e-300, of_kept, 0.0)
     right = (error <= rtol * a) & (of_time <= rtol) & (of_kept <= rtol)
 
@@ -239,52 +224,44 @@ def closed(scene, rtol):
     """As `newton`, from formulas, where there is an impulse and r = 0, or zeta = 0; NO_METHOD elsewhere."""
     zeta, r, m, beta, w = scene
     lifts, free, smooth = beta > 0.0, not_(zeta > 0.0), not_(r > 0.0)
-    some_r = where(smooth, 1.0, r)
-    a_kick, t_kick, runs_kick = _kicked(some_r, where(lifts, 1.0, w))
-    a_lift, t_lift, runs_lift = _lifted(some_r, where(lifts, m, 1.0), where(lifts, beta, 1.0))
+    r = where(smooth, 1.0, r)
+
+    # an impulse, no viscous damping: a = w/(2 r) > 2 r, T = pi + asin(r/(a - r)) - asin(r/(a + r))
+    kick = where(lifts, 1.0, w)
+    a_kick, spare = kick / (2.0 * r), fma(-4.0 * r, r, kick) / (2.0 * r)  # a - 2 r
+    runs_kick = spare > 0.0
+    before = arctan(r / (sqrt(a_kick) * sqrt(where(runs_kick, spare, 1.0))))
+    t_kick = math.pi + (before - arctan(r / (sqrt(a_kick) * sqrt(a_kick + 2.0 * r))))
+
+    # a lift, no viscous damping: a = m beta/r, m > r and a + beta > 2 r, T by the half angles of three arcs: about r
+    # tan^2 = (a - beta)/(a + beta -+ 2 r), about r - m tan = 2 beta/(v1 + v2)
+    m, beta = where(lifts, m, 1.0), where(lifts, beta, 1.0)
+    a_lift, p = m * beta / r, beta * ((m - r) / r)
+    room = pairs.scaled(pairs.two_sum(m, r), beta)
+    room = pairs.add(room, pairs.negative(pairs.scaled(pairs.two_product(r, r), 2.0)))[0] / r  # a + beta - 2 r
+    runs_lift = (p > 0.0) & (room > 0.0)
+    p, room, wide = where(runs_lift, p, 1.0), where(runs_lift, room, 1.0), a_lift + beta + 2.0 * r
+    v1, v2 = sqrt(p) * sqrt(room), sqrt(p) * sqrt(wide)
+    t_lift = 2.0 * (arctan(sqrt(p / room)) + arctan(2.0 * beta / (v1 + v2)) + arctan(sqrt(p / wide)))
+
+    # an impulse, no solid friction: a^2 = 2 w exp(-2 zeta acos(zeta)/S)/(1 - E^2), T = pi/S, multiplier E^2,
+    # S = sqrt(1 - zeta^2)
+    damped = where(zeta < 1.0, zeta, 0.5)
+    delta, root = _ringdown.decrement(damped)
+    s, arccos = root[0], 2.0 * arctan(root[0] / (1.0 + damped))
+    square = 2.0 * w * exp(-2.0 * damped * arccos / s) / -expm1(-2.0 * where(damped > 0.0, delta[0], 1.0))
+    a_smooth, kept_smooth = sqrt(square), exp(-2.0 * delta[0]) * (1.0 - 2.0 * delta[1])
+
     a, time = where(lifts, a_lift, a_kick), where(lifts, t_lift, t_kick)
-    kept, runs = (a - r) / (a + r), where(lifts, where(runs_lift, 1.0, 0.0), where(runs_kick, 1.0, 0.0)) > 0.5
-    a_smooth, t_smooth, kept_smooth = _kicked_smoothly(where(zeta < 1.0, zeta, 0.5), w)
-    a, time = where(free, a, a_smooth), where(free, time, t_smooth)
-    kept = where(free, kept, kept_smooth)
-    known = free | (smooth & not_(lifts))
+    kept, runs = where(free, (a - r) / (a + r), kept_smooth), (lifts & runs_lift) | (not_(lifts) & runs_kick)
+    a, time = where(free, a, a_smooth), where(free, time, math.pi / s)
     runs = (free & runs) | (not_(free) & (zeta < 1.0))
+    known = free | (smooth & not_(lifts))
     return Cycle(a, time, kept), where(known, where(runs, OK, STICKS), NO_METHOD)
 
 
 @jit
-def _kicked_smoothly(zeta, w):
-    """a^2 = 2 w exp(-2 zeta acos(zeta)/S)/(1 - E^2), T = pi/S, multiplier E^2, S = sqrt(1 - zeta^2): no friction."""
-    delta, root = _ringdown.decrement(zeta)
-    s = root[0]
-    arccos = 2.0 * arctan(s / (1.0 + zeta))
-    square = 2.0 * w * exp(-2.0 * zeta * arccos / s) / -expm1(-2.0 * where(zeta > 0.0, delta[0], 1.0))
-    return sqrt(square), math.pi / s, exp(-2.0 * delta[0]) * (1.0 - 2.0 * delta[1])
-
-
-@jit
-def _kicked(r, w):
-    """a = w/(2 r), T = pi + asin(r/(a - r)) - asin(r/(a + r)), and whether w > 4 r^2: no viscous damping."""
-    a = w / (2.0 * r)
-    spare = fma(-4.0 * r, r, w) / (2.0 * r)  # a - 2 r
-    runs = spare > 0.0
-    before = arctan(r / (sqrt(a) * sqrt(where(runs, spare, 1.0))))
-    after = arctan(r / (sqrt(a) * sqrt(a + 2.0 * r)))
-    return a, math.pi + (before - after), runs
-
-
-@jit
-def _lifted(r, m, beta):
-    """a = m beta/r, T by the half angles of three arcs, and whether m > r and a + beta > 2 r: no viscous damping.
-
-    About r: tan^2 = (a - beta)/(a + beta -+ 2 r); about r - m: tan = 2 beta/(v1 + v2).
-    """
-    a, p = m * beta / r, beta * ((m - r) / r)
-    room = pairs.scaled(pairs.two_sum(m, r), beta)
-    room = pairs.add(room, pairs.negative(pairs.scaled(pairs.two_product(r, r), 2.0)))[0] / r  # a + beta - 2 r
-    runs = (p > 0.0) & (room > 0.0)
-    p, room = where(runs, p, 1.0), where(runs, room, 1.0)
-    wide = a + beta + 2.0 * r
-    v1, v2 = sqrt(p) * sqrt(room), sqrt(p) * sqrt(wide)
-    arcs = arctan(sqrt(p / room)) + arctan(2.0 * beta / (v1 + v2)) + arctan(sqrt(p / wide))
-    return a, 2.0 * arcs, runs
+def closed_bound(scene):
+    """Rounding where there is a formula, infinite elsewhere."""
+    known = not_(scene.zeta > 0.0) | (not_(scene.r > 0.0) & not_(scene.beta > 0.0))
+    return where(known, ROUNDING, math.inf)

@@ -10,57 +10,34 @@ balance released from rest comes to th = 0.
 """
 
 import math
-from typing import NamedTuple
 
 from kernels.balance import _driven_swing
 from kernels.interface import Field
 from kernels.lanes.codes import BAD_INPUT, NO_LIMIT_CYCLE, OK, OUT_OF_RANGE
 from kernels.lanes.jit import jit
-from kernels.lanes.ranges import or_none, partly
+from kernels.lanes.ranges import partly
 from kernels.lanes.vectors import not_, where
 from kernels.lanes.wiring import kernel, method
-from kernels.maths.elementary import is_normal, scale
-
-ROUNDING = 4e-15
-"""What `closed` is right to."""
-
-
-class LimitCycle(NamedTuple):
-    """Outputs."""
-
-    amplitude: float
-    period: float
-    multiplier: float
+from kernels.maths.elementary import measured
 
 
 @jit
-def _outputs(p, rtol, solve):
-    """The cycle in SI units, and the status."""
+def _taken(p):
+    """The scene in units of angle and of 1/omega_n, and these."""
     scene, e, fine = _driven_swing.in_units(p)
-    cycle, verdict = solve(scene, rtol)
-    swing, whole = scale(cycle.amplitude, e), 2.0 * cycle.time / p.omega_n
-    wide, timed = is_normal(swing), is_normal(whole)
-    outputs = LimitCycle(or_none(swing, wide), or_none(whole, timed), cycle.multiplier)
-    return outputs, where(fine, partly(wide & timed, verdict), OUT_OF_RANGE)
+    return scene, (p.omega_n, e, fine)
 
 
 @jit
-def closed(p, rtol):
-    """Formulas for r = 0 under impulses and for zeta = 0; NO_METHOD elsewhere."""
-    return _outputs(p, rtol, _driven_swing.closed)
+def _put_back(units, cycle, verdict):
+    """Amplitude, period and multiplier, and the status."""
+    omega_n, e, fine = units
+    amplitude, period = measured(cycle.amplitude, e), measured(2.0 * cycle.time / omega_n, 0.0)
+    whole = (amplitude > 0.0) & (period > 0.0)
+    return (amplitude, period, cycle.multiplier), where(fine, partly(whole, verdict), OUT_OF_RANGE)
 
 
-@jit
-def closed_bound(p):
-    """Rounding where there is a formula, infinite elsewhere."""
-    known = not_(p.zeta > 0.0) | (not_(p.r > 0.0) & not_(p.beta > 0.0))
-    return where(known, ROUNDING, math.inf)
-
-
-@jit
-def newton(p, rtol):
-    """Exact pieces of the half swing and Newton on its map, in 32 digits where conditioning leaves less than rtol."""
-    return _outputs(p, rtol, _driven_swing.newton)
+UNITS = _taken, _put_back
 
 
 @jit
@@ -84,30 +61,22 @@ BALANCE_DRIVEN = kernel(
         Field("zeta", "1", "viscous damping ratio c/(2 sqrt(I k))", lower=0.0),
         Field("omega_n", "rad/s", "angular frequency without friction, sqrt(k/I)", lower=0.0, open_lower=True),
         Field("r", "rad", "solid friction torque over spring stiffness, R/k", lower=0.0),
-        Field(
-            "w",
-            "rad^2",
-            "impulse: energy over spring stiffness given at each passage of 0; or else m and beta",
-            default=0.0,
-            lower=0.0,
-            open_lower=True,
-        ),
+        Field("w", "rad^2", "impulse: energy over spring stiffness given at each passage of 0; or else m and beta",
+              default=0.0, lower=0.0, open_lower=True),
         Field("m", "rad", "lift torque over spring stiffness", default=0.0, lower=0.0),
         Field("beta", "rad", "the lift acts over abs(theta) < beta", default=0.0, lower=0.0),
     ),
     outputs=(
         Field("amplitude", "rad", "largest angle on the limit cycle"),
         Field("period", "s", "period of the limit cycle"),
-        Field(
-            "multiplier",
-            "1",
-            "multiplier of the half-swing map, of the amplitude as of the energy (0 where below 1e-308)",
-        ),
+        Field("multiplier", "1",
+              "multiplier of the half-swing map, of the amplitude as of the energy (0 where below 1e-308)"),
     ),
     check=check,
     methods=(
-        method("closed", "formulas: impulses without solid friction, or no viscous damping", closed, closed_bound),
-        method("newton", "exact damped legs, Newton on the map of a half swing", newton),
+        method("closed", "formulas: impulses without solid friction, or no viscous damping",
+               _driven_swing.closed, _driven_swing.closed_bound, units=UNITS),
+        method("newton", "exact damped legs, Newton on the map of a half swing", _driven_swing.newton, units=UNITS),
     ),
     example={"zeta": 0.002, "omega_n": 5 * math.pi, "r": 0.0, "w": 0.1},
-)
+)  # fmt: skip

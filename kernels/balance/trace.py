@@ -8,13 +8,11 @@ a balance without solid friction never ends.
 
 import math
 
-import numpy as np
-
 from kernels.balance import _ringdown
 from kernels.balance.release import EXAMPLE, PARAMETERS, Balance, side, swinging
 from kernels.interface import Field
 from kernels.lanes.codes import BAD_INPUT, GRAZING, NOT_CONVERGED, OK, OUT_OF_RANGE, OVERDAMPED
-from kernels.lanes.groups import GROUP, cells_at, write_row
+from kernels.lanes.groups import cells_at, one_row, write_row
 from kernels.lanes.jit import jit
 from kernels.lanes.records import read
 from kernels.lanes.vectors import where
@@ -59,11 +57,6 @@ def _follow(first, columns, row):
 
 
 @jit
-def _row():
-    return (np.empty(GROUP),)
-
-
-@jit
 def check(p):
     """BAD_INPUT: stiction below the friction of motion; a balance that swings for ever has turning points too."""
     return where(p.r_s >= p.r, OK, BAD_INPUT)
@@ -83,6 +76,6 @@ BALANCE_TRACE = kernel(
     ),
     record=Balance,
     check=check,
-    methods=(tracing("closed", "formula of each turning point in 32 digits", _follow, ROUNDING, buffers=_row),),
+    methods=(tracing("closed", "formula of each turning point in 32 digits", _follow, ROUNDING, buffers=one_row),),
     example=EXAMPLE,
 )  # fmt: skip

@@ -25,9 +25,8 @@ _EXPONENT_ROUNDING = 6.7e-16
 """Of the multiplier exp(-tau), for each 1 + tau: 3 units of the last place; found up to 2.1."""
 _DEEPEST = 710.0
 """tau beyond which exp(-tau) is 0, no normal number being so small."""
-_FAINT = 1e-100
+_FAINT, _FAINT_COULOMB = 1e-100, 1e-55
 """Viscous friction d below which it changes no digit, provided Coulomb friction is not faint too."""
-_FAINT_COULOMB = 1e-55
 
 
 @jit
@@ -42,21 +41,18 @@ def _parts(z, rho, slack):
 
 
 @jit
-def _start(double_k, rho, slack):
-    """z within a factor of 2: (4) is A z^2 + B z^3 for small z, slack (z - 3/2) + ... for large z."""
-    square = slack * rho / (1.0 + rho)
-    share = slack / (1.0 + rho)
+def _viscous_and_coulomb(d, rho, slack):
+    """The cycle by Halley's steps on (4), and where they have not settled.
+
+    They start within a factor of 2: (4) is A z^2 + B z^3 for small z, slack (z - 3/2) + ... for large z.
+    """
+    double_k = 2.0 * d * d
+    square, share = slack * rho / (1.0 + rho), slack / (1.0 + rho)
     cube = slack * fma(share, share, 1.0) * (1.0 / 3.0)
     by_cube = cbrt(double_k / cube)
     by_square = sqrt(double_k / where(square > 1e-200, square, 1e-200))
     strong = where(by_square < by_cube, by_square, by_cube)
-    return where(strong < 1.5, strong, double_k / slack + 1.0)
-
-
-@jit
-def _root(double_k, rho, slack):
-    """z of (4) by Halley's steps, and where they have not settled."""
-    z = _start(double_k, rho, slack)
+    z = where(strong < 1.5, strong, double_k / slack + 1.0)
     active = z > 0.0
     for _ in range(HALLEY_LIMIT):
         if not any_lane(active):
@@ -70,35 +66,18 @@ def _root(double_k, rho, slack):
         step = where(step < 0.9 * z, step, 0.9 * z)
         z = where(active, z - step, z)
         active = active & (magnitude(step) > 1e-8 * z)  # cubic: the step just made was the last
-    return z, active
 
-
-@jit
-def _viscous_and_coulomb(d, rho, slack):
-    double_k = 2.0 * d * d
-    z, unsettled = _root(double_k, rho, slack)
     u, x, m3, l3 = _parts(z, rho, slack)
     tau = z + log1p(x)
     top = 1.0 + 2.0 * (1.0 + rho) * log_remainder(x) / double_k
     share = rho / (slack * (1.0 + rho))
     s = (2.0 * rho * (share * u) * (share * u) + m3 + l3) / ((rho + u) * u * tau)
-    return Cycle(tau / d, top, u / d, s, exp(-tau) * slack / (1.0 + rho)), unsettled
-
-
-@jit
-def bound(scene):
-    """Relative errors of `limit_cycle`; the multiplier's from an upper limit of tau.
-
-    In (1) (1 + rho)(x - ln(1 + x)) <= (1 - rho)/2 as x <= (1 - rho)/(1 + rho), so z <= 2 k/(1 - rho) + 3/2; and
-    ln(1 + x) <= ln 2.
-    """
-    tau = 2.0 * scene.d * scene.d / scene.slack + 2.2
-    return errors(ROUNDING, ROUNDING, _EXPONENT_ROUNDING * (1.0 + where(tau < _DEEPEST, tau, _DEEPEST)))
+    return Cycle(tau / d, top, u / d, s, exp(-tau) * slack / (1.0 + rho)), active
 
 
 @jit_call
-def limit_cycle(scene):
-    """The cycle, and its verdict."""
+def coulomb(scene, rtol):
+    """The cycle, and its verdict; without viscous friction that of dry friction alone."""
     d, rho, slack = scene.d, scene.rho, scene.slack
     dry = d < _FAINT
     cycle, unsettled = _viscous_and_coulomb(where(dry, 1.0, d), rho, slack)
@@ -106,3 +85,14 @@ def limit_cycle(scene):
     verdict = where(unsettled, NOT_CONVERGED, OK)
     verdict = where(dry, where(rho > _FAINT_COULOMB, OK, OUT_OF_RANGE), verdict)
     return choose(dry, alone, cycle), verdict
+
+
+@jit
+def bound(scene):
+    """Rounding; the multiplier exp(-tau) repeats that of tau, here from an upper limit of tau.
+
+    In (1) (1 + rho)(x - ln(1 + x)) <= (1 - rho)/2 as x <= (1 - rho)/(1 + rho), so z <= 2 k/(1 - rho) + 3/2; and
+    ln(1 + x) <= ln 2.
+    """
+    tau = 2.0 * scene.d * scene.d / scene.slack + 2.2
+    return errors(ROUNDING, ROUNDING, _EXPONENT_ROUNDING * (1.0 + where(tau < _DEEPEST, tau, _DEEPEST)))

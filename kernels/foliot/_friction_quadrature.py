@@ -9,7 +9,10 @@ With v = v1 s, F = 1 - f(v1 s), B = 1 + sigma f(E v1 s) and M = B - F, a sum of 
     2 = v1^2 int_0^1 s N/(F B) ds,  N = (1 - e^2) F + M;  (3) has (1 + sigma E) F + M for s N,      (4)
 in which nothing cancels however weak the friction. Friction holds v1 below V, where f(V) = 1. At weak drive 1 - v1/V
 may be exp(-1e12), so the unknown is z = -ln(1 - v1/V), and the pole of 1/F at v = V, of strength 1/f'(V), is taken out:
-its integral is z/f'(V). Units and records: see `_units`. Derived here.
+its integral is z/f'(V). Everything is taken at y with z = exp(y)/V, so that exp(y) is v1 at strong drive.
+
+Notation: D = d V and G = gamma V^n are the shares of 1 - rho at V; far = v1/V, near = 1 - v1/V; a = d v1 and
+b = gamma v1^n; M = m0 + m1 s + m2 s^n. Units and records: see `_units`. Derived here.
 """
 
 import math
@@ -18,7 +21,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kernels.foliot._single_loss import without_degree_0
 from kernels.foliot._units import Cycle, errors
 from kernels.lanes.codes import NOT_CONVERGED, OK, OUT_OF_RANGE
 from kernels.lanes.jit import jit, jit_call
@@ -37,28 +39,26 @@ _WIDEST = 750.0  # no ln v1 of a float64 is beyond
 _POWER, _NODES = 5, 32
 
 
-def _legendre(x):
-    """P_n and its derivative at x, n = _NODES."""
-    before, value = Decimal(1), x
-    for k in range(2, _NODES + 1):
-        before, value = value, ((2 * k - 1) * x * value - (k - 1) * before) / k
-    return value, _NODES * (x * value - before) / (x * x - 1)
-
-
 def _rule():
     """s, 1 - s, ln s and weights of Gauss-Legendre in s^(1/5), where s^n and ln s are smooth enough for any n >= 0.
 
-    In decimal arithmetic, so that the table has the same bits on every machine.
+    Newton's method on P_n, n = _NODES, in decimal arithmetic: the table has the same bits on every machine.
     """
+
+    def legendre(x):
+        before, value = Decimal(1), x
+        for k in range(2, _NODES + 1):
+            before, value = value, ((2 * k - 1) * x * value - (k - 1) * before) / k
+        return value, _NODES * (x * value - before) / (x * x - 1)
+
     rows = []
-    with localcontext() as context:
-        context.prec = 40
+    with localcontext(prec=40):
         for j in range(_NODES):
             x = Decimal(-math.cos(math.pi * (j + 0.75) / (_NODES + 0.5)))
             for _ in range(6):
-                value, slope = _legendre(x)
+                value, slope = legendre(x)
                 x -= value / slope
-            u, weight = (1 + x) / 2, 1 / ((1 - x * x) * _legendre(x)[1] ** 2)
+            u, weight = (1 + x) / 2, 1 / ((1 - x * x) * legendre(x)[1] ** 2)
             s = u**_POWER
             rows.append([float(v) for v in (s, 1 - s, s.ln(), weight * _POWER * u ** (_POWER - 1))])
     return (np.array(column) for column in zip(*rows, strict=True))
@@ -68,7 +68,7 @@ _S, _REST, _LOG_S, _WEIGHT = _rule()
 
 
 class Terminal(NamedTuple):
-    """ln V of f(V) = 1, and the shares D = d V and G = gamma V^n of 1 - rho there."""
+    """ln V of f(V) = 1, and the shares D and G of 1 - rho there; without drag V is infinite and D = 0."""
 
     log_V: float
     D: float
@@ -76,14 +76,7 @@ class Terminal(NamedTuple):
 
 
 class Speeds(NamedTuple):
-    """All that the integrands need at z = exp(y)/V, so that exp(y) is v1 at strong drive.
-
-    v1, log_v1
-    z, far, near : z, v1/V and 1 - v1/V
-    F1, slope : 1 - f(v1), and the same over `near`, which tends to V f'(V)
-    a, b : d v1 and gamma v1^n
-    kept, power : (v1/V)^n from 1 down, and as it is
-    """
+    """v1, ln v1, z, far, near; F1 = 1 - f(v1), and that over `near`, which tends to V f'(V); a, b; 1 - far^n, far^n."""
 
     v1: float
     log_v1: float
@@ -99,13 +92,13 @@ class Speeds(NamedTuple):
 
 
 @jit_call
-def _terminal(law):
-    """The terminal speed V; without drag it is infinite, D = 0.
+def _terminal(scene):
+    """The terminal speed.
 
     Newton for ln(D + G) in ln V, which is convex: from above the root, where each share alone is at most 1 - rho, the
     steps are monotone.
     """
-    d, _, gamma, n, _, slack = law
+    d, gamma, n, slack = scene.d, scene.gamma, scene.n, scene.slack
     left, log_d, log_gamma = log(slack), log(d), log(gamma)
     by_d, by_gamma = log(slack / d), log(slack / gamma) / n
     u = where(by_d < by_gamma, by_d, by_gamma)
@@ -126,10 +119,9 @@ def _terminal(law):
 
 
 @jit
-def _speeds(law, terminal, y):
+def _speeds(scene, terminal, y):
     """The speeds at y."""
-    n = law.n
-    log_V, D, G = terminal
+    n, (log_V, D, G) = scene.n, terminal
     log_z = y - log_V
     z = exp(log_z)
     near, far = exp(-z), -expm1(-z)
@@ -140,17 +132,17 @@ def _speeds(law, terminal, y):
     slope = fma(G, where(near > 1e-290, kept / near, n), D)
     v1 = exp(y) * ratio
     F1, log_v1 = fma(G, kept, D * near), y + log_ratio
-    return Speeds(v1, log_v1, z, far, near, F1, slope, law.d * v1, G * power, kept, power)
+    return Speeds(v1, log_v1, z, far, near, F1, slope, scene.d * v1, G * power, kept, power)
 
 
 @jit
-def _leg(law, a, b):
-    """1 - e^2, and the coefficients of M = m0 + m1 s + m2 s^n."""
-    n, e = law.n, law.e
+def _leg(scene, a, b):
+    """1 - e^2, and the coefficients m0, m1, m2 of M for friction rho + a s + b s^n."""
+    n, e = scene.n, scene.e
     outward = e > 0.0
     less = -expm1(n * log(magnitude(e)))  # 1 - E^n
     m1, m2 = a * (1.0 + e), b * where(outward, 2.0 - less, less)
-    return (1.0 - e) * (1.0 + e), where(outward, 2.0 * law.rho, 0.0), m1, m2
+    return (1.0 - e) * (1.0 + e), where(outward, 2.0 * scene.rho, 0.0), m1, m2
 
 
 @jit
@@ -163,27 +155,25 @@ def _pole(e, far, near, rest, s):
 
 
 @jit
-def _pole_integral(e, z, far, near):
-    """The integral of `_pole` over s: ln((1 - E v1/V)/(1 - v1/V)) V/v1."""
+def _defect(z, rule, e, far, near):
+    """What the rule misses of the integral of `_pole` over s; 0 where it is far enough for the rule to miss nothing.
+
+    The integral is ln((1 - E v1/V)/(1 - v1/V)) V/v1.
+    """
+    close = z > _NEAR
+    far = where(close, far, 1.0)
     gap = where(e > 0.0, 0.0, 1.0 + e) * far
     mild = z < 600.0
     inward = where(mild, log1p(gap / where(mild, near, 1.0)), z + log(near + gap))
-    return where(e > 0.0, z, inward) / far
-
-
-@jit
-def _defect(z, rule, e, far, near):
-    """What the rule misses of the pole's integral; 0 where it is far enough for the rule to miss nothing."""
-    close = z > _NEAR
-    return where(close, _pole_integral(e, z, where(close, far, 1.0), near) - rule, 0.0)
+    return where(close, where(e > 0.0, z, inward) / far - rule, 0.0)
 
 
 @jit_call
-def _excess(law, terminal, y):
+def _excess(scene, terminal, y):
     """ln of the right side of (2) over its left, and its slope in y."""
-    n, e = law.n, law.e
-    _, log_v1, z, far, near, F1, slope, a, b, _, _ = _speeds(law, terminal, y)
-    lost, m0, m1, m2 = _leg(law, a, b)
+    n, e = scene.n, scene.e
+    _, log_v1, z, far, near, F1, slope, a, b, _, _ = _speeds(scene, terminal, y)
+    lost, m0, m1, m2 = _leg(scene, a, b)
     total, rule = 0.0 * y, 0.0 * y
     for j in range(_NODES):
         q = -expm1(n * _LOG_S[j])
@@ -199,36 +189,30 @@ def _excess(law, terminal, y):
     return fma(2.0, log_v1, log(0.5 * total)), stretch * rate / total
 
 
-@jit
-def _guess(law, terminal):
-    """y from the strong limit of each friction term alone and from the weak limit V z = 2 V f'(V)/V."""
-    d, _, gamma, n, _, slack = law
-    log_V, D, G = terminal
-    lost, m0, m1, m2 = _leg(law, d, gamma)
+@jit_call
+def _solve(scene, terminal):
+    """y of the cycle, and where it has not settled.
+
+    The right side of (2) grows with y, on logarithmic scales with a slope between about 1 and n + 2: Newton, within the
+    bracket that every evaluation narrows; it begins with all float64 and is halved where a step leaves it. The start is
+    from the strong limit of each friction term alone and from the weak limit V z = 2 V f'(V)/V.
+    """
+    d, gamma, n, slack, (log_V, D, G) = scene.d, scene.gamma, scene.n, scene.slack, terminal
+    lost, m0, m1, m2 = _leg(scene, d, gamma)
     product = slack * (slack + m0)
     steady = 0.5 * log(4.0 * product / fma(lost, slack, m0))
     viscous = (1.0 / 3.0) * log(6.0 * product / m1)
     drag = log(2.0 * (n + 2.0) * product / m2) / (n + 2.0)
     strong = where(steady < viscous, steady, viscous)
     strong = where(strong < drag, strong, drag)
-    return log(exp(strong) + 2.0 * fma(n, G, D) * exp(-log_V))
-
-
-@jit_call
-def _solve(law, terminal):
-    """y of the cycle, and where it has not settled.
-
-    The right side of (2) grows with y, on logarithmic scales with a slope between about 1 and n + 2: Newton, within the
-    bracket that every evaluation narrows; it begins with all float64 and is halved where a step leaves it.
-    """
-    y = _guess(law, terminal)
+    y = log(exp(strong) + 2.0 * fma(n, G, D) * exp(-log_V))
     y = where((y > -_WIDEST) & (y < _WIDEST), y, 0.0)
     low, high = 0.0 * y - _WIDEST, 0.0 * y + _WIDEST
     active = y > low
     for _ in range(NEWTON_LIMIT):
         if not any_lane(active):
             break
-        excess, slope = _excess(law, terminal, y)
+        excess, slope = _excess(scene, terminal, y)
         low, high = where(excess < 0.0, y, low), where(excess < 0.0, high, y)
         step = -excess / slope
         settled = magnitude(step) <= SETTLED
@@ -240,32 +224,34 @@ def _solve(law, terminal):
 
 
 @jit_call
-def _strong(law, terminal, y):
-    """Integral of (3) over v1, that of s/B, and s, by scaling speeds with v1.
+def _strong(scene, speeds):
+    """The integrals of (3) over v1 and of s/B, and the sensitivity, by scaling speeds with v1.
 
-    With g the logarithmic derivatives of the integral of (4) by a, b and rho, and h those of (3), (4) gives
-    w = dln v1/dln mu = (1 + g)/(2 + g_a + n g_b), and s = 1 - w + h - w (h_a + n h_b). Where friction is weak, 1 - w
-    and h are small; so 1 - g is taken from (1 - e^2) - (f/F)^2 + (E f_B/B)^2, and h from differences such as
-    1/F^2 - E^2/B^2 as products, where ones would cancel.
+    Write W for the integral in (4) and T for that of (3) over v1; then v1^2 W = 2 mu and half period = v1 T/mu, where W
+    and T depend on rho, a and b over mu. With the logarithmic derivatives of W and the derivatives of T
+        W g_a = a int s^2 (1/F^2 + e^3/B^2) ds,  g_b with b s^(n+1) and e E^n e, g_rho alike;  g their sum,
+        h_a = int s (1/F^2 - E^2/B^2) ds,  h_b with s^n and E^(n+1), h_rho with 1 and E,
+    w = dln v1/dln mu is (1 + g)/(2 + g_a + n g_b), and s = 1 - w + (rho h_rho + (1 - w) a h_a + (1 - n w) b h_b)/T.
+    Where friction is weak 1 - w and h are small, so differences are taken as products of what does not cancel:
+        1 - g = int s ((1 - e^2) - (f/F)^2 + (E f_B/B)^2) ds/W,  f = rho + a s + b s^n, f_B that at E s,
+        1/F^2 - E^2/B^2 = ((1 - E) F + M)(E F + B)/(F B)^2,  for each term with its own power of E.
     """
-    _, rho, _, n, e, _ = law
-    speeds = _speeds(law, terminal, y)
+    rho, n, e = scene.rho, scene.n, scene.e
     F1, a, b = speeds.F1, speeds.a, speeds.b
-    lost, m0, m1, m2 = _leg(law, a, b)
+    lost, m0, m1, m2 = _leg(scene, a, b)
     E = magnitude(e)
     log_E = log(E)
-    root, root_n = sqrt(E), exp(0.5 * n * log_E)
-    j0, j1, j2 = (1.0 - E) / (1.0 + root), 1.0 - E, -expm1((0.5 * n + 0.5) * log_E)  # 1 - sqrt(E) ...
-    k0, k1, k2 = rho * (1.0 - E), a * (1.0 - E) * (1.0 + E), -b * expm1((n + 1.0) * log_E)
+    root, root_n = sqrt(E), exp(0.5 * n * log_E)  # sqrt(E), E^(n/2)
+    j0, j1, j2 = (1.0 - E) / (1.0 + root), 1.0 - E, -expm1((0.5 * n + 0.5) * log_E)  # 1 - sqrt(E), 1 - E ...
+    k0, k1, k2 = rho * (1.0 - E), a * (1.0 - E) * (1.0 + E), -b * expm1((n + 1.0) * log_E)  # f - E f_B
     back = e * (E * E)
-    way, time, rise = 0.0 * y, 0.0 * y, 0.0 * y
-    excess, g_a, g_b = 0.0 * y, 0.0 * y, 0.0 * y
-    h_rho, h_a, h_b = 0.0 * y, 0.0 * y, 0.0 * y
+    way, time, rise = 0.0 * F1, 0.0 * F1, 0.0 * F1
+    excess, g_a, g_b = 0.0 * F1, 0.0 * F1, 0.0 * F1
+    h_rho, h_a, h_b = 0.0 * F1, 0.0 * F1, 0.0 * F1
     for j in range(_NODES):
-        s = _S[j]
-        w, ws = _WEIGHT[j], _WEIGHT[j] * s
+        s, w, ws = _S[j], _WEIGHT[j], _WEIGHT[j] * _S[j]
         q = -expm1(n * _LOG_S[j])
-        p = 1.0 - q
+        p = 1.0 - q  # s^n
         F = fma(a, _REST[j], fma(b, q, F1))
         M = fma(m1, s, fma(m2, p, m0))
         B = F + M
@@ -289,22 +275,28 @@ def _strong(law, terminal, y):
 
 
 @jit_call
-def _weak(law, terminal, y):
+def _weak(scene, terminal, speeds):
     """As `_strong`, by scaling speeds with V, so that nothing is divided by 1 - v1/V.
 
-    At fixed z all integrands change smoothly with -ln mu: by the changes of D, G and rho, which keep D + G + rho = 1.
+    At fixed z all integrands change smoothly with -ln mu: ln V by `stretch`, which keeps D + G + rho = 1, and with it D
+    by D_, G by G_ and rho by rho. A name with _ is a derivative by -ln mu at fixed z: way_ of the integral
+    of (4), time_ of (3) over v1, miss_ of what the rule misses of the pole, 1/K times its integral, K = V f'(V).
+    The change of z that keeps (2) is then worth `ratio`, the way's share over the time's at the end v = v1 of both
+    integrals, where their integrands are infinitely steep at weak drive and their ratio is not.
     """
-    _, rho, _, n, e, _ = law
+    rho, n, e = scene.rho, scene.n, scene.e
     _, D, G = terminal
-    _, _, z, far, near, F1, _, _, b, kept, power = _speeds(law, terminal, y)
-    lost, m0, m1, m2 = _leg(law, D * far, b)
-    _, _, m1_D, m2_G = _leg(law, far, power)
+    z, far, near, F1, b, kept, power = (
+        speeds.z, speeds.far, speeds.near, speeds.F1, speeds.b, speeds.kept, speeds.power
+    )  # fmt: skip
+    lost, m0, m1, m2 = _leg(scene, D * far, b)
+    _, _, m1_D, m2_G = _leg(scene, far, power)
     K = fma(n, G, D)
-    stretch = -(0.5 * D + rho + (1.0 - 0.5 * n) * G) / K  # of ln V
+    stretch = -(0.5 * D + rho + (1.0 - 0.5 * n) * G) / K
     D_, G_ = D * (0.5 + stretch), G * fma(n, stretch - 0.5, 1.0)
-    way, time, rise, rule = 0.0 * y, 0.0 * y, 0.0 * y, 0.0 * y
-    way_, time_ = 0.0 * y, 0.0 * y
+    way, time, rise, rule, way_, time_ = 0.0 * z, 0.0 * z, 0.0 * z, 0.0 * z, 0.0 * z, 0.0 * z
     for j in range(_NODES):
+        w, ws = _WEIGHT[j], _WEIGHT[j] * _S[j]
         q = -expm1(n * _LOG_S[j])
         p = 1.0 - q
         x, x_n = fma(far, _REST[j], near), fma(power, q, kept)
@@ -314,8 +306,6 @@ def _weak(law, terminal, y):
         B_ = F_ + fma(D_ * m1_D, _S[j], fma(G_ * m2_G, p, m0))
         both = 1.0 / (F * B)
         inverse_F, inverse_B = B * both, F * both
-        w = _WEIGHT[j]
-        ws = w * _S[j]
         way = fma(ws * fma(lost, F, M), both, way)
         time = fma(w * fma(1.0 + e, F, M), both, time)
         rise = fma(ws, inverse_B, rise)
@@ -330,25 +320,23 @@ def _weak(law, terminal, y):
     way_, time_ = way_ + miss_ / far, time_ + miss_
     M1 = m0 + m1 + m2
     ratio = fma(1.0 + e, F1, M1) * way / (fma(lost, F1, M1) * time)
-    s = 0.5 + (stretch + time_ / time) - (2.0 * stretch + way_ / way) * ratio
-    return time, rise, s
+    return time, rise, 0.5 + (stretch + time_ / time) - (2.0 * stretch + way_ / way) * ratio
 
 
 @jit
-def solve_quadrature(scene, rtol):
-    """The cycle of a scene with kappa = 0, right to what `quadrature_bound` promises whatever rtol, and its verdict."""
-    law = without_degree_0(scene)
-    terminal = _terminal(law)
-    y, unsettled = _solve(law, terminal)
-    speeds = _speeds(law, terminal, y)
+def quadrature(scene, rtol):
+    """The cycle of a scene with kappa = 0, accurate to `bound` whatever rtol, and its verdict."""
+    terminal = _terminal(scene)
+    y, unsettled = _solve(scene, terminal)
+    speeds = _speeds(scene, terminal, y)
     v1, F1 = speeds.v1, speeds.F1
-    _, m0, m1, m2 = _leg(law, speeds.a, speeds.b)
-    e, near = law.e, speeds.z > _NEAR
+    _, m0, m1, m2 = _leg(scene, speeds.a, speeds.b)
+    e, near = scene.e, speeds.z > _NEAR
     time, rise, s = 0.0 * y, 0.0 * y, 0.0 * y
     if any_lane(not_(near)):
-        time, rise, s = _strong(law, terminal, y)
+        time, rise, s = _strong(scene, speeds)
     if any_lane(near):
-        late, high, weak = _weak(law, terminal, y)
+        late, high, weak = _weak(scene, terminal, speeds)
         time, rise, s = where(near, late, time), where(near, high, rise), where(near, weak, s)
     amplitude = 1.0 + where(e > 0.0, v1 * v1 * (e * e) * rise, 0.0)
     half = v1 * time
@@ -358,16 +346,15 @@ def solve_quadrature(scene, rtol):
 
 
 @jit
-def quadrature_bound(scene):
-    """Relative errors of `solve_quadrature`.
+def bound(scene):
+    """Relative errors of `quadrature`: 1e-14 to 1e-13 for drag of degree 0.05 to 4.
 
     Measured: 1e-14 everywhere, 1e-16/(1 + e) where the switch gives almost all speed back inward. Beyond that, what
     rounding of gamma leaves of V = ((1 - rho)/gamma)^(1/n), 1/n ulp; of its logarithm; and of z, 2 V f'(V)/V^2 + 2, in
     the multiplier exp(-z). For n > 4 singularities at v = V exp(+-i pi/n) come near: the rule misses (n/4)^11 4e-14.
     """
-    law = without_degree_0(scene)
-    log_V, D, G = _terminal(law)
-    n, e = law.n, law.e
+    log_V, D, G = _terminal(scene)
+    n, e = scene.n, scene.e
     high, deep = where(log_V > 0.0, log_V, 0.0), where(log_V < 0.0, -log_V, 0.0)
     shape = 1.0 / (n * where(high > 1.0, high, 1.0)) + where(high < _FAR, n * high, 0.0) + deep
     steep = where(n > 4.0, 0.25 * n, 0.0)

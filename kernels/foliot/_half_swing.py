@@ -9,33 +9,113 @@ point A, a tangent's speed jumps by
     J = (tau + kappa A - f(0))/(tau + kappa A + f(0)).                                               (3)
 Where the motion comes to rest on its way in it is helped, without speed, to the next place where the drive wins over
 dry friction.
+
+Drag of a degree that is no whole number has a slope f' that is not smooth at rest, and of a step that begins or ends
+there the estimated error is up to 70 times too low, and up to 8 times. So a step is at most a share of the time to
+rest, or since, and rest itself is passed without one: below a slow speed w drag is held at what it is there. As in
+that short time Y = ln(1 + f(w)/(tau + kappa A + rho)) outwards, and likewise inwards, (3) with f(0) + f(w) for f(0) is
+what J exp(-Y) is with the slope followed to rest.
 """
 
 import math
 from typing import NamedTuple
 
-from kernels.foliot._swing_law import Law, Leg, Power, Swing, Terms, accelerations, held_at, pull
-from kernels.foliot._turning import longest, slow_speed, turned
-from kernels.integrate.nystrom import integrate_until
+from kernels.integrate.tableaux import DOPRI5, DOPRI5_ERROR
 from kernels.lanes.jit import jit, jit_call, jit_inline
-from kernels.lanes.records import named
-from kernels.lanes.vectors import any_lane, choose, fma, magnitude, not_, where
-from kernels.maths.elementary import exp, smaller
+from kernels.lanes.tuples import after, times
+from kernels.lanes.vectors import any_lane, choose, exponent, fma, magnitude, nearest, not_, pow2, sqrt, where
+from kernels.maths.elementary import LN2, exp, larger, power, sincos, smaller
 
 HELP_LIMIT = 1000
 """Places of rest on one half swing; a motion with more is taken for one that does not arrive."""
+STEP_LIMIT = 10_000
+"""Steps of a leg after which a cell is given up."""
+_ROOT_LIMIT, _SETTLED = 60, 1e-9
+"""Trials for the end of a leg; Newton's step, over the whole one, after which the next is the last: its error is the
+square."""
+_SAFETY, _SHRINK, _GROW = 0.9, 0.2, 5.0
+_SHARE = 0.3
+"""Of rtol that a single step may take; the rest is left to their sum."""
+_ROUGH_SHARE, _SHARP_SHARE = 0.1, 0.03
+"""The same for friction whose slope is not smooth at rest, near which estimates of the error are too low; and where its
+degree is below 2 or torque varies: errors of v count more there."""
+_SMOOTHER = 4.0
+"""Degree of drag from which a step that begins or ends at rest has an error below its estimate."""
+_FLOOR = 1e-4
+"""Of rtol and the clock's speed: the speed below which drag of a degree below 1 is constant."""
 _FORGOTTEN = 40.0
 """Y after which a motion that no force varies along the way is uniform, to exp(-40)."""
 _SCAN, _BISECTIONS = 32, 40
 _ARRIVED, _ROUNDED = 1e-12, 4e-15
 """How far x may be from the switch for having reached it: so much, and so much of the largest x."""
+_NEARER, _FARTHER = 0.8, 3.0
+"""Of the time to rest, and of that since rest, which a step may be long: its error is then at most 3 and 8 times the
+estimate, in quadrature of a power of the time with exponents from -0.9 to 3."""
+_SLOW = 0.01
+"""Of the tolerance, what is left out below the slow speed."""
+
+
+class Problem(NamedTuple):
+    """A cell by the terms of (1) and (2).
+
+    outwards, inwards : 1 + rho, with which dry friction helps, and 1 - rho; wave = harmonic pi/2
+    floor : speed below which power-law friction is constant
+    share : of rtol that a single step may take; rough: whether friction's slope is not smooth at rest
+    stiffness, pace : f'(V) and 1/V for the speed V at which friction balances the drive, within a factor of 2
+    """
+
+    e: float
+    rho_s: float
+    outwards: float
+    inwards: float
+    d: float
+    gamma: float
+    n: float
+    kappa: float
+    depth: float
+    wave: float
+    rtol: float
+    floor: float
+    share: float
+    rough: bool
+    stiffness: float
+    pace: float
+
+
+class Law(NamedTuple):
+    """The right-hand side of (1) from a reversal to the next: sign of the speed, constant force, and terms."""
+
+    side: float
+    steady: float
+    d: float
+    gamma: float
+    n: float
+    floor: float
+    kappa: float
+    depth: float
+    wave: float
+
+
+class Leg(NamedTuple):
+    """What ends a leg and bounds its steps.
+
+    stop, forgotten : speed along it and Y at its end; forgetting: f', roughly
+    slow : speed above which power-law friction is not smooth, 0 if it is smooth
+    scales : what a step's errors are relative to, at least: of speed, of its tangent by ln mu, of those by v0
+    """
+
+    stop: float
+    forgotten: float
+    forgetting: float
+    slow: float
+    scales: tuple
 
 
 class Half(NamedTuple):
     """A half swing.
 
     end : speed F at the switch, 0 where it is not reached
-    state, leg : at the switch
+    state : (x, v, x_mu, v_mu, x_start, v_start, Y) at the switch, with tangents by ln mu and by v0; rate: x'' there
     top, top_by_start : turning point and its tangent by v0
     time : taken
     shrink : J exp(-Y), 0 where helped
@@ -44,7 +124,7 @@ class Half(NamedTuple):
 
     end: float
     state: tuple
-    leg: Leg
+    rate: float
     top: float
     top_by_start: float
     time: float
@@ -54,65 +134,231 @@ class Half(NamedTuple):
 
 
 @jit
-def _scales(state, law):
-    x, v, x_mu, v_mu, x_start, v_start, decay = state
-    scales = law.terms.scales
-    return (
-        1.0 + magnitude(x),
-        scales.speed + magnitude(v),
-        scales.weak + magnitude(x_mu),
-        scales.pace + magnitude(v_mu),
-        scales.pace + magnitude(x_start),
-        1.0 + magnitude(v_start),
-        1.0 + 0.01 * decay,
+def problem_of(scene, ripple, rtol):
+    """The cell's terms.
+
+    Friction of degree 1 is viscous. Of a degree below, the slope at rest is infinite: below the floor friction is held
+    constant.
+    """
+    d, rho, rho_s, gamma, n, kappa, e, slack = scene
+    depth, harmonic = ripple
+    linear = not_(n < 1.0) & not_(n > 1.0)
+    d, gamma = d + where(linear, gamma, 0.0), where(linear, 0.0, gamma)
+    by_drag, by_power = d / slack, 0.0 * d
+    if any_lane(gamma > 0.0):
+        by_power = where(gamma > 0.0, power(gamma / slack, 1.0 / n), 0.0)
+    pace = by_drag + by_power
+    floor = where(n < 1.0, _FLOOR * rtol / (1.0 + pace), 0.0)
+    whole = not_(nearest(n) > n) & not_(nearest(n) < n)
+    rough = (gamma > 0.0) & (n < _SMOOTHER) & not_(whole)
+    share = where((depth > 0.0) | ((gamma > 0.0) & (n < 2.0)), _SHARP_SHARE, where(rough, _ROUGH_SHARE, _SHARE))
+    wave, stiffness = harmonic * (0.5 * math.pi), d + n * slack * by_power
+    return Problem(
+        e, rho_s, 1.0 + rho, slack, d, gamma, n, kappa, depth, wave, rtol, floor, share, rough, stiffness, pace
     )
 
 
+@jit_call
+def _ripple(x, depth, wave):
+    """tau(x) - 1 of (2), and its slope."""
+    sine, cosine = sincos(wave * (1.0 - x))
+    return depth * cosine, depth * wave * sine
+
+
+@jit_call
+def _drag(speed, gamma, n, floor):
+    """gamma speed^n and its slope, n > 0, taken as constant below the speed `floor`."""
+    within = speed > floor
+    speed = where(within, speed, floor)
+    slope = gamma * power(speed, n - 1.0)
+    return slope * speed, where(within, n * slope, 0.0)
+
+
 @jit
-def _ends(state, acceleration, law):
+def pull(x, problem):
+    """Force of torque and spring towards the switch, tau + kappa x, less 1."""
+    extra = 0.0 * x
+    if any_lane(problem.depth > 0.0):
+        extra, _ = _ripple(x, problem.depth, problem.wave)
+    return fma(problem.kappa, x, extra)
+
+
+@jit
+def _held_at(problem, speed):
+    """Power-law friction at a speed, 0 at rest."""
+    held = 0.0 * speed
+    if any_lane((problem.gamma > 0.0) & (speed > 0.0)):
+        held = where(speed > 0.0, problem.gamma * power(speed, problem.n), 0.0)
+    return held
+
+
+@jit
+def rates(state, law):
+    """(1), its tangents, and f'."""
+    x, v, x_mu, v_mu, x_start, v_start, _ = state
+    extra, by_x, lost, by_v = 0.0 * x, 0.0 * x, 0.0 * x, 0.0 * x
+    if any_lane(law.depth > 0.0):
+        extra, by_x = _ripple(x, law.depth, law.wave)
+    if any_lane(law.gamma > 0.0):
+        lost, by_v = _drag(magnitude(v), law.gamma, law.n, law.floor)
+    force = fma(law.kappa, x, law.steady + extra) + fma(law.d, v, law.side * lost)
+    stiffness, slope = law.kappa + by_x, law.d + by_v
+    by_mu = fma(stiffness, x_mu, fma(slope, v_mu, 1.0 + extra))
+    return v, -force, v_mu, -by_mu, v_start, -fma(stiffness, x_start, slope * v_start), slope
+
+
+@jit
+def inwards(problem, floor):
+    """The law of the leg behind the turning point."""
+    d, gamma, n, kappa, depth, wave = problem.d, problem.gamma, problem.n, problem.kappa, problem.depth, problem.wave
+    return Law(0.0 * d - 1.0, problem.inwards, d, gamma, n, floor, kappa, depth, wave)
+
+
+@jit_call
+def _step(state, first, law, h, scales):
+    """One step of Dormand-Prince 5(4) from the rates `first`: state and rates after it, the largest error over scale.
+
+    One division in all, for they are dear: the worst error and its scale are compared crosswise.
+    """
+    k1 = rates(after(state, h, DOPRI5[0], (first,)), law)
+    k2 = rates(after(state, h, DOPRI5[1], (first, k1)), law)
+    k3 = rates(after(state, h, DOPRI5[2], (first, k1, k2)), law)
+    k4 = rates(after(state, h, DOPRI5[3], (first, k1, k2, k3)), law)
+    k5 = rates(after(state, h, DOPRI5[4], (first, k1, k2, k3, k4)), law)
+    new = after(state, h, DOPRI5[5], (first, k2, k3, k4, k5))
+    last = rates(new, law)
+    errors = after(times(0.0, state), h, DOPRI5_ERROR, (first, k2, k3, k4, k5, last))
+    speed, weak, pace = scales
+    worst, over = 0.0 * h, 0.0 * h + 1.0
+    least = (over, speed, weak, pace, pace, over, over)
+    for j in range(7):
+        error, scale = magnitude(errors[j]), least[j] + where(j < 6, 1.0, 0.01) * magnitude(state[j])
+        worse = (error * over > worst * scale) | not_(error < math.inf)
+        worst, over = where(worse, error, worst), where(worse, scale, over)
+    return new, last, worst / over
+
+
+@jit
+def _step_factor(ratio):
+    """0.9 ratio^(-1/5), from 0.2 to 5, for a step whose error was `ratio` of what is allowed."""
+    ratio = where(ratio < 1e6, ratio, 1e6)  # NaN too: the step overflowed
+    ratio = where(ratio > 1e-6, ratio, 1e-6)
+    e = exponent(ratio)
+    m = ratio * pow2(-e) - 1.0
+    log2_ratio = e + m * (4.0 / 3.0 - m * (1.0 / 3.0))  # within 0.01
+    factor = larger(_SAFETY * exp(-0.2 * LN2 * log2_ratio), _SHRINK + 0.0 * ratio)
+    return smaller(factor, _GROW + 0.0 * ratio)
+
+
+@jit
+def _left(state, acceleration, law, leg):
     """Falls to 0 where a leg ends, and its rate: the least of speed along the leg, way left to the switch, and memory.
 
     Outwards the way left is above 2, so that the speed decides: at the turning point. Inwards it is the switch, unless
     the motion comes to rest before, or friction has made it uniform.
     """
-    x, v, _, _, _, _, decay = state
-    leg = law.leg
-    value, rate = leg.sign * v - leg.stop, leg.sign * acceleration
-    left = x + 1.0
-    value, rate = where(value < left, value, left), where(value < left, rate, v)
+    x, v, decay = state[0], state[1], state[6]
+    value, rate = law.side * v - leg.stop, law.side * acceleration
+    way = x + 1.0
+    value, rate = where(value < way, value, way), where(value < way, rate, v)
     memory = leg.forgotten - decay
     return where(value < memory, value, memory), where(value < memory, rate, -leg.forgetting)
 
 
-@jit_call
-def _released(x, slack, terms):
-    """The next place inwards from x where the drive wins over dry friction; -1 where there is none."""
-    depth, wave = terms.ripple
-    step = 2.0 * math.pi / _SCAN / where(depth > 0.0, wave, math.inf)
-    held, free = x, 0.0 * x - 1.0
-    searching = depth > 0.0
-    for i in range(_SCAN):
+@jit
+def _longest(v, acceleration, leg):
+    """The longest step, where friction is not smooth at rest: by the time to rest, or since."""
+    most = 0.0 * v + math.inf
+    if any_lane(leg.slow > 0.0):
+        speed, leaving = magnitude(v), v * acceleration > 0.0
+        change = where(leaving, _FARTHER * speed, larger(_NEARER * speed, leg.slow))
+        most = where(leg.slow > 0.0, change / magnitude(acceleration), most)
+    return most
+
+
+@jit_inline
+def _to_end(state, law, leg, h, tolerance, active):
+    """The active cells at the end of their leg, the time taken, the last whole step, and where it is not reached.
+
+    The step across the end is shortened until it ends there: Newton, bisection where that leaves the bracket. Each
+    trial is a whole Runge-Kutta step from the same state, so the root has the order of the method.
+    """
+    moving, t, first = active, 0.0 * h, rates(state, law)
+    h = smaller(h, _longest(state[1], first[1], leg))
+    for _ in range(STEP_LIMIT):
+        if not any_lane(moving):
+            break
+        new, last, error = _step(state, first, law, h, leg.scales)
+        ratio = error / tolerance
+        accepted = moving & (ratio <= 1.0)
+        passed = accepted & (_left(new, 0.0, law, leg)[0] <= 0.0)
+        moving = moving & not_(passed)
+        accepted = accepted & moving
+        state, first = choose(accepted, new, state), choose(accepted, last, first)
+        t = where(accepted, t + h, t)
+        most = where(accepted, _longest(new[1], last[1], leg), h)
+        h = where(moving, smaller(h * _step_factor(ratio), most), h)
+
+    low, high, shorter = 0.0 * h, h, 0.5 * h
+    new, last, _ = _step(state, first, law, shorter, leg.scales)
+    searching = active
+    for _ in range(_ROOT_LIMIT):
         if not any_lane(searching):
             break
-        there = x - (i + 1.0) * step
-        found = searching & (slack + pull(there, terms) > 0.0)
-        held = where(searching & not_(found), there, held)
-        free = where(found & (there > -1.0), there, free)
-        searching = searching & not_(found)
-    for _ in range(_BISECTIONS):
-        middle = 0.5 * (held + free)
-        wins = slack + pull(middle, terms) > 0.0
-        held, free = where(wins, held, middle), where(wins, middle, free)
-    return free
+        value, rate = _left(new, last[1], law, leg)
+        low, high = where(value > 0.0, shorter, low), where(value > 0.0, high, shorter)
+        guess = shorter - value / rate
+        settled = magnitude(guess - shorter) <= _SETTLED * h
+        guess = where(settled | ((guess > low) & (guess < high)), guess, 0.5 * (low + high))
+        shorter = where(searching, guess, shorter)
+        trial, rates_there, _ = _step(state, first, law, shorter, leg.scales)
+        new, last = choose(searching, trial, new), choose(searching, rates_there, last)
+        searching = searching & not_(settled)
+    return choose(active, new, state), t + where(active, shorter, 0.0), h, moving
 
 
 @jit
-def _inwards(decay, slow, problem):
-    """The leg behind the turning point: dry friction has changed sign."""
-    terms = problem.terms
-    varied = (terms.kappa > 0.0) | (terms.ripple.depth > 0.0)
-    forgotten = where(varied, math.inf, decay + _FORGOTTEN)
-    return Leg(0.0 * decay - 1.0, problem.dry.inwards, forgotten, problem.stiffness, 0.0 * decay, slow)
+def _moved(state, law, steady, time):
+    """The state after a time over which accelerations are constant, under the constant force `steady`, without drag."""
+    x, v, x_mu, v_mu, x_start, v_start, decay = state
+    bare = Law(law.side, steady, law.d, 0.0 * x, law.n, law.floor, law.kappa, law.depth, law.wave)
+    _, force, _, by_mu, _, by_start, slope = rates(state, bare)
+    half = 0.5 * time
+    return (
+        fma(time, fma(half, force, v), x),
+        fma(time, force, v),
+        fma(time, fma(half, by_mu, v_mu), x_mu),
+        fma(time, by_mu, v_mu),
+        fma(time, fma(half, by_start, v_start), x_start),
+        fma(time, by_start, v_start),
+        fma(time, slope, decay),
+    )
+
+
+@jit
+def _turned(state, law, slow, problem):
+    """The state behind the turning point; J; way and its tangent by v0 there; and the time taken.
+
+    Power-law friction that is not smooth at rest is constant from the speed of the state to rest, and from there to
+    the speed `slow`: J takes both, and with the integral Y outside is what it is without a step through rest.
+    """
+    zero, v, turns = 0.0 * slow, state[1], problem.e > 0.0
+    still = turns | not_(v < 0.0)
+    speed = where(slow > 0.0, larger(v, zero), zero)
+    held = _held_at(problem, speed)
+    braking = problem.outwards + held + pull(state[0], problem) + problem.d * speed
+    before = speed / braking
+    x, _, x_mu, v_mu, x_start, v_start, decay = _moved(state, law, problem.outwards + held, before)
+    force = pull(x, problem)
+    free = problem.inwards + force
+    speed = where(still & (free > 0.0), slow * smaller(free / problem.inwards, zero + 1.0), zero)
+    held_in = _held_at(problem, speed)
+    goes = free > held_in
+    jump = where(turns, (problem.inwards - held_in + force) / (problem.outwards + held + force), 1.0)
+    after_rest = where(goes, speed / (free - held_in), 0.0)
+    rest = (x, 0.0 * x, x_mu, jump * v_mu, x_start, jump * v_start, decay)
+    behind = _moved(rest, law, problem.inwards - held_in, after_rest)
+    return choose(still, behind, state), jump, x, x_start, before + after_rest
 
 
 @jit
@@ -122,82 +368,89 @@ def _coasted(state, law):
     Those of the integration waver about them by its tolerance.
     """
     x, v, x_mu, v_mu, x_start, v_start, decay = state
-    force, force_mu, force_start, slope = accelerations(state, law)
+    _, force, _, force_mu, _, force_start, slope = rates(state, law)
     v, v_mu, v_start = v + force / slope, v_mu + force_mu / slope, v_start + force_start / slope
     time = -(x + 1.0) / v
     moved = (fma(time, v_mu, x_mu), v_mu, fma(time, v_start, x_start), v_start, fma(time, slope, decay))
     return (0.0 * x - 1.0, v, *moved), time
 
 
-@jit
-def _to_switch(state, law, inwards):
-    """The state of what goes on uniformly inwards, at the switch; and the time from here."""
-    uniform = inwards & (named(Swing, state).decay > law.leg.forgotten - 1e-3)
-    time = 0.0 * law.leg.sign
-    if any_lane(uniform):
-        rest, coast = _coasted(state, law)
-        state, time = choose(uniform, rest, state), where(uniform, coast, 0.0)
-    return state, time
-
-
-@jit
-def _helped(state, leg, stopped, terms, problem):
-    """The state and the leg where what has stopped is let go again."""
-    if any_lane(stopped):
-        zero = 0.0 * leg.sign
-        slack = problem.dry.inwards - held_at(terms.power, terms.power.floor)
-        free = _released(named(Swing, state).x, slack, problem.terms)
-        state = choose(stopped, (free, zero, zero, zero, zero, zero, zero), state)
-        again = Leg(zero - 1.0, problem.dry.inwards, zero + math.inf, problem.stiffness, zero, leg.slow)
-        leg = choose(stopped, again, leg)
-    return state, leg
-
-
-@jit
-def _lowered(terms, slow, start):
-    """The terms, with a floor of power-law friction below the slow speed and that with which the half swing begins."""
-    drag, friction, kappa, ripple, scales = terms
-    speed = magnitude(start)
-    least = 0.25 * where(speed > 0.0, smaller(slow, speed), slow)
-    power = Power(friction.gamma, friction.n, smaller(friction.floor, least))
-    return Terms(drag, power, kappa, ripple, scales)
+@jit_call
+def _released(x, slack, problem):
+    """The next place inwards from x where the drive wins over dry friction; -1 where there is none."""
+    step = 2.0 * math.pi / _SCAN / where(problem.depth > 0.0, problem.wave, math.inf)
+    held, free = x, 0.0 * x - 1.0
+    searching = problem.depth > 0.0
+    for i in range(_SCAN):
+        if not any_lane(searching):
+            break
+        there = x - (i + 1.0) * step
+        found = searching & (slack + pull(there, problem) > 0.0)
+        held = where(searching & not_(found), there, held)
+        free = where(found & (there > -1.0), there, free)
+        searching = searching & not_(found)
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (held + free)
+        wins = slack + pull(middle, problem) > 0.0
+        held, free = where(wins, held, middle), where(wins, middle, free)
+    return free
 
 
 @jit_inline
 def half_swing(start, problem, tolerance, active):
-    """One half swing from x = 1, speed `start`, to the switch."""
-    zero, turns = 0.0 * start, problem.e > 0.0
-    one = zero + 1.0
-    state = (one, start, zero, zero, zero, one, zero)
+    """One half swing from x = 1, speed `start`, to the switch.
+
+    In turn: past the turning point, along a leg, and where that ends short of the switch either uniformly on to it or,
+    from rest, to where the drive wins again.
+    """
+    zero, one = 0.0 * start, 0.0 * start + 1.0
+    root = sqrt(problem.kappa)
+    scales = 1.0 / (1.0 + problem.pace), 1.0 / (1.0 + problem.kappa), 1.0 / (1.0 + problem.pace + root)
+
+    # power-law friction may be constant below the slow speed: what that leaves out is of the order of speed^(n + 1)
+    # and, as accelerations are, of speed^2; it has a floor below that and below the speed of the beginning
+    slow = zero
+    if any_lane(problem.rough):
+        degree = smaller(problem.n, one)
+        slow = where(problem.rough, power(_SLOW * tolerance, 1.0 / (1.0 + degree)) / (1.0 + problem.pace), slow)
+    speed = magnitude(start)
+    floor = smaller(problem.floor, 0.25 * where(speed > 0.0, smaller(slow, speed), slow))
+
+    state, time, h = (one, start, zero, zero, zero, one, zero), zero, 0.1 / (1.0 + problem.stiffness + root)
     moving, rising = active, active & (start > 0.0)
-    slow = slow_speed(tolerance, problem)
-    terms = _lowered(problem.terms, slow, start)
-    helped, lost = active & not_(active), active & not_(active)
-    behind, jump, top, top_by_start, time = turned(state, turns, slow, problem)
-    stop = smaller(slow, 0.5 * start)
-    outwards = Leg(one, problem.dry.outwards, zero + math.inf, problem.stiffness, stop, slow)
-    state, leg = choose(rising, state, behind), choose(rising, outwards, _inwards(zero, slow, problem))
-    time, h, top, top_by_start = where(rising, 0.0, time), problem.first, one, zero
+    turning, helped, lost = active & not_(rising), active & not_(active), active & not_(active)
+    top, top_by_start, jump, forgotten = one, zero, one, zero + math.inf
+    varied = (problem.kappa > 0.0) | (problem.depth > 0.0)
+    falling = inwards(problem, floor)
     for _ in range(HELP_LIMIT):
         if not any_lane(moving):
             break
-        law = Law(leg, terms)
-        state, spent, h, late = integrate_until(
-            _ends, accelerations, _scales, longest, state, law, h, tolerance, moving
-        )
+        behind, jumped, there, there_by_start, spent = _turned(state, falling, slow, problem)
+        forgotten = where(turning & not_(varied), state[6] + _FORGOTTEN, forgotten)
+        state, jump = choose(turning, behind, state), where(turning, jumped, jump)
+        top, top_by_start = where(turning, there, top), where(turning, there_by_start, top_by_start)
+        time = where(turning, time + spent, time)
+
+        side, steady = where(rising, 1.0, falling.side), where(rising, problem.outwards, problem.inwards)
+        law = Law(side, steady, problem.d, problem.gamma, problem.n, floor, problem.kappa, problem.depth, problem.wave)
+        stop = where(rising, smaller(slow, 0.5 * start), zero)
+        leg = Leg(stop, forgotten, problem.stiffness, slow, scales)
+        state, spent, h, late = _to_end(state, law, leg, h, tolerance, moving)
         time, lost, moving = time + spent, lost | late, moving & not_(late)
-        turning, swing = moving & rising, named(Swing, state)
-        passed = turned(state, turns, slow, problem)
-        top, top_by_start = where(turning, passed.top, top), where(turning, passed.top_by_start, top_by_start)
-        state, jump = choose(turning, passed.state, state), where(turning, passed.jump, jump)
-        time = where(turning, time + passed.time, time)
-        leg = choose(turning, _inwards(swing.decay, slow, problem), leg)
-        state, coast = _to_switch(state, Law(leg, terms), moving & not_(rising))
-        time = time + coast
-        stopped = moving & not_(rising) & (named(Swing, state).x + 1.0 > _ARRIVED + _ROUNDED * top)
-        helped, rising = helped | stopped, rising & not_(turning)
-        state, leg = _helped(state, leg, stopped, terms, problem)
-        moving = turning | (stopped & (named(Swing, state).x > -1.0))
-    swing = named(Swing, state)
-    end = where(moving | (helped & not_(swing.v < 0.0)), zero, -swing.v)
-    return Half(end, state, leg, top, top_by_start, time, where(helped, 0.0, jump * exp(-swing.decay)), helped, lost)
+        turning, inward = moving & rising, moving & not_(rising)
+        rising = rising & not_(turning)
+
+        uniform = inward & (state[6] > forgotten - 1e-3)
+        if any_lane(uniform):
+            at_switch, coast = _coasted(state, falling)
+            state, time = choose(uniform, at_switch, state), where(uniform, time + coast, time)
+        stopped = inward & (state[0] + 1.0 > _ARRIVED + _ROUNDED * top)
+        if any_lane(stopped):
+            free = _released(state[0], problem.inwards - _held_at(problem, floor), problem)
+            state = choose(stopped, (free, zero, zero, zero, zero, zero, zero), state)
+            forgotten, helped = where(stopped, math.inf, forgotten), helped | stopped
+        moving = turning | (stopped & (state[0] > -1.0))
+    v, rate = state[1], rates(state, inwards(problem, problem.floor))[1]
+    end = where(moving | (helped & not_(v < 0.0)), zero, -v)
+    shrink = where(helped, 0.0, jump * exp(-state[6]))
+    return Half(end, state, rate, top, top_by_start, time, shrink, helped, lost)

@@ -12,13 +12,10 @@ v1^2 - F^2 rising; so the one root is found, and if help was needed on the cycle
 """
 
 import math
-from typing import NamedTuple
 
-from kernels.foliot._half_swing import half_swing
-from kernels.foliot._swing_law import Law, Swing, accelerations, problem_of, pull
+from kernels.foliot._half_swing import half_swing, problem_of, pull
 from kernels.lanes.codes import INACCURATE, NOT_CONVERGED, OK, STEP_LIMIT, STICKS
 from kernels.lanes.jit import jit, jit_inline
-from kernels.lanes.records import named
 from kernels.lanes.vectors import any_lane, choose, fma, magnitude, not_, sqrt, where
 from kernels.maths.elementary import larger, smaller
 
@@ -46,23 +43,6 @@ _STEEP_FROM, _STEEP_TO = 1e-8, 0.03
 """Changes of v1 between two swings, near the cycle, whose effect on s is their own, not that of the tolerances."""
 
 
-class Search(NamedTuple):
-    """Newton's method on v1.
-
-    v, tolerance : of the next swing
-    low, high : bracket
-    tighter : share of the tolerance that is wanted, lowered where two swings differ by too much
-    before : last relative step
-    """
-
-    v: float
-    tolerance: float
-    low: float
-    high: float
-    tighter: float
-    before: float
-
-
 @jit
 def _relative(new, old):
     return magnitude(new - old) / (magnitude(new) + 1e-300)
@@ -76,58 +56,39 @@ def _enough(problem, slope, decay):
 
 
 @jit
-def first_of(problem):
-    """Where Newton's method begins, and whether stable steps are so short that a swing takes more than the limit."""
-    zero, pace = 0.0 * problem.e, problem.pace
-    slow = pace > 3.0  # friction soon balances the drive: v1 = V, and steps are short whatever the tolerance
-    v = where(slow, 1.0 / pace, 2.0 / sqrt(1.0 + 4.0 * pace * pace))
-    enough = _CHECK * _enough(problem, zero, 2.0 * problem.stiffness * pace)
-    varied = (problem.terms.kappa > 0.0) | problem.rippled
-    stiff = not_(problem.stiffness * pace < where(varied, _STIFFEST, _STIFFEST_UNIFORM))
-    return Search(v, where(slow, enough, _COARSE), zero - 1.0, zero + math.inf, zero + 1.0, zero + 1.0), stiff
+def first_speed(pace):
+    """Where Newton's method begins, and whether friction soon balances the drive: v1 = V."""
+    slow = pace > 3.0
+    return where(slow, 1.0 / pace, 2.0 / sqrt(1.0 + 4.0 * pace * pace)), slow
 
 
 @jit
-def slope_of(e, v, half):
-    """dF/dv1."""
-    return where(half.end > 0.0, e * e * v / half.end * half.shrink, 0.0)
+def newton(e, v, half):
+    """dF/dv1, and Newton's step of v1."""
+    slope = where(half.end > 0.0, e * e * v / half.end * half.shrink, 0.0)
+    return slope, (half.end - v) / (1.0 - slope)
 
 
 @jit
-def _newton(problem, search, half, tolerance, active):
-    """The bracket, with what the sign of F - v tells; the next speed, the slope dF/dv1, and whether it is Newton's own.
-
-    Newton's speed, or where that leaves the bracket one that narrows it.
-    """
-    v, end = search.v, half.end
-    noise = _NOISE * tolerance * (v + end)
-    low = where(active & (end - v > noise), v, search.low)
-    high = where(active & (v - end > noise), v, search.high)
-    slope = slope_of(problem.e, v, half)
-    newton = v + (end - v) / (1.0 - slope)
-    newton = larger(newton, 0.0 * v)
-    furthest = 8.0 * v + 8.0
-    own = (newton > low) & (newton < high) & (newton < furthest)
-    other = where(high < math.inf, 0.5 * (larger(low, 0.0 * v) + high), furthest)
-    return low, high, where(own, newton, other), slope, own
-
-
-@jit
-def cycle_by(problem, half, new, change, slope):
+def cycle_by(e, half, new, change, slope):
     """The cycle by (4) from a half swing close to it: time and amplitude follow v1 by its last `change`, to `new`.
 
     Also how many times larger than s the terms are that it is the sum of.
     """
-    e, swing = problem.e, named(Swing, half.state)
-    force = accelerations(half.state, Law(half.leg, problem.terms))[0]
-    time_by_mu, time_by_start = swing.x_mu / half.end, e * swing.x_start / half.end
-    end_by_mu = -fma(force, time_by_mu, swing.v_mu)
+    _, _, x_mu, v_mu, x_start, _, _ = half.state
+    time_by_mu, time_by_start = x_mu / half.end, e * x_start / half.end
+    end_by_mu = -fma(half.rate, time_by_mu, v_mu)
     by_start = time_by_start * (end_by_mu / (1.0 - slope))
     s = -(by_start + time_by_mu) / half.time
     cancels = (magnitude(by_start) + magnitude(time_by_mu)) / magnitude(s * half.time)
     amplitude = where(e > 0.0, fma(half.top_by_start, e * change, half.top), 1.0)
-    time = fma(time_by_start, change, half.time)
-    return (time, amplitude, new, s, e * e * half.shrink), cancels
+    return (fma(time_by_start, change, half.time), amplitude, new, s, e * e * half.shrink), cancels
+
+
+@jit
+def held(problem, top):
+    """Whether stiction holds the turning point."""
+    return (problem.e >= 0.0) & not_(1.0 + pull(top, problem) > problem.rho_s)
 
 
 @jit_inline
@@ -150,20 +111,32 @@ def dopri5(scene, ripple, rtol):
     verdict : OK, INACCURATE, STICKS, NOT_CONVERGED or STEP_LIMIT
     """
     problem = problem_of(scene, ripple, rtol)
-    e, rtol, zero = problem.e, problem.rtol, 0.0 * problem.e
-    search, stiff = first_of(problem)
-    possible = problem.dry.inwards > 0.0
-    cycle, steep = (zero, zero, zero, zero, zero), zero
+    zero, one, stiff = 0.0 * problem.e, 0.0 * problem.e + 1.0, problem.stiffness * problem.pace
+    v, slow = first_speed(problem.pace)
+    tolerance = where(slow, _CHECK * _enough(problem, zero, 2.0 * stiff), _COARSE)  # steps are short whatever it is
+    varied = (problem.kappa > 0.0) | (problem.depth > 0.0)
+    stiff = not_(stiff < where(varied, _STIFFEST, _STIFFEST_UNIFORM))
+    low, high, tighter, before, steep = zero - 1.0, zero + math.inf, one, one, zero
+    possible = problem.inwards > 0.0
+    cycle = (zero, zero, zero, zero, zero)
     verdict = where(possible, where(stiff, STEP_LIMIT, NOT_CONVERGED), STICKS)
     active = possible & not_(stiff)
     for _ in range(NEWTON_LIMIT):
         if not any_lane(active):
             break
-        tolerance = larger(search.tolerance, _FINEST + zero)
-        half = half_swing(e * search.v, problem, tolerance, active)
-        low, high, new, slope, own = _newton(problem, search, half, tolerance, active)
-        relative = _relative(new, search.v)
-        found, cancels = cycle_by(problem, half, new, new - search.v, slope)
+        used = larger(tolerance, _FINEST + zero)
+        half = half_swing(problem.e * v, problem, used, active)
+
+        # Newton's speed, or where that leaves the bracket, told by the sign of F - v, one that narrows it
+        noise = _NOISE * used * (v + half.end)
+        low = where(active & (half.end - v > noise), v, low)
+        high = where(active & (v - half.end > noise), v, high)
+        slope, change = newton(problem.e, v, half)
+        new, furthest = larger(v + change, zero), 8.0 * v + 8.0
+        own = (new > low) & (new < high) & (new < furthest)
+        new = where(own, new, where(high < math.inf, 0.5 * (larger(low, zero) + high), furthest))
+        relative = _relative(new, v)
+        found, cancels = cycle_by(problem.e, half, new, new - v, slope)
 
         # how far this swing and the one before are apart, and how steeply the cycle hangs on v1 by all that tell
         apart = _relative(found[0], cycle[0])
@@ -171,41 +144,36 @@ def dopri5(scene, ripple, rtol):
             apart = larger(apart, _relative(found[j], cycle[j]))
         apart = larger(apart, relative)
         cycle = choose(active, found, cycle)
-        telling = problem.rippled & (search.before > _STEEP_FROM) & (search.before < _STEEP_TO)
-        steep = where(telling, larger(steep, apart / search.before), steep)
+        telling = (problem.depth > 0.0) & (before > _STEEP_FROM) & (before < _STEEP_TO)
+        steep = where(telling, larger(steep, apart / before), steep)
 
         # the tolerance that is wanted, and whether it was that of this swing and the one before
         free = not_(half.helped)
         finer = where(problem.rough & free & (half.end > 0.0), larger(_CANCELS * cancels, 1.0 + 0.0 * cancels), 1.0)
-        wanted = search.tighter * _enough(problem, slope, named(Swing, half.state).decay) / finer
-        last_but_one, last = search.tolerance <= 1.5 * _CHECK * wanted, search.tolerance <= 1.5 * wanted
+        wanted = tighter * _enough(problem, slope, half.state[6]) / finer
+        last_but_one, last = tolerance <= 1.5 * _CHECK * wanted, tolerance <= 1.5 * wanted
 
         # what is done: both agree, it is at rest or sticks, rounding leaves no more, or the swing took too many steps
-        at_rest = (half.end <= 0.0) & (search.v <= 0.0)
-        held = (e >= 0.0) & not_(1.0 + pull(half.top, problem.terms) > problem.rho_s)
+        at_rest = (half.end <= 0.0) & (v <= 0.0)
         stuck = last_but_one & ((half.helped & (relative <= 0.2 * rtol)) | at_rest)
         agree = (relative <= 0.2 * rtol) & (apart <= 0.3 * rtol) & (steep * relative <= 0.3 * rtol)
         settled = last & free & agree
-        at_floor = (wanted < _FINEST) & (search.tolerance < _FINEST) & free & (relative <= rtol)
+        still = (relative <= rtol) | (relative * (1.0 - slope) <= _V_ROUNDING)
+        at_floor = (wanted < _FINEST) & (tolerance < _FINEST) & free & still
         blur = larger(steep, cancels) * _V_ROUNDING
         right = settled & (wanted >= _FINEST) & (blur <= 0.3 * rtol * (1.0 - slope))
-        status = where(half.lost, STEP_LIMIT, where(stuck | held, STICKS, where(right, OK, INACCURATE)))
+        sticks = stuck | held(problem, half.top)
+        status = where(half.lost, STEP_LIMIT, where(sticks, STICKS, where(right, OK, INACCURATE)))
         done = active & (settled | stuck | at_floor | half.lost)
         verdict, active = where(done, status, verdict), active & not_(done)
 
         # the next swing: its tolerance follows the square of the step, but not below what is wanted of the last but one
-        loose = last & free & (search.before < 0.5 * rtol) & not_(apart <= 0.3 * rtol)
+        loose = last & free & (before < 0.5 * rtol) & not_(apart <= 0.3 * rtol)
         factor = larger(smaller(0.2 * rtol / apart, 0.25 + zero), zero + 1e-3)
         aim = where(loose, 0.25 * wanted, wanted)
         square = smaller(0.1 * relative * relative, 0.03 * (1.0 - slope))
-        tolerance = larger(_CHECK * aim, where(own, smaller(search.tolerance, square), search.tolerance))
-        tolerance = where((last_but_one & (relative < 0.5 * rtol)) | at_rest, aim, tolerance)
-        search = Search(
-            where(active, new, search.v),
-            where(active, tolerance, search.tolerance),
-            low,
-            high,
-            where(active & loose, search.tighter * factor, search.tighter),
-            where(active, relative, search.before),
-        )
+        following = larger(_CHECK * aim, where(own, smaller(tolerance, square), tolerance))
+        following = where((last_but_one & (relative < 0.5 * rtol)) | at_rest, aim, following)
+        v, tolerance = where(active, new, v), where(active, following, tolerance)
+        tighter, before = where(active & loose, tighter * factor, tighter), where(active, relative, before)
     return cycle, verdict

@@ -18,7 +18,7 @@ Units and records: see `_units`. Derived here.
 import math
 from typing import NamedTuple
 
-from kernels.foliot._units import Cycle, Legs, errors
+from kernels.foliot._units import Cycle, errors
 from kernels.integrate import linear_flow
 from kernels.lanes.codes import NO_METHOD, NOT_CONVERGED, NOT_SELF_STARTING, OK, STICKS
 from kernels.lanes.jit import jit, jit_call
@@ -35,22 +35,28 @@ ROUNDING = 2e-15
 """Relative error of one half swing: of time, amplitude, speed and of the terms of (4)."""
 
 
-class Turn(NamedTuple):
-    """E_1 - E of a half swing, the noise of that, whether it was found by the balance (4), and the half swing."""
+class Legs(NamedTuple):
+    """A half swing: until the switch, largest x, speed there, whether it comes; and each leg.
 
-    gain: float
-    noise: float
-    balanced: bool
-    legs: Legs
+    Leg 1 rises, for the time t1, against the force g1; leg 2 falls under g2, beginning with the speed `down`. s, c and
+    slope are the responses of `linear_flow` over a leg.
+    """
 
-
-class Variation(NamedTuple):
-    """Changes of E_1 and of the time of a half swing; of each, the sum of the sizes of its terms: they round so."""
-
-    gain: float
     time: float
-    of_gain: float
-    of_time: float
+    top: float
+    speed: float
+    comes: bool
+    t1: float
+    s1: float
+    c1: float
+    slope1: float
+    g1: float
+    t2: float
+    s2: float
+    c2: float
+    slope2: float
+    g2: float
+    down: float
 
 
 @jit_call
@@ -81,27 +87,6 @@ def _back(scene, legs):
 
 
 @jit
-def _losses(scene, legs):
-    """d (J1 + J2) of (4) after a rise from x = 1; leg 1 is taken backwards from its turning point."""
-    d, kappa, back, g2 = scene.d, scene.kappa, _back(scene, legs), legs.g2
-    risen, fallen = linear_flow.loss(-0.5 * d, kappa, legs.t1), linear_flow.loss(0.5 * d, kappa, legs.t2)
-    return d * (back * back * risen + g2 * g2 * fallen)
-
-
-@jit
-def _area(scene, legs):
-    """dE_1/dE_0 by (3), and 1 minus e^2 times it, with its digits where that is small."""
-    d, e, back = scene.d, scene.e, _back(scene, legs)
-    rises = e > 0.0
-    ratio = where(rises, legs.g2 / back, 1.0)
-    shrink = where(rises, 2.0 * scene.rho / back, 0.0)  # 1 - ratio
-    lost = (1.0 - e) * (1.0 + e)
-    kept = -expm1(-d * legs.time)
-    rest = lost + e * e * (kept + (1.0 - kept) * shrink)
-    return exp(-d * legs.time) * ratio, rest
-
-
-@jit
 def _end(scene, legs):
     """Acceleration along the drive on arrival at the switch."""
     return fma(legs.g2, legs.slope2, -legs.down * fma(scene.d, legs.slope2, scene.kappa * legs.s2))
@@ -124,70 +109,76 @@ def own_noise(scene, start, legs):
     return ROUNDING * energy, ROUNDING * (legs.time + way / legs.speed)
 
 
+@jit
+def _area(scene, legs):
+    """dE_1/dE_0 by (3), and 1 minus e^2 times it, with its digits where that is small."""
+    d, e, back = scene.d, scene.e, _back(scene, legs)
+    rises = e > 0.0
+    ratio = where(rises, legs.g2 / back, 1.0)
+    shrink = where(rises, 2.0 * scene.rho / back, 0.0)  # 1 - ratio
+    lost = (1.0 - e) * (1.0 + e)
+    kept = -expm1(-d * legs.time)
+    rest = lost + e * e * (kept + (1.0 - kept) * shrink)
+    return exp(-d * legs.time) * ratio, rest
+
+
 @jit_call
 def _turn(scene, energy):
-    """One half swing from the energy E before the switch.
+    """E_1 - E of a half swing from the energy E before the switch, its noise, if by (4), and the half swing.
 
-    E_1 - E is a difference of speeds where the swing forgets its start (weak drive), and the balance (4) where it
-    hardly changes (strong drive).
+    A difference of speeds where the swing forgets its start (weak drive), and the balance (4) where it hardly changes
+    (strong drive), with leg 1 taken backwards from its turning point.
     """
-    e = scene.e
+    d, e, kappa = scene.d, scene.e, scene.kappa
     legs = half_swing(1.0, scene, e * sqrt(2.0 * energy))
+    back, g2 = _back(scene, legs), legs.g2
     after = 0.5 * legs.speed * legs.speed
     balanced = (after > 2.0) & (e > 0.0)
-    work = 2.0 - 2.0 * scene.rho * legs.top - _losses(scene, legs) - (1.0 - e) * (1.0 + e) * energy
+    risen, fallen = linear_flow.loss(-0.5 * d, kappa, legs.t1), linear_flow.loss(0.5 * d, kappa, legs.t2)
+    losses = d * (back * back * risen + g2 * g2 * fallen)
+    work = 2.0 - 2.0 * scene.rho * legs.top - losses - (1.0 - e) * (1.0 + e) * energy
     noise = ROUNDING * where(balanced, 4.0, after + energy + (1.0 + legs.top) * magnitude(_end(scene, legs)))
-    return Turn(where(balanced, work, after - energy), noise, balanced, legs)
+    return where(balanced, work, after - energy), noise, balanced, legs
 
 
 @jit_call
-def _variation(scene, turn, start, dstart, dmu):
-    """Of a half swing, with the speed after the switch and with the torque."""
-    d, rho, _, _, _, kappa, e, _ = scene
-    balanced, legs = turn.balanced, turn.legs
-    _, _, speed, _, t1, s1, c1, slope1, _, t2, s2, c2, slope2, g2, _ = legs
-    rises = e > 0.0
-    back, by_mu = _back(scene, legs), magnitude(dmu)
+def _variation(scene, balanced, legs, start, dstart, dmu):
+    """Changes of E_1 and of the time, (dE_1, dT), by those of the speed after the switch and of the torque; and sizes.
+
+    By (2), with E_1 = v^2/2 or by (4), and d for a change, g for the push behind the turning point:
+        dA = S1 du - C1 dmu,  dt1 = (S1' du - S1 dmu)/back,  dg = kappa dA + dmu,
+        dt2 = (dA - C2 dg - S2 ddown)/v,  dv = S2' ddown + S2 dg + v' dt2,
+        dJ1 = 2 back (J1/back^2) dg + u^2 dt1,  dJ2 = 2 g2 (J2/g2^2) dg + v^2 dt2.
+    The sizes, of dE_1 and of dT, are the sums of the magnitudes of the terms in these: the changes round so.
+    """
+    d, rho, kappa = scene.d, scene.rho, scene.kappa
+    s1, c1, slope1, s2, c2, slope2 = legs.s1, legs.c1, legs.slope1, legs.s2, legs.c2, legs.slope2
+    rises, back, speed, end = scene.e > 0.0, _back(scene, legs), legs.speed, _end(scene, legs)
+    by_mu, ddown = magnitude(dmu), where(rises, 0.0, dstart)
     dtop = where(rises, fma(s1, dstart, -c1 * dmu), 0.0)
-    dt1 = where(rises, fma(slope1, dstart, -s1 * dmu) / back, 0.0)
     of_top = where(rises, magnitude(s1 * dstart) + magnitude(c1 * dmu), 0.0)
+    dt1 = where(rises, fma(slope1, dstart, -s1 * dmu) / back, 0.0)
     of_t1 = where(rises, (magnitude(slope1 * dstart) + magnitude(s1 * dmu)) / back, 0.0)
-    ddown = where(rises, 0.0, dstart)
-    dg = fma(kappa, dtop, dmu)  # of the push at both sides of the turning point
-    of_g = fma(kappa, of_top, by_mu)
+    dg, of_g = fma(kappa, dtop, dmu), fma(kappa, of_top, by_mu)
     dt2 = (dtop - c2 * dg - s2 * ddown) / speed
     of_t2 = (of_top + magnitude(c2) * of_g + magnitude(s2 * ddown)) / speed
-    dspeed = fma(slope2, ddown, fma(s2, dg, _end(scene, legs) * dt2))
-    of_speed = magnitude(slope2 * ddown) + magnitude(s2) * of_g + magnitude(_end(scene, legs)) * of_t2
-    of_g1, of_g2 = 2.0 * back * linear_flow.loss(-0.5 * d, kappa, t1), 2.0 * g2 * linear_flow.loss(0.5 * d, kappa, t2)
-    dloss1, dloss2 = of_g1 * dg + start * start * dt1, of_g2 * dg + speed * speed * dt2
+    dspeed = fma(slope2, ddown, fma(s2, dg, end * dt2))
+    of_speed = magnitude(slope2 * ddown) + magnitude(s2) * of_g + magnitude(end) * of_t2
+
+    loss1, loss2 = linear_flow.loss(-0.5 * d, kappa, legs.t1), linear_flow.loss(0.5 * d, kappa, legs.t2)
+    by_g1, by_g2 = 2.0 * back * loss1, 2.0 * legs.g2 * loss2
+    dloss1, dloss2 = by_g1 * dg + start * start * dt1, by_g2 * dg + speed * speed * dt2
+    of_loss = magnitude(by_g1 + by_g2) * of_g + start * start * of_t1 + speed * speed * of_t2
     work = start * dstart + 2.0 * dmu - 2.0 * rho * dtop - d * (dloss1 + dloss2)
-    of_loss = magnitude(of_g1 + of_g2) * of_g + start * start * of_t1 + speed * speed * of_t2
     of_work = start * magnitude(dstart) + 2.0 * by_mu + 2.0 * rho * of_top + d * of_loss
     gain, of_gain = where(balanced, work, speed * dspeed), where(balanced, of_work, speed * of_speed)
-    return Variation(gain, dt1 + dt2, of_gain, of_t1 + of_t2)
+    return (gain, dt1 + dt2), (of_gain, of_t1 + of_t2)
 
 
-@jit
-def _sensitivity(scene, energy, turn, rest):
-    """-dlnP/dlnmu of the fixed point E_1(E, mu) = E; the sizes of its terms, and of the terms of those; dlnT/dlnE."""
-    start, time = magnitude(scene.e) * sqrt(2.0 * energy), turn.legs.time
-    by_mu = _variation(scene, turn, start, 0.0 * start, 0.0 * start + 1.0)
-    by_start = _variation(scene, turn, start, 0.0 * start + 1.0, 0.0 * start)
-    by_gain = magnitude(scene.e) / sqrt(2.0 * energy) / rest
-    chain = by_start.time * (by_gain * by_mu.gain)
-    of_chain = magnitude(by_start.time) * (by_gain * by_mu.of_gain)
-    of_chain = of_chain + by_start.of_time * (by_gain * magnitude(by_mu.gain))
-    terms, of_terms = (magnitude(by_mu.time) + magnitude(chain)) / time, (by_mu.of_time + of_chain) / time
-    return -(by_mu.time + chain) / time, terms, of_terms, 0.5 * start * magnitude(by_start.time) / time
-
-
-@jit
-def _search(scene):
-    """The energy before the switch on the cycle, by Newton from rest there, and the cells that have not settled.
-
-    A half swing's gain falls with E: where it is positive is a lower end of the bracket, where negative an upper one.
-    """
+@jit_call
+def segments(scene, rtol):
+    """The cycle, the relative errors of its outputs whatever rtol, and its verdict."""
+    # the energy before the switch, by Newton from rest: a half swing's gain falls with E, which makes a bracket
     energy = 0.0 * scene.d
     low, high = energy, energy + 1e308
     active = energy < 1.0
@@ -206,42 +197,35 @@ def _search(scene):
         settled = (change <= 1e-10 * energy) | (change * rest <= noise)
         energy = where(active, guess, energy)
         active = active & not_(settled)
-    return energy, comes, active
-
-
-@jit_call
-def limit_cycle(scene):
-    """The cycle, the relative errors of its outputs, and its verdict."""
-    energy, comes, unsettled = _search(scene)
-    turn = _turn(scene, energy)
-    legs = turn.legs
+    _, noise, balanced, legs = _turn(scene, energy)
     area, rest = _area(scene, legs)
-    s, terms, of_terms, by_energy = _sensitivity(scene, energy, turn, rest)
-    of_energy, of_pieces = turn.noise / (rest * energy), 1.0 + (1.0 + legs.top) / (legs.speed * legs.time)
+
+    # s = -dlnP/dlnmu of the fixed point E_1(E, mu) = E; the sizes of its terms, and of the terms of those; dlnT/dlnE
+    start, time = magnitude(scene.e) * sqrt(2.0 * energy), legs.time
+    (gain, longer), (of_gain, of_longer) = _variation(scene, balanced, legs, start, 0.0 * start, 0.0 * start + 1.0)
+    (_, by_start), (_, of_start) = _variation(scene, balanced, legs, start, 0.0 * start + 1.0, 0.0 * start)
+    by_gain = magnitude(scene.e) / sqrt(2.0 * energy) / rest
+    chain = by_start * (by_gain * gain)
+    of_chain = magnitude(by_start) * (by_gain * of_gain)
+    of_chain = of_chain + of_start * (by_gain * magnitude(gain))
+    s, terms, of_terms = -(longer + chain) / time, (magnitude(longer) + magnitude(chain)) / time, of_longer + of_chain
+    of_terms, by_energy = of_terms / time, 0.5 * start * magnitude(by_start) / time
+
+    # what the noise of the energy and the rounding of pieces leave of each output
+    of_energy, of_pieces = noise / (rest * energy), 1.0 + (1.0 + legs.top) / (legs.speed * time)
     loose = fma(ROUNDING, of_pieces, of_energy)
     loose_cycle = fma(ROUNDING, of_pieces, of_energy * where(by_energy > 1.0, by_energy, 1.0))
     loose_s = fma(2.0 * loose, terms, _ULPS * of_terms) / magnitude(s)
     loose_s = where(loose_s < 1.0, loose_s / (1.0 - loose_s), math.inf)  # of the true s
     of_time = fma(of_energy, by_energy, 0.3 * ROUNDING * of_pieces)
-    loose_m = loose_cycle + where(area > 0.0, of_time * scene.d * legs.time, 0.0)
-    cycle = Cycle(legs.time, legs.top, sqrt(2.0 * energy), s, scene.e * scene.e * area)
-    verdict = _verdict(scene, legs, comes & (energy > 0.0), unsettled)
+    loose_m = loose_cycle + where(area > 0.0, of_time * scene.d * time, 0.0)
+
+    # whether the half swing comes through, and what else keeps the foliot from it; from rest at x = 0, too
+    starts = linear_flow.reach(0.5 * scene.d, scene.kappa, 0.0 * scene.d, scene.slack) > 1.0
+    verdict = where((scene.rho_s < 1.0) & starts, OK, NOT_SELF_STARTING)
+    verdict = where(active, NOT_CONVERGED, verdict)
+    passes = (scene.e < 0.0) | (1.0 + scene.kappa * legs.top > scene.rho_s)  # nothing rests where e < 0
+    verdict = where(comes & (energy > 0.0) & passes, verdict, STICKS)
+    verdict = where(scene.d < _STIFFEST, verdict, NO_METHOD)
+    cycle = Cycle(time, legs.top, sqrt(2.0 * energy), s, scene.e * scene.e * area)
     return cycle, errors(loose_cycle, loose_s, loose_m), verdict
-
-
-@jit
-def _verdict(scene, legs, comes, unsettled):
-    """On a cycle whose half swing comes through or not, by what else may keep the foliot from it."""
-    verdict = where(_self_starting(scene), OK, NOT_SELF_STARTING)
-    verdict = where(unsettled, NOT_CONVERGED, verdict)
-    # for e < 0 nothing comes to rest at the switch
-    passes = (scene.e < 0.0) | (1.0 + scene.kappa * legs.top > scene.rho_s)
-    verdict = where(comes & passes, verdict, STICKS)
-    return where(scene.d < _STIFFEST, verdict, NO_METHOD)
-
-
-@jit
-def _self_starting(scene):
-    """Whether the motion from rest at x = 0 reaches the switch at x = 1."""
-    none = 0.0 * scene.d
-    return (scene.rho_s < 1.0) & (linear_flow.reach(0.5 * scene.d, scene.kappa, none, scene.slack) > 1.0)

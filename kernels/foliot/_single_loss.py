@@ -7,9 +7,9 @@ T is half the period; units and records as in `_units`. Derived from the general
 """
 
 import math
-from typing import NamedTuple
 
 from kernels.foliot._units import Cycle, errors
+from kernels.lanes.codes import NO_METHOD, OK
 from kernels.lanes.jit import jit
 from kernels.lanes.vectors import any_lane, choose, fma, not_, sqrt, where
 from kernels.maths.elementary import arctan, exp, expm1, log1p
@@ -18,32 +18,12 @@ ROUNDING = 2e-15
 """What the closed forms are right to; the multiplier to twice that."""
 
 
-class Law(NamedTuple):
-    """A scene without spring: drag of degree 0 is dry friction, and the degree does no harm where there is no drag."""
-
-    d: float
-    rho: float
-    gamma: float
-    n: float
-    e: float
-    slack: float
-
-
 @jit
-def without_degree_0(scene):
-    """The law of friction of a scene."""
-    dry = not_(scene.n > 0.0)
-    rho, slack = where(dry, scene.rho + scene.gamma, scene.rho), where(dry, scene.slack - scene.gamma, scene.slack)
-    gamma = where(dry, 0.0, scene.gamma)
-    return Law(scene.d, rho, gamma, where(gamma > 0.0, scene.n, 1.0), scene.e, slack)
-
-
-@jit
-def _acting(d, rho, gamma, n, e, kappa):
+def _acting(scene):
     """Whether dry friction, quadratic drag or restitution acts alone: one of three, or none."""
-    smooth, elastic = not_(d > 0.0) & not_(kappa > 0.0), e >= 1.0
-    solid, drag = rho > 0.0, gamma > 0.0
-    square = drag & (n >= 2.0) & (n <= 2.0)
+    smooth, elastic = not_(scene.d > 0.0) & not_(scene.kappa > 0.0), scene.e >= 1.0
+    solid, drag = scene.rho > 0.0, scene.gamma > 0.0
+    square = drag & (scene.n >= 2.0) & (scene.n <= 2.0)
     return (
         smooth & elastic & solid & not_(drag),
         smooth & elastic & not_(solid) & square,
@@ -52,23 +32,27 @@ def _acting(d, rho, gamma, n, e, kappa):
 
 
 @jit
-def pure(scene):
-    """The cycle where one loss acts alone, and whether one does."""
-    d, rho, gamma, n, e, slack = without_degree_0(scene)
-    alone, drag, switch = _acting(d, rho, gamma, n, e, scene.kappa)
-    cycle = choose(alone, dry(where(alone, rho, 0.5), where(alone, slack, 0.5)), _switch(where(switch, e, 0.0)))
+def pure(scene, rtol):
+    """The cycle where one loss acts alone; else NO_METHOD."""
+    rho, slack, gamma, e = scene.rho, scene.slack, scene.gamma, scene.e
+    alone, drag, switch = _acting(scene)
+
+    # (3) and (1)
+    e = where(switch, e, 0.0)
+    lost = (1.0 - e) * (1.0 + e)
+    amplitude = where(e > 0.0, fma(e, e, 1.0) / lost, 1.0)
+    elastic = Cycle(2.0 * sqrt((1.0 + e) / (1.0 - e)), amplitude, 2.0 / sqrt(lost), 0.5, e * e)
+    cycle = choose(alone, dry(where(alone, rho, 0.5), where(alone, slack, 0.5)), elastic)
+
+    # (2); artanh lambda = 2 gamma + ln(1 + lambda) + ln(1 + lambda^2)/2 has all digits up to lambda = 1
     if any_lane(drag):
-        cycle = choose(drag, _drag(where(drag, gamma, 1.0)), cycle)
-    return cycle, alone | drag | switch
-
-
-@jit
-def bound(p):
-    """Relative errors of `pure` for a `Foliot`: rounding, and infinite where no loss acts alone."""
-    degree_0 = not_(p.n > 0.0)
-    alone, drag, switch = _acting(p.a, p.R + where(degree_0, p.c, 0.0), where(degree_0, 0.0, p.c), p.n, p.e, p.k)
-    rounding = where(alone | drag | switch, ROUNDING, math.inf)
-    return errors(rounding, rounding, 2.0 * rounding)
+        gamma = where(drag, gamma, 1.0)
+        square = sqrt(-expm1(-4.0 * gamma))
+        lam, root, swell = sqrt(square), sqrt(gamma), log1p(square)
+        half = (2.0 * gamma + log1p(lam) + 0.5 * swell + arctan(lam)) / root
+        kept = exp(-2.0 * gamma) / (1.0 + square)
+        cycle = choose(drag, Cycle(half, 1.0 + swell / (2.0 * gamma), lam / root, 0.5, kept * kept), cycle)
+    return cycle, where(alone | drag | switch, OK, NO_METHOD)
 
 
 @jit
@@ -80,18 +64,8 @@ def dry(rho, slack):
 
 
 @jit
-def _switch(e):
-    """The cycle (3)."""
-    lost = (1.0 - e) * (1.0 + e)
-    amplitude = where(e > 0.0, fma(e, e, 1.0) / lost, 1.0)
-    return Cycle(2.0 * sqrt((1.0 + e) / (1.0 - e)), amplitude, 2.0 / sqrt(lost), 0.5, e * e)
-
-
-@jit
-def _drag(gamma):
-    """The cycle (2); artanh lambda = 2 gamma + ln(1 + lambda) + ln(1 + lambda^2)/2 has all digits up to lambda = 1."""
-    square = sqrt(-expm1(-4.0 * gamma))
-    lam, root, swell = sqrt(square), sqrt(gamma), log1p(square)
-    half = (2.0 * gamma + log1p(lam) + 0.5 * swell + arctan(lam)) / root
-    kept = exp(-2.0 * gamma) / (1.0 + square)
-    return Cycle(half, 1.0 + swell / (2.0 * gamma), lam / root, 0.5, kept * kept)
+def bound(scene):
+    """Relative errors of `pure`: rounding, and infinite where no loss acts alone."""
+    alone, drag, switch = _acting(scene)
+    rounding = where(alone | drag | switch, ROUNDING, math.inf)
+    return errors(rounding, rounding, 2.0 * rounding)

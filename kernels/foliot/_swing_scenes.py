@@ -92,20 +92,20 @@ LINEAR = Form("foliot_ripple_linear", tuple(s for s in STATES if s != "decay"), 
 SEARCHED = Form("foliot_ripple_search", ("x", "v", "top"), _LINEAR, searched_rates)
 
 
-def _surface(x):
-    return x + 1.0
-
-
 @functools.cache
 def _module(form):
     """The compiled half swing."""
 
+    def surface(x):
+        return x + 1.0
+
     def start(v0):
         return tuple(v0 if name == "v" else _FIRST.get(name, 0.0) for name in form.states)
 
-    doc = "half swing of a foliot"
-    scene = Scene(form.name, doc, form.states, (*form.terms, "v0"), form.rates, _surface, start, most_kinks=1)
-    return build(scene)
+    terms = (*form.terms, "v0")
+    return build(
+        Scene(form.name, "half swing of a foliot", form.states, terms, form.rates, surface, start, most_kinks=1)
+    )
 
 
 def half_swings(form, columns, tolerance):
@@ -118,8 +118,5 @@ def half_swings(form, columns, tolerance):
     found = dict(zip(("time", "interval", *form.states), rows, strict=False))
     if "decay" not in found:
         found["decay"] = columns[form.terms.index("drag")] * found["time"]
-    swung = np.empty((len(Swung._fields) + 1, len(tolerance)))
-    for row, name in zip(swung, Swung._fields, strict=False):
-        row[:] = found.get(name, _UNKNOWN.get(name, 0.0))
-    swung[-1] = rows[-1]
-    return swung
+    nothing = {name: np.full(len(tolerance), _UNKNOWN.get(name, 0.0)) for name in Swung._fields}
+    return np.array([*((nothing | found)[name] for name in Swung._fields), rows[-1]])

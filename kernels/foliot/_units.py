@@ -10,9 +10,9 @@ from collections import namedtuple
 from typing import NamedTuple
 
 from kernels.lanes.jit import jit
-from kernels.lanes.ranges import judged, or_none
+from kernels.lanes.ranges import judged
 from kernels.lanes.vectors import any_lane, nearest, not_, sqrt, where
-from kernels.maths.elementary import is_normal, mantissa_exponent, power, scale
+from kernels.maths.elementary import is_normal, mantissa_exponent, measured, power, scale
 from kernels.maths.pairs import two_sum
 
 
@@ -47,7 +47,7 @@ class Outputs(NamedTuple):
 class Scene(NamedTuple):
     """Coefficients of (1), and slack = 1 - rho without the rounding of rho.
 
-    Drag of degree 0 is Coulomb friction: it is counted in rho, rho_s and slack, and gamma is 0.
+    Drag of degree 0 is Coulomb friction: it is counted in rho, rho_s and slack. n is 1 where gamma is 0.
     """
 
     d: float
@@ -80,30 +80,6 @@ class Cycle(NamedTuple):
     multiplier: float
 
 
-class Legs(NamedTuple):
-    """A half swing: until the switch, largest x, speed there, whether it comes; and each leg.
-
-    Leg 1 rises, for the time t1, against the force g1; leg 2 falls under g2, beginning with the speed `down`. s, c and
-    slope are the responses of `linear_flow` over a leg.
-    """
-
-    time: float
-    top: float
-    speed: float
-    comes: bool
-    t1: float
-    s1: float
-    c1: float
-    slope1: float
-    g1: float
-    t2: float
-    s2: float
-    c2: float
-    slope2: float
-    g2: float
-    down: float
-
-
 @jit
 def terms(p):
     """The foliot of a record that has more parameters."""
@@ -130,18 +106,28 @@ def _root(m, e):
 
 
 @jit
+def _times(x, unit, e_unit):
+    """x times a unit, and whether that is a normal number where x is not zero."""
+    m, e = mantissa_exponent(where(x > 0.0, x, 1.0))
+    group = where(x > 0.0, scale(m * unit, e + e_unit), 0.0)
+    return group, not_(x > 0.0) | is_normal(group)
+
+
+@jit
 def without_dimensions(p):
     """The scene of a `Foliot`, and its units."""
     (m_mu, e_mu), (m_phi, e_phi) = mantissa_exponent(p.mu), mantissa_exponent(p.phi0)
     t, e_t = _root(m_phi / m_mu, e_phi - e_mu)
     v, e_v = _root(m_phi * m_mu, e_phi + e_mu)
-    d, kappa = _in_units(p.a, t, e_t), _in_units(p.k, t * t, 2.0 * e_t)
+    (d, fine_d), (kappa, fine_kappa) = _times(p.a, t, e_t), _times(p.k, t * t, 2.0 * e_t)
     powered = p.n > 0.0
     solid, drag = where(powered, 0.0, p.c), where(powered, p.c, 0.0)
-    gamma = _strength(p.mu, drag, p.n, scale(v, e_v))
+    gamma = 0.0 * drag
+    if any_lane(drag > 0.0):
+        gamma = where(drag > 0.0, drag / p.mu * power(scale(v, e_v), p.n), 0.0)
     rho, slack = (p.R + solid) / p.mu, spare_torque(p.mu, p.R, solid) / p.mu
-    fine = _kept(p.a, d) & _kept(p.k, kappa) & _kept(drag, gamma) & _kept(p.R + solid, rho)
-    scene = Scene(d, rho, (p.R_s + solid) / p.mu, gamma, where(powered, p.n, 1.0), kappa, p.e, slack)
+    fine = fine_d & fine_kappa & (not_(drag > 0.0) | is_normal(gamma)) & (not_(p.R + solid > 0.0) | is_normal(rho))
+    scene = Scene(d, rho, (p.R_s + solid) / p.mu, gamma, where(gamma > 0.0, p.n, 1.0), kappa, p.e, slack)
     return scene, Units(t, e_t, m_phi, e_phi, fine)
 
 
@@ -154,43 +140,31 @@ def spare_torque(mu, R, solid):
 
 
 @jit
-def _in_units(x, unit, e_unit):
-    m, e = mantissa_exponent(where(x > 0.0, x, 1.0))
-    return where(x > 0.0, scale(m * unit, e + e_unit), 0.0)
+def angle(units, x):
+    """[rad], NaN where it is no normal number, as all sizes that are put back here."""
+    return measured(units.m_phi * x, units.e_phi)
 
 
 @jit
-def _strength(mu, c, n, speed):
-    """gamma of (1); 0 without drag, whatever n."""
-    strength = 0.0 * c
-    if any_lane(c > 0.0):
-        strength = where(c > 0.0, c / mu * power(speed, n), 0.0)
-    return strength
+def speed(units, v):
+    """[rad/s]."""
+    return measured(units.m_phi / units.t * v, units.e_phi - units.e_t)
 
 
 @jit
-def _kept(x, group):
-    """Whether a group is a normal number where its parameter is not zero."""
-    return not_(x > 0.0) | is_normal(group)
-
-
-@jit
-def dimensional(units, cycle):
-    """The outputs of a `Cycle`, each NaN where it is no normal number.
-
-    Also whether all groups are normal numbers, and whether all of these are.
-    """
-    half_period, amplitude, speed, sensitivity, multiplier = cycle
-    period = scale(2.0 * units.t * half_period, units.e_t)
-    swing = scale(units.m_phi * amplitude, units.e_phi)
-    fast = scale(units.m_phi / units.t * speed, units.e_phi - units.e_t)
-    timed, wide, moves = is_normal(period), is_normal(swing), is_normal(fast)
-    period, swing, fast = or_none(period, timed), or_none(swing, wide), or_none(fast, moves)
-    return Outputs(period, swing, fast, sensitivity, multiplier), units.fine, timed & wide & moves
+def time(units, t):
+    """[s]."""
+    return measured(units.t * t, units.e_t)
 
 
 @jit
 def given(units, cycle, verdict):
     """What a method gives of a cycle: its outputs and its status."""
-    outputs, sound, whole = dimensional(units, cycle)
-    return outputs, judged(sound, whole, verdict)
+    half_period, amplitude, before, sensitivity, multiplier = cycle
+    period, swing, fast = time(units, 2.0 * half_period), angle(units, amplitude), speed(units, before)
+    whole = (period > 0.0) & (swing > 0.0) & (fast > 0.0)
+    return Outputs(period, swing, fast, sensitivity, multiplier), judged(units.fine, whole, verdict)
+
+
+UNITS = without_dimensions, given
+"""Of a method that solves a `Scene`."""

@@ -10,125 +10,20 @@ stable; where the foliot does not come to it from rest at phi = 0, `segments` re
 spring; `taylor` and `dopri5`, which do what `segments` cannot, follow the cycle only and do not say so).
 """
 
-from kernels.foliot import (
-    _coulomb,
-    _friction_quadrature,
-    _integrated_swing,
-    _linear_swing,
-    _single_loss,
-    _taylor_swing,
-    _units,
-    _viscous,
-)
-from kernels.foliot._units import Foliot
+from kernels.foliot import _coulomb, _friction_quadrature, _integrated_swing, _single_loss, _taylor_swing, _viscous
+from kernels.foliot._linear_swing import segments
+from kernels.foliot._units import UNITS, Foliot, spare_torque
 from kernels.interface import Field
-from kernels.lanes.codes import BAD_INPUT, NEVER_STARTS, NO_LIMIT_CYCLE, NO_METHOD, NOT_CONVERGED, OK
+from kernels.lanes.codes import BAD_INPUT, NEVER_STARTS, NO_LIMIT_CYCLE, OK
 from kernels.lanes.jit import jit
 from kernels.lanes.vectors import not_, where
 from kernels.lanes.wiring import kernel, method
 
 
 @jit
-def closed(p, rtol):
-    """The root q of q - tanh q = 1/alpha from fitted polynomials: 1e-15 at every drive, no iteration."""
-    k, rest, units = _viscous.without_dimensions(p)
-    return _viscous.given(units, _viscous.closed(k, rest), OK)
-
-
-@jit
-def closed_bound(p):
-    """`closed` is right to rounding everywhere."""
-    return _units.errors(_viscous.ROUNDING, _viscous.ROUNDING, 2.0 * _viscous.ROUNDING)
-
-
-@jit
-def asymptotic(p, rtol):
-    """Weak and strong series: the period within 0.5 %, the sensitivity within 2.2 % at every drive."""
-    k, _, units = _viscous.without_dimensions(p)
-    return _viscous.given(units, _viscous.asymptotic(k), OK)
-
-
-@jit
-def asymptotic_bound(p):
-    """Bound on the error of `asymptotic`: the first terms left out."""
-    k, _, _ = _viscous.without_dimensions(p)
-    return _viscous.asymptotic_bound(k)
-
-
-@jit
-def event_map(p, rtol):
-    """The exact map from switch to switch, iterated from rest; slow at strong drive, where a swing forgets little."""
-    k, _, units = _viscous.without_dimensions(p)
-    cycle, unsettled = _viscous.event_map(k, rtol)
-    return _viscous.given(units, cycle, where(unsettled, NOT_CONVERGED, OK))
-
-
-@jit
-def event_map_bound(p):
-    """What rounding leaves of the iterated map; that it settles to rtol, its status says."""
-    k, _, _ = _viscous.without_dimensions(p)
-    return _viscous.event_map_bound(k)
-
-
-@jit
-def pure(p, rtol):
-    """Closed forms where one loss acts alone: Coulomb friction, quadratic drag or restitution; else NO_METHOD."""
-    scene, units = _units.without_dimensions(p)
-    cycle, applies = _single_loss.pure(scene)
-    return _units.given(units, cycle, where(applies, OK, NO_METHOD))
-
-
-@jit
-def pure_bound(p):
-    """Rounding where one loss acts alone, infinite elsewhere."""
-    return _single_loss.bound(p)
-
-
-@jit
-def coulomb(p, rtol):
-    """One transcendental equation by Halley's steps: 4e-15 at every drive."""
-    scene, units = _units.without_dimensions(p)
-    cycle, verdict = _coulomb.limit_cycle(scene)
-    return _units.given(units, cycle, verdict)
-
-
-@jit
-def coulomb_bound(p):
-    """Rounding; the multiplier exp(-tau) repeats that of tau."""
-    scene, _ = _units.without_dimensions(p)
-    return _coulomb.bound(scene)
-
-
-@jit
-def segments(p, rtol):
-    """Exact pieces of the swing and Newton on their map; with what conditioning leaves of each output."""
-    scene, units = _units.without_dimensions(p)
-    cycle, errors, verdict = _linear_swing.limit_cycle(scene)
-    outputs, status = _units.given(units, cycle, verdict)
-    return outputs, errors, status
-
-
-@jit
-def quadrature(p, rtol):
-    """Integrals over the speed for any sum of friction laws, and Newton on their balance."""
-    scene, units = _units.without_dimensions(p)
-    cycle, verdict = _friction_quadrature.solve_quadrature(scene, rtol)
-    return _units.given(units, cycle, verdict)
-
-
-@jit
-def quadrature_bound(p):
-    """The error of the rule and rounding: 1e-14 to 1e-13 for drag of degree 0.05 to 4."""
-    scene, _ = _units.without_dimensions(p)
-    return _friction_quadrature.quadrature_bound(scene)
-
-
-@jit
-def dopri5(p, rtol):
+def dopri5(scene, rtol):
     """Dormand-Prince 5(4) over half swings, each switch located and restarted at, and Newton on their map."""
-    scene, units = _units.without_dimensions(p)
-    cycle, verdict = _integrated_swing.dopri5(scene, _integrated_swing.SMOOTH, rtol)
-    return _units.given(units, cycle, verdict)
+    return _integrated_swing.dopri5(scene, _integrated_swing.SMOOTH, rtol)
 
 
 def dopri5_is_cheaper(p, rtol):
@@ -145,7 +40,7 @@ def check(p):
     """
     mu, _, a, R, R_s, c, n, k, e = p
     friction = where(k > 0.0, R, R_s)  # a spring helps stiction be overcome
-    spare = _units.spare_torque(mu, friction, where(n > 0.0, 0.0, c))
+    spare = spare_torque(mu, friction, where(n > 0.0, 0.0, c))
     lossless = not_((a > 0.0) | (R > 0.0) | (c > 0.0) | (e < 1.0))
     verdict = where(spare > 0.0, where(lossless, NO_LIMIT_CYCLE, OK), NEVER_STARTS)
     return where(R_s >= R, verdict, BAD_INPUT)
@@ -160,15 +55,7 @@ PARAMETERS = (
     Field("c", "1", "drag c abs(v)^n per moment of inertia, in rad/s^2 for v in rad/s", default=0.0, lower=0.0),
     Field("n", "1", "exponent of the drag", default=1.0, lower=0.0),
     Field("k", "1/s^2", "hairspring stiffness per moment of inertia", default=0.0, lower=0.0),
-    Field(
-        "e",
-        "1",
-        "restitution: share of the speed kept at a switch",
-        default=1.0,
-        lower=-1.0,
-        upper=1.0,
-        open_lower=True,
-    ),
+    Field("e", "1", "restitution: share of the speed kept at a switch", 1.0, lower=-1.0, upper=1.0, open_lower=True),
 )
 
 OUTPUTS = (
@@ -179,7 +66,7 @@ OUTPUTS = (
     Field("multiplier", "1", "multiplier of the half-cycle map (0 where below 1e-308)"),
 )
 
-_VISCOUS_ONLY = ("R", "c", "k", "e")
+_VISCOUS = {"units": _viscous.UNITS, "excludes": ("R", "c", "k", "e")}
 
 FOLIOT = kernel(
     "foliot",
@@ -190,52 +77,23 @@ FOLIOT = kernel(
     record=Foliot,
     check=check,
     methods=(
-        method(
-            "closed",
-            "root of q - tanh q = 1/alpha by fitted polynomials",
-            closed,
-            closed_bound,
-            excludes=_VISCOUS_ONLY,
-        ),
-        method(
-            "asymptotic",
-            "weak and strong series with a bound each",
-            asymptotic,
-            asymptotic_bound,
-            excludes=_VISCOUS_ONLY,
-        ),
-        method("pure", "closed forms where one loss acts alone", pure, pure_bound, excludes=("a", "k")),
-        method(
-            "coulomb",
-            "viscous and Coulomb friction: one equation by Halley's steps",
-            coulomb,
-            coulomb_bound,
-            excludes=("c", "k", "e"),
-        ),
-        method(
-            "segments",
-            "exact pieces of linear terms, Newton on the half-swing map",
-            segments,
-            excludes=("c",),
-            estimates=True,
-        ),
-        method(
-            "quadrature", "integrals over the speed, for any friction", quadrature, quadrature_bound, excludes=("k",)
-        ),
-        method(
-            "map",
-            "exact map from switch to switch, iterated from rest",
-            event_map,
-            event_map_bound,
-            excludes=_VISCOUS_ONLY,
-        ),
+        method("closed", "root of q - tanh q = 1/alpha by fitted polynomials",
+               _viscous.closed, _viscous.closed_bound, **_VISCOUS),
+        method("asymptotic", "weak and strong series with a bound each",
+               _viscous.asymptotic, _viscous.asymptotic_bound, **_VISCOUS),
+        method("pure", "closed forms where one loss acts alone",
+               _single_loss.pure, _single_loss.bound, units=UNITS, excludes=("a", "k")),
+        method("coulomb", "viscous and Coulomb friction: one equation by Halley's steps",
+               _coulomb.coulomb, _coulomb.bound, units=UNITS, excludes=("c", "k", "e")),
+        method("segments", "exact pieces of linear terms, Newton on the half-swing map",
+               segments, units=UNITS, excludes=("c",), estimates=True),
+        method("quadrature", "integrals over the speed, for any friction",
+               _friction_quadrature.quadrature, _friction_quadrature.bound, units=UNITS, excludes=("k",)),
+        method("map", "exact map from switch to switch, iterated from rest",
+               _viscous.event_map, _viscous.event_map_bound, **_VISCOUS),
         _taylor_swing.by_taylor(Foliot._fields, rippled=False),
-        method(
-            "dopri5",
-            "adaptive Runge-Kutta of order 5, Newton on the half-swing map",
-            dopri5,
-            sooner=dopri5_is_cheaper,
-        ),
+        method("dopri5", "adaptive Runge-Kutta of order 5, Newton on the half-swing map",
+               dopri5, units=UNITS, sooner=dopri5_is_cheaper),
     ),
     example={"mu": 1.0, "phi0": 1.0, "a": 1.0},
-)
+)  # fmt: skip

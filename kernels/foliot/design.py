@@ -6,58 +6,41 @@ The left side falls from infinity to 1 as k grows, so the answer is unique. Deri
 arXiv:1604.06681, appendix A.
 """
 
-from typing import NamedTuple
-
 from kernels.foliot import _viscous
 from kernels.interface import Field
 from kernels.lanes.codes import BAD_INPUT, NOT_CONVERGED, OK
 from kernels.lanes.jit import jit
-from kernels.lanes.ranges import judged, or_none
+from kernels.lanes.ranges import judged
 from kernels.lanes.vectors import any_lane, magnitude, where
 from kernels.lanes.wiring import kernel, method
-from kernels.maths.elementary import is_normal, mantissa_exponent, scale
+from kernels.maths.elementary import is_normal, mantissa_exponent, measured
 
 _NEWTON_LIMIT = 20
 
 
-class Clock(NamedTuple):
-    """Outputs."""
-
-    a: float
-    mu: float
-
-
 @jit
-def _inverse_alpha(overshoot):
-    """k at which A - 1 = overshoot, and where Newton has not settled.
+def newton(p, rtol):
+    """Newton on (1) in ln k and ln(A - 1), from a start within 15 %.
 
-    Newton in ln k on ln(A - 1), nearly a straight line: slope (1/lambda - A)/(A - 1), from -1 (weak) to -1/3 (strong).
+    That is nearly a straight line: slope (1/lambda - A)/(A - 1), from -1 (weak drive) to -1/3 (strong).
     """
+    (period, e_p), (phi0, e_f) = mantissa_exponent(p.period), mantissa_exponent(p.phi0)
+    overshoot = (p.amplitude - p.phi0) / p.phi0
     k = 1.125 / (overshoot * (overshoot * overshoot + 3.0 * overshoot + 3.666))
     active = k > 0.0
     for _ in range(_NEWTON_LIMIT):
         if not any_lane(active):
             break
-        gap = _viscous.gap(k)
-        now = _viscous.overshoot(k)
+        gap, now = _viscous.gap_and_overshoot(k)
         step = (now - overshoot) / (now - gap / (1.0 - gap))  # A - 1/lambda without its two ones
         step = where(step > -0.5, step, -0.5)
         k = where(active, k + k * step, k)
         active = active & (magnitude(step) > 1e-9)  # quadratic: the step just made was the last
-    return k, active
-
-
-@jit
-def newton(p, rtol):
-    """Newton on (1) from a start within 15 %."""
-    (period, e_p), (phi0, e_f) = mantissa_exponent(p.period), mantissa_exponent(p.phi0)
-    k, unsettled = _inverse_alpha((p.amplitude - p.phi0) / p.phi0)
-    unit_a = 4.0 * _viscous.closed(k, 0.0 * k).q / period
+    unit_a = 4.0 * _viscous.cycle_of((k, 0.0 * k)).q / period
     unit_k, e_k = mantissa_exponent(k)
-    a, mu = scale(unit_a, -e_p), scale(unit_a * unit_a * phi0 / unit_k, e_f - 2.0 * e_p - e_k)
-    rubs, drives = is_normal(a), is_normal(mu)
-    verdict = judged(is_normal(k) & (rubs | drives), rubs & drives, where(unsettled, NOT_CONVERGED, OK))
-    return Clock(or_none(a, rubs), or_none(mu, drives)), verdict
+    a, mu = measured(unit_a, -e_p), measured(unit_a * unit_a * phi0 / unit_k, e_f - 2.0 * e_p - e_k)
+    rubs, drives = a > 0.0, mu > 0.0
+    return (a, mu), judged(is_normal(k) & (rubs | drives), rubs & drives, where(active, NOT_CONVERGED, OK))
 
 
 @jit

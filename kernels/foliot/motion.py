@@ -23,59 +23,46 @@ from kernels.maths.elementary import exp, exp_remainder, scale
 
 
 @jit
-def _shape(phase, k, q, lam):
-    """phi/phi0 and a v/mu at a phase in [0, 1]. a t - E is one function, for it is small at strong drive."""
-    first = phase < 0.5
-    t = 4.0 * q * where(first, phase, phase - 0.5)
-    late = exp_remainder(t)  # a t - E
-    rise = where(t < 1.0, t - late, 1.0 - exp(-t))
-    sign = where(first, 1.0, -1.0)
-    return sign * (1.0 + fma(lam, rise, -late) / k), sign * (lam - (1.0 + lam) * rise)
-
-
-@jit
-def _closed(i, columns):
+def closed(i, columns):
     """Equation (1) on the cycle from fitted polynomials: 4e-15 of amplitude and crossing speed at every drive."""
-    k, rest, units = _viscous.without_dimensions(read(LinearFoliot, columns, i))
-    cycle = _viscous.closed(k, rest)
-    outputs, sound, _ = _viscous.dimensional(units, cycle)
+    (k, rest), units = _viscous.without_dimensions(read(LinearFoliot, columns, i))
+    cycle = _viscous.cycle_of((k, rest))
+    outputs, _ = _viscous.given(units, cycle, OK)
     wide, moves = outputs.amplitude > 0.0, outputs.crossing_speed > 0.0
     for j in range(columns.phase.size):
-        x, u = _shape(columns.phase[j], k, cycle.q, cycle.lam)
+        phase = columns.phase[j]
+        first = phase < 0.5
+        sign = where(first, 1.0, -1.0)
+        t = 4.0 * cycle.q * where(first, phase, phase - 0.5)
+        late = exp_remainder(t)  # a t - E, one function, for it is small at strong drive
+        rise = where(t < 1.0, t - late, 1.0 - exp(-t))
+        x, u = sign * (1.0 + fma(cycle.lam, rise, -late) / k), sign * (cycle.lam - (1.0 + cycle.lam) * rise)
         columns.angle[i, j] = or_none(scale(units.m_phi * x, units.e_phi), wide)
         columns.speed[i, j] = or_none(scale(units.m_mu / units.m_a * u, units.e_mu - units.e_a), moves)
-    columns.status[i] = judged(sound & (wide | moves), wide & moves, OK)
+    columns.status[i] = judged(units.representable & (wide | moves), wide & moves, OK)
 
 
 @jit
-def _state(scene, legs, start, t):
-    """x and its rate at a time t after the switch at x = 1."""
-    rising = t < legs.t1
-    up = where(start > 0.0, start, 0.0)
-    v, force = where(rising, up, legs.down), where(rising, -legs.g1, legs.g2)
-    y, v = linear_flow.motion(0.5 * scene.d, scene.kappa, v, force, where(rising, t, t - legs.t1))
-    return where(rising, 1.0 + y, legs.top - y), where(rising, v, -v)
-
-
-@jit
-def _segments(i, columns):
+def segments(i, columns):
     """The exact pieces of the swing on the cycle that `foliot` finds with them."""
-    p = read(LinearFoliot, columns, i)
-    scene, units = _units.without_dimensions(_units.without_drag(p))
-    cycle, errors, verdict = _linear_swing.limit_cycle(scene)
+    scene, units = _units.without_dimensions(_units.without_drag(read(LinearFoliot, columns, i)))
+    cycle, errors, verdict = _linear_swing.segments(scene, columns.rtol[i])
     columns.error[i] = errors.period if errors.period > errors.multiplier else errors.multiplier
-    start = p.e * cycle.speed
+    start = scene.e * cycle.speed
     legs = _linear_swing.half_swing(1.0, scene, start)
-    outputs, sound, _ = _units.dimensional(units, cycle)
+    outputs, _ = _units.given(units, cycle, verdict)
     wide, moves = outputs.amplitude > 0.0, outputs.crossing_speed > 0.0
     for j in range(columns.phase.size):
         first = columns.phase[j] < 0.5
         sign = where(first, 1.0, -1.0)
-        since = where(first, columns.phase[j], columns.phase[j] - 0.5)
-        x, v = _state(scene, legs, start, 2.0 * legs.time * since)
+        t = 2.0 * legs.time * where(first, columns.phase[j], columns.phase[j] - 0.5)
+        rising = t < legs.t1
+        v, force = where(rising, where(start > 0.0, start, 0.0), legs.down), where(rising, -legs.g1, legs.g2)
+        y, v = linear_flow.motion(0.5 * scene.d, scene.kappa, v, force, where(rising, t, t - legs.t1))
+        x, v = where(rising, 1.0 + y, legs.top - y), where(rising, v, -v)
         columns.angle[i, j] = or_none(sign * scale(units.m_phi * x, units.e_phi), wide)
         columns.speed[i, j] = or_none(sign * scale(units.m_phi / units.t * v, units.e_phi - units.e_t), moves)
-    columns.status[i] = judged(sound & (wide | moves), wide & moves, verdict)
+    columns.status[i] = judged(units.fine & (wide | moves), wide & moves, verdict)
 
 
 @jit
@@ -97,15 +84,10 @@ FOLIOT_MOTION = kernel(
     record=LinearFoliot,
     check=check,
     methods=(
-        tracing(
-            "closed",
-            "viscous friction: exponentials on the closed-form cycle",
-            _closed,
-            4.0 * _viscous.ROUNDING,  # relative to the amplitude and to the crossing speed
-            excludes=("R", "k", "e"),
-            loop=cell_by_cell,
-        ),
-        tracing("segments", "exact pieces of linear terms", _segments, loop=cell_by_cell, estimates=True),
+        # the bound is relative to the amplitude and to the crossing speed
+        tracing("closed", "viscous friction: exponentials on the closed-form cycle",
+                closed, 4.0 * _viscous.ROUNDING, excludes=("R", "k", "e"), loop=cell_by_cell),
+        tracing("segments", "exact pieces of linear terms", segments, loop=cell_by_cell, estimates=True),
     ),
     example={"mu": 1.0, "phi0": 1.0, "a": 1.0},
-)
+)  # fmt: skip

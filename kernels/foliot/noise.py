@@ -35,7 +35,7 @@ from kernels.lanes.records import read
 from kernels.lanes.vectors import any_lane, choose, fma, magnitude, nearest, not_, sqrt, where
 from kernels.lanes.wiring import kernel, tracing
 from kernels.maths import philox
-from kernels.maths.elementary import exp, expm1, is_normal, mantissa_exponent, scale
+from kernels.maths.elementary import exp, expm1, is_normal, larger, mantissa_exponent, scale
 
 HALF_SWING_LIMIT = 1e9
 SECONDS_PER_DAY = 86400.0
@@ -47,17 +47,6 @@ PAIRS = 64
 """Pairs of random numbers that are made at a time."""
 
 _COUNTABLE = 2.0**50
-
-
-class Noise(NamedTuple):
-    """Parameters beside those of the foliot."""
-
-    sigma: float
-    tau_c: float
-    half_swings: float
-    seed: float
-    averaging_time: float
-    sigma_a: float
 
 
 class Clock(NamedTuple):
@@ -93,24 +82,6 @@ class Averages(NamedTuple):
 
 
 @jit_call
-def _least_torque(scene):
-    """h of (3)'s floor, over mu: the force f from rest at the switch must reach over the way 2, which grows with f."""
-    d, kappa, rho = scene.d, scene.kappa, scene.rho
-    swings = 2.0 / linear_flow.reach(0.5 * d, kappa, 0.0 * d, 0.0 * d + 1.0) + rho - kappa
-    frees = where(scene.e >= 0.0, scene.rho_s, rho) - kappa
-    least = where(swings > frees, swings, frees)
-    return where(least > 0.0, least, 0.0)
-
-
-@jit_call
-def _correlation(tau_c):
-    """r and sqrt(1 - r^2) of (1); white where tau_c = 0."""
-    white = not_(tau_c > 0.0)
-    tau_c = where(white, 1.0, tau_c)
-    return where(white, 0.0, exp(-1.0 / tau_c)), where(white, 1.0, sqrt(-expm1(-2.0 / tau_c)))
-
-
-@jit_call
 def _closed(averages, run, time, clock):
     """Closes the averaging times that end within a half swing that began at `run` and lasted `time`.
 
@@ -133,14 +104,12 @@ def _closed(averages, run, time, clock):
 @jit_call
 def _beat(run, averages, z, clock):
     """One half swing with the torque of (1), and whether it comes to the switch."""
-    scene = clock.scene
     x = where(run.t > 0.0, fma(clock.remembered, run.x, clock.fresh * z), z)
     torque = fma(clock.sigma, x, 1.0)
     short = not_(torque > clock.floor)
     torque = where(short, clock.floor, torque)
-    friction = fma(clock.sigma_a, x, 1.0)
-    friction = where(friction > LEAST_FRICTION, friction, LEAST_FRICTION)
-    d, rho, rho_s, gamma, n, kappa, e, slack = scene
+    friction = larger(fma(clock.sigma_a, x, 1.0), LEAST_FRICTION + 0.0 * x)
+    d, rho, rho_s, gamma, n, kappa, e, slack = clock.scene
     scene = Scene(d * friction, rho, rho_s, gamma, n, kappa, e, slack)
     start = scene.e * run.speed
     legs = _linear_swing.half_swing(torque, scene, start)
@@ -179,30 +148,27 @@ def _run(first, seed, half_swings, clock, speed, active, radii, turns):
     return run, averages, stopped
 
 
-@jit_call
-def _uncertainty(scene, cycle):
-    """Error of the rate as a fraction: of each half swing, and of all that they pass on."""
-    speed, e = cycle.speed, scene.e
-    start = e * speed
-    legs = _linear_swing.half_swing(1.0, scene, start)
-    kept, longer = _linear_swing.slopes(scene, start, legs)
-    energy, late = _linear_swing.own_noise(scene, start, legs)
-    remembered = energy / (speed * speed * (1.0 - e * e * kept))
-    return (late + magnitude(longer * start) * remembered) / cycle.half_period
-
-
 @jit
 def segments(first, columns, radii, turns):
     """Every half swing from exact pieces. `rtol` is meant of rates as fractions: 1e-9 of a day is 8.6e-5 s."""
     i = cells_at(first)
-    p = read(Noise, columns, i)
     scene, units = _units.without_dimensions(_units.without_drag(read(LinearFoliot, columns, i)))
-    cycle, _, found = _linear_swing.limit_cycle(scene)
-    least = _least_torque(scene)
-    m_tau, e_tau = mantissa_exponent(p.averaging_time)
-    tau = scale(m_tau / units.t, e_tau - units.e_t)
+    cycle, _, found = _linear_swing.segments(scene, columns.rtol[i])
+
+    # the floor of (1): from rest at the switch the force must reach over the way 2, which grows with it
+    d, kappa, rho, e = scene.d, scene.kappa, scene.rho, scene.e
+    swings = 2.0 / linear_flow.reach(0.5 * d, kappa, 0.0 * d, 0.0 * d + 1.0) + rho - kappa
+    least = larger(larger(swings, where(e >= 0.0, scene.rho_s, rho) - kappa), 0.0 * d)
     floor = fma(HEADROOM, 1.0 - least, least)
-    clock = Clock(scene, p.sigma, p.sigma_a, *_correlation(p.tau_c), floor, cycle.half_period, tau)
+
+    # r and sqrt(1 - r^2) of (1); white where tau_c = 0
+    white = not_(columns.tau_c[i] > 0.0)
+    tau_c = where(white, 1.0, columns.tau_c[i])
+    remembered, fresh = where(white, 0.0, exp(-1.0 / tau_c)), where(white, 1.0, sqrt(-expm1(-2.0 / tau_c)))
+
+    m_tau, e_tau = mantissa_exponent(columns.averaging_time[i])
+    tau = scale(m_tau / units.t, e_tau - units.e_t)
+    clock = Clock(scene, columns.sigma[i], columns.sigma_a[i], remembered, fresh, floor, cycle.half_period, tau)
     runs = units.fine & (found < FIRST_REFUSAL) & (least < 1.0)
     run, averages, stopped = _run(first, columns.seed, columns.half_swings, clock, cycle.speed, runs, radii, turns)
     t, closed = where(runs, run.t, 1.0), averages.closed
@@ -210,8 +176,16 @@ def segments(first, columns, radii, turns):
     deviation = sqrt(averages.squares / (2.0 * where(enough, closed - 1.0, 1.0)))
     columns.rate_error_s_per_day[i] = SECONDS_PER_DAY * run.gain / t
     columns.rate_scatter_s_per_day[i] = where(enough, SECONDS_PER_DAY * deviation, math.nan)
-    columns.truncated[i] = run.truncated / p.half_swings
-    accurate = _uncertainty(scene, cycle) <= columns.rtol[i]
+    columns.truncated[i] = run.truncated / columns.half_swings[i]
+
+    # error of the rate as a fraction: of each half swing, and of all that they pass on
+    start = e * cycle.speed
+    legs = _linear_swing.half_swing(1.0, scene, start)
+    kept, longer = _linear_swing.slopes(scene, start, legs)
+    energy, late = _linear_swing.own_noise(scene, start, legs)
+    passed_on = energy / (cycle.speed * cycle.speed * (1.0 - e * e * kept))
+    accurate = (late + magnitude(longer * start) * passed_on) / cycle.half_period <= columns.rtol[i]
+
     verdict = where(enough, where(magnitude(found - NOT_SELF_STARTING) > 0.0, OK, found), TOO_SHORT)
     verdict = where(stopped | not_(least < 1.0), STICKS, where(accurate, verdict, INACCURATE))
     verdict = where(found < FIRST_REFUSAL, verdict, found)  # of the cycle without noise
@@ -253,13 +227,8 @@ FOLIOT_NOISE = kernel(
     ),
     check=check,
     methods=(
-        tracing(
-            "segments",
-            "every half swing from exact pieces of linear terms",
-            segments,
-            excludes=("c",),
-            buffers=_uniforms,
-        ),
+        tracing("segments", "every half swing from exact pieces of linear terms",
+                segments, excludes=("c",), buffers=_uniforms),
     ),
     example={"mu": 1.0, "phi0": 1.0, "a": 1.0, "sigma": 0.01, "half_swings": 1000.0, "averaging_time": 600.0},
-)
+)  # fmt: skip

@@ -24,11 +24,17 @@ HIGHEST = 1000.0
 
 
 @jit
-def dopri5(p, rtol):
-    """Dormand-Prince 5(4) over half swings, each switch located and restarted at, and Newton on their map."""
+def _taken(p):
+    """The scene with its ripple, and its units."""
     scene, units = _units.without_dimensions(_units.terms(p))
-    cycle, verdict = _integrated_swing.dopri5(scene, (p.depth, p.harmonic), rtol)
-    return _units.given(units, cycle, verdict)
+    return (scene, (p.depth, p.harmonic)), units
+
+
+@jit
+def dopri5(rippled, rtol):
+    """Dormand-Prince 5(4) over half swings, each switch located and restarted at, and Newton on their map."""
+    scene, ripple = rippled
+    return _integrated_swing.dopri5(scene, ripple, rtol)
 
 
 @jit
@@ -43,29 +49,17 @@ FOLIOT_RIPPLE = kernel(
     source=FOLIOT.source,
     parameters=(
         *FOLIOT.parameters,
-        Field(
-            "depth",
-            "1",
-            "amplitude of the torque's ripple over its mean",
-            default=0.0,
-            lower=0.0,
-            upper=math.nextafter(1.0, 0.0),
-        ),
-        Field(
-            "harmonic",
-            "1",
-            "half waves of the ripple on the way from switch to switch",
-            default=1.0,
-            lower=1.0,
-            upper=HIGHEST,
-            integer=True,
-        ),
+        Field("depth", "1", "amplitude of the torque's ripple over its mean",
+              default=0.0, lower=0.0, upper=math.nextafter(1.0, 0.0)),
+        Field("harmonic", "1", "half waves of the ripple on the way from switch to switch",
+              default=1.0, lower=1.0, upper=HIGHEST, integer=True),
     ),
     outputs=FOLIOT.outputs,
     check=check,
     methods=(
         _taylor_swing.by_taylor((*_units.Foliot._fields, "depth", "harmonic"), rippled=True),
-        method("dopri5", "adaptive Runge-Kutta of order 5, Newton on the half-swing map", dopri5),
+        method("dopri5", "adaptive Runge-Kutta of order 5, Newton on the half-swing map",
+               dopri5, units=(_taken, _units.given)),
     ),
     example={"mu": 1.0, "phi0": 1.0, "a": 1.0, "depth": 0.3, "harmonic": 2.0},
-)
+)  # fmt: skip

@@ -13,21 +13,20 @@ Derived here from Hoyng & Nieuwenhuizen, arXiv:1604.06681, section 2, and from `
 import math
 from typing import NamedTuple
 
-import numpy as np
-
 from kernels.foliot import _linear_swing, _units
+from kernels.foliot._linear_swing import ROUNDING
 from kernels.foliot._units import LinearFoliot
 from kernels.foliot.cycle import FOLIOT
 from kernels.integrate import linear_flow
 from kernels.interface import Field
 from kernels.lanes.codes import BAD_INPUT, COMES_TO_REST, GRAZING, INACCURATE, NEVER_STARTS, OK, OUT_OF_RANGE, STICKS
-from kernels.lanes.groups import GROUP, cells_at, write_row
+from kernels.lanes.groups import cells_at, one_row, write_row
 from kernels.lanes.jit import jit, jit_call
-from kernels.lanes.ranges import or_none, partly
+from kernels.lanes.ranges import partly
 from kernels.lanes.records import read
 from kernels.lanes.vectors import any_lane, choose, fma, magnitude, not_, where
 from kernels.lanes.wiring import kernel, tracing
-from kernels.maths.elementary import is_normal, scale
+from kernels.maths.elementary import is_normal, larger
 
 FLIP_LIMIT = 1e6
 """The last flip that can be asked for."""
@@ -46,19 +45,11 @@ class Flip(NamedTuple):
 
 
 @jit
-def _place(phi0, phi_start):
-    """x of (1) and the way 1 + x to the switch, which keeps its digits for a start just before it."""
-    before = phi_start < phi0
-    way = where(before, phi0 - phi_start, phi_start + phi0) / phi0
-    return where(before, -phi_start, phi_start) / phi0, way
-
-
-@jit
 def _held(scene, x):
     """Whether stiction holds at rest at x, and whether the last digits decide it."""
     rho_s, kappa = scene.rho_s, scene.kappa
     pull = fma(kappa, x, 1.0)
-    unsure = (kappa > 0.0) & (magnitude(pull - rho_s) <= _linear_swing.ROUNDING * (magnitude(kappa * x) + rho_s))
+    unsure = (kappa > 0.0) & (magnitude(pull - rho_s) <= ROUNDING * (magnitude(kappa * x) + rho_s))
     return not_(pull > rho_s), unsure
 
 
@@ -72,8 +63,14 @@ def _near_miss(scene, energy, push, speed, way):
     kappa = scene.kappa
     against = fma(kappa, way, -push)
     left = way - linear_flow.reach(0.5 * scene.d, kappa, speed, push)
-    rounding = 8.0 * _linear_swing.ROUNDING * way * (magnitude(against) + 1.0 + kappa * (1.0 + way))
+    rounding = 8.0 * ROUNDING * way * (magnitude(against) + 1.0 + kappa * (1.0 + way))
     return left * against <= 2.0 * energy + rounding
+
+
+@jit
+def _either(condition, yes, no):
+    """`where` for conditions."""
+    return (condition & yes) | (not_(condition) & no)
 
 
 @jit_call
@@ -87,18 +84,12 @@ def _release(scene, x, way):
     time = where(through, time, 0.0)
     s, _, slope = linear_flow.response(beta, kappa, time)
     speed = push * s
-    rounded = _linear_swing.ROUNDING * (1.0 + magnitude(kappa * x) / push)  # of the push
-    wrong = rounded + _linear_swing.ROUNDING * way * magnitude(push * slope) / (speed * speed)
-    late = rounded * way / speed + _linear_swing.ROUNDING * time
+    rounded = ROUNDING * (1.0 + magnitude(kappa * x) / push)  # of the push
+    wrong = rounded + ROUNDING * way * magnitude(push * slope) / (speed * speed)
+    late = rounded * way / speed + ROUNDING * time
     near = (push > 0.0) & _near_miss(scene, 0.0 * way, push, 0.0 * way, way)
     unsure = unsure | _either(through, wrong > UNSURE, near & not_(held))
     return Flip(time, 0.0 * time, speed, wrong, late), through & not_(held), unsure
-
-
-@jit
-def _either(condition, yes, no):
-    """`where` for conditions."""
-    return (condition & yes) | (not_(condition) & no)
 
 
 @jit_call
@@ -112,7 +103,7 @@ def _next(scene, flip):
     energy_noise, time_noise = _linear_swing.own_noise(scene, start, legs)
     wrong = fma(kept * start * start, flip.wrong, energy_noise) / (legs.speed * legs.speed)
     late = flip.late + magnitude(longer * start) * flip.wrong + time_noise
-    energy = start * start * (flip.wrong + _linear_swing.ROUNDING)
+    energy = start * start * (flip.wrong + ROUNDING)
     near = _near_miss(scene, energy, legs.g2, legs.down, 1.0 + legs.top)
     unsure = (turns & unsure) | _either(legs.comes, wrong > UNSURE, near)
     later = flip.time + legs.time
@@ -121,57 +112,14 @@ def _next(scene, flip):
 
 
 @jit
-def _onward(scene, now, going, unsure, flips):
-    """So many flips on from `now`: the last that came, where all came, and where the last digits decided."""
-    for _ in range(flips):
-        if any_lane(going):
-            new, comes, grazes = _next(scene, now)
-            unsure = unsure | (going & grazes)
-            going = going & comes
-            now = choose(going, new, now)
-    return now, going, unsure
-
-
-@jit
-def _countable(flip):
-    """Whether the coordinate counts: whole numbers from 1 on; NaN fails."""
-    counts = True
-    for j in range(flip.size):
-        counts = counts and 1.0 <= flip[j] <= FLIP_LIMIT and flip[j] == math.floor(flip[j])
-    return counts
-
-
-@jit
-def _in_units(units, flip):
-    """Time [s] and speed [rad/s], NaN where no normal numbers, and whether one of them and whether both are normal."""
-    time = scale(units.t * (flip.time + flip.low), units.e_t)
-    speed = scale(units.m_phi / units.t * flip.speed, units.e_phi - units.e_t)
-    timed, moves = is_normal(time), is_normal(speed)
-    return or_none(time, timed), or_none(speed, moves), timed | moves, timed & moves
-
-
-@jit
-def _error(flip):
-    """The larger of the relative errors of time and speed."""
-    of_time = flip.late / flip.time
-    return where(of_time > flip.wrong, of_time, flip.wrong)
-
-
-@jit
-def _verdict(scene, x, starts, going, accurate, unsure):
-    """On a start from rest at x: whether it starts, goes on, and is known well enough."""
-    verdict = where(accurate, where(going, OK, COMES_TO_REST), INACCURATE)
-    held = not_(magnitude(fma(scene.kappa, x, 1.0)) > scene.rho_s)
-    verdict = where(starts, verdict, where(held, NEVER_STARTS, STICKS))
-    return where(unsure, GRAZING, verdict)
-
-
-@jit
 def _follow(first, columns, row):
     """One group of cells from flip to flip; flips asked for in falling order are followed from the release again."""
     i, flip = cells_at(first), columns.flip
     scene, units = _units.without_dimensions(_units.without_drag(read(LinearFoliot, columns, i)))
-    x, way = _place(columns.phi0[i], columns.phi_start[i])
+    phi0, phi_start = columns.phi0[i], columns.phi_start[i]
+    before = phi_start < phi0
+    way = where(before, phi0 - phi_start, phi_start + phi0) / phi0  # 1 + x, with its digits for a start just before
+    x = where(before, -phi_start, phi_start) / phi0
     fine = units.fine & is_normal(way)
     released, starts, doubt = _release(scene, x, where(fine, way, 1.0))
     now, going, unsure, here = released, starts, doubt, 1.0
@@ -179,29 +127,35 @@ def _follow(first, columns, row):
     for j in range(flip.size):
         if flip[j] < here:
             now, going, here = released, starts, 1.0
-        now, going, unsure = _onward(scene, now, going, unsure, int(flip[j] - here))
+        for _ in range(int(flip[j] - here)):
+            if any_lane(going):
+                new, comes, grazes = _next(scene, now)
+                unsure = unsure | (going & grazes)
+                going = going & comes
+                now = choose(going, new, now)
         here = flip[j]
-        time, speed, some_normal, normal = _in_units(units, now)
-        whole, given = whole & (normal | not_(going)), given | some_normal
-        accurate = accurate & ((_error(now) <= columns.rtol[i]) | not_(going))
+        time, speed = _units.time(units, now.time + now.low), _units.speed(units, now.speed)
+        whole, given = whole & ((time > 0.0) & (speed > 0.0) | not_(going)), given | (time > 0.0) | (speed > 0.0)
+        accurate = accurate & ((larger(now.late / now.time, now.wrong) <= columns.rtol[i]) | not_(going))
         write_row(first, j, where(going, time, math.nan), row, columns.flip_time)
         write_row(first, j, where(going, speed, math.nan), row, columns.flip_speed)
-    verdict = partly(whole, _verdict(scene, x, starts, going, accurate, unsure))
+    verdict = where(accurate, where(going, OK, COMES_TO_REST), INACCURATE)
+    held = not_(magnitude(fma(scene.kappa, x, 1.0)) > scene.rho_s)
+    verdict = where(starts, verdict, where(held, NEVER_STARTS, STICKS))
+    verdict = partly(whole, where(unsure, GRAZING, verdict))
     columns.status[i] = where(fine & given, verdict, OUT_OF_RANGE)
 
 
 @jit
 def segments(first, columns, row):
     """Exact pieces from switch to switch, and how far their rounding may have added up: INACCURATE beyond rtol."""
-    if _countable(columns.flip):
+    counts = True
+    for flip in columns.flip:  # whole numbers from 1 on; NaN fails
+        counts = counts and 1.0 <= flip <= FLIP_LIMIT and flip == math.floor(flip)
+    if counts:
         _follow(first, columns, row)
     else:
         columns.status[cells_at(first)] = BAD_INPUT
-
-
-@jit
-def _row():
-    return (np.empty(GROUP),)
 
 
 @jit
@@ -217,20 +171,14 @@ FOLIOT_START = kernel(
     parameters=(*FOLIOT.parameters, Field("phi_start", "rad", "angle of release from rest", default=0.0)),
     outputs=(
         Field("flip_time", "s", "time of the flip after the release; NaN where none comes", dims=("flip",)),
-        Field(
-            "flip_speed", "rad/s", "angular speed along the drive just before the switch; NaN as well", dims=("flip",)
-        ),
+        Field("flip_speed", "rad/s", "angular speed along the drive just before the switch; NaN as well",
+              dims=("flip",)),
     ),
     along=(Field("flip", "1", "number of the flip, from 1 on", lower=1.0, upper=FLIP_LIMIT, integer=True),),
     check=check,
     methods=(
-        tracing(
-            "segments",
-            "exact pieces of linear terms, from switch to switch",
-            segments,
-            excludes=("c",),
-            buffers=_row,
-        ),
+        tracing("segments", "exact pieces of linear terms, from switch to switch",
+                segments, excludes=("c",), buffers=one_row),
     ),
     example={"mu": 1.0, "phi0": 1.0, "a": 1.0},
-)
+)  # fmt: skip

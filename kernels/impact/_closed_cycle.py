@@ -25,9 +25,7 @@ and both start with V = w = wheel R - c, thrown back by V^2/(2 wheel) where V < 
 map of c^2 is linear with the factor d^2. Derived here.
 """
 
-import math
-
-from kernels.impact._units import Cycle
+from kernels.impact._units import Answer, Cycle
 from kernels.lanes.codes import GRAZING, INACCURATE, NO_CYCLE, NO_METHOD, OK, UNSTABLE
 from kernels.lanes.jit import jit
 from kernels.lanes.vectors import choose, fma, magnitude, not_, sqrt, where
@@ -165,7 +163,7 @@ def verdict(exists, stable, doubt, rtol):
 
 @jit
 def closed(scene, rtol):
-    """The cycle, the share of time in contact, and the status."""
+    """The symmetric cycle by formula, with its existence and its multipliers, and the status."""
     plastic = not_(scene.e > 0.0)
     nu, tame = bent(scene)
     cycle, doubt = impact_cycle(scene, nu)
@@ -174,4 +172,4 @@ def closed(scene, rtol):
     straight = not_(magnitude(scene.nu) > 0.0)
     status = where(plastic, where(straight, OK, NO_METHOD), status)
     share = where(plastic, held, 0.0)
-    return choose(plastic, pushed, cycle), where(not_(scene.e < 0.0), share, math.nan), status
+    return Answer(choose(plastic, pushed, cycle), 0.0 * held, share, 0.0 * held + 1.0), status

@@ -7,7 +7,6 @@ A cycle lasts until the next tooth, or, should more than one pass in it, one swi
 """
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
@@ -15,7 +14,7 @@ from kernels.impact import _half_swing as swing
 from kernels.impact._contacts import PlainScene
 from kernels.impact._half_swing import Start, half_swing
 from kernels.impact._periodic import Work, chain, difference, distance, errors, invert, multiplier, newton
-from kernels.impact._units import Cycle, bend
+from kernels.impact._units import Answer, Cycle, bend
 from kernels.lanes.codes import (
     GRAZING,
     INACCURATE,
@@ -53,15 +52,6 @@ _KICK, _KICKS = 0.01, 8
 _ROUNDING = 2.3e-16
 _CHAINED = 5.0
 """Errors of the changes after many contacts over those of one: 3.5 at most in 1055 clocks."""
-
-
-class Answer(NamedTuple):
-    """A cycle, how far the middle of its swing is off, the share of time in contact, and impacts in half a period."""
-
-    cycle: Cycle
-    offset: float
-    held: float
-    impacts: float
 
 
 @jit
@@ -229,8 +219,8 @@ def workspace():
 
 
 @jit
-def settled(scene, rtol, total, work, history):
-    """`attractor` of a scene of `_units`."""
+def events(scene, rtol, total, work, history):
+    """`attractor` of a scene of `_units`, contact by contact: no two clocks have the same to be followed in lanes."""
     if not (1.0 / KAPPA_LIMIT <= scene.kappa[0] <= KAPPA_LIMIT):
         return _none(), NO_METHOD
     return attractor(plain_scene(scene), rtol, total, work, history)

@@ -19,12 +19,11 @@ Leaves out friction, play of the pivots, and the width of teeth and pallets. Der
 import math
 from typing import NamedTuple
 
-from kernels.lanes.codes import BAD_INPUT, NEVER_MEETS, NEVER_STARTS, OK
 from kernels.lanes.jit import jit
-from kernels.lanes.ranges import or_none
+from kernels.lanes.ranges import judged, or_none
 from kernels.lanes.vectors import choose, magnitude, nearest, not_, sqrt, where
 from kernels.maths import pairs as _pairs
-from kernels.maths.elementary import in_unit, is_normal, mantissa_exponent, scale
+from kernels.maths.elementary import in_unit, is_normal, mantissa_exponent, measured, scale
 
 HALF_PITCH = 2e-15
 """Share of p/4 within which h is p/4."""
@@ -51,6 +50,15 @@ class Scene(NamedTuple):
     nu: float
 
 
+class Answer(NamedTuple):
+    """A cycle, how far the middle of its swing is off, the share of time in contact, and impacts in half a period."""
+
+    cycle: tuple
+    offset: float
+    held: float
+    impacts: float
+
+
 class Cycle(NamedTuple):
     """A cycle without dimensions: speeds are those just after impact, `back` is the way the rim is thrown back."""
 
@@ -63,7 +71,7 @@ class Cycle(NamedTuple):
 
 
 class Units(NamedTuple):
-    """T0, p, and the share r_c/r_v, each a mantissa and an exponent; and 2 pi/teeth."""
+    """T0, p, and the share r_c/r_v, each a mantissa and an exponent; 2 pi/teeth; and whether kappa is in range."""
 
     time: float
     e_time: float
@@ -72,20 +80,11 @@ class Units(NamedTuple):
     arm: float
     e_arm: float
     step: float
-
-
-class Sizes(NamedTuple):
-    """Outputs that have a unit: [s], [m], [rad/s], [rad/s], [rad]."""
-
-    period: float
-    swing: float
-    wheel_speed: float
-    pallet_speed: float
-    recoil: float
+    fine: bool
 
 
 @jit
-def _escape(r_c, teeth, h):
+def escape(r_c, teeth, h):
     """eta = h teeth/(2 pi r_c) and slack = 1 - 4 eta, as pairs."""
     m, e = mantissa_exponent(r_c)
     high = where(h < 4.0 * r_c, h, 4.0 * r_c)  # beyond p/4 for any number of teeth
@@ -97,7 +96,7 @@ def _escape(r_c, teeth, h):
 
 @jit
 def without_dimensions(p):
-    """The scene, its units, and whether kappa is in range.
+    """The scene and its units.
 
     M/m = I_c r_v^2/(I_v r_c^2), both masses pairs in a common unit, the larger in [1/2, 8). T0^2 = p M/F =
     2 pi I_c/(teeth torque) has no r_c in it.
@@ -112,7 +111,7 @@ def without_dimensions(p):
     light, heavy = where(e < 0.0, e, 0.0), where(e > 0.0, -e, 0.0)
     wheel, pallet = (scale(wheel[0], light), scale(wheel[1], light)), (scale(pallet[0], heavy), scale(pallet[1], heavy))
     both = _pairs.add(wheel, pallet)
-    eta, slack = _escape(p.r_c, p.teeth, p.h)
+    eta, slack = escape(p.r_c, p.teeth, p.h)
     shares = _pairs.over(wheel, both), _pairs.over(pallet, both)
     scene = Scene(shares[0], shares[1], _pairs.over(wheel, pallet), eta, slack, p.e, p.nu)
 
@@ -121,28 +120,26 @@ def without_dimensions(p):
     half = nearest(0.5 * (e_c - e_tau) - 0.25)
     odd = (e_c - e_tau) - 2.0 * half > 0.5
     time = sqrt(step * (m_c / m_tau) * where(odd, 2.0, 1.0))
-    return scene, Units(time, half, step * s_c, f_c, s_c / s_v, f_c - f_v, step), fine
+    return scene, Units(time, half, step * s_c, f_c, s_c / s_v, f_c - f_v, step, fine)
 
 
 @jit
-def dimensional(units, cycle):
-    """The sizes of a cycle, each NaN where it is no normal number nor 0, and whether all of them are."""
-    period = scale(2.0 * units.time * cycle.half_period, units.e_time)
-    swing = scale(units.pitch * cycle.travel, units.e_pitch)
+def given(units, answer, verdict):
+    """The outputs, each size NaN where it is no normal number nor 0, and the status."""
+    cycle, offset, held, impacts = answer
     rate = units.step / units.time
+    period, swing = (
+        measured(2.0 * units.time * cycle.half_period, units.e_time),
+        measured(units.pitch * cycle.travel, units.e_pitch),
+    )
     wheel_speed = scale(rate * cycle.rim, -units.e_time)
     pallet_speed = scale(rate * units.arm * cycle.pallet, units.e_arm - units.e_time)
-    timed, wide = is_normal(period), is_normal(swing)
     rolls, beats = _normal_or_none(cycle.rim, wheel_speed), _normal_or_none(cycle.pallet, pallet_speed)
-    speeds = or_none(wheel_speed, rolls), or_none(pallet_speed, beats)
-    sizes = Sizes(or_none(period, timed), or_none(swing, wide), speeds[0], speeds[1], units.step * cycle.back)
-    return sizes, timed & wide & rolls & beats
-
-
-@jit
-def length(units, x):
-    """A length without dimensions in metres."""
-    return scale(units.pitch * x, units.e_pitch)
+    whole = (period > 0.0) & (swing > 0.0) & rolls & beats
+    speeds, recoil = (or_none(wheel_speed, rolls), or_none(pallet_speed, beats)), units.step * cycle.back
+    middle = scale(units.pitch * offset, units.e_pitch)
+    outputs = (period, swing, speeds[0], speeds[1], cycle.multiplier, recoil, held, impacts, middle)
+    return outputs, judged(units.fine, whole, verdict)
 
 
 @jit
@@ -151,19 +148,11 @@ def _normal_or_none(x, result):
     return not_(magnitude(x) > 0.0) | is_normal(magnitude(result))
 
 
+UNITS = without_dimensions, given
+
+
 @jit
 def bend(scene):
     """c of (5) and y_i, for one float64 each; c is 0 where nu is."""
     loss = (1.0 - scene.e) / (1.0 + scene.e)
     return scene.nu * loss / scene.pallet[0], -0.25 * scene.wheel[0] / loss
-
-
-@jit
-def refusal(p):
-    """BAD_INPUT for an even number of teeth, NEVER_STARTS without torque, NEVER_MEETS; OK where a method decides."""
-    pairs = 0.5 * (p.teeth - 1.0)
-    odd = not_(magnitude(nearest(pairs) - pairs) > 0.0)
-    _, slack = _escape(p.r_c, p.teeth, p.h)
-    meets = (slack[0] > 0.0) | (not_(slack[0] < 0.0) & not_(p.e > 0.0))
-    verdict = where(p.torque > 0.0, where(meets, OK, NEVER_MEETS), NEVER_STARTS)
-    return where(odd, verdict, BAD_INPUT)

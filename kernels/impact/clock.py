@@ -22,45 +22,13 @@ NO_METHOD: lasting contact under a bent lever, and masses more unequal than 1e12
 flat lever lets no tooth pass alone (`_half_swing`), and no bent one was found to.
 """
 
-from typing import NamedTuple
-
 from kernels.impact import _closed_cycle, _followed, _units
 from kernels.interface import Field
+from kernels.lanes.codes import BAD_INPUT, NEVER_MEETS, NEVER_STARTS, OK
 from kernels.lanes.columns import cell_by_cell
 from kernels.lanes.jit import jit
-from kernels.lanes.ranges import judged
+from kernels.lanes.vectors import magnitude, nearest, not_, where
 from kernels.lanes.wiring import kernel, method
-
-
-class Beat(NamedTuple):
-    """Outputs, of which those with a unit are the record `sizes`."""
-
-    sizes: _units.Sizes
-    multiplier: float
-    contact_share: float
-    impacts: float
-    offset: float
-
-
-@jit
-def closed(p, rtol):
-    """The symmetric cycle by formula, with its existence and its multipliers, in SI units."""
-    scene, units, fine = _units.without_dimensions(p)
-    cycle, held, verdict = _closed_cycle.closed(scene, rtol)
-    sizes, whole = _units.dimensional(units, cycle)
-    one = 0.0 * held + 1.0
-    return Beat(sizes, cycle.multiplier, held, one, 0.0 * one), judged(fine, whole, verdict)
-
-
-@jit
-def events(p, rtol, total, work, history):
-    """Followed contact by contact, cell by cell: no two clocks have the same contacts to be followed in lanes."""
-    scene, units, fine = _units.without_dimensions(p)
-    answer, verdict = _followed.settled(scene, rtol, total, work, history)
-    sizes, whole = _units.dimensional(units, answer.cycle)
-    offset = _units.length(units, answer.offset)
-    beat = Beat(sizes, answer.cycle.multiplier, answer.held, answer.impacts, offset)
-    return beat, judged(fine, whole, verdict)
 
 
 @jit
@@ -71,7 +39,12 @@ def check(p):
     tooth held until h >= p/4 is met by the other pallet before it escapes; with e = 0 h = p/4 itself is the clock
     without drop.
     """
-    return _units.refusal(p)
+    pairs = 0.5 * (p.teeth - 1.0)
+    odd = not_(magnitude(nearest(pairs) - pairs) > 0.0)
+    _, slack = _units.escape(p.r_c, p.teeth, p.h)
+    meets = (slack[0] > 0.0) | (not_(slack[0] < 0.0) & not_(p.e > 0.0))
+    verdict = where(p.torque > 0.0, where(meets, OK, NEVER_MEETS), NEVER_STARTS)
+    return where(odd, verdict, BAD_INPUT)
 
 
 PARAMETERS = (
@@ -89,18 +62,15 @@ PARAMETERS = (
 OUTPUTS = (
     Field("period", "s", "period of the cycle, in which one tooth passes; the mean of cycles that differ"),
     Field("swing", "m", "half of the pallet's way between the farthest ends of its swings"),
-    Field(
-        "wheel_speed",
-        "rad/s",
-        "speed of the crown wheel just after a swing's first impact; the mean of swings that differ",
-    ),
+    Field("wheel_speed", "rad/s",
+          "speed of the crown wheel just after a swing's first impact; the mean of swings that differ"),
     Field("pallet_speed", "rad/s", "speed of the verge just after that impact, in the direction of the tooth"),
     Field("multiplier", "1", "largest factor by which disturbances grow in a half swing, from release to release"),
     Field("recoil", "rad", "largest angle by which the crown wheel is thrown back (0 where it is not)"),
     Field("contact_share", "1", "share of the time that a tooth and a pallet are in contact"),
     Field("impacts", "1", "impacts in half a period (inf where bounces die out in contact)", gaps=True),
     Field("offset", "m", "how far the middle of the pallet's swing is from the middle of its teeth"),
-)
+)  # fmt: skip
 
 IMPACT = kernel(
     "impact",
@@ -111,25 +81,10 @@ IMPACT = kernel(
     check=check,
     methods=(
         # rounding; where two multipliers nearly meet and lose more, the status says so
-        method(
-            "closed", "formula of the symmetric cycle, where it exists and is stable", closed, _closed_cycle.ROUNDING
-        ),
-        method(
-            "events",
-            "whatever the clock does, contact by contact, and Newton on what repeats",
-            events,
-            buffers=_followed.workspace,
-            loop=cell_by_cell,
-        ),
+        method("closed", "formula of the symmetric cycle, where it exists and is stable",
+               _closed_cycle.closed, _closed_cycle.ROUNDING, units=_units.UNITS),
+        method("events", "whatever the clock does, contact by contact, and Newton on what repeats",
+               _followed.events, units=_units.UNITS, buffers=_followed.workspace, loop=cell_by_cell),
     ),
-    example={
-        "torque": 1e-3,
-        "I_c": 4e-5,
-        "I_v": 1e-5,
-        "r_c": 0.03,
-        "r_v": 0.03,
-        "teeth": 31,
-        "h": 0.0,
-        "e": 0.2,
-    },
-)
+    example={"torque": 1e-3, "I_c": 4e-5, "I_v": 1e-5, "r_c": 0.03, "r_v": 0.03, "teeth": 31, "h": 0.0, "e": 0.2},
+)  # fmt: skip

@@ -12,7 +12,6 @@ from typing import NamedTuple
 
 from kernels.integrate.events import cubic_root, of_event
 from kernels.integrate.fixed_step import dip, finite, first_event, passed_another
-from kernels.integrate.nystrom import GROW, SHRINK
 from kernels.integrate.pairs import of_size
 from kernels.integrate.records import Leg, Step
 from kernels.integrate.steps import ONE, events
@@ -24,6 +23,8 @@ from kernels.lanes.vectors import any_lane, choose, fma, magnitude, not_, where
 STEP_LIMIT = 10_000
 SAFETY = 0.25
 """Of the tolerance, for which the next step is chosen."""
+SHRINK, GROW = 0.2, 5.0
+"""Least and most of the step before that the next one is."""
 CUTS = 60
 ROOT_LIMIT = 60
 CLOSE = 30.0

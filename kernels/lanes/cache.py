@@ -11,6 +11,7 @@ nothing in its place that is read.
 """
 
 import contextlib
+import fcntl
 import functools
 import hashlib
 import multiprocessing
@@ -29,11 +30,6 @@ import numba
 from llvmlite import binding
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile, _CacheLocator
 
-try:
-    import fcntl
-except ImportError:  # Windows: each process compiles for itself
-    fcntl = None
-
 PACKAGE = Path(__file__).parents[1]
 OLD_SECONDS = 30 * 24 * 3600
 """Folders of other sources, versions or CPUs that were not used for so long are removed."""
@@ -41,18 +37,12 @@ MOST_COMPILE_SECONDS = 120
 """What a process waits for another one that compiles the same."""
 
 
-def _digest():
-    digest = hashlib.sha256()
-    for path in sorted(PACKAGE.rglob("*.py")):
-        digest.update(str(path.relative_to(PACKAGE)).encode() + path.read_bytes())
-    cpu = f"{binding.get_host_cpu_name()} {binding.get_host_cpu_features().flatten()}"
-    digest.update(f"{numba.__version__} {llvmlite.__version__} {cpu}".encode())
-    return digest.hexdigest()[:20]
-
-
-def _is_ours_alone(info):
+def _ours_alone(info, path):
     """Whether a file or folder of that `os.stat` belongs to the user, and nobody else may write to it."""
-    return info.st_uid == os.geteuid() and not info.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+    alone = info.st_uid == os.geteuid() and not info.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+    if not alone:
+        _refuse(path)
+    return alone
 
 
 @functools.cache
@@ -67,34 +57,34 @@ def _refuse(path):
 def _own_folder(folder):
     """Whether a folder, made where there is none, is the user's alone, and so is the link that may lead to it."""
     folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-    own = _is_ours_alone(folder.stat()) and folder.lstat().st_uid == os.geteuid()
-    if not own:
+    if folder.lstat().st_uid != os.geteuid():
         _refuse(folder)
-    return own
+        return False
+    return _ours_alone(folder.stat(), folder)
 
 
 def _folder():
     """The folder of these sources, made and marked as used; None where there can be none."""
+    digest = hashlib.sha256()
+    for path in sorted(PACKAGE.rglob("*.py")):
+        digest.update(str(path.relative_to(PACKAGE)).encode() + path.read_bytes())
+    cpu = f"{binding.get_host_cpu_name()} {binding.get_host_cpu_features().flatten()}"
+    digest.update(f"{numba.__version__} {llvmlite.__version__} {cpu}".encode())
     home = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME")
     try:
         base = (Path(home) if home else Path.home() / ".cache") / "foliot"
-        folder = base / _digest()
+        folder = base / digest.hexdigest()[:20]
         fresh = not folder.is_dir()
         if not (_own_folder(base) and _own_folder(folder)):
             return None
         os.utime(folder)
-        if fresh:
-            _remove_old(base)
+        for other in base.iterdir() if fresh else ():
+            ours = re.fullmatch("[0-9a-f]{20}", other.name)
+            if ours and time.time() - other.stat().st_mtime > OLD_SECONDS:
+                shutil.rmtree(other, ignore_errors=True)
     except (OSError, RuntimeError):
         return None
     return folder if os.access(folder, os.W_OK) else None
-
-
-def _remove_old(base):
-    for folder in base.iterdir():
-        ours = re.fullmatch("[0-9a-f]{20}", folder.name)  # a name that `_digest` gives
-        if ours and time.time() - folder.stat().st_mtime > OLD_SECONDS:
-            shutil.rmtree(folder, ignore_errors=True)
 
 
 FOLDER = _folder()
@@ -147,9 +137,8 @@ class _Files(IndexDataCacheFile):
 def _unpickled(path):
     """What a file of the user's holds; None where there is none, or it is damaged."""
     with contextlib.suppress(Exception), Path(path).open("rb") as file:  # whatever comes of a damaged pickle
-        if _is_ours_alone(os.fstat(file.fileno())):
+        if _ours_alone(os.fstat(file.fileno()), path):
             return pickle.load(file)
-        _refuse(path)
     return None
 
 
@@ -159,29 +148,6 @@ def _write(path, content):
     with os.fdopen(handle, "wb") as file:
         file.write(content)
     Path(draft).replace(path)
-
-
-def _lock(file):
-    """Locks an open file until it is closed; gives up where its holder takes longer than anything takes to compile.
-
-    Returns
-    -------
-    bool
-        Whether nobody else had locked it.
-    """
-    for trial in range(round(MOST_COMPILE_SECONDS / 0.05)):
-        with contextlib.suppress(BlockingIOError):
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            return trial == 0
-        time.sleep(0.05)
-    return False
-
-
-def _unlock(file):
-    """Also for processes that were forked meanwhile, which have the file open as well."""
-    with contextlib.suppress(OSError):
-        fcntl.flock(file, fcntl.LOCK_UN)
-    os.close(file)
 
 
 class _Cache(FunctionCache):
@@ -195,16 +161,29 @@ class _Cache(FunctionCache):
 
     @contextlib.contextmanager
     def alone(self):
-        """Has other processes wait while this one compiles what is not kept yet, for they can load it then."""
-        index = Path(self._cache_file._index_path)
-        with contextlib.ExitStack() as held:
-            if fcntl is not None and not index.exists():
-                with contextlib.suppress(OSError):  # a folder without locks: each compiles for itself
-                    file = os.open(f"{index}.lock", os.O_CREAT | os.O_WRONLY, 0o600)
-                    held.callback(_unlock, file)
-                    if not _lock(file) and not index.exists():
-                        held.close()  # who had it could keep nothing: then none need wait for another
+        """Has other processes wait while this one compiles what is not kept yet, for they can load it then.
+
+        Gives up where its holder takes longer than anything takes to compile, and where who had it could keep nothing:
+        then none need wait for another. In a folder without locks each compiles for itself.
+        """
+        index, file = Path(self._cache_file._index_path), None
+        if not index.exists():
+            with contextlib.suppress(OSError):
+                file = os.open(f"{index}.lock", os.O_CREAT | os.O_WRONLY, 0o600)
+                for trial in range(round(MOST_COMPILE_SECONDS / 0.05)):
+                    with contextlib.suppress(BlockingIOError):
+                        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                        if trial and not index.exists():
+                            fcntl.flock(file, fcntl.LOCK_UN)
+                        break
+                    time.sleep(0.05)
+        try:
             yield
+        finally:
+            if file is not None:
+                with contextlib.suppress(OSError):  # also for processes that were forked meanwhile and have it open
+                    fcntl.flock(file, fcntl.LOCK_UN)
+                os.close(file)
 
     def load_overload(self, sig, target_context):
         try:

@@ -28,6 +28,12 @@ def room(rows):
 
 
 @jit
+def one_row():
+    """The buffer of one row."""
+    return (np.empty(GROUP),)
+
+
+@jit
 def write_row(first, j, values, row, trace):
     """trace[first + cell, j] = values[cell] for the cells of a group, through `row`, a buffer of one row."""
     row[cells_at(0)] = values

@@ -70,6 +70,13 @@ def scale(x, n):
 
 
 @jit
+def measured(x, n):
+    """x 2^n, a size in its unit; NaN where that is no normal float64."""
+    size = scale(x, n)
+    return where(is_normal(size), size, math.nan)
+
+
+@jit
 def mantissa_exponent(x):
     """m in [1, 2) and e with x = m 2^e, exact for every positive finite x, subnormal ones included."""
     small = x < 1e-290
