@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 from kernels.integrate.tableaux import DOPRI5, DOPRI5_ERROR
 from kernels.lanes.jit import jit, jit_call, jit_inline
-from kernels.lanes.tuples import after, times
+from kernels.lanes.tuples import after
 from kernels.lanes.vectors import any_lane, choose, exponent, fma, magnitude, nearest, not_, pow2, sqrt, where
 from kernels.maths.elementary import LN2, exp, larger, power, sincos, smaller
 
@@ -227,7 +227,10 @@ def _step(state, first, law, h, scales):
     k5 = rates(after(state, h, DOPRI5[4], (first, k1, k2, k3, k4)), law)
     new = after(state, h, DOPRI5[5], (first, k2, k3, k4, k5))
     last = rates(new, law)
-    errors = after(times(0.0, state), h, DOPRI5_ERROR, (first, k2, k3, k4, k5, last))
+    nothing = 0.0 * h
+    errors = after(
+        (nothing, nothing, nothing, nothing, nothing, nothing, nothing), h, DOPRI5_ERROR, (first, k2, k3, k4, k5, last)
+    )
     speed, weak, pace = scales
     worst, over = 0.0 * h, 0.0 * h + 1.0
     least = (over, speed, weak, pace, pace, over, over)

@@ -41,6 +41,8 @@ _CANCELS = 0.3
 are then bounded by the time to rest, and two tolerances may differ by less than either is off."""
 _STEEP_FROM, _STEEP_TO = 1e-8, 0.03
 """Changes of v1 between two swings, near the cycle, whose effect on s is their own, not that of the tolerances."""
+_STEEP = 0.2
+"""Of how steeply s hangs on v1, by which tolerances are finer: two may differ by less than either is off."""
 
 
 @jit
@@ -150,6 +152,7 @@ def dopri5(scene, ripple, rtol):
         # the tolerance that is wanted, and whether it was that of this swing and the one before
         free = not_(half.helped)
         finer = where(problem.rough & free & (half.end > 0.0), larger(_CANCELS * cancels, 1.0 + 0.0 * cancels), 1.0)
+        finer = larger(finer, _STEEP * steep)
         wanted = tighter * _enough(problem, slope, half.state[6]) / finer
         last_but_one, last = tolerance <= 1.5 * _CHECK * wanted, tolerance <= 1.5 * wanted
 
@@ -158,8 +161,7 @@ def dopri5(scene, ripple, rtol):
         stuck = last_but_one & ((half.helped & (relative <= 0.2 * rtol)) | at_rest)
         agree = (relative <= 0.2 * rtol) & (apart <= 0.3 * rtol) & (steep * relative <= 0.3 * rtol)
         settled = last & free & agree
-        still = (relative <= rtol) | (relative * (1.0 - slope) <= _V_ROUNDING)
-        at_floor = (wanted < _FINEST) & (tolerance < _FINEST) & free & still
+        at_floor = (wanted < _FINEST) & (tolerance < _FINEST) & free & (relative <= larger(rtol, _V_ROUNDING + zero))
         blur = larger(steep, cancels) * _V_ROUNDING
         right = settled & (wanted >= _FINEST) & (blur <= 0.3 * rtol * (1.0 - slope))
         sticks = stuck | held(problem, half.top)

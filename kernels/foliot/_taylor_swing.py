@@ -47,12 +47,15 @@ _CALM = 1e-6
 _SHARE, _SHARE_ROUGH, _TIGHTER = 0.1, 0.01, 0.01
 """Of rtol that a half swing may be off by; where the drag is of a degree below 2 or the torque varies, on which time
 and sensitivity hang steeply; how much less where it did not do."""
+AGAIN = 3
+"""How often that is tried."""
 _LEAST = 1e-17
 """Of tolerances: finer ones change nothing but the time that they take."""
 _TOLD, _TOLD_STEEP, _TOLD_ROUGH = 4.0, 16.0, 32.0
 """Error that is stated over what the two last half swings differ by, of which the finer one's should be a fifteenth;
 where the torque varies, on which the sensitivity hangs steeply; and where the drag is of a degree below 2: cores of
-abs(v)^n have a low order."""
+abs(v)^n have a low order. Besides, an output is off by what the fine one's Newton step would still change, at the rate
+at which it changed from the rough one's speed to the fine one's: a thousandfold at times."""
 _ROUNDING = 2e-14
 """Of a half swing's speed and time; a cycle's are off by 1/(1 - multiplier) as much."""
 
@@ -175,11 +178,12 @@ def cycles(cells, rtol, rippled, asked):
     terms |= dict(zip(RIPPLE, (cells[-2], cells[-1] * (0.5 * np.pi)), strict=True))
     dragged = terms["gamma"] > 0.0
     rough, linear = dragged & (terms["degree"] < 2.0), ~dragged & rippled
-    told = np.where(rough, _TOLD_ROUGH, np.where(linear, _TOLD_STEEP, _TOLD))
-    share = np.where(rough | linear, _SHARE_ROUGH, _SHARE)
+    varies = cells[-2] > 0.0
+    told = np.where(rough, _TOLD_ROUGH, np.where(varies, _TOLD_STEEP, _TOLD))
+    share = np.where(rough | varies, _SHARE_ROUGH, _SHARE)
     forms = RIPPLED if rippled else SMOOTH, SEARCHED, LINEAR
-    low, high, stuck, again = np.full(n, -1.0), np.full(n, np.inf), np.zeros(n, int), np.zeros(n, bool)
-    stage, tolerance = np.full(n, SEARCH), np.full(n, _COARSE)
+    low, high, stuck, again = np.full(n, -1.0), np.full(n, np.inf), np.zeros(n, int), np.zeros(n, int)
+    stage, tolerance, before = np.full(n, SEARCH), np.full(n, _COARSE), np.full(n, np.nan)
     outputs, errors = np.full((len(Outputs._fields), n), np.nan), np.full((len(Outputs._fields), n), np.inf)
     status = np.where(possible, Status.NOT_CONVERGED, Status.NO_METHOD).astype(np.int8)
     i = np.flatnonzero(possible)
@@ -207,20 +211,22 @@ def cycles(cells, rtol, rippled, asked):
         lost = (stuck[i] > STUCK) | ((stage[i] == SEARCH) & (high[i] - low[i] <= _COARSE * v[i]))
 
         # the error of fine ones by how far they are from the rough ones; done where that will do, or nothing helps
-        apart = told[i] * np.abs(found / outputs[:, i] - 1.0) + 2.0 * relative
+        moved = np.abs(v[i] / before[i] - 1.0)
+        apart = np.abs(found / outputs[:, i] - 1.0)
+        apart = (told[i] + 2.0 * relative / moved) * apart + 2.0 * relative
         floor = np.tile((_ROUNDING + tolerance[i]) / gap, (len(found), 1))
         floor[3] *= 1.0 + cancels
         floor[4] *= 1.0 + decay
         fine = free & (stage[i] == FINE)
         outputs[:, i[free]], errors[:, i] = found[:, free], np.where(fine, apart + floor, np.inf)
         right = errors[:, i][asked].max(axis=0) <= rtol[i]
-        last = fine & (right | again[i] | (tolerance[i] <= _LEAST))
+        last = fine & (right | (again[i] >= AGAIN) | (tolerance[i] <= _LEAST))
         status[i[last]] = verdict[last]
         repeated = i[fine & ~last]
-        share[repeated], again[repeated] = _TIGHTER * share[repeated], True
+        share[repeated], again[repeated] = _TIGHTER * share[repeated], again[repeated] + 1
 
         # the next speed: Newton's, or where that leaves the bracket one that narrows it
-        now = v[i]
+        now = before[i] = v[i]
         noise = np.where(linear[i], _NOISE_BARE, _NOISE) * tolerance[i] * now
         low[i] = np.where(~free | (end - now > noise), now, low[i])
         high[i] = np.where(free & (now - end > noise), now, high[i])

@@ -109,27 +109,21 @@ class _Part(CPUDispatcher):
         return self._type
 
 
-def _holds_arrays(kind):
-    """Whether values of a type are counted by those who hold them."""
-    return isinstance(kind, types.Buffer) or (
-        isinstance(kind, types.BaseTuple) and any(_holds_arrays(item) for item in kind)
-    )
-
-
-def _hands_over(function):
-    """Whether arrays that a function returns may be new: not those of a record, made of what its caller holds."""
-    borrows = getattr(getattr(function, "typing_key", None), "borrows", False)
-    return not (borrows or isinstance(function, types.NamedTupleClass))
-
-
 def _only_borrows(state):
-    """Whether a function makes no array, gets none from what it calls, and hands none back: its callers hold all."""
-    made = (
-        signature.return_type
-        for node, signature in state.calltypes.items()
-        if getattr(node, "op", None) == "call" and _hands_over(state.typemap[node.func.name])
-    )
-    return not any(map(_holds_arrays, (state.return_type, *made)))
+    """Whether a function makes no array, gets none from what it calls, and hands none back: its callers hold all.
+
+    Arrays of a record that is made of what the caller holds are not new.
+    """
+
+    def counted(kind):
+        return isinstance(kind, types.Buffer) or (isinstance(kind, types.BaseTuple) and any(map(counted, kind)))
+
+    def borrows(function):
+        return getattr(getattr(function, "typing_key", None), "borrows", isinstance(function, types.NamedTupleClass))
+
+    calls = [(node, signature) for node, signature in state.calltypes.items() if getattr(node, "op", None) == "call"]
+    made = (signature.return_type for node, signature in calls if not borrows(state.typemap[node.func.name]))
+    return not any(map(counted, (state.return_type, *made)))
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
@@ -177,17 +171,13 @@ class _EntryLibrary(_AlignedLibrary):
         super().finalize()
 
 
-def _all_below(library):
+def _all_below(library, found=None):
     """What a library calls, and what that calls."""
-    found = {}
-
-    def visit(caller):
-        for called in caller._linking_libraries:
-            if called not in found:
-                found[called] = True
-                visit(called)
-
-    visit(library)
+    found = {} if found is None else found
+    for called in library._linking_libraries:
+        if called not in found:
+            found[called] = True
+            _all_below(called, found)
     return list(found)
 
 
@@ -256,19 +246,15 @@ def _is_tried():
     return not numba.config.DISABLE_JIT and numba.__version__.startswith(TRIED)
 
 
-def _put_off_scipy():
-    """Loads numba's functions of arrays without scipy.linalg, a seventh of a warm run; `dot` loads it when compiled."""
+if _is_tried():
+    # loads numba's functions of arrays without scipy.linalg, a seventh of a warm run; `dot` loads it when compiled
     from numba.np import linalg
 
-    asked, linalg.ensure_blas = linalg.ensure_blas, lambda: None
+    _asked, linalg.ensure_blas = linalg.ensure_blas, lambda: None
     try:
-        import numba.np.arraymath  # noqa: F401  asks for it only to know that it is there
+        import numba.np.arraymath
     finally:
-        linalg.ensure_blas = asked
-
-
-if _is_tried():
-    _put_off_scipy()
+        linalg.ensure_blas = _asked
 
 
 def _made(dispatcher, compiler, function, options):
