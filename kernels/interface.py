@@ -92,28 +92,18 @@ KINDS = {
 """Words for what became of a cell, in the order of an account, in which each cell is counted under one of them."""
 
 
-class OnColumns(Protocol):
-    """What the engine calls: takes columns in the order that `Kernel` and `Method` say, and fills the last ones."""
-
-    def __call__(self, *columns: Any, **named: Any) -> None: ...
-
-
-class CheckCell(Protocol):
-    """`check(p) -> status`: OK or a refusal of a cell, before any method is asked; p is a record of the parameters."""
-
-    def __call__(self, p: Any, /) -> Any: ...
+OnColumns = Callable[..., None]
+"""What the engine calls: takes columns in the order that `Kernel` and `Method` say, and fills the last ones."""
+CheckCell = Callable[[Any], Any]
+"""`check(p) -> status`: OK or a refusal of a cell, before any method is asked; p is a record of the parameters."""
+BoundCell = Callable[[Any], Any]
+"""`bound(p) -> error`: relative, a number for all outputs, or a record with one for each."""
 
 
 class SolveCell(Protocol):
     """`solve(p, rtol, *buffers) -> outputs, status`; of a method that estimates, `-> outputs, errors, status`."""
 
     def __call__(self, p: Any, rtol: Any, /, *buffers: Any, **named: Any) -> tuple[Any, Any] | tuple[Any, Any, Any]: ...
-
-
-class BoundCell(Protocol):
-    """`bound(p) -> error`: relative, a number for all outputs, or a record with one for each."""
-
-    def __call__(self, p: Any, /) -> Any: ...
 
 
 class FillCells(Protocol):

@@ -1,8 +1,8 @@
-# Is a limit cycle that `dopri5` or `taylor` calls OK right to the rtol that was wanted?
+# Is a limit cycle that `dopri5`, `sdirk4` or `taylor` calls OK right to the rtol that was wanted?
 """Random foliots of every term with drag of any degree, each at its own rtol, by the integration of half swings:
 
 nice python benchmarks/honesty/cycle_honesty.py [--cells 100000] [--seed 1] [--degrees 1 6] [--rtol 1e-10 1e-3]
-    [--ripple] [--method taylor]
+    [--ripple] [--method taylor|sdirk4]
 
 Truth is `quadrature` without a hairspring and ripple, and else `taylor` at 1e-12, where the error that it states is
 below a twentieth of rtol; `auto_honesty.py` holds both against 50 digits. With `--ripple` half of the cells have a
@@ -80,7 +80,7 @@ def judged(kernel, method, cells, rtol):
 def main(arguments):
     """1 where a cell that is called OK is off by more than its rtol."""
     parser = argparse.ArgumentParser(description="Is a limit cycle that is called OK right?")
-    parser.add_argument("--method", choices=["dopri5", "taylor"], default="dopri5")
+    parser.add_argument("--method", choices=["dopri5", "sdirk4", "taylor"], default="dopri5")
     parser.add_argument("--cells", type=int, default=100_000)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--degrees", type=float, nargs=2, default=(1.0, 6.0), metavar=("LOW", "HIGH"))

@@ -26,6 +26,15 @@ from kernels.lanes.tuples import after
 from kernels.lanes.vectors import any_lane, choose, exponent, fma, magnitude, nearest, not_, pow2, sqrt, where
 from kernels.maths.elementary import LN2, exp, larger, power, sincos, smaller
 
+SDIRK4 = (
+    (1 / 2,),
+    (17 / 50, -1 / 25),
+    (371 / 1360, -137 / 2720, 15 / 544),
+    (25 / 24, -49 / 48, 125 / 16, -85 / 12),
+)
+"""Stages 1 to 4 from all before, beside 1/4 of their own."""
+SDIRK4_ERROR = (-3 / 16, -27 / 32, 25 / 32, 1 / 4)
+"""Of stages 0, 1, 2 and 4."""
 HELP_LIMIT = 1000
 """Places of rest on one half swing; a motion with more is taken for one that does not arrive."""
 STEP_LIMIT = 10_000
@@ -33,6 +42,8 @@ STEP_LIMIT = 10_000
 _ROOT_LIMIT, _SETTLED = 60, 1e-9
 """Trials for the end of a leg; Newton's step, over the whole one, after which the next is the last: its error is the
 square."""
+_STAGE_LIMIT = 12
+"""Newton's steps for a stage of an implicit method."""
 _SAFETY, _SHRINK, _GROW = 0.9, 0.2, 5.0
 _SHARE = 0.3
 """Of rtol that a single step may take; the rest is left to their sum."""
@@ -193,16 +204,22 @@ def _held_at(problem, speed):
 
 
 @jit
-def rates(state, law):
-    """(1), its tangents, and f'."""
-    x, v, x_mu, v_mu, x_start, v_start, _ = state
+def _force(x, v, law):
+    """Force towards the switch with that of friction; tau - 1; the slopes of the force by x and by v."""
     extra, by_x, lost, by_v = 0.0 * x, 0.0 * x, 0.0 * x, 0.0 * x
     if any_lane(law.depth > 0.0):
         extra, by_x = _ripple(x, law.depth, law.wave)
     if any_lane(law.gamma > 0.0):
         lost, by_v = _drag(magnitude(v), law.gamma, law.n, law.floor)
     force = fma(law.kappa, x, law.steady + extra) + fma(law.d, v, law.side * lost)
-    stiffness, slope = law.kappa + by_x, law.d + by_v
+    return force, extra, law.kappa + by_x, law.d + by_v
+
+
+@jit
+def rates(state, law):
+    """(1), its tangents, and f'."""
+    x, v, x_mu, v_mu, x_start, v_start, _ = state
+    force, extra, stiffness, slope = _force(x, v, law)
     by_mu = fma(stiffness, x_mu, fma(slope, v_mu, 1.0 + extra))
     return v, -force, v_mu, -by_mu, v_start, -fma(stiffness, x_start, slope * v_start), slope
 
@@ -214,31 +231,79 @@ def inwards(problem, floor):
     return Law(0.0 * d - 1.0, problem.inwards, d, gamma, n, floor, kappa, depth, wave)
 
 
-@jit_call
-def _step(state, first, law, h, scales):
-    """One step of Dormand-Prince 5(4) from the rates `first`: state and rates after it, the largest error over scale.
+@jit
+def _worst(state, errors, scales):
+    """The largest error over its scale.
 
     One division in all, for they are dear: the worst error and its scale are compared crosswise.
     """
+    speed, weak, pace = scales
+    worst, over = 0.0 * speed, 0.0 * speed + 1.0
+    least = (over, speed, weak, pace, pace, over, over)
+    for j in range(7):
+        error, scale = magnitude(errors[j]), least[j] + where(j < 6, 1.0, 0.01) * magnitude(state[j])
+        worse = (error * over > worst * scale) | not_(error < math.inf)
+        worst, over = where(worse, error, worst), where(worse, scale, over)
+    return worst / over
+
+
+@jit_call
+def dopri5_step(state, first, law, h, scales):
+    """One step of Dormand-Prince 5(4) from the rates `first`: state and rates after it, largest error over scale."""
     k1 = rates(after(state, h, DOPRI5[0], (first,)), law)
     k2 = rates(after(state, h, DOPRI5[1], (first, k1)), law)
     k3 = rates(after(state, h, DOPRI5[2], (first, k1, k2)), law)
     k4 = rates(after(state, h, DOPRI5[3], (first, k1, k2, k3)), law)
     k5 = rates(after(state, h, DOPRI5[4], (first, k1, k2, k3, k4)), law)
     new = after(state, h, DOPRI5[5], (first, k2, k3, k4, k5))
-    last = rates(new, law)
-    nothing = 0.0 * h
-    errors = after(
-        (nothing, nothing, nothing, nothing, nothing, nothing, nothing), h, DOPRI5_ERROR, (first, k2, k3, k4, k5, last)
-    )
-    speed, weak, pace = scales
-    worst, over = 0.0 * h, 0.0 * h + 1.0
-    least = (over, speed, weak, pace, pace, over, over)
-    for j in range(7):
-        error, scale = magnitude(errors[j]), least[j] + where(j < 6, 1.0, 0.01) * magnitude(state[j])
-        worse = (error * over > worst * scale) | not_(error < math.inf)
-        worst, over = where(worse, error, worst), where(worse, scale, over)
-    return new, last, worst / over
+    last, nothing = rates(new, law), 0.0 * h
+    zeros = (nothing, nothing, nothing, nothing, nothing, nothing, nothing)
+    errors = after(zeros, h, DOPRI5_ERROR, (first, k2, k3, k4, k5, last))
+    return new, last, _worst(state, errors, scales)
+
+
+@jit_call
+def _stage(base, v, law, g):
+    """The rates k at base + g k, by Newton's method from the speed v; and how far its last step went.
+
+    As x' = v, the speed alone is unknown: v + g force(x_b + g v, v) = v_b. The tangents are linear in theirs.
+    """
+    x_b, v_b, x_mu, v_mu, x_start, v_start, _ = base
+    change, searching = 0.0 * v, g > 0.0
+    for _ in range(_STAGE_LIMIT):
+        if not any_lane(searching):
+            break
+        force, _, stiffness, slope = _force(fma(g, v, x_b), v, law)
+        new = (v - v_b + g * force) / (1.0 + g * fma(g, stiffness, slope))
+        change, v = where(searching, new, change), where(searching, v - new, v)
+        searching = searching & (magnitude(change) > 1e-14 * magnitude(v))
+    _, extra, stiffness, slope = _force(fma(g, v, x_b), v, law)
+    damped, stiff = 1.0 / (1.0 + g * fma(g, stiffness, slope)), g * stiffness
+    of_mu = (v_mu - fma(stiff, x_mu, g * (1.0 + extra))) * damped
+    of_start = (v_start - stiff * x_start) * damped
+    rise = 1.0 / g
+    return (v, (v - v_b) * rise, of_mu, (of_mu - v_mu) * rise, of_start, (of_start - v_start) * rise, slope), change
+
+
+@jit_call
+def sdirk4_step(state, first, law, h, scales):
+    """One step of the L-stable SDIRK of order 4(3) of Hairer & Wanner, Solving ODEs II, table IV.6.5; as `dopri5_step`.
+
+    What relaxes within much less than h is damped away. Its last stage is the result.
+    """
+    g = 0.25 * h
+    k0, c0 = _stage(state, state[1], law, g)
+    k1, c1 = _stage(after(state, h, SDIRK4[0], (k0,)), k0[0], law, g)
+    k2, c2 = _stage(after(state, h, SDIRK4[1], (k0, k1)), k1[0], law, g)
+    k3, c3 = _stage(after(state, h, SDIRK4[2], (k0, k1, k2)), k2[0], law, g)
+    base = after(state, h, SDIRK4[3], (k0, k1, k2, k3))
+    k4, c4 = _stage(base, k3[0], law, g)
+    new, nothing = after(base, g, (1.0,), (k4,)), 0.0 * h
+    left = larger(larger(magnitude(c0), magnitude(c1)), larger(larger(magnitude(c2), magnitude(c3)), magnitude(c4)))
+    zeros = (nothing, nothing, nothing, nothing, nothing, nothing, nothing)
+    e_x, e_v, e_mu, e_v_mu, e_start, e_v_start, e_decay = after(zeros, h, SDIRK4_ERROR, (k0, k1, k2, k4))
+    errors = (e_x, magnitude(e_v) + left, e_mu, e_v_mu, e_start, e_v_start, e_decay)
+    return new, k4, _worst(state, errors, scales)
 
 
 @jit
@@ -280,7 +345,7 @@ def _longest(v, acceleration, leg):
 
 
 @jit_inline
-def _to_end(state, law, leg, h, tolerance, active):
+def _to_end(step, state, law, leg, h, tolerance, active):
     """The active cells at the end of their leg, the time taken, the last whole step, and where it is not reached.
 
     The step across the end is shortened until it ends there: Newton, bisection where that leaves the bracket. Each
@@ -291,7 +356,7 @@ def _to_end(state, law, leg, h, tolerance, active):
     for _ in range(STEP_LIMIT):
         if not any_lane(moving):
             break
-        new, last, error = _step(state, first, law, h, leg.scales)
+        new, last, error = step(state, first, law, h, leg.scales)
         ratio = error / tolerance
         accepted = moving & (ratio <= 1.0)
         passed = accepted & (_left(new, 0.0, law, leg)[0] <= 0.0)
@@ -303,7 +368,7 @@ def _to_end(state, law, leg, h, tolerance, active):
         h = where(moving, smaller(h * _step_factor(ratio), most), h)
 
     low, high, shorter = 0.0 * h, h, 0.5 * h
-    new, last, _ = _step(state, first, law, shorter, leg.scales)
+    new, last, _ = step(state, first, law, shorter, leg.scales)
     searching = active
     for _ in range(_ROOT_LIMIT):
         if not any_lane(searching):
@@ -314,7 +379,7 @@ def _to_end(state, law, leg, h, tolerance, active):
         settled = magnitude(guess - shorter) <= _SETTLED * h
         guess = where(settled | ((guess > low) & (guess < high)), guess, 0.5 * (low + high))
         shorter = where(searching, guess, shorter)
-        trial, rates_there, _ = _step(state, first, law, shorter, leg.scales)
+        trial, rates_there, _ = step(state, first, law, shorter, leg.scales)
         new, last = choose(searching, trial, new), choose(searching, rates_there, last)
         searching = searching & not_(settled)
     return choose(active, new, state), t + where(active, shorter, 0.0), h, moving
@@ -400,7 +465,7 @@ def _released(x, slack, problem):
 
 
 @jit_inline
-def half_swing(start, problem, tolerance, active):
+def half_swing(step, start, problem, tolerance, active):
     """One half swing from x = 1, speed `start`, to the switch.
 
     In turn: past the turning point, along a leg, and where that ends short of the switch either uniformly on to it or,
@@ -438,7 +503,7 @@ def half_swing(start, problem, tolerance, active):
         law = Law(side, steady, problem.d, problem.gamma, problem.n, floor, problem.kappa, problem.depth, problem.wave)
         stop = where(rising, smaller(slow, 0.5 * start), zero)
         leg = Leg(stop, forgotten, problem.stiffness, slow, scales)
-        state, spent, h, late = _to_end(state, law, leg, h, tolerance, moving)
+        state, spent, h, late = _to_end(step, state, law, leg, h, tolerance, moving)
         time, lost, moving = time + spent, lost | late, moving & not_(late)
         turning, inward = moving & rising, moving & not_(rising)
         rising = rising & not_(turning)

@@ -22,10 +22,10 @@ from kernels.maths.elementary import larger, smaller
 NEWTON_LIMIT = 60
 SMOOTH = (0.0, 0.0)
 """The ripple (depth, harmonic) of a torque that does not vary."""
-_STIFFEST = 1e4
-"""Larger f'(V)/V (viscous friction: d^2) takes a stable explicit method more steps than the limit: about 2/3 of it."""
-_STIFFEST_UNIFORM = 1e6
-"""The same where the motion becomes uniform and need not be followed so far."""
+EXPLICIT = (1e4, 1e6)
+"""Larger f'(V)/V (viscous friction: d^2) takes a stable explicit method more steps than the limit: about 2/3 of it; and
+the same where the motion becomes uniform and need not be followed so far."""
+IMPLICIT = (math.inf, math.inf)
 _CHECK = 4.0
 """The last swing but one has a tolerance so much wider than the last: how far the two differ is the error's measure."""
 _COARSE, _ORDERLY = 1e-3, 3e-5
@@ -94,7 +94,7 @@ def held(problem, top):
 
 
 @jit_inline
-def dopri5(scene, ripple, rtol):
+def limit_cycle(step, stiffest, scene, ripple, rtol):
     """The limit cycle.
 
     Newton's method on v1 within a bracket, first with a coarse tolerance, then with one that follows the square of
@@ -104,6 +104,7 @@ def dopri5(scene, ripple, rtol):
 
     Parameters
     ----------
+    step, stiffest : of `_half_swing`, and EXPLICIT or IMPLICIT
     scene : `_units.Scene`
     ripple : (depth, harmonic) of (2), or SMOOTH
 
@@ -117,7 +118,7 @@ def dopri5(scene, ripple, rtol):
     v, slow = first_speed(problem.pace)
     tolerance = where(slow, _CHECK * _enough(problem, zero, 2.0 * stiff), _COARSE)  # steps are short whatever it is
     varied = (problem.kappa > 0.0) | (problem.depth > 0.0)
-    stiff = not_(stiff < where(varied, _STIFFEST, _STIFFEST_UNIFORM))
+    stiff = not_(stiff <= where(varied, stiffest[0], stiffest[1]))
     low, high, tighter, before, steep = zero - 1.0, zero + math.inf, one, one, zero
     possible = problem.inwards > 0.0
     cycle = (zero, zero, zero, zero, zero)
@@ -127,7 +128,7 @@ def dopri5(scene, ripple, rtol):
         if not any_lane(active):
             break
         used = larger(tolerance, _FINEST + zero)
-        half = half_swing(problem.e * v, problem, used, active)
+        half = half_swing(step, problem.e * v, problem, used, active)
 
         # Newton's speed, or where that leaves the bracket, told by the sign of F - v, one that narrows it
         noise = _NOISE * used * (v + half.end)

@@ -10,7 +10,9 @@ stable; where the foliot does not come to it from rest at phi = 0, `segments` re
 spring; `taylor` and `dopri5`, which do what `segments` cannot, follow the cycle only and do not say so).
 """
 
-from kernels.foliot import _coulomb, _friction_quadrature, _integrated_swing, _single_loss, _taylor_swing, _viscous
+from kernels.foliot import _coulomb, _friction_quadrature, _taylor_swing, _viscous
+from kernels.foliot._half_swing import dopri5_step, sdirk4_step
+from kernels.foliot._integrated_swing import EXPLICIT, IMPLICIT, SMOOTH, limit_cycle
 from kernels.foliot._linear_swing import segments
 from kernels.foliot._units import UNITS, Foliot, spare_torque
 from kernels.interface import Field
@@ -23,12 +25,18 @@ from kernels.lanes.wiring import kernel, method
 @jit
 def dopri5(scene, rtol):
     """Dormand-Prince 5(4) over half swings, each switch located and restarted at, and Newton on their map."""
-    return _integrated_swing.dopri5(scene, _integrated_swing.SMOOTH, rtol)
+    return limit_cycle(dopri5_step, EXPLICIT, scene, SMOOTH, rtol)
 
 
 def dopri5_is_cheaper(p, rtol):
     """Where `taylor` takes 1.04 to 5 times as long as `dopri5`, in columns of 10,000 cells."""
     return (rtol >= 1e-4) & (rtol <= 1e-2) & (p.n >= 1.0) & (p.n <= 6.0)
+
+
+@jit
+def sdirk4(scene, rtol):
+    """The same by an L-stable implicit method of order 4, for what is stiff."""
+    return limit_cycle(sdirk4_step, IMPLICIT, scene, SMOOTH, rtol)
 
 
 @jit
@@ -82,9 +90,9 @@ FOLIOT = kernel(
         method("asymptotic", "weak and strong series with a bound each",
                _viscous.asymptotic, _viscous.asymptotic_bound, **_VISCOUS),
         method("pure", "closed forms where one loss acts alone",
-               _single_loss.pure, _single_loss.bound, units=UNITS, excludes=("a", "k")),
+               _coulomb.pure, _coulomb.pure_bound, units=UNITS, excludes=("a", "k")),
         method("coulomb", "viscous and Coulomb friction: one equation by Halley's steps",
-               _coulomb.coulomb, _coulomb.bound, units=UNITS, excludes=("c", "k", "e")),
+               _coulomb.coulomb, _coulomb.coulomb_bound, units=UNITS, excludes=("c", "k", "e")),
         method("segments", "exact pieces of linear terms, Newton on the half-swing map",
                segments, units=UNITS, excludes=("c",), estimates=True),
         method("quadrature", "integrals over the speed, for any friction",
@@ -94,6 +102,7 @@ FOLIOT = kernel(
         _taylor_swing.by_taylor(Foliot._fields, rippled=False),
         method("dopri5", "adaptive Runge-Kutta of order 5, Newton on the half-swing map",
                dopri5, units=UNITS, sooner=dopri5_is_cheaper),
+        method("sdirk4", "implicit Runge-Kutta of order 4, L-stable, for what is stiff", sdirk4, units=UNITS),
     ),
     example={"mu": 1.0, "phi0": 1.0, "a": 1.0},
 )  # fmt: skip

@@ -12,7 +12,9 @@ Leaves out: the geometry of the pallets that makes the ripple. Source: as `folio
 
 import math
 
-from kernels.foliot import _integrated_swing, _taylor_swing, _units
+from kernels.foliot import _taylor_swing, _units
+from kernels.foliot._half_swing import dopri5_step, sdirk4_step
+from kernels.foliot._integrated_swing import EXPLICIT, IMPLICIT, limit_cycle
 from kernels.foliot.cycle import FOLIOT
 from kernels.foliot.cycle import check as check_foliot
 from kernels.interface import Field
@@ -30,11 +32,21 @@ def _taken(p):
     return (scene, (p.depth, p.harmonic)), units
 
 
+UNITS = _taken, _units.given
+
+
 @jit
 def dopri5(rippled, rtol):
     """Dormand-Prince 5(4) over half swings, each switch located and restarted at, and Newton on their map."""
     scene, ripple = rippled
-    return _integrated_swing.dopri5(scene, ripple, rtol)
+    return limit_cycle(dopri5_step, EXPLICIT, scene, ripple, rtol)
+
+
+@jit
+def sdirk4(rippled, rtol):
+    """The same by an L-stable implicit method of order 4, for what is stiff."""
+    scene, ripple = rippled
+    return limit_cycle(sdirk4_step, IMPLICIT, scene, ripple, rtol)
 
 
 @jit
@@ -59,7 +71,8 @@ FOLIOT_RIPPLE = kernel(
     methods=(
         _taylor_swing.by_taylor((*_units.Foliot._fields, "depth", "harmonic"), rippled=True),
         method("dopri5", "adaptive Runge-Kutta of order 5, Newton on the half-swing map",
-               dopri5, units=(_taken, _units.given)),
+               dopri5, units=UNITS),
+        method("sdirk4", "implicit Runge-Kutta of order 4, L-stable, for what is stiff", sdirk4, units=UNITS),
     ),
     example={"mu": 1.0, "phi0": 1.0, "a": 1.0, "depth": 0.3, "harmonic": 2.0},
 )  # fmt: skip

@@ -145,3 +145,22 @@ def test_stiction_holds_a_turning_point_that_the_spring_does_not_free():
 )
 def test_what_cannot_be_right_to_rtol_says_so(cell, rtol, statuses):
     assert solve(FOLIOT, "dopri5", rtol=rtol, **as_columns([cell]))[1][0] in statuses
+
+
+@pytest.mark.skipif(not COMPILED, reason="thousands of steps")
+@pytest.mark.parametrize("rtol", [1e-4, 1e-7, 1e-10])
+@pytest.mark.parametrize(
+    ("exact", "cells"),
+    [
+        ("segments", {"a": np.geomspace(1.0, 1e5, 21), "R": 0.1, "k": 0.3, "e": 0.9}),
+        ("quadrature", {"c": np.geomspace(0.1, 1e4, 16), "n": np.linspace(1.0, 4.0, 16), "R": 0.2, "e": -0.4}),
+    ],
+    ids=["spring", "drag"],
+)
+def test_however_stiff_the_implicit_method_is_right_to_half_of_rtol(exact, cells, rtol):
+    true, _ = solve(FOLIOT, exact, **UNIT, rtol=1e-12, **cells)
+    found, status = solve(FOLIOT, "sdirk4", **UNIT, rtol=rtol, **cells)
+    assert (status == Status.OK).all()
+    for name in NAMES:
+        there = true[name] > 1e-300
+        assert np.abs(found[name][there] / true[name][there] - 1.0).max() <= 0.5 * rtol + 1e-12
