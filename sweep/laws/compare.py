@@ -15,6 +15,7 @@ from sweep.laws.fits import Found, all_fitted, curve
 from sweep.laws.loglog import Array
 from sweep.laws.noise import BEYOND_DOUBT, RARE, runs_chance
 from sweep.laws.shapes import CORRECTION, LAWS
+from sweep.words import Table
 
 NAMES = {
     "aicc": ("1", "Akaike's criterion, corrected for few points; of one law with the noise that suits it best"),
@@ -41,7 +42,7 @@ def compare_laws(y: xr.DataArray, dim: str, window: Window | None = None, *, sig
     y : DataArray
         One dimension; missing points, and those whose sigma is NaN, are left out.
     dim : str
-        Its dimension, or 1-D coordinate along it; positive and strictly monotone.
+        Its dimension, or 1-D coordinate along it; positive and monotone. Equal values are repeated measurements.
     window : (low, high), optional
         Ends in the unit of `dim`.
     sigma : number or DataArray, optional
@@ -53,7 +54,7 @@ def compare_laws(y: xr.DataArray, dim: str, window: Window | None = None, *, sig
         Along `law`, the best first: `aicc`, `bic`, `worse` (AICc above the best), `numbers`, `scatter`, `residual`,
         `runs`, `chi_squared`, `formula`, `exponents`; `fitted` (law, point), the law at the points, whose places are
         `x` and values `y`. Attributes `chosen`, `margin` (AICc to the next law; negative where a law with more
-        numbers is nearer) and `verdict`, a sentence.
+        numbers is nearer), `verdict`, a sentence, and `summary`, a table for printing.
 
     Raises
     ------
@@ -75,17 +76,22 @@ def compare_laws(y: xr.DataArray, dim: str, window: Window | None = None, *, sig
         raise SweepError(
             f"{title(y)} runs along {', '.join(map(str, y.dims))}; compare laws of one line, choose with .sel"
         )
-    here, t, logs, _ = window_logs(y, dim, window)
+    here, t, logs, _ = window_logs(y, dim, window, repeated=True)
     relative = relative_sigma(y, sigma).isel(here).values
     present = np.flatnonzero(np.isfinite(logs.values) & (np.isfinite(relative) | (sigma is None)))
     if present.size < FEWEST_OF_LINE:
         raise SweepError(f"laws are told apart by at least {FEWEST_OF_LINE} points of {title(y)}, found {present.size}")
-    present = present[np.argsort(t[present])]
+    present = present[np.argsort(t[present], kind="stable")]
     t, z = t[present], logs.values[present]
     weights = None if sigma is None else relative[present] ** -2.0
     tried = sorted(all_fitted(LAWS, t, z, weights).values(), key=lambda fit: fit.aicc)
     found = _table(t, z, tried)
-    found.attrs = {"y": title(y), "x": dim, **_verdict(tried)}
+    rows = [
+        (f.law.name, f"{f.aicc - tried[0].aicc:.3g}", str(e.values))
+        for f, e in zip(tried, found.exponents, strict=True)
+    ]
+    summary = Table(rows, ("law", "worse in AICc", "exponents")).text(indent="", wide=True)
+    found.attrs = {"y": title(y), "x": dim, **_verdict(tried), "summary": summary}
     if denied(found, found.attrs["chosen"]):
         found.attrs["verdict"] += "; but what it leaves has a shape, so that none of them is the law"
     for name, of in (("x", y[dim]), ("y", y), ("fitted", y)):

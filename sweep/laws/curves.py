@@ -177,7 +177,7 @@ def fits_by_line(
 
     NaN where there are too few points; raises SweepError where that is so of all lines.
     """
-    here, t, logs, _ = window_logs(y, dim, window, repeated=True)
+    here, t, logs, positive = window_logs(y, dim, window, repeated=True)
     ((dimension, _),) = here.items()
 
     def one(z: Array, errors: Array) -> Array:
@@ -195,12 +195,18 @@ def fits_by_line(
     )
     if not bool(numbers.notnull().any()):
         raise SweepError(f"this needs at least {FEWEST_OF_LINE} points of {title(y)} in the window; widen it")
-    return xr.Dataset({name: numbers.isel(number=k, drop=True) for k, name in enumerate(names)})
+    found = xr.Dataset({name: numbers.isel(number=k, drop=True) for k, name in enumerate(names)})
+    return found.assign(verdict=found.verdict.where(positive, NOT_POSITIVE))
+
+
+NOT_POSITIVE = -2
+"""Stands for the word in numbers."""
 
 
 def in_words(codes: xr.DataArray, words: Sequence[str]) -> tuple[Any, NDArray[Any]]:
     """The words that numbers stand for; NaN is a line of too few points."""
-    return codes.dims, np.array([*words, "too few points"])[codes.fillna(-1).values.astype(np.int64)]
+    every = np.array([*words, "not positive", "too few points"])
+    return codes.dims, every[codes.fillna(-1).values.astype(np.int64)]
 
 
 def like(given: Any, y: xr.DataArray, what: str) -> xr.DataArray:

@@ -11,6 +11,7 @@ from scipy.special import gammaincc, ndtri, stdtrit
 
 from sweep.errors import SweepError
 from sweep.laws.curves import (
+    NOT_POSITIVE,
     Window,
     check_confidence,
     check_dataset,
@@ -31,8 +32,8 @@ from sweep.laws.noise import NOISES, RARE, UNLIKELY, alike, corrected, inliers, 
 
 METHOD = "least squares in log-log; the interval is of what `kind` says"
 
-KINDS = ("not positive", "exact", "bounded", "curved", "bent", "weighted", *NOISES)
-"""What distances from a line are; the first is of lines that have no exponent."""
+KINDS = ("exact", "bounded", "curved", "bent", "weighted", *NOISES)
+"""What distances from a line are; of lines that have no exponent it says why."""
 
 SMOOTH = 0.12
 """Share of the distances from a line that is noise, below which they are a bend and no noise."""
@@ -162,7 +163,7 @@ def fit_exponent(
     fit = numbers_along(
         NUMBERS, lambda z, s, b: _lines(t, z, s, b, known, confidence, noise), logs, dimension, errors, bounds
     )
-    fit["kind"] = fit.kind.where(positive, KINDS.index("not positive"))
+    fit["kind"] = fit.kind.where(positive, NOT_POSITIVE)
     if not bool(fit.exponent.notnull().any()):
         raise SweepError(
             f"a line needs at least {FEWEST} points, found {int(fit.points.max())} of {title(y)} in the window "
@@ -407,24 +408,36 @@ def crossover(low_fit: xr.Dataset, high_fit: xr.Dataset) -> xr.Dataset:
             raise SweepError(f"the fits are of different {name}: {low_fit.attrs.get(name)}, {high_fit.attrs.get(name)}")
     if bool(((low_fit.low < high_fit.high) & (high_fit.low < low_fit.high)).any()):
         raise SweepError("the windows of the two fits overlap, so their errors are not independent; take them apart")
-    centres = [np.log(fit.centre) for fit in (low_fit, high_fit)]
+    fits, ends = (low_fit, high_fit), (("limit_low", "start", "low"), ("limit_high", "stop", "high"))
+    swapped = bool((low_fit.centre > high_fit.centre).all())
+    centres = [np.log(fit.centre) for fit in fits]
     middle = (centres[0] + centres[1]) / 2  # logarithms counted from here keep their digits
-    lines, wide = [], []
-    for fit, centre in zip((low_fit, high_fit), centres, strict=True):
+    lines = [(f.exponent, np.log(f.level), c - middle) for f, c in zip(fits, centres, strict=True)]
+    outer = [  # the lines through the outer ends, towards where the exponents tend
+        (f[limit], np.log(f[value]), np.log(f[end]) - middle)
+        for f, (limit, value, end) in zip(fits, ends[:: -1 if swapped else 1], strict=True)
+    ]
+    wide = []
+    for fit, line in zip(fits, lines, strict=True):
         reach = ((fit.exponent_high - fit.exponent_low) / 2).where(fit.noisy == 1, fit.exponent_error)
         factor = (reach / fit.exponent_error).where(fit.exponent_error > 0, 1.0)
-        lines.append((fit.exponent, np.log(fit.level), centre - middle))
-        wide.append((reach, fit.level_error * factor, centre - middle))
+        wide.append((reach, fit.level_error * factor, line[2]))
     slope = (lines[1][0] - lines[0][0]).where(abs(lines[1][0] - lines[0][0]) > np.hypot(wide[0][0], wide[1][0]))
     if not slope.notnull().any():
         raise SweepError("the two laws have the same exponent within their errors, so they meet nowhere")
-    there = _meeting(*lines)
+
+    def meeting(low: Any, high: Any) -> xr.DataArray:
+        """Where two lines (slope, level, place of that level) meet."""
+        gap: xr.DataArray = low[1] - low[0] * low[2] - high[1] + high[0] * high[2]
+        return gap / (high[0] - low[0])  # type: ignore[no-any-return]
+
+    there = meeting(*lines)
+    pairs = [(a, b) for a in (lines[0], outer[0]) for b in (lines[1], outer[1])]
+    moved = xr.concat([abs(meeting(*pair) - there).fillna(0.0) for pair in pairs], "which").max("which")
     # (slope (x - there))^2 = sum of (level error)^2 + (slope error (x - centre))^2, a quadratic in x - there
     square = slope**2 - wide[0][0] ** 2 - wide[1][0] ** 2
     linear = sum(p**2 * (there - c) for p, _, c in wide)
-    rest = sum(level**2 + (p * (there - c)) ** 2 for p, level, c in wide)
-    root = np.sqrt(linear**2 + square * rest)
-    moved = _systematic(low_fit, high_fit, lines, middle)
+    root = np.sqrt(linear**2 + square * sum(level**2 + (p * (there - c)) ** 2 for p, level, c in wide))
     place = (middle + there).where(slope.notnull())
     below, above = (place + (linear + sign * root) / square + sign * moved for sign in (-1, 1))
     found = xr.Dataset({"abscissa": np.exp(place), "abscissa_low": np.exp(below), "abscissa_high": np.exp(above)})
@@ -434,24 +447,3 @@ def crossover(low_fit: xr.Dataset, high_fit: xr.Dataset) -> xr.Dataset:
         units = low_fit["level" if name == "ordinate" else "centre"].attrs["units"]
         found[name].attrs = {"units": units, "long_name": f"{name} where the two laws meet"}
     return found.assign_attrs({name: low_fit.attrs[name] for name in ("y", "x", "method", "confidence")})
-
-
-def _meeting(low: Any, high: Any) -> xr.DataArray:
-    """Where two lines (slope, level, place of that level) meet."""
-    gap: xr.DataArray = low[1] - low[0] * low[2] - high[1] + high[0] * high[2]
-    found: xr.DataArray = gap / (high[0] - low[0])
-    return found
-
-
-def _systematic(low_fit: xr.Dataset, high_fit: xr.Dataset, lines: list[Any], middle: xr.DataArray) -> xr.DataArray:
-    """How far the meeting moves for lines through the outer ends, towards where the exponents tend."""
-    swapped = bool((low_fit.centre > high_fit.centre).all())
-    names = [("limit_low", "start", "low"), ("limit_high", "stop", "high")]
-    outer = []
-    for fit, (limit, value, end) in zip((low_fit, high_fit), names[::-1] if swapped else names, strict=True):
-        outer.append((fit[limit], np.log(fit[value]), np.log(fit[end]) - middle))
-    there = _meeting(*lines)
-    places = [_meeting(a, b) for a in (lines[0], outer[0]) for b in (lines[1], outer[1])]
-    moved = [abs(place - there).fillna(0.0) for place in places]
-    found: xr.DataArray = xr.concat(moved, dim="which").max("which")
-    return found

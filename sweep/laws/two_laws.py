@@ -188,6 +188,7 @@ def _one(t: Array, z: Array, weights: Array | None, confidence: float, noise: bo
         ends[1:] = _of_other_bends(tried, t, word, confidence, ends)
     if not noisy:
         ends[1:] = _widened(t, z, *ends)
+    ends[1:] = np.where(np.isnan(ends[1:]), [[-np.inf], [np.inf]], ends[1:])  # not determined
     verdict, evidence = _verdict(t, tried, noisy)
     p_low, p_high, places = ends.T
     level, places = float(np.exp(two.numbers[2])), np.exp(places)
