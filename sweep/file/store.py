@@ -247,11 +247,12 @@ class Store:
         Returns
         -------
         list of int
-            Blocks that turned out to be damaged, which have to be computed again first.
+            Blocks that turned out to be damaged, or are not acknowledged, which have to be computed again first.
         """
         with disk.refusing(self.output):
             self.commit()
-            found = self.damaged()
+            self.damaged()
+            found = self.missing()
             if not found and gather is not None:
                 found = self._gathered(gather)
                 self.undo(found)

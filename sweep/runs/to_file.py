@@ -75,6 +75,7 @@ def run_to_file(task: Task, precomputed: Precomputed | None = None) -> Ending:
             for _ in range(MOST_ATTEMPTS):
                 if missing := store.missing():
                     loop.compute(missing, sink, None if cluster is None else store.shared())
+                    sink.settle()
                 damaged = store.finish(loop.endings(), None if task.study.summary is None else sink.gathered)
                 if not damaged:
                     progress.end()
@@ -191,9 +192,13 @@ class _Stored:
     def tick(self) -> None:
         """Acknowledges what is written, if it is time to. Raises SweepError."""
         if self._last is None or self._last.done():
-            if self._last is not None:
-                self._last.result()
+            self.settle()
             self._last = self._syncing.submit(self._store.tick)
+
+    def settle(self) -> None:
+        """Returns when nothing is being brought to the disk. Raises SweepError where it could not be."""
+        if self._last is not None:
+            self._last.result()
 
     def gathered(self, file: StoredFile, block: int) -> dict[str, Any]:
         """A block of a summary's output, from its rows."""

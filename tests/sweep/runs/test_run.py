@@ -277,6 +277,26 @@ def test_writes_that_take_only_a_part_are_carried_on(output, monkeypatch):
     assert sweep.verify(output).whole
 
 
+def test_numbers_that_do_not_reach_the_disk_are_never_acknowledged(output, monkeypatch):
+    """The first sync fails, but only when all other blocks have been computed meanwhile."""
+    study, real, calls = tall(20, "bad:SLOW"), disk.sync_numbers, []
+
+    def sync(fd):
+        calls.append(fd)
+        if len(calls) == 1:
+            time.sleep(1.5)
+            raise OSError(errno.EIO, "failed")
+        real(fd)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(disk, "sync_numbers", sync)
+        with pytest.raises(SweepError, match="cannot be written"):
+            quiet(study, output, block_cells=10, workers=1)
+    assert not output.exists()
+    same(quiet(study, output), quiet(study))
+    assert sweep.verify(output).whole
+
+
 def test_a_file_that_reads_back_wrong_is_refused(output, monkeypatch):
     real, first = disk.write, quiet(tall(3003)).fall_time.values[1001].tobytes()
 
