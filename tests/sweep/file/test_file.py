@@ -17,6 +17,7 @@ from sweep.cells.output_schema import output_schema
 from sweep.cells.partition import boxes
 from sweep.file import disk
 from sweep.file.frame import cuts_of, expected_size
+from sweep.file.store import opened
 
 PHASE = {"outputs": ["fall_time", "drop"], "along": {"phase": [0.0, 0.5, 1.0]}}
 STUDIES = {
@@ -60,6 +61,20 @@ def test_the_size_of_a_result_is_known_before_it_is_computed(tmp_path, cells):
     with run(tmp_path / "out.h5", cells, **keys) as ds:
         assert sweep.study(ds, allow_import=True) == study
     assert (tmp_path / "out.h5").stat().st_size == pytest.approx(found, rel=0.05)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 20_000])
+def test_chunks_are_where_hdf5_says(tmp_path, count):
+    """20,000: HDF5 then writes some of its tables while it places chunks."""
+    study = toy_studies.build(axes={"height": np.linspace(1.0, 2.0, 8 * count)}, outputs=["fall_time"])
+    schema = output_schema(study, {})
+    with opened(tmp_path / "out.h5") as store:
+        store.begin(schema, cuts_of(study, schema, boxes(schema.grid.shape, 8)))
+        with h5py.File(store.path) as file:
+            for place in store.table.places:
+                chunks = []
+                file[place.name].id.chunk_iter(chunks.append)
+                assert place.at.tolist() == [chunk.byte_offset for chunk in chunks]
 
 
 @pytest.mark.parametrize("number", [b"3", b"5"])

@@ -201,7 +201,7 @@ def test_a_damaged_summary_is_not_handed_out(summary, tmp_path):
 def test_damage_beside_the_numbers_is_told_at_once_and_cannot_be_repaired(copy, what):
     with h5py.File(copy) as file:
         places = {"height": file["height"].id.get_chunk_info(0).byte_offset + 12}
-        places["end"] = file["integrity/ending"].id.get_offset() + 12
+        places["end"] = file["integrity/ending"].id.get_offset() + 16
     places["title"] = copy.read_bytes().index(b"toy:KERNEL")
     flip(copy, places[what])
     for action in (sweep.open_result, lambda path: quiet(study(), path, repair=True)):
