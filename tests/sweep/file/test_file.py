@@ -66,7 +66,8 @@ def test_the_size_of_a_result_is_known_before_it_is_computed(tmp_path, cells):
 @pytest.mark.parametrize("count", [1, 2, 3, 20_000])
 def test_chunks_are_where_hdf5_says(tmp_path, count):
     """20,000: HDF5 then writes some of its tables while it places chunks."""
-    study = toy_studies.build(axes={"height": np.linspace(1.0, 2.0, 8 * count)}, outputs=["fall_time"])
+    axes, fixed = {"mu": np.linspace(0.5, 1.0, 8 * count)}, {"phi0": 1.0, "a": 1.0}
+    study = sweep.study(kernel="foliot", outputs=["period"], axes=axes, fixed=fixed)
     schema = output_schema(study, {})
     with opened(tmp_path / "out.h5") as store:
         store.begin(schema, cuts_of(study, schema, boxes(schema.grid.shape, 8)))
