@@ -15,11 +15,12 @@ import numpy as np
 
 from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.vectors import magnitude, sqrt
+from kernels.maths.small_dense import sort
 from kernels.wear import _tool
 from kernels.wear._tool import PIECES, arctan2, mirrored, outline, power, sincos
 
 POINTS = (2 * (_tool.ARC_LIMIT + 2 * PIECES), 3)
-"""Shape of a list of `Point`s."""
+"""Shape of a list of points on the edge of a disc: its direction from the centre, X and Y."""
 
 _EPS = 2.0**-52
 _TERMS = 80
@@ -28,16 +29,8 @@ _SLACK = 1e-9
 _TURN = 2.0 * math.pi
 
 
-class Point(NamedTuple):
-    """On the edge of a disc: its direction from the centre, X and Y."""
-
-    angle: float
-    x: float
-    y: float
-
-
 class Room(NamedTuple):
-    """Space for crossings of a piece, `Point`s, and the stack of intervals."""
+    """Space for crossings of a piece, points of `POINTS`, and the stack of intervals."""
 
     found: np.ndarray
     points: np.ndarray
@@ -92,13 +85,14 @@ def _outline_within(piece, mirror, tool, disc, count, room):
     number = _tool.crossings(piece, tool, seen, start, found, first, room.stack)
     splits = max(number, 1)
     found[splits] = 1.0
-    _tool.sort(found, splits + 1)
+    sort(found, splits + 1)
     total, noise = 0.0, 0.0
     behind, px, py = sector(piece, 0.0, tool)
     for j in range(splits + 1):
         ahead, x, y = sector(piece, found[j], tool)
         if 0 < j < splits or _on_edge(x, mirror * y, disc):
-            _put(room.points, count, Point(arctan2(mirror * y - disc.y, x - disc.x), x, mirror * y))
+            row = room.points[count]
+            row[0], row[1], row[2] = arctan2(mirror * y - disc.y, x - disc.x), x, mirror * y
             count += 1
         if j > 0:
             _, px, py = sector(piece, found[j - 1] + _ASIDE * (found[j] - found[j - 1]), tool)
@@ -138,40 +132,19 @@ def _bulge(t):
 def _arc_within(tool, disc, one, two, turn):
     """Share of (1) of the arc of the disc's edge between two points, by about `turn`, and what it may be wrong by."""
     cx, cy, radius = disc
-    u, v, dx, dy = one.x - cx, one.y - cy, two.x - one.x, two.y - one.y
+    x, y = one[1], one[2]
+    u, v, dx, dy = x - cx, y - cy, two[1] - x, two[2] - y
     if turn < 3.0:
         turn = magnitude(arctan2(u * dy - v * dx, u * (u + dx) + v * (v + dy)))
-    s, c = sincos(one.angle + _ASIDE * turn)
+    s, c = sincos(one[0] + _ASIDE * turn)
     beyond = _tool.excess(tool, cx + radius * c, cy + radius * s)
-    share = 0.5 * (one.x * dy - one.y * dx) + 0.5 * radius * radius * _bulge(turn)
+    share = 0.5 * (x * dy - y * dx) + 0.5 * radius * radius * _bulge(turn)
     far = radius + magnitude(cx) + magnitude(cy) + tool.a + tool.b
-    sides = magnitude(one.x * dy) + magnitude(one.y * dx)
+    sides = magnitude(x * dy) + magnitude(y * dx)
     noise = 4.0 * _EPS * (sides + magnitude(share) + far * (magnitude(dx) + magnitude(dy)))
     least = 64.0 * _EPS * (tool.n + tool.m) * (1.0 + far / min(tool.a, tool.b))
     unsure = magnitude(share) if magnitude(beyond) <= least else 0.0
     return (share, noise + unsure) if beyond < 0.0 else (0.0, unsure)
-
-
-@jit
-def _put(points, k, point):
-    row = points[k]
-    row[0], row[1], row[2] = point
-
-
-@jit
-def _point(points, k):
-    row = points[k]
-    return Point(row[0], row[1], row[2])
-
-
-@jit
-def _sort_points(points, count):
-    for i in range(1, count):
-        point, j = _point(points, i), i
-        while j > 0 and _point(points, j - 1).angle > point.angle:
-            _put(points, j, _point(points, j - 1))
-            j -= 1
-        _put(points, j, point)
 
 
 @jit_apart
@@ -181,13 +154,17 @@ def _edge_within(tool, disc, points, count):
         inside = _tool.excess(tool, disc.x + disc.radius, disc.y) < 0.0
         area = math.pi * disc.radius * disc.radius if inside else 0.0
         return area, 4.0 * _EPS * area
-    _sort_points(points, count)
+    for i in range(1, count):  # by their direction
+        j = i
+        while j > 0 and points[j - 1, 0] > points[j, 0]:
+            for c in range(3):
+                points[j - 1, c], points[j, c] = points[j, c], points[j - 1, c]
+            j -= 1
     total, noise = 0.0, 0.0
     for j in range(count):
         k = j + 1 if j + 1 < count else 0
-        one, two = _point(points, j), _point(points, k)
-        turn = two.angle - one.angle + (_TURN if k == 0 else 0.0)
-        share, doubt = _arc_within(tool, disc, one, two, turn)
+        turn = points[k, 0] - points[j, 0] + (_TURN if k == 0 else 0.0)
+        share, doubt = _arc_within(tool, disc, points[j], points[k], turn)
         total, noise = total + share, noise + doubt
     return total, noise
 

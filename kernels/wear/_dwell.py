@@ -141,53 +141,42 @@ def rates_at(arm, u):
     return pose.eta, found.back, found.forth
 
 
-@jit
-def _lead(scene, rate, side):
-    """Left less right side of (4)."""
-    ride, r = scene.ride, scene.r
-    return ride.speed * rate * (r + side * ride.w) - ride.spin * r
-
-
-@jit_apart
-def _root(scene, forth, side, one, two, f_one, f_two):
-    """The arm's angle where (4) holds, between one and two, by the Illinois rule."""
-    last, eta = math.inf, 0.0
-    for _ in range(_ROOT_LIMIT):
-        u = (one * f_two - two * f_one) / (f_two - f_one)
-        eta, back, rate = rates_at(scene.arm, u)
-        value = _lead(scene, rate if forth else back, side)
-        if magnitude(u - last) <= _NEAR or value == 0.0:
-            break
-        if (value > 0.0) == (f_two > 0.0):
-            f_one *= 0.5
-        else:
-            one, f_one = two, f_two
-        two, f_two, last = u, value, u
-    return eta
-
-
 @jit_apart
 def find_stops(scene, still):
     """Puts the angles at which wear is not smooth into `still`; how many. First those where the arm turns, if it does.
 
+    Those of (4) are shut in between samples, then found by the Illinois rule.
+
     scene : of `_profile`
     """
-    arm = scene.arm
+    arm, speed, w, r, turned = scene.arm, scene.ride.speed, scene.ride.w, scene.r, scene.ride.spin * scene.r
     first, last = span(arm)
     count = np.int64(0)
     if not arm.whirls:
         still[0], still[1] = arm.least, arm.most
         count += 2
-    before, back, forth = first, 0.0, 0.0
+    before, rates = first, (0.0, 0.0)
     for k in range(_SAMPLES + 1):
         u = first + (last - first) * k / _SAMPLES
-        _, now_back, now_forth = rates_at(arm, u)
+        _, back, forth = rates_at(arm, u)
+        now = back, forth
         for j in range(4 if k > 0 else 0):
-            side, ahead = 1.0 if j % 2 else -1.0, j > 1
-            old = _lead(scene, forth if ahead else back, side)
-            new = _lead(scene, now_forth if ahead else now_back, side)
-            if old * new < 0.0 and count < STOP_LIMIT:
-                still[count] = _root(scene, ahead, side, before, u, old, new)
+            far, stroke = r + w if j % 2 else r - w, j // 2
+            one, two, f_one, f_two = before, u, speed * rates[stroke] * far - turned, speed * now[stroke] * far - turned
+            if f_one * f_two < 0.0 and count < STOP_LIMIT:
+                eta, seen = 0.0, math.inf
+                for _ in range(_ROOT_LIMIT):
+                    middle = (one * f_two - two * f_one) / (f_two - f_one)
+                    eta, back, forth = rates_at(arm, middle)
+                    value = speed * (forth if stroke else back) * far - turned
+                    if magnitude(middle - seen) <= _NEAR or value == 0.0:
+                        break
+                    if (value > 0.0) == (f_two > 0.0):
+                        f_one *= 0.5
+                    else:
+                        one, f_one = two, f_two
+                    two, f_two, seen = middle, value, middle
+                still[count] = eta
                 count += 1
-        before, back, forth = u, now_back, now_forth
+        before, rates = u, now
     return count

@@ -13,19 +13,13 @@ from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.vectors import magnitude, sqrt
 from kernels.maths import quadrature
 from kernels.maths.quadrature import ROOM, Nodes, open_panel
+from kernels.maths.small_dense import sort
 from kernels.wear import _dwell, _tool
 from kernels.wear._contour import FAR_SIDE, SPARE, about_pivot, along_outline, from_frame, phi_of, vertex_margins
 from kernels.wear._tool import CROSSING_LIMIT, PIECES, Circle, arctan2, outline, sincos
 
 _AT_TURN = 1e-11  # a gap over its largest, or a step: beyond that a split is none where the arm turns
 _TURN = 2.0 * math.pi
-
-
-class Split(NamedTuple):
-    """A circle about which panels are split, and its vertex excess."""
-
-    circle: Circle
-    start: float
 
 
 class Stops(NamedTuple):
@@ -63,29 +57,17 @@ def work_centre(scene, c, s):
     return x, ride.w * (c * ride.turn_s - s * ride.turn_c)
 
 
-@jit
-def _split(k, scene, piece, still):
-    """The circles at which panels are split: two about the pivot, then of radius r.
-
-    These are at the angles in `still`, each on either side of the arm.
-    """
-    ride, r = scene.ride, scene.r
-    if k < 2:
-        near, wide = vertex_margins(piece, scene)
-        radius = ride.w + r if k else magnitude(ride.w - r)
-        return Split(Circle(-ride.reach, 0.0, radius), wide if k else near)
-    s, c = sincos(still[k // 2 - 1])
-    x, y = work_centre(scene, c, s)
-    circle = Circle(x, -y if k % 2 else y, r)
-    return Split(circle, _tool.vertex_excess(piece, scene.tool, circle))
-
-
 @jit_apart
 def _settled(x, scene, piece):
-    """The same split, if it is where the arm turns, of all of its ways to get there that which is nearest its end.
+    """A split at x moved by one step of Newton's rule onto a zero of the arm's gap, if it is next to one; else x.
 
-    By Newton's rule on the arm's gap as the integrand has it, which goes there like a square root: where the point is
-    near the line of centres, a split that was found otherwise is off by much more than rounding of the gap.
+    On the outline the gap g of `_dwell` (3) is a function of x by the arm's angle eta = from w, chi -+ gamma, of both
+    sides Y of the outline and both halves of psi (`_contour`, (3)): four ways, of which that with the least |g| counts.
+    With the gaps top = unit cos^2(eta/2) - high and bottom = unit sin^2(eta/2) - low,
+        dg/dx = -+ unit sin(eta)/2 deta/dx,  deta/dx = +-(chi' -+ gamma').
+    The integrand goes like 1/sqrt(g) there: where the point is near the line of centres, a split that was found from a
+    circle about the work's centre is off by much more than rounding of g. The step is taken where both g over its unit
+    and g over dg/dx are below _AT_TURN.
     """
     unit = scene.arm.unit
     sight = about_pivot(scene, piece, outline(piece, x, scene.tool))
@@ -105,18 +87,29 @@ def _settled(x, scene, piece):
 
 @jit_apart
 def _splits_of(piece, scene, stops, room):
-    """Puts the ends of a piece's panels into `room`, split where contact ends or v is 0; how many panels."""
-    found, splits = room.found, np.int64(1)
+    """Puts the ends of a piece's panels into `room`, split where contact ends or v is 0; how many panels.
+
+    Splits are where circles cross the piece: two about the pivot, then those of radius r about the work's centre with
+    the arm at each stop, on either side of it. A circle that coincides with the outline splits none.
+    """
+    tool, ride, r, found, splits = scene.tool, scene.ride, scene.r, room.found, np.int64(1)
+    near, wide = vertex_margins(piece, scene)
     found[0] = 0.0
     for j in range(2 + 2 * stops.count):
-        split = _split(j, scene, piece, stops.angles)
+        if j < 2:
+            circle, start = Circle(-ride.reach, 0.0, ride.w + r if j else magnitude(ride.w - r)), wide if j else near
+        else:
+            s, c = sincos(stops.angles[j // 2 - 1])
+            x, y = work_centre(scene, c, s)
+            circle = Circle(x, -y if j % 2 else y, r)
+            start = _tool.vertex_excess(piece, tool, circle)
         if splits + CROSSING_LIMIT < found.size:
-            number = _tool.crossings(piece, scene.tool, split.circle, split.start, found, splits, room.stack)
+            number = _tool.crossings(piece, tool, circle, start, found, splits, room.stack)
             for i in range(splits, number if 1 < j < 6 and not scene.arm.whirls else splits):
                 found[i] = _settled(found[i], scene, piece)
-            splits = number if number >= 0 else splits  # where circle and outline coincide there is none to split
+            splits = max(number, splits)
     found[splits] = 1.0
-    _tool.sort(found, splits + 1)
+    sort(found, splits + 1)
     return splits
 
 
@@ -143,6 +136,8 @@ def open_outline(count, scene, stops, room):
 @jit_apart
 def _phase(arm, eta):
     """u of `pose_at`."""
+    if arm.whirls:
+        return eta
     ahead, behind = arm.most - eta, eta - arm.least
     return 2.0 * arctan2(sqrt(max(behind, 0.0)), sqrt(max(ahead, 0.0))) - 0.5 * math.pi
 
@@ -162,8 +157,8 @@ def open_split(pool, count, kind, low, high, scene, stops):
             turns = math.floor((stops.angles[k] - start) / _TURN) if arm.whirls else 0.0
             stop = stops.angles[k] - turns * _TURN
             end = stop if start < stop < end else end
-        first, last = (start, end) if arm.whirls else (_phase(arm, start), _phase(arm, end))
-        open_panel(pool, count, kind, first, last - first)
+        first = _phase(arm, start)
+        open_panel(pool, count, kind, first, _phase(arm, end) - first)
         count += 1
         start = end
     return count

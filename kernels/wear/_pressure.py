@@ -17,6 +17,7 @@ from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.vectors import magnitude, sqrt
 from kernels.maths.decimals import PI, cosine, multiples, precise
 from kernels.maths.elementary import in_unit
+from kernels.maths.small_dense import sort
 from kernels.wear import _contact, _scene, _tool
 from kernels.wear._tool import Circle, Tool, arctan2, sincos
 
@@ -67,23 +68,6 @@ class Memory(NamedTuple):
     room: _contact.Room
 
 
-class Footing(NamedTuple):
-    """Parameters on which areas hang."""
-
-    b: float
-    d: float
-    f: float
-    e: float
-    type: float
-    b_angle: float
-    L: float
-    beta: float
-    w_x: float
-    w_y: float
-    shape: tuple[float, float, float, float]
-    workpiece_radius: float
-
-
 class Overhang(NamedTuple):
     """The tool and its area, L, w and the workpiece's radius."""
 
@@ -99,14 +83,6 @@ def memory():
     """A `Memory`."""
     stops, values = np.empty(_tool.ARC_LIMIT), np.empty(NODES + _TESTS)
     return Memory(np.empty(TABLE), np.empty(3), stops, values, _contact.room())
-
-
-@jit_apart
-def _area_at(phi, scene, room):
-    """Area of contact with the arm at phi from the direction of w, and what it may be wrong by."""
-    s, c = sincos(phi)
-    disc = Circle(scene.w * c - scene.reach, -scene.w * s, scene.radius)
-    return _contact.contact_area(scene.tool, scene.whole, disc, room)
 
 
 @jit
@@ -133,7 +109,7 @@ def _stops(scene, stops):
             chi, gamma = arctan2(sqrt((unit - cosine) * (unit + cosine)), cosine), arctan2(y, x)
             stops[count], stops[count + 1] = _folded(chi + gamma), _folded(chi - gamma)
             count += 2
-    _tool.sort(stops, count)
+    sort(stops, count)
     return count
 
 
@@ -169,7 +145,9 @@ def _fit(row, low, high, scene, values, room):
     least, most, noise, calm = math.inf, 0.0, 0.0, math.inf
     for j in range(NODES + _TESTS):
         t = _COSINES[1, j] if j < NODES else _TRIED[j - NODES]
-        values[j], doubt = _area_at(middle + half * t, scene, room)
+        s, c = sincos(middle + half * t)
+        disc = Circle(scene.w * c - scene.reach, -scene.w * s, scene.radius)
+        values[j], doubt = _contact.contact_area(scene.tool, scene.whole, disc, room)
         least, most = min(least, values[j]), max(most, values[j])
         noise, calm = max(noise, doubt), min(calm, doubt)
     slope, last = 0.0, 0.0
@@ -215,34 +193,23 @@ def table_of(arm, tool, ride, radius, tolerance, memory):
 
 
 @jit_apart
-def _areas(p, rtol, memory):
-    """The areas of contact of a cell with these parameters, in its unit of length; none where none are needed."""
-    setup = _scene.without_units(p)
-    if not (p.load > 0.0 and _scene.turns_fully(setup.verdict)):
-        return Areas(memory.table, np.int64(0), 1.0, 1.0)
-    radius, tolerance = in_unit(p.workpiece_radius, setup.unit), max(_SHARE * rtol, 4.0 * _EPS)
-    return table_of(setup.arm, setup.tool, setup.ride, radius, tolerance, memory)
+def areas_of(p, rtol, first, q, rtol_q, memory):
+    """The areas of contact of a cell in its unit of length, none where none are needed.
 
-
-@jit
-def _footing(p):
-    shape = p.tool_a, p.tool_b, p.tool_n, p.tool_m
-    return Footing(p.b, p.d, p.f, p.e, p.type, p.b_angle, p.L, p.beta, p.w_x, p.w_y, shape, p.workpiece_radius)
-
-
-@jit
-def _alike(p, rtol, q, rtol_q):
-    """Whether two cells have the same areas of contact, to the same tolerance."""
-    return rtol == rtol_q and (p.load > 0.0) == (q.load > 0.0) and _footing(p) == _footing(q)
-
-
-@jit_apart
-def areas_of(p, rtol, first, before, rtol_before, memory):
-    """The areas of contact of a cell; those that `memory` has, unless it is the first or unlike the cell before."""
+    Those that `memory` has, unless it is the first or has another geometry, load or tolerance than the cell q before.
+    """
+    alike = not first and rtol == rtol_q and (p.load > 0.0) == (q.load > 0.0)
+    alike = alike and p.b == q.b and p.d == q.d and p.f == q.f and p.e == q.e and p.type == q.type and p.L == q.L
+    alike = alike and p.b_angle == q.b_angle and p.beta == q.beta and p.w_x == q.w_x and p.w_y == q.w_y
+    alike = alike and p.tool_a == q.tool_a and p.tool_b == q.tool_b and p.tool_n == q.tool_n and p.tool_m == q.tool_m
     rest = memory.rest
-    if first or not _alike(p, rtol, before, rtol_before):
-        areas = _areas(p, rtol, memory)
-        rest[0], rest[1], rest[2] = areas.panels, areas.lowest, areas.largest
+    if not (alike and p.workpiece_radius == q.workpiece_radius):
+        setup = _scene.without_units(p)
+        rest[0], rest[1], rest[2] = 0.0, 1.0, 1.0
+        if p.load > 0.0 and _scene.turns_fully(setup.verdict):
+            radius, tolerance = in_unit(p.workpiece_radius, setup.unit), max(_SHARE * rtol, 4.0 * _EPS)
+            areas = table_of(setup.arm, setup.tool, setup.ride, radius, tolerance, memory)
+            rest[0], rest[1], rest[2] = areas.panels, areas.lowest, areas.largest
     return Areas(memory.table, np.int64(rest[0]), rest[1], rest[2])
 
 

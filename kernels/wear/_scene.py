@@ -69,17 +69,14 @@ def _unit_of(x):
 
 
 @jit_apart
-def _arm(p):
-    """The arm, and the verdict on the linkage: OK, a remark or a refusal."""
-    lengths, _, fine = linkage.in_units(p)
+def without_units(p):
+    """The `Setup` of a machine. Angles of type B are mirrored at the frame."""
+    lengths, _, normal = linkage.in_units(p)
     margin = linkage.margins(lengths)
-    verdict = extremes.verdict(lengths, margin)
-    return _dwell.arm_of(lengths, margin), verdict if fine else OUT_OF_RANGE
-
-
-@jit_apart
-def _ride(p, unit, pace):
-    """The `Ride`. Angles of type B are mirrored at the frame."""
+    verdict = extremes.verdict(lengths, margin) if normal else OUT_OF_RANGE
+    unit = _unit_of(max(max(p.L, max(p.tool_a, p.tool_b)), max(magnitude(p.w_x), magnitude(p.w_y))))
+    pace = _unit_of(max(magnitude(p.omega), magnitude(p.Omega)))
+    a, b, reach = in_unit(p.tool_a, unit), in_unit(p.tool_b, unit), in_unit(p.L, unit)
     x, y = signed_in_unit(p.w_x, unit), signed_in_unit(p.w_y, unit)
     w = max(magnitude(x), magnitude(y))
     if w > 0.0 and min(magnitude(x), magnitude(y)) > 0.0:
@@ -89,26 +86,12 @@ def _ride(p, unit, pace):
     c, s = c * c_b - s * s_b, s * c_b + c * s_b
     cosine, sine = (x * c + y * s) / w if w > 0.0 else 1.0, (y * c - x * s) / w if w > 0.0 else 0.0
     speed, spin = signed_in_unit(p.omega, pace), signed_in_unit(p.Omega, pace)
-    return Ride(speed, spin, in_unit(p.L, unit), w, cosine, -sine if p.type == 1.0 else sine)
-
-
-@jit
-def _none_or_seen(x):
-    """Whether a length is 0, or not too small beside the longest."""
-    return x == 0.0 or x >= _SPAN
-
-
-@jit_apart
-def without_units(p):
-    """The `Setup` of a machine."""
-    arm, verdict = _arm(p)
-    unit = _unit_of(max(max(p.L, max(p.tool_a, p.tool_b)), max(magnitude(p.w_x), magnitude(p.w_y))))
-    pace = _unit_of(max(magnitude(p.omega), magnitude(p.Omega)))
-    a, b, ride = in_unit(p.tool_a, unit), in_unit(p.tool_b, unit), _ride(p, unit, pace)
-    fine = a >= _SPAN and b >= _SPAN and _none_or_seen(ride.w) and _none_or_seen(ride.reach)
+    ride = Ride(speed, spin, reach, w, cosine, -sine if p.type == 1.0 else sine)
+    fine = a >= _SPAN and b >= _SPAN and (w == 0.0 or w >= _SPAN) and (reach == 0.0 or reach >= _SPAN)
     fine = fine and (p.workpiece_radius == 0.0 or in_unit(p.workpiece_radius, unit) >= _SPAN)
     verdict = verdict if fine or verdict >= FIRST_REFUSAL else OUT_OF_RANGE
-    return Setup(arm, _tool.tool_of(a, b, p.tool_n, p.tool_m), ride, unit, pace, verdict)
+    tool = _tool.tool_of(a, b, p.tool_n, p.tool_m)
+    return Setup(_dwell.arm_of(lengths, margin), tool, ride, unit, pace, verdict)
 
 
 @jit_apart

@@ -20,6 +20,7 @@ from kernels.lanes.vectors import magnitude, where
 from kernels.maths.elementary import arctan, expm1, log1p
 from kernels.maths.elementary import power as inlined_power
 from kernels.maths.elementary import sincos as inlined_sincos
+from kernels.maths.small_dense import sort
 
 PIECES = 4
 CROSSING_LIMIT = 32
@@ -261,7 +262,10 @@ def crossings(piece, tool, circle, start, found, count, stack):
             return count
         right = _top(stack, top - 1)
         x = math.nan
-        if _may_cross(left, right, square):
+        least = _least_square(left.u, right.u) + _least_square(left.v, right.v)
+        most = max(left.u * left.u, right.u * right.u) + max(left.v * left.v, right.v * right.v)
+        slack = _ROUNDING * (square + most)
+        if least <= square + slack and most >= square - slack:  # the circle meets the rectangle of both ends
             low, high = _slope_bounds(piece, tool, left, right)
             if low > 0.0 or high < 0.0:
                 if (left.excess > 0.0) != (right.excess > 0.0):
@@ -280,15 +284,6 @@ def crossings(piece, tool, circle, start, found, count, stack):
         left = right
         top -= 1
     return -1
-
-
-@jit
-def _may_cross(left, right, square):
-    """Whether a circle of that squared radius has points in the rectangle of two ends."""
-    least = _least_square(left.u, right.u) + _least_square(left.v, right.v)
-    most = max(left.u * left.u, right.u * right.u) + max(left.v * left.v, right.v * right.v)
-    slack = _ROUNDING * (square + most)
-    return least <= square + slack and most >= square - slack
 
 
 @jit
@@ -323,17 +318,6 @@ def arctan2(y, x):
 
 
 @jit_apart
-def sort(values, count):
-    """Sorts the first `count` values, by insertion."""
-    for i in range(1, count):
-        value, j = values[i], i
-        while j > 0 and values[j - 1] > value:
-            values[j] = values[j - 1]
-            j -= 1
-        values[j] = value
-
-
-@jit_apart
 def arcs(tool, circle, near, far, angles, found, stack):
     """Arcs of a circle within the tool: their ends in pairs in `angles`, in [-pi, pi]; how many numbers, -1: too many.
 
@@ -358,12 +342,7 @@ def arcs(tool, circle, near, far, angles, found, stack):
             count += 1
     angles[count] = math.pi
     sort(angles, count + 1)
-    return _kept(tool, circle, angles, count)
-
-
-@jit
-def _kept(tool, circle, angles, count):
-    """Keeps those of `count` neighbouring arcs that are within the tool; how many numbers, what is unsure, where."""
+    # those of neighbouring arcs that are within the tool
     kept, unsure, about = 0, 0.0, -1.0
     for j in range(count):
         low, high = angles[j], angles[j + 1]

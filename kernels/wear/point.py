@@ -17,8 +17,8 @@ import numpy as np
 from kernels.interface import Field
 from kernels.lanes.codes import INACCURATE, OUT_OF_RANGE, STEP_LIMIT
 from kernels.lanes.columns import cell_by_cell
-from kernels.lanes.jit import jit, jit_apart, jit_inline
-from kernels.lanes.records import read, write
+from kernels.lanes.jit import jit, jit_apart
+from kernels.lanes.records import read
 from kernels.lanes.vectors import magnitude, sqrt
 from kernels.lanes.wiring import kernel, tracing
 from kernels.maths import quadrature
@@ -33,44 +33,12 @@ _TURN = 2.0 * math.pi
 _DEPTH = _path.HALVINGS + 2
 
 
-class Point(NamedTuple):
-    """Parameters beside those of the machine."""
-
-    r0: float
-    theta0: float
-    tau: float
-
-
-class Worn(NamedTuple):
-    """Outputs."""
-
-    wear: float
-    wear_error: float
-
-
-class Clock(NamedTuple):
-    """Time of a step, and what the crank and the work turn by in it, in turns, as pairs."""
-
-    h: float
-    crank: float
-    crank_low: float
-    work: float
-    work_low: float
-
-
 class Room(NamedTuple):
     """Space for panels of integrals and their nodes, and for the stack of times."""
 
     pool: np.ndarray
     nodes: quadrature.Nodes
     stack: np.ndarray
-
-
-@jit_apart
-def _speeds(kind, nodes, count, step):
-    """The integrand: `_speed` at the times of all nodes."""
-    for j in range(count):
-        nodes.value[j], nodes.doubt[j] = _speed(nodes.x[j], step)
 
 
 @jit_apart
@@ -83,6 +51,13 @@ def _speed(s, step):
     cosine, sine = _path.facing(step, s)
     weight, doubt, slope = _pressure.weight(step.areas, cosine, sine)
     return weight * v, weight * v * (4.0 * _EPS + doubt + 8.0 * _EPS * slope)
+
+
+@jit_apart
+def _speeds(kind, nodes, count, step):
+    """The integrand: `_speed` at the times of all nodes."""
+    for j in range(count):
+        nodes.value[j], nodes.doubt[j] = _speed(nodes.x[j], step)
 
 
 @jit_apart
@@ -140,85 +115,70 @@ def _way_in_step(step, h, curve, rtol, room):
     return total, error
 
 
-@jit
-def _clock(speed, spin):
-    """The `Clock`."""
-    if speed == 0.0:
-        return Clock(_TURN / (STEPS * magnitude(spin)), 0.0, 0.0, (1.0 if spin > 0.0 else -1.0) / STEPS, 0.0)
-    ratio = spin / speed
-    steps = STEPS * math.ceil(max(1.0, min(magnitude(ratio), 1e9)))
-    low = linkage.fma(-ratio, speed, spin) / speed
-    sign = 1.0 if speed > 0.0 else -1.0
-    share = sign * ratio / steps
-    rest = linkage.fma(-share, steps, sign * ratio) / steps
-    turn = sign / steps
-    turn_rest = linkage.fma(-turn, steps, sign) / steps
-    return Clock(_TURN / (steps * magnitude(speed)), turn, turn_rest, share, rest + sign * low / steps)
-
-
 @jit_apart
 def way(course, areas, theta0, tau, rtol, room):
-    """The way of polishing over the time tau, its error, and whether there were few enough steps."""
-    if course.speed == 0.0 and course.spin == 0.0:
+    """The way of polishing over the time tau, its error, and whether there were few enough steps.
+
+    A step is a share of a turn of the crank or the work, whichever is faster; what both turn by in it is kept as pairs.
+    """
+    speed, spin = course.speed, course.spin
+    if speed == 0.0 and spin == 0.0:
         return 0.0, 0.0, True
-    clock = _clock(course.speed, course.spin)
-    steps = tau / clock.h
+    if speed == 0.0:
+        h, crank, crank_low = _TURN / (STEPS * magnitude(spin)), 0.0, 0.0
+        work, work_low = (1.0 if spin > 0.0 else -1.0) / STEPS, 0.0
+    else:
+        ratio, sign = spin / speed, 1.0 if speed > 0.0 else -1.0
+        count = STEPS * math.ceil(max(1.0, min(magnitude(ratio), 1e9)))
+        h, crank, work = _TURN / (count * magnitude(speed)), sign / count, sign * ratio / count
+        crank_low = linkage.fma(-crank, count, sign) / count
+        low = linkage.fma(-ratio, speed, spin) / speed
+        work_low = linkage.fma(-work, count, sign * ratio) / count + sign * low / count
+    steps = tau / h
     if not steps < _path.STEP_LIMIT:
         return 0.0, 0.0, False
     curve = _path.bend(course)
     total, error = 0.0, 0.0
     for j in range(int(steps) + 1):
-        rest = clock.h * (steps - j)
+        rest = h * (steps - j)
         if rest > 0.0:
-            turned = theta0 + _path.phase(j, clock.work, clock.work_low)
-            step = Step(course, _path.phase(j, clock.crank, clock.crank_low), turned, areas)
-            more, doubt = _way_in_step(step, min(clock.h, rest), curve, rtol, room)
+            turned = theta0 + _path.phase(j, work, work_low)
+            step = Step(course, _path.phase(j, crank, crank_low), turned, areas)
+            more, doubt = _way_in_step(step, min(h, rest), curve, rtol, room)
             total, error = total + more, error + doubt
-    return total, error + 4.0 * _EPS * (total + tau * 0.0), True
-
-
-@jit
-def _course(p, r0, setup):
-    """The `Course` of the point at that radius."""
-    arm, ride, unit = setup.arm, setup.ride, setup.unit
-    x, y, r = signed_in_unit(p.w_x, unit), signed_in_unit(p.w_y, unit), in_unit(r0, unit)
-    side = linkage.side_of(p.type)
-    return Course(
-        arm.lengths, arm.margin, side, p.b_angle, ride.speed, ride.spin, ride.reach, x, y, p.beta, r, setup.tool
-    )
-
-
-@jit_inline
-def _cell(p, point, rtol, areas, room):
-    """`Worn` and the status of one cell."""
-    setup = _scene.without_units(p)
-    if not _scene.turns_fully(setup.verdict):
-        return Worn(math.nan, math.nan), setup.verdict
-    course, ride, tool = _course(p, point.r0, setup), setup.ride, setup.tool
-    m, e = mantissa_exponent(point.tau if point.tau > 0.0 else 1.0)
-    tau = scale(m, e + setup.pace) if point.tau > 0.0 else 0.0
-    if point.r0 > p.workpiece_radius > 0.0 or course.r > 4.0 * (ride.reach + ride.w + tool.a + tool.b):
-        return Worn(0.0, 0.0), setup.verdict
-    value, error, short = way(course, areas, point.theta0, tau, 0.25 * rtol, room)
-    if not short:
-        return Worn(math.nan, math.nan), STEP_LIMIT
-    hard, units = (p.pressure, setup.unit) if areas.panels == 0 else (p.load, -setup.unit)
-    wear = _scene.with_units(value, p.preston, hard, units)
-    worn = Worn(wear, _scene.with_units(error, p.preston, hard, units))
-    if value > 0.0 and not is_normal(wear):
-        return worn, OUT_OF_RANGE
-    return worn, setup.verdict if error <= rtol * value else INACCURATE
+    return total, error + 4.0 * _EPS * total, True
 
 
 @jit
 def _follow(i, columns, room, memory):
     """(1), split at every entry and exit; one cell at a time, for no two split alike."""
-    h = max(i - 1, 0)
-    p, rtol = read(Machine, columns, i), columns.rtol[i]
-    areas = _pressure.areas_of(p, rtol, i == 0, read(Machine, columns, h), columns.rtol[h], memory)
-    worn, status = _cell(p, read(Point, columns, i), rtol, areas, room)
-    write(columns, i, worn)
-    columns.status[i] = status
+    before = max(i - 1, 0)
+    p, rtol, r0, tau = read(Machine, columns, i), columns.rtol[i], columns.r0[i], columns.tau[i]
+    areas = _pressure.areas_of(p, rtol, i == 0, read(Machine, columns, before), columns.rtol[before], memory)
+    setup = _scene.without_units(p)
+    arm, ride, unit, tool = setup.arm, setup.ride, setup.unit, setup.tool
+    x, y, r = signed_in_unit(p.w_x, unit), signed_in_unit(p.w_y, unit), in_unit(r0, unit)
+    side = linkage.side_of(p.type)
+    course = Course(
+        arm.lengths, arm.margin, side, p.b_angle, ride.speed, ride.spin, ride.reach, x, y, p.beta, r, tool
+    )  # fmt: skip
+    m, e = mantissa_exponent(tau if tau > 0.0 else 1.0)
+    time = scale(m, e + setup.pace) if tau > 0.0 else 0.0
+    wear, doubt, status = math.nan, math.nan, setup.verdict
+    if _scene.turns_fully(status):
+        if r0 > p.workpiece_radius > 0.0 or r > 4.0 * (ride.reach + ride.w + tool.a + tool.b):
+            wear, doubt = 0.0, 0.0
+        else:
+            value, error, short = way(course, areas, columns.theta0[i], time, 0.25 * rtol, room)
+            hard, units = (p.pressure, unit) if areas.panels == 0 else (p.load, -unit)
+            if short:
+                wear = _scene.with_units(value, p.preston, hard, units)
+                doubt = _scene.with_units(error, p.preston, hard, units)
+                status = status if error <= rtol * value else INACCURATE
+                status = OUT_OF_RANGE if value > 0.0 and not is_normal(wear) else status
+            else:
+                status = STEP_LIMIT
+    columns.wear[i], columns.wear_error[i], columns.status[i] = wear, doubt, status
 
 
 @jit

@@ -20,12 +20,11 @@ under a load leaves wholly wears without bound: NaN with an infinite error, henc
 """
 
 import math
-from typing import NamedTuple
 
 from kernels.interface import Field
 from kernels.lanes.codes import INACCURATE, OUT_OF_RANGE
 from kernels.lanes.columns import cell_by_cell
-from kernels.lanes.jit import jit, jit_inline
+from kernels.lanes.jit import jit
 from kernels.lanes.ranges import partly
 from kernels.lanes.records import read
 from kernels.lanes.wiring import kernel, tracing
@@ -40,65 +39,44 @@ _AT_RIM = 1e-8
 _FOUR_PI2 = 4.0 * math.pi * math.pi
 
 
-class Amount(NamedTuple):
-    """What makes wear of an integral: preston, pressure or load, power of two of its units; and the rim's radius."""
-
-    preston: float
-    hard: float
-    units: float
-    rim: float
-
-
-@jit_inline
-def _wear_at(radius, setup, areas, amount, rtol, room):
-    """Wear and its error at one radius [m], and whether it is a number that float64 can hold."""
-    rim, units = amount.rim, amount.units
-    if radius > rim > 0.0:
-        return 0.0, 0.0, True
-    if _pressure.leaves(areas) and not radius < rim * (1.0 - _AT_RIM):
-        return math.nan, math.inf, True
-    r = in_unit(radius, setup.unit)
-    r = r if r > _FAINT or setup.ride.w == 0.0 else 0.0
-    value, error = _profile.profile(Scene(setup.arm, setup.tool, setup.ride, r, areas, room.spare), 0.7 * rtol, room)
-    wear = _scene.with_units(value / _FOUR_PI2, amount.preston, amount.hard, units)
-    doubt = _scene.with_units(error / _FOUR_PI2, amount.preston, amount.hard, units)
-    return wear, doubt, not value > 0.0 or is_normal(wear)
-
-
-@jit_inline
-def _cell(p, rtol, areas, radius, wear, wear_error, room):
-    """Fills the profile of one cell and returns its status.
+@jit
+def _contour(i, columns, room, memory):
+    """(2) as integrals along the outline, split where contact ends; one cell at a time, for no two split alike.
 
     The status is about errors over the largest wear of the profile: that of every radius is stated beside it.
     """
-    setup = _scene.without_units(p)
-    turns = _scene.turns_fully(setup.verdict)
-    units = setup.pace + (setup.unit if areas.panels == 0 else -setup.unit)
-    amount = Amount(p.preston, max(p.pressure, p.load), units, p.workpiece_radius)
-    most, worst, normal = 0.0, 0.0, True
-    for k in range(radius.size):
-        wear[k], wear_error[k] = math.nan, math.nan
-        if turns:
-            value, doubt, held = _wear_at(radius[k], setup, areas, amount, rtol, room)
-            if held:
-                wear[k], wear_error[k] = value, doubt
-                most = value if value > most else most
-                worst = worst if doubt <= worst else doubt  # NaN stays
-            normal = normal and held
-    if not turns:
-        return setup.verdict
-    if not (normal or most > 0.0):
-        return OUT_OF_RANGE
-    return partly(normal, setup.verdict) if worst <= rtol * most else INACCURATE
-
-
-@jit
-def _contour(i, columns, room, memory):
-    """(2) as integrals along the outline, split where contact ends; one cell at a time, for no two split alike."""
     h = max(i - 1, 0)
     p, rtol = read(Machine, columns, i), columns.rtol[i]
     areas = _pressure.areas_of(p, rtol, i == 0, read(Machine, columns, h), columns.rtol[h], memory)
-    columns.status[i] = _cell(p, rtol, areas, columns.radius, columns.wear[i], columns.wear_error[i], room)
+    setup, rim, hard = _scene.without_units(p), p.workpiece_radius, max(p.pressure, p.load)
+    turns = _scene.turns_fully(setup.verdict)
+    units = setup.pace + (setup.unit if areas.panels == 0 else -setup.unit)
+    most, worst, normal = 0.0, 0.0, True
+    for k in range(columns.radius.size):
+        radius, wear, doubt, held = columns.radius[k], math.nan, math.nan, True
+        if turns and radius > rim > 0.0:
+            wear, doubt = 0.0, 0.0
+        elif turns and _pressure.leaves(areas) and not radius < rim * (1.0 - _AT_RIM):
+            doubt = math.inf
+        elif turns:
+            r = in_unit(radius, setup.unit)
+            r = r if r > _FAINT or setup.ride.w == 0.0 else 0.0
+            scene = Scene(setup.arm, setup.tool, setup.ride, r, areas, room.spare)
+            value, error = _profile.profile(scene, 0.7 * rtol, room)
+            wear = _scene.with_units(value / _FOUR_PI2, p.preston, hard, units)
+            if value > 0.0 and not is_normal(wear):
+                wear, held, normal = math.nan, False, False
+            else:
+                doubt = _scene.with_units(error / _FOUR_PI2, p.preston, hard, units)
+        columns.wear[i, k], columns.wear_error[i, k] = wear, doubt
+        most = wear if wear > most else most
+        worst = worst if doubt <= worst or not held else doubt
+    if not turns:
+        columns.status[i] = setup.verdict
+    elif not (normal or most > 0.0):
+        columns.status[i] = OUT_OF_RANGE
+    else:
+        columns.status[i] = partly(normal, setup.verdict) if worst <= rtol * most else INACCURATE
 
 
 @jit
