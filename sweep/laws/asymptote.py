@@ -26,6 +26,8 @@ SCATTERS = 0.3
 """Share of the distances from (1) that is noise between neighbours, from which on they are noise."""
 AS_WELL = 4.0
 """Difference of AICc up to which a logarithmic correction, whose exponent is far harder to tell, is not ruled out."""
+CAUTION = 0.5
+"""Share of the level of intervals that counts where D is fitted as well: by trial, of whole ones 88 to 92 % held."""
 VERDICTS = ("a power law with a correction", "no power law with a correction", "no law at this end")
 NAMES = {
     "exponent": "exponent far out",
@@ -184,7 +186,7 @@ def _mixture(t: Array, z: Array, found: Found, word: str, confidence: float) -> 
         weight=np.concatenate([one.weight * share for one, share in zip(parts, shares / shares.sum(), strict=True)]),
         value=np.concatenate([one.value for one in parts]),
         error=np.concatenate([one.error for one in parts]),
-        share=np.concatenate([one.share for one in parts]),
+        share=CAUTION * np.concatenate([one.share for one in parts]),
     )
     ends = [float(end[0]) for end in both.interval(2, confidence)]
     slow = fitted(LOG_CORRECTION, t, z, weights)
