@@ -6,7 +6,7 @@ The functions are plain Python of named scalars; each asks by name for the state
 They are called once, with objects that record what is done to them (`expression`), and written out as compiled
 functions for one cell and for lanes (`module`), in a file that can be read. In them are allowed + - * / ** abs,
 and sqrt, exp, log, sin, cos, power, sign, maximum, minimum and where of this module. power(abs(u), n), u a state and
-n > -1 any number, has no Taylor series at u = 0; there it is followed as `power_core` says, right to the same
+n > -1 any number, has no Taylor series at u = 0; there it is followed as `integrate.powers` says, right to the same
 tolerance. Of what is not a state, power and sqrt want something above 0 (else OUT_OF_RANGE).
 
 A cell is OK where each state is within rtol of the truth, relative to the largest size that the state had on the way,

@@ -12,7 +12,8 @@ import math
 import numpy as np
 
 from kernels.interface import FIRST_REFUSAL, Status
-from kernels.lanes.refill import MOVING, fresh
+from kernels.lanes.refill import MOVING, fresh, to_the_end
+from kernels.lanes.tuples import first_rows, flat
 from kernels.maths.elementary import NORMAL_HIGH, NORMAL_LOW
 
 HIGH_BELOW = 5e-10
@@ -71,17 +72,18 @@ def _followed(module, columns, rtol, of_a_step, together=False, tells=False, sha
 
 def _run(module, run, inputs, together, tells):
     """The results of cells; those that take as many steps side by side, for so lanes wait less for each other."""
-    row = {name: j for j, name in enumerate(module.ROWS)}
-    found = [*range(row["time"], row["verdict"] + 1), *([row["error"]] if tells else [])]
-    cells, places = fresh(len(row), inputs), np.arange(len(inputs[0]))
+    cell = getattr(module, "M_TOLD", module.M).cell
+    row, rows = first_rows(cell), len(flat(cell))
+    found = [*range(row["time"], row["verdict"] + 1), *([row["errors"] + 1] if tells else [])]
+    cells, places = fresh(rows, inputs), np.arange(len(inputs[0]))
     whole = np.where(inputs[-3] < math.inf, inputs[-3], math.nan)  # NaN is refused, without end not followed
-    cells[:, found] = np.nan
-    if "told" in row:
-        cells[:, row["told"]] = float(tells)
+    cells[:, row["interval"] : row["size"]] = np.nan
+    if cell.errors:
+        cells[:, row["errors"]] = float(tells)
     results = np.empty((len(found), len(cells)))
     for stop in (math.inf,) if together else STOPS:
         cells[:, row["flips"]] = np.minimum(whole, stop)
-        run(cells, together)
+        to_the_end(run, cells, together)
         results[:, places] = cells[:, found].T
         count, verdict, steps, before = (cells[:, row[name]] for name in ("count", "verdict", "steps", "before"))
         going = np.flatnonzero((count >= stop) & (count < whole) & (verdict < FIRST_REFUSAL))

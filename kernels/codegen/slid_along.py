@@ -13,7 +13,7 @@ def slid_along(how, scene, methods):
     """The function of columns `how`, whose cells that stick are followed from their start by these methods, that slide.
 
     A cell goes to the next method where one finds no end of its slide; with none left it STICKS.
-    Powers of abs(u) are followed to u = 0 by the Taylor method alone (`power_core`): scenes with such stay as they are.
+    Powers of abs(u) are followed to u = 0 by the Taylor method alone (`integrate.powers`); their scenes stay so.
     """
     graph = record(scene).graph
     if graph.powers or not graph.kinks:

@@ -1,6 +1,6 @@
 """Columns of cells followed once by the Taylor method of a scene's module, with the error carried along.
 
-The error that a cell states (`source_text.error`) is signed and of first order; STATED times that is to be believed. A
+The error that a cell states (`integrate.carried`) is signed and of first order; STATED times that is to be believed. A
 cell whose error that does not show to be small enough is followed again with a tolerance as much smaller; what then is
 left, and all that is remarked or refused, is followed twice (`followed_twice`), which asks for no derivatives.
 """
@@ -12,24 +12,16 @@ import numpy as np
 from kernels.codegen import followed_twice
 from kernels.codegen.followed_twice import ROUNDING
 from kernels.codegen.module import ORDERS, Writer, build, loaded
-from kernels.codegen.power_core import core
 from kernels.codegen.record import record
 from kernels.interface import Status
-from kernels.source_text.driver import of_error as names_of_error
-from kernels.source_text.driver import rows_of
-from kernels.source_text.error import of_error
-from kernels.source_text.hidden import hidden
-from kernels.source_text.leg import leg
-from kernels.source_text.template import filled
+from kernels.source_text.rounding import sizes
 
 TEXT = '''
 """Motion of {name} with its error carried along: written by kernels; do not change it here."""
 
 from {module} import *
-from kernels.integrate.carried import DOUBT, FADES, ORDERLY, PART, STRAIGHT, ULP, VAGUE, further
-from kernels.integrate.taylor import curvature, slope
 
-ROWS = {rows}
+M_TOLD = M._replace(cell=cell_of({cell}, True, {spreads}))
 '''
 
 STATED = 1.5
@@ -52,15 +44,25 @@ def by_one(scene):
 @functools.cache
 def telling(scene):
     """The module of the scene's motion with its error, written once."""
-    module, writer = build(scene), Writer(scene, record(scene))
-    errors = names_of_error(writer.states, writer.feeds_back())
-    rows = tuple(rows_of(writer.states, writer.parameters, writer.kinks, errors))
-    parts = [filled(TEXT, name=scene.name, module=module.__name__, rows=rows).lstrip(), *of_error(writer)]
-    powers, (_, *hides) = len(writer.recorded.graph.powers), hidden(writer)
-    parts += [core(writer, i, True) for i in range(powers)]
-    for order in ORDERS:
-        parts += [writer.series(order, powers, True), leg(writer, order, hides, True)]
-        parts.append(writer.advance(order, True))
+    writer = Writer(scene, record(scene))
+    graph, of = writer.recorded.graph, writer.tangents.of
+    values = [graph.multiply(factor, u) for _, factor, u in writer.recorded.events]
+    made = "What the {} are made of, in size: an ulp of it is what rounding takes."
+    changed = (
+        ("rate_changes", "What changes of the states change of each rate.", writer.recorded.rates),
+        ("event_changes", "What changes of the states change of each event's value.", values),
+        ("jump_changes", "What changes of the states before a switch are behind it.", writer.recorded.switched),
+    )
+    cell = f"{len(writer.states)}, {len(writer.parameters)}, {writer.kinks}"
+    parts = [
+        TEXT.format(name=scene.name, module=build(scene).__name__, cell=cell, spreads=writer.feeds_back()).lstrip(),
+        sizes(writer, "made_of_rates", made.format("rates"), writer.recorded.rates),
+        sizes(writer, "made_of_events", made.format("events but for their offsets"), values),
+    ]
+    for name, doc, expressions in changed:
+        derivatives = [graph.of(0.0) if of(x) is None else of(x) for x in expressions]
+        parts.append(writer.function(name, doc, derivatives, ("state", "mode", "changes")))
+    parts += [writer.by_series(order, tells=True) for order in ORDERS]
     return loaded("told", scene, "\n".join(parts))
 
 

@@ -15,7 +15,8 @@ import numpy as np
 from kernels.codegen.followed_twice import off_by_roundings
 from kernels.integrate.events import METHODS, MOREAU, NONE
 from kernels.interface import FIRST_REFUSAL, Status
-from kernels.lanes.refill import fresh
+from kernels.lanes.refill import fresh, to_the_end
+from kernels.lanes.tuples import flat
 from kernels.maths.elementary import NORMAL_HIGH, NORMAL_LOW
 
 LOCATED, BLIND = ((0.37, 2.0), (0.77, 1.0)), ((0.23, 1.0), (0.61, 1.0))
@@ -48,8 +49,8 @@ def followed(module, method, columns, step, location, substeps=1.0):
         cells = location == one
         extra = (step, GRAZING, METHODS.index(method), one, substeps)
         rows = [np.broadcast_to(c, step.shape)[cells] for c in (*columns, *extra)]
-        table = fresh(len(module.ROWS), rows)
-        module.run(table, False)
+        table = fresh(len(flat(module.M_FIXED.cell)), rows)
+        to_the_end(module.run, table)
         results[:, cells] = table[:, 1 + len(rows) : 1 + len(rows) + len(results)].T
     return results
 

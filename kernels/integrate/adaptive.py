@@ -1,6 +1,6 @@
 """Legs from event to event by an embedded pair of methods (`pairs`) to a tolerance; generic in one cell or lanes.
 
-A leg has the signature of the Taylor method's (`source_text.leg`) and drops into the same driver. Of each step the
+A leg has the form of the Taylor method's (`taylor_leg`) and drops into the same driver. Of each step the
 events are known at both ends by value and rate, and between them by intervals (`source_text.hidden`): each must be
 proved to stay above 0, to fall or to rise all along, or the step is halved; an event that comes so close to 0 that no
 short step proves it is called grazing. One that ends below 0 is located on the dense output by Newton's method in a
@@ -17,6 +17,7 @@ from kernels.integrate.records import Leg, Step
 from kernels.integrate.steps import ONE, events
 from kernels.integrate.taylor import COME_UP, next_step
 from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.symbols import symbolic
 from kernels.lanes.tuples import after, boxes, marks, reached, times
 from kernels.lanes.vectors import any_lane, choose, fma, magnitude, not_, where
 
@@ -48,6 +49,8 @@ class Course(NamedTuple):
     on, fired : 1 for each event that the motion starts on, that it has met
     start, start_rates, wide : value and rate of each event; the largest value so far
     cuts, tried : how often the step has been cut, how many have been tried
+    stuck, lost, broken, grazing, hangs : as of `Leg`
+    blown : a step has left the numbers
     """
 
     state: tuple
@@ -62,11 +65,6 @@ class Course(NamedTuple):
     tried: float
     reach: tuple
     moving: bool
-
-
-class Troubles(NamedTuple):
-    """As of `Leg`; `blown` where a step has left the numbers."""
-
     stuck: bool
     lost: bool
     blown: bool
@@ -75,22 +73,13 @@ class Troubles(NamedTuple):
     hangs: bool
 
 
-class Found(NamedTuple):
-    """An event on the dense output: part of the step, state, the event's rate; how far the output may be off."""
-
-    part: float
-    state: tuple
-    rate: float
-    vague: float
-
-
 class Ending(NamedTuple):
     """How a step is to end.
 
     new, taken : in this state, after that time
     again, shorter : it must be tried again, with this length
     loose : again for the dense output's sake
-    stuck, grazing, hangs : as of `Leg`
+    hangs : as of `Leg`
     """
 
     new: tuple
@@ -98,33 +87,31 @@ class Ending(NamedTuple):
     again: bool
     shorter: float
     loose: bool
-    stuck: bool
-    grazing: bool
     hangs: bool
 
 
-@jit_call
-def hides_nothing(m, step, first, last, mode, tolerance):
-    """Whether what a step may hide is within the tolerance of each state's size and of each event's value; NaN fails.
+@symbolic
+def passed_box(step, first, last):
+    """The box of states that a step passes; `first` and `last` are the rates at its ends."""
+    return boxes(step.state, step.new, times(step.h, after(last, -1.0, ONE, (first,))))
 
-    `first` and `last` are the rates where the step begins and where it ends.
-    """
-    box = boxes(step.state, step.new, times(step.h, after(last, -1.0, ONE, (first,))))
-    of_rates, of_events = m.hidden(step.state, box, mode.side, mode.signs, mode.parameters)
+
+@symbolic
+def shows_all(step, of_rates, of_events, first, tolerance):
+    """Whether what a step hides is within the tolerance of each state's size and of each event's value; NaN fails."""
     seen = of_size(step.state, step.new, first, step.h, times(step.h, of_rates)) <= tolerance
-    for j in range(len(step.start)):
-        seen = seen & (of_events[j] <= tolerance * (magnitude(step.start[j]) + magnitude(step.end[j])))
+    for hidden, start, end in zip(of_events, step.start, step.end, strict=True):
+        seen = seen & (hidden <= tolerance * (magnitude(start) + magnitude(end)))
     return seen
 
 
-@jit_call
-def doubted(m, step, first, last, mode, course, tolerance):
+@symbolic
+def doubted(step, bounds, course, tolerance):
     """Where an event is not proved to stay above its margin, or to fall or rise all along; and where one is near 0.
 
     A motion that starts on an event with no rate and leaves it by its bend is believed to, on a step cut short enough.
     """
-    box = boxes(step.state, step.new, times(step.h, after(last, -1.0, ONE, (first,))))
-    low, rate_low, rate_high = m.bounds(step.state, box, mode.side, mode.signs, mode.parameters)
+    low, rate_low, rate_high = bounds
     margin, doubt = margins(course, tolerance), step.h < 0.0
     near = doubt
     for j in range(len(low)):
@@ -138,11 +125,10 @@ def doubted(m, step, first, last, mode, course, tolerance):
 
 
 @jit_call
-def on_dense(m, pair, mode, step, terms, which, first, seeking):
+def on_dense(m, pair, mode, step, terms, which, part, seeking):
     """Where in the step the event fires, the state there and the event's rate, by the dense output."""
     h = step.h
-    low, high, part = 0.0 * h, 0.0 * h + 1.0, first
-    slope = 0.0 * h
+    low, high, slope = 0.0 * h, 0.0 * h + 1.0, 0.0 * h
     for _ in range(ROOT_LIMIT):
         if not any_lane(seeking):
             break
@@ -157,21 +143,7 @@ def on_dense(m, pair, mode, step, terms, which, first, seeking):
     return part, pair.dense(m, step.state, terms, mode, h, part), slope
 
 
-@jit
-def located(m, pair, mode, step, trial, which, curved):
-    """The event of the lanes in which it is above 0 at the start; of the others the start itself."""
-    terms = pair.series(m, step.state, trial, mode, step.h)
-    e0, e1 = of_event(step.start, which), of_event(step.end, which)
-    d0, d1 = step.h * of_event(step.start_rates, which), step.h * of_event(step.end_rates, which)
-    first = where(curved, cubic_root(e0, e1, d0, d1, curved), 0.0)
-    part, state, slope = on_dense(m, pair, mode, step, terms, which, first, curved)
-    part = where(curved, part, 0.0)
-    vague = pair.vague(m, step.state, terms, mode, step.h, part)
-    vague = of_size(step.state, step.new, trial.stages[0], step.h, vague)
-    return Found(part, choose(curved, state, step.state), slope, vague)
-
-
-@jit
+@symbolic
 def only_just(step, which, slope, margin):
     """Whether an event that has this rate where it fires would turn round within the margin behind it."""
     d0, d1 = step.h * of_event(step.start_rates, which), step.h * of_event(step.end_rates, which)
@@ -183,27 +155,32 @@ def only_just(step, which, slope, margin):
 def onto_event(m, pair, mode, step, trial, course, which, tolerance, seeking, ending):
     """The ending of the lanes that seek an event: on it, or again where another is behind by then, or it is vague."""
     curved = seeking & (of_event(step.start, which) > 0.0)
-    found = located(m, pair, mode, step, trial, which, curved)
-    part = found.part
+    terms = pair.series(m, step.state, trial, mode, step.h)
+    e0, e1 = of_event(step.start, which), of_event(step.end, which)
+    d0, d1 = step.h * of_event(step.start_rates, which), step.h * of_event(step.end_rates, which)
+    first = where(curved, cubic_root(e0, e1, d0, d1, curved), 0.0)
+    part, found, slope = on_dense(m, pair, mode, step, terms, which, first, curved)
+    part, state = where(curved, part, 0.0), choose(curved, found, step.state)
+    vague = pair.vague(m, step.state, terms, mode, step.h, part)
+    vague = of_size(step.state, step.new, trial.stages[0], step.h, vague)
     other = curved & (part < 0.999999) & (part > 0.0)
-    other = other & passed_another(events(m, found.state, mode)[0], which, course.on)
+    other = other & passed_another(events(m, state, mode)[0], which, course.on)
+    loose = curved & not_(other) & (vague > tolerance)
     shorter = where(other, part * course.h, ending.shorter)
-    loose = curved & not_(other) & (found.vague > tolerance)
     shorter = where(loose, course.h * where(part < 0.9, 1.05 * part, 0.5), shorter)
     margin = of_event(margins(course, tolerance), which)
-    hangs = curved & not_(other | loose) & only_just(step, which, found.rate, margin)
-    new, taken = choose(seeking, found.state, ending.new), where(seeking, part * course.h, ending.taken)
-    again = ending.again | other | loose
-    return Ending(new, taken, again, shorter, loose, ending.stuck, ending.grazing, hangs)
+    hangs = curved & not_(other | loose) & only_just(step, which, slope, margin)
+    new, taken = choose(seeking, state, ending.new), where(seeking, part * course.h, ending.taken)
+    return Ending(new, taken, ending.again | other | loose, shorter, loose, hangs)
 
 
-@jit
+@symbolic
 def margins(course, tolerance):
     """Within which a turning point of each event is too close to 0."""
     return times(CLOSE * tolerance, course.wide)
 
 
-@jit
+@symbolic
 def next_length(pair, h, error):
     """The next step, for an error over the tolerance."""
     longer = next_step(h, error / SAFETY, pair.order)
@@ -211,19 +188,7 @@ def next_length(pair, h, error):
     return where(longer > SHRINK * h, longer, SHRINK * h)
 
 
-@jit
-def allowed(m, pair, mode, step, trial, course, tolerance):
-    """The next length by the step's error, and the ending of a step that meets no event."""
-    error = trial.error / tolerance
-    fine = (error <= 1.0) & finite(trial.new)
-    longer = next_length(pair, course.h, error)
-    seen = hides_nothing(m, step, trial.stages[0], trial.last, mode, tolerance)
-    longer = where(seen | not_(fine), longer, COME_UP * course.h)
-    again, nothing = course.moving & not_(fine & seen), course.moving & not_(course.moving)
-    return longer, Ending(trial.new, course.h, again, longer, nothing, nothing, nothing, nothing)
-
-
-@jit
+@symbolic
 def leaves(step, which, course, tolerance):
     """Whether a motion leaves the event that it starts on and has met again: also by its bend alone."""
     rate, end = of_event(step.start_rates, which), of_event(step.end, which)
@@ -231,104 +196,92 @@ def leaves(step, which, course, tolerance):
     return (rate > 0.0) | (flat & (course.cuts < HALVED))
 
 
+@symbolic
+def moved_on(course, step, ending, which, longer, cuts, stuck, grazing):
+    """The course behind a step, with its troubles."""
+    moving = course.moving
+    course = course._replace(
+        stuck=course.stuck | stuck,
+        lost=course.lost | (moving & (cuts > CUTS)),
+        blown=course.blown | (moving & not_(finite(step.new))),
+        broken=course.broken | (moving & not_(course.h > 1e-280)),
+        grazing=course.grazing | grazing,
+        hangs=course.hangs | ending.hangs,
+    )
+    given_up = course.stuck | course.grazing | course.broken | course.lost
+    moved = moving & not_(ending.again | given_up)
+    done, start = moved & (which > -0.5), choose(moved, step.end, course.start)
+    state = choose(moved, ending.new, course.state)
+    return course._replace(
+        state=state,
+        t=where(moved, course.t + ending.taken, course.t),
+        h=where(ending.again, ending.shorter, where(moved & not_(done), longer, course.h)),
+        on=choose(moved, marks(0.0 * course.h - 1.0, course.on), course.on),
+        fired=choose(done, marks(which, course.on), course.fired),
+        start=start,
+        start_rates=choose(moved, step.end_rates, course.start_rates),
+        wide=reached(course.wide, start),
+        cuts=cuts,
+        tried=where(moving, course.tried + 1.0, course.tried),
+        reach=reached(course.reach, state),
+        moving=moving & not_(done | given_up),
+    )
+
+
 @jit
-def searched(m, pair, mode, step, trial, course, which, tolerance, ending):
-    """The ending, on the event that the step meets; or again, for it may hide a root of an event."""
-    fine, was_cut = course.moving & not_(ending.again), not_(course.cuts < 0.5)
-    met = fine & (which > -0.5)
+def one_step(m, pair, mode, unit, tolerance, course):
+    """The course after one more step."""
+    trial = pair.tried(m, course.state, mode, course.h * unit)
+    end, end_rates = events(m, trial.new, mode)
+    step = Step(course.state, trial.new, course.h * unit, course.start, course.start_rates, end, end_rates)
+    which = first_event(step, course.on, 0.0)
+    # By its error, and by what it may hide
+    error = trial.error / tolerance
+    fine = (error <= 1.0) & finite(trial.new)
+    box = passed_box(step, trial.stages[0], trial.last)
+    of_rates, of_events = m.hidden(step.state, box, mode)
+    seen = shows_all(step, of_rates, of_events, trial.stages[0], tolerance)
+    longer = where(seen | not_(fine), next_length(pair, course.h, error), COME_UP * course.h)
+    rough = course.moving & not_(fine & seen)
+    # By its events: proved to stay away, met, or to be cut, for it may hide a root
+    met = course.moving & not_(rough) & (which > -0.5)
     pressed = met & (of_event(course.on, which) > 0.5)
     away = leaves(step, which, course, tolerance)
-    doubt, near = doubted(m, step, trial.stages[0], trial.last, mode, course, tolerance)
-    doubt = doubt & fine & not_(pressed)
-    low = where(doubt & not_(met | was_cut), dip(step), 0.0)
+    doubt, near = doubted(step, m.bounds(step.state, box, mode), course, tolerance)
+    doubt = doubt & course.moving & not_(rough | pressed)
+    low = where(doubt & not_(met | not_(course.cuts < 0.5)), dip(step), 0.0)
     close = doubt & near & (course.cuts > NARROWED)
-    again = ending.again | (pressed & away) | (doubt & not_(close))
-    shorter = where(ending.again, ending.shorter, where(low > 0.0, low * course.h, 0.5 * course.h))
-    stuck, nothing = pressed & not_(away), ending.loose
-    ending = Ending(ending.new, ending.taken, again, shorter, nothing, stuck, close, nothing)
+    again = rough | (pressed & away) | (doubt & not_(close))
+    shorter = where(rough, longer, where(low > 0.0, low * course.h, 0.5 * course.h))
+    nothing = course.moving & not_(course.moving)
+    ending = Ending(trial.new, course.h, again, shorter, nothing, nothing)
     seeking = met & not_(pressed | again)
     if any_lane(seeking):
         ending = onto_event(m, pair, mode, step, trial, course, which, tolerance, seeking, ending)
-    return ending
-
-
-@jit
-def troubled(troubles, course, step, ending, cuts):
-    """The troubles with those of a step."""
-    moving = course.moving
-    return Troubles(
-        troubles.stuck | ending.stuck,
-        troubles.lost | (moving & (cuts > CUTS)),
-        troubles.blown | (moving & not_(finite(step.new))),
-        troubles.broken | (moving & not_(course.h > 1e-280)),
-        troubles.grazing | ending.grazing,
-        troubles.hangs | ending.hangs,
-    )
-
-
-@jit
-def moved_on(course, step, ending, which, longer, cuts, given_up):
-    """The course behind a step."""
-    moved = course.moving & not_(ending.again | given_up)
-    done, start = moved & (which > -0.5), choose(moved, step.end, course.start)
-    state = choose(moved, ending.new, course.state)
-    return Course(
-        state,
-        where(moved, course.t + ending.taken, course.t),
-        where(ending.again, ending.shorter, where(moved & not_(done), longer, course.h)),
-        choose(moved, marks(0.0 * course.h - 1.0, course.on), course.on),
-        choose(done, marks(which, course.on), course.fired),
-        start,
-        choose(moved, step.end_rates, course.start_rates),
-        reached(course.wide, start),
-        cuts,
-        where(course.moving, course.tried + 1.0, course.tried),
-        reached(course.reach, state),
-        course.moving & not_(done | given_up),
-    )
-
-
-@jit
-def one_step(m, pair, mode, unit, tolerance, course, troubles):
-    """The course and its troubles after one more step."""
-    length = course.h * unit
-    trial = pair.tried(m, course.state, mode, length)
-    end, end_rates = events(m, trial.new, mode)
-    step = Step(course.state, trial.new, length, course.start, course.start_rates, end, end_rates)
-    which = first_event(step, course.on, False)
-    longer, plain = allowed(m, pair, mode, step, trial, course, tolerance)
-    ending = searched(m, pair, mode, step, trial, course, which, tolerance, plain)
     once_more = where(ending.again, course.cuts, 0.0)
-    cuts = where(ending.again & not_(plain.again | ending.loose), course.cuts + 1.0, once_more)
-    troubles = troubled(troubles, course, step, ending, cuts)
-    given_up = troubles.stuck | troubles.grazing | troubles.broken | troubles.lost
-    return moved_on(course, step, ending, which, longer, cuts, given_up), troubles
+    cuts = where(ending.again & not_(rough | ending.loose), course.cuts + 1.0, once_more)
+    return moved_on(course, step, ending, which, longer, cuts, pressed & not_(away), close)
 
 
-@jit_call
+@jit
 def to_event(m, pair, state, mode, unit, h, on, tolerance, active):
-    """Follow the active lanes until an event falls through 0, and stop there; see `source_text.leg`."""
+    """Follow the active lanes until an event falls through 0, and stop there; see `taylor_leg`."""
+    h = pair.first(m, state, mode, unit, h)
     none, zero, unmarked = active & not_(active), 0.0 * h, times(0.0, on)
     start, start_rates = events(m, state, mode)
-    wide = reached(unmarked, start)
-    reach = reached(times(0.0, state), state)
-    course = Course(state, zero, h, on, unmarked, start, start_rates, wide, zero, zero, reach, active)
-    troubles = Troubles(none, none, none, none, none, none)
+    wide, reach = reached(unmarked, start), reached(times(0.0, state), state)
+    course = Course(
+        state, zero, h, on, unmarked, start, start_rates, wide, zero, zero, reach, active,
+        none, none, none, none, none, none,
+    )  # fmt: skip
     for _ in range(STEP_LIMIT):
-        course, troubles = one_step(m, pair, mode, unit, tolerance, course, troubles)
+        course = one_step(m, pair, mode, unit, tolerance, course)
         if not any_lane(course.moving):
             break
-    lost = troubles.lost | course.moving
-    return Leg(
-        course.state,
-        course.t,
-        course.h,
-        course.fired,
-        troubles.stuck,
-        lost & not_(troubles.blown),
-        troubles.broken | (lost & troubles.blown),
-        troubles.grazing,
-        troubles.hangs,
-        course.tried,
-        course.reach,
-    )
+    lost = course.lost | course.moving
+    broken = course.broken | (lost & course.blown)
+    leg = Leg(
+        course.state, course.t, course.h, course.fired, course.stuck, lost & not_(course.blown), broken,
+        course.grazing, course.hangs, course.tried, course.reach,
+    )  # fmt: skip
+    return leg, ()

@@ -1,7 +1,31 @@
-"""Arithmetic of an error that is carried along with a motion; generic in one cell or lanes."""
+"""The error of a motion by Taylor series, carried along beside it: what each state is off by.
 
-from kernels.lanes.jit import jit
-from kernels.lanes.vectors import where
+What a step leaves out is told by the defect of its polynomial U(t) of order p at the end, f(U(h)) - U'(h), which grows
+as t^p, so that it comes to h/(p + 1) times that; f(U(h)) is the first coefficient of the next step. A state that is the
+sum of another one, w, leaves out w_p h^(p+1)/(p + 1). As it grows, what is left out, l, changes the rates too, and with
+them the states by h/(p + 2) Df l more. What rounding takes is added so that errors grow. From step to step the error
+follows the tangent of the motion, of low order. At an event e the motion is late by
+    -(De off)/(De f),                                                                                     (1)
+and compared there, each at its own time, states are off by f times that more; behind it goes on what the jump leaves of
+it. That is to first order; `late` is infinite, and so is the error, where the event bends, or comes so soon after the
+one before, that it may not do.
+
+Errors of some steps may cancel but for what is not known of them, and where states feed back on one another the motion
+may make that large again. There what a step leaves out is taken to its next order: with l' = f(U) - U' + Df l and
+l'' = f'(U) - U'' at the end, l = h (2 l'/(p + 2) - h l''/((p + 1) (p + 2))). And the *spread* is carried along as the
+error is: VAGUE of what each step leaves out, added so that it grows. Where states do not, the spread is ().
+
+Generic in one cell or lanes; `m` is a `taylor_leg.Series`, and where its `error` is None none is carried: all is ().
+"""
+
+import math
+from typing import NamedTuple
+
+from kernels.integrate.events import of_event
+from kernels.integrate.taylor import curvature, last_term, natural_power, slope
+from kernels.lanes.symbols import fold, symbolic
+from kernels.lanes.vectors import choose, fma, magnitude, where
+from kernels.maths.intervals import most
 
 ULP = 2.0**-50
 """What rounding may take, four times over: as errors are carried, roundings of two states may cancel by chance."""
@@ -19,7 +43,272 @@ STRAIGHT = 20.0
 """Of the rate of an event, what it may change by within the time by which it is late: else it is no straight line."""
 
 
-@jit
+class Changes(NamedTuple):
+    """What is written of a scene for its error; functions of (state, mode, changes) unless said otherwise.
+
+    of_rates, of_events, behind : what they change of each rate, of each event's value, of the state behind a switch
+    rates_made, events_made : (state, mode) -> what rates, and events but for their offsets, are made of, in size
+    tangent, rough : (state, mode, unit, inner, changes, cores) -> what each change is evaluated from (`taylor.Way`)
+    """
+
+    of_rates: object
+    of_events: object
+    behind: object
+    rates_made: object
+    events_made: object
+    tangent: object
+    rough: object
+
+
+class Error(NamedTuple):
+    """What each state is off by, its spread; and of the last step: its polynomial's rates and their rates at its end,
+    its length over the order + 1 (0 where there was none), and what it has left out of sums."""
+
+    off: tuple
+    spread: tuple
+    due: tuple
+    bent: tuple
+    weight: float
+    left: tuple
+
+
+class Late(NamedTuple):
+    """The error at the event that ends a leg: of each state, of the leg's time; and the spread of both."""
+
+    off: tuple
+    late: float
+    spread: tuple
+    spread_late: float
+
+
+class Here(NamedTuple):
+    """Where a leg ends: in its last step, since its start; by which event, and whether others fire with it."""
+
+    end: float
+    t: float
+    which: float
+    others: bool
+
+
+@symbolic
 def further(x, by):
     """x, further from 0 by something that is not below 0."""
     return where(x < 0.0, x - by, x + by)
+
+
+@symbolic
+def begun(m, state, errors, h):
+    """The error at the start of a leg."""
+    if m.error is None:
+        return ()
+    nothing = tuple(0.0 * h for u in state)
+    return Error(errors.off, errors.spread, nothing, nothing, 0.0 * h, nothing)
+
+
+@symbolic
+def wider(m, margins, state, mode, errors):
+    """The events' margins, with their errors at the start of a leg."""
+    if m.error is None:
+        return margins
+    changes = m.error.of_events(state, mode, errors.off)
+    told = errors.told > 0.5
+    return tuple(
+        where(told, fma(DOUBT, magnitude(x), margin), margin) for x, margin in zip(changes, margins, strict=True)
+    )
+
+
+@symbolic
+def since(m, error, full, state, mode, unit, pieces):
+    """The error with what the step that has led to this state has left out; `full` are true rates beside powers."""
+    if m.error is None:
+        return ()
+    now = full or tuple(u[1] for u in pieces.states)
+    defects = tuple(rate - due for rate, due in zip(now, error.due, strict=True))
+    bends = tuple(2.0 * u[2] - bent for u, bent in zip(pieces.states, error.bent, strict=True))
+    return left_out(m, error, full, state, mode, unit, defects, bends)
+
+
+@symbolic
+def left_out(m, error, full, state, mode, unit, defects, bends):
+    """The error with what a step leaves out.
+
+    `defects` and `bends` are f - U' and f' - U''; for a power's core there is no f'.
+    """
+    weight, n = error.weight, m.order + 1
+    if not error.spread:
+        parts = zip(m.summed, error.off, defects, strict=True)
+        return error._replace(off=tuple(where(summed > 0.5, x, fma(weight, d, x)) for summed, x, d in parts))
+    parts = zip(m.summed, error.left, defects, strict=True)
+    left = tuple(where(summed > 0.5, x, weight * defect) for summed, x, defect in parts)
+    share, twice = weight * (n / (n + 1.0)), 2.0 * n / (n + 1.0)
+    more = m.error.of_rates(state, mode, left)
+    if full is None:
+        left = tuple(
+            where(summed > 0.5, x, fma(share, unit * by - weight * bend, twice * x))
+            for summed, x, by, bend in zip(m.summed, left, more, bends, strict=True)
+        )
+    off = tuple(fma(share, unit * by, x + y) for by, x, y in zip(more, error.off, left, strict=True))
+    spread = tuple(further(x, VAGUE * magnitude(y)) for x, y in zip(error.spread, left, strict=True))
+    return error._replace(off=off, spread=spread, left=left)
+
+
+@symbolic
+def changes(m, error, state, mode, unit, pieces, cores):
+    """What the error, and its spread, are evaluated from on a step."""
+    if m.error is None:
+        return ()
+    off = m.error.tangent(state, mode, unit, pieces.inner, error.off, cores)
+    return off, m.error.rough(state, mode, unit, pieces.rough, error.spread, cores) if error.spread else ()
+
+
+@symbolic
+def moved(m, error, changes, state, mode, unit, x, pieces, coarse):
+    """The error after a time x, with what rounding and cores of powers take; and what sums leave out."""
+    n = m.order + 1
+    power, share = natural_power(x, n), 1.0 / n
+    lasts = tuple(curve[-1][-1] for curve in pieces.of_states)
+    off = tuple(way.value(x, curve) for way, curve in zip(m.ways, changes[0], strict=True))
+    if not error.spread:
+        parts = zip(m.summed, lasts, off, strict=True)
+        off = tuple(where(summed > 0.5, fma(unit * last, power * share, y), y) for summed, last, y in parts)
+    parts = zip(off, m.error.rates_made(state, mode), state, strict=True)
+    off = tuple(further(y, ULP * fma(x * unit, noise, magnitude(u))) for y, noise, u in parts)
+    for left in coarse:
+        off = tuple(further(y, by) for y, by in zip(off, left, strict=True))
+    spread = tuple(way.value(x, curve) for way, curve in zip(m.ways, changes[1], strict=False))
+    left = tuple(
+        where(summed > 0.5, unit * power * share * last, 0.0) for summed, last in zip(m.summed, lasts, strict=True)
+    )
+    return error._replace(off=off, spread=spread, left=left)
+
+
+@symbolic
+def weighed(m, error, lanes, cores, x):
+    """The error with the weight of a step to x, in lanes that are in no core of a power."""
+    for core in cores:
+        lanes = lanes & (core < 0.0)
+    weight = where(lanes, x, 0.0) * (1.0 / (m.order + 1.0))
+    return error._replace(weight=weight, left=tuple(where(weight > 0.0, left, 0.0) for left in error.left))
+
+
+@symbolic
+def still(m, error, h):
+    """The error where no lane takes a step."""
+    if m.error is None:
+        return ()
+    return error._replace(weight=0.0 * h, left=tuple(0.0 * h for x in error.left))
+
+
+@symbolic
+def stepped(m, error, changes, state, mode, unit, trial, steps, pieces, cores, coarse):
+    """The error behind a step of the lanes that take one."""
+    if m.error is None:
+        return ()
+    new = weighed(m, moved(m, error, changes, state, mode, unit, trial, pieces, coarse), steps, cores, trial)
+    due = tuple(slope(trial, u) for u in pieces.states)
+    bent = tuple(curvature(trial, u) for u in pieces.states)
+    off, spread = choose(steps, new.off, error.off), choose(steps, new.spread, error.spread)
+    return new._replace(off=off, spread=spread, due=due, bent=bent)
+
+
+@symbolic
+def at_event(m, error, changes, full, state, mode, unit, ends, here, pieces, cores, coarse):
+    """The error at the event that ends a leg in the states `ends`, by (1)."""
+    if m.error is None:
+        return ()
+    end, which = here.end, here.which
+    rates = m.scene.rates(ends, mode)
+    error = moved(m, error, changes, state, mode, unit, end, pieces, coarse)
+    error = weighed(m, error, end <= math.inf, cores, end)
+    parts = zip(m.error.of_rates(ends, mode, rates), pieces.states, strict=True)
+    bends = tuple(unit * unit * x - curvature(end, u) for x, u in parts)
+    defects = tuple(unit * rate - slope(end, u) for rate, u in zip(rates, pieces.states, strict=True))
+    error = left_out(m, error, full, ends, mode, unit, defects, bends)
+    power = natural_power(end, m.order - 1)
+    of_each = tuple(
+        where(unseen > 0.5, further(change, magnitude(factor) * last_term(end, u) * power), change)
+        for unseen, change, (_, factor, u) in zip(
+            m.unseen, m.error.of_events(ends, mode, error.off), pieces.events, strict=True
+        )
+    )
+    parts = zip(m.error.events_made(ends, mode), pieces.events, strict=True)
+    noises = tuple(noise + magnitude(event[0]) for noise, event in parts)
+    parts = zip(pieces.events, m.watched, pieces.of_events, strict=True)
+    bends = tuple(event[1] * way.rates(end, curve)[2] for event, way, curve in parts)
+    change, noise, bend = (of_event(values, which) for values in (of_each, noises, bends))
+    per_time = unit * of_event(m.error.of_events(ends, mode, rates), which)
+    by = -further(change, ULP * noise) / per_time
+    doubtful = (magnitude(bend * by) * STRAIGHT > magnitude(per_time)) | (magnitude(by) * ORDERLY > here.t)
+    late, spread_late = where(doubtful | here.others, math.inf, by), 0.0 * end
+    if error.spread:
+        spread_late = -of_event(m.error.of_events(ends, mode, error.spread), which) / per_time
+    off = tuple(fma(unit * rate, late, x) for rate, x in zip(rates, error.off, strict=True))
+    spread = tuple(fma(unit * rate, spread_late, x) for rate, x in zip(rates, error.spread, strict=False))
+    return Late(off, late, spread, spread_late)
+
+
+@symbolic
+def started(errors, state, fresh):
+    """The errors of fresh lanes: a start is rounded."""
+    if not errors:
+        return ()
+    parts = zip(state, errors.off, strict=True)
+    return errors._replace(off=tuple(where(fresh, ULP * magnitude(u), x) for u, x in parts))
+
+
+@symbolic
+def later(errors, at_event, unit):
+    """The errors at the end of a leg."""
+    if not errors:
+        return ()
+    late, spread_late = at_event.late, at_event.spread_late
+    return errors._replace(
+        late=fma(late, unit, errors.late),
+        lag=fma(late, unit, errors.lag),
+        spread_late=fma(spread_late, unit, errors.spread_late),
+        spread_lag=fma(spread_late, unit, errors.spread_lag),
+        off=at_event.off,
+        spread=at_event.spread,
+    )
+
+
+@symbolic
+def faded(largest, new, spread, switches):
+    """The largest error so far at a switch, fading."""
+    new = magnitude(new) + magnitude(spread)
+    return where(switches, most(FADES * largest, new), largest)
+
+
+@symbolic
+def at_switch(errors, switches):
+    """The errors of the lanes that switch."""
+    if not errors:
+        return ()
+    spread = errors.spread or tuple(0.0 for x in errors.off)
+    return errors._replace(
+        latest=faded(errors.latest, errors.late, errors.spread_late, switches),
+        lagged=faded(errors.lagged, errors.lag, errors.spread_lag, switches),
+        once=tuple(faded(*parts, switches) for parts in zip(errors.once, errors.off, spread, strict=True)),
+    )
+
+
+@symbolic
+def stated(errors, watched, time, since, size):
+    """The errors with the largest one, relative, of the lanes at a switch that is watched."""
+    if not errors:
+        return ()
+    parts = tuple(x / where(largest > 0.0, largest, 1.0) for x, largest in zip(errors.once, size, strict=True))
+    error = fold(most, most(errors.latest / time, errors.lagged / since), (), parts)
+    return errors._replace(error=where(watched, error, errors.error))
+
+
+@symbolic
+def behind(m, errors, state, mode, switches):
+    """The errors behind a switch."""
+    if not errors:
+        return ()
+    lag, spread_lag = where(switches, 0.0, errors.lag), where(switches, 0.0, errors.spread_lag)
+    off, spread = choose(switches, m.behind(state, mode, errors.off), errors.off), ()
+    if errors.spread:
+        spread = choose(switches, m.behind(state, mode, errors.spread), errors.spread)
+    return errors._replace(off=off, lag=lag, spread=spread, spread_lag=spread_lag)

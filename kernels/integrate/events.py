@@ -8,10 +8,13 @@ extension. `henon` goes from behind the event back onto it in one step, with the
 Source: Henon, Physica D 5:412 (1982). `none` takes the event to fire at the end of the step: the fault to be shown.
 """
 
+from typing import NamedTuple
+
 from kernels.integrate.records import Mode
 from kernels.integrate.steps import dop853, dopri5, euler, events, moreau, rk4, semi_implicit, verlet
 from kernels.lanes.jit import jit, jit_call
-from kernels.lanes.tuples import but_last, with_last
+from kernels.lanes.symbols import over_tuples, symbolic
+from kernels.lanes.tuples import joined
 from kernels.lanes.vectors import any_lane, choose, fma, magnitude, not_, sqrt, where
 
 METHODS = ("euler", "semi_implicit", "verlet", "rk4", "dopri5", "dop853", "moreau")
@@ -51,7 +54,7 @@ def leap(m, scheme, state, mode, h):
     return state
 
 
-@jit
+@symbolic
 def cubic(s, e0, e1, m0, m1):
     """Value and slope at s in [0, 1] of the cubic with these values and slopes at the ends."""
     d = e1 - e0
@@ -77,7 +80,7 @@ def cubic_root(e0, e1, m0, m1, seeking):
     return s
 
 
-@jit
+@symbolic
 def lowest(e0, e1, m0, m1):
     """Where the cubic with m0 < 0 < m1 is lowest in (0, 1), and how low."""
     d = e1 - e0
@@ -87,7 +90,7 @@ def lowest(e0, e1, m0, m1):
     return s, cubic(s, e0, e1, m0, m1)[0]
 
 
-@jit
+@symbolic
 def of_event(values, which):
     """The entry of a tuple at the index `which` of each lane."""
     chosen = values[0]
@@ -125,18 +128,44 @@ def shortened(m, scheme, mode, step, which, first, seeking):
     return part, new, trials, seeking
 
 
+@jit
+@over_tuples
+def rates_per_value(wide, mode):
+    """Rates of the states and of time per unit of an event's value; (1)."""
+    m, which, parameters = mode.parameters
+    inside = Mode(mode.side, mode.signs, parameters, False)
+    slope = of_event(events(m, wide[:-1], inside)[1], which)
+    return joined(tuple(rate / slope for rate in m.rates(wide[:-1], inside)), (1.0 / slope,))
+
+
+@jit
+def held_signs(state, mode):
+    """The signs as they are."""
+    return mode.signs
+
+
+class Swap(NamedTuple):
+    """In the place of a scene, one whose variable is the event's value."""
+
+    rates: object
+    natural_signs: object
+
+
+SWAP = Swap(rates_per_value, held_signs)
+
+
 @jit_call
 def swapped(m, scheme, mode, step, which, value):
     """From behind the event, where it has that value, back onto it by (1): part of h, state, whether it is there."""
-    wide = with_last(with_last(step.new, step.h), which)
-    held = Mode(mode.side, mode.signs, mode.parameters, False)
+    wide = joined(step.new, (step.h,))
+    held = Mode(mode.side, mode.signs, (m, which, mode.parameters), False)
     if scheme.method in (DOP853, DOPRI5):
         for _ in range(scheme.substeps):
-            wide = dop853(m.swap, wide, held, -value / scheme.substeps)
+            wide = dop853(SWAP, wide, held, -value / scheme.substeps)
     else:
         for _ in range(scheme.substeps):
-            wide = rk4(m.swap, wide, held, -value / scheme.substeps)
-    time, found = but_last(wide)[-1], but_last(but_last(wide))
+            wide = rk4(SWAP, wide, held, -value / scheme.substeps)
+    time, found = wide[-1], wide[:-1]
     left = of_event(events(m, found, mode)[0], which)
     there = (magnitude(left) <= -CLOSE * value) & (time > -CLOSE * step.h) & (time <= step.h)
     return time / step.h, found, there

@@ -9,26 +9,16 @@ halved; what cannot leave it sticks.
 import math
 from typing import NamedTuple
 
-from kernels.integrate.events import (
-    CALLS,
-    HENON,
-    HERMITE,
-    MOREAU,
-    NONE,
-    ROOT,
-    cubic_root,
-    leap,
-    lowest,
-    of_event,
-    shortened,
-    swapped,
-)
-from kernels.integrate.records import Mode, Motion, Step, Tally
+from kernels.integrate import events as E
+from kernels.integrate.driver import begun, settled
+from kernels.integrate.events import cubic_root, leap, lowest, of_event, shortened, swapped
+from kernels.integrate.records import Mode, Step
 from kernels.integrate.steps import ONE, events, rate
 from kernels.lanes import codes
-from kernels.lanes.codes import GRAZING, INACCURATE, NOT_CONVERGED, OUT_OF_RANGE, REFUSED, STICKS
+from kernels.lanes.codes import BAD_INPUT, GRAZING, INACCURATE, NOT_CONVERGED, OUT_OF_RANGE, REFUSED, STICKS
 from kernels.lanes.jit import jit, jit_call
-from kernels.lanes.tuples import after, boxes, but_last, joined, marks, reached, times, turned, with_last
+from kernels.lanes.symbols import fold, symbolic
+from kernels.lanes.tuples import after, any_of, boxes, joined, marks, reached, read, times, write
 from kernels.lanes.vectors import any_lane, choose, magnitude, not_, where
 
 STEP_LIMIT = 20_000
@@ -41,64 +31,56 @@ HIDDEN = 1e-13
 """Of a state's size, what the rates may hide in a step (`source_text.hidden`) unremarked."""
 LOW = 0.25
 """Of the smaller end: an event that the cubic takes below this share of it is looked at where it is lowest."""
+BLUR = 1e-14
+"""Of the surface's value at the start, what rounding may take from it unremarked."""
 
 
-@jit
-def first_event(step, on, natural):
-    """The event passed first in a step, by the line between the ends; -1 where none is.
+class Scheme(NamedTuple):
+    """A method at a fixed step, how it locates events (both numbers of `events`), and the substeps of a step."""
 
-    Without location only the switch counts, and not while it still rises from below.
+    method: int
+    location: int
+    substeps: int
+
+
+class Cell(NamedTuple):
+    """All that a lane knows of its cell; the first entry is the lane's stage, inputs and results follow.
+
+    flips, step, graze : switches to follow; the step; margin of grazing over an event's value at the start of a step
+    time, interval, at, reach_at : of the last switch; states there, and their reach before it
+    slim : least margin behind a switch
+    on : 1 for the event that the motion starts on
+    cut, cuts : length of the step that is tried next (0: a whole one), and how often that has been cut
+    since, trials, reach, wide : since the last switch: time, trials, largest of each state, of the surface's value
     """
-    start, end = step.start, step.end
-    which, earliest = 0.0 * start[0] - 1.0, 0.0 * start[0] + math.inf
-    for j in range(1 if natural else len(start)):
-        part = where(start[j] > 0.0, start[j] / (start[j] - end[j]), 0.0)
-        passed = (end[j] <= 0.0) & (part < earliest)
-        if natural:
-            passed = passed & not_((on[j] > 0.5) & (step.end_rates[j] > 0.0))
-        which, earliest = where(passed, float(j), which), where(passed, part, earliest)
-    return which
 
-
-@jit
-def dip(step):
-    """Where in the step an event that ends above 0 may have been below it; 0 where none was."""
-    start, end, h, at = step.start, step.end, step.h, 0.0 * step.h
-    for j in range(len(start)):
-        turns = (start[j] > 0.0) & (end[j] > 0.0) & (step.start_rates[j] < 0.0) & (step.end_rates[j] > 0.0)
-        s, low = lowest(start[j], end[j], h * step.start_rates[j], h * step.end_rates[j])
-        smaller = where(start[j] < end[j], start[j], end[j])
-        deep = turns & (low < LOW * smaller) & (s > 1e-3) & (s < 0.999)
-        at = where(deep & not_((at > 0.0) & (at < s)), s, at)
-    return at
-
-
-@jit
-def near_an_event(values, on, margins):
-    """Whether an event that the motion did not start on is within its margin of 0."""
-    close = values[0] < -math.inf
-    for j in range(len(values)):
-        close = close | ((magnitude(values[j]) < margins[j]) & (on[j] < 0.5))
-    return close
-
-
-@jit
-def passed_another(values, which, on):
-    """Whether another event than this one is behind."""
-    other = values[0] < -math.inf
-    for j in range(len(values)):
-        own = (which > j - 0.5) & (which < j + 0.5)
-        other = other | ((values[j] < 0.0) & not_(own | (on[j] > 0.5)))
-    return other
-
-
-@jit
-def finite(state):
-    """Whether every entry is a number."""
-    total = magnitude(state[0])
-    for j in range(1, len(state)):
-        total = total + magnitude(state[j])
-    return total < math.inf
+    stage: float
+    parameters: tuple
+    flips: float
+    step: float
+    graze: float
+    method: float
+    location: float
+    substeps: float
+    time: float
+    interval: float
+    at: tuple
+    reach_at: tuple
+    slim: float
+    steps: float
+    calls: float
+    verdict: float
+    state: tuple
+    side: float
+    signs: tuple
+    on: tuple
+    cut: float
+    cuts: float
+    since: float
+    count: float
+    trials: float
+    wide: float
+    reach: tuple
 
 
 class Trial(NamedTuple):
@@ -117,20 +99,61 @@ class Trial(NamedTuple):
     shorter: float
 
 
-class Moved(NamedTuple):
-    """What a step has come to.
+def cell_of(cell):
+    """A cell of zeros, as large as one of `records.Cell`."""
+    u = cell.state
+    motion = u, 0.0, cell.signs, cell.on
+    return Cell(0.0, cell.parameters, *[0.0] * 8, u, u, *[0.0] * 4, *motion, *[0.0] * 6, u)
 
-    which : the event that it ends on, -1 for none, -2 where it must be tried again
-    taken, calls, verdict : as of `Trial`
-    wide, behind : the surface's largest value, with this step's start; see `margin_behind`
+
+@symbolic
+def first_event(step, on, natural):
+    """The event passed first in a step, by the line between the ends; -1 where none is.
+
+    With `natural`, 1, only the switch counts, and not while it still rises from below.
     """
+    which, earliest = 0.0 * step.start[0] - 1.0, 0.0 * step.start[0] + math.inf
+    for j, (start, end) in enumerate(zip(step.start, step.end, strict=True)):
+        part = where(start > 0.0, start / (start - end), 0.0)
+        passed = (end <= 0.0) & (part < earliest)
+        rising = (on[j] > 0.5) & (step.end_rates[j] > 0.0)
+        passed = passed & ((natural < 0.5) | (not_(rising) if j == 0 else natural < 0.5))
+        which, earliest = where(passed, float(j), which), where(passed, part, earliest)
+    return which
 
-    which: float
-    taken: float
-    calls: float
-    verdict: float
-    wide: float
-    behind: float
+
+@symbolic
+def dip(step):
+    """Where in the step an event that ends above 0 may have been below it; 0 where none was."""
+    at = 0.0 * step.h
+    for start, end, first, last in zip(step.start, step.end, step.start_rates, step.end_rates, strict=True):
+        turns = (start > 0.0) & (end > 0.0) & (first < 0.0) & (last > 0.0)
+        s, low = lowest(start, end, step.h * first, step.h * last)
+        deep = turns & (low < LOW * where(start < end, start, end)) & (s > 1e-3) & (s < 0.999)
+        at = where(deep & not_((at > 0.0) & (at < s)), s, at)
+    return at
+
+
+@symbolic
+def passed_another(values, which, on):
+    """Whether another event than this one is behind."""
+    other = which < -math.inf
+    for j, value in enumerate(values):
+        own = (which > j - 0.5) & (which < j + 0.5)
+        other = other | ((value < 0.0) & not_(own | (on[j] > 0.5)))
+    return other
+
+
+@symbolic
+def plus_size(total, x):
+    """The sum of magnitudes."""
+    return total + magnitude(x)
+
+
+@symbolic
+def finite(state):
+    """Whether every entry is a number."""
+    return fold(plus_size, magnitude(state[0]), (), state[1:]) < math.inf
 
 
 @jit_call
@@ -140,25 +163,25 @@ def located(m, scheme, mode, step, which, seeking):
     part = where(e0 > 0.0, e0 / (e0 - e1), 0.0)
     new, calls, lost = step.new, 0.0 * h, seeking & not_(seeking)
     curved = seeking & (e0 > 0.0)
-    if scheme.location in (HERMITE, ROOT):
+    if scheme.location in (E.HERMITE, E.ROOT):
         d0, d1 = of_event(step.start_rates, which), of_event(step.end_rates, which)
         part = where(curved, cubic_root(e0, e1, h * d0, h * d1, curved), part)
-    if scheme.location == HENON:
+    if scheme.location == E.HENON:
         part, new, there = swapped(m, scheme, mode, step, which, e1)
         lost = curved & not_(there)
         calls = calls + where(scheme.method > 3.5, 12.0, 4.0) * scheme.substeps
         part, new = where(curved, part, 0.0), choose(curved, new, step.state)
-    elif scheme.location == ROOT:
+    elif scheme.location == E.ROOT:
         part, new, trials, lost = shortened(m, scheme, mode, step, which, part, curved)
         part, new = where(curved, part, 0.0), choose(curved, new, step.state)
-        calls = trials * (CALLS[scheme.method] * scheme.substeps)
+        calls = trials * (E.CALLS[scheme.method] * scheme.substeps)
     else:
         new = choose(curved, leap(m, scheme, step.state, mode, part * h), step.state)
-        calls = calls + CALLS[scheme.method] * scheme.substeps
+        calls = calls + E.CALLS[scheme.method] * scheme.substeps
     return part, new, where(curved, calls, 0.0), lost
 
 
-@jit
+@symbolic
 def margin_behind(which, step, wide):
     """How far behind the switch the motion would turn round, over the surface's largest value so far; infinite if not.
 
@@ -166,203 +189,230 @@ def margin_behind(which, step, wide):
     """
     start, end, first, last = step.start[0], step.end[0], step.start_rates[0], step.end_rates[0]
     part = where(start > end, start / (start - end), 0.0)
-    rate = (last - first) * part + first
+    at_switch = (last - first) * part + first
     back = (which > -0.5) & (which < 0.5) & (last > first) & (start > 0.0)
     bend = where(back, (last - first) / step.h, 1.0)
-    return where(back, rate * rate / (2.0 * bend * where(wide > 0.0, wide, 1.0)), math.inf)
+    return where(back, at_switch * at_switch / (2.0 * bend * where(wide > 0.0, wide, 1.0)), math.inf)
 
 
 @jit_call
-def hides_something(m, state, new, mode, h):
-    """Whether a step may hide more of a state than its stages tell; NaN does."""
+def shows_all(m, state, new, mode, h):
+    """Whether a step hides no more of a state than its stages tell; NaN does."""
     change = times(h, after(rate(m, new, mode), -1.0, ONE, (rate(m, state, mode),)))
-    of_rates, _ = m.hidden(state, boxes(state, new, change), mode.side, mode.signs, mode.parameters)
+    of_rates, _ = m.hidden(state, boxes(state, new, change), mode)
+    return all_seen(of_rates, state, new, h)
+
+
+@symbolic
+def all_seen(of_rates, state, new, h):
+    """Whether what rates hide on a step is below the states' sizes."""
     seen = h <= math.inf
-    for i in range(len(state)):
-        seen = seen & (h * of_rates[i] <= HIDDEN * (magnitude(state[i]) + magnitude(new[i])))
-    return not_(seen)
+    for hidden, u, w in zip(of_rates, state, new, strict=True):
+        seen = seen & (h * hidden <= HIDDEN * (magnitude(u) + magnitude(w)))
+    return seen
+
+
+@symbolic
+def uncertain(step, motion, missed):
+    """Of a step that is not ended by an event: whether it turns close to one; where it may have been below one."""
+    was_cut, margins = motion.cuts > 0.5, times(motion.graze, reached(times(0.0, motion.on), step.start))
+    parts = zip(step.end, margins, motion.on, strict=True)
+    close = any_of(tuple((magnitude(value) < margin) & (on < 0.5) for value, margin, on in parts))
+    return missed & was_cut & close, where(missed & not_(was_cut), dip(step), 0.0)
 
 
 @jit
-def uncut(m, scheme, mode, motion, h):
-    """The step as it is first tried."""
-    start, start_rates = events(m, motion.state, mode)
-    new = leap(m, scheme, motion.state, mode, h)
-    end, end_rates = events(m, new, mode)
-    return Step(motion.state, new, h, start, start_rates, end, end_rates)
-
-
-@jit
-def onto_event(m, scheme, mode, step, which, on, seeking, trial):
-    """The trial, ended on its event; to be tried again with that length where another event is behind by then."""
-    part, found, calls, lost = located(m, scheme, mode, step, which, seeking)
-    other = seeking & (part < 0.999999) & (part > 0.0) & not_(lost)
-    other = other & passed_another(events(m, found, mode)[0], which, on)
-    return Trial(
-        choose(seeking, found, trial.new),
-        where(seeking, part * step.h, trial.taken),
-        where(seeking, trial.calls + calls, trial.calls),
-        where(seeking & lost, NOT_CONVERGED, trial.verdict),
-        trial.again | other,
-        where(other, part * step.h, trial.shorter),
-    )
-
-
-@jit
-def searched(m, scheme, mode, step, which, motion, graze, met, missed, trial):
-    """The trial, ended on the event that it met; or what it must be cut to, for it may hide a root of an event."""
-    on, was_cut = motion.on, motion.cuts > 0.5
-    pressed = met & (of_event(on, which) > 0.5)
-    away = of_event(step.start_rates, which) > 0.0
-    verdict = where(pressed & not_(away), STICKS, trial.verdict)
-    low = where(missed & not_(was_cut), dip(step), 0.0)
-    again = (pressed & away) | (low > 0.0)
-    shorter = where(low > 0.0, low * step.h, 0.5 * step.h)
-    turning = missed & was_cut & near_an_event(step.end, on, times(graze, reached(times(0.0, on), step.start)))
-    verdict = where(turning & (verdict < GRAZING), GRAZING, verdict)
-    trial = Trial(trial.new, trial.taken, trial.calls, verdict, again, shorter)
-    seeking = met & not_(pressed)
-    if any_lane(seeking):
-        trial = onto_event(m, scheme, mode, step, which, on, seeking, trial)
-    return trial
-
-
-@jit
-def tried(m, scheme, mode, step, which, motion, graze, active):
-    """The step, judged."""
+def tried(m, scheme, mode, step, which, motion, active):
+    """The step, judged: ended on the event that it met, or to be cut, for it may hide a root of an event."""
+    h, on = step.h, motion.on
     broken = active & not_(finite(step.new) & finite(step.end))
     met = active & (which > -0.5) & not_(broken)
-    verdict = where(broken, OUT_OF_RANGE, 0.0)
-    if scheme.method == MOREAU:
-        rests = (magnitude(step.state[-1]) <= 0.0) & (magnitude(step.new[-1]) <= 0.0) & not_(met)
+    new, taken, verdict = step.new, h, where(broken, OUT_OF_RANGE, 0.0)
+    calls = 0.0 * h + E.CALLS[scheme.method] * scheme.substeps
+    again, shorter = active & not_(active), h
+    if scheme.method == E.MOREAU:
+        rests = (magnitude(step.state[-1]) <= 0.0) & (magnitude(new[-1]) <= 0.0) & not_(met)
         verdict = where(active & rests, STICKS, verdict)
-    calls = 0.0 * step.h + CALLS[scheme.method] * scheme.substeps
-    trial = Trial(step.new, step.h, calls, verdict, active & not_(active), step.h)
     if not mode.natural:
-        missed = active & not_(met | broken)
-        trial = searched(m, scheme, mode, step, which, motion, graze, met, missed, trial)
-    return trial
+        pressed = met & (of_event(on, which) > 0.5)
+        away = of_event(step.start_rates, which) > 0.0
+        verdict = where(pressed & not_(away), STICKS, verdict)
+        turning, low = uncertain(step, motion, active & not_(met | broken))
+        again = (pressed & away) | (low > 0.0)
+        shorter = where(low > 0.0, low * h, 0.5 * h)
+        verdict = where(turning & (verdict < GRAZING), GRAZING, verdict)
+        seeking = met & not_(pressed)
+        if any_lane(seeking):
+            part, found, more, lost = located(m, scheme, mode, step, which, seeking)
+            other = seeking & (part < 0.999999) & (part > 0.0) & not_(lost)
+            other = other & passed_another(events(m, found, mode)[0], which, on)
+            new, taken = choose(seeking, found, new), where(seeking, part * h, taken)
+            calls = where(seeking, calls + more, calls)
+            verdict = where(seeking & lost, NOT_CONVERGED, verdict)
+            again, shorter = again | other, where(other, part * h, shorter)
+    return Trial(new, taken, calls, verdict, again, shorter)
 
 
-@jit
+@symbolic
 def arrived(motion, trial, which, moved, on):
     """The motion behind the step, of the lanes that have moved; the others' next trial is shorter."""
-    signs = with_last(turned(but_last(motion.signs), on), where(on[0] > 0.5, 1.0, motion.signs[-1]))
-    return Motion(
-        choose(moved, trial.new, motion.state),
-        motion.side,
-        choose(moved, signs, motion.signs),
-        on,
-        where(trial.again, trial.shorter, 0.0),
-        where(trial.again, motion.cuts + 1.0, 0.0),
+    parts = zip(motion.signs[:-1], on[1:], strict=True)
+    signs = tuple(where(o > 0.5, -sign, sign) for sign, o in parts)
+    signs = (*signs, where(on[0] > 0.5, 1.0, motion.signs[-1]))
+    return motion._replace(
+        state=choose(moved, trial.new, motion.state),
+        signs=choose(moved, signs, motion.signs),
+        on=on,
+        cut=where(trial.again, trial.shorter, 0.0),
+        cuts=where(trial.again, motion.cuts + 1.0, 0.0),
     )
 
 
-@jit_call
-def attempt(m, scheme, parameters, limits, wide, motion, active):
-    """Try one step.
+@symbolic
+def counted(motion, taken, calls, verdict, which, active):
+    """The motion with one more step of the active lanes counted."""
+    return motion._replace(
+        time=where(active, motion.time + taken, motion.time),
+        since=where(active, motion.since + taken, motion.since),
+        steps=where(active & (which > -1.5), motion.steps + 1.0, motion.steps),
+        calls=where(active, motion.calls + calls, motion.calls),
+        trials=where(active, motion.trials + 1.0, motion.trials),
+        reach=choose(active, reached(motion.reach, motion.state), motion.reach),
+        verdict=where(active & (verdict > motion.verdict), verdict, motion.verdict),
+    )
 
-    Parameters
-    ----------
-    wide : largest value of the surface since the last switch
-    active : lanes that move
+
+@symbolic
+def widened(motion, step, active):
+    """The motion with the surface's largest value so far."""
+    return motion._replace(wide=where(active & (step.start[0] > motion.wide), step.start[0], motion.wide))
+
+
+@jit_call
+def attempt(m, scheme, motion, active):
+    """One step of the active lanes.
 
     Returns
     -------
-    motion : Motion
+    motion : Cell
         After the step.
-    moved : Moved
+    which : the event that it ends on, -1 for none, -2 where it must be tried again
+    behind : `margin_behind`
     """
-    mode = Mode(motion.side, motion.signs, parameters, scheme.location == NONE)
-    step = uncut(m, scheme, mode, motion, where(motion.cut > 0.0, motion.cut, limits.step))
-    which = first_event(step, motion.on, mode.natural)
-    wide = where(active & (step.start[0] > wide), step.start[0], wide)
-    behind = margin_behind(which, step, wide)
-    trial = tried(m, scheme, mode, step, which, motion, limits.graze, active)
+    mode = Mode(motion.side, motion.signs, motion.parameters, scheme.location == E.NONE)
+    h = where(motion.cut > 0.0, motion.cut, motion.step)
+    start, start_rates = events(m, motion.state, mode)
+    new = leap(m, scheme, motion.state, mode, h)
+    end, end_rates = events(m, new, mode)
+    step = Step(motion.state, new, h, start, start_rates, end, end_rates)
+    which = first_event(step, motion.on, 1.0 if mode.natural else 0.0)
+    motion = widened(motion, step, active)
+    behind = margin_behind(which, step, motion.wide)
+    trial = tried(m, scheme, mode, step, which, motion, active)
     verdict = where(trial.again & (motion.cuts > CUTS), codes.STEP_LIMIT, trial.verdict)
     which = where(trial.again, -2.0, which)
     moved = active & not_(trial.again) & (verdict < REFUSED)
-    if m.hides:
-        hidden = moved & hides_something(m, motion.state, trial.new, mode, trial.taken)
-        verdict = where(hidden & (verdict < INACCURATE), INACCURATE, verdict)
-    below = moved & mode.natural & (which < -0.5) & (step.end[0] <= 0.0)  # not yet above where it began
+    if any_of(m_hides(m)):
+        seen = shows_all(m, motion.state, trial.new, mode, trial.taken)
+        verdict = where(moved & not_(seen) & (verdict < INACCURATE), INACCURATE, verdict)
+    below = moved & mode.natural & (which < -0.5) & (end[0] <= 0.0)  # not yet above where it began
     on = choose(moved & not_(below), marks(which, motion.on), motion.on)
     motion = arrived(motion, trial, which, moved, on)
-    return motion, Moved(which, where(moved, trial.taken, 0.0), trial.calls, verdict, wide, behind)
+    return counted(motion, where(moved, trial.taken, 0.0), trial.calls, verdict, which, active), which, behind
+
+
+@symbolic
+def m_hides(m):
+    """Which rates of the scene can hide something."""
+    return tuple(hides > 0.5 for hides in m.hiding[0])
+
+
+@symbolic
+def jumped(motion, state, side, signs, on, behind, switches):
+    """The motion of the lanes that have passed a switch, in the state behind it."""
+    new = motion._replace(
+        state=state, side=side, signs=signs, on=on, since=0.0, interval=motion.since, count=motion.count + 1.0,
+        trials=0.0, reach=reached(times(0.0, motion.reach), state), at=motion.state, reach_at=motion.reach, wide=0.0,
+        slim=where(behind < motion.slim, behind, motion.slim),
+    )  # fmt: skip
+    return type(motion)(*(_chosen(switches, x, y) for x, y in zip(new, motion, strict=True)))
+
+
+@symbolic
+def _chosen(switches, x, y):
+    """x of the lanes that switch, else y; of tuples each entry."""
+    return choose(switches, x, y) if isinstance(x, tuple) else where(switches, x, y)
 
 
 @jit_call
-def switch(m, parameters, motion, left, switches):
-    """The motion behind the switch, of the lanes that are on it; `left` is the surface's value there."""
-    jumped = m.switched(motion.state, motion.side, motion.signs, parameters)
-    state, side = choose(switches, jumped, motion.state), where(switches, -motion.side, motion.side)
-    signs, kinks_on = m.settled(state, side, parameters, 0.0 * side + 1.0, times(0.0, motion.signs))
-    behind = m.events(state, side, signs, parameters)[0][0]
-    still = magnitude(behind) <= 2.0 * magnitude(left)
-    signs = with_last(but_last(signs), where((behind < 0.0) & not_(still), -1.0, signs[-1]))
-    signs = choose(switches, signs, motion.signs)
-    on = choose(switches, joined(where(still, 1.0, 0.0), kinks_on), motion.on)
-    return Motion(state, side, signs, on, motion.cut, motion.cuts)
+def switched(m, motion, behind, switches):
+    """The motion behind the switch, of the lanes that are on it."""
+    mode = Mode(motion.side, motion.signs, motion.parameters, False)
+    left = events(m, motion.state, mode)[0][0]
+    faint = m.underflows(motion.state, mode, motion.step)
+    side = where(switches, -motion.side, motion.side)
+    state = choose(switches, m.switched(motion.state, mode), motion.state)
+    signs, kinks_on = settled(m, state, side, motion.parameters, 0.0 * side + 1.0, times(0.0, motion.signs[:-1]))
+    after_it = events(m, state, Mode(side, signs, motion.parameters, False))[0][0]
+    still = magnitude(after_it) <= 2.0 * magnitude(left)
+    signs = joined(signs[:-1], (where((after_it < 0.0) & not_(still), -1.0, signs[-1]),))
+    on = joined((where(still, 1.0, 0.0),), kinks_on)
+    return refused(jumped(motion, state, side, signs, on, behind, switches), switches & faint, OUT_OF_RANGE)
 
 
-@jit
-def counted(tally, state, moved, active):
-    """The tally with one more step of the active lanes."""
-    return Tally(
-        where(active, tally.time + moved.taken, tally.time),
-        where(active, tally.since + moved.taken, tally.since),
-        tally.interval,
-        tally.count,
-        where(active & (moved.which > -1.5), tally.steps + 1.0, tally.steps),
-        where(active, tally.calls + moved.calls, tally.calls),
-        where(active, tally.trials + 1.0, tally.trials),
-        choose(active, reached(tally.reach, state), tally.reach),
-        tally.at,
-        tally.reach_at,
-        moved.wide,
-        tally.slim,
+@symbolic
+def refused(motion, lanes, verdict):
+    """The motion with that verdict in the lanes."""
+    return motion._replace(verdict=where(lanes, verdict, motion.verdict))
+
+
+@symbolic
+def started(motion, start, fresh):
+    """The motion of the fresh lanes at its start."""
+    endless = not_((motion.flips >= 1.0) & (motion.flips < math.inf))
+    unsure = where(start.blur <= BLUR, 0.0, INACCURATE)
+    state = choose(fresh, start.state, motion.state)
+    return motion._replace(
+        state=state,
+        side=where(fresh, start.side, motion.side),
+        signs=choose(fresh, start.signs, motion.signs),
+        on=choose(fresh, start.on, motion.on),
+        slim=where(fresh, math.inf, motion.slim),
+        reach=choose(fresh, tuple(magnitude(u) for u in state), motion.reach),
+        verdict=where(fresh, where(start.beyond | endless, BAD_INPUT, unsure), motion.verdict),
     )
 
 
+@symbolic
+def put_down(motion, stage):
+    """The motion with the lanes' stages."""
+    return motion._replace(stage=stage)
+
+
 @jit
-def behind_switch(tally, at, state, behind, switches):
-    """The tally of the lanes that have passed a switch: before it in the state `at`, behind it in `state`."""
-    return Tally(
-        tally.time,
-        where(switches, 0.0, tally.since),
-        where(switches, tally.since, tally.interval),
-        where(switches, tally.count + 1.0, tally.count),
-        tally.steps,
-        tally.calls,
-        where(switches, 0.0, tally.trials),
-        choose(switches, reached(times(0.0, tally.reach), state), tally.reach),
-        choose(switches, at, tally.at),
-        choose(switches, tally.reach, tally.reach_at),
-        where(switches, 0.0, tally.wide),
-        where(switches & (behind < tally.slim), behind, tally.slim),
-    )
-
-
-@jit_call
-def follow(m, scheme, parameters, limits, motion, tally, verdict, active):
-    """A few steps of the active lanes: the records `motion` and `tally`, the verdict, and which are done."""
-    done = active & not_(active)
+def advance(m, memory, i):
+    """Every lane on by some steps; whether one has finished."""
+    motion = read(memory, i, m.cell)
+    stage = motion.stage
+    fresh = (stage > 0.5) & (stage < 1.5)
+    active = fresh | ((stage > 1.5) & (stage < 2.5))
+    if any_lane(fresh):
+        motion = started(motion, begun(m, motion.flips, motion.parameters), fresh)
+    row = 4 + len(motion.parameters)  # behind the stage and three limits
+    scheme = Scheme(int(memory[row][0]), int(memory[row + 1][0]), int(memory[row + 2][0]))
+    moving = active & (motion.verdict < REFUSED)
+    done = active & (motion.verdict >= REFUSED)
     for _ in range(TOGETHER):
         rises = motion.signs[-1] < 0.0
-        motion, moved = attempt(m, scheme, parameters, limits, tally.wide, motion, active)
-        verdict = where(active & (moved.verdict > verdict), moved.verdict, verdict)
-        tally = counted(tally, motion.state, moved, active)
-        switches = active & (moved.which > -0.5) & (moved.which < 0.5) & not_(rises) & (verdict < REFUSED)
+        motion, which, behind = attempt(m, scheme, motion, moving)
+        switches = moving & (which > -0.5) & (which < 0.5) & not_(rises) & (motion.verdict < REFUSED)
         if any_lane(switches):
-            at = motion.state
-            left = m.events(at, motion.side, motion.signs, parameters)[0][0]
-            faint = m.underflows(at, motion.side, motion.signs, parameters, limits.step)
-            verdict = where(switches & faint, OUT_OF_RANGE, verdict)
-            motion = switch(m, parameters, motion, left, switches)
-            tally = behind_switch(tally, at, motion.state, moved.behind, switches)
-        verdict = where(active & (tally.trials > STEP_LIMIT) & (verdict < REFUSED), codes.STEP_LIMIT, verdict)
-        ended = active & ((verdict >= REFUSED) | (tally.count >= limits.flips))
-        done, active = done | ended, active & not_(ended)
-        if any_lane(done):
+            motion = switched(m, motion, behind, switches)
+        late = moving & (motion.trials > STEP_LIMIT) & (motion.verdict < REFUSED)
+        motion = refused(motion, late, codes.STEP_LIMIT)
+        ended = moving & ((motion.verdict >= REFUSED) | (motion.count >= motion.flips))
+        done, moving = done | ended, moving & not_(ended)
+        if any_lane(ended):
             break
-    return motion, tally, verdict, done
+    write(memory, i, put_down(motion, where(done, 3.0, where(active, 2.0, stage))))
+    return any_lane(done)

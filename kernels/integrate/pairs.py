@@ -15,6 +15,7 @@ from kernels.integrate.tableaux import (
     DOPRI5_ERROR,
 )
 from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.symbols import symbolic
 from kernels.lanes.tuples import after, times
 from kernels.lanes.vectors import fma, magnitude, sqrt, where
 
@@ -37,7 +38,7 @@ class Trial(NamedTuple):
     error: float
 
 
-@jit
+@symbolic
 def of_size(state, new, first, h, error):
     """The largest error of a state over its own size on the step."""
     worst = 0.0 * h
@@ -49,7 +50,7 @@ def of_size(state, new, first, h, error):
     return worst
 
 
-@jit
+@symbolic
 def at_least(error, least):
     """The larger one; NaN stays."""
     return where(error < least, least, error)
@@ -149,21 +150,47 @@ def dopri5_dense(m, state, terms, mode, h, part):
     return after(state, h, weights, (k0, k2, k3, k4, k5, k6))
 
 
-@jit
+@symbolic
 def _weight(part, powers):
     a, b, c, d = powers
     return part * fma(part, fma(part, fma(part, d, c), b), a)
 
 
 class Pair(NamedTuple):
-    """An embedded pair of methods, as functions: a step with its error, its dense output, how far that may be off."""
+    """An embedded pair of methods, as functions: a step with its error, its dense output, how far that may be off.
+
+    `first` is the first step of a leg, in units.
+    """
 
     tried: object
     series: object
     dense: object
     vague: object
+    first: object
     order: float
 
 
-DOPRI5 = Pair(dopri5_tried, dopri5_series, dopri5_dense, dopri5_vague, 5.0)
-DOP853 = Pair(dop853_tried, dop853_series, dop853_dense, dop853_vague, 8.0)
+@jit
+def as_it_is(m, state, mode, unit, h):
+    """The first step as it was guessed."""
+    return h
+
+
+DOPRI5 = Pair(dopri5_tried, dopri5_series, dopri5_dense, dopri5_vague, as_it_is, 5.0)
+DOP853 = Pair(dop853_tried, dop853_series, dop853_dense, dop853_vague, as_it_is, 8.0)
+
+
+def kept_on_kink(pair):
+    """The pair whose steps and dense output are put back onto the kink that the motion slides along."""
+    free_tried, free_dense = pair.tried, pair.dense
+
+    @jit_call
+    def tried(m, state, mode, h):
+        trial = free_tried(m, state, mode, h)
+        return Trial(m.slides.onto(trial.new, mode), trial.stages, trial.last, trial.error)
+
+    @jit_call
+    def dense(m, state, terms, mode, h, part):
+        return m.slides.onto(free_dense(m, state, terms, mode, h, part), mode)
+
+    return pair._replace(tried=tried, dense=dense)

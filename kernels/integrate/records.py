@@ -19,16 +19,122 @@ class Mode(NamedTuple):
     natural: bool
 
 
-class Start(NamedTuple):
-    """Of a motion: `beyond` the surface or not, and what rounding may take (`blur`) from its value, relative to it."""
+class Written(NamedTuple):
+    """What is written of a scene: functions of (state, mode) unless said otherwise, and its numbers.
 
+    rates, surface, kinks, switched : rates; the surface's value; what is 0 at each kink; the state behind a switch
+    started : (parameters, side) -> the state
+    natural_signs : 1 or -1 for each kink, the side on which the state is, and the way over the surface, 1
+    underflows : (state, mode, unit) -> whether a product loses its digits
+    jet : (state, mode, unit, ()) -> `Pieces` of order 2
+    lost : what rounding takes from the surface's value at the start
+    hidden, bounds : (state, boxes, mode) -> what a box hides of rates and events; the events' values and rates in it
+    made : what each event's value is made of, in size, and its rate
+    offset : of the surface, 0 where that would be long
+    numbers : 0.0, 1.0 ... for each event
+    alternating : 1.0, -1.0 ... for each state
+    most_kinks : between two switches, after which a cell is given up
+    cell : a `Cell` of zeros
+    slides : None, or the functions of a scene that slides (`driver.Slides`)
+    hiding : 1 for each rate, and for each event, that can hide something
+    factored, solved : None, or of a scene that may be stiff (`source_text.stiff`)
+    """
+
+    rates: object
+    surface: object
+    kinks: object
+    switched: object
+    started: object
+    natural_signs: object
+    underflows: object
+    jet: object
+    lost: object
+    hidden: object
+    bounds: object
+    made: object
+    offset: object
+    numbers: tuple
+    alternating: tuple
+    most_kinks: float
+    cell: object
+    slides: object
+    hiding: tuple
+    factored: object
+    solved: object
+
+
+class Pieces(NamedTuple):
+    """Taylor series at a state, each a tuple of coefficients; time in units.
+
+    states, events : of each state; (offset, factor, series) of each event
+    controlled : the series that a step's length hangs on
+    of_states, of_events : what each state, and what each event watches, is evaluated from (`taylor.Way`)
+    inner, rough : coefficients that the tangents take from the series
+    """
+
+    states: tuple
+    events: tuple
+    controlled: tuple
+    of_states: tuple
+    of_events: tuple
+    inner: tuple
+    rough: tuple
+
+
+class Cell(NamedTuple):
+    """All that a lane knows of its cell between two events; the first entry is the lane's stage, inputs follow.
+
+    shake : by how many of its roundings each event is missed, in turn early and late, and each state at the start
+    time, interval, at, size, verdict : results: of the last switch; interval and states there; states' sizes; status
+    unit, h : of time, in seconds; the next step, in units
+    count, since, kinks_met : switches; time and kinks since the last one
+    steps, before : of the last leg, of the one before
+    errors : `Errors`, or () where no error is carried along
+    """
+
+    stage: float
+    parameters: tuple
+    flips: float
+    tolerance: float
+    shake: float
+    time: float
+    interval: float
+    at: tuple
+    size: tuple
+    verdict: float
     state: tuple
     side: float
     signs: tuple
     unit: float
+    h: float
     on: tuple
-    beyond: bool
-    blur: float
+    count: float
+    since: float
+    kinks_met: float
+    steps: float
+    before: float
+    errors: tuple
+
+
+class Errors(NamedTuple):
+    """What a lane knows of its error.
+
+    told, error : whether it is heeded; the largest of the last switch, relative
+    late, lag, off : of time, of time since the last switch, of each state; and the spread of each
+    latest, lagged, once : the largest so far at a switch, fading
+    """
+
+    told: float
+    error: float
+    late: float
+    lag: float
+    off: tuple
+    spread_late: float
+    spread_lag: float
+    spread: tuple
+    latest: float
+    lagged: float
+    once: tuple
 
 
 class Step(NamedTuple):
@@ -64,56 +170,3 @@ class Leg(NamedTuple):
     hangs: bool
     tried: float
     reach: tuple
-
-
-class Scheme(NamedTuple):
-    """A method at a fixed step, how it locates events (both numbers of `events`), and the substeps of a step."""
-
-    method: int
-    location: int
-    substeps: int
-
-
-class Limits(NamedTuple):
-    """Switches to follow, the step, and the margin of grazing over an event's value at the start of a step."""
-
-    flips: float
-    step: float
-    graze: float
-
-
-class Motion(NamedTuple):
-    """Where a motion is.
-
-    on : 1 for the event that it starts on
-    cut, cuts : length of the step that is tried next (0: a whole one), and how often that has been cut
-    """
-
-    state: tuple
-    side: float
-    signs: tuple
-    on: tuple
-    cut: float
-    cuts: float
-
-
-class Tally(NamedTuple):
-    """What is counted along a motion at a fixed step.
-
-    since, trials, reach, wide : since the last switch: time, trials, largest of each state, of the surface's value
-    interval, at, reach_at : between the last two switches; states at the last one, and their reach before it
-    count, slim : of switches; least margin behind one
-    """
-
-    time: float
-    since: float
-    interval: float
-    count: float
-    steps: float
-    calls: float
-    trials: float
-    reach: tuple
-    at: tuple
-    reach_at: tuple
-    wide: float
-    slim: float

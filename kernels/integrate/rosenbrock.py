@@ -21,7 +21,7 @@ FIRST = 2.0
 @jit
 def factored(m, state, mode, h):
     """The factors of I - gamma h J."""
-    return m.factored(state, mode.side, mode.signs, mode.parameters, RODAS5P_GAMMA * h)
+    return m.factored(state, mode, RODAS5P_GAMMA * h)
 
 
 @jit
@@ -94,4 +94,4 @@ def vague(m, state, terms, mode, h, part):
     return stepped(m, state, mode, factored(m, state, mode, part * h), part * h)[3]
 
 
-RODAS5P_PAIR = Pair(tried, series, dense, vague, 5.0)
+RODAS5P_PAIR = Pair(tried, series, dense, vague, followable, 5.0)

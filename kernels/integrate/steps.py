@@ -1,29 +1,33 @@
 """One step of each method, of any scene; generic in one cell or lanes.
 
-`m` has the written functions of a scene (`stepped`); `mode` is a record (`records.Mode`).
+`m` is what is written of a scene (`records.Written`), `mode` what its rates hang on beside the state (`records.Mode`).
 """
 
+from kernels.integrate.records import Mode
 from kernels.integrate.tableaux import DOP853, DOPRI5, RK4
 from kernels.lanes.jit import jit, jit_call
-from kernels.lanes.tuples import after, paired, times
-from kernels.lanes.vectors import choose
+from kernels.lanes.symbols import over_tuples, symbolic
+from kernels.lanes.tuples import after, joined, paired, times
+from kernels.lanes.vectors import choose, fma
 
 ONE = (1.0,)
 
 
 @jit
 def rate(m, state, mode):
-    """The rates of the state."""
+    """The rates of the state; with `mode.natural` those of the side of each kink on which it is."""
     signs = mode.signs
     if mode.natural:
-        signs = m.natural_signs(state, mode.side, mode.parameters)
-    return m.rates(state, mode.side, signs, mode.parameters)
+        signs = m.natural_signs(state, mode)
+    return m.rates(state, Mode(mode.side, signs, mode.parameters, False))
 
 
-@jit
+@symbolic
 def events(m, state, mode):
     """Value and rate of each event."""
-    return m.events(state, mode.side, mode.signs, mode.parameters)
+    found = m.jet(state, mode, 0.0 * mode.side + 1.0, ()).events
+    values = tuple(fma(factor, u[0], offset) for offset, factor, u in found)
+    return values, tuple(factor * u[1] for offset, factor, u in found)
 
 
 @jit_call
@@ -50,6 +54,7 @@ def verlet(m, state, mode, h):
 
 
 @jit_call
+@over_tuples
 def moreau(m, state, mode, h):
     """Moreau's time-stepping for one pair (x, v) with dry friction at v = 0: half a drift, a kick, half a drift.
 
@@ -57,8 +62,10 @@ def moreau(m, state, mode, h):
     Source: Moreau, Comput. Methods Appl. Mech. Eng. 177:329 (1999).
     """
     middle = paired(after(state, 0.5 * h, ONE, (rate(m, state, mode),)), state)
-    forward = after(state, h, ONE, (m.rates(middle, mode.side, m.ahead, mode.parameters),))
-    backward = after(state, h, ONE, (m.rates(middle, mode.side, m.behind, mode.parameters),))
+    ahead = tuple(1.0 for sign in mode.signs)
+    behind = joined(tuple(-1.0 for sign in mode.signs[:-1]), (1.0,))
+    forward = after(state, h, ONE, (m.rates(middle, Mode(mode.side, ahead, mode.parameters, False)),))
+    backward = after(state, h, ONE, (m.rates(middle, Mode(mode.side, behind, mode.parameters, False)),))
     slid = choose(forward[-1] > 0.0, forward, choose(backward[-1] < 0.0, backward, times(0.0, state)))
     kicked = paired(state, slid)
     return paired(after(middle, 0.5 * h, ONE, (rate(m, kicked, mode),)), kicked)

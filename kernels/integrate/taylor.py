@@ -9,26 +9,14 @@ The proof is of the series; what that leaves out is below the tolerance of the s
 is called grazing.
 """
 
+from typing import NamedTuple
+
 from numba import types
+from numba.extending import lower_builtin, type_callable
 
 from kernels.lanes.jit import jit, jit_call
-from kernels.lanes.vectors import (
-    _called,
-    _constant,
-    _function,
-    _items,
-    _number,
-    any_lane,
-    exponent,
-    fma,
-    horner,
-    magnitude,
-    nearest,
-    not_,
-    pow2,
-    sqrt,
-    where,
-)
+from kernels.lanes.symbols import symbolic
+from kernels.lanes.vectors import any_lane, exponent, fma, horner, magnitude, nearest, not_, pow2, sqrt, where
 
 STEP_LIMIT = 2000
 """Steps between two events after which a cell is given up."""
@@ -48,65 +36,36 @@ SAME, ROUNDING = 0.04, 1e-15
 """Tolerances, and besides of its size, within which an event is 0 where another one fires: they fire together."""
 
 
+@symbolic
 def tail(h, series):
     """A bound on A of (1) for u: sum over k > 3 of k abs(u_k) h^(k-2), with 4 (5/4)^(k-4) >= k for k."""
-    total, wide = abs(series[-1]), WIDER * h
-    for k in range(len(series) - 2, 3, -1):
-        total = fma(total, wide, abs(series[k]))
+    total, wide = magnitude(series[-1]), WIDER * h
+    for term in series[-2:3:-1]:
+        total = fma(total, wide, magnitude(term))
     return 4.0 * (total * (h * h))
 
 
-def _lower_tail(context, builder, signature, values):
-    target = signature.return_type
-    h = context.cast(builder, values[0], signature.args[0], target)
-    items = _items(context, builder, signature.args[1], values[1], target)
-    sizes = [_called("fabs")(builder, item) for item in items]
-    total, wide = sizes[-1], builder.fmul(_constant(h.type, WIDER), h)
-    for k in range(len(items) - 2, 3, -1):
-        total = _called("fma")(builder, total, wide, sizes[k])
-    return builder.fmul(_constant(h.type, 4.0), builder.fmul(total, builder.fmul(h, h)))
-
-
-_function(tail, 2, lambda h, series: _number(h, *series), _lower_tail)
-
-
+@symbolic
 def bend(h, series):
     """Sum over k > 1 of abs(u_k) h^k: how far u may be from its tangent on [0, h]."""
     return _sizes(h, series[2:]) * (h * h)
 
 
+@symbolic
 def tail_of_sum(h, series):
     """A of (1) for the integral of w, from the series of w: the sum over k > 2 of abs(w_k) h^(k-1), as in `mean`."""
     return _sizes(h, series[3:-1]) * (h * h)
 
 
+@symbolic
 def _sizes(h, terms):
-    total = abs(terms[-1])
+    total = magnitude(terms[-1])
     for term in terms[-2::-1]:
-        total = fma(total, h, abs(term))
+        total = fma(total, h, magnitude(term))
     return total
 
 
-def _lower_sizes(terms):
-    """The compiled form, of a slice of the series."""
-
-    def lower(context, builder, signature, values):
-        target = signature.return_type
-        h = context.cast(builder, values[0], signature.args[0], target)
-        items = _items(context, builder, signature.args[1], values[1], target)[terms]
-        sizes = [_called("fabs")(builder, item) for item in items]
-        total = sizes[-1]
-        for size_of_term in sizes[-2::-1]:
-            total = _called("fma")(builder, total, h, size_of_term)
-        return builder.fmul(total, builder.fmul(h, h))
-
-    return lower
-
-
-_function(bend, 2, lambda h, series: _number(h, *series), _lower_sizes(slice(2, None)))
-_function(tail_of_sum, 2, lambda h, series: _number(h, *series), _lower_sizes(slice(3, -1)))
-
-
+@symbolic
 def slope(x, series):
     """u'(x) by Horner's scheme, whose values on the way are those of `horner` and cost nothing beside it."""
     value = rate = series[-1]
@@ -116,17 +75,7 @@ def slope(x, series):
     return rate
 
 
-def _lower_slope(context, builder, signature, values):
-    target = signature.return_type
-    x = context.cast(builder, values[0], signature.args[0], target)
-    items = _items(context, builder, signature.args[1], values[1], target)
-    value = rate = items[-1]
-    for item in items[-2:0:-1]:
-        value = _called("fma")(builder, value, x, item)
-        rate = _called("fma")(builder, rate, x, value)
-    return rate
-
-
+@symbolic
 def curvature(x, series):
     """u''(x) by Horner's scheme."""
     value = rate = bend = series[-1]
@@ -137,18 +86,7 @@ def curvature(x, series):
     return 2.0 * bend
 
 
-def _lower_curvature(context, builder, signature, values):
-    target = signature.return_type
-    x = context.cast(builder, values[0], signature.args[0], target)
-    items = _items(context, builder, signature.args[1], values[1], target)
-    value = rate = bend = items[-1]
-    for item in items[-2:1:-1]:
-        value = _called("fma")(builder, value, x, item)
-        rate = _called("fma")(builder, rate, x, value)
-        bend = _called("fma")(builder, bend, x, rate)
-    return builder.fmul(_constant(bend.type, 2.0), bend)
-
-
+@symbolic
 def mean(x, series):
     """The mean of u between 0 and x, but for its last term: sum of u_k x^k/(k + 1).
 
@@ -159,20 +97,6 @@ def mean(x, series):
     for k in range(len(series) - 2, 0, -1):
         value = fma(value, x * (k / (k + 1)), series[k - 1])
     return value
-
-
-def _lower_mean(context, builder, signature, values):
-    target = signature.return_type
-    x = context.cast(builder, values[0], signature.args[0], target)
-    items = _items(context, builder, signature.args[1], values[1], target)
-    value = items[-2]
-    for k in range(len(items) - 2, 0, -1):
-        value = _called("fma")(builder, value, builder.fmul(x, _constant(x.type, k / (k + 1))), items[k - 1])
-    return value
-
-
-for _of_series, _lower in ((slope, _lower_slope), (curvature, _lower_curvature), (mean, _lower_mean)):
-    _function(_of_series, 2, lambda x, series: _number(x, *series), _lower)
 
 
 @jit
@@ -186,7 +110,7 @@ def natural_power(x, n):
     return product
 
 
-@jit
+@symbolic
 def last_term(h, series):
     """The last term of a series on a step, over h^(p-1).
 
@@ -197,13 +121,13 @@ def last_term(h, series):
     return where(last < before, before, last)
 
 
-@jit
+@symbolic
 def size(h, series):
     """Of a state on a step: its first terms."""
     return fma(fma(magnitude(series[2]), h, magnitude(series[1])), h, magnitude(series[0]))
 
 
-@jit
+@symbolic
 def worse(first, second):
     """Of two pairs (what is left out, size) the one that is worse in its size; a state that stays 0 never is."""
     (x, of_x), (y, of_y) = first, second
@@ -226,7 +150,7 @@ def next_step(h, ratio, order):
     return h * fma(part, fma(part, fma(part, 0.0555, 0.2402), 0.6931), 1.0) * pow2(whole)
 
 
-@jit
+@symbolic
 def keeps(h, power_h, series, allowed):
     """Whether a step leaves out no more than that, over the state's size; NaN fails. `power_h` is h^(p-1).
 
@@ -235,14 +159,14 @@ def keeps(h, power_h, series, allowed):
     return last_term(h, series) * power_h <= allowed * size(h, series)
 
 
-@jit
+@symbolic
 def box(h, series):
     """An interval that u does not leave on [0, h]."""
     along, aside = h * series[1], bend(h, series)
     return series[0] + where(along < 0.0, along, 0.0) - aside, series[0] + where(along > 0.0, along, 0.0) + aside
 
 
-@jit
+@symbolic
 def rises(d, dd):
     """Whether what has these first derivatives rises in the next moment."""
     return (d > 0.0) | ((d >= 0.0) & (dd > 0.0))
@@ -258,10 +182,11 @@ def _lower_stays_apart(context, builder, signature, values):
     return context.get_dummy_value()
 
 
-_function(stays_apart, 1, lambda x: types.void, _lower_stays_apart)
+type_callable(stays_apart)(lambda context: lambda x: types.void)
+lower_builtin(stays_apart, types.Any)(_lower_stays_apart)
 
 
-@jit
+@symbolic
 def falls(d, dd, ddd, rest, h):
     """Whether an event falls all along a step, by (1): from its coefficients 1 to 3, `rest` is A."""
     b, q = fma(2.0, dd, rest), 3.0 * ddd
@@ -269,7 +194,7 @@ def falls(d, dd, ddd, rest, h):
     return (d <= 0.0) & (fma(h, fma(h, q, b), d) < 0.0) & not_(turns)
 
 
-@jit
+@symbolic
 def clear(e, d, dd, ddd, rest, h, margin):
     """Whether an event does not fire in (0, h], by (1): from its coefficients 0 to 3.
 
@@ -298,6 +223,43 @@ def of_sum(t, curve):
 
 
 @jit
+def value_of_series(t, curve):
+    """u at t."""
+    return horner(t, curve[0])
+
+
+@jit
+def value_of_sum(t, curve):
+    """u at t."""
+    start, unit, w = curve
+    return fma(unit * t, mean(t, w), start)
+
+
+@jit
+def tail_of_series(t, curve):
+    """A of (1)."""
+    return tail(t, curve[0])
+
+
+@jit
+def tail_of_integral(t, curve):
+    """A of (1)."""
+    return curve[1] * tail_of_sum(t, curve[2])
+
+
+class Way(NamedTuple):
+    """How what has a curve is evaluated at t: u; u, u' and about u''/2; a bound on A of (1)."""
+
+    value: object
+    rates: object
+    tail: object
+
+
+BY_SERIES = Way(value_of_series, of_series, tail_of_series)
+BY_SUM = Way(value_of_sum, of_sum, tail_of_integral)
+
+
+@symbolic
 def foreseen(e, d, dd, ddd, h):
     """About where an event falls through 0 in (0, h], by its coefficients 0 to 3; the middle where they do not tell."""
     bend = fma(d, d, -4.0 * (dd * e))

@@ -214,6 +214,11 @@ class _Entry(CPUDispatcher):
                 gc.enable()
 
 
+def _is_plain(kind):
+    """Whether it is a number, or as many as there are lanes (`vectors`), or what tells of such."""
+    return isinstance(kind, types.Number | types.Boolean) or getattr(kind, "wide", False)
+
+
 def _remember(context):
     """Has numba ask once what an operator makes of numbers: it looks at lists, sets, text and arrays first."""
     if "resolve_function_type" in vars(context):
@@ -221,7 +226,7 @@ def _remember(context):
     known, ask = {}, context.resolve_function_type
 
     def resolve(function, args, kws):
-        if function not in _OPERATORS or not all(isinstance(kind, types.Number | types.Boolean) for kind in args):
+        if function not in _OPERATORS or not all(map(_is_plain, args)):
             return ask(function, args, kws)
         key = function, tuple(args)
         if key not in known:

@@ -50,20 +50,24 @@ def _busy(memory):
     return busy
 
 
+def to_the_end(run, cells, together=False):
+    """Runs every cell, (n_cells, numbers that a lane knows), by a compiled `each_refilled`."""
+    run(cells, np.zeros((cells.shape[1], LANES)), np.zeros(LANES, np.int64), together)
+
+
 @jit
-def each_refilled(advance, cells, together):
+def each_refilled(advance, cells, memory, held, together):
     """Every cell to its end.
 
     Parameters
     ----------
     cells : (n_cells, numbers that a lane knows), fresh or moving; in the end all are done
+    memory, held : zeros, a row for each number, and the lanes' cells; numba takes long to compile what makes arrays
     together : refill no lane before all have finished, as lanes in lockstep do; the rival that this is measured against
     """
-    memory = np.zeros((cells.shape[1], LANES))
-    held = np.zeros(LANES, np.int64)
     n = cells.shape[0]
     for lane in range(LANES):
-        held[lane] = min(lane, n - 1)
+        held[lane] = lane if lane < n else n - 1
         _give(memory, lane, cells, held[lane])
         memory[0, lane] = memory[0, lane] if lane < n else IDLE
     handed, left = LANES, n

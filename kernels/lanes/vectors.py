@@ -24,6 +24,7 @@ from numba.core.typeconv import Conversion
 from numba.extending import lower_builtin, lower_cast, models, register_model, type_callable
 
 from kernels.lanes.jit import jit
+from kernels.lanes.symbols import symbolic
 
 WIDTH = 32
 """8 lanes reach half the speed, 16 85 %, 64 no more than 32: several registers hide the latency of a recurrence."""
@@ -34,6 +35,8 @@ _MAGIC = 6755399441055744.0  # 1.5 * 2^52: adding it leaves the nearest integer 
 
 class LanesType(types.Type):
     """WIDTH float64 cells; a float64 beside them is repeated in every lane."""
+
+    wide = True
 
     def __init__(self):
         super().__init__("Lanes")
@@ -47,6 +50,8 @@ class LanesType(types.Type):
 
 class MaskType(types.Type):
     """One bit a lane; a boolean beside it is repeated."""
+
+    wide = True
 
     def __init__(self):
         super().__init__("Mask")
@@ -208,6 +213,7 @@ _function(sqrt, 1, _number, _emit(_called("sqrt")))
 _function(magnitude, 1, _number, _emit(_called("fabs")))
 
 
+@symbolic
 def dot(weights, terms):
     """Sum of weights[j] terms[j] by a chain of multiply-adds from the first term on; both are tuples."""
     total = weights[0] * terms[0]
@@ -216,41 +222,13 @@ def dot(weights, terms):
     return total
 
 
+@symbolic
 def horner(x, coefficients):
     """Polynomial in x, lowest power first; the coefficients are a tuple."""
     value = coefficients[-1]
     for coefficient in coefficients[-2::-1]:
         value = fma(value, x, coefficient)
     return value
-
-
-def _items(context, builder, numba_type, value, target):
-    """The elements of a tuple, each as `target`."""
-    items = cgutils.unpack_tuple(builder, value)
-    return [context.cast(builder, v, t, target) for v, t in zip(items, numba_type, strict=True)]
-
-
-def _lower_dot(context, builder, signature, values):
-    target = signature.return_type
-    weights, terms = (_items(context, builder, t, v, target) for v, t in zip(values, signature.args, strict=True))
-    total = builder.fmul(weights[0], terms[0])
-    for weight, term in zip(weights[1:], terms[1:], strict=True):
-        total = _called("fma")(builder, weight, term, total)
-    return total
-
-
-def _lower_horner(context, builder, signature, values):
-    target = signature.return_type
-    x = context.cast(builder, values[0], signature.args[0], target)
-    coefficients = _items(context, builder, signature.args[1], values[1], target)
-    value = coefficients[-1]
-    for coefficient in coefficients[-2::-1]:
-        value = _called("fma")(builder, value, x, coefficient)
-    return value
-
-
-_function(dot, 2, lambda weights, terms: _number(*terms), _lower_dot)
-_function(horner, 2, lambda x, coefficients: _number(x), _lower_horner)
 
 
 def pow2(n):
@@ -301,25 +279,11 @@ def where(condition, x, y):
     return x if condition else y
 
 
+@symbolic
 def choose(condition, xs, ys):
     """`where` for each pair of two tuples; a record, if the first is one."""
     chosen = tuple(where(condition, x, y) for x, y in zip(xs, ys, strict=True))
     return type(xs)(*chosen) if hasattr(xs, "_fields") else chosen
-
-
-def _type_choose(condition, xs, ys):
-    chosen = tuple(_number(condition, x, y) for x, y in zip(xs, ys, strict=True))
-    return types.BaseTuple.from_types(chosen, getattr(xs, "instance_class", None))
-
-
-def _lower_choose(context, builder, signature, values):
-    condition, xs, ys = signature.args
-    items = (cgutils.unpack_tuple(builder, v) for v in values[1:])
-    chosen = [
-        _lower_where(context, builder, result(condition, x, y), (values[0], a, b))
-        for result, x, y, a, b in zip(signature.return_type, xs, ys, *items, strict=True)
-    ]
-    return context.make_tuple(builder, signature.return_type, chosen)
 
 
 def _lower_where(context, builder, signature, values):
@@ -356,7 +320,6 @@ def _lower_isnt(context, builder, signature, values):
 
 
 _function(where, 3, lambda condition, x, y: _number(condition, x, y), _lower_where)
-_function(choose, 3, _type_choose, _lower_choose)
 _function(any_lane, 1, lambda condition: types.boolean, _lower_any_lane)
 _function(not_, 1, lambda condition: condition, _lower_isnt)
 

@@ -1,6 +1,5 @@
-"""What a scene's module is written from: the graph of its right-hand side, and the source text of its parts.
+"""What a scene's module is written from: the graph of its right-hand side, and the source text of its expressions.
 
-Faces: `expression` (what a right-hand side may use), `tangent` (its derivatives), `template`, and a file for each part
-of a module: `series`, `leg`, `driver`, `lane`, `error`, `hidden`, `rounding`, `sliding`, `stiff`. `codegen` puts them
-together.
+Faces: `expression` (what a right-hand side may use), `tangent` (its derivatives), `template`, and what is written:
+`series`, `hidden`, `rounding`, `stiff`. `codegen` puts it together; what is done with it is generic (`integrate`).
 """

@@ -239,7 +239,7 @@ class Graph:
         return self.multiply(self._node("power", (self._plain(constant, side), exponent), False), node)
 
     def over_base(self, power):
-        """abs(u)^n/u of a power of a state's abs; 0 where that is a constant (`power_core`)."""
+        """abs(u)^n/u of a power of a state's abs; 0 where that is a constant (`integrate.powers`)."""
         return self._node("power_over_base", (power,), True)
 
     def magnitude(self, x):

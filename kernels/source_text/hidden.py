@@ -15,7 +15,7 @@ from kernels.source_text.template import filled, listed
 
 HIDDEN = '''
 @jit_call
-def hidden(state, boxes, side, signs, parameters):
+def hidden(state, boxes, mode):
     """How far each rate, and each event, may be in the box from what the state tells, by (1)."""
     {unpack}
     {boxes} = boxes
@@ -98,7 +98,7 @@ class Enclosures:
         return f"of_log({self.interval(x.args[0])})"
 
     def _excess(self, x):
-        # powers are for `power_core`, from kink to kink
+        # powers are for `integrate.powers`, from kink to kink
         if not x.varies or x.kind in (INPUT, "power_of_side", "power_over_base"):
             return None
         return " + ".join(filter(None, getattr(self, f"_excess_of_{x.kind}")(x))) or None
@@ -168,7 +168,7 @@ class Enclosures:
 
 BOUNDS = '''
 @jit_call
-def bounds(state, boxes, side, signs, parameters):
+def bounds(state, boxes, mode):
     """The least value of each event over the box, and the least and the largest rate of each."""
     {unpack}
     {boxes} = boxes

@@ -18,32 +18,16 @@ SLOPES = {
 
 LOST = '''
 @jit
-def lost_by_surface(state, side, signs, parameters):
+def lost(state, mode):
     """What rounding takes from the surface's value at the start, at most."""
     {unpack}
     {lines}
     return {lost}
 '''
 
-BLURRED = '''
-@jit_call
-def blurred(state, side, signs, on, parameters):
-    """For how long, in seconds, rounding may keep the events open that fire."""
-    {unpack}
-    {ons} = on
-    {lines}
-    place = 0.0 * side
-    {places}
-    return place
-'''
-
-PLACE = """\
-open_{j} = where(on_{j} > 0.5, {ulp} * ({size}) / magnitude({rate}), 0.0)
-place = where(open_{j} > place, open_{j}, place)"""
-
 SIZES = '''
 @jit
-def {name}(state, side, signs, parameters):
+def {name}(state, mode):
     """{doc}"""
     {unpack}
     {lines}
@@ -144,18 +128,19 @@ class Sizes:
         return f"fma({slope}, {parts[0]}, magnitude({value}))"
 
 
-def blurred(writer):
-    """The text of `blurred`: an ulp of what each event's value is made of, over its rate."""
-    recorded, made, places = writer.recorded, Sizes(writer.names), []
+def made(writer):
+    """The text of `made`: what each event's value is made of, in size, and its rate."""
+    recorded, found, pairs = writer.recorded, Sizes(writer.names), []
     graph, states = recorded.graph, writer.scene.states
-    for j, (offset, factor, u) in enumerate(recorded.events):
+    for offset, factor, u in recorded.events:
         value = graph.multiply(factor, u)
         rate = along(graph, [Tangents.along(graph, s).of(value) for s in states], recorded.rates)
-        size = f"{made.of(value)} + magnitude({made.lines.value(offset)})"
-        places.append(PLACE.format(j=j, ulp=repr(ULP), size=size, rate=made.lines.value(rate)))
+        size = f"{found.of(value)} + magnitude({found.lines.value(offset)})"
+        pairs.append(f"({size}, {found.lines.value(rate)})")
+    doc = "What each event's value is made of, in size, and its rate."
     return filled(
-        BLURRED, unpack=writer.all_unpacked, ons=listed(f"on_{j}" for j in range(len(places))),
-        lines="\n".join(made.lines.text), places="\n".join(places),
+        SIZES, name="made", doc=doc, unpack=writer.all_unpacked, lines="\n".join(found.lines.text),
+        sizes=f"({listed(pairs)})",
     )  # fmt: skip
 
 

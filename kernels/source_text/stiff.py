@@ -12,7 +12,7 @@ from kernels.source_text.template import filled, listed
 
 LINEAR = '''
 @jit_call
-def factored(state, side, signs, parameters, h):
+def factored(state, mode, h):
     """I - h J in triangular form: 1 over its diagonal, what is above, the factors, and which rows were swapped."""
     {unpack}
     {lines}

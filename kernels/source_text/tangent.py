@@ -17,14 +17,13 @@ exp, sin and cos, and of linear rates, first grow, as x^k/k!; those of states th
 
 TANGENT = '''
 @jit
-def {name}_{order}(state, side, signs, parameters, unit, inner, changes{also}):
-    """Taylor coefficients of a change of each state; `inner` are coefficients that `series_{order}` knows."""
+def {name}_{order}(state, mode, unit, inner, changes, cores):
+    """What a change of each state is evaluated from; `inner` are coefficients that `series_{order}` knows."""
     {unpack}
-    {deltas} = changes
     {cores}
     {inner}
     {lines}
-    return {result}
+    return ({result})
 '''
 
 
@@ -122,14 +121,15 @@ def along(graph, gradient, rates):
 def tangent(writer, lines, order, powers, name, length):
     """The text of a tangent of the order `length`, and what it takes of `lines`, which are the series', as text."""
     changes = lines.branch()
-    result = [changes.coefficients(delta, length) for delta in writer.tangents.deltas.values()]
-    own = set(re.findall(r"\w+", "\n".join([*changes.text, *result])))
+    deltas = zip(writer.states, writer.tangents.deltas.values(), strict=True)
+    named = [f"d_{s} = {in_every_lane(changes.coefficients(delta, length))}" for s, delta in deltas]
+    own = set(re.findall(r"\w+", "\n".join([*changes.text, *named])))
     given = [known for known in (line.split(" = ")[0] for line in lines.text) if known in own]
     text = filled(
-        TANGENT, name=name, order=order, unpack=writer.all_unpacked, deltas=listed(f"delta_{s}" for s in writer.states),
+        TANGENT, name=name, order=order, unpack=writer.unpacked("state", "mode", "changes"),
         cores=listed(f"core_{i}" for i in range(powers)) + " = cores" if powers else "",
-        also=", cores" if powers else "", inner=f"{listed(given)} = inner" if given else "",
-        lines="\n".join(changes.text), result=f"({listed(in_every_lane(r) for r in result)})",
+        inner=f"{listed(given)} = inner" if given else "", lines="\n".join([*changes.text, *named]),
+        result=listed(writer.curve(s, "d", "delta_{}") for s in writer.states),
     )  # fmt: skip
     return text, f"({listed(given)})"
 

@@ -10,7 +10,7 @@ from mpmath import mp, mpf
 from stiff_scene import LAG, PASSED, WAVE
 
 import sweep
-from kernels.codegen.stepped import adaptive
+from kernels.codegen.stepped import stepped
 from kernels.integrate import rosenbrock
 from kernels.integrate.records import Mode
 from kernels.interface import Status
@@ -92,7 +92,7 @@ PENDULUM = Scene(
 
 
 def one_step(scene, state, h, *parameters):
-    m, mode = adaptive(scene).M_STIFF, Mode(1.0, (1.0,), parameters, False)
+    m, mode = stepped(scene).M_STIFF, Mode(1.0, (1.0,), parameters, False)
     return rosenbrock.tried(m, state, mode, h)
 
 

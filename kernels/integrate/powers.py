@@ -1,0 +1,150 @@
+"""The *core* of a power: where abs(u)^n, u a state, is a constant for a Taylor series, for it has none at u = 0.
+
+From a kink u = 0 on, u is r t, and abs(u)^n has the mean (r t)^n/(n + 1). With the mean in its place the rates' impulse
+is right for whatever n, and what is left of a state whose rate the power changes by D is, in units of time,
+    D t (t + d),  d = (D of u)/r                                                                         (1)
+for the speed between differs from the true one by less than D t, and the motion is not quite even: d, at most 1/4.
+The core ends where that is the tolerance times the state's own size; outside the series steps towards it or away from
+it by parts of the way that is left, as the radius of convergence allows.
+
+Where nothing but the power acts at u = 0, u' = -c u^n with n < 1 comes to rest there after u^(1 - n)/((1 - n) c), while
+every state's rate changes by the power as u's does: with (1 - n) u^n in the power's place that time and all impulses
+are right, and what hangs on u is off by less than u times that time. Generic in one cell or lanes.
+"""
+
+from typing import NamedTuple
+
+from kernels.integrate.taylor import SLACK
+from kernels.lanes.jit import jit_call
+from kernels.lanes.symbols import fold, over_tuples, symbolic
+from kernels.lanes.tuples import all_of, joined
+from kernels.lanes.vectors import any_lane, choose, fma, magnitude, not_, where
+from kernels.maths.elementary import power
+
+UNEVEN = 0.25
+"""d of (1), at most."""
+FAR = 1e300
+SHORT = 0.9
+"""Of the way to rest, that a step may take: at the end of it the series may turn round instead."""
+
+
+class Power(NamedTuple):
+    """What is written of a scene for one of its powers.
+
+    rates : (state, mode, unit, value) -> the rates per unit of time, with that value of the power
+    base, exponent : (state, mode) -> abs(u); n
+    of_base, of_kink : the entry of u in a tuple of states, of its kink in one of events
+    without : (state, mode) -> the state at u = 0
+    """
+
+    rates: object
+    base: object
+    exponent: object
+    of_base: object
+    of_kink: object
+    without: object
+
+
+@jit_call
+@over_tuples
+def core(p, state, mode, unit, tolerance, on, t, margins):
+    """The mean of a power in its core, and how far from there a step may go.
+
+    Parameters
+    ----------
+    p : Power
+    t : time since the last event
+    margins : of each event, what there is of it for next to nothing
+
+    Returns
+    -------
+    core : the mean, -1 where the motion is not in the core
+    longest : step from the kink on
+    coarse : what (1) leaves of each state
+    full : the rates with the power as it is
+    """
+    n, base = p.exponent(state, mode), p.base(state, mode)
+    margin, leaves = p.of_kink(margins), (p.of_kink(on) > 0.5) & (t <= 0.0)
+    value, nothing = power(base, n), 0.0 * mode.side
+    full = p.rates(state, mode, unit, value)
+    core, longest, nears = nothing - 1.0, nothing + FAR, p.of_kink(joined((0.0,), mode.signs)) * p.of_base(full) < 0.0
+    coarse = tuple(nothing for u in state)
+    if any_lane(nears):
+        bare = p.rates(state, mode, unit, nothing)
+        over = 1.0 / magnitude(p.of_base(full))
+        t_base, d = base * over, magnitude(p.of_base(full) - p.of_base(bare)) * over
+        uneven = t_base * (t_base + d)
+        small = tuple(
+            magnitude(x - y) * uneven <= tolerance * size_in_unit(u, x)
+            for x, y, u in zip(full, bare, state, strict=True)
+        )
+        inside = nears & (d <= UNEVEN) & all_of(small)
+        coarse = tuple(where(inside, magnitude(x - y) * uneven, 0.0) for x, y in zip(full, bare, strict=True))
+        core = where(inside, mean_power(value, n), -1.0)
+        at_kink = p.of_base(p.rates(p.without(state, mode), mode, unit, nothing))
+        settles = nears & (at_kink <= 0.0) & (at_kink >= 0.0) & (n < 1.0)
+        left = t_base / (1.0 - n)
+        rests = settles & no_matter(base, left, t, margin)
+        core = where(rests, value * (1.0 - n), core)
+        longest = where(settles & not_(rests), SHORT * left, longest)
+    if any_lane(leaves):
+        bare, whole = p.rates(state, mode, unit, nothing), p.rates(state, mode, unit, nothing + 1.0)
+        by_power = tuple(magnitude(x - y) for x, y in zip(whole, bare, strict=True))
+        capacity = fold(
+            least_share,
+            nothing + FAR,
+            (),
+            tuple(size_in_unit(u, y) / z for u, y, z in zip(state, bare, by_power, strict=True)),
+        )
+        speed, of_base = magnitude(p.of_base(bare)), p.of_base(by_power)
+        reach = core_time(capacity, speed, of_base, n, tolerance)
+        mean = mean_power(power(speed * reach, n), n)
+        core, longest = where(leaves, mean, core), where(leaves, reach, longest)
+        last = (n + 1.0) * mean
+        uneven = reach * fma(of_base, last / speed, reach)
+        coarse = choose(leaves, tuple(z * last * uneven for z in by_power), coarse)
+    return core, longest, coarse, full
+
+
+@symbolic
+def least_share(x, share):
+    """The smaller one."""
+    return where(share < x, share, x)
+
+
+@symbolic
+def size_in_unit(u, rate):
+    """Of a state, with what it gains in a unit of time."""
+    return magnitude(u) + magnitude(rate)
+
+
+@symbolic
+def mean_power(last, n):
+    """The mean of what grows as t^n up to `last`."""
+    return last / (n + 1.0)
+
+
+@symbolic
+def no_matter(u, left, t, margin):
+    """Whether so little is left of u that its way to rest, in the time `left`, does not matter."""
+    return (SLACK * u * left <= margin * (t + left)) | (u <= SLACK * margin)
+
+
+@symbolic
+def core_time(capacity, rate, most, n, tolerance):
+    """How long u = rate t may be taken for small, by (1); at most 1 unit.
+
+    `capacity` is the least size of a state over what the power, were it 1, would add to its rate; `most` is that of u.
+    """
+    drag = power(rate, n)
+    whole = 0.5 * tolerance * capacity / drag  # D t^2 <= half the tolerance times the size
+    slow = power(_no_more_than_one(whole), 1.0 / (n + 2.0))
+    even = power(_no_more_than_one(whole * (rate / (most * drag))), 1.0 / (2.0 * n + 1.0))
+    mild = where(n > 0.0, power(_no_more_than_one(UNEVEN * (rate / (most * drag))), 1.0 / where(n > 0.0, n, 1.0)), 1.0)
+    shorter = where(slow < even, slow, even)
+    return where(shorter < mild, shorter, mild)
+
+
+@symbolic
+def _no_more_than_one(x):
+    return where(x < 1.0, x, 1.0)

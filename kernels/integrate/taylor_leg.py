@@ -1,0 +1,287 @@
+"""The leg of a motion by Taylor series, from event to event; generic in the scene, in one cell or lanes.
+
+Each step takes the length that the series allow, is halved where no event is proved to fall all along or to stay
+clear (`taylor`), and ends the leg where one has fallen through 0. `m` is what is written of the scene for one order
+(`Series`).
+"""
+
+import math
+from typing import NamedTuple
+
+from kernels.integrate import carried
+from kernels.integrate.powers import FAR
+from kernels.integrate.records import Leg
+from kernels.integrate.taylor import (
+    COME_UP,
+    HALVINGS,
+    LONGEST,
+    ROUNDING,
+    SAME,
+    SLACK,
+    STEP_LIMIT,
+    box,
+    clear,
+    crossing,
+    falls,
+    keeps,
+    last_term,
+    natural_power,
+    next_step,
+    rises,
+    size,
+    stays_apart,
+    worse,
+)
+from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.symbols import fold, over_tuples, symbolic
+from kernels.lanes.tuples import all_of, any_of, joined, reached
+from kernels.lanes.vectors import any_lane, choose, fma, magnitude, not_, where
+from kernels.maths.intervals import most
+
+
+class Series(NamedTuple):
+    """What is written of a scene for the series of one order.
+
+    scene : `Written`
+    order : of the series
+    pieces : (state, mode, unit, cores) -> `Pieces`
+    cores : (state, mode, unit, tolerance, on, t, margins) -> of powers: `powers.core`, a tuple of each part
+    on_kink : (state, fires) -> the state, 0 where a kink of a power fires
+    ways, watched : how each state, and what each event watches, is evaluated (`taylor.Way`)
+    summed, unseen : 1 for each state that is the sum of another one, for each event of more than one state
+    error : `carried.Changes`; None where no error is carried along
+    """
+
+    scene: object
+    order: int
+    pieces: object
+    cores: object
+    on_kink: object
+    ways: tuple
+    watched: tuple
+    summed: tuple
+    unseen: tuple
+    error: object
+
+
+@symbolic
+def facts_of(offset, factor, u):
+    """Coefficients 0 to 3 of an event."""
+    return fma(factor, u[0], offset), factor * u[1], factor * u[2], factor * u[3]
+
+
+@symbolic
+def judged(m, pieces, facts, margins, now, trial):
+    """Which events are proved to stay clear on a step, and which to fall all along."""
+    rests = tuple(
+        magnitude(event[1]) * way.tail(trial, curve)
+        for way, event, curve in zip(m.watched, pieces.events, pieces.of_events, strict=True)
+    )
+    clears = tuple(
+        clear(e, d, dd, ddd, rest, trial, margin)
+        for (e, d, dd, ddd), rest, margin in zip(facts, rests, margins, strict=True)
+    )
+    fallings = tuple(
+        falls(d, dd, ddd, rest, trial) | begun for (e, d, dd, ddd), rest, begun in zip(facts, rests, now, strict=True)
+    )
+    return clears, fallings
+
+
+@jit_call
+@over_tuples
+def doubted(m, pieces, facts, margins, now, trial, unsure, fallings):
+    """Steps of the unsure lanes halved until each event is proved to fall or to stay clear; which fall."""
+    stays_apart(trial)
+    for _ in range(HALVINGS):
+        clears, down = judged(m, pieces, facts, margins, now, trial)
+        proved = all_of(tuple(x | y for x, y in zip(clears, down, strict=True)))
+        fallings = tuple((unsure & x) | (y & not_(unsure)) for x, y in zip(down, fallings, strict=True))
+        unsure = unsure & not_(proved)
+        if not any_lane(unsure):
+            break
+        trial = where(unsure, 0.5 * trial, trial)
+    return trial, unsure, fallings
+
+
+@symbolic
+def by_kink(facts, now, clears, fallings, at_kink):
+    """The surface's proof where its rate is a kink's u: `at_kink` takes the kink's entry from a tuple."""
+    _, d, dd, _ = facts[0]
+    clear_kink, falls_kink = at_kink(clears), at_kink(fallings)
+    lead = where(at_kink(facts)[0] > 0.0, d, 0.0)
+    clear_0 = rises(lead, dd) & (clear_kink | falls_kink)
+    falls_0 = (rises(-lead, -dd) & clear_kink) | now[0]
+    return joined((clear_0,), clears[1:]), joined((falls_0,), fallings[1:])
+
+
+@symbolic
+def shows_all(m, pieces, state, mode, unit, trial, tolerance):
+    """Whether a step hides no more than the tolerance.
+
+    Of an event that can hide something the series is asked for its last term too, for the states' do not tell of it.
+    """
+    boxes = tuple(box(trial, s) for s in pieces.states)
+    of_rates, of_events = m.scene.hidden(state, boxes, mode)
+    power = natural_power(trial, m.order - 1)
+    seen = tuple(
+        (hides < 0.5) | (unit * trial * hidden <= tolerance * size(trial, s))
+        for hides, hidden, s in zip(m.scene.hiding[0], of_rates, pieces.states, strict=True)
+    )
+    seen_events = tuple(
+        (hides < 0.5)
+        | (
+            most(hidden, magnitude(factor) * last_term(trial, u) * power)
+            <= tolerance * (magnitude(offset) + magnitude(factor) * size(trial, u))
+        )
+        for hides, hidden, (offset, factor, u) in zip(m.scene.hiding[1], of_events, pieces.events, strict=True)
+    )
+    return all_of(seen) & all_of(seen_events)
+
+
+@jit
+def first_root(found, number, way, curve, event, facts, passed, met, span, tolerance):
+    """`found` is where the leg ends, by which event, whether only just; with this event, where it fires before."""
+    end, which, hangs = found
+    offset, factor, u = event
+    first = met & passed
+    if any_lane(first):
+        first = first & ((which < 0.0) | (fma(factor, way.value(end, curve), offset) <= 0.0))
+        at, only_just = crossing(way.rates, curve, (offset, factor, u[0]), facts, span, tolerance, first)
+        end, which, hangs = where(first, at, end), where(first, number, which), (hangs & not_(first)) | only_just
+    return end, which, hangs
+
+
+@symbolic
+def shorter(h, limit):
+    """The step, no longer than a limit."""
+    return where(h < limit, h, limit)
+
+
+@jit
+@over_tuples
+def to_event(m, state, mode, unit, h, on, tolerance, active, errors, hides, at_kink):
+    """Follow the motion of the active lanes until an event falls through 0, and stop there.
+
+    Parameters
+    ----------
+    unit : of time, in seconds
+    h : first guess of a step, in units
+    on : for each event 1 where the motion starts on it, else 0
+    tolerance : of a step, relative to each state's own size
+    errors : `Errors` at the start of the leg, or ()
+    hides : None where neither rates nor events can hide anything
+    at_kink : None, or the entry of a tuple of the kink whose u is the rate of the surface
+
+    Returns
+    -------
+    leg : Leg
+    late : `carried.Late`, or ()
+    """
+    moving, t, span, tried = active, 0.0 * h, h, 0.0 * h
+    nothing = active & not_(active)
+    passed = tuple(nothing for _ in on)
+    now, margins = passed, tuple(0.0 * h for _ in on)
+    stuck, lost, broken, grazing = nothing, nothing, nothing, nothing
+    power_h, allowed = natural_power(h, m.order - 1), SLACK * tolerance
+    longest, reach = 0.0 * h + FAR, tuple(magnitude(u) for u in state)
+    error = carried.begun(m, state, errors, h)
+    for step in range(STEP_LIMIT):
+        cores, limits, coarse, full = m.cores(state, mode, unit, tolerance, on, t, margins)
+        pieces = m.pieces(state, mode, unit, cores)
+        error = carried.since(m, error, full, state, mode, unit, pieces)
+        facts = tuple(facts_of(offset, factor, u) for offset, factor, u in pieces.events)
+        left = tuple((last_term(h, u), size(h, u)) for u in pieces.controlled)
+        left_out, over = fold(worse, left[0], (), left[1:])
+        ratio = where(left_out <= 0.0, 0.0, left_out * power_h / (tolerance * over))
+        h = where(moving, next_step(h, ratio, m.order), h)
+        h = fold(shorter, h, (), limits)
+        if hides is not None:
+            h = where(h < longest, h, longest)
+        power_h = natural_power(h, m.order - 1)
+        fine = all_of(tuple(keeps(h, power_h, u, allowed) for u in pieces.controlled))
+        trial = h
+        if step == 0:
+            sizes = tuple(magnitude(u[-1]) for u in pieces.states)
+            broken = active & not_(fold(plus, sizes[0], (), sizes[1:]) < math.inf)
+            now = tuple((o < 0.5) & (fact[0] <= 0.0) for o, fact in zip(on, facts, strict=True))
+            pressed = tuple((o > 0.5) & not_(rises(fact[1], fact[2])) for o, fact in zip(on, facts, strict=True))
+            stuck = active & any_of(pressed)
+            trial = where(any_of(now), 0.0, h)
+            margins = tuple(
+                SLACK * tolerance * (magnitude(offset) + magnitude(factor * u[0]))
+                for offset, factor, u in pieces.events
+            )
+            margins = carried.wider(m, margins, state, mode, errors)
+            moving = moving & not_(broken | stuck)
+        tried = where(moving, tried + 1.0, tried)
+        steps = moving
+        if hides is not None:
+            seen = shows_all(m, pieces, state, mode, unit, trial, tolerance)
+            longest = where(seen, longest / COME_UP, COME_UP * trial)
+            steps = moving & seen
+        clears, fallings = judged(m, pieces, facts, margins, now, trial)
+        if at_kink is not None:
+            clears, fallings = by_kink(facts, now, clears, fallings, at_kink)
+        unsure = steps & not_(all_of(tuple(x | y for x, y in zip(clears, fallings, strict=True))))
+        if any_lane(unsure):
+            trial, unsure, fallings = doubted(m, pieces, facts, margins, now, trial, unsure, fallings)
+        broken = broken | (unsure & not_(power_h < FAR))  # it goes off to where no event is
+        grazing = grazing | (unsure & not_(broken))
+        moving = moving & not_(unsure)
+        steps = steps & fine & not_(unsure)
+        ends = tuple(way.value(trial, curve) for way, curve in zip(m.ways, pieces.of_states, strict=True))
+        passed = tuple(
+            before | (steps & falling & (fma(factor, way.value(trial, curve), offset) <= 0.0))
+            for before, falling, way, curve, (offset, factor, u) in zip(
+                passed, fallings, m.watched, pieces.of_events, pieces.events, strict=True
+            )
+        )
+        meets = steps & any_of(passed)
+        span = where(meets, trial, span)
+        steps = steps & not_(meets)
+        changes = carried.changes(m, error, state, mode, unit, pieces, cores)
+        error = carried.still(m, error, h)
+        if any_lane(steps):
+            error = carried.stepped(m, error, changes, state, mode, unit, trial, steps, pieces, cores, coarse)
+        state = choose(steps, ends, state)
+        reach = reached(reach, state)
+        t = where(steps, t + trial, t)
+        now = tuple(x & meets for x in now)
+        moving = moving & not_(meets)
+        if not any_lane(moving):
+            break
+    lost = moving
+    met = active & not_(lost | stuck | broken | grazing)
+    end, which, hangs = fold(
+        first_root, (span, -1.0 - 0.0 * h, nothing), (met, span, tolerance),
+        m.scene.numbers, m.watched, pieces.of_events, pieces.events, facts, passed,
+    )  # fmt: skip
+    own = tuple(met & (which > j - 0.5) & (which < j + 0.5) for j in m.scene.numbers)
+    beside = tuple(
+        met
+        & before
+        & (
+            magnitude(fma(factor, way.value(end, curve), offset))
+            <= fma(SAME, tolerance, ROUNDING) * (magnitude(offset) + magnitude(factor * u[0]))
+        )
+        for before, way, curve, (offset, factor, u) in zip(
+            passed, m.watched, pieces.of_events, pieces.events, strict=True
+        )
+    )
+    fires = tuple(x | y for x, y in zip(beside, own, strict=True))
+    at_root = tuple(way.value(end, curve) for way, curve in zip(m.ways, pieces.of_states, strict=True))
+    ends = m.on_kink(choose(met, at_root, state), fires)
+    t = where(met, t + end, t)
+    h = where(met & (t > 0.0) & (h > LONGEST * t), LONGEST * t, h)
+    others = any_of(tuple(x & not_(y) for x, y in zip(beside, own, strict=True)))
+    here = carried.Here(end, t, which, others)
+    late = carried.at_event(m, error, changes, full, state, mode, unit, ends, here, pieces, cores, coarse)
+    reach = choose(met, reached(reach, ends), reach)
+    fired = tuple(where(x, 1.0, 0.0) for x in fires)
+    return Leg(ends, t, h, fired, stuck, lost, broken, grazing, hangs, tried, reach), late
+
+
+@symbolic
+def plus(x, y):
+    """The sum."""
+    return x + y

@@ -1,0 +1,215 @@
+"""Functions that are run when code is compiled, on symbols: what they do to these is written where they are called.
+
+numba compiles no comprehension over a tuple, and takes some hundredths of a second for each small function. A
+`symbolic` function is plain Python without loops over steps and without branches on values. Where compiled code calls
+it, it is run once with symbols of its arguments to know the result's type, and once more to write the LLVM code; so
+tuples of any length, records and their `_replace`, and branches on what is None or how long it is, cost nothing.
+`over_tuples` does the same for the comprehensions of a function that has loops and branches. In plain Python they are
+functions like any other, of the same bits.
+"""
+
+import ast
+import functools
+import inspect
+import operator
+import textwrap
+from types import FunctionType
+
+from numba import types
+from numba.extending import lower_builtin, type_callable
+
+from kernels.lanes.jit import COMPILED
+
+_SIGNATURES = {}
+"""Of calls that have been typed."""
+
+
+class _Symbol:
+    """What stands for a value: its type, and where there is a builder its LLVM value, written when it is needed."""
+
+    def __init__(self, writer, kind, write=None):
+        self._writer, self._kind, self._write = writer, kind, write
+
+    @functools.cached_property
+    def _value(self):
+        return self._writer.builder and self._write()
+
+    def __call__(self, *arguments):
+        return self._writer.call(self._kind, arguments)
+
+    def __neg__(self):
+        return self._writer.call(operator.neg, (self,))
+
+    def __abs__(self):
+        return self._writer.call(abs, (self,))
+
+
+def _operation(function, turned):
+    def write(x, y):
+        return x._writer.call(function, (y, x) if turned else (x, y))
+
+    return write
+
+
+for _name in ("add", "sub", "mul", "truediv", "lt", "le", "gt", "ge", "and_", "or_"):
+    _function = getattr(operator, _name)
+    setattr(_Symbol, f"__{_name.strip('_')}__", _operation(_function, turned=False))
+    setattr(_Symbol, f"__r{_name.strip('_')}__", _operation(_function, turned=True))
+
+
+class _Writer:
+    """Types calls of compiled functions; with a builder it writes them, too."""
+
+    def __init__(self, typing_context, context=None, builder=None):
+        self.typing_context, self.context, self.builder = typing_context, context, builder
+
+    def opened(self, kind, write=None):
+        """The symbol of what `write` writes; of a tuple or a record such a one of symbols, and None of nothing."""
+        if isinstance(kind, types.NoneType):
+            return None
+        if not isinstance(kind, types.BaseTuple):
+            return _Symbol(self, kind, write)
+        whole = functools.cache(lambda: write())
+        parts = tuple(
+            self.opened(part, lambda j=j: self.builder.extract_value(whole(), j)) for j, part in enumerate(kind)
+        )
+        return kind.instance_class(*parts) if hasattr(kind, "instance_class") else parts
+
+    def closed(self, x):
+        """Type and value of a symbol, a number, or a tuple with such in it."""
+        if isinstance(x, _Symbol):
+            return x._kind, x._value
+        if isinstance(x, tuple):
+            kinds, values = zip(*map(self.closed, x), strict=True) if x else ((), ())
+            kind = types.BaseTuple.from_types(kinds, type(x) if hasattr(x, "_fields") else None)
+            return kind, self.builder and self.context.make_tuple(self.builder, kind, values)
+        kind = types.float64 if isinstance(x, float) else types.unliteral(self.typing_context.resolve_value_type(x))
+        return kind, self.builder and self.context.get_constant_generic(self.builder, kind, x)
+
+    def call(self, function, arguments):
+        """What a compiled function, or one of that type, gives for the arguments."""
+        of_arguments = [self.closed(x) for x in arguments]
+        kind = function if isinstance(function, types.Type) else self.typing_context.resolve_value_type(function)
+        key = kind, tuple(types.unliteral(of_one) for of_one, _ in of_arguments)
+        if key not in _SIGNATURES:
+            _SIGNATURES[key] = kind.get_call_type(self.typing_context, key[1], {})
+        signature = _SIGNATURES[key]
+        if self.builder is None:
+            return self.opened(signature.return_type)
+        wanted = zip(of_arguments, signature.args, strict=True)
+        values = [self.context.cast(self.builder, value, of_one, want) for (of_one, value), want in wanted]
+        called = self.context.get_function(kind, signature)
+        value = called(self.builder, values)
+        self.context.add_linking_libs(getattr(called, "libs", ()))
+        return self.opened(signature.return_type, lambda: value)
+
+
+def _writer_of(arguments):
+    """The writer of the first symbol in tuples of tuples; None where there is none."""
+    for x in arguments:
+        writer = x._writer if isinstance(x, _Symbol) else _writer_of(x) if isinstance(x, tuple) else None
+        if writer is not None:
+            return writer
+    return None
+
+
+def _for_symbols(function):
+    """A global function of a symbolic one, for symbols too."""
+    if hasattr(function, "on_symbols"):
+        return lambda *arguments: function.on_symbols()(*arguments)
+
+    def call(*arguments):
+        writer = _writer_of(arguments)
+        return function(*arguments) if writer is None else writer.call(function, arguments)
+
+    return call
+
+
+@functools.cache
+def _scope_of(module):
+    """Globals of a module, with its functions for symbols."""
+    scope = dict(_MODULES[module])
+    for name, x in scope.items():
+        if isinstance(x, FunctionType) or isinstance(getattr(x, "_numba_type_", None), types.Callable):
+            scope[name] = _for_symbols(x)
+    return scope
+
+
+_MODULES = {}
+"""Globals by the name of their module."""
+
+
+def _on_symbols(function):
+    """The function in the scope that is for symbols."""
+    _MODULES.setdefault(function.__module__, function.__globals__)
+    scope = _scope_of(function.__module__)
+    return FunctionType(function.__code__, scope, function.__name__, function.__defaults__, function.__closure__)
+
+
+def symbolic(function):
+    """Gives a function of plain Python its meaning in compiled code: what it does is written where it is called."""
+    if not COMPILED:
+        return function
+    function.on_symbols = functools.cache(lambda: _on_symbols(function))
+
+    @type_callable(function)
+    def _type(context):
+        def typer(*kinds):
+            writer = _Writer(context)
+            return writer.closed(function.on_symbols()(*map(writer.opened, kinds)))[0]
+
+        typer.pysig = inspect.signature(function)
+        return typer
+
+    @lower_builtin(function, types.VarArg(types.Any))
+    def _lower(context, builder, signature, values):
+        writer = _Writer(context.typing_context, context, builder)
+        arguments = [
+            writer.opened(kind, lambda value=value: value) for kind, value in zip(signature.args, values, strict=True)
+        ]
+        kind, value = writer.closed(function.on_symbols()(*arguments))
+        return context.cast(builder, value, kind, signature.return_type)
+
+    return function
+
+
+@symbolic
+def fold(function, first, shared, *tuples):
+    """function(... function(first, x0, y0, ..., *shared) ..., x1, y1, ..., *shared), from left to right."""
+    for entries in zip(*tuples, strict=True):
+        first = function(first, *entries, *shared)
+    return first
+
+
+class _Lifter(ast.NodeTransformer):
+    """Takes each comprehension over tuples out into a symbolic function of the local names that it uses."""
+
+    def __init__(self, name, local):
+        self.lifted, self._name, self._local = {}, name, local
+
+    def visit_Call(self, node):
+        folds = getattr(node.func, "id", "") == "fold"
+        if not folds and not (getattr(node.func, "id", "") == "tuple" and isinstance(node.args[0], ast.GeneratorExp)):
+            return self.generic_visit(node)
+        names = [n for n in ast.walk(node) if isinstance(n, ast.Name)]
+        own = {n.id for n in names if isinstance(n.ctx, ast.Store)}
+        used = sorted(({n.id for n in names} & self._local) - own)
+        name = f"{self._name}_{len(self.lifted)}"
+        self.lifted[name] = f"def {name}({', '.join(used)}):\n    return {ast.unparse(node)}\n"
+        return ast.parse(f"{name}({', '.join(used)})", mode="eval").body
+
+
+def over_tuples(function):
+    """Lets a function with loops and branches hold `tuple(f(x, y) for x, y in zip(xs, ys))` and `fold`."""
+    if not COMPILED:
+        return function
+    (definition,) = ast.parse(textwrap.dedent(inspect.getsource(function))).body
+    definition.decorator_list = []
+    code = function.__code__
+    lifter = _Lifter(f"_{function.__name__}", {*code.co_varnames, *code.co_cellvars})
+    text = ast.unparse(ast.fix_missing_locations(lifter.visit(definition)))
+    scope = function.__globals__
+    exec("\n".join([*lifter.lifted.values(), text]), scope)
+    for name in lifter.lifted:
+        scope[name] = symbolic(scope[name])
+    return scope[function.__name__]
