@@ -86,7 +86,7 @@ def {name}(state, mode, unit, cores):
 
 SCENE = """
 M = Written(
-    rates, surface, kinks, switched, started, natural_signs, underflows, jet, lost, hidden, bounds, made, offset,
+    rates, surface, kinks, switched, started, natural_signs, underflows, jet, lost, hidden, bounds, made,
     {numbers}, {alternating}, {most_kinks}, cell_of({cell}), {slides}, {hiding}, None, None,
 )
 """
@@ -392,13 +392,11 @@ class Writer:
         """The whole module; of a scene that slides without the Taylor method, which does not follow that."""
         scene, recorded = self.scene, self.recorded
         of_hidden, *hides = self._hidden
-        offset = recorded.offset if recorded.offset.kind == INPUT else recorded.graph.of(0.0)
         parts = [
             filled(HEAD, name=scene.name, doc=scene.doc, states=tuple(scene.states),
                    parameters=tuple(scene.parameters)).lstrip(),
             self.function("rates", "Time derivative of each state.", recorded.rates),
             self.function("surface", "Falls through 0 at the switch.", (recorded.surface,), single=True),
-            self.function("offset", "Of the surface.", (offset,), single=True),
             self.function("kinks", "What is 0 at each kink.", recorded.graph.kinks),
             self.function("switched", "The state behind the switch; the side then turns.", recorded.switched),
             self.function("started", "The state at the start.", recorded.started, ("parameters", "side")),

@@ -19,7 +19,7 @@ class Recorded:
     `events` are (offset, factor, u): each fires where offset + factor u falls through 0; the first is the switch, the
     others are the kinks. The switch's has the factor ".way": -1 while the motion is behind the surface, where its event
     is that it comes up. `timed` are the rates per unit of time, an input ".unit" in seconds. `onto` and `speeds` are
-    those of `sliding.slid`; `offset` is the surface's own.
+    those of `sliding.slid`.
     """
 
     graph: Graph
@@ -30,7 +30,6 @@ class Recorded:
     started: tuple[Expression, ...]
     events: tuple[tuple[Expression, Expression, Expression], ...]
     nested: int
-    offset: Expression
     onto: tuple[Expression, ...] = ()
     speeds: tuple[tuple[Expression, Expression], ...] = ()
 
@@ -64,7 +63,6 @@ def record(scene):
         started,
         events,
         _nested(events, dict(zip(states.values(), rates, strict=True))),
-        offset,
     )
     return slid(recorded, scene.states) if scene.slides else recorded
 

@@ -248,8 +248,7 @@ def advance(m, leg, memory, i, tells, slides):
             new_signs, kinks_on = settled(m, jumped, side, parameters, unit, near)
             state, signs = choose(switches, jumped, state), choose(switches, new_signs, signs)
             mode = Mode(side, signs, parameters, False)
-            after, offset = m.surface(state, mode), m.offset(state, mode)
-            extent = magnitude(offset) + magnitude(after - offset)
+            after, extent = m.surface(state, mode), m.made(state, mode)[0][0]
             still = magnitude(after) <= fma(1e-12, extent, 2.0 * magnitude(before_it))
             on = choose(switches, joined((where(still, 1.0, 0.0),), kinks_on), on)
             way = where(switches & (after < 0.0) & not_(still), -1.0, signs[-1])
