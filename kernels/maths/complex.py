@@ -41,25 +41,6 @@ def size(z):
     return magnitude(z[0]) + magnitude(z[1])
 
 
-@jit
-def plus(y, z):
-    """Sum of two complex numbers."""
-    return y[0] + z[0], y[1] + z[1]
-
-
-@jit
-def times(z, number):
-    """z times a real number."""
-    return z[0] * number, z[1] * number
-
-
-@jit
-def quotient(y, z):
-    """Quotient of two complex numbers of any size; NaN or infinite for z = 0."""
-    own = -exponent(where(size(z) > 0.0, size(z), 1.0))
-    return scaled(over(y, scaled(z, own)), own)
-
-
 @jit_call
 def modulus(re, im):
     """abs(re + i im), also where a square would leave the range."""
