@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sweep.file.layout import ENDING
-from sweep.file.reading import ending_of, study_together
+from sweep.file.reading import ending_of
+from sweep.study.model import study_together
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -26,7 +26,6 @@ from sweep.cells.schema import STATUS, Column, Schema
 from sweep.file import disk
 from sweep.file.fletcher import checksum
 from sweep.file.layout import (
-    ARRAY,
     BYTES,
     ENDING,
     ENDING_BYTES,
@@ -38,6 +37,7 @@ from sweep.file.layout import (
     contents,
     sealed,
 )
+from sweep.study.model import ARRAY
 
 if TYPE_CHECKING:
     from sweep.study.model import Study

@@ -47,8 +47,6 @@ PIECE = 8 << 20
 """Bytes read at a time."""
 GROUP, ENDING, ENDING_BYTES = "integrity", "integrity/ending", 256
 """The group of digests, and in it what is written when all is done: JSON, and its digest."""
-ARRAY = '"float64":"%s"'
-"""An array in the JSON of a study: as hexadecimal digits, or @ and the name of the coordinate that it is."""
 DAMAGE = (OSError, EOFError, LookupError, ValueError, TypeError, AttributeError, RuntimeError)
 """What comes of reading a damaged file."""
 

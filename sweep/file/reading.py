@@ -23,7 +23,8 @@ from kernels.interface import Status
 from sweep.cells.schema import METHOD_USED, STATUS, Coordinate
 from sweep.errors import SweepError
 from sweep.file import disk
-from sweep.file.layout import ARRAY, BYTES, ENDING_BYTES, read_bytes, read_seal
+from sweep.file.layout import BYTES, ENDING_BYTES, read_bytes, read_seal
+from sweep.study.model import study_together
 
 READERS = 4
 """Threads that read a large piece,"""
@@ -272,14 +273,6 @@ def _parts(wanted: Any, size: int, length: int) -> list[tuple[int, int, Any, sli
         found.append((box, own, there, slice(start, stop)))
         start = stop
     return found
-
-
-def study_together(text: str, coords: Mapping[Any, Any]) -> str:
-    """The JSON of a study, with the numbers of the coordinates to which it refers in the file."""
-    for name, coordinate in coords.items():
-        if (named := ARRAY % f"@{name}") in text:
-            text = text.replace(named, ARRAY % coordinate.values.tobytes().hex())
-    return text
 
 
 def ending_of(text: bytes) -> dict[str, str]:

@@ -23,6 +23,8 @@ AUTO = -1
 SETTINGS = ("method", "rtol")
 """What may be an axis although it is no parameter of the kernel."""
 SMALLEST_RTOL = 1e-15
+ARRAY = '"float64":"%s"'
+"""An array in the JSON of a study: as hexadecimal digits; in a file also @ and the name of a coordinate."""
 DECLARED = {
     Kernel: ("name", "doc", "source", "parameters", "outputs", "methods", "along", "same_length"),
     Method: ("name", "doc", "excludes", "lacks"),
@@ -238,6 +240,22 @@ class Study:
         except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
             raise SweepError(f"not the JSON of a study: {type(error).__name__} {error}") from None
         return study if declared else dataclasses.replace(study, kernel=load_kernel(study.kernel_name, allow_import))
+
+
+def study_together(text: str, coords: Mapping[Any, Any]) -> str:
+    """The JSON of a study, with the numbers of the coordinates to which it refers in a file.
+
+    Raises
+    ------
+    SweepError
+        A coordinate is shorter than the study has it.
+    """
+    for name, coordinate in coords.items():
+        if (named := ARRAY % f"@{name}") in text:
+            if f'{named},"shape":[{len(coordinate.values)}' not in text:
+                raise SweepError(f"{name}: a part of this axis is missing; open the file with sweep.open_result")
+            text = text.replace(named, ARRAY % coordinate.values.astype("<f8").tobytes().hex())
+    return text
 
 
 def setting(name: str, kernel: Kernel) -> Field:

@@ -122,3 +122,14 @@ def test_xarray_opens_a_result_as_one_of_ours(clocks, tmp_path):
         assert ours.period.identical(opened.period)
         assert "amplitude" not in ours
         assert opened.period.equals(clocks.period)
+
+
+def test_the_study_of_a_long_axis_is_whole_for_plain_xarray_too(tmp_path):
+    """Its values stand in the file once, as the coordinate."""
+    with sweep.run(FOLIOT | {"axes": {"mu": np.geomspace(0.3, 30.0, 3000)}}, tmp_path / "long.h5") as written:
+        study = sweep.study(written)
+    with xr.open_dataset(tmp_path / "long.h5") as plain:
+        assert sweep.study(plain) == study
+        assert plain.sweep.check(sample=2).beyond == 0
+        with pytest.raises(sweep.SweepError, match="mu"):
+            sweep.study(plain.isel(mu=slice(10)))
