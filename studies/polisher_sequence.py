@@ -60,7 +60,7 @@ def optimum(ds: xr.Dataset) -> list[Statement]:
     return [
         *alone,
         Statement("best sequence", "-", f"{best:.1%}, centre {mixed[0]:.2f}, {used.sum()} settings", None,
-                  bool(best < single / 10 and least(mixed, weight, ds.radius.values) > KEPT)),
+                  bool(best < single / 35 and least(mixed, weight, ds.radius.values) > KEPT)),
         Statement("  conditions of an optimum", "0", "largest breach", worst, worst < 1e-6),
         *[Statement(f"  {s:.0%} of the wear at", "", where) for s, where in steps(ds, shares)],
     ]  # fmt: skip

@@ -139,7 +139,7 @@ def eccentricities(ds: xr.Dataset) -> list[Statement]:
     lost = tool.average.isel(w_x=0)
     return [
         Statement("disc, no offset: throw halves the unevenness", "", text, None, bool(evenest < 0.5 * aligned[0])),
-        *one_setting(ds),
+        *one_setting(tool),
         Statement(
             "disc, no offset: mean wear more than doubles with throw [um/h]", "",
             f"{UM_PER_HOUR * float(lost[0]):.3g} at 2 cm, at most {UM_PER_HOUR * float(lost.max()):.3g}", None,

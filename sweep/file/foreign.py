@@ -38,11 +38,11 @@ def changed_result(path: Path) -> xr.Dataset:
         # h5netcdf takes the first axis, too, to be over a dimension that it makes up
         if any(str(dim).startswith("phony_dim") for dim in found.sizes):
             raise ValueError("something in it is over no dimension of its own")
-        numbers = all(v.dtype.kind in "fiu" for v in found.data_vars.values())
+        numbers = all(v.dims and v.dtype.kind in "fiu" for v in found.data_vars.values())
         texts = [found.attrs[name] for name in ("study_json", "fingerprint", "start")]
         texts += [v.attrs[name] for v in found.variables.values() for name in ("units", "long_name") if name in v.attrs]
         if not numbers or not all(isinstance(text, str) for text in texts):
-            raise TypeError("something in it is no number, or no text")
+            raise TypeError("something in it is no number of a cell, or no text")
         # words as fixed-width text, as in a Dataset that was never in a file
         words = {name: c for name, c in found.coords.items() if c.dtype.kind not in "fi"}
         plain = found.assign_coords({name: (c.dims, c.values.astype(str), c.attrs) for name, c in words.items()})

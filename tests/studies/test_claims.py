@@ -89,7 +89,7 @@ TABLE = {
     "polisher_wear": Claims({
         "polisher_wear": {"e": [0.02, 0.08, 0.1, 0.16], "w_x": [0.5, 0.53, 0.54, 0.56, 0.58], "radius": 2},
         "polisher_wear_load": {"radius": [0.0, 0.05, 0.098], "rtol": 1e-4},
-    }, "wear_error", 4),
+    }, "wear_error", 8),
     "polisher_zone": Claims({"polisher_zone": {}}, "wear_error", 3),
     "rate_parameters": Claims({"rate_parameters": {}}, "", 4),
     "self_starting": Claims({"self_starting": {}}, "flip_speed status", 6),
@@ -125,8 +125,8 @@ TABLE = {
     "verge_losses": Claims({
         "verge_losses": {"I_c": 2.5e-6 * 10 ** (np.array([0, 4, 5, 6, 8, 12, 16]) / 4), "flips": 3000, "rtol": 1e-9},
         "verge_losses_wheel": {"flips": 3000, "rtol": 1e-9},
-    }, "angle gap interval recoil time status verge_losses_wheel.drag verge_losses_wheel.rubbing "
-        "verge_losses_wheel.speed verge_losses_wheel.wheel", 1),
+    }, "angle gap interval time status verge_losses_wheel.drag verge_losses_wheel.rubbing "
+        "verge_losses_wheel.recoil verge_losses_wheel.speed verge_losses_wheel.wheel", 1),
 }
 # fmt: on
 
