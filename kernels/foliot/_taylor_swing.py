@@ -213,7 +213,10 @@ def cycles(cells, rtol, rippled, asked):
         # the error of fine ones by how far they are from the rough ones; done where that will do, or nothing helps
         moved = np.abs(v[i] / before[i] - 1.0)
         apart = np.abs(found / outputs[:, i] - 1.0)
-        apart = (told[i] + 2.0 * relative / moved) * apart + 2.0 * relative
+        rate = np.divide(
+            relative, moved, out=np.zeros_like(moved), where=moved > 0.0
+        )  # 0 of a speed that has not moved
+        apart = (told[i] + 2.0 * rate) * apart + 2.0 * relative
         floor = np.tile((_ROUNDING + tolerance[i]) / gap, (len(found), 1))
         floor[3] *= 1.0 + cancels
         floor[4] *= 1.0 + decay
