@@ -84,11 +84,12 @@ def require_asked(study: Study) -> None:
 
 
 def solved(study: Study) -> Cells:
-    """All cells of a study, in memory; those at which the kernel raises FAILED."""
+    """All cells of a study with their errors, in memory; those at which the kernel raises FAILED."""
     from sweep.cells.guard import Guard
     from sweep.cells.solve import Solver
 
-    cells = empty_cells(study, Grid(study).size)
+    size = Grid(study).size
+    cells = empty_cells(study, size)._replace(error=np.empty(size, np.float32))
     Guard(Solver(study), lambda cell: None).solve(0, cells)
     return cells
 
@@ -112,3 +113,13 @@ def multiplied(study: Study, factors: Mapping[str, Any]) -> Study:
     fixed = {name: frozen(value) if np.ndim(value) else value for name, value in fixed.items()}
     along = {name: frozen(values * by.get(name, 1.0)) for name, values in study.along.items()}
     return replace(study, axes=axes, fixed=fixed, along=along)
+
+
+def relative_error(values: Any, true: Any, size: float = 0.0) -> Any:
+    """Largest relative error of an output in each cell; of traces to their largest value, and to `size` if larger."""
+    rest = tuple(range(1, true.ndim))
+    scale = np.nanmax(np.abs(true), axis=rest, keepdims=True, initial=0.0) if rest else np.abs(true)
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+        off = np.abs(values - true) / np.maximum(scale, size)
+    off = np.where((values == true) | (np.isnan(values) & np.isnan(true)), 0.0, off)
+    return np.where(np.isnan(off), np.inf, off).max(axis=rest, initial=0.0)

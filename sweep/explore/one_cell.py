@@ -10,11 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kernels.interface import Status
-from sweep.cells.grid import Cells, Grid, empty_cells
-from sweep.cells.guard import Guard
-from sweep.cells.sample import with_method
+from sweep.cells.sample import solved, with_method
 from sweep.cells.schema import ERROR_BOUND, METHOD_USED, STATUS
-from sweep.cells.solve import Solver
 from sweep.cells.turns import usable_methods
 from sweep.errors import SweepError
 from sweep.results.statuses import flag_words
@@ -61,12 +58,8 @@ def cell_study(dataset: xr.Dataset, study: Study) -> Study:
     first = next(field.name for field in study.kernel.parameters if field.default is None)
     axes = {first: Axis(first, frozen([fixed.pop(first)]), "values")}
     plain: dict[str, Any] = {"design": "product", "blocks": (), "where": "", "summary": None, "follows": {}}
-    return dataclasses.replace(study, axes=axes, fixed=fixed, **plain, **_asked(dataset, study))
-
-
-def _asked(dataset: xr.Dataset, study: Study) -> dict[str, Any]:
-    """The method and the rtol that were asked for in the cell."""
-    return {name: dataset[name].item() for name in SETTINGS if name in study.axes}
+    asked = {name: dataset[name].item() for name in SETTINGS if name in study.axes}
+    return dataclasses.replace(study, axes=axes, fixed=fixed, **plain, **asked)
 
 
 def together(alone: Sequence[Study]) -> Study:
@@ -77,14 +70,6 @@ def together(alone: Sequence[Study]) -> Study:
     axes = {name: Axis(name, frozen([cell[name] for cell in cells]), "values") for name in swept}
     fixed = {name: value for name, value in first.items() if name not in axes}
     return dataclasses.replace(alone[0], design="zip", axes=axes, fixed=fixed)
-
-
-def solved_by(study: Study, method: str, rtol: float) -> Cells:
-    """All cells of a study, by one method at one rtol, with their errors."""
-    size = Grid(study).size
-    cells = empty_cells(study, size)._replace(error=np.empty(size, np.float32))
-    Guard(Solver(with_method(study, method, rtol)), lambda cell: None).solve(0, cells)
-    return cells
 
 
 @dataclass(frozen=True)
@@ -149,7 +134,7 @@ def report_cell(dataset: xr.Dataset, study: Study) -> CellReport:
     numbers = [name for name in study.outputs if not dataset[name].dims]
     words, again = {int(status): status for status in Status}, {}
     for method in (study.kernel.methods[k].name for k in usable_methods(alone)):
-        cells = solved_by(alone, method, alone.rtol)
+        cells = solved(with_method(alone, method, alone.rtol))
         outputs = {name: float(cells.outputs[name][0]) for name in numbers}
         again[method] = words[int(cells.status[0])], float(cells.error[0]), outputs
     return CellReport(

@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kernels.interface import Status
+from kernels.interface import FIRST_REFUSAL, Status
+from sweep.cells.sample import relative_error, solved, with_method
 from sweep.cells.schema import METHOD_USED, STATUS
+from sweep.cells.solve import GIVEN_UP, among
 from sweep.cells.turns import usable_methods
 from sweep.errors import SweepError
-from sweep.explore.one_cell import cell_study, require_cells, solved_by, together
+from sweep.explore.one_cell import cell_study, require_cells, together
 from sweep.results.statuses import cell_values
 from sweep.study.model import SMALLEST_RTOL, Study
 
@@ -21,7 +23,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 CLOSER = 100.0
-"""A second opinion is asked for at rtol over this."""
+"""A second opinion is asked for at rtol over this, or at the smallest rtol."""
 GOOD = 10.0
 """Its own error is to be below rtol over this, or where none is, below rtol."""
 CONFIDENCE = 0.95
@@ -40,7 +42,8 @@ class Checked:
     by_another : int
         Judged cells whose second opinion came from another method.
     beyond : int
-        Judged cells in which an output differs by more than rtol and the error of the second opinion.
+        Judged cells in which an output differs by more than rtol and the error of the second opinion, or of which the
+        second opinion is that there is no such answer.
     limit : float
         Share of all OK cells that may be beyond rtol, at 95 % confidence.
     worst : dict
@@ -58,7 +61,7 @@ class Checked:
     def __str__(self) -> str:
         same = self.judged - self.by_another
         lines = [
-            f"{self.sample:,} of {self.cells:,} OK cells solved again, at rtol/{CLOSER:g}: "
+            f"{self.sample:,} of {self.cells:,} OK cells solved again, up to {CLOSER:g} times as closely: "
             f"{self.by_another:,} by another method, {same:,} by the same"
             + (" (which does not see a fault that both runs have)" if same else "")
         ]
@@ -118,7 +121,10 @@ def check(dataset: xr.Dataset, study: Study, sample: int = 200, seed: int = 0) -
     beyond, worst = 0, dict[str, Any]()
     opinions = _second_opinions(alone, used)
     for i, (other, error, values) in opinions.items():
-        off = {name: _difference(cells[i][name].values, values[name], sizes[name]) for name in compared}
+        off = {
+            name: float(relative_error(cells[i][name].values[None], values[name][None], sizes[name])[0])
+            for name in compared
+        }
         output = max(off, key=lambda name: off[name])
         beyond += off[output] > alone[i].rtol + error
         if not worst or off[output] / alone[i].rtol > worst["off"]:
@@ -136,7 +142,10 @@ def check(dataset: xr.Dataset, study: Study, sample: int = 200, seed: int = 0) -
 
 
 def _second_opinions(alone: Sequence[Study], used: Sequence[str]) -> dict[int, tuple[str, float, dict[str, Any]]]:
-    """By cell: a method, what it is right to, and its outputs; none of cells that no method solves closely enough."""
+    """By cell: a method, what it is right to, and its outputs; none of cells that no method solves closely enough.
+
+    Where a method finds that the scene has no such answer, the outputs are NaN, and differ from any value.
+    """
     able = [[study.kernel.methods[k].name for k in usable_methods(study)] for study in alone]
     # those that say what they are right to come first, and the method that solved a cell last
     methods = sorted(alone[0].kernel.methods, key=lambda m: m.bound is None and not m.estimates)
@@ -151,20 +160,14 @@ def _second_opinions(alone: Sequence[Study], used: Sequence[str]) -> dict[int, t
             ]
             if not todo:
                 continue
-            cells = solved_by(together([alone[i] for i in todo]), name, max(rtol / CLOSER, SMALLEST_RTOL))
+            closer = max(rtol / CLOSER, SMALLEST_RTOL)
+            cells = solved(with_method(together([alone[i] for i in todo]), name, closer))
+            none = (cells.status >= FIRST_REFUSAL) & ~among(cells.status, GIVEN_UP)
             for row, i in enumerate(todo):
-                status, error = cells.status[row], float(cells.error[row])
-                if status in (Status.OK, Status.INACCURATE) and error <= rtol / good:
+                status, error = cells.status[row], 0.0 if none[row] else float(cells.error[row])
+                if none[row] or (status in (Status.OK, Status.INACCURATE) and error <= rtol / good):
                     found[i] = name, error, {output: column[row] for output, column in cells.outputs.items()}
     return found
-
-
-def _difference(value: Any, again: Any, size: float) -> float:
-    """How far a value is off another one, relative to the largest of it and of `size`."""
-    with np.errstate(invalid="ignore"):  # where both are infinite
-        off = np.where((value == again) | (np.isnan(value) & np.isnan(again)), 0.0, abs(value - again)).max()
-    size = max(size, float(np.nanmax(abs(again), initial=0.0)))
-    return float(np.nan_to_num(off / size, nan=np.inf)) if off else 0.0
 
 
 def _limit(beyond: int, judged: int, cells: int) -> float:

@@ -21,7 +21,7 @@ import xarray as xr
 
 from kernels.interface import FIRST_REFUSAL, Status
 from sweep.cells.grid import Grid, empty_cells
-from sweep.cells.sample import sampled, solved, with_method
+from sweep.cells.sample import relative_error, sampled, solved, with_method
 from sweep.cells.schema import STATUS
 from sweep.cells.solve import GIVEN_UP, Solver, among
 from sweep.cells.turns import usable_methods
@@ -321,19 +321,6 @@ def _best(study: Study, names: Sequence[str]) -> _Reference:
     return best
 
 
-def _errors(outputs: Mapping[str, Any], reference: Mapping[str, Any]) -> Any:
-    """Largest relative error of each cell over its outputs, of traces relative to their largest value."""
-    worst = np.zeros(len(next(iter(reference.values()))))
-    for name, true in reference.items():
-        values, rest = outputs[name], tuple(range(1, true.ndim))
-        size = np.nanmax(np.abs(true), axis=rest, keepdims=True, initial=0.0) if rest else np.abs(true)
-        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-            off = np.abs(values - true) / size
-        off = np.where((values == true) | (np.isnan(values) & np.isnan(true)), 0.0, off)
-        worst = np.maximum(worst, np.where(np.isnan(off), np.inf, off).max(axis=rest, initial=0.0))
-    return worst
-
-
 def _table(study: Study, names: Sequence[str], tolerances: Sequence[float], against: _Reference) -> xr.Dataset:
     """Everything that is measured, over methods and tolerances."""
     rows = [_measured(study, name, rtol, against) for name in names for rtol in tolerances]
@@ -348,7 +335,7 @@ def _table(study: Study, names: Sequence[str], tolerances: Sequence[float], agai
 def _measured(study: Study, name: str, rtol: float, against: _Reference) -> dict[str, Any]:
     """What is measured of a method at a tolerance, but for its time."""
     outputs, status, used, _ = solved(with_method(study, name, rtol))
-    error = _errors(outputs, against.values)
+    error = np.max([relative_error(outputs[name], true) for name, true in against.values.items()], axis=0)
     methods = [method.name for method in study.kernel.methods]
     # against itself the reference has no error; what can be said is what it is right to, also where auto took it
     itself = used == methods.index(against.source) if against.source in methods else np.zeros(len(used), bool)

@@ -34,8 +34,8 @@ class SweepAccessor:
     2
     >>> figure = ds.sweep.plot(y="amplitude")
     >>> print(ds.sweep.statuses())
-      status  cells  what it says
-      OK      3      right to the wanted rtol
+      cells  status  kind  meaning, and where
+      3      OK      ok    right to the wanted rtol
     >>> ds.sweep.check().beyond
     0
     >>> ds.sweep.cell(mu=2.0).method
@@ -84,17 +84,10 @@ class SweepAccessor:
         return fit_exponent(self._dataset[output_of(self._dataset, y)], x, **options)
 
     def statuses(self) -> Table:
-        """How many cells have each status, what it says, and one of them."""
-        from kernels.interface import Status
-        from sweep.results.statuses import count_statuses
-        from sweep.words import Table
+        """How many cells have each status, what it says, and where: as `sweep show`."""
+        from sweep.show.text import status_table
 
-        found = count_statuses(self._dataset)
-        rows = [
-            (one.name, f"{one.cells:,}", Status[one.name].doc, ", ".join(f"{k}={v}" for k, v in one.example.items()))
-            for one in found
-        ]
-        return Table(rows, ("status", "cells", "what it says", "e.g." if any(row[3] for row in rows) else ""))
+        return status_table(self._dataset)
 
     def cell(self, *, allow_import: bool = False, **values: float | str) -> CellReport:
         """What there is to say of one cell, named by the values of its axes: as the command `sweep cell`.

@@ -106,7 +106,7 @@ def sections(dataset: xr.Dataset) -> list[Table]:
         variables(fixed, _value, "parameter", "value", "fixed"),
         coordinates(along, "coordinate", "along"),
         variables(outputs, _extent if scanned else lambda output: "", kind, "from, to", f"{kind}s"),
-        Table(_status_rows(dataset), ("cells", "status", "kind", "meaning, and where"), "status"),
+        status_table(dataset, "status"),
         Table(_method_rows(dataset), ("method", "cells", "share"), "methods used"),
     ]
     return [table for table in tables if table.rows]
@@ -155,14 +155,16 @@ def _extent(output: xr.DataArray) -> str:
     return _span(output.values[np.isfinite(output.values)]) or "no values"
 
 
-def _status_rows(dataset: xr.Dataset) -> Rows:
+def status_table(dataset: xr.Dataset, title: str = "") -> Table:
     """Every status that occurs: cells, kind, meaning; but for OK also where on the axes it occurs, and an example."""
+    rows: list[tuple[str, ...]] = []
     places = {} if is_summary(dataset) else _places(dataset)
     for count in count_statuses(dataset):
         texts = [Status[count.name].doc if count.name in Status.__members__ else "", places.get(count.name, "")]
         if count.example:
             texts.append(f"e.g. {' '.join(f'{name}={value}' for name, value in count.example.items())}")
-        yield f"{count.cells:,}", count.name, kind_of(count.name), "; ".join(filter(None, texts))
+        rows.append((f"{count.cells:,}", count.name, kind_of(count.name), "; ".join(filter(None, texts))))
+    return Table(rows, ("cells", "status", "kind", "meaning, and where"), title)
 
 
 def _method_rows(dataset: xr.Dataset) -> Rows:

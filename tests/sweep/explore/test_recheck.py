@@ -133,3 +133,16 @@ def test_the_study_of_a_long_axis_is_whole_for_plain_xarray_too(tmp_path):
         assert plain.sweep.check(sample=2).beyond == 0
         with pytest.raises(sweep.SweepError, match="mu"):
             sweep.study(plain.isel(mu=slice(10)))
+
+
+def test_a_value_where_another_method_finds_that_there_is_none_is_beyond(clocks):
+    """Below R nothing starts; a result that says OK there is wrong, whatever its values."""
+    fixed = {name: clocks[name].item() for name in ("phi0", "a")}
+    refused = sweep.run(FOLIOT | {"axes": {"mu": [0.05, 1.0], "R": [0.1]}, "fixed": fixed})
+    false = refused.assign(
+        {name: refused[name].fillna(1.0) for name in FOLIOT["outputs"]}
+        | {"status": refused.status * 0, "method_used": refused.method_used.isel(mu=[1, 1]).drop_vars("mu")}
+    )
+    found = false.sweep.check()
+    assert (found.judged, found.beyond) == (2, 1)
+    assert found.worst["off"] == np.inf
