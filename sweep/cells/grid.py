@@ -26,14 +26,17 @@ class Box:
 
 
 class Grid(Box):
-    """The cells of a study; its dims are the axes of a product, ("cell",) of axes that run together."""
+    """The cells of a study; its dims are the axes of a product, ("cell",) of axes that run together.
+
+    `varying` names the axis of every column that varies, by the column's number.
+    """
 
     def __init__(self, study: Study) -> None:
         super().__init__(tuple(study.grid_shape), tuple(study.grid_shape.values()))
         self.study = study
         self._runs = {name: study.run(name) for name in study.axes}
         sources = enumerate(study.follows.get(field.name, field.name) for field in study.kernel.parameters)
-        self._varying = {place: name for place, name in sources if name in study.axes}
+        self.varying = {place: name for place, name in sources if name in study.axes}
 
     def constants(self) -> dict[int, float | Floats]:
         """Column number and value of every parameter that is the same in all cells."""
@@ -43,11 +46,11 @@ class Grid(Box):
     def spreads(self) -> dict[int, Floats | None]:
         """All values that the parameter at each position takes, shape (values, ...); None where that is not known."""
         found: dict[int, Floats | None] = {k: np.asarray(value)[None] for k, value in self.constants().items()}
-        return found | {k: self.study.axes[name].values for k, name in self._varying.items()}
+        return found | {k: self.study.axes[name].values for k, name in self.varying.items()}
 
     def columns(self, start: int, stop: int, out: Sequence[Floats]) -> None:
         """Write the varying parameters of the cells `start` to `stop` into columns, one per parameter of the kernel."""
-        for place, name in self._varying.items():
+        for place, name in self.varying.items():
             out[place][: stop - start] = self.column(name, start, stop)
 
     def column(self, name: str, start: int, stop: int) -> Floats:

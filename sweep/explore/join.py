@@ -80,7 +80,7 @@ def join(
     if 2 * sum(dataset.nbytes for dataset in results) > memory():
         raise SweepError("the two results together do not fit into the memory")
     studies = [Study.from_json(str(dataset.attrs["study_json"]), declared=True) for dataset in results]
-    joined, whole = _along(axis, studies, results, labels) if axis is not None else _joined(studies, results)
+    joined, whole = _fitted(axis, labels, studies, results)
     joined = replace(joined, text="", title=studies[0].title)
 
     grid = Grid(joined)
@@ -104,51 +104,45 @@ def join(
     return store_cells(joined, path, arrays, force, mark, versions)
 
 
-def _apart(first: Study, second: Study) -> list[str]:
-    """What two studies differ in: "axes.mu", "fixed.a", "rtol", of axes that run together "points"."""
+def _fitted(
+    axis: str | None, labels: tuple[str, ...], studies: Sequence[Study], results: Sequence[xr.Dataset]
+) -> tuple[Study, xr.Dataset]:
+    """The study of both along a new axis or what they differ in, and the numbers in its dimensions."""
+    first, second = studies
     old, new = (
         {name: text for name, text in fingerprint(study).items() if name != "study" and not is_of_program(name)}
-        for study in (first, second)
+        for study in studies
     )
+    # "axes.mu", "fixed.a", "rtol"; of axes that run together "points"
     apart = sorted(name for name in {*old, *new} if old.get(name) != new.get(name))
     if first.dims == second.dims and len(first.dims) == 1 and first.design != "product":
         apart = list(dict.fromkeys("points" if name.startswith("axes.") else name for name in apart))
-    return apart
+    differ = f"they differ in {listed(apart, word='and')}"
+    if axis is not None:
+        if apart:
+            raise SweepError(f"along {axis} all else is to be the same; {differ}")
+        taken = (*results[0].variables, *SETTINGS, *results[0].dims)
+        if not isinstance(axis, str) or not axis.isidentifier() or axis in taken:
+            raise SweepError(f'"{axis}" cannot be the name of a new axis; choose another')
+        if len(labels) != 2 or len(set(labels)) != 2 or not all(isinstance(label, str) and label for label in labels):
+            raise SweepError("a new axis needs two labels that differ")
+        return _with_axis(first, results, Axis(axis, frozen([0.0, 1.0]), "values", labels))
 
-
-def _along(
-    axis: str, studies: Sequence[Study], results: Sequence[xr.Dataset], labels: tuple[str, ...]
-) -> tuple[Study, xr.Dataset]:
-    """The study of both along a new axis of words, and the numbers in its dimensions. Raises SweepError."""
-    if apart := _apart(*studies):
-        raise SweepError(f"along {axis} all else is to be the same; they differ in {listed(apart, word='and')}")
-    taken = (*results[0].variables, *SETTINGS, *results[0].dims)
-    if not isinstance(axis, str) or not axis.isidentifier() or axis in taken:
-        raise SweepError(f'"{axis}" cannot be the name of a new axis; choose another')
-    if len(labels) != 2 or len(set(labels)) != 2 or not all(isinstance(label, str) and label for label in labels):
-        raise SweepError("a new axis needs two labels that differ")
-    return _with_axis(studies[0], results, Axis(axis, frozen([0.0, 1.0]), "values", labels))
-
-
-def _joined(studies: Sequence[Study], results: Sequence[xr.Dataset]) -> tuple[Study, xr.Dataset]:
-    """The study of both along what they differ in, and the numbers in its dimensions. Raises SweepError."""
-    first, second = studies
-    apart = _apart(first, second)
+    unfit = "the results do not fit together:"
     if len(apart) != 1:
-        what = f"they differ in {listed(apart, word='and')}" if apart else "they do not differ; name a new axis"
-        raise SweepError(f"the results do not fit together: {what}")
+        raise SweepError(f"{unfit} {differ if apart else 'they do not differ; name a new axis'}")
     group, _, name = apart[0].rpartition(".")
     if group == "axes" or apart == ["points"]:
         return _longer(first, second, results, name if first.design == "product" else next(iter(first.dims)))
     if group != "fixed" and name not in SETTINGS:
-        raise SweepError(f"the results do not fit together: they differ in {apart[0]}")
+        raise SweepError(f"{unfit} {differ}")
     if name == "method":
         methods = first.method, second.method
         codes = {"auto": -1.0} | {method.name: float(code) for code, method in enumerate(first.kernel.methods)}
         return _with_axis(first, results, Axis(name, frozen([codes[m] for m in methods]), "values", methods))
     values = [study.rtol if name == "rtol" else study.fixed.get(name) for study in studies]
     if any(value is None or np.ndim(value) for value in values):
-        raise SweepError(f"the results do not fit together: they differ in {name}, which is not one number in both")
+        raise SweepError(f"{unfit} they differ in {name}, which is not one number in both")
     choices = {} if name == "rtol" else first.kernel.parameter(name).choices
     words = {float(number): word for word, number in choices.items()}
     said = tuple(words[float(value)] for value in values) if words else None  # type: ignore[arg-type]
@@ -175,8 +169,15 @@ def _longer(a: Study, b: Study, results: Sequence[xr.Dataset], dim: str) -> tupl
     """Both, longer along an axis or by further points; what is in both has to be the same."""
     first, second = results
     names = [dim] if a.design == "product" else list(a.axes)
-    places = {point: place for place, point in enumerate(_points(a, names))}
-    here = [places.get(point) for point in _points(b, names)]
+
+    def points(study: Study) -> Iterable[tuple[Any, ...]]:
+        """What tells places along the axes, which run together, from each other."""
+        axes = [study.axes[name] for name in names]
+        columns = (axis.words if axis.words is not None else axis.values.tolist() for axis in axes)
+        return zip(*([tuple(v) if isinstance(v, list) else v for v in column] for column in columns), strict=True)
+
+    places = {point: place for place, point in enumerate(points(a))}
+    here = [places.get(point) for point in points(b)]
     shared = [place for place, there in enumerate(here) if there is not None]
     fresh = [place for place, there in enumerate(here) if there is None]
     if shared:
@@ -196,14 +197,6 @@ def _longer(a: Study, b: Study, results: Sequence[xr.Dataset], dim: str) -> tupl
         axes[dim] = replace(axes[dim], values=frozen(axes[dim].values[order]))
         whole = whole.isel({dim: order})
     return replace(a, axes=axes), whole
-
-
-def _points(study: Study, names: Sequence[str]) -> Iterable[tuple[Any, ...]]:
-    """What tells places along some axes, which run together, from each other."""
-    axes = [study.axes[name] for name in names]
-    values = (axis.words if axis.words is not None else axis.values.tolist() for axis in axes)
-    columns = ([tuple(value) if isinstance(value, list) else value for value in column] for column in values)
-    return zip(*columns, strict=True)
 
 
 def _numbers(dataset: xr.Dataset, study: Study) -> xr.Dataset:

@@ -109,50 +109,42 @@ def with_beyond(corners: Indices) -> Indices:
     return np.concatenate([corners, opposite, opposite[neighbour].reshape(count, -1)], axis=1)
 
 
-def interpolation_errors(points: Array, heights: Array, around: Indices) -> tuple[Array, Indices]:
+def errors_inside(points: Array, heights: Array, kind: Indices, corners: Indices) -> tuple[Array, Indices]:
     """How far straight lines between points (n, axes) of heights (n,) are off, as the points around tell.
 
     Parameters
     ----------
-    around : ndarray of int, shape (m, corners and those beyond)
-        Simplices, as `with_beyond` gives them.
+    kind : ndarray of int, shape (n,)
+        Of which kind points are, -1 of none: a simplex is judged by points of its own kind alone.
+    corners : ndarray of int, shape (m, axes + 1)
+        Simplices.
 
     Returns
     -------
     tuple of ndarray
-        Of each simplex the error, shape (m,), and the edge that needs a cut most, shape (m, 2).
+        Of each simplex the error, shape (m,), and the edge that needs a cut most, shape (m, 2). Where its corners are
+        of several kinds, or those of its kind too few, the error is infinite and the edge the longest one.
     """
     axes = points.shape[1]
-    corners = around[:, : axes + 1]
-    sizes = []
-    for side in (-1, 1) if axes == 1 else (0,):
-        bend, misfit = _parabolas(points, heights, around, side)
-        middle = abs(bend) / 4
-        inside = abs(bend.sum(axis=1)) / corners.shape[1] ** 2
-        sizes.append(SAFETY * np.maximum(middle.max(axis=1, initial=0.0), inside) + MISFIT.get(axes, 2.5) * misfit)
-    # the mean of logarithms: from one side of an interval alone a jump is seen that lies beyond it, not in it
-    with np.errstate(divide="ignore"):
-        size = np.exp(np.nanmean(np.log(sizes), axis=0))
-    # a diagonal bends as its sides do, which lie along the axes that need a cut, and are shorter
-    nearly = middle >= NEARLY * middle.max(axis=1, keepdims=True)
     ends = points[corners[:, edges(axes)]]
     lengths = np.linalg.norm(ends[:, :, 0] - ends[:, :, 1], axis=2)
-    return size, largest(corners, np.where(nearly, -lengths, -np.inf))
-
-
-def errors_inside(points: Array, heights: Array, kind: Indices, corners: Indices) -> tuple[Array, Indices]:
-    """Errors of simplices between points of one kind, as the points of that kind tell; -1 is none.
-
-    Infinite where points are of several kinds, or too few; there the longest edge is to be cut.
-    """
-    ends = points[corners[:, edges(points.shape[1])]]
-    size, cut = np.full(len(corners), np.inf), largest(corners, np.linalg.norm(ends[:, :, 0] - ends[:, :, 1], axis=2))
+    size, cut = np.full(len(corners), np.inf), largest(corners, lengths)
     for number in np.unique(kind[kind >= 0]):
         members, here = np.flatnonzero(kind == number), np.flatnonzero((kind[corners] == number).all(axis=1))
-        if len(here) and not are_too_few(points[members]):
-            around = with_beyond(np.searchsorted(members, corners[here]))
-            size[here], own = interpolation_errors(points[members], heights[members], around)
-            cut[here] = members[own]
+        if not len(here) or are_too_few(points[members]):
+            continue
+        around, sizes = with_beyond(np.searchsorted(members, corners[here])), []
+        for side in (-1, 1) if axes == 1 else (0,):
+            bend, misfit = _parabolas(points[members], heights[members], around, side)
+            middle = abs(bend) / 4
+            inside = abs(bend.sum(axis=1)) / (axes + 1) ** 2
+            sizes.append(SAFETY * np.maximum(middle.max(axis=1, initial=0.0), inside) + MISFIT.get(axes, 2.5) * misfit)
+        # the mean of logarithms: from one side of an interval alone a jump is seen that lies beyond it, not in it
+        with np.errstate(divide="ignore"):
+            size[here] = np.exp(np.nanmean(np.log(sizes), axis=0))
+        # a diagonal bends as its sides do, which lie along the axes that need a cut, and are shorter
+        nearly = middle >= NEARLY * middle.max(axis=1, keepdims=True)
+        cut[here] = largest(corners[here], np.where(nearly, -lengths[here], -np.inf))
     return size, cut
 
 

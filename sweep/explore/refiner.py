@@ -79,6 +79,8 @@ class Refiner:
     ----------
     points, values : ndarray, shape (cells, axes)
         Where the cells lie in a box from 0 to 1, and on the axes.
+    origins : ndarray of int, shape (cells, 2)
+        The two cells that each was put between; of the first ones, itself.
     first : int
         How many cells there were.
     found : Judged
@@ -91,20 +93,16 @@ class Refiner:
         self, dataset: xr.Dataset, study: Study, names: Sequence[str], tolerance: float, most_cells: int, solve: Solve
     ) -> None:
         self.tolerance, self.most, self._solve = tolerance, most_cells, solve
-        self.parts = [_flat(dataset.load())]
-        self.axes = list(study.axes)
+        self.parts, self.axes = [_flat(dataset.load())], list(study.axes)
         first = {name: self.parts[0][name].values for name in self.axes}
         self.box = Box.of(first)
-        self.values = np.stack(list(first.values()), axis=1)
-        self.points = self.box.points(first)
+        self.points, self.values = self.box.points(first), np.stack(list(first.values()), axis=1)
         self.first = len(self.points)
         self.origins = np.stack([np.arange(self.first)] * 2, axis=1)
-        known = [dict(zip(_keys(t), v, strict=True)) for t, v in zip(self.points.T, self.values.T, strict=True)]
-        self._known = known
+        self._known = [dict(zip(_keys(t), v, strict=True)) for t, v in zip(self.points.T, self.values.T, strict=True)]
         even = study.design != "product"
-        self._steps = np.array([self.first ** (1 / len(known)) if even else len(k) - 1 for k in known])
+        self._steps = np.array([self.first ** (1 / len(self.axes)) if even else len(k) - 1 for k in self._known])
         self.noise = dict.fromkeys(names, 0.0)
-        self._stretched = {name: np.eye(len(self.axes)) for name in names}
         self._to_cut: dict[str, list[tuple[int, float]]] = {name: [] for name in names}
 
     def refine(self) -> None:
@@ -112,19 +110,25 @@ class Refiner:
         # between two values nothing tells whether an output bends
         for k, known in enumerate(self._known):
             if len(known) == 2:
-                first = self.points[:, k] == 0
-                points, values = self.points[first], self.values[first]
-                points[:, k], values[:, k] = 0.5, self.box.values(k, np.array([0.5]))
-                self._add(points, values)
+                middle = self.points[self.points[:, k] == 0]
+                middle[:, k] = 0.5
+                self._add(middle)
         stretched_at = 0
         while True:
             if len(self.points) >= GROWTH * stretched_at:
-                self._stretched = {name: stretch(self.points, heights(self.column(name))) for name in self.noise}
+                stretches = {name: stretch(self.points, heights(self.column(name))) for name in self.noise}
                 stretched_at = len(self.points)
-            parts = [self._judged(name) for name in self.noise]
-            self.found = Judged(*(np.concatenate(column) for column in zip(*parts, strict=True)))
-            if len(cuts := self._cuts()):
-                self._add(*self._middles(cuts), cuts)
+            parts = [self._judged(name, stretches[name]) for name in self.noise]
+            self.found = found = Judged(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+            # worst first, as many as are allowed; none shares an end with one before: a cut changes what is known there
+            used, cuts = np.zeros(len(self.points), dtype=bool), []
+            todo = np.flatnonzero(found.wanted & ~found.finest)
+            for ends in found.ends[todo[np.argsort(-found.size[todo], kind="stable")]]:
+                if not used[ends].any():
+                    used[ends] = True
+                    cuts.append(ends)
+            if cuts := cuts[: max(0, self.most - len(self.points))]:
+                self._add(self.points[np.array(cuts)].mean(axis=1), np.array(cuts))
             elif len(self.points) > SETTLED * stretched_at:
                 stretched_at = 0
             else:
@@ -134,11 +138,22 @@ class Refiner:
         """An output, or what is said of it, of all cells."""
         return np.concatenate([part[name].values for part in self.parts])
 
-    def _judged(self, name: str) -> Judged:
+    def _add(self, points: Array, ends: Indices | None = None) -> None:
+        """Solves further cells, maybe in the middles between two others; a value that an axis has is taken again."""
+        values = np.empty(points.shape)
+        for k, known in enumerate(self._known):
+            there = self.box.values(k, points[:, k])
+            values[:, k] = [known.setdefault(t, v) for t, v in zip(_keys(points[:, k]), there, strict=True)]
+        itself = len(self.points) + np.arange(len(points))
+        self.parts.append(_flat(self._solve(dict(zip(self.axes, values.T, strict=True)))))
+        self.points, self.values = np.concatenate([self.points, points]), np.concatenate([self.values, values])
+        self.origins = np.concatenate([self.origins, np.stack([itself] * 2, axis=1) if ends is None else ends])
+
+    def _judged(self, name: str, stretched: Array) -> Judged:
         """Errors of an output's straight lines between cells, and borders between statuses that are to be cut."""
         points, axes, height = self.points, len(self.axes), heights(self.column(name))
         finite = np.isfinite(np.stack([self.column(each) for each in self.noise])).all(axis=0)
-        places, kind = points @ self._stretched[name], kinds(self.column(STATUS), finite)
+        places, kind = points @ stretched, kinds(self.column(STATUS), finite)
         corners = simplices(places)
         of_corners, pairs = kind[corners], edges(axes)
         alike = (of_corners == of_corners[:, :1]).all(axis=1)
@@ -166,22 +181,15 @@ class Refiner:
             tree = cKDTree(points[np.unique(corners[~alike])] * self._steps)
             apart = tree.query(points * self._steps, p=math.inf)[0]
             beside = alike & (apart <= border)[corners].any(axis=1)
-        valued, off = alike & (of_corners[:, 0] >= 0), self._off(height)
+        valued = alike & (of_corners[:, 0] >= 0)
         finest = extent(ends) <= np.where(beside, beside_border, inside)
         finest |= valued & np.isfinite(size) & self._is_at_pole(height)[ends.max(axis=1)]
-        limit = max(self.tolerance, NOISE_SIZE * self.noise[name])
-        wide = corners[valued & (size > limit)]
+        wide = corners[valued & (size > max(self.tolerance, NOISE_SIZE * self.noise[name]))]
         volume = float(abs(np.linalg.det(points[wide[:, 1:]] - points[wide[:, :1]])).sum())
-        self.noise[name] = max(self.noise[name], self._noise(off, self._to_cut[name], volume))
+        self._to_cut[name].append((len(points), volume))
+        self.noise[name] = max(self.noise[name], self._noise(height, self._to_cut[name]))
         wanted = size > max(self.tolerance, NOISE_SIZE * self.noise[name])
         return Judged(corners, size, ends, wanted, finest, valued, beside)
-
-    def _off(self, height: Array) -> Array:
-        """How far each cell is off the line between the two that it was put between; NaN of the first ones."""
-        with np.errstate(invalid="ignore"):
-            off: Array = abs(height - height[self.origins].mean(axis=1))
-        off[self.origins[:, 0] == self.origins[:, 1]] = np.nan
-        return off
 
     def _ancestors(self, cells: Indices) -> Indices:
         """The younger ends of the edges that were cut for cells, as many cuts ago as there are axes."""
@@ -205,47 +213,22 @@ class Refiner:
             stays: NDArray[np.bool_] = (after > STAYS * before) & ((small <= JUMP * large).sum(axis=0) <= 1)
         return stays
 
-    def _noise(self, off: Array, to_cut: list[tuple[int, float]], volume: float) -> float:
-        """How far the latest cells are off, where more cells do not lessen that; `volume` is that of what is too far
-        off, and appended `to_cut`, those of earlier rounds."""
-        to_cut.append((len(off), volume))
-        earlier = [v for count, v in to_cut if count * 2 ** len(self.axes) <= len(off)]
+    def _noise(self, height: Array, to_cut: Sequence[tuple[int, float]]) -> float:
+        """How far the latest cells are off the line between the two that each was put between, where more cells do not
+        lessen that; `to_cut` has the number of cells, and the volume of what is too far off, of all rounds."""
+        cells, volume = to_cut[-1]
+        earlier = [v for count, v in to_cut if count * 2 ** len(self.axes) <= cells]
         if not earlier or volume <= LESSENING * earlier[-1]:
             return 0.0
-        latest = np.arange(max(0, len(off) - LATEST), len(off))
+        with np.errstate(invalid="ignore"):
+            off = abs(height - height[self.origins].mean(axis=1))
+        off[self.origins[:, 0] == self.origins[:, 1]] = np.nan
+        latest = np.arange(max(0, cells - LATEST), cells)
         before = off[self._ancestors(latest)]
         known = np.isfinite(off[latest] + before)
         if known.sum() <= 0.75 * LATEST or np.median((off[latest] - LESSENING * before)[known]) <= 0:
             return 0.0
         return float(np.median(off[latest][known]))
-
-    def _cuts(self) -> Indices:
-        """Edges to cut, worst first, as many as are allowed; none shares an end with one before, for a cut changes what
-        is known there."""
-        wanted = np.flatnonzero(self.found.wanted & ~self.found.finest)
-        used = np.zeros(len(self.points), dtype=bool)
-        cuts = []
-        for first, second in self.found.ends[wanted[np.argsort(-self.found.size[wanted], kind="stable")]].tolist():
-            if not (used[first] or used[second]):
-                used[first] = used[second] = True
-                cuts.append((first, second))
-        return np.array(cuts, dtype=np.intp).reshape(-1, 2)[: max(0, self.most - len(self.points))]
-
-    def _middles(self, cuts: Indices) -> tuple[Array, Array]:
-        """Places and axis values in the middles of edges; a value that an axis has already is taken again."""
-        points = self.points[cuts].mean(axis=1)
-        values = np.empty(points.shape)
-        for k, known in enumerate(self._known):
-            between = self.box.values(k, points[:, k])
-            values[:, k] = [known.setdefault(t, v) for t, v in zip(_keys(points[:, k]), between, strict=True)]
-        return points, values
-
-    def _add(self, points: Array, values: Array, ends: Indices | None = None) -> None:
-        """Solves further cells, maybe in the middles between two others."""
-        itself = len(self.points) + np.arange(len(points))
-        self.parts.append(_flat(self._solve(dict(zip(self.axes, values.T, strict=True)))))
-        self.points, self.values = np.concatenate([self.points, points]), np.concatenate([self.values, values])
-        self.origins = np.concatenate([self.origins, np.stack([itself] * 2, axis=1) if ends is None else ends])
 
 
 def _keys(places: Array) -> list[float]:

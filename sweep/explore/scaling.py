@@ -264,21 +264,21 @@ def _held(study: Study, seconds: float | None) -> tuple[dict[str, list[Fraction]
     if seconds is not None and LEAST_SOLVED * cost > max(seconds, LEAST_SECONDS):
         return {}, [], 0, 0
     affordable = int(max(seconds or SECONDS, LEAST_SECONDS) / (cost * (4 * len(leading) + 16)))
-    cells = min(TRIED_CELLS, max(FEWEST_CELLS, affordable))
+    number = min(TRIED_CELLS, max(FEWEST_CELLS, affordable))
 
     # another unit of each kind is tried; then what slopes tell, where there is the time
-    trial = _Trial(study, names, leading, cells, seed=2)
+    cells, old = _at_random(study, leading, number, seed=2)
     bases = sorted({base for powers in units.values() for base in powers})
     declared = [np.array([units[name].get(base, 0) for name in names], float) for base in bases]
-    rows, leads = _echelon(np.reshape([row for row in declared if trial.holds(row)], (-1, len(names))))
+    rows, leads = _echelon(np.reshape([row for row in declared if _holds(cells, old, names, row)], (-1, len(names))))
     by_units = len(rows)
     if affordable >= FEWEST_CELLS:
-        slopes = _Trial(study, names, leading, cells, seed=1).slopes()
+        slopes = _slopes(*_at_random(study, leading, number, seed=1), leading)
         more, more_leads = _echelon(np.concatenate([rows, _null_space(slopes, len(leading))]))
-        if len(more) > by_units and all(trial.holds(row) for row in more):
+        if len(more) > by_units and all(_holds(cells, old, names, row) for row in more):
             rows, leads = more, more_leads
     weights = {name: [_fraction(w) for w in row] for name, row in zip(names, rows.T.tolist(), strict=True)}
-    return weights, [names[k] for k in leads], len(rows) - by_units, trial.number
+    return weights, [names[k] for k in leads], len(rows) - by_units, int(_valued(old).sum())
 
 
 def _is_scalable(study: Study, field: Field) -> bool:
@@ -293,46 +293,43 @@ def _is_scalable(study: Study, field: Field) -> bool:
     return bool(np.any(study.fixed[field.name]))
 
 
-class _Trial:
-    """Cells of a study at random, beside its own values, solved again with some of its numbers multiplied."""
+def _at_random(study: Study, fields: Sequence[str], number: int, seed: int) -> tuple[Study, Cells]:
+    """Cells of a study at random, beside its own values as far as they are not refused there, and what they give."""
+    rng = np.random.default_rng(seed)
+    own = drawn(study, number, rng)
+    jitter = {name: np.exp(rng.uniform(-JITTER, JITTER, number)) for name in own.axes if name in fields}
+    refused = ~_valued(solved(multiplied(own, jitter)))
+    moved = multiplied(own, {name: np.where(refused, 1.0, by) for name, by in jitter.items()})
+    return moved, solved(moved)
 
-    def __init__(self, study: Study, names: Sequence[str], fields: Sequence[str], cells: int, seed: int) -> None:
-        self._names, self._fields, rng = names, fields, np.random.default_rng(seed)
-        own = drawn(study, cells, rng)
-        jitter = {name: np.exp(rng.uniform(-JITTER, JITTER, cells)) for name in own.axes if name in fields}
-        refused = ~_valued(solved(multiplied(own, jitter)))
-        self._study = multiplied(own, {name: np.where(refused, 1.0, by) for name, by in jitter.items()})
-        self._old = solved(self._study)
-        self.number = int(_valued(self._old).sum())
 
-    def holds(self, row: Array) -> bool:
-        """Whether fields and outputs may be multiplied like this; statuses may change as rounding decides."""
-        old, fine = self._old, _valued(self._old)
-        for factor in FACTORS:
-            factors = {name: factor**weight for name, weight in zip(self._names, row.tolist(), strict=True) if weight}
-            new = solved(multiplied(self._study, factors))
-            was, now = (np.where(c.status == Status.INACCURATE, Status.OK, c.status) for c in (old, new))
-            if not factors or not fine.any() or (was != now).any():
+def _holds(study: Study, old: Cells, names: Sequence[str], row: Array) -> bool:
+    """Whether fields and outputs may be multiplied like this; statuses may change as rounding decides."""
+    fine = _valued(old)
+    for factor in FACTORS:
+        factors = {name: factor**weight for name, weight in zip(names, row.tolist(), strict=True) if weight}
+        new = solved(multiplied(study, factors))
+        was, now = (np.where(c.status == Status.INACCURATE, Status.OK, c.status) for c in (old, new))
+        if not factors or not fine.any() or (was != now).any():
+            return False
+        for name, values in old.outputs.items():
+            expected = factors.get(name, 1.0) * values[fine]
+            if not np.allclose(new.outputs[name][fine], expected, AGREEMENT * study.rtol, 0, equal_nan=True):
                 return False
-            for name, values in old.outputs.items():
-                expected = factors.get(name, 1.0) * values[fine]
-                if not np.allclose(new.outputs[name][fine], expected, AGREEMENT * self._study.rtol, 0, equal_nan=True):
-                    return False
-        return True
+    return True
 
-    def slopes(self) -> Array:
-        """dln y/dln p of all outputs in all cells by every field, and -1 of each output by itself: what times weights
-        is 0 in (1). Infinite by fields of which a kernel does not take other numbers; shape (values, names)."""
-        outputs, old = list(self._old.outputs), [_logs(self._old, name) for name in self._old.outputs]
-        found = np.full((sum(map(len, old)), len(self._names)), np.inf)
-        for k, name in enumerate(self._fields):
-            moved = [solved(multiplied(self._study, {name: math.exp(j * STEP)})) for j in (-2, -1, 1, 2)]
-            if all(_valued(cells).sum() >= self.number / 2 for cells in moved):
-                logs = [np.concatenate([_logs(cells, output) for output in outputs]) for cells in moved]
-                found[:, k] = (logs[0] - 8 * logs[1] + 8 * logs[2] - logs[3]) / (12 * STEP)
-        owner = np.repeat(outputs, [len(each) for each in old])
-        found[:, len(self._fields) :] = -1.0 * (owner[:, None] == self._names[len(self._fields) :])
-        return found
+
+def _slopes(study: Study, old: Cells, fields: Sequence[str]) -> Array:
+    """dln y/dln p of all outputs in all cells by every field, and -1 of each output by itself: what times weights is 0
+    in (1). Infinite by fields of which a kernel does not take other numbers; shape (values, fields and outputs)."""
+    lengths = [_logs(old, name).size for name in old.outputs]
+    found = np.full((sum(lengths), len(fields)), np.inf)
+    for k, name in enumerate(fields):
+        moved = [solved(multiplied(study, {name: math.exp(j * STEP)})) for j in (-2, -1, 1, 2)]
+        if all(_valued(cells).sum() >= int(_valued(old).sum()) / 2 for cells in moved):
+            logs = [np.concatenate([_logs(cells, output) for output in old.outputs]) for cells in moved]
+            found[:, k] = (logs[0] - 8 * logs[1] + 8 * logs[2] - logs[3]) / (12 * STEP)
+    return np.column_stack([found, -np.repeat(np.eye(len(lengths)), lengths, axis=0)])
 
 
 def _valued(cells: Cells) -> NDArray[np.bool_]:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections import namedtuple
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -63,64 +63,56 @@ class PointSolver:
         SweepError
             A parameter is missing, unknown or given twice.
         """
-        given = self._ordered(values, named) if named or len(values) != len(self.names) else values
+        given = list(values)
+        if named or len(values) != len(self.names):
+            by_name = dict(zip(self.names, values, strict=False))
+            for name in named:
+                if name not in self.names:
+                    hint = did_you_mean(name, self.names) or f"; it takes {listed(self.names, word='and')}"
+                    raise SweepError(f"{name}: the study has no such axis{hint}")
+                if name in by_name:
+                    raise SweepError(f"{name} is given twice")
+            by_name |= named
+            if (count := max(len(by_name), len(values))) != len(self.names):
+                expected = listed(self.names, word="and")
+                raise SweepError(f"expected {expected}, found {count} of {len(self.names)} values")
+            given = [by_name[name] for name in self.names]
         try:
             points = np.array(np.broadcast_arrays(*given), np.float64)
         except (TypeError, ValueError) as error:
             raise SweepError(f"{listed(self.names, word='and')}: expected numbers or arrays, found {error}") from None
         shape = points.shape[1:]
-        self._grid.given = points.reshape(len(self.names), -1)
-        cells = empty_cells(self._study, self._grid.given.shape[1])
+        self._grid.given = dict(zip(self.names, points.reshape(len(self.names), -1), strict=True))
+        cells = empty_cells(self._study, math.prod(shape))
         self._solver.solve(0, cells)
         outputs = (cells.outputs[name].reshape(shape + cells.outputs[name].shape[1:]) for name in self._study.outputs)
-        found = (*outputs, cells.status.reshape(shape))
-        return self._solved(*(column if column.ndim else column.item() for column in found))
+        columns = (*outputs, cells.status.reshape(shape))
+        return self._solved(*(column if column.ndim else column.item() for column in columns))
 
-    def _ordered(self, values: Sequence[Any], named: dict[str, Any]) -> list[Any]:
-        """One value for each name. Raises SweepError."""
-        found = dict(zip(self.names, values, strict=False))
-        for name in named:
-            if name not in self.names:
-                hint = did_you_mean(name, self.names) or f"; it takes {listed(self.names, word='and')}"
-                raise SweepError(f"{name}: the study has no such axis{hint}")
-            if name in found:
-                raise SweepError(f"{name} is given twice")
-        found |= named
-        count = max(len(found), len(values))
-        if count != len(self.names):
-            raise SweepError(f"expected {listed(self.names, word='and')}, found {count} of {len(self.names)} values")
-        return [found[name] for name in self.names]
+
+class _Points(Grid):
+    """Cells whose values on the axes are set before they are solved: `given`, by the axis' name."""
+
+    def __init__(self, study: Study) -> None:
+        super().__init__(study)
+        self.size, self.given = np.iinfo(np.int64).max, dict[str, Any]()
+
+    def spreads(self) -> dict[int, Any]:
+        return super().spreads() | dict.fromkeys(self.varying)
+
+    def column(self, name: str, start: int, stop: int) -> Any:
+        return self.given[name][start:stop]
+
+    def values(self, name: str, cells: Any) -> Any:
+        return self.given[name][cells]
+
+    def cell(self, index: int) -> dict[str, str]:
+        return {name: repr(float(values[index])) for name, values in self.given.items()}
 
 
 def _warn(cell: BadCell) -> None:
     values = ", ".join(f"{name}={value}" for name, value in cell.values.items())
     warnings.warn(f"FAILED at {values}: {cell.reason}", RuntimeWarning, stacklevel=2)
-
-
-class _Points(Grid):
-    """Cells whose parameters are set before they are solved: `given`, shape (axes, cells)."""
-
-    def __init__(self, study: Study) -> None:
-        super().__init__(study)
-        self.size = np.iinfo(np.int64).max
-        self.given = np.empty((len(study.axes), 0))
-        places = {name: place for place, name in enumerate(study.axes)}
-        self._places = {f.name: places.get(study.follows.get(f.name, f.name)) for f in study.kernel.parameters}
-        self._filled = {k: place for k, place in enumerate(self._places.values()) if place is not None}
-
-    def spreads(self) -> dict[int, Any]:
-        return super().spreads() | dict.fromkeys(self._filled)
-
-    def columns(self, start: int, stop: int, out: Sequence[Any]) -> None:
-        for k, place in self._filled.items():
-            out[k][: stop - start] = self.given[place, start:stop]
-
-    def cell(self, index: int) -> dict[str, str]:
-        return {name: repr(float(row[index])) for name, row in zip(self.study.axes, self.given, strict=True)}
-
-    def _of(self, name: str, cells: Any) -> Any:
-        place = self._places.get(name)
-        return super()._of(name, cells) if place is None else self.given[place, cells]
 
 
 def solver(study: Given) -> PointSolver:

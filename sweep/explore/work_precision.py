@@ -13,8 +13,7 @@ import dataclasses
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -139,12 +138,31 @@ def work_precision(
     if cells < 1:
         raise SweepError(f"cells: expected at least 1, found {cells}")
     part = sampled(as_study(study), cells)
-    able, names = _methods(part, methods, reference)
+    able = [part.kernel.methods[number].name for number in usable_methods(part)]
+    if not able:
+        raise SweepError("no method of the kernel can do this study")
+    names = ["auto", *able] if methods is None else list(dict.fromkeys(methods))
+    for name in names if reference is None else [*names, reference]:
+        if name not in able and (name != "auto" or name == reference):
+            hint = did_you_mean(name, able) or f"; there are auto, {', '.join(able)}"
+            raise SweepError(f"no method {name} that can do this study{hint}")
     if isolate or cell_timeout is not None:
         part = _without_failing(part, ["auto", *able], cell_timeout, note)
     against = _given(part, truth) if truth is not None else _best(part, [reference] if reference else able)
-    found = _table(part, names, tolerances, against)
-    missing = _missing(part, able) if methods is None else []
+    missing = []
+    for method in part.kernel.methods if methods is None else ():
+        if method.name not in able:
+            terms = [name for name in method.excludes if name in part.terms]
+            lacks = [name for name in method.lacks if name in part.outputs]
+            missing.append(f"{method.name} {'cannot do' if terms else 'does not give'} {', '.join(terms or lacks)}")
+    rows = [_measured(part, name, rtol, against) for name in names for rtol in tolerances]
+    columns = {key: np.array([row[key] for row in rows]).reshape(len(names), -1) for key in rows[0]}
+    columns["seconds"] = _seconds(part, names, tolerances)
+    about = {key: {"units": "s" if key == "seconds" else "1", "long_name": LONG_NAMES[key]} for key in columns}
+    found = xr.Dataset(
+        {key: (("method", "rtol"), values, about[key]) for key, values in columns.items()},
+        {"method": names, "rtol": tolerances},
+    )
     return found.assign_attrs(
         title=part.title,
         kernel=part.kernel_name,
@@ -155,30 +173,6 @@ def work_precision(
         missing="; ".join(missing),
         omissions="; ".join([*missing, *omissions(found)]),
     )
-
-
-def _methods(study: Study, methods: Sequence[str] | None, reference: str | None) -> tuple[list[str], list[str]]:
-    """The methods that can do a study, and those to measure. Raises SweepError."""
-    able = [study.kernel.methods[number].name for number in usable_methods(study)]
-    if not able:
-        raise SweepError("no method of the kernel can do this study")
-    names = ["auto", *able] if methods is None else list(dict.fromkeys(methods))
-    for name in names if reference is None else [*names, reference]:
-        if name not in able and (name != "auto" or name == reference):
-            hint = did_you_mean(name, able) or f"; there are auto, {', '.join(able)}"
-            raise SweepError(f"no method {name} that can do this study{hint}")
-    return able, names
-
-
-def _missing(study: Study, able: Sequence[str]) -> list[str]:
-    """Which methods cannot do a study, and why, in words."""
-    found = []
-    for method in study.kernel.methods:
-        if method.name not in able:
-            terms = [name for name in method.excludes if name in study.terms]
-            lacks = [name for name in method.lacks if name in study.outputs]
-            found.append(f"{method.name} {'cannot do' if terms else 'does not give'} {', '.join(terms or lacks)}")
-    return found
 
 
 def _without_failing(
@@ -245,8 +239,7 @@ def omissions(found: xr.Dataset) -> list[str]:
     return lines
 
 
-@dataclass(frozen=True, eq=False)
-class _Reference:
+class _Reference(NamedTuple):
     """Values by output; in each cell their relative error, infinite where they are not known to be right; and whether
     it is known that there is nothing to give."""
 
@@ -293,24 +286,23 @@ def _best(study: Study, names: Sequence[str]) -> _Reference:
     compared = tuple(name for name in study.outputs if name not in (*WORK, *ESTIMATES))
     study = dataclasses.replace(study, outputs=compared or study.outputs)
     vague = {name: study.kernel.method(name).bound is None for name in names}
-    found: list[_Reference] = []
+    size, found = Grid(study).size, list[_Reference]()
     for name in sorted(names, key=lambda name: vague[name]):
-        if vague[name] and any(one.judged == len(one.floor) for one in found):
+        if vague[name] and any(one.judged == size for one in found):
             break  # those that state a bound suffice
-        floor, void = np.full(Grid(study).size, np.inf), np.zeros(Grid(study).size, bool)
         values: dict[str, Any] = {}
+        one = _Reference(name, values, np.full(size, np.inf), np.zeros(size, bool))
         for rtol in FINE:
             outputs, status, *_ = solved(with_method(study, name, rtol))
-            values = values or dict(outputs)
             refused = status >= FIRST_REFUSAL
-            void |= refused & ~among(status, GIVEN_UP)
-            now = ~refused & (status != Status.INACCURATE) & np.isinf(floor)
+            one.void[refused & ~among(status, GIVEN_UP)] = True
+            now = ~refused & (status != Status.INACCURATE) & ~one.sound
             for output, column in outputs.items():
-                values[output][now] = column[now]
-            floor[now] = rtol
-            if (np.isfinite(floor) | void).all():
+                values.setdefault(output, column)[now] = column[now]
+            one.floor[now] = rtol
+            if one.judged == size:
                 break
-        found.append(_Reference(name, values, floor, void))
+        found.append(one)
 
     def rank(one: _Reference) -> tuple[int, bool, float]:
         return -one.judged, vague[one.source], float(np.log10(one.floor[one.sound]).mean()) if one.sound.any() else 0.0
@@ -319,17 +311,6 @@ def _best(study: Study, names: Sequence[str]) -> _Reference:
     if not best.sound.any():
         raise SweepError(f"{best.source} solves none of the cells, so there is nothing to measure against")
     return best
-
-
-def _table(study: Study, names: Sequence[str], tolerances: Sequence[float], against: _Reference) -> xr.Dataset:
-    """Everything that is measured, over methods and tolerances."""
-    rows = [_measured(study, name, rtol, against) for name in names for rtol in tolerances]
-    columns = {key: np.array([row[key] for row in rows]).reshape(len(names), -1) for key in rows[0]}
-    found = xr.Dataset(coords={"method": names, "rtol": tolerances})
-    for key, values in {**columns, "seconds": _seconds(study, names, tolerances)}.items():
-        attrs = {"units": "s" if key == "seconds" else "1", "long_name": LONG_NAMES[key]}
-        found[key] = ("method", "rtol"), values, attrs
-    return found
 
 
 def _measured(study: Study, name: str, rtol: float, against: _Reference) -> dict[str, Any]:
@@ -348,19 +329,20 @@ def _measured(study: Study, name: str, rtol: float, against: _Reference) -> dict
     # no number between two cells: errors may be infinite
     low, high = np.quantile(error[valued], (0.1, 0.9), method="inverted_cdf") if valued.any() else [math.nan] * 2
     counts = {method: int((used == i).sum()) for i, method in enumerate(methods)}
-    numbers = {
+    shares = {
+        "ok": against.sound & (status == Status.OK),
+        "remarked": valued & (status != Status.OK) & ~inaccurate,
+        "inaccurate": valued & inaccurate,
+        "unsolved": unsolved,
+        "silent": wrong,
+    }
+    return {
         "error_median": np.median(error[valued]) if valued.any() else math.nan,
         "error_low": low,
         "error_high": high,
         "error_worst": error[worst] if sure.any() else math.nan,
-        "ok": (against.sound & (status == Status.OK)).sum() / against.judged,
-        "remarked": (valued & (status != Status.OK) & ~inaccurate).sum() / against.judged,
-        "inaccurate": (valued & inaccurate).sum() / against.judged,
-        "unsolved": unsolved.sum() / against.judged,
-        "silent": wrong.sum() / against.judged,
+        **{key: cells.sum() / against.judged for key, cells in shares.items()},
         **{key: outputs[key][valued].mean() if valued.any() else math.nan for key in WORK if key in outputs},
-    }
-    return numbers | {
         "worst_cell": _cell(study, worst) if sure.any() else "",
         "unsolved_as": f"{NAMES[int(status[first])]} at {_cell(study, first)}" if unsolved.any() else "",
         "silent_at": _cell(study, int(wrong.argmax())) if wrong.any() else "",
