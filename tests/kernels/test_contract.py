@@ -42,8 +42,18 @@ def sound(name, columns, rtol):
 
 def found_of(name, columns, rtol):
     cells, rtol = sound(name, columns, rtol)
-    kernel = get(name)
-    return Found(cells, rtol, {m.name: golden.solved(kernel, m, cells, rtol) for m in kernel.methods})
+    return Found(cells, rtol, {m.name: some_solved(get(name), m, cells, rtol) for m in get(name).methods})
+
+
+def some_solved(kernel, method, cells, rtol):
+    """What a method gives; of one that takes thousands of steps in a tenth of the cells, others are NOT_ASKED."""
+    rows = np.arange(rtol.size)[:: 10 if method.name in golden.THOUSANDS else 1]
+    columns = {}
+    for what, some in golden.solved(kernel, method, golden.taken(cells, rows), rtol[rows]).items():
+        columns[what] = np.full((rtol.size, *some.shape[1:]), Status.NOT_ASKED if what == "status" else np.nan)
+        columns[what] = columns[what].astype(some.dtype)
+        columns[what][rows] = some
+    return columns
 
 
 @functools.cache
@@ -78,7 +88,7 @@ def test_bits_are_those_that_are_kept(name):
     """After a change that is meant, golden_columns.py --write; the commit says so."""
     if name == "sliding" and not COMPILED:
         pytest.skip("a single cell takes minutes as plain Python")
-    assert not list(golden.differences([name]))
+    assert not list(golden.differences([name], few=10))
 
 
 @compiled
@@ -86,11 +96,9 @@ def test_bits_are_those_that_are_kept(name):
 def test_a_cell_has_the_same_bits_alone_in_lanes_and_in_tails(name):
     """Alone, in two groups of lanes in another order, and in a tail; beside cells that are refused, too."""
     found, kernel = usual(name), get(name)
-    count = found.rtol.size
-    orders = [[0], [count - 1], np.arange(count)[::-1], np.random.default_rng(5).permutation(count)[:33]]
     for method in kernel.methods:
-        for order in orders:
-            order = np.asarray(order)
+        there = np.flatnonzero(found.by[method.name]["status"] != Status.NOT_ASKED)
+        for order in (there[:1], there[-1:], there[::-1], np.random.default_rng(5).permutation(there)[:33]):
             again = golden.solved(kernel, method, golden.taken(found.cells, order), found.rtol[order])
             for what, column in again.items():
                 assert not golden.difference(column, found.by[method.name][what][order]), (method.name, what)
@@ -144,7 +152,7 @@ def test_over_the_whole_of_float64_a_cell_is_right_or_refused(name):
     for found in (usual(name), found_of(name, *anywhere(name))):
         for method in kernel.methods:
             columns = found.by[method.name]
-            assert np.isin(columns["status"], KNOWN).all()
+            assert np.isin(columns["status"], KNOWN).sum() == (columns["status"] != Status.NOT_ASKED).sum() > 0
             good = can(kernel, method, found) & (columns["status"] == Status.OK)
             if method.estimates:
                 good &= columns["error"] <= found.rtol  # else the engine says INACCURATE
@@ -257,8 +265,9 @@ def test_units_scale_as_the_fields_declare(name):
         changed = {f.name: cells[f.name] * factor(f) for f in kernel.parameters}
         along = [values * factor(f) for f, values in zip(kernel.along, golden.along_of(kernel), strict=True)]
         for method in kernel.methods:
-            other = golden.solved(kernel, method, changed, rtol, along)
-            here = {what: column[rows] for what, column in found.by[method.name].items()}
+            there = found.by[method.name]["status"][rows] != Status.NOT_ASKED
+            other = golden.solved(kernel, method, golden.taken(changed, there), rtol[there], along)
+            here = {what: column[rows][there] for what, column in found.by[method.name].items()}
             assert (other["status"] == here["status"]).all(), method.name
             for field in (f for f in kernel.outputs if f.name != "amplitude_dB"):  # a logarithm
                 back = other[field.name] / factor(field)

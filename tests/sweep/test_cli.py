@@ -3,13 +3,10 @@
 What it prints, word for word, stands in `tests/snapshots/`.
 """
 
-import json
 import os
 import shutil
-import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -95,53 +92,7 @@ def test_an_output_that_takes_no_words_changes_no_exit_status(done):
         assert (process.wait(60), process.stderr.read()) == (0, "")
 
 
-SLOW = """
-import time
-from dataclasses import replace
-from toy import KERNEL, exact
-def slow(height, v0, g, rtol, phase, *outputs):
-    time.sleep(0.01 * len(height))
-    exact(height, v0, g, rtol, phase, *outputs)
-KERNEL = replace(KERNEL, methods=(replace(KERNEL.methods[1], solve=slow),))
-"""
-
-
-def test_ctrl_c_keeps_what_is_done_for_every_command_that_is_told_so(here, call):
-    Path("slowstones.py").write_text(SLOW)
-    Path("slow.toml").write_text(
-        'kernel = "slowstones:KERNEL"\noutputs = ["fall_time"]\n'
-        'axes.height = { spacing = "log", start = 1, stop = 9, num = 2000 }'
-    )
-    process = in_a_process("-m", "sweep", "run", "slow.toml", "--allow-import", "--workers", "2", "--log-json")
-    limit, out = time.monotonic() + 60, ""
-    while " OK " not in out:  # a block is done
-        assert time.monotonic() < limit
-        time.sleep(0.1)
-        code, out, _ = call("show", "slow.h5") if Path("slow.h5.unfinished").exists() else (0, "", "")
-    assert (code, "slow.h5: unfinished: " in out, "PENDING" in out) == (0, True, True)
-    process.send_signal(signal.SIGINT)
-    _, err = process.communicate(timeout=30)
-    assert process.returncode == 130
-    assert "continue" in err
-    assert "Traceback" not in err
-    assert not Path("slow.h5").exists()
-    last = json.loads(Path("slow.h5.log").read_text().splitlines()[-1])
-    assert (last["event"], last["exit"]) == ("end", 130)
-    code, _, err = call("export", "slow.h5", "-o", "slow.csv", "--unfinished")
-    assert (code, "PENDING" in err) == (0, True)
-    assert 0 < pd.read_csv("slow.csv", comment="#").fall_time.count() < 2000
-
-
 # kernels
-
-
-@pytest.mark.parametrize("kernel", ["toy:KERNEL", "toy:RICH", *sweep.kernels()])
-def test_the_study_to_begin_with_is_sound(call, here, kernel):
-    assert call("kernels", kernel, "--allow-import", "--study", "begin.toml")[:2] == (0, "begin.toml\n")
-    assert sweep.study("begin.toml", allow_import=True).kernel_name == kernel
-    printed = call("kernels", kernel, "--allow-import")[1]
-    assert set(Path("begin.toml").read_text().split("?\n")[1].split()) <= set(printed.split())
-    assert call("kernels", kernel, "--allow-import", "--study", "begin.toml")[0] == 2  # it is there already
 
 
 def test_a_kernel_in_the_current_folder_is_described_as_it_is_run(here, call, monkeypatch):

@@ -48,7 +48,7 @@ def test_what_numba_compiles_is_no_work():
     began, worked = time.perf_counter(), work_clock()
     assert outer(1.0) == 4.0
     compiled = time.perf_counter() - began
-    assert work_clock() - worked < 0.2 * compiled
+    assert work_clock() - worked < 0.5 * compiled
     worked = work_clock()
     time.sleep(0.01)
     assert work_clock() - worked >= 0.01

@@ -30,17 +30,6 @@ def test_a_kernel_may_not_say_it():
     assert found.status.values.tolist() == [Status.FAILED]
 
 
-def test_a_study_with_a_condition_is_extended(tmp_path):
-    first = build(axes={"height": [1.0, 2.0, 4.0]}, where="height > 1.5")
-    sweep.run(first, tmp_path / "a.h5").close()
-    more = build(axes={"height": [1.0, 1.2, 2.0, 3.0, 4.0]}, where="height > 1.5")
-    found = sweep.run(more, tmp_path / "a.h5", extend=True).load()
-    assert found.status.values.tolist() == [Status.NOT_ASKED, Status.NOT_ASKED, 0, 0, 0]
-    other = build(axes={"height": [1.0, 1.2, 2.0, 3.0, 4.0, 5.0]}, where="height > 1.7")
-    with pytest.raises(sweep.SweepError, match="where"):
-        sweep.run(other, tmp_path / "a.h5", extend=True)
-
-
 def test_a_sample_is_of_cells_that_are_asked_for_where_there_are_any():
     axes = {"height": [float(h) for h in range(1, 1001)], "v0": [0.0, 1.0]}
     found = sampled(build(axes=axes, where="height > 990 and v0 > 0.5"), 7).axes

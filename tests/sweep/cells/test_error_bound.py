@@ -8,7 +8,6 @@ from mpmath import mp, mpf, sqrt
 import sweep
 from kernels.interface import FIRST_REFUSAL, Status
 from sweep.explore.refine import refine
-from sweep.show.text import outputs_of
 
 
 def run(**keys):
@@ -33,37 +32,9 @@ def test_a_balance_at_too_tight_an_rtol_gets_its_count():
     assert (found.status, found.error_bound) == (Status.INACCURATE, pytest.approx(2e-15, rel=1e-6))
 
 
-def test_a_file_holds_the_bounds_and_says_so(tmp_path):
-    study = sweep.study(
-        kernel="foliot", axes={"mu": [1.0, 2.0, -1.0]}, fixed={"phi0": 1.0, "a": 1.0}, rtol=1e-9, method="asymptotic"
-    )
-    path = tmp_path / "out.h5"
-    with sweep.run(study, path, progress=False) as found, sweep.run(study, progress=False) as whole:
-        assert np.array_equal(found.error_bound, whole.error_bound, equal_nan=True)
-        assert np.isnan(found.error_bound.values).tolist() == [False, False, True]
-        assert found.error_bound.dtype == np.float32
-        assert "error_bound" in found.period.attrs["ancillary_variables"]
-        assert outputs_of(found) == list(study.outputs)
-
-
 def test_a_refined_grid_keeps_the_bounds():
     keys = {"kernel": "foliot", "axes": {"mu": np.geomspace(0.1, 10, 5)}, "fixed": {"phi0": 1.0, "a": 1.0}}
     study = sweep.study(**keys, rtol=1e-12, method="asymptotic")
     found = refine(sweep.run(study, progress=False), ["period"], 1e-2).dataset
     assert ((found.status < FIRST_REFUSAL) == found.error_bound.notnull()).all()
     assert ((found.status == Status.INACCURATE) == (found.error_bound > 1e-12)).all()
-
-
-def test_cells_that_are_ok_say_what_made_them_so():
-    """The bound or estimate of the method; rtol of one that states none."""
-    fixed = {"phi0": 1.0, "a": 1.0, "R": 0.1}
-    axes = {"method": ["coulomb", "segments", "dopri5"], "rtol": [1e-3, 1e-9], "mu": [1.0, -1.0]}
-    found = sweep.run(sweep.study(kernel="foliot", axes=axes, fixed=fixed), progress=False)
-    bound = found.error_bound.values[..., 0]
-    assert (found.status.values[..., 0] == Status.OK).all()
-    assert np.isnan(found.error_bound.values[..., 1]).all()
-    assert bound[0].tolist() == pytest.approx([4e-15, 4e-15], rel=1e-6)
-    assert ((bound[1] > 0) & (bound[1] < 1e-12)).all()
-    assert (bound[2] == np.float32([1e-3, 1e-9])).all()
-    assert (found.error_bound.isel(mu=0) <= found.rtol.astype(np.float32)).all()
-    assert "amplitude" in found.error_bound.attrs["relative_to"]

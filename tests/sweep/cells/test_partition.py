@@ -18,16 +18,6 @@ def sample(costs, size, cells=LANES):
     return Sample(places, costs, cells)
 
 
-@given(size=st.integers(1, 10**12), cells=st.integers(1, 10**9))
-def test_blocks_cover_the_grid_without_gap_or_overlap(size, cells):
-    blocks = Partition(size, cells)
-    for index in {0, min(1, blocks.count - 1), blocks.count // 2, max(blocks.count - 2, 0), blocks.count - 1}:
-        start, stop = blocks.bounds(index)
-        assert 0 < stop - start <= cells
-        assert start == (0 if index == 0 else blocks.bounds(index - 1)[1])
-    assert blocks.bounds(blocks.count - 1)[1] == size
-
-
 @given(
     cost=st.floats(1e-10, 1e3),
     size=st.integers(1, 10**11),
@@ -49,6 +39,15 @@ def test_boxes_waste_a_tenth_at_most_whatever_is_wanted(length):
     for wanted in range(1, length + 1):
         cells = boxes((length,), wanted).cells
         assert -(-length // cells) * cells <= 1.1 * length
+
+
+@given(st.integers(1, 9), st.integers(1, 60), st.integers(1, 70), st.integers(1, 80))
+def test_strips_of_a_summary_fit_their_room_and_leave_no_cell_out(groups, group, length, room):
+    blocks, covered = Partition(groups * group, min(length, group), group), []
+    for _, rows, cell, cells in blocks.strips(0, blocks.count, room):
+        assert rows * cells <= room
+        covered += range(cell, cell + rows * cells)
+    assert covered == list(range(groups * group))
 
 
 class Uneven:

@@ -1,12 +1,10 @@
 """Which method a cell gets, and what is said of it."""
 
 import doctest
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from stand_ins import solved, toy_study
-from toy import KERNEL
 
 import sweep
 from kernels.interface import FIRST_REFUSAL, Status
@@ -31,21 +29,6 @@ def test_traces_are_solved_a_few_cells_at_a_time():
     )
     outputs, _, _ = solved(study, 0, 45)
     assert outputs["drop"][44, -1] == pytest.approx(1 + 44 / 49, rel=1e-15)
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (lambda k: {"outputs": (*k.outputs, k.outputs[0])}, "fall_time more than once"),
-        (lambda k: {"along": ()}, "phase, neither in"),
-    ],
-)
-def test_a_kernel_that_no_result_could_hold_is_refused_at_once(monkeypatch, change, message):
-    import toy
-
-    monkeypatch.setattr(toy, "KERNEL", replace(KERNEL, **change(KERNEL)))
-    with pytest.raises(sweep.SweepError, match=message):
-        toy_study(axes={"height": [1.0]})
 
 
 def test_auto_does_not_deny_what_an_impact_clock_does_where_following_it_leaves_that_open():

@@ -9,8 +9,8 @@ from scipy.interpolate import LinearNDInterpolator
 
 import sweep
 from sweep.explore.mesh import errors_inside, simplices, stretch
-from sweep.explore.scattered import Box, axes_of, heights, on_lines
-from sweep.laws.maps import contours, fraction
+from sweep.explore.scattered import axes_of, heights, on_lines
+from sweep.laws.maps import contours
 
 MU, A = np.geomspace(1e-3, 1e3, 121), np.geomspace(0.1, 10, 41)
 
@@ -54,21 +54,6 @@ def test_no_line_crosses_what_has_no_value():
     assert len(set(found.line.values)) == 2
     assert not ((found.a > 0.7) & (found.a < 1.4)).any()
     assert contours(period(), (1e9,)).sizes["point"] == 0
-
-
-@pytest.mark.parametrize(
-    ("level", "text"),
-    [
-        (-1 / 3, "-1/3"),
-        (0.5 + 0.9e-9, "1/2"),
-        (0.5 + 1.1e-9, "0.5"),
-        (-1.0, "-1"),
-        (0.27318, "0.273"),
-        (5 / 13, "0.385"),
-    ],
-)
-def test_levels_are_written_as_people_do(level, text):
-    assert fraction(level) == text
 
 
 def test_what_is_no_map_is_refused():
@@ -129,17 +114,6 @@ def test_outside_and_beside_missing_cells_there_is_nothing_and_at_cells_their_va
     assert float(found.y[1, 1]) == pytest.approx(float(ds.y[24]), rel=1e-12)
 
 
-@pytest.mark.parametrize(("axes", "taken"), [(1, False), (2, True), (5, True), (6, False)])
-def test_boxes_have_two_to_five_axes(axes, taken):
-    corners = np.array(list(itertools.product([1.0, 3.0], repeat=axes)))
-    names = list("abcdef"[:axes])
-    coords = {name: ("cell", column) for name, column in zip(names, corners.T, strict=True)}
-    ds = xr.Dataset({"status": ("cell", np.zeros(len(corners), np.int8))}, coords)
-    assert axes_of(ds) == (names if taken else [])
-    assert axes_of(ds.assign_coords(fixed=("cell", np.ones(len(corners))))) == (names if taken else [])
-    assert axes_of(ds.drop_vars("status")) == []
-
-
 def test_only_cells_that_fill_a_box_are_taken_for_such():
     ds = cells()
     without_corner, curve = ds.isel(cell=slice(1, None)), ds.assign_coords(b=("cell", ds.a.values))
@@ -149,20 +123,6 @@ def test_only_cells_that_fill_a_box_are_taken_for_such():
             sweep.interpolated(wrong, {"a": [1.0], "b": [1.0]})
     with pytest.raises(sweep.SweepError, match="expected values of a, b"):
         sweep.interpolated(ds, {"a": [1.0]})
-
-
-def test_places_and_values_are_each_others_inverse_and_heights_logarithms_or_shares():
-    """An axis is logarithmic from a positive value to twice that."""
-    values = {"a": np.array([1.0, 10.0, 100.0]), "b": np.array([-1.0, 0.0, 1.0]), "c": np.array([2.0, 2.5, 3.0])}
-    values["d"] = np.array([1.0, 1.999**0.5, 1.999])
-    box = Box.of(values)
-    assert box.logarithmic.tolist() == [True, False, False, True]
-    np.testing.assert_allclose(box.points(values), np.array([[0] * 4, [0.5] * 4, [1] * 4]), atol=1e-15)
-    for k, column in enumerate(values.values()):
-        np.testing.assert_allclose(box.values(k, np.array([0.0, 0.5, 1.0])), column, rtol=1e-14, atol=1e-15)
-    np.testing.assert_allclose(heights(np.array([1.0, np.e, np.nan])), [0, 1, np.nan])
-    np.testing.assert_allclose(heights(np.array([-1.0, 4.0, 0.0])), [-0.25, 1, 0])
-    np.testing.assert_allclose(heights(np.zeros(2)), 0)
 
 
 def test_lines_hold_what_was_computed_and_say_how_to_ask_for_others():
@@ -191,16 +151,6 @@ def test_lines_hold_what_was_computed_and_say_how_to_ask_for_others():
 
 
 # errors of straight lines between cells
-
-
-@pytest.mark.parametrize("axes", [1, 2, 3, 4])
-def test_simplices_fill_the_box_and_overlap_nowhere(axes):
-    grid = np.meshgrid(*[np.linspace(0, 1, 4)] * axes)
-    points = np.stack([g.ravel() for g in grid], axis=1)
-    corners = points[simplices(points)]
-    volume = abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / np.prod(np.arange(1, axes + 1))
-    assert volume.sum() == pytest.approx(1.0, rel=1e-9)
-    assert volume.min() > 0.9 * volume.mean()  # no slivers where corners lie on one sphere
 
 
 def judged(points, values):
@@ -242,13 +192,6 @@ def test_a_kink_is_not_taken_for_the_parabola_through_it_and_a_wave_is_cut_acros
     points = np.stack([g.ravel() for g in grid], axis=1)
     _, _, ends = judged(points, np.sin(3 * points[:, 0]))
     assert (abs(points[ends[:, 0], 0] - points[ends[:, 1], 0]) > 0.1).all()
-
-
-@pytest.mark.parametrize(("axes", "least"), [(1, 3), (2, 6), (3, 10)])
-def test_a_parabola_needs_as_many_points_as_it_has_numbers(axes, least):
-    points = np.random.default_rng(axes).random((least, axes))
-    assert np.isinf(judged(points[:-1], points[:-1, 0])[1]).all()
-    assert np.isfinite(judged(points, points[:, 0])[1]).all()
 
 
 # boxes stretched to where an output bends

@@ -50,14 +50,6 @@ def test_words_become_an_axis_and_an_axis_of_words_becomes_longer():
     assert sweep.join(*parts).method.values.tolist() == ["exact", "rough"]
 
 
-def test_points_are_put_behind_each_other_and_those_in_both_are_kept_once():
-    parts = [of(h, v, design="zip") for h, v in (([1.0, 2.0], [0.0, 1.0]), ([2.0, 2.0], [2.0, 1.0]))]
-    same(sweep.join(*parts), of([1.0, 2.0, 2.0], [0.0, 1.0, 2.0], design="zip"))
-    parts[1].fall_time[1] *= 1 + 1e-12
-    with pytest.raises(sweep.SweepError, match=r"height=2\.0 v0=1\.0"):
-        sweep.join(*parts)
-
-
 def test_refined_results_that_share_a_border_are_joined_to_one_that_can_be_refined():
     keys = {"kernel": "foliot", "outputs": ["period"], "fixed": {"phi0": 1.0}}
     parts = []

@@ -1,11 +1,5 @@
 """A result on the disk: what plain readers of HDF5 find in it, of which format it is, and who may write to it."""
 
-import os
-import signal
-import subprocess
-import sys
-from pathlib import Path
-
 import h5py
 import numpy as np
 import pytest
@@ -25,6 +19,12 @@ STUDIES = {
     "a line": {"axes": {"height": np.arange(1.0, 26)}, **PHASE},
     "a box": {"axes": {"height": np.arange(1.0, 7), "v0": np.arange(5.0), "method": ["exact", "rough"]}, **PHASE},
     "a zip": {"axes": {"height": np.arange(1.0, 12), "v0": np.arange(11.0)}, "design": "zip"},
+    "arrays": {
+        "kernel": "beads:KERNEL",
+        "outputs": ["moment", "share"],
+        "axes": {"g": [1.0, 2.0]},
+        "fixed": {"mass": [0.1, 0.2, 0.7]},
+    },
     "a summary": {"axes": {"height": np.arange(1.0, 40), "v0": [0.0, 1.0, 2.0]}, "summary": {"over": ["height"]}},
     "more blocks than a page of HDF5's table holds": {"axes": {"height": np.linspace(1.0, 2.0, 1100)}},
 }
@@ -106,24 +106,3 @@ def test_digests_reach_the_disk_behind_their_numbers(tmp_path, monkeypatch):
     for last, block in digests:
         numbers = max(k for k, at, _ in written if at == chunks[block] and k < last)
         assert "sync" in calls[numbers:last]
-
-
-def test_one_run_at_a_time_writes_to_an_output_and_a_killed_one_blocks_nobody(tmp_path):
-    path = tmp_path / "out.h5"
-    code = f"""
-import time
-from pathlib import Path
-from sweep.file.store import opened
-with opened(Path({str(path)!r})):
-    print("locked", flush=True)
-    time.sleep(60)
-"""
-    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[3])}
-    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, env=environment) as other:
-        assert other.stdout.readline() == b"locked\n"
-        with pytest.raises(sweep.SweepError, match="another run"):
-            run(path, axes={"height": [1.0]})
-        other.send_signal(signal.SIGKILL)
-        other.wait()
-        run(path, axes={"height": [1.0]}).close()
-    assert [p.name for p in tmp_path.iterdir()] == ["out.h5"]

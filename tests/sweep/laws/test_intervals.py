@@ -109,24 +109,6 @@ def test_where_noise_hides_a_bend_the_interval_is_the_range_of_its_slope_however
     assert width(found) < 0.25
 
 
-def test_errors_within_stated_bounds_are_bounds_and_no_noise():
-    rng, t = np.random.default_rng(7), axis(41)
-    worst = np.sign(t)  # as bad as such errors can be
-    z = -0.5 * t + 1e-3 * np.vstack([rng.uniform(-1, 1, (SETS, 41)), worst, -worst])
-    found = sweep.fit_exponent(curve(t, z, rtol=1e-3), "mu")
-    assert kinds(found) == {"bounded"}
-    assert share(found, "exponent", -0.5) == 1.0
-    assert (found.noisy == 0).all()
-
-
-@pytest.mark.parametrize("noise", [None, True, False])
-@pytest.mark.parametrize(("power", "prefactor"), [(0.0, 7.3), (-0.5, 3.0), (2.0, 1.0), (-1 / 3, 2.5)])
-def test_an_exact_law_is_known_to_rounding_whatever_is_said_of_noise(power, prefactor, noise):
-    fit = sweep.fit_exponent(curve(np.log(MU), np.log(prefactor * MU**power)), "mu", noise=noise)
-    assert share(fit, "exponent", power) == 1.0
-    assert width(fit) < 1e-11
-
-
 @pytest.mark.parametrize("gaps", [slice(0), slice(None, None, 2), slice(2, None, 3), slice(20, 40)])
 @pytest.mark.parametrize("points", [81, 641])
 def test_without_noise_the_interval_is_the_range_of_the_exponent_whatever_points_there_are(points, gaps):

@@ -131,17 +131,6 @@ def test_the_laws_that_lines_are_made_of_are_found_to_rounding(seed):
     assert np.log(float(place.abscissa) / middle) == pytest.approx(0.15 / b, rel=1e-8)
 
 
-def test_both_laws_and_a_correction_are_found_to_what_their_formulas_leave():
-    x = np.geomspace(1e-6, 1e6, 121)
-    line = xr.DataArray(3.0 * x**-0.5 * (1 + 0.4 * x**-0.8), {"x": x}, "x", name="y")
-    found = sweep.fit_correction(line, "x", window=(1.0, 1e6))
-    assert (float(found.exponent), float(found.correction_exponent)) == pytest.approx((-0.5, 0.8), abs=1e-6)
-    windows = ((1e-6, 1e-5), (1e5, 1e6))
-    met = sweep.fit_two_laws(xr.DataArray(2 * x**-1.3 + 8 * x**0.2, {"x": x}, "x", name="y"), "x", windows=windows)
-    np.testing.assert_allclose(met.exponent, [-1.3, 0.2], atol=1e-6)
-    assert float(met.crossover) == pytest.approx(0.25 ** (1 / 1.5), rel=1e-4)
-
-
 def test_a_weight_is_a_repetition():
     """A point of half the standard error counts as four points do; of equal ones, as those without errors."""
     y = curves("scatters", 4).isel(size=0)

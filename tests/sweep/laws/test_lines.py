@@ -77,18 +77,6 @@ def test_known_errors_weigh_the_points_and_make_all_errors_of_a_fit():
     assert int(sweep.fit_exponent(curve(bent, np.arange(40.0)), "x", sigma=0.3 * np.exp(bent[0])).fits) == 0
 
 
-def test_errors_of_lines_and_of_where_two_meet_are_those_of_repeated_noise():
-    """600 lines at once, since a standard deviation is then known to 3 %; each takes two regressions."""
-    t = np.linspace(-6, 6, 49)
-    z = np.where(t < 0, -t, -t / 3) + 0.05 * np.random.default_rng(5).standard_normal((600, 49))
-    found = sweep.fit_two_laws(curve(z, t), "x", windows=((None, np.exp(-1.0)), (np.exp(1.0), None)), noise="even")
-    inside = (found.crossover_low <= 1) & (found.crossover_high >= 1)
-    assert 0.93 < float(inside.mean()) < 0.97
-    fit = sweep.fit_exponent(curve(z[:300], t), "x", (None, np.exp(-1.0)), noise="even")
-    assert float(fit.exponent.std()) == pytest.approx(float(fit.exponent_error.mean()), rel=0.1)
-    assert float(np.log(fit.level).std()) == pytest.approx(float(fit.level_error.mean()), rel=0.1)
-
-
 @pytest.mark.parametrize("size", [0.0, 1e-3])
 def test_the_interval_within_error_bounds_is_all_that_they_can_do_to_a_slope(size):
     bound = size * np.linspace(0.5, 1.0, N)
@@ -195,16 +183,6 @@ def test_a_line_that_is_not_positive_or_too_short_is_left_out_and_named():
 def test_a_window_holds_its_ends_to_rounding_and_may_be_open(window, points):
     t = np.linspace(-2, 2, 41) * np.log(10)
     assert int(sweep.fit_exponent(curve(t, t), "x", window).points) == points
-
-
-def test_missing_points_are_left_out_and_lines_without_three_are_nan():
-    t = np.linspace(0, 1, 11)
-    y = curve(np.stack([2 * t] * 3), t)
-    y[0, ::2], y[1, 2:] = np.nan, np.nan
-    fit = sweep.fit_exponent(y, "x")
-    assert fit.points.values.tolist() == [5, 2, 11]
-    np.testing.assert_allclose(fit.exponent, [2, np.nan, 2], rtol=1e-12)
-    assert float(fit.low[0]) == pytest.approx(np.exp(t[1]))
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from toy_studies import build
 
 import sweep
 from kernels.interface import Status
-from sweep.results.statuses import boxes, count_statuses, pieces
+from sweep.results.statuses import count_statuses
 
 AXES = {"height": [1.0, 2.0, 4.0], "v0": [0.0, 1.0]}
 
@@ -102,18 +102,3 @@ def test_cells_of_large_results_are_found_wherever_they_are():
     assert (found.outputs["time"].cells, found.outputs["time"].largest) == (2, 0.5)
     assert found.outputs["time"].example == "e.g. x=1.0 y=5.0"
     assert [(c.cells, c.example) for c in count_statuses(other)] == [(5_999_999, {}), (1, {"x": "3.0", "y": "7.0"})]
-
-
-@pytest.mark.parametrize("shape", [(), (7,), (3, 5), (2, 3, 4), (4, 1, 6), (0, 3)])
-@pytest.mark.parametrize("most", [1, 2, 6, 100])
-def test_boxes_hold_all_places_once_and_in_order(shape, most):
-    places = np.arange(np.prod(shape, dtype=int)).reshape(shape)
-    found = [places[box].ravel() for box in boxes(shape, most)]
-    assert np.concatenate([[], *found]).tolist() == places.ravel().tolist()
-    assert max(map(len, found), default=0) <= most
-
-
-def test_parts_of_a_dataset_have_no_more_numbers_than_are_to_be_in_memory(result):
-    parts = list(pieces(result, ("height", "v0"), 20))
-    assert [sum(v.size for v in part.data_vars.values()) for part in parts] == [14] * 3
-    xr.testing.assert_equal(xr.concat(parts, "height"), result)

@@ -83,16 +83,6 @@ def test_a_fault_half_way_leaves_the_old_file_and_nothing_else(tmp_path, monkeyp
     assert [p.name for p in tmp_path.iterdir()] == [target.name]
 
 
-def test_an_export_never_replaces_its_source(tmp_path):
-    path = tmp_path / "stones.nc"
-    sweep.run(toy_studies.build(axes={"height": [1.0, 2.0]}), tmp_path / "out.h5").close()
-    path.write_bytes((tmp_path / "out.h5").read_bytes())
-    before = path.read_bytes()
-    with sweep.open_result(path) as ds, pytest.raises(SweepError, match=r"stones\.nc"):
-        sweep.export(ds, path, force=True)
-    assert path.read_bytes() == before
-
-
 KILLED = """
 import os, signal, sys
 import sweep

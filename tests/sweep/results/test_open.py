@@ -40,17 +40,6 @@ def unfinished(tmp_path):
     return tmp_path / "out.h5"
 
 
-@pytest.mark.parametrize("engine", ["h5netcdf", "netcdf4"])
-def test_the_file_opens_with_plain_xarray(stored, engine):
-    with xr.open_dataset(stored, engine=engine) as plain, open_result(stored) as ours:
-        assert plain.sizes == {"height": 4, "v0": 3, "method": 2, "phase": 3}
-        assert set(plain.coords) == {"height", "v0", "method", "phase", "g"}
-        assert plain.method.values.tolist() == ["rough", "auto"]
-        for name in ours.data_vars:
-            assert plain[name].dtype == ours[name].dtype
-            np.testing.assert_array_equal(plain[name], ours[name])
-
-
 def test_the_file_opens_with_plain_h5py_and_is_stored_as_promised(stored):
     with h5py.File(stored) as file:
         for name in ("fall_time", "drop", "status", "method_used", "error_bound"):

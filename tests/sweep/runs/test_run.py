@@ -14,12 +14,10 @@ import numpy as np
 import pytest
 import slow
 import toy_studies
-import xarray as xr
-from running import environment, fail_on, flip, interrupted, kept, place, quiet, same, slow_run, stone, tall, wait_for
+from running import environment, flip, interrupted, kept, place, quiet, same, slow_run, stone, tall, wait_for
 
 import sweep
 from kernels.interface import Status
-from sweep.cli import main
 from sweep.errors import SweepError
 from sweep.file import disk
 from sweep.file.store import unfinished_of
@@ -39,18 +37,6 @@ def unfinished(output):
 
 
 # the numbers
-
-
-def test_numbers_are_those_of_the_formula_in_memory_and_in_the_file(output):
-    found, stored = quiet(stone()), quiet(stone(), output).load()
-    cell = found.sel(height=2.0, v0=3.0)
-    # the larger root of 2 = 3 t + 9.80665 t^2 / 2
-    assert cell.fall_time.item() == pytest.approx((-3 + 48.2266**0.5) / 9.80665, rel=1e-14)
-    assert found.status.sel(height=-1.0).values.tolist() == [Status.BAD_INPUT] * 5
-    assert np.isnan(found.fall_time.sel(height=-1.0)).all()
-    assert found.attrs.keys() == stored.attrs.keys()
-    xr.testing.assert_identical(found.drop_attrs(deep=False), stored.drop_attrs(deep=False))
-    assert list(output.parent.iterdir()) == [output]
 
 
 def test_cells_that_are_cheap_beside_a_call_are_solved_by_few_calls():
@@ -256,17 +242,6 @@ def test_a_summary_a_zip_and_a_damaged_result_are_not_extended(tmp_path):
                 quiet(few, output, retry_failed=True)
 
 
-def test_extend_on_the_command_line(tmp_path, read, capsys):
-    command = ["run", str(tmp_path / "fall.toml"), "-o", str(tmp_path / "out.h5"), "--allow-import"]
-    read("axes.height = [1.0, 2.0]\n")
-    assert main(command) == 0
-    read("axes.height = [1.0, 2.0, 4.0]\n")
-    assert main(command) == 2
-    assert "--extend" in capsys.readouterr().err
-    assert main([*command, "--extend"]) == 0
-    assert "3 cells: 3 ok" in capsys.readouterr().out
-
-
 # the disk
 
 
@@ -309,12 +284,6 @@ def test_a_file_that_reads_back_wrong_is_refused(output, monkeypatch):
             quiet(tall(3003), output, block_cells=1001, workers=1)
     assert not output.exists()
     same(quiet(tall(3003), output, force=True), quiet(tall(3003)))
-
-
-def test_a_folder_that_may_not_be_written_is_told_before_anything_is_computed(output, monkeypatch):
-    fail_on(monkeypatch, "open_file", 1, errno.EACCES)
-    with pytest.raises(SweepError, match="Permission denied"):
-        quiet(tall(50, "bad:HOPELESS"), output)
 
 
 def test_a_file_too_large_for_the_system_is_one_clear_line(output):

@@ -87,9 +87,9 @@ def test_of_a_run_that_is_killed_no_process_is_left(begun):
     psutil = pytest.importorskip("psutil")
     process, output = begun("bad:HOGGING", 60, "--cell-timeout", "10 min")
     wait_for(lambda: log_path(output).exists() and "begins" in log_path(output).read_text(), process)
-    time.sleep(3.0)
+    wait_for(lambda: len(psutil.Process(process.pid).children(recursive=True)) >= 3, process)
+    time.sleep(3.0)  # they come to the kernel meanwhile
     below = psutil.Process(process.pid).children(recursive=True)
-    assert len(below) >= 3
     process.kill()
     process.wait()
     assert psutil.wait_procs(below, timeout=20)[1] == []
@@ -97,10 +97,10 @@ def test_of_a_run_that_is_killed_no_process_is_left(begun):
 
 def test_a_machine_that_sleeps_costs_no_cell(begun):
     """All processes of the run are stopped for longer than a cell may take, some of them inside cells."""
-    process, output = begun("bad:SLOW", 200, "--cell-timeout", "1.5 s")
+    process, output = begun("bad:SLOW", 200, "--cell-timeout", "5 s")
     wait_for(lambda: solved(output) >= 20, process)
     os.killpg(process.pid, signal.SIGSTOP)
-    time.sleep(4.0)
+    time.sleep(8.0)
     os.killpg(process.pid, signal.SIGCONT)
     process.communicate(timeout=120)
     assert (process.returncode, solved(output)) == (0, 200)

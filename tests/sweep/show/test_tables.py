@@ -102,14 +102,6 @@ def test_a_status_is_told_with_the_part_of_each_axis_where_it_occurs(design):
     assert "height 100 to 158.489, v0 1; e.g. height=100.0 v0=1.0" in text
 
 
-@pytest.mark.parametrize("keys", [{}, {"summary": {"outputs": {"fall_time": ["min"]}, "over": ["v0"]}}])
-def test_the_ends_of_one_value_are_told_once(keys):
-    found = sweep.run(build(axes={"height": [1.0], "v0": [0.0]}, **keys))
-    *_, line = (line for line in result_text("x.h5", found).splitlines() if line.startswith("  fall_time"))
-    assert " 0.451601 " in line
-    assert "to 0.45" not in line
-
-
 # logs
 
 

@@ -141,12 +141,3 @@ def test_json_suffices_to_read_a_study_whose_kernel_is_gone():
 def test_other_json_is_refused(text):
     with pytest.raises(sweep.SweepError, match="not the JSON of a study"):
         Study.from_json(text)
-
-
-def test_what_a_study_may_be_given_as(tmp_path):
-    keys = {"kernel": "toy:KERNEL", "outputs": ["fall_time"], "axes": {"height": [1.0, 2.0]}}
-    path = tmp_path / "s.toml"
-    path.write_text(sweep.to_toml(build(**keys)))
-    found = [sweep.run(build(**keys)), sweep.run(**keys, allow_import=True)]
-    found += [sweep.run(given, allow_import=True) for given in (path, str(path), keys)]
-    assert len({ds.fall_time.values.tobytes() for ds in found}) == 1

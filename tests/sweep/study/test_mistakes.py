@@ -7,52 +7,6 @@ from toy_studies import build, message_of
 import sweep
 
 
-def test_every_mistake_of_a_file_is_reported_at_once(read, tmp_path):
-    with pytest.raises(sweep.StudyError) as caught:
-        read(
-            """
-            kernel = "toy:KERNEL"
-            rtoll = 1e-6
-            method = "exakt"
-            rtol = 2
-            outputs = ["fall_time", "drop", "fal_time"]
-            [axes.height]
-            spacing = "log"
-            start = 0
-            stop = "5e-3"
-            num = 0
-            unit = "kg"
-            [axes.v_0]
-            values = [1.0]
-            [fixed]
-            g = { value = "9.81 m/s^2", units = "m/s^2" }
-            height = 2
-            [along]
-            face = { num = 3 }
-            """,
-            head="",
-        )
-    # a message as a user reads it, whole
-    assert str(caught.value).replace(str(tmp_path), "studies") == (
-        """\
-studies/fall.toml: 14 mistakes
-  rtoll              no such key; did you mean rtol?
-  method             expected "auto", "rough" or "exact", found "exakt"; did you mean exact?
-  rtol               expected 1e-15 <= rtol < 1, found 2
-  outputs[2]         expected "fall_time", "impact_speed" or "drop", found "fal_time"; did you mean fall_time?
-  axes.height.unit   "kg" is a mass; height is a length, e.g. "m" or "mm"
-  axes.height.start  a log axis needs start > 0, found 0
-  axes.height.stop   expected a number, found "5e-3"; drop the quotes
-  axes.height.num    expected a whole number from 2 to 10000000, found 0; for a single value write values = [...]
-  axes.v_0           kernel toy has no such parameter; did you mean v0?
-  fixed.g.units      no such key; did you mean unit?
-  fixed.g.value      expected a number, found "9.81 m/s^2"; write { value = 9.81, unit = "m/s^2" }
-  fixed.height       height is an axis as well; keep one of the two
-  along.face         kernel toy has no such coordinate; it has phase
-  along.phase        missing; output drop needs it, e.g. num = 200"""
-    )
-
-
 @pytest.mark.parametrize(
     ("text", "where", "word"),
     [

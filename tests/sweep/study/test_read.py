@@ -7,7 +7,6 @@ import sys
 import numpy as np
 import pytest
 import toy
-import xarray as xr
 from columns import columns_of
 from toy_studies import build, build_rich, message_of
 
@@ -23,45 +22,6 @@ MASS = [0.1, 0.2, 0.7]
 def beads(fixed=None, **keys):
     given = {"fixed": {"mass": MASS} if fixed is None else fixed, "axes": {"g": [1.0, 2.0]}} | keys
     return sweep.study(kernel="beads:KERNEL", allow_import=True, **given)
-
-
-def test_a_whole_study_is_read(read):
-    study = read(
-        """# How fast does a stone fall?
-        title = "Falling stones"
-        kernel = "toy:KERNEL"
-        method = "exact"
-        rtol = 1e-6
-        outputs = ["drop", "fall_time"]
-        axes.v0 = [0, 0.5]
-        [axes.height]
-        spacing = "log"
-        start = 1
-        stop = 100
-        num = 3
-        unit = "mm"
-        [fixed]
-        g = { value = 981, unit = "cm/s^2" }
-        [along.phase]
-        num = 3
-        """,
-        head="",
-    )
-    assert (study.title, study.question) == ("Falling stones", "How fast does a stone fall?")
-    assert (study.kernel_name, study.kernel, study.method, study.rtol) == ("toy:KERNEL", toy.KERNEL, "exact", 1e-6)
-    assert study.outputs == tuple(f.name for f in study.asked) == ("fall_time", "drop")  # the kernel's order
-    assert {name: axis.values.tolist() for name, axis in study.axes.items()} == {
-        "v0": [0.0, 0.5], "height": [0.001, 0.01, 0.1],
-    }  # fmt: skip
-    assert [axis.spacing for axis in study.axes.values()] == ["values", "log"]
-    assert (study.fixed, study.along["phase"].tolist()) == ({"g": 9.81}, [0.0, 0.5, 1.0])
-    assert "spacing" in study.text
-
-
-def test_defaults_are_filled_in(read):
-    study = read("axes.height = [1.0]")
-    assert (study.method, study.rtol, study.design, study.question) == ("auto", 1e-9, "product", "")
-    assert (study.title, study.fixed) == ("toy over height", {"v0": 0.0, "g": 9.80665})
 
 
 def test_python_and_toml_give_the_same_study_with_numbers_of_its_own(read):
@@ -144,13 +104,6 @@ def test_words_become_the_numbers_of_the_kernel(read, tmp_path):
     assert (study.axes["method"].words, study.axes["method"].values.tolist()) == (("exact", "auto"), [1.0, -1.0])
 
 
-def test_a_parameter_follows_an_axis_or_has_the_value_of_a_fixed_one():
-    study = build_rich()
-    assert (study.follows, study.fixed) == ({"grip": "load", "hold": "load"}, {"shape": 0.0, "drag": 0.0})
-    study = build_rich(axes={"drag": [0.0, 1.0]}, fixed={"load": 5, "grip": 7}, method="auto")
-    assert (study.follows, study.fixed) == ({}, {"load": 5.0, "shape": 0.0, "grip": 7.0, "hold": 7.0})
-
-
 def test_a_method_that_cannot_do_a_term_of_the_study_is_a_mistake():
     drag = {"load": [1.0], "drag": [0.0, 1.0], "method": ["quick", "slow"]}
     for keys, where in (({"method": "quick", "fixed": {"drag": 0.1}}, "method"), ({"axes": drag}, "axes.method")):
@@ -166,24 +119,6 @@ def test_a_method_that_cannot_do_a_term_of_the_study_is_a_mistake():
 
 
 # array parameters
-
-
-def test_a_list_and_one_number_for_all_run_with_dimensions_of_their_own(tmp_path):
-    rows = [[1.0, 2.0], [3.0, 4.0]]
-    ds, zipped = sweep.run(beads(), tmp_path / "a.h5"), sweep.run(beads({}, axes={"mass": rows}, design="zip"))
-    assert (ds.moment.dims, ds.share.dims, ds.place.dims) == (("g", "bead"), ("g", "turned"), ("bead",))
-    np.testing.assert_allclose(ds.moment, np.outer([1.0, 2.0], MASS) * 0.5)
-    np.testing.assert_allclose(ds.share[0], MASS[::-1])
-    assert ds.bead.values.tolist() == [1, 2, 3]
-    assert (zipped.mass.dims, zipped.total.values.tolist()) == (("cell", "bead"), [3.0, 7.0])
-    for engine in ("h5netcdf", "netcdf4"):
-        with xr.open_dataset(tmp_path / "a.h5", engine=engine) as plain:
-            assert {"mass", "place", "bead", "turned"} <= set(plain.coords)
-            np.testing.assert_array_equal(plain.moment, ds.moment)
-    quick = sweep.run(beads(outputs=["total"], method="quick"))
-    assert float(quick.total[0]) == sum(MASS)
-    # a method is kept out where it lacks an output
-    assert [set(sweep.run(beads(**keys)).method_used.values) for keys in ({}, {"outputs": ["total"]})] == [{1}, {0}]
 
 
 def test_arrays_come_from_lists_of_any_unit_columns_of_files_and_rows(tmp_path):

@@ -9,7 +9,7 @@ from fractions import Fraction
 import mpmath
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import qmc
 from toy_studies import build, message_of
@@ -63,6 +63,15 @@ def test_a_unit_does_to_a_spacing_what_it_does_to_values_one_by_one():
         spaced = heights(spacing=spacing, start=1, stop=1000, num=4, unit="mm").tolist()
         fixed = [build(axes={"height": [1.0]}, fixed={"v0": {"value": n, "unit": "mm/s"}}).fixed["v0"] for n in listed]
         assert spaced == heights(values=listed, unit="mm").tolist() == fixed == [n / 1000 for n in listed]
+
+
+def test_edges_of_bins_may_be_spaced_as_axes_are_and_in_another_unit():
+    edges = {"fall_time": {"spacing": "log", "start": 100, "stop": 1e4, "num": 3, "unit": "ms"}}
+    summary = {"outputs": {"fall_time": ["histogram"]}, "edges": edges}
+    found = sweep.run(build(axes={"height": [1.0, 2.0, -1.0]}, summary=summary))
+    np.testing.assert_array_equal(found.fall_time_bin_lower, [0.1, 1.0])
+    np.testing.assert_array_equal(found.fall_time_bin_upper, [1.0, 10.0])
+    assert found.fall_time_histogram.values.tolist() == [2, 0]
 
 
 @pytest.mark.parametrize(
@@ -174,16 +183,6 @@ def test_arrays_go_into_a_block_of_their_own():
     found, alone = sweep.run(**keys, blocks=[{"axes": {"tol": [0.0, 0.01]}}, arrays]), sweep.run(**keys, **arrays)
     assert found.J.dims == ("point", "mass")
     np.testing.assert_array_equal(found.frequency.isel(tol=0), alone.frequency)
-
-
-@settings(deadline=None, max_examples=10)
-@given(block=st.integers(1, 40), kind=st.sampled_from(["sobol", "latin", "random"]))
-def test_the_bits_are_the_same_for_any_blocks_of_cells(block, kind):
-    keys = {"blocks": [{"design": {"kind": kind, "n": 8, "seed": 1}, "axes": RANGES}, {"axes": {"g": [9.81, 1.62]}}]}
-    study = build(**keys, where="v0**2 < 2*g*height")
-    whole, cut = sweep.run(study), sweep.run(study, block_cells=block, workers=1)
-    assert whole.fall_time.values.tobytes() == cut.fall_time.values.tobytes()
-    assert np.array_equal(whole.status, cut.status)
 
 
 @pytest.mark.parametrize(
