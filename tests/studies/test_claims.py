@@ -73,6 +73,7 @@ TABLE = {
     },
         "impact_map.contact_share impact_map.offset impact_map.status impact_map_lever.period "
         "impact_map_lever.swing", 4),
+    "law_any_swing": Claims({"law_any_swing": {}}, "status", 1),
     "law_map": Claims({"law_map": {"e": [1, 0.99, 0.5], "R": [0, 1, 100], "c": [0, 1e-6, 1]}}, "status"),
     "law_map_overnight": Claims({
         "law_map_overnight": {"n": [0.25, 1.5, 3.0], "e": [1, 0.99, 0.97, 0.5], "R": 3, "c": 10},

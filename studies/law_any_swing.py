@@ -1,0 +1,181 @@
+"""What is the exponent of a foliot's period, P ~ torque^(-s), at any swing and any shares of its losses?
+
+    sweep run studies/law_any_swing.toml
+    python studies/law_any_swing.py law_any_swing.h5
+
+draws law_any_swing.png and prints theory beside what comes out. Let friction of degree n (0 dry, 1 viscous, n drag)
+take the share lambda_n of the energy of half a swing, impacts the share lambda_e; N = sum of n lambda_n, and A is the
+amplitude over phi0. At large swings s = L = (N + lambda_e)/(N + 2). At small ones the foliot goes at its final speed,
+or starts from rest after an impact, and s = 1/M, M = N + 2 lambda_e. Between them, with x = k (A^2 - 1),
+    s = (1 + L x)/(M + x),   1/k = sum of lambda_n/k_n + lambda_e/5,   k_n = 2 (2n + 1)(3n + 2)/(n + 2)^2.       (1)
+k_n makes (1) right to the order A^-2 for one friction, from the series of its integrals in v^n; impacts enter M and k
+as friction of degree 2, k_2 = 5. Exact: dry friction alone at any swing, 1/(A^2 - 1) as k_0 = 1, friction of degree 2
+or impacts alone, 1/2, and both limits.
+Exact for every clock, since no other quantity has a time in it: with p_n = dlnP/dlnc_n for each friction c_n v^n,
+    s = 1/2 + 1/2 sum of (2 - n) p_n.                                                                            (2)
+"""
+
+from __future__ import annotations
+
+import itertools
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from _common import Groups, Statement, read_result, report
+from _losses import any_swing, shares
+
+import sweep
+
+BANDS = ((1.0, 1.1, 0.25), (1.1, 2.0, 0.20), (2.0, 10.0, 0.09), (10.0, np.inf, 0.005))
+"""Swings over phi0, and the most that (1) may be off there, as a share of s."""
+SAMPLE = 32
+STEP = 1e-3
+"""Of ln c_n, in the differences of (2); their error is the square of it."""
+
+NOTES = """\
+deviation: of s, as a share of it, or the difference where an exponent is beside a number. Allowed: of (1)
+what the line says, of (2) the error of differences. Clocks: 1280 drawn over a, R, c and n, with e = 1, .99, .9, .5, 0
+"""
+
+
+def everywhere(ds: xr.Dataset) -> list[Statement]:
+    """(1) against every clock, by its swing."""
+    off = abs(ds.law / ds.sensitivity - 1.0)
+    usual = off.quantile([0.5, 0.95]).values
+    lines = [
+        Statement("all clocks: half of them, 95 % of them within", "", f"{usual[0]:.2%}, {usual[1]:.1%}", usual[1],
+                  bool(usual[0] < 0.012 and usual[1] < 0.1)),
+    ]  # fmt: skip
+    for low, high, allowed in BANDS:
+        part = off.where((ds.swing >= low) & (ds.swing < high))
+        text = f"{int(part.notnull().sum())} clocks within {float(part.max()):.2%}"
+        what = f"swings from {low:g} phi0" + (f" to {high:g}" if np.isfinite(high) else "")
+        lines.append(Statement(what, f"(1) to {allowed:.1%}", text, float(part.max()), bool(part.max() < allowed)))
+    near = [float((abs(ds[name] / ds.sensitivity - 1.0) < 0.1).mean()) for name in ("law", "large", "small")]
+    text = ", ".join(f"{share:.0%}" for share in near)
+    there = bool(near[0] > 0.9 > 0.75 > max(near[1:]))
+    lines.append(Statement("within 10 %: by (1), by large swings, by small", "", text, None, there))
+    return lines
+
+
+LOSSES: dict[str, tuple[dict[str, float], float]] = {
+    "dry": ({"R": 1.0}, 1e-8), "viscous": ({"a": 1.0}, 0.05), "degree 3": ({"c": 1.0, "n": 3.0}, 0.05),
+    "degree 2": ({"c": 1e-2, "n": 2.0}, 1e-8), "impacts": ({"e": 0.7}, 1e-8),
+}  # fmt: skip
+"""Clocks of one loss, and the most that (1) may be off."""
+
+
+def alone(name: str) -> xr.Dataset:
+    """One loss at many torques, with its laws."""
+    fixed, _ = LOSSES[name]
+    mu = 1.0 + np.geomspace(1e-3, 1e3, 40) if "R" in fixed else np.geomspace(1e-8, 1e8, 50)
+    outputs = ["amplitude", "crossing_speed", "sensitivity"]
+    fixed = {"a": 0.0, "c": 0.0, "phi0": 1.0, **fixed}
+    study = sweep.study(kernel="foliot", axes={"mu": mu}, fixed=fixed, outputs=outputs, rtol=1e-10)
+    return any_swing(shares(sweep.run(study)))
+
+
+def one_loss() -> list[Statement]:
+    """(1) where it is exact, and of two losses where it is not."""
+    lines = []
+    for name, (_, allowed) in LOSSES.items():
+        ds = alone(name)
+        off = float(abs(ds.law / ds.sensitivity - 1).max())
+        text = f"s from {float(ds.sensitivity.max()):.4g} to {float(ds.sensitivity.min()):.4g}"
+        lines.append(Statement(f"{name} alone", f"(1) to {allowed:g}", text, off, off < allowed))
+    return lines
+
+
+def by_periods(ds: xr.Dataset) -> list[Statement]:
+    """(2) with the periods of some of the clocks at other friction."""
+    few = ds.isel(point=slice(0, SAMPLE), e=slice(0, 4)).stack(clock=("point", "e"))
+    clock = {name: few[name].values for name in ("a", "R", "c", "n", "e")}
+    study = {"kernel": "foliot", "outputs": ["period"], "rtol": 1e-12, "axes": {name: [0.5] for name in clock}}
+    period = sweep.solver({**study, "fixed": {"mu": 1.0, "phi0": 1.0}})
+
+    def slope(name: str) -> np.ndarray:
+        up, down = (period(**{**clock, name: clock[name] * np.exp(sign * STEP)}).period for sign in (1, -1))
+        return np.log(up / down) / (2 * STEP)
+
+    with np.errstate(divide="ignore", invalid="ignore"):
+        s = 0.5 + 0.5 * (slope("a") + 2.0 * slope("R") + (2.0 - clock["n"]) * slope("c"))
+    off = float(np.nanmax(abs(s / few.sensitivity.values - 1)))
+    text = "s by the kernel's tangent, p_n by its periods"
+    return [Statement(f"(2), {SAMPLE * 4} clocks", "1e-4", text, off, off < 1e-4)]
+
+
+def figure(ds: xr.Dataset) -> Any:
+    """One loss alone over the swing, (1) against every clock, and how far it is off; for two columns of print."""
+    from sweep.show import charts
+
+    with charts.style():
+        page = charts.new_figure(charts.PAGE, 62.0)
+        for axes, draw, text in zip(page.subplots(1, 3), (draw_alone, draw_all, draw_off), "abc", strict=True):
+            draw(axes, ds)
+            charts.letter(axes, text)
+    return page
+
+
+def draw_alone(axes: Any, _: xr.Dataset) -> None:
+    """s of one loss over its swing beyond the switch."""
+    from sweep.show.charts import COLOURS
+
+    for colour, name in zip(COLOURS, list(LOSSES)[:3], strict=False):
+        line = alone(name)
+        axes.loglog(line.swing - 1, line.law, color=colour, label=name)
+        axes.loglog(line.swing - 1, line.sensitivity, "o", color=colour, markersize=2.5, markerfacecolor="white")
+    axes.plot([], [], "ko", markersize=2.5, markerfacecolor="white", label="kernel")
+    axes.set(xlabel=r"swing beyond the switch, $A-1$ [1]", ylabel="exponent, $s$ [1]", xlim=(1e-3, 1e2))
+    axes.set(ylim=(0.02, 30))
+    axes.legend(fontsize=6.5, loc="upper right")
+
+
+def draw_all(axes: Any, ds: xr.Dataset) -> None:
+    """The exponent of every clock against (1), and against the law of large swings."""
+    from sweep.show.charts import COLOURS
+
+    s = ds.sensitivity.values.ravel()
+    for name, colour, text in (("large", "0.75", "large swings alone"), ("law", COLOURS[0], "(1)")):
+        axes.loglog(ds[name].values.ravel(), s, ".", color=colour, markersize=1, label=text, rasterized=True)
+    axes.plot([0.02, 30], [0.02, 30], color="black", linewidth=0.6)
+    axes.set(xlabel="exponent by the law [1]", ylabel="exponent, $s$ [1]", xlim=(0.02, 30), ylim=(0.02, 30))
+    axes.legend(fontsize=6.5, loc="upper left", markerscale=6)
+
+
+def draw_off(axes: Any, ds: xr.Dataset) -> None:
+    """Deviations of (1) over the swing, with what half and 95 % of the clocks keep."""
+    from sweep.show.charts import COLOURS
+
+    swing, off = ds.swing.values.ravel() - 1, 100 * abs(ds.law / ds.sensitivity - 1).values.ravel()
+    axes.loglog(swing, off, ".", color="0.75", markersize=1, rasterized=True)
+    edges = np.geomspace(1e-3, 20, 10)
+    bins = [off[(swing >= low) & (swing < high)] for low, high in itertools.pairwise(edges)]
+    middle = np.sqrt(edges[1:] * edges[:-1])
+    for share, dashes in ((95, "-"), (50, "--")):
+        axes.plot(middle, [np.percentile(b, share) for b in bins], dashes, color=COLOURS[0], label=f"{share} % of them")
+    axes.set(xlabel=r"swing beyond the switch, $A-1$ [1]", ylabel="deviation of (1) [% of $s$]", xlim=(1e-3, 100))
+    axes.set(ylim=(1e-3, 100))
+    axes.legend(fontsize=6.5, loc="lower left")
+
+
+def conclude(path: str) -> tuple[Groups, list[str], Any]:
+    """Statements and the figure."""
+    ds = any_swing(shares(read_result(path, "foliot", ["point", "e"], "law_any_swing.toml")))
+    groups = {
+        "Any losses, any swing": everywhere(ds),
+        "One loss alone": one_loss(),
+        "By the period at other friction": by_periods(ds),
+    }
+    return groups, [NOTES], lambda: figure(ds)
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Table and figure of the result that is named; 1 if a statement does not hold."""
+    return report(__file__, ["law_any_swing.h5"], arguments, conclude)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
