@@ -8,14 +8,23 @@ from __future__ import annotations
 
 import sys
 import textwrap
-from collections.abc import Callable, Sequence
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import xarray as xr
 
 import sweep
+from sweep.file.overwriting import check_target
+
+try:
+    from sweep.show import charts
+except sweep.SweepError as error:  # no matplotlib
+    sys.exit(str(error))
 
 
 @dataclass(frozen=True)
@@ -76,6 +85,30 @@ def cheapest(found: dict[str, xr.Dataset]) -> list[Statement]:
     return lines
 
 
+def measured(off: Callable[[float], Any], tolerances: Sequence[float]) -> xr.Dataset:
+    """Over rtol: the `worst` of the errors of cells that `off` gives, infinite where one is NaN, and `seconds` a cell.
+
+    `off` is called twice, and timed at the second call, when all is compiled.
+    """
+    rows = []
+    for rtol in tolerances:
+        off(rtol)
+        begin = time.process_time()
+        errors = off(rtol)
+        rows.append((np.nan_to_num(errors, nan=np.inf).max(), (time.process_time() - begin) / len(errors)))
+    worst, seconds = zip(*rows, strict=True)
+    return xr.Dataset({"worst": ("rtol", list(worst)), "seconds": ("rtol", list(seconds))}, {"rtol": list(tolerances)})
+
+
+def solved_by(kernel: Any, method: str, rtol: float, **given: Any) -> tuple[Any, Any]:
+    """The first output of cells by the kernel's own function, without the engine, and their statuses."""
+    shape = np.broadcast_shapes(*map(np.shape, given.values()))
+    columns = [np.broadcast_to(given.get(p.name, p.default), shape).astype(float) for p in kernel.parameters]
+    outputs, status = [np.empty(shape) for _ in kernel.outputs], np.empty(shape, np.int8)
+    kernel.method(method).solve(*columns, np.full(shape, rtol), *outputs, status)
+    return outputs[0], status
+
+
 def table(groups: Groups, source: str = "paper") -> list[str]:
     """Lines of the table "`source` | here"."""
     rows: list[tuple[str, ...]] = [("", source, "here", "deviation", "holds")]
@@ -134,9 +167,6 @@ def report(
         print(f"use: python {Path(script).name} {' '.join(inputs)} [--force]", file=sys.stderr)
         return 2
     try:
-        from sweep.file.overwriting import check_target
-        from sweep.show import charts
-
         target = Path(arguments[0]).with_suffix(".png")
         check_target(target, force=force)
         groups, notes, draw = conclude(*arguments)
@@ -149,12 +179,21 @@ def report(
     return int(any(s.failed for lines in groups.values() for s in lines))
 
 
+@contextmanager
+def page_of(height: float, *shape: int, width: float = charts.PAGE, **how: Any) -> Iterator[tuple[Any, Any]]:
+    """A figure for print of so many mm, and its panels as `subplots` gives them, lettered in the end if several."""
+    with charts.style():
+        page = charts.new_figure(width, height)
+        panels = page.subplots(*shape, **how)
+        yield page, panels
+        for axes, text in zip(np.ravel(panels), "abcdefghi", strict=False) if np.size(panels) > 1 else ():
+            charts.letter(axes, text)
+
+
 def hatch(axes: Any, x: Any, y: Any, where: Any, pattern: str, colour: str = "0.45") -> None:
     """Hatches the cells of a map for which `where`, of shape (y, x), is true, and draws their edge."""
-    import matplotlib
-
     shown = where.astype(float)
-    with matplotlib.rc_context({"hatch.color": colour, "hatch.linewidth": 0.4}):
+    with charts.matplotlib.rc_context({"hatch.color": colour, "hatch.linewidth": 0.4}):
         axes.contourf(x, y, shown, levels=[0.5, 1.5], colors="none", hatches=[pattern])
     axes.contour(x, y, shown, levels=[0.5], colors=[colour], linewidths=0.8)
 
@@ -163,6 +202,30 @@ def direct_label(axes: Any, x: float, y: float, text: str, colour: str = "black"
     """Text in the colour of the line it names, readable where it crosses others."""
     box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.8}
     axes.text(x, y, text, color=colour, bbox=box, **{"fontsize": 8, "ha": "center", "va": "center", **how})
+
+
+def draw_costs(axes: Any, found: dict[str, xr.Dataset], places: dict[str, tuple[float, float]]) -> None:
+    """`worst` error over `seconds` a cell of each method, in its colour, with its name beside it.
+
+    Parameters
+    ----------
+    places : by name, factors from the line's first point to where the name stands; those without are not drawn.
+    """
+    for name, row in found.items():
+        look, drawn = charts.method_look(name), row.worst.where(row.worst < 1.0).dropna("rtol")
+        if name in places and drawn.size:
+            axes.plot(row.seconds.sel(rtol=drawn.rtol), drawn.clip(1e-16), markersize=4, linewidth=0.9, **look)
+            right, up = places[name]
+            x, y = float(row.seconds.sel(rtol=drawn.rtol[0])), float(drawn[0])
+            direct_label(axes, right * x, up * y, name, look["color"], fontsize=7)
+    axes.set(xscale="log", yscale="log", xlabel="CPU time per cell [s]", ylabel="relative error, worst cell [1]")
+
+
+def quality_bar(page: Any, mesh: Any, axes: Any, label: str, **how: Any) -> Any:
+    """The bar of a map in "cividis_r" of what is better the less it is: the good end is bright, and on top."""
+    bar = page.colorbar(mesh, ax=axes, label=label, **how)
+    bar.ax.invert_yaxis()
+    return bar
 
 
 def plain_ticks(axis: Any, values: Sequence[float]) -> None:

@@ -107,7 +107,7 @@ FOLLOWERS: dict[str, Callable[[Any, Any, Any, float], Any]] = {
         ("scipy BDF", "scipy", partial(scipy_places, "BDF")),
         ("scipy LSODA", "scipy", partial(scipy_places, "LSODA")),
         ("diffrax Kvaerno5", "diffrax", diffrax_places),
-        ("DOP853, modes by hand", "scipy", modes),
+        ("scipy DOP853, modes by hand", "scipy", modes),
     )
     if find_spec(module)
 }

@@ -21,14 +21,15 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, compared, differing, plain_ticks, read_result, report
+from _common import Groups, Statement, compared, differing, direct_label, page_of, plain_ticks, read_result, report
 
 import sweep
+from sweep.show.charts import COLOURS, DASHES, MARKS
 
 DAY = 86400.0
 LARGE = 20.0
@@ -181,36 +182,31 @@ def pivots() -> list[Statement]:
 
 def figure(ds: xr.Dataset, lift: xr.Dataset, hung: xr.Dataset) -> Any:
     """Loss against amplitude for impulses, over their angle, for lifts and in positions; for two columns of print."""
-    from sweep.show import charts
-
-    with charts.style():
-        page = charts.new_figure(charts.PAGE, 125.0)
-        (lines, plane), (lifted, posed) = page.subplots(2, 2)
+    with page_of(125.0, 2, 2) as (page, ((lines, plane), (lifted, posed))):
         draw_lines(lines, ds.isel(r=1))
         draw_plane(page, plane, ds.isel(r=1))
         draw_lifts(lifted, lift.isel(r=-1))
         draw_positions(posed, hung)
-        for axes, text in zip((lines, plane, lifted, posed), "abcd", strict=True):
-            charts.letter(axes, text)
     return page
 
 
 def draw_lines(axes: Any, ds: xr.Dataset) -> None:
     """Loss over amplitude, impulse by impulse, with (1)."""
-    from sweep.show.charts import COLOURS, MARKS
-
     for k, at in enumerate((-0.05, -0.025, -0.0125, 0.0, 0.05)):
-        line = ds.sel(at=at, method="nearest")
-        first = theory(line)
-        axes.plot(line.a, first, color=COLOURS[k], linewidth=0.9)
-        name = f"{1e3 * at:+.0f}" if at else "0"
+        line = ds.sel(at=at, method="nearest").sortby("w")
+        axes.plot(line.a, theory(line), color=COLOURS[k], linewidth=0.9)
         look = {"linestyle": "", "color": COLOURS[k], "markerfacecolor": "white", "markersize": 3.6}
-        axes.plot(line.a[::4], line.loss[::4], MARKS[k % len(MARKS)], label=name, **look)
+        axes.plot(line.a[::4], line.loss[::4], MARKS[k], **look)
+        text = f"{1e3 * at:+.0f} mrad" if at else "centre"
+        direct_label(axes, 1.15 * float(line.a.max()), float(theory(line)[int(line.a.argmax())]), text, COLOURS[k],
+                     fontsize=7, ha="left")  # fmt: skip
+    axes.plot([], [], "o", color="0.3", markerfacecolor="white", markersize=3.6, label="impulse at, scene")
+    axes.plot([], [], color="0.3", linewidth=0.9, label="theory (1)")
     axes.set_yscale("symlog", linthresh=1.0, linscale=0.6)
     axes.set_yticks([-1000, -100, -10, -1, 0, 1, 10, 100, 1000])
-    axes.set(xscale="log", xlabel="amplitude, $a$ [rad]", ylabel="loss [s/day]", ylim=(-3e5, 1e4))
-    axes.plot([], [], color="black", linewidth=0.9, label="theory")
-    axes.legend(title="impulse at [mrad]", fontsize=7, title_fontsize=7, loc="lower right", ncols=2)
+    axes.set_yticks([], minor=True)
+    axes.set(xscale="log", xlabel="amplitude, $a$ [rad]", ylabel="loss [s/day]", ylim=(-4e3, 1e4), xlim=(0.2, 22))
+    axes.legend(fontsize=7, loc="upper right")
     plain_ticks(axes.xaxis, (0.2, 0.5, 1, 2, 5))
 
 
@@ -232,8 +228,6 @@ def draw_plane(page: Any, axes: Any, ds: xr.Dataset) -> None:
 
 def draw_lifts(axes: Any, ds: xr.Dataset) -> None:
     """Loss over amplitude by lift; the mark is where the rate does not depend on the torque."""
-    from sweep.show.charts import COLOURS, DASHES
-
     for k, beta in enumerate(ds.beta.values):
         line = ds.sel(beta=beta)
         axes.loglog(line.amplitude, line.loss, color=COLOURS[k], linestyle=DASHES[k],
@@ -249,8 +243,6 @@ def draw_lifts(axes: Any, ds: xr.Dataset) -> None:
 def draw_positions(axes: Any, ds: xr.Dataset) -> None:
     """Rate over amplitude, position by position, with J1."""
     from scipy.special import j1
-
-    from sweep.show.charts import COLOURS, MARKS
 
     wide = np.linspace(1.0, 6.5, 200)
     for k, hang in enumerate(ds.hang.values):
@@ -286,10 +278,8 @@ def conclude(*paths: str) -> tuple[Groups, list[str], Any]:
     return groups, [NOTES], lambda: figure(ds, lift, hung)
 
 
-def main(arguments: Sequence[str]) -> int:
-    """Table and figure of the results that are named; 1 if a statement does not hold."""
-    inputs = ["balance_isochronism.h5", "balance_isochronism_lift.h5", "balance_isochronism_positions.h5"]
-    return report(__file__, inputs, arguments, conclude)
+INPUTS = ["balance_isochronism.h5", "balance_isochronism_lift.h5", "balance_isochronism_positions.h5"]
+main = partial(report, __file__, INPUTS, conclude=conclude)
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -23,6 +23,8 @@ from _common import Groups, Statement, compared, differing, direct_label, hatch,
 
 import sweep
 from kernels.interface import Status
+from sweep.show import charts
+from sweep.show.charts import COLOURS, MARKS
 
 LIGHT = 0.01
 """Damping up to which delta = pi zeta to 5e-5."""
@@ -51,7 +53,10 @@ def turning_points(zeta: float, r: float, start: float, count: int) -> tuple[np.
     times, angles = [0.0], [start]
     for _ in range(count):
         side = -math.copysign(1.0, angles[-1])  # of the speed
-        equation = _equation(zeta, r, side)
+
+        def equation(t: float, y: Any, side: float = side) -> tuple[float, float]:
+            return y[1], -2 * zeta * y[1] - y[0] - side * r
+
         push = -angles[-1] - side * r
         small = 1e-6  # the first step by its series, off the zero of the speed
         y = [angles[-1] + push * small**2 / 2, push * small * (1 - zeta * small)]
@@ -59,10 +64,6 @@ def turning_points(zeta: float, r: float, start: float, count: int) -> tuple[np.
         times.append(times[-1] + float(leg.t_events[0][0]))
         angles.append(float(leg.y_events[0][0][0]))
     return np.array(times), np.array(angles)
-
-
-def _equation(zeta: float, r: float, side: float) -> Any:
-    return lambda t, y: (y[1], -2 * zeta * y[1] - y[0] - side * r)
 
 
 def motion(zeta: float, r: float, start: float, t: Any, count: int) -> np.ndarray:
@@ -190,15 +191,8 @@ def isochronism(ds: xr.Dataset) -> list[Statement]:
     ]  # fmt: skip
 
 
-def statements(ds: xr.Dataset) -> Groups:
-    """Every line of the table, by heading."""
-    return {"Half swings": counts(ds), "Rest": rest(ds), "Isochronism of the free balance": isochronism(ds)}
-
-
 def figure(ds: xr.Dataset) -> Any:
     """The count over both frictions, its collapse on one law, and the period; for two columns of print."""
-    from sweep.show import charts
-
     with charts.style():
         page = charts.new_figure(charts.PAGE, 118.0)
         left, right = page.subfigures(1, 2, width_ratios=(1.12, 1))
@@ -215,8 +209,6 @@ def figure(ds: xr.Dataset) -> Any:
 
 def draw_motion(axes: Any) -> None:
     """theta(t) of one ring-down, with the centre of each half swing, which solid friction shifts; marks by DOP853."""
-    from sweep.show.charts import COLOURS
-
     zeta, r = SHOWN
     count = int(np.ceil(_swings(zeta, r)))
     half = math.pi / math.sqrt(1 - zeta**2)
@@ -262,8 +254,6 @@ def draw_map(page: Any, axes: Any, ds: xr.Dataset) -> None:
 
 def draw_law(axes: Any, ds: xr.Dataset) -> None:
     """pi zeta N against x: one curve for all light damping."""
-    from sweep.show.charts import COLOURS, MARKS
-
     x = np.geomspace(1e-4, 1e4, 200)
     axes.loglog(x, np.log1p(x), color="black", label=r"$\ln(1+x)$")
     for k, zeta in enumerate((1e-4, 1e-3, 1e-2, 0.3)):
@@ -288,8 +278,6 @@ def _power(x: float) -> str:
 
 def draw_period(axes: Any, ds: xr.Dataset) -> None:
     """How much viscous damping slows the balance, at three solid frictions: the marks lie on each other."""
-    from sweep.show.charts import COLOURS, MARKS
-
     zeta = np.geomspace(1e-4, 0.9999, 300)
     axes.loglog(zeta, 1 / np.sqrt(1 - zeta**2) - 1, color="black", label=r"$(1-\zeta^2)^{-1/2}-1$")
     for k, (r, size) in enumerate(((1e-4, 6.5), (1e-2, 4.2), (0.5, 2.0))):
@@ -308,12 +296,11 @@ def read(path: str) -> xr.Dataset:
 def conclude(path: str) -> tuple[Groups, list[str], Any]:
     """Statements and the figure."""
     ds = read(path)
-    return statements(ds), [NOTES], lambda: figure(ds)
+    groups = {"Half swings": counts(ds), "Rest": rest(ds), "Isochronism of the free balance": isochronism(ds)}
+    return groups, [NOTES], lambda: figure(ds)
 
 
-def main(arguments: Sequence[str]) -> int:
-    """Table and figure of the result that is named; 1 if a statement does not hold."""
-    return report(__file__, ["balance_ringdown.h5"], arguments, conclude)
+main = partial(report, __file__, ["balance_ringdown.h5"], conclude=conclude)
 
 
 if __name__ == "__main__":

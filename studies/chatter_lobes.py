@@ -17,15 +17,16 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, compared, direct_label, paragraph, plain_ticks, read_result, report
+from _common import Groups, Statement, compared, direct_label, page_of, plain_ticks, read_result, report
 from fula_milling_machine import receptance
 
 import sweep
+from sweep.show.charts import COLOURS
 
 FREQUENCIES = np.concatenate([np.geomspace(15, 60, 6001), np.geomspace(60, 3000, 12001)[1:]])
 """Where H is taken [Hz]."""
@@ -209,34 +210,13 @@ def by_masses(ds: xr.Dataset) -> list[Statement]:
     return [Statement("border held to 5 % up to a tooth frequency of, by masses", "more with more", told, None, falls)]
 
 
-def statements(ds: xr.Dataset) -> Groups:
-    """Every line of the table, by heading."""
-    return {"Lobes of the chains": whole_chain(ds), "What the reduction moves": moved(ds)}
-
-
-def answer(ds: xr.Dataset) -> list[str]:
-    """The conclusion, with the numbers of the dataset."""
-    (_, K8), (_, K5) = (least(ds, n, BANDS[0]) for n in (8, 5))
-    (g8, M8), (g5, M5) = (least(ds, n, BANDS[1]) for n in (8, 5))
-    return paragraph(f"""In a line: five masses put the least K at {K5:.1f} N m/rad instead of {K8:.1f},
-        {K5 / K8 - 1:+.2%}, and hold the border to 5 % up to {held(ds, 5):.0f} teeth a second. They move the lobes of
-        the fifth mode from {g8:.0f} to {g5:.0f} Hz and by {M5 / M8 - 1:+.0%} in K; those lie {M8 / K8:.0f} times above
-        the least.""")
-
-
 def figure(ds: xr.Dataset) -> Any:
     """-Re H, the lobes at usual and at high tooth frequencies, and what the reductions do; for two columns of print."""
-    from sweep.show import charts
-
-    with charts.style():
-        page = charts.new_figure(charts.PAGE, 118.0)
-        (real, usual), (high, error) = page.subplots(2, 2)
+    with page_of(118.0, 2, 2) as (page, ((real, usual), (high, error))):
         draw_real(real, ds)
         draw_usual(usual, ds)
         draw_high(high, ds)
         draw_error(error, ds)
-        for axes, text in zip((real, usual, high, error), "abcd", strict=True):
-            charts.letter(axes, text)
     return page
 
 
@@ -246,8 +226,6 @@ LOOK = {8: ("-", 0), 7: ("-", 2), 6: ((0, (6, 1.5, 1.2, 1.5)), 3), 5: ((0, (5, 1
 
 def draw_line(axes: Any, x: Any, y: Any, n: int) -> None:
     """The line of a chain of n masses."""
-    from sweep.show.charts import COLOURS
-
     dashes, colour = LOOK[n]
     axes.plot(x, y, color=COLOURS[colour], linestyle=dashes, label=f"{n} masses")
 
@@ -308,20 +286,14 @@ def draw_error(axes: Any, ds: xr.Dataset) -> None:
     axes.legend(loc="upper left", fontsize=7, ncols=2)
 
 
-def read(path: str) -> xr.Dataset:
-    """The chains with their lobes. Raises SweepError where it is no sweep of this study."""
-    return prepared(read_result(path, "drivetrain", ["n_keep"], "chatter_lobes.toml"))
-
-
 def conclude(path: str) -> tuple[Groups, list[str], Any]:
     """Statements and the figure."""
-    ds = read(path)
-    return statements(ds), [NOTES, "", *answer(ds)], lambda: figure(ds)
+    ds = prepared(read_result(path, "drivetrain", ["n_keep"], "chatter_lobes.toml"))
+    groups = {"Lobes of the chains": whole_chain(ds), "What the reduction moves": moved(ds)}
+    return groups, [NOTES], lambda: figure(ds)
 
 
-def main(arguments: Sequence[str]) -> int:
-    """Table and figure of the result that is named; 1 if a statement does not hold."""
-    return report(__file__, ["chatter_lobes.h5"], arguments, conclude)
+main = partial(report, __file__, ["chatter_lobes.h5"], conclude=conclude)
 
 
 if __name__ == "__main__":

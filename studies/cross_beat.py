@@ -22,14 +22,15 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, compared, differing, paragraph, plain_ticks, read_result, report
+from _common import Groups, Statement, compared, differing, page_of, plain_ticks, read_result, report
 
 import sweep
+from sweep.show.charts import COLOURS, MARKS
 
 SMALL = 1e-3
 """Wind-up tau/(4 k phi0) up to which (2) is held to `FIRST` of itself."""
@@ -162,47 +163,17 @@ def steadied(halves: xr.DataArray) -> list[Statement]:
     ]  # fmt: skip
 
 
-def statements(ds: xr.Dataset, halves: xr.DataArray) -> Groups:
-    """Every line of the table, by heading."""
-    return {
-        "Two as one": as_one(ds),
-        "Only the sums count (alpha = 30)": sums(ds),
-        f"A case that sways by {SWAY:g} rad/s^2": steadied(halves),
-    }
-
-
-def answer(ds: xr.Dataset, halves: xr.DataArray) -> list[str]:
-    """The conclusion, with the numbers of the dataset."""
-    at = usual(ds).isel(stiffness=-1)
-    scatter = halves.std("swing")
-    one = float((scatter[1:] / scatter.share[1:]).mean())
-    minute = 86400 * float(-at.off)
-    return paragraph(f"""In a line: a cross-beat is one foliot of both inertias and both frictions, its exponents are
-        those of one, s = {float(at.s):.3f} at alpha = 30, so for them it is a detail; a gear of 1 N m/rad winds up and
-        gains {minute:.0f} s a day. What it is good for is a case that turns: one that sways by {SWAY:g} rad/s^2
-        scatters the half swings of one foliot by {1e3 * one:.1f} ms, those of two equal ones by
-        {1e6 * float(scatter[0]):.1f} us.""")
-
-
 def figure(ds: xr.Dataset, halves: xr.DataArray) -> Any:
     """Period, what the gear's wind-up does to it, and half swings on a swaying case; for two columns of print."""
-    from sweep.show import charts
-
-    with charts.style():
-        page = charts.new_figure(charts.PAGE, 68.0)
-        panels = page.subplots(1, 3)
+    with page_of(68.0, 1, 3) as (page, panels):
         draw_period(panels[0], ds)
         draw_wound(panels[1], ds)
         draw_shaken(panels[2], halves)
-        for axes, text in zip(panels, "abc", strict=True):
-            charts.letter(axes, text)
     return page
 
 
 def draw_period(axes: Any, ds: xr.Dataset) -> None:
     """The pair's period, with one foliot of the sums and one of the two alone."""
-    from sweep.show.charts import COLOURS
-
     one = single(ds.tau.values, float(ds.I_l), float(ds.c_l), float(ds.phi0))
     axes.loglog(ds.alpha, ds.alone, color=COLOURS[0], label="one foliot, (1)")
     axes.loglog(ds.alpha, one.period, color=COLOURS[1], linestyle=(0, (5, 1.5)), label="one of the two alone")
@@ -214,8 +185,6 @@ def draw_period(axes: Any, ds: xr.Dataset) -> None:
 
 def draw_wound(axes: Any, ds: xr.Dataset) -> None:
     """How much sooner the teeth leave, with (2)."""
-    from sweep.show.charts import COLOURS, MARKS
-
     for k, stiffness in enumerate(ds.stiffness.values):
         line = ds.sel(stiffness=stiffness)
         axes.loglog(ds.alpha, line.s * line.wound, color=COLOURS[k], label=f"{stiffness:g}")
@@ -228,8 +197,6 @@ def draw_wound(axes: Any, ds: xr.Dataset) -> None:
 
 def draw_shaken(axes: Any, halves: xr.DataArray) -> None:
     """Half swings on a swaying case."""
-    from sweep.show.charts import COLOURS, MARKS
-
     for k, share in enumerate(halves.share.values[::-1]):
         line = halves.sel(share=share)
         away = 1e3 * (line - line.mean())
@@ -242,15 +209,18 @@ def draw_shaken(axes: Any, halves: xr.DataArray) -> None:
 
 
 def conclude(path: str) -> tuple[Groups, list[str], Any]:
-    """Statements, the answer and the figure."""
+    """Statements and the figure."""
     ds = prepared(read_result(path, "cross_beat_scene:KERNEL", ["stiffness", "tau"], "cross_beat.toml"))
     halves = shaken(ds)
-    return statements(ds, halves), [NOTES, "", *answer(ds, halves)], lambda: figure(ds, halves)
+    groups = {
+        "Two as one": as_one(ds),
+        "Only the sums count (alpha = 30)": sums(ds),
+        f"A case that sways by {SWAY:g} rad/s^2": steadied(halves),
+    }
+    return groups, [NOTES], lambda: figure(ds, halves)
 
 
-def main(arguments: Sequence[str]) -> int:
-    """Table and figure of the result that is named; 1 if a statement does not hold."""
-    return report(__file__, ["cross_beat.h5"], arguments, conclude)
+main = partial(report, __file__, ["cross_beat.h5"], conclude=conclude)
 
 
 if __name__ == "__main__":

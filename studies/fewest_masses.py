@@ -25,11 +25,13 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, columns, table
+from _common import Groups, Statement, columns, page_of, table
 
 import sweep
 from kernels.catalogue import KERNELS
 from kernels.interface import load
+from sweep.show import charts
+from sweep.show.charts import COLOURS, MARKS
 
 METHODS = ("rivin", "guyan", "irs", "craig_bampton", "modal")
 MASSES, SPREAD, DAMPER, TOLERANCE = 10, 100.0, 0.1, 0.01
@@ -161,16 +163,8 @@ def notes(ds: xr.Dataset, times: xr.Dataset) -> list[str]:
 
 
 def figure(ds: xr.Dataset, times: xr.Dataset) -> Any:
-    """Median of masses needed with the middle 80 %; how many beyond the frequencies in the band suffice; and cost.
-
-    The line in (c) is the full chain's.
-    """
-    from sweep.show import charts
-    from sweep.show.charts import COLOURS, MARKS
-
-    with charts.style():
-        page = charts.new_figure(charts.PAGE, 82.0)
-        left, right, dear = page.subplots(1, 3, width_ratios=(1.1, 1.1, 1))
+    """Median of masses needed with the middle 80 %; how many beyond the frequencies in the band suffice; and cost."""
+    with page_of(82.0, 1, 3, width_ratios=(1.1, 1.1, 1)) as (page, (left, right, dear)):
         for i, name in enumerate(METHODS):
             kept = ds.kept.sel(reduction=name)
             low, mean, high = (kept.quantile(q, "drivetrain").values for q in (0.1, 0.5, 0.9))
@@ -182,9 +176,10 @@ def figure(ds: xr.Dataset, times: xr.Dataset) -> Any:
             beyond = (kept - ds.inside).values.ravel()
             share = [np.mean(beyond <= extra) for extra in range(9)]
             right.plot(range(9), share, marker=MARKS[i], color=COLOURS[i], label=label)
-            how = {"marker": MARKS[i], "color": COLOURS[i], "linestyle": "none"}
-            dear.plot(times.time[i, 0], times.off[i, 0], **how)
-            dear.plot(times.time[i, 1], times.off[i, 1], fillstyle="none", **how)
+            five, fewest = float(times.off[i, 1]), float(times.off[i, 0])
+            dear.plot([five, fewest], [-i, -i], color=COLOURS[i], linewidth=0.8)
+            dear.plot(five, -i, marker=MARKS[i], color=COLOURS[i], fillstyle="none")
+            dear.plot(fewest, -i, marker=MARKS[i], color=COLOURS[i])
         left.axhline(MASSES, color="0.5", linewidth=0.7)
         left.text(0.6, MASSES + 0.15, "the full chain", fontsize=7, color="0.3")
         left.set(xlabel="frequencies in the band [1]", ylabel="masses needed for 1 % [1]", ylim=(0, MASSES + 0.7))
@@ -194,22 +189,21 @@ def figure(ds: xr.Dataset, times: xr.Dataset) -> Any:
         page.legend(*right.get_legend_handles_labels(), loc="outside upper center", ncols=5)
         left.errorbar([], [], [], color="0.3", marker=".", elinewidth=0.6, capsize=1.5, label="median and middle 80 %")
         left.legend(handles=left.get_legend_handles_labels()[0][-1:], loc="lower right", handlelength=1)
-        dear.axvline(float(times.full), color="0.5", linewidth=0.7)
-        dear.text(1.2 * float(times.full), 2e-5, "the full chain", fontsize=7, color="0.3", rotation=90)
         for label, fill in (("fewest for 1 %", "full"), ("five masses", "none")):
-            dear.plot([], [], "s", color="0.3", fillstyle=fill, label=label)
-        dear.legend(loc="upper right")
-        dear.set(yscale="log", xlabel="time of a cell [\u00b5s]", ylabel="error of the receptance")
-        dear.set(xlim=(0, 1.15 * float(times.time.max())), ylim=(1e-5, 30))
-        for axes, text in ((left, "a"), (right, "b"), (dear, "c")):
-            charts.letter(axes, text)
+            dear.plot([], [], "o", color="0.3", fillstyle=fill, label=label)
+        dear.legend(loc="lower right", fontsize=7)
+        names = [name.replace("_", "-") for name in METHODS]
+        dear.set(
+            xscale="log", xlabel="error of the receptance, median [1]", xlim=(3e-5, 3), ylim=(-len(names) - 0.4, 0.6)
+        )
+        dear.set_yticks(range(0, -len(names), -1), labels=names)
+        dear.set_yticks([], minor=True)
     return page
 
 
 def main(arguments: Sequence[str]) -> int:
     """Table and figure; 1 if a statement does not hold."""
     from sweep.file.overwriting import check_target
-    from sweep.show import charts
 
     if list(arguments) == ["points"]:
         write_points(Path(__file__).with_suffix(".csv"))

@@ -13,6 +13,7 @@ import math
 import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,8 @@ import xarray as xr
 from _common import Groups, Statement, columns, compared, differing, read_result, report
 
 import sweep
+from sweep.show import charts
+from sweep.show.charts import COLOURS
 
 WEAK: tuple[float | None, float | None] = (None, 1e-5)
 STRONG: tuple[float | None, float | None] = (1e5, None)
@@ -371,8 +374,6 @@ def trajectories(ds: xr.Dataset) -> xr.Dataset:
 
 def figure(ds: xr.Dataset) -> Any:
     """Period and amplitude, the sliding exponent, and trajectories, in one figure for two columns of print."""
-    from sweep.show import charts
-
     with charts.style():
         page = charts.new_figure(charts.PAGE, 118.0)
         left, right = page.subfigures(1, 2, width_ratios=(1.12, 1))
@@ -388,8 +389,6 @@ def figure(ds: xr.Dataset) -> Any:
 
 def draw_scaling(axes: Any, ds: xr.Dataset, half: HalfPoint) -> None:
     """a P and A against alpha, with the asymptotes of both."""
-    from sweep.show.charts import COLOURS
-
     alpha = ds.alpha.values
     axes.loglog(alpha, ds.aP, color=COLOURS[0], label=r"period, $aP$")
     axes.loglog(alpha, ds.A, color=COLOURS[1], linestyle=(0, (6, 1.5)), label=r"amplitude, $\varphi_{\max}/\varphi_0$")
@@ -410,8 +409,6 @@ def draw_scaling(axes: Any, ds: xr.Dataset, half: HalfPoint) -> None:
 
 def draw_exponent(axes: Any, ds: xr.Dataset, half: HalfPoint) -> None:
     """Local exponent by differences of ln P, the exact -s, and the drive at which it is -1/2."""
-    from sweep.show.charts import COLOURS
-
     slope = sweep.local_exponent(ds.aP, "alpha")
     few = slice(None, None, max(1, slope.size // 56))
     for value in (-1, -1 / 2, -1 / 3):
@@ -440,8 +437,6 @@ def draw_exponent(axes: Any, ds: xr.Dataset, half: HalfPoint) -> None:
 
 def draw_trajectories(panels: Sequence[Any], motion: xr.Dataset, phi0: float) -> None:
     """Two periods of phi(t)/phi0 at each drive; shaded while the torque is positive."""
-    from sweep.show.charts import COLOURS
-
     phase = np.concatenate([motion.phase.values, 1 + motion.phase.values[1:]])
     for i, (axes, (name, alpha)) in enumerate(zip(panels, SHOWN.items(), strict=True)):
         angle = motion.angle.isel(mu=i).values / phi0
@@ -471,9 +466,7 @@ def conclude(path: str) -> tuple[Groups, list[str], Any]:
     return statements(ds), [NOTES, "", heading, *columns(inverse_design(ds), "   ")], lambda: figure(ds)
 
 
-def main(arguments: Sequence[str]) -> int:
-    """Table and figure of the result that is named; 1 if a statement of the paper does not hold."""
-    return report(__file__, ["foliot_scaling.h5"], arguments, conclude, "paper")
+main = partial(report, __file__, ["foliot_scaling.h5"], conclude=conclude, source="paper")
 
 
 if __name__ == "__main__":

@@ -16,15 +16,16 @@ there s = (3 a^2 phi0/(2 R))^(1/3). As mu grows without end, s - 1/3 goes as 4/4
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, compared, differing, direct_label, hatch, read_result, report
+from _common import Groups, Statement, compared, differing, direct_label, hatch, page_of, read_result, report
 
 import sweep
 from kernels.interface import Status
+from sweep.show.charts import COLOURS
 
 KNOWN = {10.0: (8.719, 0.27318), 100.0: (6.098, 0.17768)}
 """mu/R and s in the valley at R/(a^2 phi0), in 50-digit arithmetic."""
@@ -176,23 +177,15 @@ def far(line: xr.Dataset) -> list[Statement]:
 
 def figure(laws: xr.Dataset, grid: xr.Dataset, line: xr.Dataset) -> Any:
     """Exponents against torque, their limits against n, and the map with its valley."""
-    from sweep.show import charts
-
-    with charts.style():
-        page = charts.new_figure(charts.PAGE, 70.0)
-        left, middle, right = page.subplots(1, 3, width_ratios=(1.1, 0.85, 1.25))
+    with page_of(70.0, 1, 3, width_ratios=(1.1, 0.85, 1.25)) as (page, (left, middle, right)):
         draw_exponents(left, laws)
         draw_limits(middle, laws)
         draw_map(right, grid, line)
-        for axes, text in ((left, "a"), (middle, "b"), (right, "c")):
-            charts.letter(axes, text)
     return page
 
 
 def draw_exponents(axes: Any, laws: xr.Dataset) -> None:
     """-s against mu for every n."""
-    from sweep.show.charts import COLOURS
-
     for i, n in enumerate((0.0, 1.0, 2.0, 3.0, 4.0)):
         law = laws.sel(n=n)
         axes.semilogx(law.mu, -law.sensitivity, color=COLOURS[i])
@@ -204,8 +197,6 @@ def draw_exponents(axes: Any, laws: xr.Dataset) -> None:
 
 def draw_limits(axes: Any, laws: xr.Dataset) -> None:
     """The exponents at both ends of the torque against n."""
-    from sweep.show.charts import COLOURS
-
     n = np.linspace(0.2, 4.3, 200)
     axes.plot(n, -1 / n, color="black", linewidth=0.8)
     axes.plot(n, -n / (n + 2), color="black", linewidth=0.8, linestyle=(0, (5, 1.5)))
@@ -257,9 +248,7 @@ def conclude(laws_path: str, map_path: str) -> tuple[Groups, list[str], Any]:
     return groups, [NOTES], lambda: figure(laws, grid, line)
 
 
-def main(arguments: Sequence[str]) -> int:
-    """Table and figure of the results that are named; 1 if a statement does not hold."""
-    return report(__file__, ["friction_laws.h5", "friction_laws_map.h5"], arguments, conclude)
+main = partial(report, __file__, ["friction_laws.h5", "friction_laws_map.h5"], conclude=conclude)
 
 
 if __name__ == "__main__":

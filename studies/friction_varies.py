@@ -22,14 +22,16 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, compared, read_result, report
+from _common import Groups, Statement, compared, page_of, read_result, report
 
 import sweep
+from sweep.show.charts import COLOURS, MARKS
 
 DAY = 86400.0
 SMALL = 0.125
@@ -196,24 +198,16 @@ def by_noise(noisy: xr.Dataset) -> list[Statement]:
 
 def figure(ds: xr.Dataset, noisy: xr.Dataset) -> Any:
     """Periods, averages, seasons, noise; for two columns of print."""
-    from sweep.show import charts
-
-    with charts.style():
-        page = charts.new_figure(charts.PAGE, 120.0)
-        (swing, mean), (year, noise) = page.subplots(2, 2)
+    with page_of(120.0, 2, 2) as (page, ((swing, mean), (year, noise))):
         draw_swing(swing, ds)
         draw_means(mean, ds)
         draw_year(year)
         draw_noise(noise, noisy)
-        for axes, text in zip((swing, mean, year, noise), "abcd", strict=True):
-            charts.letter(axes, text)
     return page
 
 
 def draw_swing(axes: Any, ds: xr.Dataset) -> None:
     """Half period over depth, over that of even friction."""
-    from sweep.show.charts import COLOURS, MARKS
-
     for k, mu in enumerate(ds.mu.values):
         line = ds.interval.sel(mu=mu, harmonic=1)
         change = 100 * (line / line.sel(depth=0, method="nearest") - 1)
@@ -224,8 +218,6 @@ def draw_swing(axes: Any, ds: xr.Dataset) -> None:
 
 def draw_means(axes: Any, ds: xr.Dataset) -> None:
     """First order in the depth beside three means."""
-    from sweep.show.charts import COLOURS, MARKS
-
     found = averages(ds).sel(harmonic=1)
     axes.semilogx(found.mu, found.effect, "o", color="black", label="true")
     for k, name in enumerate(("angle", "time", "energy")):
@@ -238,8 +230,6 @@ def draw_means(axes: Any, ds: xr.Dataset) -> None:
 
 def draw_year(axes: Any) -> None:
     """Rate over the year by both laws of viscosity."""
-    from sweep.show.charts import COLOURS
-
     for k, (mu, name) in enumerate(((0.1, "0.1"), (1.4629905875801047, "1.46"), (30.0, "30"))):
         for oil, dashes in ((vogel, "-"), (andrade, ":")):
             days, rate, _ = seasons(mu, oil)
@@ -252,8 +242,6 @@ def draw_year(axes: Any) -> None:
 
 def draw_noise(axes: Any, noisy: xr.Dataset) -> None:
     """Scatter over its unit against s, with (4)."""
-    from sweep.show.charts import COLOURS, MARKS
-
     s = np.linspace(1 / 3, 1, 100)
     cells = ({"sigma": 0.05, "sigma_a": 0}, {"sigma": 0, "sigma_a": 0.05}, {"sigma": 0.05, "sigma_a": 0.05})
     laws = (s, abs(2 * s - 1), 1 - s)
@@ -280,9 +268,7 @@ def conclude(path: str, noise_path: str) -> tuple[Groups, list[str], Any]:
     return groups, [NOTES], lambda: figure(ds, noisy)
 
 
-def main(arguments: Sequence[str]) -> int:
-    """Table and figure of the results that are named; 1 if a statement does not hold."""
-    return report(__file__, ["friction_varies.h5", "friction_varies_noise.h5"], arguments, conclude)
+main = partial(report, __file__, ["friction_varies.h5", "friction_varies_noise.h5"], conclude=conclude)
 
 
 if __name__ == "__main__":

@@ -18,13 +18,15 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, differing, read_result, report
+from _common import Groups, Statement, differing, page_of, read_result, report
 from _fula_source import CARRIED, CHAINS, KGF, TABLE_2_E, TABLE_6, holzer, judged, tables_2_to_4
+
+from sweep.show.charts import COLOURS, MARKS
 
 METHODS = ("rivin", "guyan", "irs", "craig_bampton", "modal", "exact")
 FIVE = {
@@ -244,27 +246,19 @@ def others(ds: xr.Dataset) -> list[Statement]:
 
 def figure(ds: xr.Dataset) -> Any:
     """Receptance of the spindle by eight and by five with its phase, its error, and errors by size; for two columns."""
-    from sweep.show import charts
-
     f = np.concatenate([np.linspace(0.2, 60, 600), np.linspace(60, 500, 1400)])
-    with charts.style():
-        page = charts.new_figure(charts.PAGE, 118.0)
-        (polar, amplitude, phase), (error, size, damping) = page.subplots(2, 3)
+    with page_of(118.0, 2, 3) as (page, ((polar, amplitude, phase), (error, size, damping))):
         draw_responses(polar, amplitude, phase, f, responses(ds, f))
         draw_errors(error, ds, f[::4])
         draw_sizes(size, ds.frequency_error, ds.n_keep, "largest error of $f_1$ to $f_4$ [1]")
         lost = ds.damping / ds.damping.sel(n_keep=8).isel(reduction=0) - 1
         draw_sizes(damping, lost, ds.n_keep, r"largest error of $\zeta_1$ to $\zeta_4$ [1]")
         size.legend(loc="lower left", fontsize=7)
-        for axes, text in zip((polar, amplitude, phase, error, size, damping), "abcdef", strict=True):
-            charts.letter(axes, text)
     return page
 
 
 def draw_responses(polar: Any, amplitude: Any, phase: Any, f: np.ndarray, responses: Any) -> None:
     """Figures 6 to 11 of the source."""
-    from sweep.show.charts import COLOURS
-
     for i, (H, name, line) in enumerate(zip(responses, ("8 masses", "5 masses"), ("-", "--"), strict=True)):
         shown = H * KGF * 1e3
         polar.plot(shown.real, shown.imag, line, color=COLOURS[i], label=name)
@@ -279,8 +273,6 @@ def draw_responses(polar: Any, amplitude: Any, phase: Any, f: np.ndarray, respon
 
 def draw_sizes(axes: Any, error: xr.DataArray, kept: xr.DataArray, label: str) -> None:
     """The largest error of the first four modes, by method and size; the line is 1 %."""
-    from sweep.show.charts import COLOURS, MARKS
-
     for code, name in enumerate(METHODS[:4]):
         worst = abs(error.isel(reduction=code, mode=slice(0, 4))).max("mode", skipna=False)
         shown = worst.where((worst > 1e-15) & (kept < 8))
@@ -291,8 +283,6 @@ def draw_sizes(axes: Any, error: xr.DataArray, kept: xr.DataArray, label: str) -
 
 def draw_errors(axes: Any, ds: xr.Dataset, f: np.ndarray) -> None:
     """abs(H5/H8 - 1): with the source's formulas, and with exact dampers."""
-    from sweep.show.charts import COLOURS
-
     for how, name, colour, line in (("real", "source", COLOURS[1], "-"), ("complex", "dampers exact", "black", ":")):
         axes.semilogy(f, [error_at(ds, x, how) for x in f], line, color=colour, label=name)
     axes.axvline(SPAN, color="0.5", linewidth=0.7, label="1000 rad/s")
@@ -300,14 +290,9 @@ def draw_errors(axes: Any, ds: xr.Dataset, f: np.ndarray) -> None:
     axes.legend(loc="lower right")
 
 
-def read(path: str) -> xr.Dataset:
-    """The sweep. Raises SweepError where it is none of this study."""
-    return read_result(path, "drivetrain", ["reduction", "n_keep"], "fula_milling_machine.toml")
-
-
 def conclude(path: str) -> tuple[Groups, list[str], Any]:
     """Statements and the figure."""
-    ds = read(path)
+    ds = read_result(path, "drivetrain", ["reduction", "n_keep"], "fula_milling_machine.toml")
     groups = {
         "Tables 2 to 4": tables_2_to_4({n: chain(ds, n) for n in (8, 7, 6)}), "Tables 3 to 5": tables(ds),
         "Table 6": frequencies(ds), "The cause": cause(ds), "Conclusions": conclusions(ds),
@@ -316,9 +301,7 @@ def conclude(path: str) -> tuple[Groups, list[str], Any]:
     return groups, [NOTES], lambda: figure(ds)
 
 
-def main(arguments: Sequence[str]) -> int:
-    """Table and figure of the result that is named; 1 if a statement does not hold."""
-    return report(__file__, ["fula_milling_machine.h5"], arguments, conclude)
+main = partial(report, __file__, ["fula_milling_machine.h5"], conclude=conclude)
 
 
 if __name__ == "__main__":

@@ -17,15 +17,16 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, columns, compared, differing, direct_label, hatch, read_result, report
+from _common import Groups, Statement, columns, compared, differing, direct_label, hatch, page_of, read_result, report
 
 import sweep
 from kernels.interface import Status
+from sweep.show.charts import COLOURS
 
 SHOWN = (1e6, 1e4, 1e2, 1.0)
 """alpha of the lines in the figure."""
@@ -208,22 +209,14 @@ def clock(ds: xr.Dataset, springs: xr.Dataset) -> list[str]:
 
 def figure(ds: xr.Dataset, springs: xr.Dataset) -> Any:
     """Sensitivity against the spring, and a map of it over spring and drive."""
-    from sweep.show import charts
-
-    with charts.style():
-        page = charts.new_figure(charts.PAGE, 84.0)
-        left, right = page.subplots(1, 2, width_ratios=(1, 1.05))
+    with page_of(84.0, 1, 2, width_ratios=(1, 1.05)) as (page, (left, right)):
         draw_lines(left, ds, springs)
         draw_map(right, ds)
-        for axes, text in ((left, "a"), (right, "b")):
-            charts.letter(axes, text)
     return page
 
 
 def draw_lines(axes: Any, ds: xr.Dataset, springs: xr.Dataset) -> None:
     """s against kappa at several drives: exact, by (1), and the best springs."""
-    from sweep.show.charts import COLOURS
-
     for alpha, colour in zip(SHOWN, COLOURS, strict=False):
         line = lines(ds, alpha)
         started = line.status == Status.OK
@@ -279,22 +272,15 @@ def draw_map(axes: Any, ds: xr.Dataset) -> None:
     axes.annotate("best spring", (3e3, 3e3), (1e6, 4e2), arrowprops=arrow, **how)
 
 
-def read(path: str) -> xr.Dataset:
-    """The sweep with its dimensionless groups. Raises SweepError where it is none of this study."""
-    return scaled(read_result(path, "foliot", ["a", "k"], "hairspring.toml"))
-
-
 def conclude(path: str) -> tuple[Groups, list[str], Any]:
     """Statements, springs for the clockmaker, and the figure."""
-    ds = read(path)
+    ds = scaled(read_result(path, "foliot", ["a", "k"], "hairspring.toml"))
     springs = best_springs(ds)
     groups = {"The law": laws(ds), "How far it goes": optimum(ds, springs), "The paper's spring": improvement(ds)}
     return groups, [NOTES, "", *clock(ds, springs)], lambda: figure(ds, springs)
 
 
-def main(arguments: Sequence[str]) -> int:
-    """Table and figure of the result that is named; 1 if a statement does not hold."""
-    return report(__file__, ["hairspring.h5"], arguments, conclude)
+main = partial(report, __file__, ["hairspring.h5"], conclude=conclude)
 
 
 if __name__ == "__main__":

@@ -16,12 +16,12 @@ from __future__ import annotations
 import math
 import sys
 import textwrap
-from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, direct_label, hatch, read_result, report
+from _common import Groups, Statement, direct_label, hatch, page_of, read_result, report
 
 import sweep
 from kernels.interface import Status
@@ -200,18 +200,12 @@ def _steady_light(bent: xr.Dataset) -> xr.DataArray:
 
 def figure(closed: xr.Dataset, motion: xr.Dataset, bent: xr.Dataset) -> Any:
     """Cycle, recoil, motion and lever; for two columns of print."""
-    from sweep.show import charts
-
-    with charts.style():
-        page = charts.new_figure(charts.PAGE, 150.0)
-        axes = page.subplots(2, 2)
+    with page_of(150.0, 2, 2) as (page, axes):
         draw_swing(page, axes[0, 0], closed)
         draw_recoil(page, axes[0, 1], closed)
         keys = draw_kinds(axes[1, 0], motion)
         page.legend(handles=keys, title="(c) the clock's motion", loc="outside lower left", ncols=3)
         page.legend(handles=draw_lever(page, axes[1, 1], bent), title="Borders", loc="outside lower right")
-        for panel, text in zip(axes.flat, "abcd", strict=True):
-            charts.letter(panel, text)
     return page
 
 
@@ -311,9 +305,7 @@ def conclude(path: str, lever_path: str) -> tuple[Groups, list[str], Any]:
     return groups, [NOTES, "", words(closed), census(motion)], lambda: figure(closed, motion, bent)
 
 
-def main(arguments: Sequence[str]) -> int:
-    """Table and figure of the results that are named; 1 if a statement does not hold."""
-    return report(__file__, ["impact_map.h5", "impact_map_lever.h5"], arguments, conclude)
+main = partial(report, __file__, ["impact_map.h5", "impact_map_lever.h5"], conclude=conclude)
 
 
 if __name__ == "__main__":

@@ -18,15 +18,16 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, compared, differing, direct_label, hatch, read_result, report
+from _common import Groups, Statement, compared, differing, direct_label, hatch, page_of, read_result, report
 from _losses import any_swing, shares
 
 import sweep
+from sweep.show.charts import COLOURS
 
 LARGE, SMALL = 100.0, 1.0003
 """Amplitudes over phi0 from which, and up to which, losses are called light and heavy."""
@@ -158,16 +159,6 @@ def width(line: xr.Dataset, start: float, end: float) -> float:
     return float(abs(places[1] - places[0]))
 
 
-def statements(ds: xr.Dataset) -> Groups:
-    """Every line of the table, by heading."""
-    return {
-        "The general law": laws(ds),
-        "One loss alone": pure_laws(),
-        "Best torque, viscous and dry": best_torques(),
-        "Width of the crossovers (25 to 75 %)": widths(ds),
-    }
-
-
 PLANE = {"a": 1.0, "e": 0.9, "n": 3.0, "c": 4e-6, "phi0": 1.0}
 """The clock whose exponent is mapped over torque and dry friction."""
 
@@ -204,17 +195,11 @@ def all_over() -> xr.Dataset:
 
 def figure(ds: xr.Dataset, whole: xr.Dataset) -> Any:
     """The law over shares, over torque and friction, over the degree, and against every cell; for two columns."""
-    from sweep.show import charts
-
-    with charts.style():
-        page = charts.new_figure(charts.PAGE, 140.0)
-        (triangle, region), (degree, check) = page.subplots(2, 2)
+    with page_of(140.0, 2, 2) as (page, ((triangle, region), (degree, check))):
         draw_triangle(page, triangle)
         draw_region(page, region, whole)
         draw_degrees(degree)
         draw_check(check, ds)
-        for axes, text in zip((triangle, region, degree, check), "abcd", strict=True):
-            charts.letter(axes, text)
     return page
 
 
@@ -270,8 +255,6 @@ def draw_region(page: Any, axes: Any, whole: xr.Dataset) -> None:
 
 def draw_degrees(axes: Any) -> None:
     """The two exponents of one friction over its degree."""
-    from sweep.show.charts import COLOURS
-
     n = np.linspace(0.02, 4, 200)
     axes.plot(n, n / (n + 2), color=COLOURS[0], label="large swings, $n/(n+2)$")
     axes.plot(n, 1 / n, color=COLOURS[1], linestyle="--", label="small swings, $1/n$")
@@ -290,8 +273,6 @@ def draw_degrees(axes: Any) -> None:
 
 def draw_check(axes: Any, ds: xr.Dataset) -> None:
     """The exponent of every cell against (1), by the swing."""
-    from sweep.show.charts import COLOURS
-
     bands = ((1.5, 3, "0.8"), (3, 10, COLOURS[5]), (10, 100, COLOURS[1]), (100, math.inf, COLOURS[0]))
     for low, high, colour in bands:
         part = ds.where((ds.swing > low) & (ds.swing <= high))
@@ -307,12 +288,16 @@ def conclude(path: str) -> tuple[Groups, list[str], Any]:
     """Statements and the figure."""
     ds = prepared(read_result(path, "foliot", ["n", "e", "a", "R", "c", "mu"], "law_map.toml"))
     law = "the law: s = (N + lambda_e)/(N + 2) at large swings, 1/N at small, N = sum of n lambda_n over the frictions"
-    return statements(ds), [law, "", NOTES], lambda: figure(ds, plane())
+    groups = {
+        "The general law": laws(ds),
+        "One loss alone": pure_laws(),
+        "Best torque, viscous and dry": best_torques(),
+        "Width of the crossovers (25 to 75 %)": widths(ds),
+    }
+    return groups, [law, "", NOTES], lambda: figure(ds, plane())
 
 
-def main(arguments: Sequence[str]) -> int:
-    """Table and figure of the result that is named; 1 if a statement does not hold."""
-    return report(__file__, ["law_map.h5"], arguments, conclude)
+main = partial(report, __file__, ["law_map.h5"], conclude=conclude)
 
 
 if __name__ == "__main__":

@@ -22,14 +22,15 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, compared, differing, direct_label, paragraph, plain_ticks, report
+from _common import Groups, Statement, compared, differing, direct_label, page_of, paragraph, plain_ticks, report
 
 import sweep
+from sweep.show.charts import COLOURS, DASHES, MARKS
 
 LARGE = 5.0
 """Way beyond the switch over phi0, by (1), from which (1) is held to `CLOSE` of s."""
@@ -152,16 +153,10 @@ def answer(ds: xr.Dataset) -> list[str]:
 
 def figure(ds: xr.Dataset, fine: xr.Dataset) -> Any:
     """How many clocks come how low, the least s over dry friction, and the refined borders; for two columns."""
-    from sweep.show import charts
-
-    with charts.style():
-        page = charts.new_figure(charts.PAGE, 68.0)
-        panels = page.subplots(1, 3)
+    with page_of(68.0, 1, 3) as (page, panels):
         draw_shares(panels[0], ds)
         draw_least(panels[1], ds)
         draw_borders(page, panels[2], fine)
-        for axes, text in zip(panels, "abc", strict=True):
-            charts.letter(axes, text)
     return page
 
 
@@ -171,8 +166,6 @@ SHOWN = (1.0, 0.99, 0.9, 0.5)
 
 def draw_shares(axes: Any, ds: xr.Dataset) -> None:
     """Share of the clocks whose least s is below a value."""
-    from sweep.show.charts import COLOURS, DASHES
-
     for k, e in enumerate(SHOWN):
         least = np.sort(ds.sensitivity_min.sel(e=e, method="nearest").values.ravel())
         axes.plot(least, np.linspace(0, 100, least.size), color=COLOURS[k], linestyle=DASHES[k], label=f"{e:g}")
@@ -183,8 +176,6 @@ def draw_shares(axes: Any, ds: xr.Dataset) -> None:
 
 def draw_least(axes: Any, ds: xr.Dataset) -> None:
     """Least s over dry friction with hardly any drag, with (1) and (2)."""
-    from sweep.show.charts import COLOURS, MARKS
-
     part = ds[["sensitivity_min"]].isel(c=[0]).sel(n=[3.0]).isel(R=slice(None, None, 3)).load()
     part = part.where(part.R > 1, drop=True)
     theory = balanced(part, ds.mu)
@@ -226,9 +217,7 @@ def conclude(path: str, borders_path: str) -> tuple[Groups, list[str], Any]:
     return groups, [NOTES, "", *answer(ds)], lambda: figure(ds, fine)
 
 
-def main(arguments: Sequence[str]) -> int:
-    """Table and figure of the results that are named; 1 if a statement does not hold."""
-    return report(__file__, ["law_map_overnight.h5", "law_map_borders_fine.h5"], arguments, conclude)
+main = partial(report, __file__, ["law_map_overnight.h5", "law_map_borders_fine.h5"], conclude=conclude)
 
 
 if __name__ == "__main__":

@@ -21,13 +21,15 @@ import math
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, compared, differing, direct_label, read_result, report
+from _common import Groups, Statement, compared, differing, direct_label, page_of, read_result, report
 
 import sweep
+from sweep.show.charts import COLOURS, DASHES
 
 E = 0.8
 """Restitution of impacts."""
@@ -193,15 +195,10 @@ def slight_impacts() -> Statement:
 
 def figure(ds: xr.Dataset) -> Any:
     """Periods in units of (phi0/mu)^(1/2), and exponents."""
-    from sweep.show import charts
-
-    with charts.style():
-        page = charts.new_figure(charts.PAGE, 80.0)
-        left, right = page.subplots(1, 2)
+    with page_of(80.0, 1, 2) as (page, (left, right)):
         draw_periods(left, ds)
         draw_exponents(right, ds)
-        for axes, text in ((left, "a"), (right, "b")):
-            charts.letter(axes, text)
+        for axes in (left, right):
             axes.set_xlabel(r"torque, $\mu/(a^2\varphi_0)$ [1]")
     return page
 
@@ -218,8 +215,6 @@ SHOWN = {
 
 def draw(axes: Any, ds: xr.Dataset, value: Any) -> None:
     """`value` of the shown mixtures against mu: lines, and points for proportional friction."""
-    from sweep.show.charts import COLOURS, DASHES
-
     for i, (name, mixture) in enumerate(SHOWN.items()):
         line = part(ds, mixture)
         look = {"linestyle": DASHES[i % 4]}
@@ -231,11 +226,15 @@ def draw(axes: Any, ds: xr.Dataset, value: Any) -> None:
 
 def draw_periods(axes: Any, ds: xr.Dataset) -> None:
     """P (mu/phi0)^(1/2): flat where P ~ mu^(-1/2)."""
-    axes.set(yscale="log", ylim=(4, 2e4), ylabel=r"$P\,(\mu/\varphi_0)^{1/2}$ [1]")
+    axes.set(yscale="log", ylim=(3, 2e4), ylabel=r"$P\,(\mu/\varphi_0)^{1/2}$ [1]")
     draw(axes, ds, lambda line: line.period * np.sqrt(line.mu / line.phi0))
-    for x, y, text in ((6e-4, 1e3, r"$P\sim\mu^{-1}$"), (6e2, 1e3, r"$\mu^0$"), (1e4, 45, r"$\mu^{-1/3}$")):
-        direct_label(axes, x, y, text)
-    direct_label(axes, 3e-4, 5.5, r"$\mu^{-1/2}$")
+    for x, y, text in (
+        (2e-2, 2e3, r"slope $-\frac{1}{2}$: $P\propto\mu^{-1}$"),
+        (3e2, 6e3, r"slope $\frac{1}{2}$: $P$ constant"),
+        (2.5e4, 95, r"slope $\frac{1}{6}$: $P\propto\mu^{-1/3}$"),
+        (3e-4, 4.7, r"flat: $P\propto\mu^{-1/2}$"),
+    ):
+        direct_label(axes, x, y, text, fontsize=7)
 
 
 def draw_exponents(axes: Any, ds: xr.Dataset) -> None:
@@ -247,23 +246,16 @@ def draw_exponents(axes: Any, ds: xr.Dataset) -> None:
     axes.legend(loc="lower right")
 
 
-def read(path: str) -> xr.Dataset:
-    """The sweep. Raises SweepError where it is none of this study."""
-    return read_result(path, "foliot", ["e", "c", "a", "R", "mu"], "origin_of_half.toml")
-
-
 def conclude(path: str) -> tuple[Groups, list[str], Any]:
     """Statements and the figure."""
-    ds = read(path)
+    ds = read_result(path, "foliot", ["e", "c", "a", "R", "mu"], "origin_of_half.toml")
     found = followed()
     groups = {"Exponent -1/2 at every torque": always_half(found), "Prefactors": prefactors(found)}
     groups["Other exponents"] = [*never_half(ds), slight_impacts()]
     return groups, [NOTES], lambda: figure(ds)
 
 
-def main(arguments: Sequence[str]) -> int:
-    """Table and figure of the result that is named; 1 if a statement does not hold."""
-    return report(__file__, ["origin_of_half.h5"], arguments, conclude)
+main = partial(report, __file__, ["origin_of_half.h5"], conclude=conclude)
 
 
 if __name__ == "__main__":

@@ -14,13 +14,16 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, compared, differing, direct_label, hatch, read_result, report
+from _common import Groups, Statement, compared, differing, direct_label, hatch, quality_bar, read_result, report
 
 import sweep
+from sweep.show import charts
+from sweep.show.charts import COLOURS, DASHES
 
 WANTED = math.radians(15.0)
 ARM = 0.38
@@ -173,8 +176,6 @@ def statements(ds: xr.Dataset) -> Groups:
 
 def figure(ds: xr.Dataset) -> Any:
     """Distortion over motor and coupler, with the border of lock-up; the best coupler; a cut; for a page of print."""
-    from sweep.show import charts
-
     b, f = (np.arange(float(x[0]), float(x[-1]) + 1e-9, FINE) for x in (ds.b, ds.f))
     arms = [machines_on(b, float(d), f) for d in ds.d]
     usual = next(arm for arm in arms if abs(arm.d - ARM) < 1e-9)
@@ -198,8 +199,8 @@ def draw_map(page: Any, axes: Any, arm: xr.Dataset) -> None:
 
     b, f = 1e3 * arm.b.values, 1e3 * arm.f.values
     thd = 100 * arm.thd.transpose("f", "b").values
-    mesh = axes.pcolormesh(b, f, thd, norm=LogNorm(2, 40), cmap="cividis", shading="nearest", rasterized=True)
-    bar = page.colorbar(mesh, ax=axes, label="distortion [%]", pad=0.02, extend="both")
+    mesh = axes.pcolormesh(b, f, thd, norm=LogNorm(2, 40), cmap="cividis_r", shading="nearest", rasterized=True)
+    bar = quality_bar(page, mesh, axes, "distortion [%]", pad=0.02, extend="both")
     bar.set_ticks([2, 5, 10, 20, 40], labels=["2", "5", "10", "20", "40"])
     bar.minorticks_off()
     lines = axes.contour(b, f, 1e3 * arm.crank.transpose("f", "b").values, [50, 70, 90], colors="white", linewidths=0.6)
@@ -217,8 +218,6 @@ def draw_map(page: Any, axes: Any, arm: xr.Dataset) -> None:
 
 def draw_best(axes: Any, arms: Sequence[xr.Dataset]) -> None:
     """The least distortion over all couplers, for each arm."""
-    from sweep.show.charts import COLOURS, DASHES
-
     for k, arm in enumerate(arms):
         top = best(arm)
         look = {"color": COLOURS[k], "linestyle": DASHES[k]}
@@ -231,8 +230,6 @@ def draw_best(axes: Any, arms: Sequence[xr.Dataset]) -> None:
 
 def draw_cut(axes: Any, cut: xr.Dataset) -> None:
     """Distortion and transmission angle over the coupler, with motor and arm of the paper's machine."""
-    from sweep.show.charts import COLOURS
-
     f = 1e3 * cut.f
     axes.plot(f, 100 * cut.thd, color=COLOURS[0], label="distortion [%]")
     axes.plot(f, np.degrees(cut.transmission_angle), "--", color=COLOURS[1], label="transmission angle [degree]")
@@ -241,20 +238,13 @@ def draw_cut(axes: Any, cut: xr.Dataset) -> None:
     axes.legend(loc="center right", bbox_to_anchor=(1.0, 0.36), fontsize=7)
 
 
-def read(path: str) -> xr.Dataset:
-    """The sweep of this study. Raises SweepError where it is none."""
-    return read_result(path, "polisher", ["d", "b", "f", "e"], "polisher_design.toml")
-
-
 def conclude(path: str) -> tuple[Groups, list[str], Any]:
     """Statements and the figure."""
-    ds = read(path)
+    ds = read_result(path, "polisher", ["d", "b", "f", "e"], "polisher_design.toml")
     return statements(ds), [NOTES], lambda: figure(ds)
 
 
-def main(arguments: Sequence[str]) -> int:
-    """Table and figure of the result that is named; 1 if a statement does not hold."""
-    return report(__file__, ["polisher_design.h5"], arguments, conclude, "expected")
+main = partial(report, __file__, ["polisher_design.h5"], conclude=conclude, source="expected")
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,8 @@ from _common import Groups, Statement, compared, differing, direct_label, read_r
 
 import sweep
 from kernels.interface import Status
+from sweep.show import charts
+from sweep.show.charts import COLOURS
 
 SHOWN = (0.01, 0.05, 0.1, 0.15)
 """Eccentricities in m whose motion is drawn."""
@@ -165,8 +167,6 @@ def motions(ds: xr.Dataset) -> xr.Dataset:
 
 def figure(ds: xr.Dataset) -> Any:
     """alpha over a turn, A0 and A1 against e, with the border; for two columns of print."""
-    from sweep.show import charts
-
     with charts.style():
         page = charts.new_figure(charts.PAGE, 88.0)
         left, right = page.subfigures(1, 2, width_ratios=(1.12, 1))
@@ -182,8 +182,6 @@ def figure(ds: xr.Dataset) -> Any:
 
 def draw_motion(axes: Any, ds: xr.Dataset) -> None:
     """The paper's figure 4 over the crank's angle from b, with the path of the extremes."""
-    from sweep.show.charts import COLOURS
-
     motion = motions(ds)
     turn = np.degrees(motion.crank_angle.values - B_ANGLE)
     for k, e in enumerate(SHOWN):
@@ -227,20 +225,13 @@ def _locked(axes: Any, ds: xr.Dataset) -> None:
     axes.legend(fontsize=7, loc="best")
 
 
-def read(path: str) -> xr.Dataset:
-    """The sweep of this study. Raises SweepError where it is none."""
-    return read_result(path, "polisher", ["e"], "polisher_extrema.toml")
-
-
 def conclude(path: str) -> tuple[Groups, list[str], Any]:
     """Statements and the figure."""
-    ds = read(path)
+    ds = read_result(path, "polisher", ["e"], "polisher_extrema.toml")
     return statements(ds), [NOTES], lambda: figure(ds)
 
 
-def main(arguments: Sequence[str]) -> int:
-    """Table and figure of the result that is named; 1 if a statement does not hold."""
-    return report(__file__, ["polisher_extrema.h5"], arguments, conclude, "paper")
+main = partial(report, __file__, ["polisher_extrema.h5"], conclude=conclude, source="paper")
 
 
 if __name__ == "__main__":

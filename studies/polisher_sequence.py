@@ -12,15 +12,16 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, compared, read_result, report
+from _common import Groups, Statement, compared, page_of, read_result, report
 from _polishing import KEPT, POINTS, area, best_settings, disc, least, one_setting, unevenness
 
 import sweep
+from sweep.show.charts import COLOURS
 
 TOOLS = (
     (2, 2, 1, 1), (2, 2, 1, 2), (1, 1, 1, 2), (0.5, 0.5, 1, 2), (100, 100, 1, 2),
@@ -124,24 +125,16 @@ def turning(ds: xr.Dataset) -> list[Statement]:
 
 def figure(ds: xr.Dataset) -> Any:
     """Machines, tools, profiles and shares; for two columns of print."""
-    from sweep.show import charts
-
-    with charts.style():
-        page = charts.new_figure(charts.PAGE, 112.0)
-        (machines, tools), (profiles, shares) = page.subplots(2, 2)
+    with page_of(112.0, 2, 2) as (page, ((machines, tools), (profiles, shares))):
         draw_machines(machines, ds)
         draw_tools(tools)
         draw_profiles(profiles, ds)
         draw_shares(page, shares, ds)
-        for axes, text in zip((machines, tools, profiles, shares), "abcd", strict=True):
-            charts.letter(axes, text)
     return page
 
 
 def draw_machines(axes: Any, ds: xr.Dataset) -> None:
     """Pivot, motor, crank, coupler and arm of both types at e = 10 cm, the paper's figure 3."""
-    from sweep.show.charts import COLOURS
-
     b, d = float(ds.b), float(ds.d)
     turn = 1.0
     study = sweep.study(
@@ -165,8 +158,6 @@ def draw_machines(axes: Any, ds: xr.Dataset) -> None:
 
 def draw_tools(axes: Any) -> None:
     """Outlines of the paper's figure 5."""
-    from sweep.show.charts import COLOURS
-
     t = np.linspace(0, 1, 400)
     for k, (n, m, a, b) in enumerate(TOOLS):
         x = np.concatenate([t, t[::-1]]) ** (1 if n >= 1 else 2)
@@ -185,8 +176,6 @@ def draw_tools(axes: Any) -> None:
 
 def draw_profiles(axes: Any, ds: xr.Dataset) -> None:
     """The best profiles of one setting, and of the sequence."""
-    from sweep.show.charts import COLOURS
-
     (bored, best), wear = best_settings(ds), disc(ds)
     fine, coarse = np.linspace(0.0, float(ds.radius[-1]), POINTS), ds.radius.values
     shown = {
@@ -226,9 +215,7 @@ def conclude(path: str) -> tuple[Groups, list[str], Any]:
     return groups, [NOTES], lambda: figure(ds)
 
 
-def main(arguments: Sequence[str]) -> int:
-    """Table and figure of the result that is named; 1 if a statement does not hold."""
-    return report(__file__, ["polisher_sequence.h5"], arguments, conclude)
+main = partial(report, __file__, ["polisher_sequence.h5"], conclude=conclude)
 
 
 if __name__ == "__main__":

@@ -14,12 +14,16 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, compared, hatch, read_result, report
+from _common import Groups, Statement, compared, hatch, quality_bar, read_result, report
 from _polishing import KEPT, area, least, one_setting, unevenness
+
+from sweep.show import charts
+from sweep.show.charts import COLOURS
 
 UM_PER_HOUR = 3.6e9
 """1 m/s."""
@@ -156,21 +160,9 @@ SHAPES = (
 )
 
 
-def statements(ds: xr.Dataset, load: xr.Dataset) -> Groups:
-    """Every line of the table, by heading."""
-    return {
-        "Numbers": [centre(ds), worst_error(ds)],
-        "Offset": offsets(ds),
-        "Eccentricity": eccentricities(ds),
-        "Constant load": edge(ds, load),
-    }
-
-
 def figure(ds: xr.Dataset, load: xr.Dataset) -> Any:
     """Profiles of three tools, and how uneven they are over offset and eccentricity; for two columns of print."""
     from matplotlib.patches import Patch
-
-    from sweep.show import charts
 
     with charts.style():
         page = charts.new_figure(charts.PAGE, 116.0)
@@ -181,7 +173,7 @@ def figure(ds: xr.Dataset, load: xr.Dataset) -> Any:
             mesh = draw_map(lower[k], tool, k)
             charts.letter(upper[k], "abc"[k])
             charts.letter(lower[k], "def"[k])
-        page.colorbar(mesh, ax=list(lower), label="unevenness of the wear [1]", pad=0.01)
+        quality_bar(page, mesh, list(lower), "unevenness of the wear [1]", pad=0.01)
         hole = Patch(facecolor="0.4", edgecolor="white", hatch="////", linewidth=0, label="(d-f) a hole in the middle")
         star = lower[0].get_legend_handles_labels()[0]
         page.legend(handles=[*upper[2].lines, upper[0].lines[-1], hole, *star], loc="outside lower center", ncols=4)
@@ -190,8 +182,6 @@ def figure(ds: xr.Dataset, load: xr.Dataset) -> Any:
 
 def draw_profiles(axes: Any, tool: xr.Dataset, name: str, k: int, load: xr.Dataset | None) -> None:
     """Wear along the radius at some offsets; dashed under a constant load."""
-    from sweep.show.charts import COLOURS
-
     for j, place in enumerate(PROFILES):
         line = tool.wear.sel(e=USUAL, method="nearest").sel(w_x=place, method="nearest")
         offset = MM * float(line.w_x - tool.L)
@@ -209,7 +199,7 @@ def draw_map(axes: Any, tool: xr.Dataset, k: int) -> Any:
     """Unevenness over offset and eccentricity."""
     uneven = tool.uneven.transpose("e", "w_x")
     x, y = MM * (tool.w_x - tool.L).values, MM * tool.e.values
-    mesh = axes.pcolormesh(x, y, uneven, vmin=0, vmax=1.2, cmap="cividis", shading="gouraud", rasterized=True)
+    mesh = axes.pcolormesh(x, y, uneven, vmin=0, vmax=1.2, cmap="cividis_r", shading="gouraud", rasterized=True)
     axes.clabel(axes.contour(x, y, uneven, levels=[0.3, 0.5], colors="white", linewidths=0.7), fmt="%g", fontsize=7)
     hatch(axes, x, y, (tool.least < KEPT).transpose("e", "w_x").values, "////", "white")
     best = least_uneven(without_hole(tool), ("e", "w_x"))
@@ -221,21 +211,20 @@ def draw_map(axes: Any, tool: xr.Dataset, k: int) -> Any:
     return mesh
 
 
-def read(path: str) -> xr.Dataset:
-    """The sweep with its groups. Raises SweepError where it is none of this study."""
-    return scaled(read_result(path, "polisher_wear", ["tool_n", "tool_b", "e", "w_x"], "polisher_wear.toml"))
-
-
 def conclude(path: str, loaded: str) -> tuple[Groups, list[str], Any]:
     """Statements and the figure."""
-    ds = read(path)
+    ds = scaled(read_result(path, "polisher_wear", ["tool_n", "tool_b", "e", "w_x"], "polisher_wear.toml"))
     load = read_result(loaded, "polisher_wear", ["w_x"], "polisher_wear_load.toml")
-    return statements(ds, load), [NOTES], lambda: figure(ds, load)
+    groups = {
+        "Numbers": [centre(ds), worst_error(ds)],
+        "Offset": offsets(ds),
+        "Eccentricity": eccentricities(ds),
+        "Constant load": edge(ds, load),
+    }
+    return groups, [NOTES], lambda: figure(ds, load)
 
 
-def main(arguments: Sequence[str]) -> int:
-    """Table and figure of the results that are named; 1 if a statement does not hold."""
-    return report(__file__, ["polisher_wear.h5", "polisher_wear_load.h5"], arguments, conclude)
+main = partial(report, __file__, ["polisher_wear.h5", "polisher_wear_load.h5"], conclude=conclude)
 
 
 if __name__ == "__main__":

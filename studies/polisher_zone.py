@@ -20,14 +20,15 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, differing, paragraph, read_result, report
+from _common import Groups, Statement, differing, page_of, read_result, report
 
 import sweep
+from sweep.show.charts import COLOURS, DASHES, MARKS
 
 TURN = 720
 """Crank angles of a turn."""
@@ -150,37 +151,17 @@ def rims(ds: xr.Dataset) -> dict[float, tuple[float, float]]:
     return {float(e): (float(far), float(near)) for e, (far, near) in zip(ds.e.values, ends, strict=True)}
 
 
-def answer(ds: xr.Dataset) -> list[str]:
-    """The conclusion, with the numbers of the dataset."""
-    small = ds.sel(e=0.04, method="nearest")
-    rim = rims(ds)
-    e = max(rim)
-    return paragraph(f"""In a line: turning O_DH by up to 15 degree moves the zone that is worked from
-        {100 * float(small.zone.min()):.1f} to {100 * float(small.zone.max()):.1f} cm at a throw of 4 cm; from 10 to
-        15 cm of throw it takes {A0[10.0] - A0[15.0]:.3f} degree to keep the middle. The tool loses what the work
-        loses, its outer rim {100 * (rim[e][0] / rim[e][1] - 1):.0f} % more than its inner one at
-        {100 * e:.0f} cm.""")
-
-
 def figure(ds: xr.Dataset) -> Any:
     """Profiles by beta, zones, and the tool's wear; for two columns of print."""
-    from sweep.show import charts
-
-    with charts.style():
-        page = charts.new_figure(charts.PAGE, 66.0)
-        panels = page.subplots(1, 3)
+    with page_of(66.0, 1, 3) as (page, panels):
         draw_profiles(panels[0], ds)
         draw_zones(panels[1], ds)
-        draw_tool(page, panels[2], ds)
-        for axes, text in zip(panels, "abc", strict=True):
-            charts.letter(axes, text)
+        draw_tool(panels[2], ds)
     return page
 
 
 def draw_profiles(axes: Any, ds: xr.Dataset) -> None:
     """Wear over the radius at the smallest throw, by beta."""
-    from sweep.show.charts import COLOURS, DASHES
-
     for k, degrees in enumerate((0, 5, 10, 15)):
         line = ds.wear.isel(e=0).sel(beta=math.radians(degrees), method="nearest")
         axes.plot(100 * ds.radius, UM_PER_HOUR * line, color=COLOURS[k], linestyle=DASHES[k], label=f"{degrees}")
@@ -190,8 +171,6 @@ def draw_profiles(axes: Any, ds: xr.Dataset) -> None:
 
 def draw_zones(axes: Any, ds: xr.Dataset) -> None:
     """The zone over beta, by throw; filled where the centre wears."""
-    from sweep.show.charts import COLOURS, MARKS
-
     for k, e in enumerate(ds.e.values):
         line = ds.sel(e=e)
         axes.plot(np.degrees(line.beta), 100 * line.zone, color=COLOURS[k], linewidth=0.8)
@@ -204,29 +183,25 @@ def draw_zones(axes: Any, ds: xr.Dataset) -> None:
     axes.legend(title="throw, $e$ [cm]", title_fontsize=7, fontsize=7, loc="upper center", ncols=2)
 
 
-def draw_tool(page: Any, axes: Any, ds: xr.Dataset) -> None:
-    """Wear over the tool at the largest throw, over its mean."""
-    a = float(ds.tool_a)
-    grid = np.linspace(-a, a, 61)
-    X, Y = np.meshgrid(grid, grid)
-    wear = tool_wear(ds, swings(ds), X, Y, 0.0)[-1]
-    inside = np.hypot(X, Y) <= a
-    shown = np.where(inside, wear / wear[inside].mean(), np.nan)
-    mesh = axes.pcolormesh(100 * grid, 100 * grid, shown, cmap="cividis", shading="nearest", rasterized=True)
-    page.colorbar(mesh, ax=axes, label="wear of the tool over its mean [1]", pad=0.02, shrink=0.8)
-    axes.set(xlabel="along the arm [cm]", ylabel="across it [cm]", aspect="equal")
+def draw_tool(axes: Any, ds: xr.Dataset) -> None:
+    """Wear along the tool's diameter that lies on the arm, over its mean there, by throw."""
+    x = np.linspace(-float(ds.tool_a), float(ds.tool_a), 61)
+    wear = tool_wear(ds, swings(ds), x, np.zeros_like(x), 0.0)
+    for k, e in enumerate(ds.e.values):
+        line = wear[k] / wear[k].mean()
+        axes.plot(100 * x, line, color=COLOURS[k], linestyle=DASHES[k], label=f"{100 * e:.0f}")
+    axes.set(xlabel="place on the tool, outwards [cm]", ylabel="wear of the tool over its mean [1]", ylim=(0.88, 1.2))
+    axes.legend(title="throw, $e$ [cm]", title_fontsize=7, fontsize=7, loc="upper left", ncols=3)
 
 
 def conclude(path: str) -> tuple[Groups, list[str], Any]:
     """Statements and the figure."""
     ds = prepared(read_result(path, "polisher_wear", ["e", "beta"], "polisher_zone.toml"))
     groups = {"The zone by O_DH": zones(ds), "Wear of the tool": tools(ds)}
-    return groups, [NOTES, "", *answer(ds)], lambda: figure(ds)
+    return groups, [NOTES], lambda: figure(ds)
 
 
-def main(arguments: Sequence[str]) -> int:
-    """Table and figure of the result that is named; 1 if a statement does not hold."""
-    return report(__file__, ["polisher_zone.h5"], arguments, conclude)
+main = partial(report, __file__, ["polisher_zone.h5"], conclude=conclude)
 
 
 if __name__ == "__main__":

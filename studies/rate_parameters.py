@@ -13,13 +13,15 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, differing, read_result, report
+from _common import Groups, differing, direct_label, page_of, read_result, report
 
 import sweep
+from sweep.show.charts import COLOURS, MARKS
 
 TOML = "studies/rate_parameters.toml"
 ALLOWED = 0.03
@@ -34,11 +36,6 @@ NOTES = """\
 Friction decides nothing where the period falls as mu^(-1/2): more of it lowers the speed and the amplitude alike, so
 that a shorter way is gone more slowly in the same time. Who wants a steady rate there looks after the torque and the
 pallets, not after the oil."""
-
-
-def read(path: str) -> xr.Dataset:
-    """The finished sweep. Raises SweepError where it is none of this study."""
-    return read_result(path, "foliot", ["cell"], TOML)
 
 
 def shares(s: float) -> dict[str, float]:
@@ -96,34 +93,28 @@ def statements(ds: xr.Dataset) -> Groups:
 
 def figure(found: xr.Dataset) -> Any:
     """Total indices against the drive, with the shares that the exponents give."""
-    from sweep.show import charts
-
-    with charts.style():
-        page = charts.new_figure(120.0, 82.0)
-        axes = page.subplots()
-        colours = dict(zip(NAMES, charts.COLOURS, strict=False))
-        for name, colour in colours.items():
-            # torque and angle have the same share: rings around dots
-            ring = {"markersize": 7, "fillstyle": "none"} if name == "mu" else {}
-            axes.plot(found.alpha, found.total.sel(parameter=name), "o", color=colour, label=NAMES[name], **ring)
+    with page_of(82.0, width=120.0) as (page, axes):
         law = [shares(exponent(float(drive))) for drive in found.alpha.values]
-        for name in ("mu", "a", "phi0"):
-            axes.plot(found.alpha, [row[name] for row in law], "-", color=colours[name], zorder=0)
-        axes.set(xscale="log", ylim=(-0.02, 0.82), ylabel="share of the variance of ln(period) [1]")
+        labels = {"mu": (0.1, 0.44, "torque"), "phi0": (22.0, 0.48, "switching angle, alike")}
+        labels |= {"a": (25.0, 0.13, "friction"), "e": (250.0, 0.09, "restitution")}
+        for k, (name, (x, y, text)) in enumerate(labels.items()):
+            some = found.isel(alpha=slice(k % 2 if name in ("mu", "phi0") else 0, None, 2 if k < 2 else 1))
+            axes.plot(some.alpha, some.total.sel(parameter=name), MARKS[k], color=COLOURS[k], label=text)
+            if name in law[0]:
+                axes.plot(found.alpha, [row[name] for row in law], "-", color=COLOURS[k], zorder=0, linewidth=0.8)
+            direct_label(axes, x, y, text, COLOURS[k])
+        axes.set(xscale="log", ylim=(-0.02, 0.58), ylabel=r"share of the variance of $\ln P$ [1]")
         axes.set_xlabel(r"drive, $\alpha = \mu/(a^2 \varphi_0)$ [1]")
-        axes.legend(title="points: total Sobol' index; lines: from the exponents alone", ncols=2, loc="upper center")
     return page
 
 
 def conclude(path: str) -> tuple[Groups, Sequence[str], Any]:
     """Table, notes and figure of a result."""
-    ds = read(path)
+    ds = read_result(path, "foliot", ["cell"], TOML)
     return statements(ds), NOTES.splitlines(), lambda: figure(against_drive())
 
 
-def main(arguments: Sequence[str]) -> int:
-    """The script."""
-    return report(__file__, ["rate_parameters.h5"], arguments, conclude)
+main = partial(report, __file__, ["rate_parameters.h5"], conclude=conclude)
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ viscous friction takes more, at most so much that the foliot must be able to res
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,8 @@ import xarray as xr
 from _common import Groups, Statement, read_result, report
 
 import sweep
+from sweep.show import charts
+from sweep.show.charts import COLOURS
 
 NOTES = """\
 theory is sharp, and no cell is on its border: exceptions are counted; the share of cells is right to one step of mu
@@ -77,9 +79,7 @@ def figure(ds: xr.Dataset) -> Any:
     from matplotlib.colors import ListedColormap
     from matplotlib.patches import Patch
 
-    from sweep.show import charts
-
-    palette = ("0.85", charts.COLOURS[5], charts.COLOURS[0])
+    palette = ("0.85", COLOURS[5], COLOURS[0])
     with charts.style():
         page = charts.new_figure(charts.PAGE, 78.0)
         panels = page.subplots(1, 3, sharey=True)
@@ -109,9 +109,7 @@ def conclude(path: str) -> tuple[Groups, list[str], Any]:
     return statements(ds), [NOTES], lambda: figure(ds)
 
 
-def main(arguments: Sequence[str]) -> int:
-    """Table and figure of the result that is named; 1 if a statement does not hold."""
-    return report(__file__, ["self_starting.h5"], arguments, conclude)
+main = partial(report, __file__, ["self_starting.h5"], conclude=conclude)
 
 
 if __name__ == "__main__":

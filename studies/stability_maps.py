@@ -18,16 +18,18 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, read_result, report
+from _common import Groups, Statement, page_of, read_result, report
 from scipy.integrate import DOP853, RK45
 
 import sweep
 from kernels.interface import FIRST_REFUSAL, Field, Status
 from kernels.stepping import stepped_kernel
+from sweep.show.charts import method_look
 
 STEPS = 64
 """Of the oscillator, after which it is seen whether it has grown."""
@@ -205,74 +207,52 @@ def hard(method: str, step: float = 0.02) -> list[str]:
 
 
 def figure(linear: xr.Dataset, foliot: Sequence[xr.Dataset]) -> Any:
-    """Growth of the oscillator above, errors of the foliot's period below."""
-    from matplotlib.colors import LogNorm
-
-    from sweep.show import charts
-
-    with charts.style():
-        page = charts.new_figure(charts.PAGE, 200.0)
-        names = [str(m) for m in linear.method.values]
-        axes = page.subplots(1 + len(foliot), len(names), squeeze=False)
-        for k, method in enumerate(names):
-            draw_growth(axes[0, k], linear, method)
-            for row, ds in zip(axes[1:], foliot, strict=True):
-                mesh = draw_error(row[k], ds, method, LogNorm(1e-8, 1))
-        for one in axes[:, 1:].flat:
-            one.set(ylabel="", yticklabels=[])
-        for one, text in zip(axes[:, 0], ROWS, strict=False):
-            one.set_title(text, loc="left", fontsize=8)
-        page.legend(handles=keys(), loc="outside lower center", ncols=4)
-        page.colorbar(mesh, ax=axes[1:].ravel().tolist(), label="relative error of the period", pad=0.01, aspect=40)
+    """Where the oscillator grows; the longest step that holds a foliot's period to 10 %, over three margins."""
+    with page_of(120.0, 2, 2) as (page, panels):
+        draw_growth(panels[0, 0], linear)
+        for axes, ds in zip(panels.flat[1:], foliot, strict=True):
+            draw_steps(axes, ds)
+        border = panels[0, 0].plot([], [], color="0.3", linewidth=0.9, label="(a) border by theory")
+        marks = [line for line in panels[0, 0].lines if line.get_marker() not in ("None", "")]
+        page.legend(handles=[*marks, *border], loc="outside lower center", ncols=7, columnspacing=1.0)
     return page
 
 
-ROWS = ("(a)", "(b) foliot over its drive", "(c) foliot close to sticking", "(d) foliot close to grazing its switch")
-"""Headings; that of the oscillator leaves room for the names of the methods."""
-
-
-def keys() -> list[Any]:
-    """What colours and lines mean."""
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
-
-    return [
-        Patch(color="#b04a3a", label="(a) the amplitude grows"),
-        Line2D([], [], color="black", linestyle="--", linewidth=0.9, label="its border by theory"),
-        Patch(color="0.8", label="(b-d) refused, with the reason"),
-        Line2D([], [], color="#b04a3a", linewidth=0.9, label=f"error of {WRONG:.0%}"),
-    ]
-
-
-def draw_growth(axes: Any, ds: xr.Dataset, method: str) -> None:
-    """Where the oscillator grows (dark), and theory's border."""
-    growth = grown(ds.sel({"method": method})).transpose("w", "a")
-    axes.contourf(ds.a, ds.w, np.minimum(growth, 1e3), levels=[0, 1, 2e3], colors=["#e8eef5", "#b04a3a"])
-    theory = eigenvalue(method, ds.a.values[None, :], ds.w.values[:, None])
-    axes.contour(ds.a, ds.w, theory, levels=[1], colors="black", linewidths=0.9, linestyles="--")
-    axes.set(title=method, xlabel="$ah$ [1]", ylabel=r"$\omega h$ [1]")
-    axes.title.set_size(8)
+def draw_growth(axes: Any, ds: xr.Dataset) -> None:
+    """The border above which the oscillator grows: lines by theory, marks as followed, at every so many-th damping."""
+    for method in map(str, ds["method"].values):
+        look, some = method_look(method), slice(2, None, max(1, ds.a.size // 10))
+        theory = eigenvalue(method, ds.a.values[None, :], ds.w.values[:, None])
+        axes.contour(ds.a, ds.w, theory, levels=[1], colors=[look["color"]], linewidths=0.9)
+        grows = (grown(ds.sel({"method": method})) > 1).transpose("a", "w").isel(a=some)
+        first = ds.w.values[grows.argmax("w").values]
+        shown = np.where(grows.any("w") & ~grows.isel(w=0), first, np.nan)
+        axes.plot(ds.a[some], shown, **{**look, "linestyle": ""}, markersize=4, label=method)
+    axes.set(xlabel="damping, $ah$ [1]", ylabel=r"frequency, $\omega h$ [1]", xlim=(0, 8), ylim=(0, 8))
 
 
 MARGIN = {
-    "mu": (r"$\mu$ [rad/s$^2$]", lambda mu: mu),
-    "R": (r"$1 - R/\mu$", lambda R: 1 - R),
-    "k": (r"$1 - k\varphi_0/2\mu$", lambda k: 1 - k / 2),
+    "mu": (r"torque, $\mu$ [rad/s$^2$]", lambda mu: mu),
+    "R": (r"distance from sticking, $1 - R/\mu$ [1]", lambda R: 1 - R),
+    "k": (r"distance from grazing, $1 - k\varphi_0/2\mu$ [1]", lambda k: 1 - k / 2),
 }
 """How far a foliot is from not flipping, where mu = phi0 = 1 in the last two."""
 
 
-def draw_error(axes: Any, ds: xr.Dataset, method: str, norm: Any) -> Any:
-    """The true error over step and margin; grey where the method refuses."""
+def draw_steps(axes: Any, ds: xr.Dataset) -> None:
+    """The longest step up to which all steps that are not refused give the period to 10 %."""
     label, margin = MARGIN[swept(ds)]
-    across = margin(ds[swept(ds)].values)
-    here = ds.sel({"method": method}).transpose("step", swept(ds))
-    axes.set_facecolor("0.8")
-    off = np.clip(here.off.where(here.status < FIRST_REFUSAL), 1e-8, 1)
-    mesh = axes.pcolormesh(across, ds.step, off, norm=norm, cmap="cividis_r", shading="nearest", rasterized=True)
-    axes.contour(across, ds.step, off.fillna(1.0), levels=[WRONG], colors="#b04a3a", linewidths=0.9)
-    axes.set(xscale="log", yscale="log", xlabel=label, ylabel="step $h$ [s]")
-    return mesh
+    for method in map(str, ds["method"].values):
+        here = ds.sel({"method": method}).transpose("step", swept(ds)).sortby("step")
+        right = (here.off <= WRONG) & (here.status < FIRST_REFUSAL)
+        first = right.argmax("step")
+        place = xr.DataArray(np.arange(here.step.size), dims="step")
+        ends = place.where((place > first) & ~right).min("step").fillna(here.step.size) - 1
+        longest = here.step.values[ends.values.astype(int)]
+        across = margin(ds[swept(ds)].values)
+        axes.plot(across, np.where(right.any("step"), longest, np.nan), **method_look(method), markersize=4,
+                  linewidth=0.9, markevery=max(1, across.size // 10))  # fmt: skip
+    axes.set(xscale="log", yscale="log", xlabel=label, ylabel="longest step for 10 %, $h$ [s]", ylim=(0.015, 30))
 
 
 def conclude(path: str, oscillator: str, *paths: str) -> tuple[Groups, list[str], Any]:
@@ -292,14 +272,8 @@ GRIDS = {"stability_maps": "mu", "stability_maps_sticking": "R", "stability_maps
 """Studies of a foliot, and what each is over."""
 
 
-def main(arguments: Sequence[str]) -> int:
-    """Table and figure of the results that are named; 1 if a statement does not hold."""
-    return report(
-        __file__,
-        ["stability_maps.h5", "stability_maps_oscillator.h5", "stability_maps_sticking.h5", "stability_maps_spring.h5"],
-        arguments,
-        conclude,
-    )
+INPUTS = [f"stability_maps{end}.h5" for end in ("", "_oscillator", "_sticking", "_spring")]
+main = partial(report, __file__, INPUTS, conclude=conclude)
 
 
 if __name__ == "__main__":

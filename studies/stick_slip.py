@@ -12,16 +12,28 @@ that locates no kink. Last, the cost of a digit. Times are noisy and only told.
 from __future__ import annotations
 
 import sys
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, cheapest, read_result, report
+from _common import (
+    Groups,
+    Statement,
+    cheapest,
+    direct_label,
+    draw_costs,
+    measured,
+    page_of,
+    read_result,
+    report,
+    solved_by,
+)
 from _sliding_peers import FOLLOWERS, motion
 
 from kernels.interface import FIRST_REFUSAL, Status
+from sweep.show.charts import COLOURS, DASHES, method_look
 
 TOLERANCES = 10.0 ** -np.arange(3.0, 10.5, 3.0)
 FLIPS = 5.0
@@ -70,7 +82,7 @@ def ours(belt: Any, fall: Any, rtol: float) -> Any:
     """Times of the last count by `dop853`; NaN where that is not OK."""
     from belt_scene import KERNEL
 
-    outputs, status = solved(KERNEL, "dop853", rtol, belt=belt, fall=fall)
+    outputs, status = solved_by(KERNEL, "dop853", rtol, mu=1.0, flips=FLIPS, belt=belt, fall=fall)
     return np.where(status == Status.OK, outputs, np.nan)
 
 
@@ -80,19 +92,9 @@ def chattering(belt: Any, fall: Any) -> Any:
 
     from kernels.stepping import stepped_kernel
 
-    kernel = stepped_kernel(**{**SCENE, "name": "belt_steps"})
-    outputs, status = solved(kernel, "dopri5", LOOSE, belt=belt, fall=fall, step=STEP, location=0.0)
+    kernel, cells = stepped_kernel(**{**SCENE, "name": "belt_steps"}), {"belt": belt, "fall": fall, "step": STEP}
+    outputs, status = solved_by(kernel, "dopri5", LOOSE, mu=1.0, flips=FLIPS, location=0.0, **cells)
     return np.where(status < FIRST_REFUSAL, outputs, np.nan)
-
-
-def solved(kernel: Any, method: str, rtol: float, **given: Any) -> tuple[Any, Any]:
-    """The times and the statuses of cells."""
-    cells = {"mu": 1.0, "flips": FLIPS, **given}
-    shape = np.shape(given["belt"])
-    columns = [np.broadcast_to(cells[field.name], shape).astype(float) for field in kernel.parameters]
-    outputs, status = [np.empty(shape) for _ in kernel.outputs], np.empty(shape, np.int8)
-    kernel.method(method).solve(*columns, np.full(shape, rtol), *outputs, status)
-    return outputs[0], status
 
 
 def errors(follow: Callable[..., Any], belt: Any, fall: Any, rtol: float) -> Any:
@@ -115,30 +117,15 @@ def others(ds: xr.Dataset) -> xr.Dataset:
     )
 
 
-def costs(follow: Callable[[Any, Any, float], Any], belt: Any, fall: Any) -> xr.Dataset:
-    """Worst error, infinite where a cell is given up, and seconds per cell, at each tolerance."""
-    rows = []
-    for rtol in TOLERANCES:
-        follow(belt, fall, rtol)  # compiled before it is timed
-        begin = time.process_time()
-        off = follow(belt, fall, rtol)
-        seconds = (time.process_time() - begin) / len(belt)
-        rows.append((np.where(np.isnan(off), np.inf, off).max(), seconds))
-    worst, seconds = zip(*rows, strict=True)
-    return xr.Dataset({"worst": ("rtol", list(worst)), "seconds": ("rtol", list(seconds))}, {"rtol": TOLERANCES})
-
-
 def all_costs(tell: bool) -> dict[str, xr.Dataset]:
     """What a digit costs, of ours and of others where these are to be told."""
     random = np.random.default_rng(1)
     belt, fall = 10.0 ** random.uniform(-1.0, -0.4, CELLS), 10.0 ** random.uniform(-1.5, -0.4, CELLS)
-
-    def late(belt: Any, fall: Any, rtol: float) -> Any:
-        return abs(ours(belt, fall, rtol) / last_count(FLIPS, 1.0, belt, fall) - 1.0)
-
-    found = {"dop853, slides": costs(late, belt, fall)}
+    true = last_count(FLIPS, 1.0, belt, fall)
+    found = {"dop853 (slides)": measured(lambda rtol: abs(ours(belt, fall, rtol) / true - 1.0), TOLERANCES)}
     for name, follow in FOLLOWERS.items() if tell else ():
-        found[name] = costs(lambda b, f, r, follow=follow: errors(follow, b, f, r), belt[::FEW], fall[::FEW])
+        off = partial(errors, follow, belt[::FEW], fall[::FEW])
+        found[name] = measured(off, TOLERANCES)
     return found
 
 
@@ -164,60 +151,46 @@ def failures(found: xr.Dataset) -> list[Statement]:
 
 
 def figure(ds: xr.Dataset, unslid: xr.Dataset, found: dict[str, xr.Dataset]) -> Any:
-    """The motion; maps of the error over the belt's speed and the fall of friction; what a digit costs."""
-    from matplotlib.colors import LogNorm
-
-    from sweep.show import charts
-
-    with charts.style():
-        page = charts.new_figure(charts.PAGE, 118.0)
-        panels = page.subplots(2, 3)
-        draw_motion(panels[0, 0])
-        slides = ds.sel({"method": "taylor"})
-        shown = {"taylor, slides": slides.off.where(slides.status < FIRST_REFUSAL)}
-        shown |= dict(unslid.data_vars)
-        for axes, (name, off) in zip(panels.flat[1:], shown.items(), strict=False):
-            mesh = draw_map(axes, off, LogNorm(1e-16, 1.0))
-            axes.set_title(name, loc="center")
-        page.colorbar(mesh, ax=panels.ravel().tolist(), label="relative error", location="right", aspect=40)
-        draw_costs(panels[1, 2], found)
-        for axes, letter in zip(panels.flat, "abcdef", strict=True):
-            charts.letter(axes, letter)
+    """The motion; the error over the belt's speed, of a method that slides and of those that do not; costs."""
+    with page_of(72.0, 1, 3) as (page, (left, middle, right)):
+        draw_motion(left)
+        draw_errors(middle, ds.sel({"method": "taylor"}), unslid)
+        places = {
+            "dop853 (slides)": (1.6, 12.0),
+            "scipy Radau": (0.35, 0.2),
+            "scipy DOP853, modes by hand": (1.0, 20.0),
+        }
+        draw_costs(right, found, places)
+        right.set(xlim=(2e-5, 2e-2), ylim=(1e-13, 10))
     return page
 
 
 def draw_motion(axes: Any) -> None:
     """Speed over place, for three falls of friction."""
-    from sweep.show.charts import COLOURS
-
     for i, fall in enumerate((0.02, 0.1, 0.4)):
         until = float(last_count(FLIPS, 1.0, 0.3, fall))
         place, speed = motion(0.3, fall, until, 1e-8, SHOWN)
-        axes.plot(place, speed, color=COLOURS[i], label=f"fall {fall:g}")
-    axes.set(xlabel="place $x$", ylabel="speed $x'$", ylim=(-0.95, 0.45))
-    axes.legend(loc="lower left", fontsize=6)
+        axes.plot(place, speed, color=COLOURS[i], linestyle=DASHES[i], label=f"{fall:g}")
+    axes.set(xlabel="place, $x$ [1]", ylabel="speed, $x'$ [1]", ylim=(-1.25, 0.45))
+    axes.legend(
+        loc="lower left", title="fall of friction [1]", fontsize=7, title_fontsize=7, ncols=3, columnspacing=0.9
+    )
 
 
-def draw_map(axes: Any, off: xr.DataArray, norm: Any) -> Any:
-    """Error over the belt's speed and the fall of friction; grey where a method gives up."""
-    axes.set_facecolor("0.8")
-    values = np.maximum(off, 1e-16).transpose("fall", "belt")
-    mesh = axes.pcolormesh(off.belt, off.fall, values, norm=norm, cmap="cividis_r", shading="nearest", rasterized=True)
-    axes.set(xscale="log", yscale="log", xlabel="speed of the belt", ylabel="fall of friction")
-    return mesh
-
-
-def draw_costs(axes: Any, found: dict[str, xr.Dataset]) -> None:
-    """Worst error over time per cell."""
-    from sweep.show.charts import COLOURS, DASHES, MARKS
-
-    for i, (name, row) in enumerate(found.items()):
-        look = {"color": COLOURS[i], "marker": MARKS[i], "linestyle": DASHES[i % len(DASHES)], "markersize": 3}
-        ends = row.worst < np.inf
-        label = name if bool(ends.any()) else f"{name}: gives up"
-        axes.plot(row.seconds, row.worst.where(ends).clip(1e-16), label=label, **look)
-    axes.set(xscale="log", yscale="log", xlabel="time per cell on one core [s]", ylabel="relative error, worst cell")
-    axes.legend(loc="best", fontsize=5)
+def draw_errors(axes: Any, slides: xr.Dataset, unslid: xr.Dataset) -> None:
+    """Median and range of the error over the falls of friction; those that give up every cell stand on the rim."""
+    shown = {"taylor, slides": slides.off.where(slides.status < FIRST_REFUSAL), "fixed step": unslid["fixed step"]}
+    for (name, off), look in zip(shown.items(), (method_look("taylor"), method_look("rk4")), strict=True):
+        off = off.clip(1e-16)
+        axes.fill_between(off.belt, off.min("fall"), off.max("fall"), color=look["color"], alpha=0.25, linewidth=0)
+        axes.plot(off.belt, off.median("fall"), color=look["color"])
+        direct_label(axes, 0.06, 30 * float(off.max()) if name != "fixed step" else 3e-4, name, look["color"])
+    for k, name in enumerate(("scipy Radau", "scipy LSODA")):
+        given = float(unslid[name].notnull().mean())
+        text = "no value in any cell" if given == 0 else f"a value in {given:.0%} of the cells"
+        direct_label(axes, 0.063, 10.0 ** (2.6 - 1.9 * k), f"{name}: {text}", "0.35", fontsize=7)
+    axes.set(xscale="log", yscale="log", xlim=(0.01, 0.4), ylim=(1e-16, 1e4))
+    axes.set(xlabel="speed of the belt [1]", ylabel="relative error of the time [1]")
 
 
 def conclude(path: str, tell: bool = True) -> tuple[Groups, list[str], Any]:
@@ -234,9 +207,7 @@ def conclude(path: str, tell: bool = True) -> tuple[Groups, list[str], Any]:
     return groups, NOTES.splitlines(), lambda: figure(ds, unslid, found)
 
 
-def main(arguments: Sequence[str]) -> int:
-    """Table and figure of the result that is named; 1 if a statement does not hold."""
-    return report(__file__, ["stick_slip.h5"], arguments, conclude)
+main = partial(report, __file__, ["stick_slip.h5"], conclude=conclude)
 
 
 if __name__ == "__main__":

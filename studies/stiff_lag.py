@@ -13,16 +13,28 @@ and BDF, and diffrax's Kvaerno5 where it is installed (the extra `peers`). Times
 from __future__ import annotations
 
 import sys
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, cheapest, read_result, report
+from _common import (
+    Groups,
+    Statement,
+    cheapest,
+    direct_label,
+    draw_costs,
+    measured,
+    page_of,
+    read_result,
+    report,
+    solved_by,
+)
 from _stiff_peers import FOLLOWERS, FRICTION
 
 from kernels.interface import FIRST_REFUSAL, Status
+from sweep.show.charts import COLOURS, method_look
 
 EPS = 1e-6
 """Lag at which the costs are compared, in seconds."""
@@ -30,8 +42,6 @@ TOLERANCES = 10.0 ** -np.arange(3.0, 11.5, 2.0)
 MU = np.geomspace(0.1, 10.0, 256)
 """Cells of our own; of the others every 32nd."""
 
-GIVEN_UP = 0.5
-"""Error of a run that was broken off."""
 
 NOTES = """\
 error: of the time of the switch, or of rest, relative to the closed form. Times are of one core, CPU seconds
@@ -60,30 +70,18 @@ def first_switch(mu: Any, eps: Any) -> Any:
 
 
 def costs(mu: Any, follow: Callable[[Any, float, float], Any]) -> xr.Dataset:
-    """Median and worst error, and seconds per cell, at each tolerance."""
-    true, rows = first_switch(mu, EPS), []
-    for rtol in TOLERANCES:
-        follow(mu, EPS, rtol)  # compiled before it is timed
-        begin = time.process_time()
-        found = follow(mu, EPS, rtol)
-        seconds = (time.process_time() - begin) / len(mu)
-        off = abs(found / true - 1.0)
-        rows.append((np.median(off), off.max(), seconds))
-    keys = ("median", "worst", "seconds")
-    columns = zip(keys, zip(*rows, strict=True), strict=True)
-    return xr.Dataset({key: ("rtol", list(values)) for key, values in columns}, {"rtol": TOLERANCES})
+    """Worst error, and seconds per cell, at each tolerance."""
+    true = first_switch(mu, EPS)
+    return measured(lambda rtol: abs(follow(mu, EPS, rtol) / true - 1.0), TOLERANCES)
 
 
 def ours(mu: Any, eps: float, rtol: float) -> Any:
     """Times of the first switch by `rodas5p`; NaN where that is not OK."""
     from lag_scene import KERNEL
 
-    given = {"mu": mu, "phi0": 1.0, "a": FRICTION, "b": FRICTION, "eps": eps, "flips": 1.0}
-    columns = [np.broadcast_to(given[field.name], mu.shape).astype(float) for field in KERNEL.parameters]
-    outputs = [np.empty(len(mu)) for _ in KERNEL.outputs]
-    status = np.empty(len(mu), np.int8)
-    KERNEL.method("rodas5p").solve(*columns, np.full(len(mu), rtol), *outputs, status)
-    return np.where(status == Status.OK, outputs[0], np.nan)
+    cells = {"mu": mu, "phi0": 1.0, "a": FRICTION, "b": FRICTION, "eps": eps, "flips": 1.0}
+    time, status = solved_by(KERNEL, "rodas5p", rtol, **cells)
+    return np.where(status == Status.OK, time, np.nan)
 
 
 def maps(ds: xr.Dataset) -> list[Statement]:
@@ -130,60 +128,47 @@ def at_rest(ds: xr.Dataset) -> Any:
 
 
 def figure(lag: xr.Dataset, bounce: xr.Dataset, found: dict[str, xr.Dataset]) -> Any:
-    """Four maps of the error over lag and drive; the ball; what a digit costs."""
-    from matplotlib.colors import LogNorm
-
-    from sweep.show import charts
-
-    with charts.style():
-        page = charts.new_figure(charts.PAGE, 118.0)
-        panels = page.subplots(2, 3)
-        for axes, letter, method in zip(panels.flat, "abcd", lag["method"].values, strict=False):
-            mesh = draw_map(axes, lag.sel({"method": method}), LogNorm(1e-16, 1e-8))
-            axes.set_title(f"({letter}) {method}", loc="left")
-        page.colorbar(mesh, ax=panels[:, 0].tolist(), label="relative error", location="left", aspect=40)
-        draw_bounces(panels[1, 1], bounce)
-        draw_costs(panels[1, 2], found)
-        charts.letter(panels[1, 1], "e")
-        charts.letter(panels[1, 2], "f")
+    """How many drives each method solves over the lag, and how well; the ball; what a digit costs."""
+    with page_of(112.0, 2, 2) as (page, ((share, error), (ball, cost))):
+        draw_lags(share, error, lag)
+        draw_bounces(ball, bounce)
+        places = {
+            "rodas5p": (2.2, 4.0),
+            "scipy Radau": (0.6, 6.0),
+            "scipy BDF": (3.0, 4.0),
+            "diffrax Kvaerno5": (3.0, 6.0),
+        }
+        draw_costs(cost, found, places)
+        cost.set(xlim=(1e-5, 1.0), ylim=(1e-15, 1))
     return page
 
 
-def draw_map(axes: Any, ds: xr.Dataset, norm: Any) -> Any:
-    """Error over lag and drive; grey where the method gives up."""
-    axes.set_facecolor("0.8")
-    off = np.maximum(ds.off.where(ds.status < FIRST_REFUSAL), 1e-16).transpose("mu", "eps")
-    mesh = axes.pcolormesh(ds.eps, ds.mu, off, norm=norm, cmap="cividis_r", shading="nearest", rasterized=True)
-    axes.set(xscale="log", yscale="log", xlabel=r"lag $\varepsilon$ [s]", ylabel=r"$\mu$ [rad/s$^2$]")
-    return mesh
+def draw_lags(share: Any, error: Any, ds: xr.Dataset) -> None:
+    """Share of the drives that a method solves over the lag, and the largest error of what it solves."""
+    for method in map(str, ds["method"].values):
+        here, look = ds.sel({"method": method}), {**method_look(method), "markersize": 3.5, "label": method}
+        given = here.status < FIRST_REFUSAL
+        share.plot(here.eps, 100 * given.mean("mu"), **look)
+        error.plot(here.eps, here.off.where(given).max("mu").clip(1e-16), **look)
+    share.set(xscale="log", ylim=(-4, 108), xlabel=r"lag, $\varepsilon$ [s]", ylabel="drives solved [%]")
+    error.set(xscale="log", yscale="log", ylim=(1e-16, 1e-7), xlabel=r"lag, $\varepsilon$ [s]")
+    error.axhline(1e-9, color="0.5", linewidth=0.7)
+    direct_label(error, 1e-8, 1e-9, "tolerance", "0.35", fontsize=7)
+    error.set_ylabel("largest relative error [1]")
+    share.legend(loc="center left", fontsize=7, bbox_to_anchor=(0.0, 0.55))
 
 
 def draw_bounces(axes: Any, ds: xr.Dataset) -> None:
-    """What is left of the time of rest after 20 and 100 bounces, and the error of the time of rest."""
-    from sweep.show.charts import COLOURS
-
+    """What is left of the time until rest after 20 and 100 bounces."""
     rest = ds.isel(flips=-1).time
     for i, flips in enumerate(ds.flips.values[:-1]):
-        left = 1.0 - ds.sel(flips=flips) / rest
-        for d, line in zip(ds.d.values, "-:", strict=True):
-            label = f"after {flips:.0f}" if line == "-" else None
-            axes.plot(1 - ds.e, left.time.sel(d=d).clip(1e-16), line, color=COLOURS[i], label=label)
-    without = ds.isel(flips=-1).sel(d=0.0)
-    off = abs(without.time / at_rest(without) - 1).clip(1e-16)
-    axes.plot(1 - ds.e, off, "o", color=COLOURS[2], markersize=3, label="at rest: error")
-    axes.set(xscale="log", yscale="log", xlabel="$1 - e$", ylabel="share of the time of rest", ylim=(5e-17, 30.0))
-    axes.legend(loc="center left", borderpad=0.1, fontsize=6)
-
-
-def draw_costs(axes: Any, found: dict[str, xr.Dataset]) -> None:
-    """Worst error over time per cell."""
-    from sweep.show.charts import COLOURS, DASHES, MARKS
-
-    for i, (name, row) in enumerate(found.items()):
-        look = {"color": COLOURS[i], "marker": MARKS[i], "linestyle": DASHES[i], "markersize": 3}
-        axes.plot(row.seconds, row.worst.where(row.worst < GIVEN_UP).clip(1e-16), label=name, **look)
-    axes.set(xscale="log", yscale="log", xlabel="time per cell on one core [s]", ylabel="relative error, worst cell")
-    axes.legend(loc="lower center", fontsize=6)
+        left = 1.0 - ds.sel(flips=flips).time / rest
+        for d, dashes, name in zip(ds.d.values, ("-", ":"), ("without drag", "with drag"), strict=True):
+            line = left.sel(d=d).where(left.sel(d=d) > 1e-12)
+            axes.plot(1 - ds.e, line, color=COLOURS[i], linestyle=dashes, label=f"{flips:.0f} bounces, {name}")
+    axes.set(xscale="log", yscale="log", xlabel="1 - restitution, $1 - e$ [1]", ylim=(1e-12, 30))
+    axes.set_ylabel("share of the time until rest still to come [1]", fontsize=8)
+    axes.legend(loc="lower left", fontsize=7)
 
 
 def conclude(path: str, bounces: str, tell: bool = True) -> tuple[Groups, list[str], Any]:
@@ -197,9 +182,7 @@ def conclude(path: str, bounces: str, tell: bool = True) -> tuple[Groups, list[s
     return groups, NOTES.splitlines(), lambda: figure(lag, bounce, found)
 
 
-def main(arguments: Sequence[str]) -> int:
-    """Table and figure of the results that are named; 1 if a statement does not hold."""
-    return report(__file__, ["stiff_lag.h5", "stiff_lag_bounce.h5"], arguments, conclude)
+main = partial(report, __file__, ["stiff_lag.h5", "stiff_lag_bounce.h5"], conclude=conclude)
 
 
 if __name__ == "__main__":

@@ -18,15 +18,16 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, compared, differing, direct_label, read_result, report
+from _common import Groups, Statement, compared, differing, direct_label, page_of, read_result, report
 
 import sweep
+from sweep.show.charts import COLOURS, DASHES
 
 MODELS = ("two bodies", "kept share", "viscous")
 
@@ -170,19 +171,16 @@ def identity(ds: xr.Dataset, impact: xr.Dataset) -> list[Statement]:
 
 def figure(ds: xr.Dataset) -> Any:
     """Period, exponent and swing over torque; for two columns of print."""
-    from sweep.show import charts
-
-    with charts.style():
-        page = charts.new_figure(charts.PAGE, 66.0)
-        axes = page.subplots(1, 3)
+    with page_of(66.0, 1, 3) as (page, axes):
         for k, name in enumerate(MODELS):
-            one, look = ds.sel(model=name), {"color": charts.COLOURS[k], "linestyle": charts.DASHES[k]}
-            axes[0].loglog(ds.torque, one.period, label=name, **look)
-            axes[1].semilogx(ds.torque, -one.exponent, **look)
-            axes[2].loglog(ds.torque, one.amplitude, **look)
+            look = {"color": COLOURS[k], "linestyle": DASHES[k]}
+            if k == 1:  # lies on the first: rings at every so many-th torque
+                look = {"color": COLOURS[k], "marker": "o", "linestyle": "", "markerfacecolor": "white"}
+            one = ds.sel(model=name).isel(torque=slice(4, None, max(1, ds.torque.size // 9)) if k == 1 else slice(None))
+            axes[0].loglog(one.torque, one.period, label=name, **look)
+            axes[1].semilogx(one.torque, -one.exponent, **look)
+            axes[2].loglog(one.torque, one.amplitude, **look)
         _letter_axes(axes, ds)
-        for panel, text in zip(axes, "abc", strict=True):
-            charts.letter(panel, text)
     return page
 
 
@@ -223,10 +221,8 @@ def conclude(path: str, denny_path: str, viscous_path: str) -> tuple[Groups, lis
     return groups, [NOTES, "", f"all three models: {target}"], lambda: figure(ds)
 
 
-def main(arguments: Sequence[str]) -> int:
-    """Table, dataset and figure of the results that are named; 1 if a statement does not hold."""
-    inputs = ["three_models.h5", "three_models_denny.h5", "three_models_viscous.h5"]
-    return report(__file__, inputs, arguments, conclude)
+INPUTS = ["three_models.h5", "three_models_denny.h5", "three_models_viscous.h5"]
+main = partial(report, __file__, INPUTS, conclude=conclude)
 
 
 if __name__ == "__main__":

@@ -26,8 +26,8 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import product
 from typing import Any
 
@@ -36,6 +36,8 @@ import xarray as xr
 from _common import Groups, Statement, columns, compared, differing, read_result, report
 
 import sweep
+from sweep.show import charts
+from sweep.show.charts import COLOURS
 
 DAY = 86400.0
 CLOCKS = {"verge": "timekeeping.toml", "Bürgi": "timekeeping_buergi.toml", "spring": "timekeeping_spring.toml"}
@@ -205,14 +207,12 @@ noise, a share of sigma^2; what differs from day to day stays.\
 
 def figure(clocks: dict[str, xr.Dataset]) -> Any:
     """Scatter against noise, against correlation, and loss against noise."""
-    from sweep.show import charts
-
     with charts.style():
         page = charts.new_figure(charts.PAGE, 76.0)
         panels = page.subplots(1, 3)
         for draw, axes, letter in zip((draw_scatter, draw_correlation, draw_losses), panels, "abc", strict=True):
             for i, (name, ds) in enumerate(clocks.items()):
-                draw(axes, ds, name, charts.COLOURS[i], "os^"[i])
+                draw(axes, ds, name, COLOURS[i], "os^"[i])
             charts.letter(axes, letter)
         page.legend(*panels[1].get_legend_handles_labels(), loc="outside upper center", ncols=3)
         frame(panels[0])
@@ -278,9 +278,7 @@ def conclude(*paths: str) -> tuple[Groups, list[str], Any]:
     return groups, [*table(clocks), "", *in_words(clocks)], lambda: figure(clocks)
 
 
-def main(arguments: Sequence[str]) -> int:
-    """Table and figure of the results that are named; 1 if a statement does not hold."""
-    return report(__file__, [toml.replace(".toml", ".h5") for toml in CLOCKS.values()], arguments, conclude)
+main = partial(report, __file__, [toml.replace(".toml", ".h5") for toml in CLOCKS.values()], conclude=conclude)
 
 
 if __name__ == "__main__":

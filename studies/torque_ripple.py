@@ -22,12 +22,14 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, columns, compared, differing, direct_label, read_result, report
+from _common import Groups, Statement, columns, compared, differing, direct_label, page_of, read_result, report
+
+from sweep.show.charts import COLOURS, DASHES
 
 DRIVES = ("weak", "middle", "strong")
 LIMITS = {"1 %": 1e-2, "0.07 %": 7e-4}
@@ -219,11 +221,7 @@ def in_words(ds: xr.Dataset) -> list[str]:
 
 def figure(ds: xr.Dataset) -> Any:
     """Change of the period against depth; first-order coefficients of period and sensitivity against the harmonic."""
-    from sweep.show import charts
-
-    with charts.style():
-        page = charts.new_figure(charts.PAGE, 82.0)
-        panels = page.subplots(1, 3)
+    with page_of(82.0, 1, 3) as (page, panels):
         draw_depths(panels[0], ds)
         draw_harmonics(panels[1], ds, ds.K, first_order, 0)
         draw_harmonics(panels[2], ds, ds.L, first_order_sensitivity, 1)
@@ -232,8 +230,6 @@ def figure(ds: xr.Dataset) -> Any:
         page.legend(handles=[*panels[1].get_legend_handles_labels()[0], *keys()], loc="outside upper center", ncols=3)
         direct_label(panels[1], 20, 0.25, "$h^{-1/2}$")
         direct_label(panels[2], 3, 2.6, "$h^{1/2}$")
-        for axes, text in zip(panels, "abc", strict=True):
-            charts.letter(axes, text)
     return page
 
 
@@ -249,25 +245,23 @@ def keys() -> list[Any]:
 
 
 def draw_depths(axes: Any, ds: xr.Dataset) -> None:
-    """|P/P0 - 1| of some harmonics, and the two limits."""
-    from sweep.show.charts import COLOURS, DASHES
-
-    for h, dashes in zip((1, 2, 16), DASHES, strict=False):
+    """|P/P0 - 1| of a coarse and of a fine ripple, and the two limits."""
+    for h, dashes in zip((1, 16), DASHES, strict=False):
         for i in range(3):
             line = ds.change.isel(a=i, depth=slice(1, None)).sel(harmonic=h)
             axes.loglog(line.depth, abs(line), color=COLOURS[i], linestyle=dashes)
         axes.plot([], [], color="black", linestyle=dashes, label=f"$h = {h}$")
     for name, limit in LIMITS.items():
-        axes.axhline(limit, color="0.6", linewidth=0.6)
-        axes.text(1.03, limit, name, fontsize=7, va="center", transform=axes.get_yaxis_transform())
+        axes.axhline(limit, color="0.6", linewidth=0.6, zorder=0)
+        direct_label(axes, 0.6, limit, name, "0.35", fontsize=7)
+    axes.annotate("changes sign", (0.14, 6e-4), (0.03, 4e-6), color=COLOURS[0], fontsize=7, ha="center",
+                  arrowprops={"arrowstyle": "->", "linewidth": 0.6, "color": COLOURS[0]})  # fmt: skip
     axes.legend(loc="upper left")
     axes.set(xlim=(2e-3, 1), ylim=(1e-6, 3), xlabel="depth of the ripple [1]", ylabel="$|P/P_0 - 1|$ [1]")
 
 
 def draw_harmonics(axes: Any, ds: xr.Dataset, found: xr.DataArray, theory: Any, which: int) -> None:
     """A coefficient at some harmonics, theory as a dot, and the envelopes of (2)."""
-    from sweep.show.charts import COLOURS
-
     h = np.intersect1d(ds.harmonic, np.geomspace(1, 64, 30).round())
     for i, mark in enumerate("os^"):
         alpha = float(ds.alpha[i])
@@ -279,21 +273,14 @@ def draw_harmonics(axes: Any, ds: xr.Dataset, found: xr.DataArray, theory: Any, 
     axes.set(xlim=(0.9, 72), xlabel="harmonic, $h$ [1]")
 
 
-def read(path: str) -> xr.Dataset:
-    """The sweep with what is made of it. Raises SweepError where it is none of this study."""
-    return scaled(read_result(path, "foliot_ripple", ["a", "harmonic", "depth"], "torque_ripple.toml"))
-
-
 def conclude(path: str) -> tuple[Groups, list[str], Any]:
     """Statements, tables and the figure."""
-    ds = read(path)
+    ds = scaled(read_result(path, "foliot_ripple", ["a", "harmonic", "depth"], "torque_ripple.toml"))
     groups = {"First order in the depth": linear(ds), "High harmonics": falls(ds), "Weak drive": weak(ds)}
     return groups, [*permitted(ds), "", *in_words(ds)], lambda: figure(ds)
 
 
-def main(arguments: Sequence[str]) -> int:
-    """Table and figure of the result that is named; 1 if a statement does not hold."""
-    return report(__file__, ["torque_ripple.h5"], arguments, conclude)
+main = partial(report, __file__, ["torque_ripple.h5"], conclude=conclude)
 
 
 if __name__ == "__main__":

@@ -23,14 +23,15 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, differing, direct_label, hatch, read_result, report
+from _common import Groups, Statement, differing, direct_label, hatch, page_of, read_result, report
 
 import sweep
+from sweep.show.charts import COLOURS, DASHES, MARKS
 
 STRONG = 1e4
 """alpha from which (1) is held to 0.015, what is left of the drop and of a swing that is not endless."""
@@ -224,32 +225,13 @@ def clock_like(ds: xr.Dataset) -> xr.Dataset:
     return line.isel(tau=int(abs(line.pitches - 0.25).argmin("tau")))
 
 
-def statements(ds: xr.Dataset, wheel: xr.Dataset) -> Groups:
-    """Every line of the table, by heading."""
-    return {
-        "Energy": balance(ds),
-        "Ends": ends(ds),
-        "Where exponents turn": turns(ds),
-        f"In mesh: recoil of at most {MESH:g} pitch": in_mesh(ds),
-        "A clock with a light wheel": answer(ds),
-        "By the shares of the losses": by_shares(ds),
-        "Friction on the wheel": on_the_wheel(ds, wheel),
-    }
-
-
 def figure(ds: xr.Dataset) -> Any:
     """Maps of the exponent, shares of the losses, and (1); for two columns of print."""
-    from sweep.show import charts
-
-    with charts.style():
-        page = charts.new_figure(charts.PAGE, 130.0)
-        (plane, rubbed), (shares, scatter) = page.subplots(2, 2)
+    with page_of(130.0, 2, 2) as (page, ((plane, rubbed), (shares, scatter))):
         draw_plane(page, plane, ds.isel(R_v=0))
         draw_dry(rubbed, ds.sel(I_c=2.5e-5, method="nearest"))
         draw_shares(shares, ds.isel(R_v=1).sel(I_c=2.5e-5, method="nearest"))
         draw_law(scatter, ds)
-        for axes, text in zip((plane, rubbed, shares, scatter), "abcd", strict=True):
-            charts.letter(axes, text)
     return page
 
 
@@ -271,8 +253,6 @@ def draw_plane(page: Any, axes: Any, ds: xr.Dataset) -> None:
 
 def draw_dry(axes: Any, ds: xr.Dataset) -> None:
     """s over alpha by dry friction."""
-    from sweep.show.charts import COLOURS, DASHES
-
     unit = float(ds.I_v * (ds.c_v / ds.I_v) ** 2 * ds.phi0)
     for k in range(ds.sizes["R_v"]):
         line = ds.isel(R_v=k)
@@ -287,8 +267,6 @@ def draw_dry(axes: Any, ds: xr.Dataset) -> None:
 
 def draw_shares(axes: Any, ds: xr.Dataset) -> None:
     """Shares of the losses over alpha, stacked."""
-    from sweep.show.charts import COLOURS
-
     there = np.isfinite(ds.viscous.values)
     parts = [ds[name].values[there] for name in ("viscous", "dry", "impact")]
     axes.stackplot(ds.alpha.values[there], parts, colors=COLOURS[:3], labels=["viscous", "dry", "impact"], alpha=0.85)
@@ -299,8 +277,6 @@ def draw_shares(axes: Any, ds: xr.Dataset) -> None:
 
 def draw_law(axes: Any, ds: xr.Dataset) -> None:
     """s against (1), by drive."""
-    from sweep.show.charts import COLOURS, MARKS
-
     for k, (low, high) in enumerate(((1e-1, 1e2), (1e2, 1e4), (1e4, 1e7))):
         part = (ds.alpha > low) & (ds.alpha <= high)
         x, y = (v.where(part & ds.s.notnull()).values.ravel() for v in (law(ds), ds.s))
@@ -325,12 +301,19 @@ def conclude(path: str, wheel_path: str) -> tuple[Groups, list[str], Any]:
     """Statements and the figure."""
     ds = prepared(read_result(path, "verge_scene:KERNEL", ["R_v", "I_c", "tau"], "verge_losses.toml"))
     wheel = prepared(read_result(wheel_path, "verge_scene:KERNEL", ["R_c", "I_c", "tau"], "verge_losses_wheel.toml"))
-    return statements(ds, wheel), [NOTES], lambda: figure(ds)
+    groups = {
+        "Energy": balance(ds),
+        "Ends": ends(ds),
+        "Where exponents turn": turns(ds),
+        f"In mesh: recoil of at most {MESH:g} pitch": in_mesh(ds),
+        "A clock with a light wheel": answer(ds),
+        "By the shares of the losses": by_shares(ds),
+        "Friction on the wheel": on_the_wheel(ds, wheel),
+    }
+    return groups, [NOTES], lambda: figure(ds)
 
 
-def main(arguments: Sequence[str]) -> int:
-    """Table and figure of the results that are named; 1 if a statement does not hold."""
-    return report(__file__, ["verge_losses.h5", "verge_losses_wheel.h5"], arguments, conclude)
+main = partial(report, __file__, ["verge_losses.h5", "verge_losses_wheel.h5"], conclude=conclude)
 
 
 if __name__ == "__main__":

@@ -11,22 +11,24 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, report
+from _common import Groups, Statement, page_of, report
 
 import sweep
 from sweep.explore.work_precision import TOLERANCES, precision_text, work_precision
+from sweep.show.charts import method_look
 
 PARTS = ("", "_viscous", "_drag", "_terms", "_balance", "_impact", "_polisher")
 """Ends of the names of the study files."""
 AS_MANY = 1e-12
 """Shares of cells that differ by less are the same."""
-ROOM = 50.0
-"""For the legends, above what is drawn."""
+SHOWN = 1e-7
+"""The tolerance at which times are drawn."""
 
 NOTES = """\
 saved: time of the best single method over that of auto, on the same cells; "gives" is the share of cells that come out
@@ -84,61 +86,36 @@ def statements(found: xr.Dataset) -> list[Statement]:
 
 
 def figure(parts: Sequence[xr.Dataset]) -> Any:
-    """Time of every method over that of auto, a panel for each kernel; the best single method is ringed."""
-    from sweep.show import charts
-
-    with charts.style():
-        page = charts.new_figure(charts.PAGE, 210.0)
-        *panels, rest = page.subplots(4, 2, sharex=True, sharey=True).ravel()
-        for axes, found, text in zip(panels, parts, "abcdefg", strict=False):
-            draw(axes, found)
-            charts.letter(axes, text)
-            axes.set_title(found.attrs["title"])
-        for axes in panels[-2:]:
-            axes.set_xlabel("relative tolerance, rtol [1]")
-            axes.tick_params(labelbottom=True)
-        rest.axis("off")
-        rest.legend(handles=keys(), loc="center")
-        for axes in panels[::2]:
-            axes.set_ylabel("time over that of auto [1]")
-        panels[0].set_ylim(top=ROOM * panels[0].get_ylim()[1])
+    """Time of every method over that of auto at one tolerance, a row for each study; the best single one is ringed."""
+    with page_of(20.0 + 14.0 * len(parts)) as (page, axes):
+        for k, found in enumerate(parts):
+            draw_row(axes, found, -k)
+        axes.axvline(1.0, color="black", linewidth=0.8)
+        axes.set(xscale="log", xlabel=f"time over that of auto, at rtol = {SHOWN:g} [1]", ylim=(-len(parts) + 0.4, 0.6))
+        axes.set_yticks(range(0, -len(parts), -1), labels=[found.attrs["title"] for found in parts])
+        axes.set_yticks([], minor=True)
+        look = {"color": "0.3", "marker": "o", "linestyle": "", "markersize": 4}
+        axes.plot([], [], **look, label="gives every cell that auto gives")
+        axes.plot([], [], **look, markerfacecolor="white", label="gives fewer")
+        axes.plot([], [], **look | {"markersize": 9}, markerfacecolor="none", label="best single method")
+        keys = dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
+        page.legend(keys.values(), keys.keys(), loc="outside lower center", ncols=5, fontsize=7)
     return page
 
 
-def keys() -> list[Any]:
-    """What the marks mean, whatever their colour."""
-    from matplotlib.lines import Line2D
-
-    mark = {"color": "0.3", "marker": "o", "linestyle": ""}
-    return [
-        Line2D([], [], color="black", linewidth=0.8, label="auto"),
-        Line2D([], [], **mark, markersize=3.5, label="gives every cell that auto gives"),
-        Line2D([], [], **mark, markersize=3.5, markerfacecolor="white", label="gives fewer"),
-        Line2D([], [], **mark | {"color": "black"}, markersize=8, markerfacecolor="none", label="best single method"),
-    ]
-
-
-def draw(axes: Any, found: xr.Dataset) -> None:
-    """Filled marks where a method gives every cell that auto gives, open ones where it gives fewer."""
-    from sweep.show.charts import COLOURS, MARKS
-
-    auto = found.sel({"method": "auto"})
-    axes.axhline(1.0, color="black", linewidth=0.8)
-    for i, name in enumerate([m for m in found["method"].values if m != "auto"]):
-        row = found.sel({"method": name})
-        ratio, whole = (row.seconds / auto.seconds).values, (given(row) >= given(auto) - AS_MANY).values
-        look = {"color": COLOURS[i % len(COLOURS)], "marker": MARKS[i % len(MARKS)], "markersize": 3.5}
-        axes.plot(found.rtol, ratio, linewidth=0.8, markerfacecolor="white", label=str(name), **look)
-        axes.plot(found.rtol.values[whole], ratio[whole], linestyle="", **look)
-    best = [best_single(found, rtol) for rtol in found.rtol.values]
-    rings = [
-        float(found.seconds.sel({"method": m, "rtol": r}) / auto.seconds.sel({"rtol": r}))
-        for m, r in zip(best, found.rtol.values, strict=True)
-    ]
-    axes.plot(found.rtol, rings, "o", color="black", markerfacecolor="none", markersize=8, markeredgewidth=0.7)
-    axes.set(xscale="log", yscale="log")
-    axes.invert_xaxis()
-    axes.legend(fontsize=6.5, loc="upper center", ncols=3, labelspacing=0.2, handlelength=1.4, columnspacing=0.8)
+def draw_row(axes: Any, found: xr.Dataset, place: float) -> None:
+    """The methods of one study side by side at a height."""
+    row = found.sel({"rtol": SHOWN}, method="nearest")
+    auto, best = row.sel({"method": "auto"}), best_single(found, float(row.rtol))
+    axes.axhline(place, color="0.9", linewidth=0.6, zorder=0)
+    for name in [str(m) for m in found["method"].values if m != "auto"]:
+        one, look = row.sel({"method": name}), {**method_look(name), "linestyle": "", "markersize": 5}
+        ratio = float(one.seconds / auto.seconds)
+        axes.plot([], [], label=name, **look)
+        fill = {} if float(given(one)) >= float(given(auto)) - AS_MANY else {"markerfacecolor": "white"}
+        axes.plot(ratio, place, **look, **fill)
+        if name == best:
+            axes.plot(ratio, place, "o", color="0.3", markerfacecolor="none", markersize=10, markeredgewidth=0.7)
 
 
 def charted(path: Path, cells: int, tolerances: Sequence[float]) -> list[xr.Dataset]:
@@ -147,7 +124,7 @@ def charted(path: Path, cells: int, tolerances: Sequence[float]) -> list[xr.Data
     return [work_precision(sweep.study(file), cells=cells, tolerances=tolerances) for file in files]
 
 
-def conclude(path: str, cells: int = 4096, tolerances: Sequence[float] = TOLERANCES) -> tuple[Groups, list[str], Any]:
+def conclude(path: str, cells: int = 1024, tolerances: Sequence[float] = TOLERANCES) -> tuple[Groups, list[str], Any]:
     """Statements, tables and the figure."""
     parts = charted(Path(path), cells, tolerances)
     groups = {found.attrs["title"]: statements(found) for found in parts}
@@ -155,9 +132,7 @@ def conclude(path: str, cells: int = 4096, tolerances: Sequence[float] = TOLERAN
     return groups, [NOTES, "", *tables], lambda: figure(parts)
 
 
-def main(arguments: Sequence[str]) -> int:
-    """Table and figure of the study file that is named; 1 if a statement does not hold."""
-    return report(__file__, ["what_auto_saves.toml"], arguments, conclude)
+main = partial(report, __file__, ["what_auto_saves.toml"], conclude=conclude)
 
 
 if __name__ == "__main__":

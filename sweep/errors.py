@@ -32,9 +32,9 @@ def missing(what: str, extra: str) -> SweepError:
 
 COMPLETE, FAULT, MISTAKE, INCOMPLETE, CELLS_FAILED, INTERRUPTED, TERMINATED = 0, 1, 2, 3, 4, 130, 143
 EXIT_CODES = {
-    COMPLETE: "complete, or what was asked for is done",
+    COMPLETE: "complete",
     FAULT: "a fault in foliot",
-    MISTAKE: "a mistake in what was asked, or the machine has no room or no memory for it",
+    MISTAKE: "a mistake in the study or command, or too little disk space or memory",
     INCOMPLETE: "not complete yet (--until, a cluster or output that is lost); the same command continues",
     CELLS_FAILED: "complete, but some cells FAILED; sweep show names them",
     INTERRUPTED: "stopped by Ctrl-C; the same command continues",

@@ -25,7 +25,7 @@ from sweep.errors import COMPLETE, SweepError
     *(o.FORCE, o.ALLOW_IMPORT, switch("--all", "parameters, outputs and methods of all kernels, and all statuses")),
 )
 def kernels(arguments: argparse.Namespace) -> None:
-    """What can be swept: parameters, units, outputs, methods."""
+    """The kernels that can be swept: parameters, units, outputs, methods."""
     from sweep.show.kernels import catalogue_text, write_starter
 
     name, path = arguments.name, arguments.study
@@ -51,7 +51,7 @@ def studies(arguments: argparse.Namespace) -> None:
     switch("--follow", "then print the run's log until it ends, on any machine that sees it"),
 )
 def show(arguments: argparse.Namespace) -> None:
-    """What is in a result, how much is done, what became of its cells."""
+    """Contents of a result, how much is computed, and a count of statuses."""
     from sweep.show.follow import follow
     from sweep.show.text import result_text
 
@@ -77,7 +77,7 @@ def verify(arguments: argparse.Namespace) -> None:
     *(o.ALL, o.JSON),
 )
 def list_(arguments: argparse.Namespace) -> None:
-    """The results in a folder: cells, how much is done, statuses, question."""
+    """The results in a folder: cells, how much is computed, statuses, question."""
     found = sweep.list_results(arguments.folder)
     tell(arguments, found, found.table(arguments.all))
 
@@ -91,7 +91,7 @@ def list_(arguments: argparse.Namespace) -> None:
     o.JSON,
 )
 def diff(arguments: argparse.Namespace) -> Outcome:
-    """In what two results differ: cells, statuses, how far; exit status 1 if they do."""
+    """Differences between two results, by cell and status; exit status 1 if there are any."""
     with opened(arguments) as a, opened(arguments, "other") as b:
         found = sweep.diff(a, b, arguments.rtol)
     tell(arguments, found)
@@ -206,7 +206,7 @@ def exponent(arguments: argparse.Namespace) -> None:
 
 @command("sweep sensitivity saltelli.h5 --y period", o.RESULT, o.OUTPUT_Y, o.JSON)
 def sensitivity(arguments: argparse.Namespace) -> None:
-    """Which axes of a design "saltelli" or "morris" decide an output."""
+    """Influence of each axis on an output, from a design "saltelli" or "morris"."""
     from sweep.show import laws
 
     with opened(arguments) as dataset:
@@ -240,7 +240,7 @@ def export(arguments: argparse.Namespace) -> None:
     option("--labels", "its values; default: the names of the files", metavar="LABEL", nargs=2),
 )
 def join(arguments: argparse.Namespace) -> None:
-    """Two results of one kernel as one, longer along an axis or along a new one."""
+    """Join two results of one kernel along an axis, or along a new one."""
     from sweep.results.statuses import summary_text
 
     paths = [arguments.result, arguments.other]

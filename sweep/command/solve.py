@@ -31,7 +31,7 @@ RUN_OPTIONS = ("cluster", "force", "extend", "until", "retry_failed", "repair")
 
 @command("sweep plan foliot_scaling.toml", o.STUDY, *o.SOLVING, o.JSON)
 def plan(arguments: argparse.Namespace) -> None:
-    """Cells, bytes, memory and a timed forecast, before anything runs."""
+    """Before a run: its cells, size, memory, and the time it will take."""
     from sweep.runs.progress import Progress
 
     study = study_from(arguments)
@@ -130,7 +130,7 @@ def notify(arguments: argparse.Namespace, ended: Outcome) -> None:
     *o.SOLVING,
 )
 def refine(arguments: argparse.Namespace) -> None:
-    """Add cells to a result where it bends, until it can be interpolated."""
+    """Add cells to a result where it is curved, until interpolation is accurate."""
     with opened(arguments) as dataset:
         study = study_from(arguments, dataset)
         keys = {"most_cells": arguments.most_cells, "force": arguments.force, **solving(arguments, study)}
@@ -190,7 +190,7 @@ def check(arguments: argparse.Namespace) -> Outcome:
     *(o.RESULT, option("at", metavar="AXIS=VALUE", nargs="*"), o.ALLOW_IMPORT, o.JSON),
 )
 def cell(arguments: argparse.Namespace) -> None:
-    """One cell: its values, what its status means, and what each method says of it."""
+    """One cell: its values, the meaning of its status, and the result of each method."""
     from sweep.explore.one_cell import report_cell
 
     with opened(arguments) as dataset:

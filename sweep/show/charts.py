@@ -8,7 +8,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -111,18 +111,16 @@ def precision_figure(found: xr.Dataset) -> Figure:
 
     The legend names every method, also one that solves no cell and one that is silently wrong in some.
     """
+    attrs, names = found.attrs, [str(name) for name in found["method"].values]
     with style():
-        names = [str(name) for name in found["method"].values]
-        rows = -(-(len(names) + 4) // 4)
-        figure = new_figure(PAGE, 90.0 + 4.0 * rows)
+        figure = new_figure(PAGE, 92.0 + 4.0 * -(-(len(names) + 4) // 4))
         panels = figure.subplots(1, 2, sharex=True, sharey=True)
-        for axes, key, text in zip(panels, ("error_median", "error_worst"), ("median cell", "worst cell"), strict=True):
+        for axes, key, text in zip(panels, ("error_median", "error_worst"), ("median", "worst"), strict=True):
             draw_precision(axes, found, key)
-            axes.set_title(text)
-            letter(axes, "a" if key == "error_median" else "b")
+            axes.set_title(f"{text} of {attrs['cells']} cells")
         low, high = panels[0].get_xlim()
         wide = np.sqrt(max(LEAST_SPAN * low / high, 1.0))
-        panels[0].set(ylabel="relative error [1]", xlim=(low / wide, high * wide))
+        panels[0].set(ylabel=f"relative error against {attrs['reference']} [1]", xlim=(low / wide, high * wide))
         lines = dict(zip(*reversed(panels[0].get_legend_handles_labels()), strict=True))
         handles = {}
         for name in names:
@@ -132,10 +130,7 @@ def precision_figure(found: xr.Dataset) -> Figure:
             )
         handles |= precision_marks(found)
         figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=4, fontsize=7)
-        attrs = found.attrs
-        accurate = f", accurate to {attrs['reference_error']:.1g}" if np.isfinite(attrs["reference_error"]) else ""
-        basis = f"{attrs['cells']} cells, errors against {attrs['reference']}{accurate}"
-        figure.suptitle(f"{_plain(attrs['title'])}: {basis}", fontsize=9)
+        figure.suptitle(_plain(attrs["title"]), fontsize=9)
     return figure
 
 
@@ -152,46 +147,72 @@ def precision_marks(found: xr.Dataset) -> dict[str, Any]:
         marks["some unsolved or inaccurate"] = Line2D([], [], **{**look, "markerfacecolor": "white"})
     if (found.silent > 0).any():
         marks["some silently wrong"] = Line2D([], [], linestyle="", marker="x", color="black", markersize=7)
-    if "error_high" in found:
-        marks["middle 80 % of the cells"] = Line2D([], [], color="0.3", linestyle="", marker="|", markersize=9)
-    if np.isfinite(found.attrs.get("reference_error", np.nan)):
-        marks["below the accuracy of the reference"] = Patch(color="0.9", linewidth=0)
+    accurate = found.attrs.get("reference_error", np.nan)
+    if np.isfinite(accurate):
+        marks[f"below the reference's own error, {accurate:.1g}"] = Patch(color="0.9", linewidth=0)
     return marks
 
 
 LEAST_SPAN = 30.0
 """Of the times in a chart, so that methods alike look alike."""
-FLOOR, CEILING = 1e-17, 3.0
+FLOOR, CEILING = 1e-16, 3.0
 """Where errors of 0, and errors beyond all sense, are drawn at the least and at the most."""
 
 
-def draw_precision(axes: Any, found: xr.Dataset, key: str, names: Sequence[str] = ()) -> None:
-    """A line for each method; those in `names` look the same in every picture that gives the same names.
+def draw_precision(axes: Any, found: xr.Dataset, key: str) -> None:
+    """A line for each method, with the look that `method_look` gives it.
 
     Filled marks where all cells are solved, open ones where some are unsolved or said to be inaccurate, crosses where
-    some are silently wrong; bars about a median are the middle 80 % of the cells; `precision_marks` says so in a
-    legend. Errors a decade below the accuracy of the reference mean nothing, and are drawn there. A method that solves
-    no cell is left out.
+    some are silently wrong; `precision_marks` says so in a legend. Errors below that of the reference mean nothing, and
+    are drawn a little below it. A method that solves no cell is left out.
     """
     accurate = found.attrs.get("reference_error", np.nan)
-    floor = max(FLOOR, accurate / 10) if np.isfinite(accurate) else FLOOR
-    order = list(dict.fromkeys([*names, *found["method"].values.tolist()]))
-    for name in found["method"].values:
-        row, i = found.sel({"method": name}), order.index(name)
+    floor = max(FLOOR, accurate / 3) if np.isfinite(accurate) else FLOOR
+    for i, name in enumerate(map(str, found["method"].values)):
+        row, look = found.sel({"method": name}), {**method_look(name, i), "markersize": 4}
         if not np.isfinite(row.error_median).any():
             continue
         seconds, error = row.seconds.values, np.clip(row[key].values, floor, CEILING)
         whole, silent = (row.unsolved + row.inaccurate).values == 0, row.silent.values > 0
-        look = {"color": COLOURS[i % len(COLOURS)], "marker": MARKS[i % len(MARKS)], "markersize": 4}
-        axes.plot(seconds, error, linewidth=0.8, linestyle=DASHES[i % len(DASHES)], markevery=whole, label=name, **look)
-        axes.plot(seconds[~whole], error[~whole], linestyle="", **{**look, "markerfacecolor": "white"})
-        if key == "error_median" and "error_high" in row:
-            ends = np.clip([row.error_low.values, row.error_high.values], floor, CEILING)
-            axes.vlines(seconds, *ends, color=look["color"], linewidth=0.7, alpha=0.7)
+        axes.plot(seconds, error, linewidth=0.8, markevery=whole, label=name, **look)
+        axes.plot(seconds[~whole], error[~whole], **{**look, "linestyle": "", "markerfacecolor": "white"})
         axes.plot(seconds[silent], error[silent], "x", color="black", markersize=7)
     if np.isfinite(accurate):
-        axes.axhspan(floor / 2, max(accurate, floor), color="0.9", linewidth=0)
-    axes.set(xscale="log", yscale="log", xlabel="time per cell on one core [s]", ylim=(floor / 2, 10))
+        axes.axhspan(floor / 3, max(accurate, floor), color="0.9", linewidth=0)
+    axes.set(xscale="log", yscale="log", xlabel="time per cell on one core [s]", ylim=(floor / 3, 10))
+
+
+FAMILIES = {
+    COLOURS[6]: ("auto",),
+    COLOURS[2]: ("closed", "coulomb", "pure", "asymptotic", "stable"),
+    COLOURS[4]: ("quadrature", "segments", "events", "map", "waveform"),
+    COLOURS[0]: ("taylor",),
+    COLOURS[1]: ("dopri5",),
+    COLOURS[3]: ("dop853",),
+    COLOURS[5]: ("rodas5p", "sdirk4"),
+    "0.6": ("euler",),
+    "#8C510A": ("semi_implicit",),
+    "#35978F": ("verlet",),
+    "#4D4DBF": ("rk4",),
+    "#A6761D": ("moreau",),
+    "0.35": ("heyoka.py", "diffrax", "scipy"),
+}
+"""Colours of methods, the same in every picture: formulas, integrals, Taylor series, the integrators by themselves,
+textbook steppers and other libraries; within a colour they differ by their marks."""
+
+
+def method_look(name: str, place: int = 0) -> dict[str, Any]:
+    """Colour, marker and line style of a method; of one of a user's own by its place among others."""
+    for colour, members in FAMILIES.items():
+        if name.split()[0] in members:
+            i = members.index(name.split()[0])
+            marker = MARKS[(i + list(FAMILIES).index(colour)) % len(MARKS)]
+            return {"color": colour, "marker": marker, "linestyle": "--" if members[-1] == "scipy" else "-"}
+    return {
+        "color": COLOURS[place % len(COLOURS)],
+        "marker": MARKS[place % len(MARKS)],
+        "linestyle": DASHES[place % len(DASHES)],
+    }
 
 
 @contextlib.contextmanager
