@@ -4,7 +4,7 @@
 
 sweeps ten thousand foliots with viscous and Coulomb friction by every method at every tolerance, on one core, follows
 some of the same foliots by heyoka.py, diffrax and scipy (the extra `peers`), and draws work_precision.png. The time is
-that of the whole `sweep.run`, over its cells. Errors are the largest among a thousand of the cells, against 20 digits
+that of the whole `sweep.run`, over its cells. Errors are the largest among 400 of the cells, against 20 digits
 where mpmath is installed, else against the best method. Two tables are printed beside it: the same for drag, and the
 order of integrators at a fixed step. Timings are noisy and for information only; errors and counts are checked.
 """
@@ -23,16 +23,19 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from _common import Groups, Statement, cheapest, differing, direct_label, measured, page_of, report
+from _peers import FOLLOWERS, swings
 
 import sweep
+from sweep.cells.grid import Grid
 from sweep.cells.sample import sampled, solved
 from sweep.explore.work_precision import TOLERANCES, precision_cells, precision_text, work_precision
 from sweep.show.charts import draw_precision, method_look
 
 DIGITS = 20
 """Of the truth."""
-PEER_CELLS = {"heyoka.py": 1000, "diffrax": 1000, "scipy": 50}
-"""diffrax follows all its cells side by side, the others one after the other."""
+PEER_CELLS = {"heyoka.py": 1, "diffrax": 2, "scipy": 10}
+"""Other libraries follow every so many-th of the cells; diffrax follows all of them side by side."""
+LONGEST = 10.0
 ORDERS = {"euler": (1, 1e-2), "semi_implicit": (1, 1e-2), "verlet": (2, 1e-2), "rk4": (4, 1e-2)}
 """Order, and by how much the exponent of the error in the step may be off, for steps from 0.01 to 0.1 s."""
 
@@ -67,45 +70,39 @@ def _oracle(name: str) -> Any:
         return None
 
 
-def charted(study: sweep.study.read.Study, cells: int, tolerances: Sequence[float]) -> xr.Dataset:
-    """Every method at every tolerance on some cells of a study."""
-    return work_precision(study, cells=cells, tolerances=tolerances, truth=cycles(study, cells))
-
-
 def swept(study: sweep.study.read.Study, found: xr.Dataset) -> xr.Dataset:
-    """`found` with the CPU seconds of `sweep.run` over the whole grid, per cell, by every method and tolerance."""
-    seconds = xr.zeros_like(found.seconds)
+    """`found` with the CPU seconds of `sweep.run` over the whole grid, per cell, by every method and tolerance.
+
+    What would take more than `LONGEST` seconds keeps the time of its sample, beside which the engine's share is small.
+    """
+    seconds = found.seconds.copy()
     for method in map(str, found["method"].values):
         for rtol in found.rtol.values:
-            keys = replace(study, method=method, rtol=float(rtol))
-            begin = time.process_time()
-            ds = sweep.run(keys, progress=False, workers=1)
-            seconds.loc[{"method": method, "rtol": rtol}] = (time.process_time() - begin) / ds.status.size
+            at = {"method": method, "rtol": rtol}
+            if float(seconds.sel(at)) * Grid(study).size < LONGEST:
+                begin = time.process_time()
+                ds = sweep.run(replace(study, method=method, rtol=float(rtol)), progress=False, workers=1)
+                seconds.loc[at] = (time.process_time() - begin) / ds.status.size
     return found.assign(seconds=seconds)
 
 
-def peers(study: sweep.study.read.Study, tolerances: Sequence[float]) -> dict[str, xr.Dataset]:
-    """Other libraries on some cells, by name; none where the truth is not at hand."""
-    from _peers import FOLLOWERS
-
-    found = {}
-    for name, follower in FOLLOWERS.items():
-        cells = PEER_CELLS[name]
-        true, some = cycles(study, cells), sampled(study, cells)
-        if true is not None:
-            multiplier = solved(replace(some, outputs=("multiplier",), method="auto", rtol=1e-6))[0]["multiplier"]
-            found[name] = _measured(follower, precision_cells(study, cells), true, multiplier, tolerances)
-    return found
+def peers(study: sweep.study.read.Study, true: Any, cells: int, tolerances: Sequence[float]) -> dict[str, xr.Dataset]:
+    """Other libraries on some of the cells, by name; none where the truth is not at hand."""
+    if true is None:
+        return {}
+    given = precision_cells(study, cells)
+    left = solved(replace(sampled(study, cells), outputs=("multiplier",), method="auto", rtol=1e-6))[0]["multiplier"]
+    rows = np.transpose([given["a"], given["R"], left, *true.values()])
+    return {name: _followed(one, rows[:: PEER_CELLS[name]], tolerances) for name, one in FOLLOWERS.items()}
 
 
-def _measured(follower: Any, cells: Any, true: Any, multiplier: Any, tolerances: Sequence[float]) -> xr.Dataset:
-    from _peers import swings
-
-    made = cache(follower)  # compiled once for each tolerance, and not timed
+def _followed(follower: Any, rows: Any, tolerances: Sequence[float]) -> xr.Dataset:
+    a, R, left, *true = rows.T
+    made = cache(follower)  # made once for each tolerance, and not timed
 
     def off(rtol: float) -> Any:
-        columns = (cells["a"], cells["R"], true["crossing_speed"], [swings(rtol, m) for m in multiplier])
-        return abs(made(rtol).settle(*columns) / np.transpose(list(true.values())) - 1).max(axis=1)
+        found = made(rtol).settle(a, R, true[2], [swings(rtol, x) for x in left])
+        return abs(found / np.transpose(true) - 1).max(axis=1)
 
     return measured(off, tolerances)
 
@@ -172,12 +169,16 @@ def figure(found: xr.Dataset, others: dict[str, xr.Dataset]) -> Any:
     return page
 
 
-def conclude(path: str, cells: int = 1000, tolerances: Sequence[float] = TOLERANCES) -> tuple[Groups, list[str], Any]:
+def conclude(path: str, cells: int = 400, tolerances: Sequence[float] = TOLERANCES) -> tuple[Groups, list[str], Any]:
     """Statements, tables and the figure."""
     study, drag = (sweep.study(Path(path).with_name(f"work_precision{end}.toml")) for end in ("", "_drag"))
-    coulomb, dragged = charted(study, cells, tolerances), charted(drag, cells, tolerances)
+    true = cycles(study, cells)
+    keys = {"cells": cells, "tolerances": tolerances}
+    coulomb, dragged = (
+        work_precision(one, truth=of, **keys) for one, of in ((study, true), (drag, cycles(drag, cells)))
+    )
     fixed = stepped(Path(path).with_name("work_precision_steps.toml"))
-    coulomb, others = swept(study, coulomb), peers(study, tolerances)
+    coulomb, others = swept(study, coulomb), peers(study, true, cells, tolerances)
     missing = [Statement(name, "", "not installed") for name in PEER_CELLS if name not in others]
     groups = {
         "Honesty": [*honesty("viscous and Coulomb", coulomb), *honesty("drag", dragged)],

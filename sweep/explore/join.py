@@ -35,11 +35,11 @@ def join(
     labels: Sequence[str] = PAIR,
     force: bool = False,
 ) -> xr.Dataset:
-    """Two finished results of one kernel as one.
+    """Join two finished results of one kernel.
 
-    They may differ in the values of one axis, which becomes longer; in one fixed parameter, method or rtol, which
-    becomes an axis; or, told by `axis`, in nothing that a study says, such as the version that computed them. Cells
-    that are in both, points of a list or of refined results too, are to be the same bit for bit, and are kept once.
+    They may differ in the values of one axis, which becomes longer, or in one fixed parameter, method or rtol, which
+    becomes an axis. If their studies are equal, for example where two versions computed them, `axis` and `labels` make
+    a new axis. Cells that are in both results must agree to the last bit, and are kept once.
 
     Parameters
     ----------
@@ -57,8 +57,8 @@ def join(
     Raises
     ------
     SweepError
-        They are not two results, do not fit together, are unfinished, or do not fit into the memory; or `path` holds
-        another result, which a join of other cells or labels is too.
+        They are not two results, cannot be joined, are unfinished, or are larger than the memory; or `path` holds
+        another result, or a join of other cells or labels.
 
     Examples
     --------

@@ -151,7 +151,7 @@ def plan(
     isolate: bool = False,
     cell_timeout: float | str | None = None,
 ) -> Plan:
-    """Forecast of a run, from some of its cells, spread over the grid.
+    """Forecast of a run: its cells, size, memory and time, from some cells that are computed.
 
     Parameters
     ----------
@@ -160,14 +160,14 @@ def plan(
     path : path, optional
         Where the output would be; default: the current folder.
     note : callable, optional
-        Told what is compiled, where that takes long.
+        Called with a message where compiling takes long.
     isolate, cell_timeout
         As of `run`: the cells that are tried are solved in processes of their own.
 
     Raises
     ------
     SweepError
-        The folder of the output is not there.
+        The folder of the output does not exist.
 
     Examples
     --------

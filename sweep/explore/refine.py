@@ -142,8 +142,8 @@ def refine(
     Raises
     ------
     SweepError
-        The dataset is no finished product of number axes, nor refined before; an output is not there or runs along
-        something; `path` is not to be written.
+        The dataset is not a finished product of number axes, and was not refined before; an output does not exist or
+        has a coordinate of its own; `path` cannot be written.
 
     Examples
     --------

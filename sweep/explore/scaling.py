@@ -172,8 +172,8 @@ def scaling(study: Given, seconds: float | None = None) -> Scaling:
     ----------
     study : Study, path, mapping of its keys, or Dataset that came from it
     seconds : float, optional
-        What trying scalings on cells may take, else none is found. Default: about two, and longer for dear kernels, of
-        which those of the declared units alone are tried, on four cells.
+        Time for the test of scalings on cells; with less time than needed none is found. Default: about two seconds. Of
+        slow kernels only the scalings of the declared units are tested, on four cells, which may take longer.
 
     Raises
     ------

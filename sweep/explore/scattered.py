@@ -107,15 +107,15 @@ def interpolated(dataset: xr.Dataset, at: Mapping[str, Sequence[float] | Array])
     Returns
     -------
     Dataset
-        Outputs of one value a cell, and the status of the nearest cell around, over the axes in the order of `at`. NaN
-        outside of the cells, and beside cells without a value. INACCURATE, with `error_bound`, where straight lines
-        miss the tolerance of the refinement as far as the cells around tell, and across borders of statuses, where
-        nothing tells how far they are off.
+        Outputs of one value a cell, and the status of the nearest cell, over the axes in the order of `at`. NaN outside
+        of the cells, and beside cells without a value. INACCURATE, with `error_bound`, where the estimated error of
+        linear interpolation exceeds the tolerance of the refinement, and across borders of statuses, where the error is
+        unknown.
 
     Raises
     ------
     SweepError
-        The cells do not fill a box, or an axis is missing or not there.
+        The cells do not fill a box, an axis is missing, or there is no such axis.
 
     Examples
     --------

@@ -36,7 +36,7 @@ def sensitivity(dataset: xr.Dataset, y: str | xr.DataArray) -> xr.Dataset:
     dataset : Dataset
         From `run` or `open_result` of a study of such a design.
     y : str or DataArray
-        An output of one value a cell, or what is made of outputs: np.log(ds.period).
+        An output of one value a cell, or a function of outputs: np.log(ds.period).
 
     Returns
     -------

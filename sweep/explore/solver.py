@@ -116,7 +116,7 @@ def _warn(cell: BadCell) -> None:
 
 
 def solver(study: Given) -> PointSolver:
-    """The study's kernel as a function of its axes, whose values it does not use.
+    """The study's kernel as a function of its axes; the values of the axes in the study are not used.
 
     Parameters
     ----------

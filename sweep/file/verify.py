@@ -48,7 +48,7 @@ class Verdict:
 
 
 def verify(path: str | os.PathLike[str]) -> Verdict:
-    """Reads a result, finished or not, and compares all digests.
+    """Check all checksums of a result, finished or not.
 
     Raises
     ------

@@ -88,16 +88,16 @@ class Difference:
 
 
 def diff(a: xr.Dataset, b: xr.Dataset | None = None, rtol: float = 0.0) -> Difference:
-    """In what two results of one kernel differ.
+    """Differences between two results of one kernel.
 
-    Cells are those of equal parameters; where the cells of both run along `cell` or `point`, those of equal number.
+    Cells with equal parameters are compared; where both results are lists of cells, those with equal number.
 
     Parameters
     ----------
     a, b : Dataset
         From `run` or `open_result`, not of a summary.
     rtol : float
-        Relative distance up to which outputs are the same; NaN is the same as NaN.
+        Relative differences up to this count as equal; NaN is equal to NaN.
 
     Raises
     ------

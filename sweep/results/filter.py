@@ -28,7 +28,7 @@ def where(dataset: xr.Dataset, condition: str) -> xr.Dataset:
     Raises
     ------
     SweepError
-        The condition cannot be read, or names what is not there.
+        The condition cannot be read, or contains an unknown name.
 
     Examples
     --------

@@ -77,7 +77,7 @@ class Listing(tuple[Listed, ...]):
 
 
 def list_results(folder: str | os.PathLike[str] = ".") -> Listing:
-    """The results in a folder, finished or not, by name; other HDF5 files are named with why they are none.
+    """The results in a folder, finished or not, by name; of other HDF5 files, why they are not results.
 
     Raises
     ------

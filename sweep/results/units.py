@@ -27,7 +27,7 @@ def in_units(dataset: xr.Dataset, units: Mapping[str, str]) -> xr.Dataset:
     Raises
     ------
     StudyError
-        Names that are not there, or units that measure something else; all of them are listed.
+        Unknown names, or units of another quantity; all of them are listed.
 
     Examples
     --------

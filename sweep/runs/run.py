@@ -52,12 +52,12 @@ def run(
     retry_failed: bool = False,
     **keys: Any,
 ) -> xr.Dataset:
-    """Computes every cell of a study. The same study gives the same bits, however it is cut and continued.
+    """Compute every cell of a study. The result is the same to the last bit, however often the run is interrupted.
 
     Parameters
     ----------
     study : Study, path of a study file, mapping of its keys, or Dataset of an earlier run, optional
-        None: these keys stand as keywords.
+        None: the study is given as keywords.
     path : path, optional
         The output, an HDF5 (netCDF4) file. A run that was stopped or killed is continued; an output that is complete
         for the same study is opened and left alone. None: in memory.
@@ -66,7 +66,7 @@ def run(
     force : bool
         Overwrite the result of another study, give up one that is not finished, compute a complete one anew.
     progress : bool or text stream, optional
-        Where to tell how far it is; None and True: stderr, False: nowhere. A run of less than a second is silent.
+        Where progress is printed; None and True: stderr, False: nowhere. A run of less than a second prints nothing.
     block_cells : int, optional
         Cells a block, instead of a size taken from a timed sample. A run that is continued keeps its own.
     extend : bool
@@ -74,16 +74,16 @@ def run(
         new cells only; the output is replaced when all are there. One of an earlier version of foliot is taken over
         if a sample of its cells, computed again, has the same bits.
     until : str or datetime, optional
-        Stop within a block's time of "07:00" or "2027-01-31 07:00"; what there is by then is returned.
+        Stop at "07:00" or "2027-01-31 07:00", at most the time of a block later; the unfinished result is returned.
     cluster : str or distributed.Client, optional
         Compute on the workers of this dask scheduler ("tcp://10.0.0.1:8786", or a scheduler file) instead of here.
-        Workers that see the folder of the output write there; others send their numbers. Where there are none, or all
-        are lost, new ones are waited for; those of batch systems may be a long time coming.
+        Workers that can write to the folder of the output write there; others send their numbers. If there are no
+        workers, or all are lost, the run waits for new ones.
     repair : bool
         Where the output is complete for this study, but damaged on the disk, compute the damaged blocks again.
     isolate : bool
-        Solve cells in processes of their own: a kernel that crashes or never ends costs only the cells it does so at.
-        The command does so for every kernel "module:NAME".
+        Solve cells in separate processes, so that a crash or an endless loop loses only the cells where it happens.
+        `sweep run` does so for every kernel "module:NAME".
     cell_timeout : float or str, optional
         Seconds, or "90 s", "5 min", "1 h", that a cell may take; with it cells are isolated. Default: a minute, or a
         hundred times the dearest cell of the timed sample, where that is more.
@@ -98,7 +98,7 @@ def run(
         The output cannot be written, belongs to another study or another run, the disk is full, or a kernel failed.
         What is finished is kept.
     KeyboardInterrupt, SystemExit
-        After Ctrl-C or SIGTERM, when the blocks at work have been stored.
+        After Ctrl-C or SIGTERM, when the blocks in progress have been stored.
 
     Examples
     --------

@@ -95,7 +95,7 @@ class Catalogue(Mapping[str, KernelPage]):
 
 
 def kernels(name: str | None = None, allow_import: bool = False) -> Catalogue | KernelPage:
-    """What can be swept: all kernels of the catalogue, or one of them with parameters, units, outputs and methods.
+    """The kernels that can be swept: all of the catalogue, or one with parameters, units, outputs and methods.
 
     Parameters
     ----------
