@@ -176,8 +176,7 @@ def test_a_second_process_compiles_nothing_of_any_kernel_and_method(name, compil
     assert compiled_again[name] == []
 
 
-@pytest.mark.parametrize("others", [0o020, 0o002])
-@pytest.mark.parametrize("which", ["foliot", "foliot/*"])
+@pytest.mark.parametrize(("which", "others"), [("foliot", 0o020), ("foliot/*", 0o002)])
 def test_a_folder_that_others_may_write_to_is_not_used(filled, which, others):
     (folder,) = filled.glob(which)
     folder.chmod(0o700 | others)

@@ -1,12 +1,9 @@
 """Conditions on the cells of a study: those outside are neither computed nor refused."""
 
-from dataclasses import replace
-
 import pytest
 from toy_studies import build
 
 import sweep
-from kernels.interface import Status
 from sweep.cells.sample import sampled
 
 AXES = {"height": [-1.0, 1.0, 2.0, 4.0], "v0": [0.0, 1.0, 3.0]}
@@ -18,16 +15,6 @@ def test_a_condition_that_holds_nowhere_is_told_before_anything_is_run(tmp_path)
         with pytest.raises(sweep.SweepError, match='where = "height > 4": holds for none of the 12 cells'):
             function(study, *path)
     assert not list(tmp_path.iterdir())
-
-
-def test_a_kernel_may_not_say_it():
-    study = build(axes={"height": [1.0]}, method="exact")
-
-    def check(height, v0, g, status):
-        status[...] = Status.NOT_ASKED
-
-    found = sweep.run(replace(study, kernel=replace(study.kernel, check=check)))
-    assert found.status.values.tolist() == [Status.FAILED]
 
 
 def test_a_sample_is_of_cells_that_are_asked_for_where_there_are_any():

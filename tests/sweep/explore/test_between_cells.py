@@ -192,38 +192,3 @@ def test_a_kink_is_not_taken_for_the_parabola_through_it_and_a_wave_is_cut_acros
     points = np.stack([g.ravel() for g in grid], axis=1)
     _, _, ends = judged(points, np.sin(3 * points[:, 0]))
     assert (abs(points[ends[:, 0], 0] - points[ends[:, 1], 0]) > 0.1).all()
-
-
-# boxes stretched to where an output bends
-
-
-def places(axes, number=5):
-    """A grid, and as many cells anywhere."""
-    grid = np.stack([g.ravel() for g in np.meshgrid(*[np.linspace(0, 1, number)] * axes)], axis=1)
-    return np.concatenate([grid, np.random.default_rng(1).random(grid.shape)])
-
-
-@pytest.mark.parametrize("axes", [2, 3])
-def test_the_stretch_of_a_parabola_is_the_root_of_its_second_derivatives(axes):
-    points = places(axes)
-    matrix = np.random.default_rng(axes).normal(size=(axes, axes))
-    matrix = matrix @ matrix.T + np.eye(axes)
-    found = stretch(points, np.einsum("ni,ij,nj->n", points, matrix, points) / 2 + points[:, 0])
-    np.testing.assert_allclose(found @ found, matrix / np.linalg.eigvalsh(matrix).max(), rtol=1e-6, atol=1e-9)
-    if axes == 2:  # down and up sizes count, and cells without a value do not
-        heights = 4 * points[:, 0] ** 2 - points[:, 1] ** 2
-        heights[np.hypot(*points.T) < 0.5] = np.nan
-        np.testing.assert_allclose(stretch(points, heights), np.diag([1.0, 0.5]), atol=1e-6)
-
-
-def test_a_direction_that_matters_nothing_shrinks_and_what_is_straight_or_missing_stretches_nothing():
-    points = places(2)
-    found = stretch(points, (points[:, 0] + points[:, 1]) ** 2)
-    np.testing.assert_allclose(found @ [1, 1], [1, 1], rtol=1e-6)
-    corners = points[simplices(points @ found)]
-    along, level = np.ptp(corners.sum(axis=2), axis=1), np.ptp(corners[:, :, 0] - corners[:, :, 1], axis=1)
-    assert along.mean() < 0.3 * level.mean()
-    for straight in (np.zeros(50), points @ [1.0, 2.0], np.full(50, np.nan)):
-        np.testing.assert_array_equal(stretch(points, straight), np.eye(2))
-    np.testing.assert_array_equal(stretch(points[:5], points[:5, 0] ** 2), np.eye(2))
-    np.testing.assert_array_equal(stretch(points[:, :1], points[:, 0] ** 2), np.eye(1))

@@ -258,16 +258,6 @@ def test_one_law_is_not_called_two_whatever_its_noise(kind):
     assert int((found.regimes == 2).sum()) <= 1
 
 
-def test_two_laws_are_told_from_one_and_from_a_logarithm():
-    t = np.log(MU)
-    slight = sweep.fit_two_laws(curve(t, broken(t, -0.5, -0.4) + 0.5 * noise_of("even", 61, 10)), "mu")
-    assert (slight.regimes == 2).all()
-    assert float(slight.evidence.median()) > 10
-    x = np.geomspace(2, 2e4, 61)
-    logarithm = sweep.fit_two_laws(curve(np.log(x), np.log(x**-0.5 * np.log(x))), "mu")
-    assert (str(logarithm.verdict.values), float(logarithm.evidence) < 0) == ("no power law", True)
-
-
 # other laws
 
 

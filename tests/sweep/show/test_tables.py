@@ -49,14 +49,6 @@ def test_two_laws_are_told_in_a_text_a_page_and_a_table(tmp_path):
     assert "residual" in laws_text(found, complete=True)
 
 
-def test_a_second_law_needs_eight_points_and_no_straight_line():
-    for points, bent in ((8, True), (7, False)):
-        x = np.geomspace(1e-4, 1e4, points)
-        found = laws(lines_of(x**-1 + x**-0.25, x=x).isel(a=0), "y", "x")
-        assert (found.bend is not None) is bent
-    assert laws(lines_of(X**-0.5).isel(a=0), "y", "x").bend is None
-
-
 def test_laws_of_one_line_are_compared_in_one_window(tmp_path):
     found = comparison(lines_of(BENT).isel(a=0), "y", "x")
     write_comparison(found, tmp_path / "laws.csv")

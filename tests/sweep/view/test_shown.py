@@ -13,7 +13,7 @@ import sweep
 from sweep.show.charts import COLOURS
 from sweep.show.view import view
 from sweep.view import region
-from sweep.view.region import Choice, nearest, shown
+from sweep.view.region import Choice, shown
 
 pytestmark = pytest.mark.skipif(not find_spec("panel"), reason="the extra view is not installed")
 if find_spec("panel"):
@@ -72,18 +72,6 @@ def test_what_is_no_axis_has_no_exponent():
         shown(dataset, Choice("period", "mu", exponent=True))
 
 
-@pytest.mark.parametrize("cell", [(0, 0), (40, 20), (17, 5)])
-def test_the_cell_of_a_point_is_the_one_whose_edges_surround_it(dataset, cell):
-    found = shown(dataset, Choice("period", "mu", "R", {"a": 1}))
-    mu, R = float(dataset.mu[cell[0]]), float(dataset.R[cell[1]])
-    for step in (0.99, 1.01):  # of 1.122 to the next edge
-        assert nearest(found, mu * step**10, R + 0.049 * np.sign(step - 1), (True, False)) == {
-            "mu": cell[0],
-            "R": cell[1],
-        }
-    assert nearest(found, 1e3, R, (True, False)) is None
-
-
 # what is drawn
 
 FLAGS = {"flag_values": np.array([0, 1, 64], np.int8), "flag_meanings": "OK INACCURATE BAD_INPUT"}
@@ -109,14 +97,6 @@ def test_lines_are_drawn_with_their_statuses_at_the_foot_where_they_have_no_valu
     logarithmic.show(found, True)
     np.testing.assert_array_equal(logarithmic.lines.data["ys"], [[1.0, 2.0, np.nan], [4.0, np.nan, 6.0]])
     assert logarithmic.marks.data["y"].tolist() == [2.0, 1.0]
-
-
-def test_statuses_of_any_kernel_have_colours_of_their_own(dataset):
-    found = shown(dataset, MAP)
-    colours = [status_colour(found, code) for code in found.meanings if code > 0]
-    for name in ("INACCURATE", "NOT_CONVERGED", "FAILED", "PENDING"):
-        code = next(code for code, word in found.meanings.items() if word == name)
-        assert colours.count(status_colour(found, code)) == 1
 
 
 # what is saved
