@@ -62,6 +62,7 @@ class Scene:
     switch : (states, side, parameters) -> the states just behind the switch; None: they do not jump
     most_kinks : between two switches, after which a cell is given up; None: a thousand
     slides : whether motion goes on along a kink onto which both sides press it (`sliding`), or sticks there
+    exact_start : whether what rounding takes from the surface's value at the start does not count
 
     At a switch `side` turns from 1 to -1 or back. Where abs(u) or sign(u) occurs, u = 0 is a *kink*: the motion is
     followed up to it and begun anew behind it.
@@ -77,6 +78,7 @@ class Scene:
     switch: Function | None = None
     most_kinks: int | None = None
     slides: bool = False
+    exact_start: bool = False
 
     def __post_init__(self) -> None:
         names = [*self.states, *self.parameters]

@@ -380,6 +380,11 @@ class Writer:
         """The text of `run_{leg}`."""
         return filled(DRIVEN, leg=leg, m=m, tells=tells, slides="M.slides" if self.scene.slides else "None")
 
+    def _lost(self):
+        if self.scene.exact_start:
+            return self.function("lost", "Nothing.", (self.recorded.graph.of(0.0),), single=True)
+        return lost_by_surface(self)
+
     @functools.cached_property
     def _hidden(self):
         return hidden(self)
@@ -400,7 +405,7 @@ class Writer:
             self.function("kinks", "What is 0 at each kink.", recorded.graph.kinks),
             self.function("switched", "The state behind the switch; the side then turns.", recorded.switched),
             self.function("started", "The state at the start.", recorded.started, ("parameters", "side")),
-            self.natural_signs(), self.underflows(), self.series(2), lost_by_surface(self), of_hidden, bounds(self),
+            self.natural_signs(), self.underflows(), self.series(2), self._lost(), of_hidden, bounds(self),
             made(self),
         ]  # fmt: skip
         if scene.slides:

@@ -36,10 +36,10 @@ class Side:
     def _of(self, x):
         if x.kind in (INPUT, NUMBER):
             return x
-        return _made(self._graph, x.kind, [self.of(a) for a in x.args])
+        return made(self._graph, x.kind, [self.of(a) for a in x.args])
 
 
-def _made(graph, kind, args):
+def made(graph, kind, args):
     """The expression of that kind."""
     made = {ADD: graph.add, MUL: graph.multiply, SCALED: graph.multiply, DIV: graph.divide, "power": graph.power}
     made |= {"abs": graph.magnitude, "sign": graph.sign, HALF_SQUARE: lambda u: 0.5 * u * u}

@@ -1,0 +1,88 @@
+"""Small linear equations and eigenvalues of columns of cells: sums and products one by one, so bits are everybody's.
+
+A matrix has the shape (n, n, n_cells); numpy's own linear algebra calls a library whose bits depend on the CPU.
+"""
+
+import numpy as np
+
+ROUNDS = 60
+"""Of corrections of all roots of a polynomial: simple ones settle in ten, double ones to half of their digits."""
+
+
+def times(A, B):
+    """The product of matrices (n, m, cells) and (m, k, cells)."""
+    total = A[:, :1] * B[:1]
+    for j in range(1, A.shape[1]):
+        total = total + A[:, j : j + 1] * B[j : j + 1]
+    return total
+
+
+def solved(A, B):
+    """The solution X (n, m, cells) of A X = B, by the largest pivots; NaN or infinite where there is none."""
+    A, B, n = A.copy(), B.copy(), len(A)
+    for k in range(n):
+        best = k + np.argmax(abs(A[k:, k]), axis=0)
+        for M in (A, B):
+            rows = np.broadcast_to(best, (1, *M.shape[1:])).copy()
+            pivots, first = np.take_along_axis(M, rows, 0), M[k : k + 1].copy()
+            np.put_along_axis(M, rows, first, 0)
+            M[k] = pivots[0]
+        for r in range(k + 1, n):
+            factor = A[r, k] / A[k, k]
+            A[r, k:] = A[r, k:] - factor * A[k, k:]
+            B[r] = B[r] - factor * B[k]
+    for k in range(n - 1, -1, -1):
+        for c in range(k + 1, n):
+            B[k] = B[k] - A[k, c] * B[c]
+        B[k] = B[k] / A[k, k]
+    return B
+
+
+def identity(n, cells):
+    return np.broadcast_to(np.eye(n)[:, :, None], (n, n, cells)).copy()
+
+
+def eigenvalues(A):
+    """Real and imaginary parts (n, cells), in no order: roots of the characteristic polynomial.
+
+    Its coefficients are those of Faddeev and Le Verrier, c_k = -trace(A M_k)/k, M_(k+1) = A M_k + c_k, good for the few
+    states that a scene has; its roots are found at once by the corrections of Durand and Kerner.
+    """
+    n, cells = len(A), A.shape[-1]
+    M, coefficients = identity(n, cells), [np.ones(cells)]
+    for k in range(1, n + 1):
+        AM = times(A, M)
+        coefficients.append(-sum(AM[i, i] for i in range(n)) / k)
+        M = AM + coefficients[-1] * identity(n, cells)
+    size = np.maximum(np.sqrt(sum(A[i, j] * A[i, j] for i in range(n) for j in range(n))), 1e-300)
+    real, imaginary = (np.array([size * part for part in parts]) for parts in zip(*_circle(n), strict=True))
+    for _ in range(ROUNDS if n > 1 else 1):
+        for j in range(n):
+            value = coefficients[0], 0.0 * size
+            for c in coefficients[1:]:
+                x, y = _product(*value, real[j], imaginary[j])
+                value = x + c, y
+            for i in range(n):
+                if i != j:
+                    value = _quotient(*value, real[j] - real[i], imaginary[j] - imaginary[i])
+            real[j], imaginary[j] = real[j] - value[0], imaginary[j] - value[1]
+    return real, imaginary
+
+
+def _circle(n):
+    """Where the roots are looked for first: powers of a number of no symmetry."""
+    points = [(1.0, 0.0)]
+    while len(points) < n:
+        points.append(_product(*points[-1], 0.4, 0.9))
+    return points
+
+
+def _product(a, b, c, d):
+    return a * c - b * d, a * d + b * c
+
+
+def _quotient(a, b, c, d):
+    """a + ib over c + id; 0 where both are 0, as at two roots that have met."""
+    square = c * c + d * d
+    over = np.where(square > 0.0, square, 1.0)
+    return np.where(square > 0.0, (a * c + b * d) / over, 0.0), np.where(square > 0.0, (b * c - a * d) / over, 0.0)

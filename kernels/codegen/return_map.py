@@ -1,0 +1,206 @@
+"""The return map of a scene: its states just before a switch, from those just before one `flips` earlier.
+
+A run begins behind the switch. So a scene of its own is written, whose start takes the states before it as parameters,
+and which begins as the scene itself does where the parameter FRESH is 1. Its rates, surface and switch are the scene's.
+The state that the surface watches is put onto the surface, whatever is given for it.
+"""
+
+import functools
+import inspect
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+
+from kernels.codegen import followed_twice, stated_error
+from kernels.codegen.accumulated import to_rest
+from kernels.codegen.module import build, loaded
+from kernels.codegen.record import record
+from kernels.codegen.slid_along import slid_along
+from kernels.codegen.sliding import made
+from kernels.codegen.stepped import stepped, twice_by
+from kernels.interface import Status
+from kernels.source_text.expression import INPUT, NUMBER, Expression, SceneError, needed
+from kernels.source_text.template import filled, listed
+
+SLIDERS = {"taylor": ("dop853", "rodas5p")}
+"""Methods by which a method follows what slides along a kink, where that is not itself."""
+FRESH = "from_start"
+RATES = '''
+"""Rates of {name} in columns of states: written by kernels; do not change it here."""
+
+from {module} import *
+from kernels.integrate.records import Mode
+
+
+@kept
+def rates_of(states, parameters, side, found):
+    """The rates of each state."""
+    for i in range(states.shape[1]):
+        state, given = ({states}), ({parameters})
+        mode = Mode(side, (), given, False)
+        new = rates(state, Mode(side, natural_signs(state, mode), given, False))
+        {results}
+'''
+ROUGH, TIGHT, OTHERS = 4e-10, 1e-12, (1e-12, 1e-11, 1e-10)
+"""Tolerances of the runs that tell the states' sizes."""
+APART = 4.0
+"""Differences of runs, within which the largest size is."""
+
+
+class ReturnMap:
+    """The return map by one method, of columns of cells.
+
+    Parameters
+    ----------
+    scene : whose cycles are wanted
+    method : "taylor", "rodas5p", "dop853", "dopri5"
+    """
+
+    def __init__(self, scene, method):
+        self.scene, self.method, self.seen = returning(scene), method, watched(scene)
+        how = stated_error.by_one(self.scene) if method == "taylor" else twice_by(method, self.scene)
+        self._how = slid_along(to_rest(how), self.scene, SLIDERS.get(method, (method,)))
+        self.directions = [j for j in range(len(scene.states)) if j != self.seen]
+        """Of the states, those that the map depends on."""
+
+    def passed(self, parameters, before, flips, rtol, fresh=0.0):
+        """Time, states and statuses, columns: at the switch `flips` after the one before which the states are given."""
+        count, n = len(flips), len(before)
+        found, status = np.full((2 + n, count), np.nan), np.empty(count, np.int8)
+        columns = [*parameters, *before, np.full(count, fresh), flips]
+        self._how(build(self.scene), columns, rtol, list(found), status)
+        return found[0], found[2:], status
+
+    def sizes(self, parameters, before, flips):
+        """The largest size of each state on the way to some digits; NaN where the motion does not get there."""
+        return self._sizes(self.scene, parameters, before, flips, ROUGH)
+
+    def turned(self, parameters, before, flips):
+        """The same to the tolerance TIGHT, where states turn round; and by how much it may be off besides.
+
+        Where a turn cannot be told, sizes are those of three runs whose steps end at other points.
+        """
+        sizes, off = self._sizes(turning(self.scene, True), parameters, before, flips, TIGHT), np.zeros(before.shape)
+        left = np.flatnonzero(np.isnan(sizes).any(axis=0))
+        if len(left):
+            some, here, steps = [c[left] for c in parameters], before[:, left], flips[left]
+            runs = [self._sizes(turning(self.scene, False), some, here, steps, rtol) for rtol in OTHERS]
+            most = np.maximum.reduce(runs)
+            apart = most - np.minimum.reduce(runs)
+            apart[paired(self.scene)] = 0.0
+            sizes[:, left], off[:, left] = most, APART * apart
+        return sizes, np.where(np.isnan(off), np.inf, off)
+
+    def _sizes(self, scene, parameters, before, flips, rtol):
+        """The largest size of each state at the ends of steps."""
+        count, n, runs = len(flips), len(before), build(scene)
+        if self.method != "taylor":
+            run = getattr(stepped(scene), f"run_{self.method}")
+            runs = SimpleNamespace(STATES=scene.states, M=runs.M, run_12=run, run_18=run)
+        columns = [*parameters, *before, np.zeros(count), flips]
+        found = followed_twice.followed(runs, columns, np.full(count, rtol))
+        return np.where(found[-1] <= Status.INACCURATE, found[2 + n : -1], np.nan)
+
+    def rates(self, parameters, states, side):
+        """The rates of each state, columns."""
+        found = np.empty(states.shape)
+        rating(self.scene).rates_of(np.ascontiguousarray(states), np.array(parameters), side, found)
+        return found
+
+
+def named(function, names):
+    """A function of keywords that asks for these names."""
+    kind = inspect.Parameter.POSITIONAL_OR_KEYWORD
+    function.__signature__ = inspect.Signature([inspect.Parameter(name, kind) for name in names])
+    return function
+
+
+def asked(function, values):
+    """What a scene's function returns for those of the values that it asks for, as a tuple."""
+    found = function(**{name: values[name] for name in inspect.signature(function).parameters})
+    return tuple(found) if isinstance(found, tuple | list | np.ndarray) else (found,)
+
+
+def watched(scene):
+    """The number of the state that the surface watches. Raises SceneError where that is not one alone."""
+    u = record(scene).events[0][2]
+    if u.kind != INPUT:
+        raise SceneError(f"surface of the scene {scene.name}: of a cycle it has to be a state, but for constants")
+    return scene.states.index(u.args[0])
+
+
+def has_sides(scene):
+    """Whether the motion or its surface hangs on the side."""
+    recorded = record(scene)
+    parts = needed(*recorded.rates, recorded.surface, *recorded.switched)
+    return any(x.kind == INPUT and x.args[0] == "side" for x in parts)
+
+
+@functools.cache
+def returning(scene):
+    """The scene that begins behind a switch at side -1, or at its start."""
+    places = [f"{name}_before" for name in scene.states]
+    seen = watched(scene)
+    offset, factor, _ = record(scene).events[0]
+
+    def start(**given):
+        before = {name: given[place] for name, place in zip(scene.states, places, strict=True)}
+        values = {**given, "side": -1.0, ".way": 1.0}
+        before[scene.states[seen]] = -_again(offset, values) / _again(factor, values)
+        behind = tuple(before.values())
+        if scene.switch is not None:
+            behind = asked(scene.switch, values | before)
+        fresh, begun = given[FRESH], asked(scene.start, given)
+        return tuple(fresh * x + (1.0 - fresh) * y for x, y in zip(begun, behind, strict=True))
+
+    parameters = (*scene.parameters, *places, FRESH)
+    start = named(start, (*parameters, "side"))
+    return replace(scene, name=f"{scene.name}_return", parameters=parameters, start=start, exact_start=True)
+
+
+def _again(x, values):
+    """A recorded expression of other values."""
+    if x.kind == NUMBER:
+        return x.args[0]
+    if x.kind == INPUT:
+        return values[x.args[0]]
+    args = [_again(a, values) for a in x.args]
+    graph = next((a.graph for a in args if isinstance(a, Expression)), x.graph)
+    return made(graph, x.kind, args)
+
+
+def paired(scene):
+    """Whether the rate of each state is another state, but for a factor."""
+    return np.array([r.varies and r.graph.parts(r)[1].kind == INPUT for r in record(scene).rates])
+
+
+@functools.cache
+def turning(scene, everywhere):
+    """The scene with a kink wherever a state turns round, so that steps end where its size is largest.
+
+    If not `everywhere`, of states alone whose rate is another one: a rate may come close to 0 and stay there.
+    """
+    those = np.full(len(scene.states), True) if everywhere else paired(scene)
+
+    def rates(**given):
+        found = asked(scene.rates, given)
+        for rate, turns in zip(found, those, strict=True):
+            if turns and isinstance(rate, Expression) and rate.varies:
+                abs(rate)
+        return found
+
+    rates = named(rates, inspect.signature(scene.rates).parameters)
+    return replace(scene, name=f"{scene.name}_turning", rates=rates)
+
+
+@functools.cache
+def rating(scene):
+    """The module of the scene's rates in columns."""
+    n, m = len(scene.states), len(scene.parameters)
+    text = filled(
+        RATES, name=scene.name, module=build(scene).__name__, states=listed(f"states[{j}, i]" for j in range(n)),
+        parameters=listed(f"parameters[{j}, i]" for j in range(m)),
+        results="\n".join(f"found[{j}, i] = new[{j}]" for j in range(n)),
+    )  # fmt: skip
+    return loaded("rates", scene, text.lstrip())

@@ -1,0 +1,121 @@
+"""Limit cycles of scenes: against closed forms, the foliot's own kernel, and in the words of their statuses."""
+
+import numpy as np
+import pytest
+import rich_scene
+from columns import checked, estimated, solve
+from kicked_scene import KICKED
+from mpmath import mp, mpf
+
+from kernels.cycle import cycle_kernel
+from kernels.foliot.cycle import FOLIOT
+from kernels.interface import Status
+from kernels.lanes.jit import COMPILED
+from kernels.scene import Field, SceneError
+
+pytestmark = pytest.mark.skipif(not COMPILED, reason="a cycle takes minutes as plain Python")
+
+
+def kicked(zeta, omega, kick):
+    """Period, speed before the kick, sizes, multiplier, sensitivities to zeta and omega: u = q (u + kick)."""
+    with mp.workdps(50):
+        zeta, omega, kick = mpf(zeta), mpf(omega), mpf(kick)
+        turn = mp.sqrt(1 - zeta**2)
+        q = mp.exp(-mp.pi * zeta / turn)
+        before = q * kick / (1 - q)
+        far = (before + kick) / omega * mp.exp(-zeta * mp.acos(zeta) / turn)
+        found = (2 * mp.pi / (omega * turn), before, far, before + kick, q**2, (zeta / turn) ** 2, mpf(-1))
+        return [float(x) for x in found]
+
+
+def test_a_kicked_oscillator_has_the_cycle_of_the_closed_form():
+    zeta, omega, kick = (
+        np.ravel(x) for x in np.meshgrid([1e-3, 0.05, 0.3, 0.9], [1e-3, 1.0, 1e3], [0.2, 30.0], indexing="ij")
+    )
+    found, status, error = estimated(KICKED, "taylor", zeta=zeta, omega=omega, kick=kick, rtol=1e-9)
+    assert (status[zeta > 0.2] == Status.OK).all()
+    assert error.max() < 1e-6
+    assert (solve(KICKED, "taylor", zeta=zeta, omega=omega, kick=kick, asked=("period", "v"))[1] == Status.OK).all()
+    true = np.array([kicked(*cell) for cell in zip(zeta, omega, kick, strict=True)]).T
+    names = "period", "v", "x_size", "v_size", "multiplier", "period_by_zeta", "period_by_omega"
+    for name, value, whole in zip(names, true, (1, 1, 1, 1, 0, 0, 0), strict=True):
+        scale = np.abs(value) if whole else np.maximum(1.0, np.abs(value))
+        assert (abs(abs(found[name]) - abs(value)) <= np.maximum(error, 1e-14) * scale).all(), name
+    assert (np.sign(found["period_by_omega"]) == -1).all()
+    assert abs(found["period_by_kick"]).max() < 1e-9
+    alone, _, _ = estimated(KICKED, "taylor", zeta=zeta[5:6], omega=omega[5:6], kick=kick[5:6], rtol=1e-9)
+    for name, column in alone.items():
+        assert column[0] == found[name][5], name
+
+
+def logistic(gain, flips):
+    """Multiplier of the stable orbit of so many kicks of u -> gain u (1 - u), and its speeds."""
+    u = 0.3
+    for _ in range(20_000):
+        u = gain * u * (1.0 - u)
+    orbit, slope = [u], 1.0
+    for _ in range(flips):
+        slope *= gain * (1.0 - 2.0 * u)
+        u = gain * u * (1.0 - u)
+        orbit.append(u)
+    return slope, orbit
+
+
+def test_a_cycle_that_doubles_its_period_is_told_by_its_multiplier():
+    gain = np.array([2.8, 3.2, 3.5, 3.2])
+    cells = {"gain": gain, "bend": 1.0, "settle": [4.0, 4.0, 4.0, 0.0], "v0": [0.3, 0.3, 0.3, 2.2 / 3.2]}
+    found, status = solve(KICKED, "taylor", **cells, asked=("period", "v", "multiplier"), rtol=1e-8)
+    assert list(status) == [Status.OK, Status.OK, Status.PERIOD_2, Status.UNSTABLE]
+    for cell, flips in enumerate((2, 2, 4)):
+        slope, orbit = logistic(gain[cell], flips)
+        assert found["multiplier"][cell] == pytest.approx(slope, abs=1e-8)
+        assert min(abs(found["v"][cell] - u) for u in orbit) < 1e-9
+        assert found["period"][cell] == pytest.approx(np.pi * flips, rel=1e-12)
+    assert found["multiplier"][3] == pytest.approx(1.2**2, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("cell", "status"),
+    [
+        ({"zeta": 0.1}, Status.COMES_TO_REST), ({"zeta": 0.0}, Status.NO_CYCLE),
+        ({"zeta": -0.1, "kick": -1.0, "v0": 3.6}, Status.UNSTABLE), ({"zeta": 0.0, "kick": 1.0}, Status.NOT_CONVERGED),
+    ],
+)  # fmt: skip
+def test_what_has_no_stable_cycle_says_so(cell, status):
+    found, verdict = solve(KICKED, "taylor", **{name: [value] for name, value in cell.items()})
+    assert verdict[0] == status
+    if status == Status.COMES_TO_REST:
+        assert np.isnan(found["period"][0])
+        assert found["x"][0] == found["v"][0] == 0.0
+
+
+def test_the_foliot_as_a_scene_has_the_cycle_of_its_own_kernel():
+    """Five decades of drive, four losses; a minute of compiling where nothing is kept."""
+    scene = cycle_kernel(
+        name="rich_cycle", doc="foliot", states=rich_scene.RICH.outputs[2:], parameters=rich_scene.RICH.parameters[:-1],
+        rates=rich_scene.rates, surface=rich_scene.surface, start=rich_scene.start, switch=rich_scene.switch,
+    )  # fmt: skip
+    mu = np.tile(10.0 ** np.linspace(-1.0, 4.0, 6), 4)
+    losses = {name: np.zeros(24) for name in ("a", "c", "R")} | {"e": np.ones(24)}
+    losses["a"][:] = 0.5
+    losses["e"][6:12], losses["c"][12:18], losses["R"][18:] = 0.6, 0.3, 0.2 * mu[18:]
+    found, status = solve(scene, "taylor", mu=mu, phi0=1.0, **losses)
+    assert (status == Status.OK).all()
+    smooth = losses["c"] == 0.0
+    for those, method in ((smooth, "segments"), (~smooth, "taylor")):
+        own, _ = solve(FOLIOT, method, mu=mu[those], phi0=1.0, n=2.0, rtol=1e-11,
+                       **{name: column[those] for name, column in losses.items()})  # fmt: skip
+        for name, other in (("period", "period"), ("speed", "crossing_speed"), ("angle_size", "amplitude")):
+            assert abs(abs(found[name][those]) / own[other] - 1.0).max() < 1e-9, name
+        assert abs(found["multiplier"][those] - own["multiplier"] ** 2).max() < 1e-9
+        assert abs(found["period_by_mu"][those] + own["sensitivity"]).max() < 1e-9
+
+
+def test_a_cycle_of_half_the_sides_and_a_surface_of_two_states_are_refused():
+    assert checked(KICKED, zeta=[0.1], flips=[3.0])[0] == Status.BAD_INPUT
+    states = Field("x", "1", "x"), Field("v", "1", "v")
+    own = {"name": "two", "doc": "", "states": states, "parameters": (), "start": lambda: (1.0, 0.0)}
+    with pytest.raises(SceneError, match="surface"):
+        cycle_kernel(**own, rates=lambda x, v: (v, -x), surface=lambda x, v, side: side * (x + v))
+    with pytest.raises(SceneError, match="turn"):
+        cycle_kernel(**own, rates=lambda x, v: (v, -x), surface=lambda x, side: side * x, turns={"x": 1.0})
