@@ -8,19 +8,18 @@ for the interval: each of a grid has its weight, by restricted likelihood, as ea
 
 from __future__ import annotations
 
-import functools
 import math
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from sweep.laws.curves import Window, check_confidence, check_end, described, fits_by_line, in_words, title
+from sweep.laws.curves import Window, check_confidence, check_end, described, fit_lines, title
 from sweep.laws.fits import Found, fitted
 from sweep.laws.lines import check_noise, rounding
 from sweep.laws.loglog import Array, slope_bounds, slopes
-from sweep.laws.noise import noise_size, regress
-from sweep.laws.shapes import CORRECTION, LOG_CORRECTION, Law
+from sweep.laws.noise import regress, roughness
+from sweep.laws.shapes import CORRECTION, LOG_CORRECTION
 
 SCATTERS = 0.3
 """Share of the distances from (1) that is noise between neighbours, from which on they are noise."""
@@ -28,11 +27,14 @@ AS_WELL = 4.0
 """Difference of AICc up to which a logarithmic correction, whose exponent is far harder to tell, is not ruled out."""
 CAUTION = 0.5
 """Share of the level of intervals that counts where D is fitted as well: by trial, of whole ones 88 to 92 % held."""
+FADES = np.exp(np.linspace(-6.0, 6.0, 25)), 0.3, 80.0
+"""How fast a correction may fade, per window: those tried about the best, to the power of its relative error, and the
+least and largest."""
+MANY = 10**7
+"""Degrees of freedom of a normal distribution."""
 VERDICTS = ("a power law with a correction", "no power law with a correction", "no law at this end")
 NAMES = {
     "exponent": "exponent far out",
-    "exponent_low": "lower end of its interval",
-    "exponent_high": "upper end of its interval",
     "verdict": "whether the points are a power law with a correction that fades",
     "correction_exponent": "D: how fast the correction fades",
     "correction": "B x^-D at the outer end of the window",
@@ -103,41 +105,45 @@ def fit_correction(
     check_noise(noise, sigma)
     sign = 1.0 if end == "high" else -1.0
 
-    def one(t: Array, z: Array, weights: Array | None) -> tuple[float, ...]:
+    def each(t: Array, z: Array, errors: Array | None, bounds: Array | None) -> list[tuple[float, ...]]:
         if end == "low":
-            t, z, weights = -t[::-1], z[::-1], None if weights is None else weights[::-1]
-        return _one(t, z, weights, sign, confidence, noise)
+            t, z, errors = -t[::-1], z[:, ::-1], None if errors is None else errors[:, ::-1]
+        tried = fitted((CORRECTION, LOG_CORRECTION), t, z, errors)
+        parts = ((row, None if errors is None else errors[k], tried[k]) for k, row in enumerate(z))
+        return [_one(t, *part, sign, confidence, noise) for part in parts]
 
-    found = fits_by_line(tuple(NAMES), one, y, dim, window, sigma)
-    found["verdict"] = in_words(found.verdict, VERDICTS)
+    names = ("exponent_low", "exponent_high", *NAMES)
+    found = fit_lines(names, ("verdict", VERDICTS), each, y, dim, window, sigma)
     law = f"{title(y)} = A {dim}^p (1 + B {dim}^-D), {end} end"
     return described(found, NAMES, {}, {"y": title(y), "x": dim, "law": law}, confidence)
 
 
 def _one(
-    t: Array, z: Array, weights: Array | None, sign: float, confidence: float, noise: bool | str | None
+    t: Array,
+    z: Array,
+    errors: Array | None,
+    tried: dict[str, Found],
+    sign: float,
+    confidence: float,
+    noise: bool | str | None,
 ) -> tuple[float, ...]:
-    """NAMES of one line; t runs towards the end where (1) is a power law, and exponents take `sign`."""
-    found = fitted(CORRECTION, t, z, weights)
-    if found is None:
-        return (math.nan,) * len(NAMES)
+    """Ends of the interval and NAMES of one line; t runs towards the end where (1) is a power law, and exponents take
+    `sign`."""
+    found, fits = tried[CORRECTION.name], True
     exponent, fade, left = _outer(found, t)
     size = float(np.sqrt(np.mean(found.off**2)))
-    scatters = bool(noise_size(t, found.off) > SCATTERS * size if noise is None else noise)
-    noisy = weights is not None or (scatters and size > float(8 * rounding(t, z)))
-    word, fits = noise if isinstance(noise, str) else "noise", True
+    scatters = bool(roughness(t, found.off)[0] > SCATTERS * size if noise is None else noise)
+    noisy = errors is not None or (scatters and size > float(8 * rounding(t, z)))
+    word = noise if isinstance(noise, str) else "noise"
     if not noisy:
         low, high = _by_half(t, z, exponent)
     else:
         fits = not found.denied(t, word)
-        low, high = _mixture(t, z, found, word, confidence) if fits else (math.nan, math.nan)
-    reached = [sign * one for one in (low, high, exponent)] if fits else [math.nan, math.nan]
+        low, high = _mixture(t, z, errors, tried, word, confidence) if fits else (math.nan, math.nan)
+    ends = sorted(sign * one for one in (low, high, exponent))[::2] if fits else (math.nan, math.nan)
     verdict = 1 if not fits else 0 if abs(left) < 1 else 2
     residual = math.expm1(min(float(abs(found.off).max()), 700.0))
-    return (
-        *(sign * exponent, min(reached), max(reached)),
-        *(verdict, sign * fade, left, residual, float(noisy), float(verdict == 0)),
-    )
+    return *ends, sign * exponent, verdict, sign * fade, left, residual, noisy, verdict == 0
 
 
 def _outer(found: Found, t: Array) -> tuple[float, float, float]:
@@ -158,29 +164,37 @@ def _by_half(t: Array, z: Array, exponent: float) -> tuple[float, float]:
     first = np.append(True, np.diff(t) > 0)
     t, z = t[first], z[first]
     half = t >= (t[0] + t[-1]) / 2
-    other = fitted(CORRECTION, t[half], z[half])
-    local = slopes(t, z, 5)[-1] if other is None else _outer(other, t[half])[0]
+    other = fitted((CORRECTION,), t[half], z[None, half])[0]
+    local = _outer(other[CORRECTION.name], t[half])[0] if other else slopes(t, z, 5)[-1]
     doubt = float(slope_bounds(t, np.full(t.size, 1e-15 * (1 + abs(z).max())), 5)[-1])
     reach = 3 * abs(float(local) - exponent) + doubt
     return exponent - reach, exponent + reach
 
 
-def _mixture(t: Array, z: Array, found: Found, word: str, confidence: float) -> tuple[float, float]:
+def _mixture(
+    t: Array, z: Array, errors: Array | None, tried: dict[str, Found], word: str, confidence: float
+) -> tuple[float, float]:
     """Ends of the interval of the exponent, over all D and noises."""
-    span, weights, parts, evidence = float(t[-1] - t[0]), found.weights, [], []
-    known = weights is not None
-    best = float(np.clip(abs(found.numbers[1]), *FADES))
+    found, slow, span, known = (
+        tried[CORRECTION.name],
+        tried[LOG_CORRECTION.name],
+        float(t[-1] - t[0]),
+        errors is not None,
+    )
+    steps, least, most = FADES
+    best = float(np.clip(abs(found.numbers[1]), least, most))
     doubt = float(np.nan_to_num(found.errors()[1], posinf=best)) / best
-    tried = best * np.exp(np.linspace(-6.0, 6.0, 25) * np.clip(doubt, 0.01, 0.5))
-    for fade in tried[(tried >= FADES[0]) & (tried <= FADES[1])]:
-        one = fitted(_of_fade(float(fade)), t, z, weights)
-        if one is None or not np.isfinite(one.jacobian).all() or not np.isfinite(one.errors()).all():
-            continue
-        part = regress(t, one.jacobian, one.off[None], "even" if known else word)
-        if known:
-            part = part._replace(error=one.errors()[None, :, None], left=MANY)
-        parts.append(part._replace(value=part.value + one.numbers[:, None]))
-        evidence.append(-0.5 * one.deviance if known else float(part.evidence[0]))
+    fades = best * steps ** np.clip(doubt, 0.01, 0.5)
+    fades = fades[(fades >= least) & (fades <= most)]
+    laws = [CORRECTION.at(1, float(fade)) for fade in fades]
+    parts, evidence = [], []
+    for one in fitted(laws, t, z[None], None if errors is None else errors[None])[0].values():
+        if np.isfinite(one.jacobian).all() and np.isfinite(one.errors()).all():
+            part = regress(t, one.jacobian, one.off[None], "even" if known else word)
+            if known:
+                part = part._replace(error=one.errors()[None, :, None], left=MANY)
+            parts.append(part._replace(value=part.value + one.numbers[:, None]))
+            evidence.append(-0.5 * one.deviance if known else float(part.evidence[0]))
     shares = np.exp(np.array(evidence) - max(evidence))
     both = parts[0]._replace(
         weight=np.concatenate([one.weight * share for one, share in zip(parts, shares / shares.sum(), strict=True)]),
@@ -189,24 +203,6 @@ def _mixture(t: Array, z: Array, found: Found, word: str, confidence: float) -> 
         share=CAUTION * np.concatenate([one.share for one in parts]),
     )
     ends = [float(end[0]) for end in both.interval(2, confidence)]
-    slow = fitted(LOG_CORRECTION, t, z, weights)
-    if slow is not None and slow.aicc < found.aicc + AS_WELL and np.isfinite(slow.errors()).all():
+    if slow.aicc < found.aicc + AS_WELL and np.isfinite(slow.errors()).all():
         ends += [float(slow.numbers[3] + end[0]) for end in slow.interval(t, [3], word, confidence)]
     return min(ends) / span, max(ends) / span
-
-
-@functools.lru_cache(maxsize=256)
-def _of_fade(fade: float) -> Law:
-    """(1) of one D."""
-    return CORRECTION._replace(
-        parts=lambda q, s, span: CORRECTION.parts(np.stack([q[0], np.full_like(q[0], fade)]), s, span),
-        starts=CORRECTION.starts[:1],
-        limits=CORRECTION.limits[:1],
-        numbers=3,
-    )
-
-
-FADES = (0.3, 80.0)
-"""How fast a correction may fade, per window."""
-MANY = 10**7
-"""Degrees of freedom of a normal distribution."""

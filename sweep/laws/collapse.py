@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 from scipy.special import gammaincc, ndtri
 
 from sweep.errors import SweepError
@@ -20,27 +21,9 @@ from sweep.laws.curves import check_confidence, check_output, described, log_of,
 from sweep.laws.loglog import Array
 from sweep.laws.noise import RARE, ROUNDING, UNLIKELY, regress
 
-
-class Points(NamedTuple):
-    """Logarithms of all points, one curve behind the other."""
-
-    t: Array
-    z: Array
-    size: Array
-    """ln L."""
-    curve: Array
-    """Number of the L that a point is of."""
-    root: Array
-    """One over the standard error of z; 1 where it is not known."""
-
-
 NAMES = {
     "x_exponent": "a of x / L^a",
-    "x_exponent_low": "lower end of its interval",
-    "x_exponent_high": "upper end of its interval",
     "y_exponent": "b of y / L^b",
-    "y_exponent_low": "lower end of its interval",
-    "y_exponent_high": "upper end of its interval",
     "verdict": "whether the curves fall on one another within their own scatter",
     "residual": "relative distance of the points from the common curve, root mean square",
     "points": "points that lie among those of another curve",
@@ -48,8 +31,6 @@ NAMES = {
     "fits": "1 where the curves fall on one another within their own scatter",
 }
 FEWEST_POINTS = 10
-TRIES = 41
-"""Exponents that are tried near the best."""
 
 
 def fit_collapse(y: xr.DataArray, dim: str, over: str, *, sigma: Any = None, confidence: float = 0.95) -> xr.Dataset:
@@ -95,15 +76,14 @@ def fit_collapse(y: xr.DataArray, dim: str, over: str, *, sigma: Any = None, con
     points, count = _points(y, dim, over, sigma)
     # exponents that leave neighbours in L with something in common, and no more than 8
     most = min(8.0, 0.9 * float(np.ptp(points.t)) / float(np.diff(np.unique(points.size)).min()))
-    a = _best(points, (-most, most))
-    inside = _shared(points, a)
+    a = points.best(-most, most, 81)
+    inside = points.shared(a)
     if (among := int(inside.sum())) < FEWEST_POINTS:
         raise SweepError(
             f"of {count} points {among} lie among those of another curve; at least {FEWEST_POINTS} are needed"
         )
     points = Points(*(column[inside] for column in points))
-    a = _best(points, (a - 0.3 * (1 + abs(a)), a + 0.3 * (1 + abs(a))), TRIES)
-    _require_determined(points, a)
+    a = points.best(a - 0.3 * (1 + abs(a)), a + 0.3 * (1 + abs(a)), 41)
     columns, b, off = _jacobian(points, a)
     low, high, fits = _intervals(points, columns, off, sigma is not None, confidence)
     found = {"x_exponent": a, "y_exponent": b, "residual": float(np.sqrt(np.mean(off**2))), "points": points.t.size}
@@ -116,117 +96,111 @@ def fit_collapse(y: xr.DataArray, dim: str, over: str, *, sigma: Any = None, con
     return described(result, NAMES, {}, {"y": title(y), "x": dim, "over": over, "law": law}, confidence)
 
 
+class Points(NamedTuple):
+    """Logarithms of all points, one curve behind the other."""
+
+    t: Array
+    z: Array
+    size: Array
+    """ln L."""
+    root: Array
+    """One over the standard error of z; 1 where it is not known."""
+
+    def spline(self, a: float) -> tuple[Array, Array, Array]:
+        """Columns of b and of a cubic spline of ln x - a ln L, its knots, and the numbers that fit best."""
+        from scipy.interpolate import BSpline
+
+        u = self.t - a * self.size
+        pieces = int(min(20, max(1, u.size // 8)))
+        inner = np.interp(np.linspace(0, u.size - 1, pieces + 1), np.arange(u.size), np.sort(u))  # quantiles
+        knots = np.concatenate([[inner[0]] * 3, inner, [inner[-1]] * 3])
+        knots[-4:] += 1e-9 * (1 + abs(knots[-1]))
+        columns = np.column_stack([self.size - self.size.mean(), BSpline.design_matrix(u, knots, 3).toarray()])
+        numbers = np.linalg.lstsq(columns * self.root[:, None], self.z * self.root, rcond=1e-10)[0]
+        return columns, knots, numbers.astype(np.float64)
+
+    def square(self, a: float) -> float:
+        """Sum of squares about the common curve."""
+        columns, _, numbers = self.spline(a)
+        return float(((self.root * (self.z - columns @ numbers)) ** 2).sum())
+
+    def shared(self, a: float) -> NDArray[np.bool_]:
+        """Which points lie, in x / L^a, between the first and the last of another curve."""
+        u, found = self.t - a * self.size, np.zeros(self.t.size, dtype=bool)
+        for size in np.unique(self.size):
+            here = self.size == size
+            found |= ~here & (u >= u[here].min()) & (u <= u[here].max())
+        return found
+
+    def best(self, low: float, high: float, tries: int) -> float:
+        """The a of the least square between two, from the best of some tries."""
+        from scipy.optimize import minimize_scalar
+
+        grid = np.linspace(low, high, tries)
+        # weight against exponents that pull curves apart until nothing is compared
+        squares = [self.square(a) / max(float(self.shared(a).mean()), 1e-3) ** 4 for a in grid]
+        k = int(np.argmin(squares))
+        around = float(grid[max(k - 1, 0)]), float(grid[min(k + 1, tries - 1)])
+        return float(minimize_scalar(self.square, bounds=around, method="bounded", options={"xatol": 1e-9}).x)
+
+
 def _points(y: xr.DataArray, dim: str, over: str, sigma: Any) -> tuple[Points, int]:
+    """Points that are there, and how many could be."""
     check_output(y)
     if y.ndim != 2 or {dim, over} != {str(d) for d in y.dims}:
         raise SweepError(f"a collapse takes one output along {dim} and {over}, and nothing else; choose with .sel")
     t, sizes = np.log(positive_axis(y, dim)[1]), y[over].values.astype(np.float64)
     if sizes.size < 2 or not (np.isfinite(sizes) & (sizes > 0)).all():
         raise SweepError(f"{over}: a collapse needs at least two values, all positive")
-    z, errors = (part.transpose(over, dim).values for part in (log_of(y), relative_sigma(y, sigma)))
     order = np.argsort(t)
-    t, z, errors = t[order], z[:, order], errors[:, order]
+    z, errors = (part.transpose(over, dim).values[:, order] for part in (log_of(y), relative_sigma(y, sigma)))
     fine = np.isfinite(z) & (np.isfinite(errors) | (sigma is None))
     curve, place = np.nonzero(fine)
-    root = 1 / errors[fine] if sigma is not None else np.ones(place.size)
-    found = Points(t[place], z[fine], np.log(sizes)[curve], curve.astype(np.float64), root)
-    if found.t.size < FEWEST_POINTS:
-        few = f"a collapse needs at least {FEWEST_POINTS} positive points of {title(y)}, found {found.t.size}"
+    if place.size < FEWEST_POINTS:
+        few = f"a collapse needs at least {FEWEST_POINTS} positive points of {title(y)}, found {place.size}"
         raise SweepError(few)
-    return found, z.size
+    root = np.ones(place.size) if sigma is None else 1 / errors[fine]
+    return Points(t[order][place], z[fine], np.log(sizes)[curve], root), z.size
 
 
-def _spline(points: Points, a: float) -> tuple[Array, Array, Array]:
-    """Columns of b and of a cubic spline of ln x - a ln L, its knots, and the numbers that fit best."""
+def _jacobian(points: Points, a: float) -> tuple[Array, float, Array]:
+    """Derivatives of the curves by a, b and the spline, b, and the distances of the points.
+
+    Raises SweepError where another a, far off, does as well: of a power law f any does.
+    """
     from scipy.interpolate import BSpline
 
-    u = points.t - a * points.size
-    pieces = int(min(20, max(1, u.size // 8)))
-    inner = np.interp(np.linspace(0, u.size - 1, pieces + 1), np.arange(u.size), np.sort(u))  # quantiles
-    knots = np.concatenate([[inner[0]] * 3, inner, [inner[-1]] * 3])
-    knots[-4:] += 1e-9 * (1 + abs(knots[-1]))
-    basis = BSpline.design_matrix(u, knots, 3).toarray()
-    columns = np.column_stack([points.size - points.size.mean(), basis])
-    numbers = np.linalg.lstsq(columns * points.root[:, None], points.z * points.root, rcond=1e-10)[0]
-    return columns, knots, numbers.astype(np.float64)
-
-
-def _square(points: Points, a: float) -> float:
-    columns, _, numbers = _spline(points, a)
-    return float(((points.root * (points.z - columns @ numbers)) ** 2).sum())
-
-
-def _best(points: Points, ends: tuple[float, float], tries: int = 81) -> float:
-    from scipy.optimize import minimize_scalar
-
-    grid = np.linspace(*ends, tries)
-    # weight against exponents that pull curves apart until nothing is compared
-    squares = [_square(points, a) / max(float(_shared(points, a).mean()), 1e-3) ** 4 for a in grid]
-    k = int(np.argmin(squares))
-    around = float(grid[max(k - 1, 0)]), float(grid[min(k + 1, tries - 1)])
-    return float(
-        minimize_scalar(lambda a: _square(points, a), bounds=around, method="bounded", options={"xatol": 1e-9}).x
-    )
-
-
-def _shared(points: Points, a: float) -> Any:
-    """Which points lie, in x / L^a, between the first and the last of another curve."""
-    u = points.t - a * points.size
-    found = np.zeros(u.size, dtype=bool)
-    for number in np.unique(points.curve):
-        here = points.curve == number
-        found |= ~here & (u >= u[here].min()) & (u <= u[here].max())
-    return found
-
-
-def _require_determined(points: Points, a: float) -> None:
-    """Raises SweepError where another a, far off, does as well: of a power law f any does."""
-    columns = _spline(points, a)[0]
+    columns, knots, numbers = points.spline(a)
     rounding = ROUNDING * (1 + abs(points.z).max())
-    least = _square(points, a) + float((points.root**2).sum()) * (rounding**2 + 1e-20 * float(np.ptp(points.z)) ** 2)
-    worst = min(_square(points, a + step) for step in (-0.25, 0.25))
+    least = points.square(a) + float((points.root**2).sum()) * (rounding**2 + 1e-20 * float(np.ptp(points.z)) ** 2)
+    worst = min(points.square(a + step) for step in (-0.25, 0.25))
     if worst < least * (1 + 12.0 / max(1, points.z.size - columns.shape[1] - 1)):
         raise SweepError(
             "the curves collapse for any exponents of x: f is a power law, so a and b are not determined apart"
         )
-
-
-def _jacobian(points: Points, a: float) -> tuple[Array, float, Array]:
-    """Derivatives of the curves by a, b and the spline, b, and the distances of the points."""
-    from scipy.interpolate import BSpline
-
-    columns, knots, numbers = _spline(points, a)
     steep: Array = BSpline(knots, numbers[1:], 3).derivative()(points.t - a * points.size)
     used = columns[:, 1:][:, (columns[:, 1:] != 0).any(axis=0)]
     matrix = np.column_stack([-points.size * steep, columns[:, 0], used])
-    off: Array = points.z - columns @ numbers
-    return matrix, float(numbers[0]), off
+    return matrix, float(numbers[0]), points.z - columns @ numbers
 
 
-def _intervals(
-    points: Points, columns: Array, off: Array, known: bool, confidence: float
-) -> tuple[list[float], list[float], bool]:
+def _intervals(points: Points, columns: Array, off: Array, known: bool, confidence: float) -> tuple[Array, Array, bool]:
     """Ends of the intervals of a and b, about them, and whether the curves are one.
 
     They are not where chi-squared says so, or where a level, a slope and a bow of each curve are better by far.
     """
-    k, u, own = columns.shape[1], points.t - points.t.mean(), []
-    for number in np.unique(points.curve)[1:]:
-        here = (points.curve == number).astype(np.float64)
-        own += [here, here * u, here * u**2]
-    basis = np.linalg.qr(columns)[0]
-    beside = np.column_stack(own)
-    beside -= basis @ (basis.T @ beside)
-    left, moved, _ = np.linalg.svd(beside, full_matrices=False)
+    k, u, root = columns.shape[1], points.t - points.t.mean(), points.root[:, None]
+    own = [here * u**power for here in points.size == np.unique(points.size)[1:, None] for power in range(3)]
+    basis, beside = np.linalg.qr(columns)[0], np.column_stack(own)
+    left, moved, _ = np.linalg.svd(beside - basis @ (basis.T @ beside), full_matrices=False)
     beside = left[:, moved > 1e-6 * moved.max()][:, : max(0, off.size - k - 3)]
-    root, place = points.root, np.arange(float(off.size))
-    every = np.column_stack([columns, beside]) * root[:, None]
-    found = regress(place, every, (off * root)[None], "even" if known else "correlated", k)
+    every, scaled = np.column_stack([columns, beside]) * root, off * points.root
+    found = regress(np.arange(float(off.size)), every, scaled[None], "even" if known else "correlated", k)
     smooth = abs(off).max() <= 1e-6 * (1 + np.ptp(points.z))
     fits = bool(smooth or not found.chance[0] < UNLIKELY)
     if known:
-        fits &= bool(gammaincc((off.size - k) / 2, float(((root * off) ** 2).sum()) / 2) > RARE)
+        fits &= bool(gammaincc((off.size - k) / 2, float((scaled**2).sum()) / 2) > RARE)
         reach = ndtri((1 + confidence) / 2) * np.sqrt(np.diag(np.linalg.inv(every[:, :k].T @ every[:, :k])))
-        return [-float(reach[0]), -float(reach[1])], [float(reach[0]), float(reach[1])], fits
-    low, high = zip(*(found.interval(number, confidence) for number in (0, 1)), strict=True)
-    return [min(float(one[0]), 0.0) for one in low], [max(float(one[0]), 0.0) for one in high], fits
+        return -reach, reach, fits
+    low, high = np.array([found.interval(number, confidence) for number in (0, 1)])[:, :, 0].T
+    return np.minimum(low, 0), np.maximum(high, 0), fits

@@ -7,14 +7,12 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from scipy.special import gammaincc
 
-from sweep.errors import SweepError
-from sweep.laws.curves import FEWEST_OF_LINE, Window, check_output, relative_sigma, title, window_logs
-from sweep.laws.fits import Found, all_fitted, curve
+from sweep.laws.curves import FEWEST_OF_LINE, Window, fit_lines, one_line, title
+from sweep.laws.fits import Found, fitted
 from sweep.laws.loglog import Array
 from sweep.laws.noise import BEYOND_DOUBT, RARE, runs_chance
-from sweep.laws.shapes import CORRECTION, LAWS
+from sweep.laws.shapes import CORRECTION, LAWS, OFFSET
 from sweep.words import Table
 
 NAMES = {
@@ -71,37 +69,22 @@ def compare_laws(y: xr.DataArray, dim: str, window: Window | None = None, *, sig
     >>> sweep.compare_laws(y, "x").attrs["chosen"]
     'offset'
     """
-    check_output(y)
-    if y.ndim != 1:
-        raise SweepError(
-            f"{title(y)} runs along {', '.join(map(str, y.dims))}; compare laws of one line, choose with .sel"
-        )
-    here, t, logs, _ = window_logs(y, dim, window, repeated=True)
-    relative = relative_sigma(y, sigma).isel(here).values
-    present = np.flatnonzero(np.isfinite(logs.values) & (np.isfinite(relative) | (sigma is None)))
-    if present.size < FEWEST_OF_LINE:
-        raise SweepError(f"laws are told apart by at least {FEWEST_OF_LINE} points of {title(y)}, found {present.size}")
-    present = present[np.argsort(t[present], kind="stable")]
-    t, z = t[present], logs.values[present]
-    weights = None if sigma is None else relative[present] ** -2.0
-    tried = sorted(all_fitted(LAWS, t, z, weights).values(), key=lambda fit: fit.aicc)
-    found = _table(t, z, tried)
-    rows = [
-        (f.law.name, f"{f.aicc - tried[0].aicc:.3g}", str(e.values))
-        for f, e in zip(tried, found.exponents, strict=True)
-    ]
-    summary = Table(rows, ("law", "worse in AICc", "exponents")).text(indent="", wide=True)
-    found.attrs = {"y": title(y), "x": dim, **_verdict(tried), "summary": summary}
-    if denied(found, found.attrs["chosen"]):
-        found.attrs["verdict"] += "; but what it leaves has a shape, so that none of them is the law"
+    one_line(y, "compare laws of")
+    found: list[xr.Dataset] = []
+
+    def compared(t: Array, z: Array, errors: Array | None, bounds: Array | None) -> Array:
+        fits = sorted(fitted(LAWS, t, z, errors)[0].values(), key=lambda fit: fit.aicc)
+        found.append(_table(t, z[0], fits))
+        return np.zeros((1, 1))
+
+    fit_lines(("kind",), ("kind", ("compared",)), compared, y, dim, window, sigma, fewest=FEWEST_OF_LINE)
     for name, of in (("x", y[dim]), ("y", y), ("fitted", y)):
-        found[name].attrs = {"units": str(of.attrs.get("units", "1"))}
-    return found
+        found[0][name].attrs = {"units": str(of.attrs.get("units", "1"))}
+    return found[0].assign_attrs({"y": title(y), "x": dim} | found[0].attrs)
 
 
-@np.errstate(over="ignore")
 def _table(t: Array, z: Array, tried: list[Found]) -> xr.Dataset:
-    span = t[-1] - t[0]
+    """All that `compare_laws` says of laws, the best first."""
     columns: dict[str, list[Any]] = {
         "aicc": [f.aicc for f in tried],
         "bic": [f.bic for f in tried],
@@ -110,54 +93,46 @@ def _table(t: Array, z: Array, tried: list[Found]) -> xr.Dataset:
         "scatter": [math.sqrt(float(np.mean(f.off**2))) for f in tried],
         "residual": [math.expm1(min(float(abs(f.off).max()), 700.0)) for f in tried],
         "runs": [float(runs_chance(f.off)) for f in tried],
-        "chi_squared": [_chance(f) for f in tried],
+        "chi_squared": [f.chi_squared() for f in tried],
         "formula": [f.law.formula for f in tried],
-        "exponents": [_exponents(f, float(span)) for f in tried],
+        "exponents": [_exponents(f, float(t[-1] - t[0])) for f in tried],
     }
-    found = xr.Dataset({name: ("law", values) for name, values in columns.items()})
-    for name, (units, text) in NAMES.items():
-        found[name].attrs = {"units": units, "long_name": text}
-    found["fitted"] = ("law", "point"), np.exp([curve(f, t, t[0], t[-1]) for f in tried])
-    found["x"], found["y"] = ("point", np.exp(t)), ("point", np.exp(z))
-    return found.assign_coords(law=[f.law.name for f in tried])
-
-
-def _verdict(tried: list[Found]) -> dict[str, Any]:
+    table = [
+        ("law", values, dict(zip(("units", "long_name"), NAMES.get(name, ()), strict=False)))
+        for name, values in columns.items()
+    ]
+    variables: dict[str, Any] = dict(zip(columns, table, strict=True))
+    variables |= {"fitted": (("law", "point"), np.exp([z - f.off for f in tried]))}
+    variables |= {"x": ("point", np.exp(t)), "y": ("point", np.exp(z)), "law": [f.law.name for f in tried]}
     alive = [f for f in tried if f.aicc <= tried[0].aicc + BEYOND_DOUBT]
     chosen = min(alive, key=lambda f: (f.law.numbers, f.aicc))
-    others = [f for f in tried if f is not chosen]
-    margin = min((f.aicc for f in others), default=math.inf) - chosen.aicc
+    margin = min((f.aicc for f in tried if f is not chosen), default=math.inf) - chosen.aicc
     rivals = [f.law.name for f in alive if f is not chosen]
     text = f"{chosen.law.name} ({chosen.law.formula}): "
     if not chosen.law.power:
         text += "no power law; "
     alone = f"all others are worse by {margin:.3g} and more in AICc"
     text += f"not ruled out beside it: {', '.join(rivals)}" if rivals else alone
-    return {"chosen": chosen.law.name, "margin": margin, "verdict": text}
-
-
-def _chance(found: Found) -> float:
-    if found.weights is None:
-        return math.nan
-    square = float((found.off**2 * found.weights).sum())
-    return float(gammaincc((found.off.size - found.law.numbers) / 2, square / 2))
+    if float(runs_chance(chosen.off)) < RARE or chosen.chi_squared() < RARE:
+        text += "; but what it leaves has a shape, so that none of them is the law"
+    rows = list(
+        zip(variables["law"], (f"{worse:.3g}" for worse in columns["worse"]), columns["exponents"], strict=True)
+    )
+    summary = Table(rows, ("law", "worse in AICc", "exponents")).text(indent="", wide=True)
+    attrs = {"chosen": chosen.law.name, "margin": margin, "verdict": text, "summary": summary}
+    return xr.Dataset(variables, attrs=attrs)
 
 
 def _exponents(found: Found, span: float) -> str:
     """The exponents with their standard errors, as of independent noise."""
-    names = found.law.exponents or ("p",) * (found.law.name == "offset")
-    places = range(found.numbers.size - len(names), found.numbers.size) if found.law.exponents else range(len(names))
+    law = found.law
+    names = law.exponents or ("p",) * (law is OFFSET)
+    places = range(len(names)) if law is OFFSET else range(found.numbers.size - len(names), found.numbers.size)
     doubt = found.errors()
     parts = [
         f"{name} = {found.numbers[k] / span:.4g} +- {doubt[k] / span:.1g}"
         for name, k in zip(names, places, strict=True)
     ]
-    if found.law is CORRECTION:
+    if law is CORRECTION:
         parts.append(f"D = {found.numbers[1] / span:.3g}")
     return ", ".join(parts) or "none"
-
-
-def denied(found: xr.Dataset, law: str) -> bool:
-    """Whether the runs test or chi-squared denies a law."""
-    one = found.sel(law=law)
-    return bool(one.runs.item() < RARE or one.chi_squared.item() < RARE)

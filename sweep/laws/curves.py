@@ -18,6 +18,15 @@ from sweep.words import Table, kind, require_dataset
 
 Window = tuple[float | None, float | None]
 
+FEWEST_OF_LINE = 8
+"""Points from which on laws with more numbers than a line are fitted."""
+LINES = 250
+"""Lines that are taken at once, so that what is held stays below some 50 MB."""
+MOST_SIGMA = 1e6
+"""Relative standard error beyond which a logarithm says nothing."""
+MOST_ROWS = 20
+"""Lines of a summary."""
+
 
 def check_output(y: Any) -> None:
     """Raises SweepError where y is no DataArray of numbers."""
@@ -35,9 +44,36 @@ def check_dataset(name: str, given: Any, maker: str = "", needs: Sequence[str] =
         raise SweepError(f"sweep.{name}: this Dataset has no {', '.join(map(str, missing))}")
 
 
+def check_confidence(confidence: float) -> None:
+    """Raises SweepError where it is no share."""
+    if not 0 < confidence < 1:
+        raise SweepError(f"confidence: expected a number between 0 and 1, found {confidence}")
+
+
+def check_end(name: str, end: str) -> None:
+    """Raises SweepError where it is neither end of a window."""
+    if end not in ("low", "high"):
+        raise SweepError(f'{name}: expected "low" or "high", found {end!r}')
+
+
+def one_line(y: Any, what: str) -> None:
+    """Raises SweepError where y has further dimensions."""
+    check_output(y)
+    if y.ndim != 1:
+        raise SweepError(f"{title(y)} runs along {', '.join(map(str, y.dims))}; {what} one line, choose with .sel")
+
+
 def positive_axis(y: xr.DataArray, dim: str, repeated: bool = False) -> tuple[str, Array]:
     """Dimension that `dim` runs along, and its values, fit to take logarithms of; some may be `repeated`."""
-    dimension, values = _coordinate(y, dim)
+    check_output(y)
+    known = [str(name) for name, coordinate in y.coords.items() if coordinate.ndim == 1]
+    if dim not in known:
+        there = f"{title(y)} runs along {', '.join(known)}" if known else f"{title(y)} runs along no axis with values"
+        if dim in y.coords:
+            raise SweepError(f"{dim} has one value here, so nothing can be fitted along it; {there}")
+        close = difflib.get_close_matches(str(dim), known, 1)
+        raise SweepError(f"{title(y)} has no axis {dim!r}; " + (f"did you mean {close[0]}?" if close else there))
+    values = y.coords[dim].values
     if values.dtype.kind in "mM":
         times = f"{dim} - {dim}[0]" if values.dtype.kind == "M" else dim
         raise SweepError(f"{dim} holds times, not numbers; take seconds, ({times}) / np.timedelta64(1, 's')")
@@ -52,52 +88,7 @@ def positive_axis(y: xr.DataArray, dim: str, repeated: bool = False) -> tuple[st
     steps = np.diff(x)
     if not (((steps >= 0).all() or (steps <= 0).all()) and (repeated or steps.all())):
         raise SweepError(f"{dim} neither rises nor falls throughout; sort first, e.g. ds.sortby({dim!r})")
-    return dimension, x
-
-
-def _coordinate(y: xr.DataArray, dim: str) -> tuple[str, NDArray[Any]]:
-    check_output(y)
-    known = [str(name) for name, coordinate in y.coords.items() if coordinate.ndim == 1]
-    if dim in known:
-        return str(y.coords[dim].dims[0]), y.coords[dim].values
-    there = f"{title(y)} runs along {', '.join(known)}" if known else f"{title(y)} runs along no axis with values"
-    if dim in y.coords:
-        raise SweepError(f"{dim} has one value here, so nothing can be fitted along it; {there}")
-    close = difflib.get_close_matches(str(dim), known, 1)
-    raise SweepError(f"{title(y)} has no axis {dim!r}; " + (f"did you mean {close[0]}?" if close else there))
-
-
-def window_logs(
-    y: xr.DataArray, dim: str, window: Window | None, repeated: bool = False
-) -> tuple[dict[str, NDArray[np.intp]], Array, xr.DataArray, xr.DataArray]:
-    """What `isel` takes for the window, ln dim and ln y there, and whether a line is positive; others are NaN.
-
-    Raises SweepError where no line is.
-    """
-    dimension, x = positive_axis(y, dim, repeated)
-    here = {dimension: np.flatnonzero(inside_window(x, window, dim))}
-    part = y.isel(here).compute()
-    bad = missing_is_nan(part) <= 0
-    positive = ~bad.any(dimension)
-    if not bool(positive.any()):
-        first = part[tuple(np.argwhere(bad.values)[0])]
-        raise SweepError(
-            f"a power law needs positive values; {int(bad.sum())} of {part.size} of {title(y)} in the window are not, "
-            f"e.g. {float(first):g} at {dim} = {float(first.coords[dim]):g}; choose a window without them"
-        )
-    return here, np.log(x[here[dimension]]), log_of(part).where(positive), positive
-
-
-def check_confidence(confidence: float) -> None:
-    """Raises SweepError where it is no share."""
-    if not 0 < confidence < 1:
-        raise SweepError(f"confidence: expected a number between 0 and 1, found {confidence}")
-
-
-def check_end(name: str, end: str) -> None:
-    """Raises SweepError where it is neither end of a window."""
-    if end not in ("low", "high"):
-        raise SweepError(f'{name}: expected "low" or "high", found {end!r}')
+    return str(y.coords[dim].dims[0]), x
 
 
 def inside_window(x: Array, window: Window | None, dim: str) -> NDArray[np.bool_]:
@@ -134,79 +125,74 @@ def log_of(y: xr.DataArray) -> xr.DataArray:
     return logs.rename(y.name)
 
 
-def along(
-    function: Callable[..., Array], y: xr.DataArray, dimension: str, to: str | None = None, *others: xr.DataArray
-) -> xr.DataArray:
-    """`function` of the last axis, put along `dimension`: in its place, or as a new last dimension `to`.
-
-    `others` have the shape of `y`, and are further arguments.
-    """
-    found: xr.DataArray = xr.apply_ufunc(
-        function,
-        y.compute(),
-        *(other.compute() for other in others),
-        input_core_dims=[[dimension]] * (1 + len(others)),
-        output_core_dims=[[to or dimension]],
-        exclude_dims={dimension} if to else set(),
-        keep_attrs=True,  # those of the coordinates; the caller writes those of the result
-    )
-    return found if to else found.transpose(*y.dims)
-
-
-def numbers_along(
-    names: Sequence[str], function: Callable[..., Array], y: xr.DataArray, dimension: str, *others: xr.DataArray
-) -> xr.Dataset:
-    """Numbers that a function puts in place of the points of each line, under these names."""
-    numbers = along(function, y, dimension, "number", *others)
-    return xr.Dataset({name: numbers.isel(number=k, drop=True) for k, name in enumerate(names)})
-
-
-FEWEST_OF_LINE = 8
-"""Points from which on laws with more numbers than a line are fitted."""
-
-
-def fits_by_line(
+def fit_lines(
     names: Sequence[str],
-    function: Callable[[Array, Array, Array | None], Sequence[float]],
+    words: tuple[str, Sequence[str]],
+    function: Callable[[Array, Array, Array | None, Array | None], Any],
     y: xr.DataArray,
     dim: str,
     window: Window | None,
     sigma: Any,
+    bounds: xr.DataArray | None = None,
+    fewest: int = FEWEST_OF_LINE,
 ) -> xr.Dataset:
-    """Numbers that a function of ln x, ln y and weights (n,), x rising and none missing, gives for each line.
+    """Numbers of each line of y in a window under these names, and `points`, how many of its values are there.
 
-    NaN where there are too few points; raises SweepError where that is so of all lines.
+    `function` of ln x (n,), rising, and ln y, relative standard errors (None where `sigma` is) and bounds (m, n) of m
+    lines without gaps gives numbers (m, names). One of them, words[0], stands for one of the words[1]. NaN where there
+    are too few points; raises SweepError where that is so of all lines, or no line is positive.
     """
-    here, t, logs, positive = window_logs(y, dim, window, repeated=True)
-    ((dimension, _),) = here.items()
-
-    def one(z: Array, errors: Array) -> Array:
-        present = np.flatnonzero(np.isfinite(z) & (np.isfinite(errors) | (sigma is None)))
-        present = present[np.argsort(t[present], kind="stable")]
-        if present.size < FEWEST_OF_LINE or not np.ptp(t[present]) > 0:
-            return np.full(len(names), np.nan)
-        with np.errstate(all="ignore"):  # what overflows is infinite
-            weights = None if sigma is None else errors[present] ** -2.0
-            return np.array(function(t[present], z[present], weights), np.float64)
-
-    errors, axes = relative_sigma(y, sigma).isel(here).compute(), [[dimension], [dimension]]
-    numbers = xr.apply_ufunc(
-        one, logs, errors, input_core_dims=axes, output_core_dims=[["number"]], vectorize=True, keep_attrs=True
+    dimension, x = positive_axis(y, dim, repeated=True)
+    here = {dimension: np.flatnonzero(inside_window(x, window, dim))}
+    part, t = y.isel(here).transpose(..., dimension).compute(), np.log(x[here[dimension]])
+    values = np.where(np.isfinite(part.values), part.values, np.nan).astype(np.float64)
+    bad, lines = np.asarray((values <= 0).any(axis=-1)), values.shape[:-1]
+    if bad.all():
+        first = part[tuple(np.argwhere(values <= 0)[0])]
+        raise SweepError(
+            f"a power law needs positive values; {(values <= 0).sum()} of {part.size} of {title(y)} in the window are "
+            f"not, e.g. {float(first):g} at {dim} = {float(first.coords[dim]):g}; choose a window without them"
+        )
+    with np.errstate(all="ignore"):
+        z = np.where(bad[..., None], np.nan, np.log(values)).reshape(math.prod(lines), t.size)
+    others = [None if sigma is None else relative_sigma(y, sigma), bounds]
+    errors, bound = (
+        None if one is None else one.isel(here).transpose(..., dimension).values.reshape(z.shape) for one in others
     )
-    if not bool(numbers.notnull().any()):
-        raise SweepError(f"this needs at least {FEWEST_OF_LINE} points of {title(y)} in the window; widen it")
-    found = xr.Dataset({name: numbers.isel(number=k, drop=True) for k, name in enumerate(names)})
-    return found.assign(verdict=found.verdict.where(positive, NOT_POSITIVE))
+    present = np.isfinite(z) if errors is None else np.isfinite(z) & np.isfinite(errors)
+    numbers = np.full((len(z), len(names)), np.nan)
+    for pattern, which in alike(present):
+        at = np.flatnonzero(pattern)
+        at = at[np.argsort(t[at], kind="stable")]
+        if at.size >= fewest and t[at[0]] < t[at[-1]]:
+            grid = np.ix_(which, at)
+            given = (None if one is None else one[grid] for one in (errors, bound))
+            with np.errstate(all="ignore"):  # what overflows is infinite
+                numbers[which] = function(t[at], z[grid], *given)
+    count, codes = present.sum(axis=1).reshape(lines), numbers[:, names.index(words[0])].reshape(lines)
+    if np.isnan(codes).all():
+        low, high = ends(window, dim)
+        raise SweepError(
+            f"a fit needs at least {fewest} points, found {count.max()} of {title(y)} in the window {low:g} to "
+            f"{high:g} of {dim}; choose a wider one"
+        )
+    every = np.array([*words[1], "not positive", "too few points"])
+    texts = every[np.where(bad, -2, np.nan_to_num(codes, nan=-1)).astype(np.int64)]
+    columns = {name: numbers[:, k].reshape(lines) for k, name in enumerate(names)} | {"points": count, words[0]: texts}
+    coords = {name: one for name, one in part.coords.items() if dimension not in one.dims}
+    return xr.Dataset({name: (part.dims[:-1], column) for name, column in columns.items()}, coords)
 
 
-NOT_POSITIVE = -2
-"""Stands for the word in numbers."""
-
-
-def in_words(codes: xr.DataArray, words: Sequence[str]) -> tuple[Any, NDArray[Any]]:
-    """The words that numbers stand for; NaN is a line of too few points."""
-    every = np.array([*words, "not positive", "too few points"])
-    return codes.dims, every[codes.fillna(-1).values.astype(np.int64)]
+def alike(present: NDArray[np.bool_], most: int = LINES) -> list[tuple[NDArray[np.bool_], NDArray[np.intp]]]:
+    """Patterns among rows (m, n), and which rows have each; at most so many at once."""
+    if not len(present):
+        return []
+    if present.all():
+        patterns, which = present[:1], np.zeros(len(present), dtype=np.intp)
+    else:
+        patterns, which = np.unique(present, axis=0, return_inverse=True)
+    parts = [(p, np.flatnonzero(which.reshape(-1) == number)) for number, p in enumerate(patterns)]
+    return [(p, rows[i : i + most]) for p, rows in parts for i in range(0, rows.size, most)]
 
 
 def like(given: Any, y: xr.DataArray, what: str) -> xr.DataArray:
@@ -223,10 +209,6 @@ def like(given: Any, y: xr.DataArray, what: str) -> xr.DataArray:
     if bool((found < 0).any()):
         raise SweepError(f"{what}: errors are not negative; found {float(found.min()):g}")
     return found
-
-
-MOST_SIGMA = 1e6
-"""Relative standard error beyond which a logarithm says nothing."""
 
 
 def relative_sigma(y: xr.DataArray, sigma: Any) -> xr.DataArray:
@@ -254,17 +236,7 @@ def stated_bound(y: xr.DataArray, bound: Any = None) -> xr.DataArray:
 def stated_error(dataset: xr.Dataset, name: str) -> xr.DataArray:
     """Relative error that a result states for each value of an output: `rtol`, or `error_bound` where it is INACCURATE.
 
-    Parameters
-    ----------
-    dataset : Dataset
-        From `run` or `open_result`.
-    name : str
-        Output.
-
-    Returns
-    -------
-    DataArray
-        Of the output's shape; 0 where nothing is stated, inf where no error is known.
+    Of the output's shape; 0 where nothing is stated, inf where no error is known.
     """
     check_dataset("fit_exponent", dataset, needs=[name])
     rtol = dataset["rtol"] if "rtol" in dataset.coords else float(dataset.attrs.get("rtol", 0.0))
@@ -275,35 +247,32 @@ def stated_error(dataset: xr.Dataset, name: str) -> xr.DataArray:
     return found.transpose(*dataset[name].dims)
 
 
-MOST_ROWS = 20
-"""Lines of a summary."""
-
-
 def described(
     found: xr.Dataset, names: dict[str, str], units: dict[str, str], attrs: dict[str, Any], confidence: float
 ) -> xr.Dataset:
-    """A result with its variables in the order of their names, with units and long names, and a summary."""
-    found = found[list(names)]
+    """A result with its variables in the order of their names, each followed by the ends of its interval where there is
+    one, with units and long names, and a summary: a table of intervals and words, a row for each line."""
+    every = {}
     for name, words in names.items():
-        found[name].attrs = {"units": units.get(name, "1"), "long_name": words}
+        every[name] = words, units.get(name, "1")
+        if f"{name}_low" in found:
+            every |= {f"{name}_{end}": (f"{end} end of its interval", every[name][1]) for end in ("low", "high")}
+    found = found[list(every)]
+    for name, (words, unit) in every.items():
+        found[name].attrs = {"units": unit, "long_name": words}
     found.attrs = {**attrs, "confidence": confidence}
-    found.attrs["summary"] = summary(found)
-    return found
-
-
-def summary(found: xr.Dataset) -> str:
-    """A table of numbers with their intervals, and of words: a row for each line."""
     numbers = [str(name) for name in found.data_vars if f"{name}_low" in found]
-    words = [str(name) for name, variable in found.data_vars.items() if variable.dtype.kind == "U"]
-    table = found[[*words, *(name + end for name in numbers for end in ("", "_low", "_high"))]]
+    texts = [str(name) for name, variable in found.data_vars.items() if variable.dtype.kind == "U"]
+    table = found[[*texts, *(name + end for name in numbers for end in ("", "_low", "_high"))]]
     dims, rows = list(table.sizes), []
     for place in itertools.islice(np.ndindex(*table.sizes.values()), MOST_ROWS):
         one = table.isel(dict(zip(dims, place, strict=True)))
         labels = [one[dim].item() if dim in one.coords else place[i] for i, dim in enumerate(dims)]
         values = [[float(one[name + end]) for end in ("", "_low", "_high")] for name in numbers]
-        texts = [f"{value:.6g} ({low:.6g} to {high:.6g})" for value, low, high in values]
-        rows.append((*(f"{one:.6g}" if isinstance(one, float) else str(one) for one in labels), *texts))
-        rows[-1] += tuple(str(one[word].item()) for word in words)
+        row = [f"{one:.6g}" if isinstance(one, float) else str(one) for one in labels]
+        row += [f"{value:.6g} ({low:.6g} to {high:.6g})" for value, low, high in values]
+        rows.append((*row, *(str(one[text].item()) for text in texts)))
     more = math.prod(table.sizes.values()) - len(rows)
-    heading = (*map(str, dims), *(f"{name} ({100 * found.attrs['confidence']:g} %)" for name in numbers), *words)
-    return Table(rows, heading).text(indent="", wide=True) + f"\nand {more} more" * (more > 0)
+    heading = (*map(str, dims), *(f"{name} ({100 * confidence:g} %)" for name in numbers), *texts)
+    found.attrs["summary"] = Table(rows, heading).text(indent="", wide=True) + f"\nand {more} more" * (more > 0)
+    return found

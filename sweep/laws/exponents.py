@@ -6,6 +6,7 @@ coordinate along a dimension, such as an axis of a zip design: `local_exponent(d
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, Literal, overload
 
 import numpy as np
@@ -14,11 +15,9 @@ import xarray as xr
 from sweep.errors import SweepError
 from sweep.laws.curves import (
     Window,
-    along,
     inside_window,
     log_of,
     missing_is_nan,
-    numbers_along,
     positive_axis,
     stated_bound,
     title,
@@ -76,13 +75,22 @@ def local_exponent(y: xr.DataArray, dim: str, *, error: bool = False, bound: Any
     """
     dimension, x = positive_axis(y, dim)
     t, logs, name = np.log(x), log_of(y), "" if y.name is None else f"{y.name}_"
-    found = along(lambda z: slopes(t, z, 5), logs, dimension).rename(f"{name}exponent")
+    found = _along(lambda z: slopes(t, z, 5), dimension, logs).rename(f"{name}exponent")
     found.attrs = {"units": "1", "long_name": f"local exponent of {title(y)} in {dim}"}
     if not error:
         return found
-    errors = along(lambda z, b: slope_errors(t, z, b), logs, dimension, None, stated_bound(y, bound))
+    errors = _along(lambda z, b: slope_errors(t, z, b), dimension, logs, stated_bound(y, bound))
     errors.attrs = {"units": "1", "long_name": f"error of the local exponent of {title(y)} in {dim}"}
     return xr.Dataset({"exponent": found, "exponent_error": errors})
+
+
+def _along(function: Callable[..., Array], dimension: str, *arrays: xr.DataArray) -> xr.DataArray:
+    """`function` of arrays of one shape, whose last axis is the dimension, in place of the first."""
+    axes = [[dimension]] * len(arrays)
+    found: xr.DataArray = xr.apply_ufunc(
+        function, *(one.compute() for one in arrays), input_core_dims=axes, output_core_dims=axes[:1], keep_attrs=True
+    )
+    return found.transpose(*arrays[0].dims)
 
 
 def where_exponent(
@@ -135,7 +143,7 @@ def where_exponent(
         fine, coarse = ((points, slopes(t, z, stencil) if stencil else z) for points, stencil in orders)
         places = brackets(np.where(inside, fine[1], np.nan), value)
         if len(places) != 1:
-            return np.nan, len(places)
+            return np.nan, float(len(places))
         at = places[0]
         step, rise = float(abs(t[at + 1] - t[at])), float(abs(fine[1][at + 1] - fine[1][at]))
         found = root(t, fine[1], at, value, fine[0])
@@ -144,11 +152,13 @@ def where_exponent(
         noise = EPSILON * float(np.nanmax(abs(z))) / (1.0 if values else float(abs(np.diff(t)).min()))
         return found, apart + noise * step / rise + EPSILON * abs(float(t[at]))
 
-    def each(z: Array) -> Array:
-        return np.array([one(line) for line in z.reshape(-1, t.size)]).reshape(*z.shape[:-1], 2)
-
-    numbers = numbers_along(("place", "error"), each, curve, dimension)
-    place, error = numbers.place, numbers.error
+    place, error = xr.apply_ufunc(
+        *(one, curve.compute()),
+        input_core_dims=[[dimension]],
+        output_core_dims=[[], []],
+        vectorize=True,
+        keep_attrs=True,
+    )
     if not bool(place.notnull().any()):
         count = int(error.max())
         said = f"passes {value:g} {count} times" if count else f"does not pass {value:g}"

@@ -11,24 +11,20 @@ from scipy.special import gammaincc, ndtri, stdtrit
 
 from sweep.errors import SweepError
 from sweep.laws.curves import (
-    NOT_POSITIVE,
     Window,
+    alike,
     check_confidence,
     check_dataset,
     check_end,
-    check_output,
     described,
-    ends,
-    in_words,
+    fit_lines,
     log_of,
-    numbers_along,
-    relative_sigma,
+    one_line,
     stated_bound,
     title,
-    window_logs,
 )
 from sweep.laws.loglog import EPSILON, FEWEST, Array, slope_bounds, slopes, tends
-from sweep.laws.noise import NOISES, RARE, UNLIKELY, alike, corrected, inliers, noise_share, regress, runs_chance
+from sweep.laws.noise import NOISES, RARE, UNLIKELY, corrected, inliers, regress, roughness, runs_chance
 
 METHOD = "least squares in log-log; the interval is of what `kind` says"
 
@@ -42,8 +38,6 @@ FEWEST_FOR_BEND = 8
 
 FIT_NAMES = {
     "exponent": "exponent of the power law",
-    "exponent_low": "lower end of the interval of the exponent",
-    "exponent_high": "upper end of the interval of the exponent",
     "verdict": "whether one power law describes the points",
     "kind": "what the distances of the points from the line are",
     "exponent_error": "standard error of the exponent",
@@ -64,7 +58,7 @@ FIT_NAMES = {
     "limit_low": "to where the local exponent tends below the window; no end of an interval; NaN where there is noise",
     "limit_high": "to where the local exponent tends above the window; no end of an interval; NaN where there is noise",
 }
-NUMBERS = tuple(name for name in FIT_NAMES if name not in ("verdict", "noisy"))
+NUMBERS = ("exponent_low", "exponent_high", *(n for n in FIT_NAMES if n not in ("verdict", "noisy", "points")))
 
 
 def fit_exponent(
@@ -153,23 +147,21 @@ def fit_exponent(
         return _by_window(y, dim, window, towards, confidence=confidence, noise=noise, sigma=sigma, bound=bound)
     check_confidence(confidence)
     check_noise(noise, sigma)
-    here, t, logs, positive = window_logs(y, dim, window, repeated=True)
-    ((dimension, _),) = here.items()
-    errors = relative_sigma(y, sigma).isel(here)
-    if sigma is not None:
-        logs = logs.where(np.isfinite(errors))
-    bounds = stated_bound(y, bound).isel(here)
-    known = sigma is not None
-    fit = numbers_along(
-        NUMBERS, lambda z, s, b: _lines(t, z, s, b, known, confidence, noise), logs, dimension, errors, bounds
-    )
-    fit["kind"] = fit.kind.where(positive, NOT_POSITIVE)
-    if not bool(fit.exponent.notnull().any()):
-        raise SweepError(
-            f"a line needs at least {FEWEST} points, found {int(fit.points.max())} of {title(y)} in the window "
-            f"{ends(window, dim)[0]:g} to {ends(window, dim)[1]:g} of {dim}; choose a wider one"
-        )
-    return _describe_fit(fit, y, dim, confidence)
+
+    def each(t: Array, z: Array, errors: Array | None, bounds: Array | None) -> Array:
+        fit = _alike(t, z, errors, bounds, confidence, noise)
+        return np.stack([np.broadcast_to(fit[name], len(z)) for name in NUMBERS], axis=1)
+
+    fit = fit_lines(NUMBERS, ("kind", KINDS), each, y, dim, window, sigma, stated_bound(y, bound), FEWEST)
+    smooth = np.isin(fit.kind, ["exact", "bounded", "curved"])
+    fit["noisy"] = fit.kind.dims, np.where(np.isnan(fit.fits), np.nan, ~smooth)
+    words = np.where(fit.fits == 1, "one power law", np.where(fit.fits == 0, "no power law", fit.kind))
+    fit["verdict"] = fit.kind.dims, words
+    units, place = str(y.attrs.get("units", "1")), str(y.coords[dim].attrs.get("units", "1"))
+    of = dict.fromkeys(("prefactor", "prefactor_error", "level", "start", "stop"), units)
+    of |= dict.fromkeys(("low", "high", "centre"), place)
+    law = f"{title(y)} = prefactor {dim}^exponent"
+    return described(fit, FIT_NAMES, of, {"law": law, "y": title(y), "x": dim, "method": METHOD}, confidence)
 
 
 FEWEST_IN_WINDOW, MOST_WINDOWS = 8, 8
@@ -178,16 +170,13 @@ FEWEST_IN_WINDOW, MOST_WINDOWS = 8, 8
 def _by_window(y: xr.DataArray, dim: str, window: Window | None, end: str, **keys: Any) -> xr.Dataset:
     """Fits over ever smaller windows that reach to one end, and whether their exponents come to rest."""
     check_end("towards", end)
-    check_output(y)
     if window is not None:
         raise SweepError("window does not go with towards, which chooses the windows")
-    if y.ndim != 1:
-        raise SweepError(f"{title(y)} runs along {', '.join(map(str, y.dims))}; take one line, choose with .sel")
+    one_line(y, "take")
     x = y[dim].values[np.isfinite(log_of(y).values)]
     if x.size < FEWEST_IN_WINDOW:
         raise SweepError(f"an exponent against the window needs at least {FEWEST_IN_WINDOW} points, found {x.size}")
-    low, high = float(x.min()), float(x.max())
-    fits = []
+    low, high, fits = float(x.min()), float(x.max()), []
     for share in 1.5 ** -np.arange(float(MOST_WINDOWS)):
         reach = (high / low) ** share
         smaller = (high / reach, high) if end == "high" else (low, low * reach)
@@ -223,28 +212,8 @@ def rounding(t: Array, z: Array) -> Array:
     return found
 
 
-def _lines(
-    t: Array, z: Array, sigma: Array, bound: Array, known: bool, confidence: float, noise: bool | str | None
-) -> Array:
-    """NUMBERS of each line (..., n) of `z`; lines with the same points at once."""
-    count = math.prod(z.shape[:-1])
-    rows, sigma, bound = (np.broadcast_to(part, z.shape).reshape(count, t.size) for part in (z, sigma, bound))
-    found = np.full((len(rows), len(NUMBERS)), np.nan)
-    present = np.isfinite(rows)
-    found[:, NUMBERS.index("points")] = present.sum(axis=1)
-    for pattern, which in alike(present):
-        at = np.flatnonzero(pattern)
-        at = at[np.argsort(t[at], kind="stable")]
-        if at.size >= FEWEST and t[at[0]] < t[at[-1]]:
-            row, s, b = (part[np.ix_(which, at)] for part in (rows, sigma, bound))
-            with np.errstate(over="ignore", under="ignore"):
-                fit = _alike(t[at], row, s if known else None, b, confidence, noise)
-            found[which] = np.stack([np.broadcast_to(fit[name], which.size) for name in NUMBERS], axis=1)
-    return found.reshape(*z.shape[:-1], len(NUMBERS))
-
-
 def _alike(
-    t: Array, z: Array, sigma: Array | None, bound: Array, confidence: float, noise: bool | str | None
+    t: Array, z: Array, sigma: Array | None, bound: Any, confidence: float, noise: bool | str | None
 ) -> dict[str, Any]:
     """NUMBERS (m,) of lines z (m, n) without gaps, t rising: least squares, and then by what the distances are."""
     share = np.ones_like(z) if sigma is None else sigma**-2.0
@@ -257,8 +226,11 @@ def _alike(
     size = np.sqrt((share * off * off).sum(axis=1) / max(n - 2, 1))
     fit: dict[str, Any] = {name: np.full(len(z), np.nan) for name in NUMBERS}
     fit |= {"exponent": slope, "level": level, "exponent_error": size / np.sqrt(spread), "level_error": size / n**0.5}
-    fit |= {"drift": _drift(u, off, share), "points": n, "low": np.exp(t[0]), "high": np.exp(t[-1])}
-    fit |= {"start": np.exp(z[:, 0]), "stop": np.exp(z[:, -1]), "centre": np.exp(centre)}
+    fit |= {"low": np.exp(t[0]), "high": np.exp(t[-1]), "centre": np.exp(centre)}
+    fit |= {"start": np.exp(z[:, 0]), "stop": np.exp(z[:, -1])}
+    # the parabola that fits best, beside the line
+    bow = u * u - spread[:, None] / n - (share * u**3).sum(axis=1, keepdims=True) / spread[:, None] * u
+    fit["drift"] = 2 * (share * bow * off).sum(axis=1) / (share * bow * bow).sum(axis=1) * (t[-1] - t[0])
     if sigma is not None:
         error = 1 / np.sqrt((sigma**-2 * u * u).sum(axis=1))
         reach = ndtri((1 + confidence) / 2) * error
@@ -270,7 +242,7 @@ def _alike(
         noisy = (abs(off).max(axis=1) > least) & (n > FEWEST)
         if noise is None:
             within = bound.any(axis=1) & (abs(off) <= 2 * bound).all(axis=1)
-            noisy &= (size > least) & ~within & (noise_share(t, off) > SMOOTH)
+            noisy &= (size > least) & ~within & (roughness(t, off)[1] > SMOOTH)
         else:
             noisy &= bool(noise)
         word, parts = noise if isinstance(noise, str) else "noise", []
@@ -288,19 +260,6 @@ def _alike(
     fit |= {"residual": residual, "prefactor": prefactor, "prefactor_error": prefactor * relative}
     fit |= {"exponent_low": np.fmin(fit["exponent_low"], slope), "exponent_high": np.fmax(fit["exponent_high"], slope)}
     return fit | {"level": np.exp(level)}
-
-
-def _drift(u: Array, off: Array, share: Array) -> Array:
-    """Change of slope across the window by the parabola that fits best; `u` is centred, `off` the distance to the
-    line."""
-    square = u * u
-    spread = (share * square).sum(axis=1, keepdims=True)
-    skew = (share * square * u).sum(axis=1, keepdims=True) / spread
-    bow = square - spread / u.shape[1] - skew * u
-    width = u[:, -1] - u[:, 0]
-    with np.errstate(invalid="ignore", divide="ignore"):
-        change: Array = 2.0 * (share * bow * off).sum(axis=1) / (share * bow * bow).sum(axis=1) * width
-    return change
 
 
 def _noisy(t: Array, z: Array, centre: Array, word: str, confidence: float) -> dict[str, Array]:
@@ -368,19 +327,6 @@ def _exact(t: Array, z: Array, off: Array, bound: Array, slope: Array) -> dict[s
         found["limit_low"][row] = tends(t, local[i], by_error[i, 0])[1]
         found["limit_high"][row] = tends(-t[::-1], local[i, ::-1], by_error[i, -1])[1]
     return found
-
-
-def _describe_fit(fit: xr.Dataset, y: xr.DataArray, dim: str, confidence: float) -> xr.Dataset:
-    smooth = fit.kind.isin([KINDS.index(word) for word in ("exact", "bounded", "curved")])
-    fit["noisy"] = (~smooth).astype(np.float64).where(fit.fits.notnull())
-    fit["kind"], fit["points"] = in_words(fit.kind, KINDS), fit.points.fillna(0).astype(np.int64)
-    words = np.where(fit.fits == 1, "one power law", np.where(fit.fits == 0, "no power law", fit.kind))
-    fit["verdict"] = fit.kind.dims, words
-    units, place = str(y.attrs.get("units", "1")), str(y.coords[dim].attrs.get("units", "1"))
-    of = dict.fromkeys(("prefactor", "prefactor_error", "level", "start", "stop"), units)
-    of |= dict.fromkeys(("low", "high", "centre"), place)
-    law = f"{title(y)} = prefactor {dim}^exponent"
-    return described(fit, FIT_NAMES, of, {"law": law, "y": title(y), "x": dim, "method": METHOD}, confidence)
 
 
 def crossover(low_fit: xr.Dataset, high_fit: xr.Dataset) -> xr.Dataset:

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -41,7 +42,15 @@ def slopes(t: Array, z: Array, points: int) -> Array:
         NaN where missing; the result is NaN there, and in runs shorter than three. A run shorter than `points`
         is differentiated with what it has.
     """
-    return _by_runs(t, z, lambda s, y: _derivative(s, y, points))
+
+    def derivative(s: Array, y: Array) -> Array:
+        nodes, weights = _stencils(s, points)
+        slope = np.zeros(y.shape)
+        for k in range(nodes.shape[1]):  # differences from the home point: a constant has slope zero exactly
+            slope += weights[:, k] * (y[..., nodes[:, k]] - y)
+        return slope
+
+    return _by_runs(t, z, derivative)
 
 
 def slope_errors(t: Array, z: Array, bound: Array | None = None) -> Array:
@@ -57,6 +66,13 @@ def slope_errors(t: Array, z: Array, bound: Array | None = None) -> Array:
         return found
     missing = np.where(np.isfinite(z), np.broadcast_to(bound, z.shape), np.nan)
     return found + _by_runs(t, missing, lambda s, b: slope_bounds(s, b, 5))
+
+
+def slope_bounds(t: Array, bound: Array, points: int) -> Array:
+    """How far errors up to `bound` (..., n) in the values can move each slope of `slopes`; lines without gaps."""
+    nodes, weights = _stencils(t, points)
+    found: Array = (abs(weights) * bound[..., nodes]).sum(axis=-1) + abs(weights.sum(axis=1)) * bound
+    return found
 
 
 def _by_runs(t: Array, z: Array, function: Callable[[Array, Array], Array]) -> Array:
@@ -80,36 +96,30 @@ def runs(present: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
     yield from zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
 
 
-def _derivative(t: Array, z: Array, points: int) -> Array:
-    nodes, weights = _stencils(t, points)
-    slope = np.zeros(z.shape)
-    for k in range(nodes.shape[1]):  # differences from the home point: a constant has slope zero exactly
-        slope += weights[:, k] * (z[..., nodes[:, k]] - z)
-    return slope
-
-
 def _derivative_errors(t: Array, z: Array) -> Array:
+    """`slope_errors` of lines without gaps, with noise or without."""
     fine, middle, rough = (7, 5, 3) if t.size > 5 else (t.size, max(2, t.size - 2), 2)  # beside few points lower orders
-    slope = _derivative(t, z, middle)
-    apart, coarse = abs(_derivative(t, z, fine) - slope), abs(_derivative(t, z, rough) - slope)
+    slope = slopes(t, z, middle)
+    apart, coarse = abs(slopes(t, z, fine) - slope), abs(slopes(t, z, rough) - slope)
     sharp = 4.0 * apart > coarse  # orders that do not tell: a bend within a step, about which the steps beside it do
     steps = np.diff(z, axis=-1) / np.diff(t)
-    beside = np.maximum(
-        abs(steps[..., np.r_[0, : t.size - 1]] - slope), abs(steps[..., np.r_[: t.size - 1, -1]] - slope)
-    )
+    both = [abs(steps[..., np.clip(np.arange(t.size) - k, 0, t.size - 2)] - slope) for k in (0, 1)]
     weights, between = _dense(t, middle), _dense(t, fine)
-    apart_by_noise = apart / _norm(between - weights)
-    noise = 1.4826 * _median_near(apart_by_noise)
+    places = np.arange(weights.shape[1])
+    alike = MEMORY ** abs(np.subtract.outer(places, places))
+    # standard errors for values with autocorrelated errors of size 1
+    size, size_apart = (np.sqrt(np.einsum("ij,jk,ik->i", w, alike, w)) for w in (weights, between - weights))
+    apart_by_noise = apart / size_apart
+    # the median near a point, which a bend or a spike does not change
+    noise = 1.4826 * np.median(_near(apart_by_noise, min(NEAR, (t.size - 1) // 2), "reflect"), axis=-1)
     least = np.minimum(noise, 1.4826 * np.median(apart_by_noise, axis=-1, keepdims=True))
-    by_noise = noise * _norm(weights)
-    few = t.size < FEW
-    by_bend = _largest_near(np.where(sharp, np.maximum(apart, beside), np.maximum(apart, coarse) if few else apart))
-    bends = few | (_largest_near(apart_by_noise) > BEYOND_NOISE * least)
-    error = np.where(bends, np.maximum(by_noise, by_bend), by_noise)
+    few, rises = t.size < FEW, _near(apart_by_noise, 2, "edge").max(axis=-1) > BEYOND_NOISE * least
+    by_bend = np.where(sharp, np.maximum(apart, np.maximum(*both)), np.maximum(apart, coarse) if few else apart)
+    error = noise * size
+    error = np.where(few | rises, np.maximum(error, _near(by_bend, 2, "edge").max(axis=-1)), error)
     rounding = EPSILON * (1.0 + abs(z).max(axis=-1, keepdims=True)) * np.sqrt((weights**2).sum(axis=1))
     found: Array = 2.3 * error + rounding  # 1.96 and what the median, of few points, is too small
-    pole = _beside_pole(steps) & (_largest_near(apart_by_noise) > BEYOND_NOISE * least)
-    return np.where(pole, np.inf, found)
+    return np.where(_beside_pole(steps) & rises, np.inf, found)
 
 
 def _beside_pole(steps: Array) -> NDArray[np.bool_]:
@@ -117,43 +127,21 @@ def _beside_pole(steps: Array) -> NDArray[np.bool_]:
 
     Nothing at the points says how near the pole is.
     """
-    size, sign = abs(steps), np.sign(steps)
     found = np.zeros((*steps.shape[:-1], steps.shape[-1] + 1), dtype=bool)
-    if steps.shape[-1] < 6:
-        return found
-    up, down = size[..., :-1] < size[..., 1:], size[..., :-1] > size[..., 1:]
-    same = sign[..., :-1] == sign[..., 1:]
-    before = up[..., :-1] & up[..., 1:] & same[..., :-1] & same[..., 1:]  # [i]: steps i to i + 2 grow
-    after = down[..., :-1] & down[..., 1:] & same[..., :-1] & same[..., 1:]  # [i]: steps i to i + 2 shrink
-    last, first = sign[..., 2:], sign[..., :-2]
-    at = before[..., :-3] & after[..., 3:] & (last[..., :-3] == -first[..., 3:])
-    found[..., 3:-3] |= at
-    within = before[..., :-4] & after[..., 4:] & (last[..., :-4] == -first[..., 4:])
-    found[..., 3:-4] |= within
-    found[..., 4:-3] |= within
+    for between in range(min(2, max(0, steps.shape[-1] - 5))):  # steps over the pole
+        window = sliding_window_view(steps, 6 + between, axis=-1)
+        towards = np.stack([window[..., :3], window[..., :-4:-1]])
+        grow = (np.diff(abs(towards), axis=-1) > 0).all(axis=-1) & (abs(np.sign(towards).sum(axis=-1)) == 3)
+        pole = grow.all(axis=0) & (np.sign(towards[..., 2]).sum(axis=0) == 0)
+        for k in range(3, 4 + between):
+            found[..., k : k + pole.shape[-1]] |= pole
     return found
 
 
-def slope_bounds(t: Array, bound: Array, points: int) -> Array:
-    """How far errors up to `bound` (..., n) in the values can move each slope of `slopes`; lines without gaps."""
-    nodes, weights = _stencils(t, points)
-    found: Array = (abs(weights) * bound[..., nodes]).sum(axis=-1) + abs(weights.sum(axis=1)) * bound
-    return found
-
-
-def _largest_near(values: Array) -> Array:
-    """The largest of each value and its two neighbours on both sides."""
-    padded = np.pad(values, [(0, 0)] * (values.ndim - 1) + [(2, 2)], mode="edge")
-    found: Array = np.lib.stride_tricks.sliding_window_view(padded, 5, axis=-1).max(axis=-1)
-    return found
-
-
-def _median_near(values: Array) -> Array:
-    """The median of each value and its NEAR neighbours on both sides, which a bend or a spike does not change."""
-    reach = min(NEAR, (values.shape[-1] - 1) // 2)
-    padded = np.pad(values, [(0, 0)] * (values.ndim - 1) + [(reach, reach)], mode="reflect")
-    found: Array = np.median(np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1, axis=-1), axis=-1)
-    return found
+def _near(values: Array, reach: int, mode: Any) -> Array:
+    """Each value and its neighbours on both sides (..., n, 2 reach + 1)."""
+    padded = np.pad(values, [(0, 0)] * (values.ndim - 1) + [(reach, reach)], mode=mode)
+    return sliding_window_view(padded, 2 * reach + 1, axis=-1)
 
 
 def _dense(t: Array, points: int) -> Array:
@@ -165,46 +153,22 @@ def _dense(t: Array, points: int) -> Array:
     return found
 
 
-def _norm(weights: Array) -> Array:
-    """Standard error of each slope for values with autocorrelated errors of size 1."""
-    places = np.arange(weights.shape[1])
-    size: Array = np.sqrt(np.einsum("ij,jk,ik->i", weights, MEMORY ** abs(np.subtract.outer(places, places)), weights))
-    return size
-
-
 def _stencils(t: Array, points: int) -> tuple[NDArray[np.intp], Array]:
     """Neighbours (n, points) of each point, and their weights in its slope; that of the point itself is left zero."""
-    points = min(points, t.size)
-    home = np.arange(t.size)
-    first = np.clip(home - points // 2, 0, t.size - points)
-    nodes = first[:, None] + np.arange(points)
-    return nodes, _weights(t[nodes], home - first)
-
-
-def _weights(nodes: Array, home: NDArray[np.intp]) -> Array:
-    """Weights (n, points) of the derivative at nodes[i, home[i]]; that of the home point itself is left zero."""
-    row = np.arange(len(nodes))
-    apart = nodes[:, :, None] - nodes[:, None, :]
-    apart[:, np.arange(nodes.shape[1]), np.arange(nodes.shape[1])] = 1.0
-    barycentric = 1.0 / apart.prod(axis=2)
+    points, row = min(points, t.size), np.arange(t.size)
+    first = np.clip(row - points // 2, 0, t.size - points)
+    nodes, home = first[:, None] + np.arange(points), row - first
+    apart, barycentric = differences(t[nodes])
     weights: Array = barycentric / barycentric[row, home][:, None] / apart[row, home]
     weights[row, home] = 0.0
-    return weights
+    return nodes, weights
 
 
-def interpolations(t: Array, z: Array, count: int) -> list[Array]:
-    """How far each point inside (..., n - count) is off the polynomial through `count` neighbours, half on either side,
-    and how far it would be if all points were independent noise.
-
-    In units that give noise of size 1 the size 1.
-    """
-    nodes = np.arange(t.size - count)[:, None] + np.arange(count + 1)
-    apart = t[nodes][:, :, None] - t[nodes][:, None, :]
-    apart[:, np.arange(count + 1), np.arange(count + 1)] = 1.0
-    weights = 1.0 / apart.prod(axis=2)
-    weights /= np.sqrt((weights**2).sum(axis=1, keepdims=True))
-    parts = weights * z[..., nodes]
-    return [parts.sum(axis=-1), np.sqrt((parts**2).sum(axis=-1))]
+def differences(nodes: Array) -> tuple[Array, Array]:
+    """Differences of nodes (m, k), their own taken for 1 (m, k, k), and barycentric weights (m, k)."""
+    apart, own = nodes[:, :, None] - nodes[:, None, :], np.arange(nodes.shape[1])
+    apart[:, own, own] = 1.0
+    return apart, 1.0 / apart.prod(axis=2)
 
 
 def tends(t: Array, local: Array, doubt: float) -> tuple[float, float]:
@@ -233,32 +197,22 @@ def brackets(c: Array, value: float) -> list[int]:
 
 def root(t: Array, c: Array, bracket: int, value: float, points: int) -> float:
     """Where the polynomial through `points` neighbours of t[bracket], t[bracket + 1] passes `value` between these."""
+    from scipy.optimize import brentq
+
     start, stop = next((a, b) for a, b in runs(np.isfinite(c)) if a <= bracket < b)
     first = min(max(bracket - points // 2 + 1, start), max(stop - points, start))
     near = slice(first, min(first + points, stop))
-    nodes, heights = t[near], c[near] - value
-    apart = nodes[:, None] - nodes[None, :]
-    np.fill_diagonal(apart, 1.0)
-    weights = 1.0 / apart.prod(axis=1)
-    left, right = float(t[bracket]), float(t[bracket + 1])
-    rising = bool(c[bracket + 1] > c[bracket])
-    for _ in range(64):  # halves down to the last bit
-        middle = left + (right - left) / 2
-        if middle in (left, right):
-            break
-        if (_polynomial(nodes, weights, heights, middle) >= 0) == rising:
-            right = middle
-        else:
-            left = middle
-    return left + (right - left) / 2
+    nodes, heights, ends = t[near], c[near] - value, t[bracket : bracket + 2]
+    weights = differences(nodes[None])[1][0]
 
+    def polynomial(at: float) -> float:
+        away = at - nodes
+        if not away.all():
+            return float(heights[away == 0][0])
+        share = weights / away
+        return float((share * heights).sum() / share.sum())
 
-def _polynomial(nodes: Array, weights: Array, heights: Array, at: float) -> float:
-    away = at - nodes
-    if not away.all():
-        return float(heights[away == 0][0])
-    share = weights / away
-    return float((share * heights).sum() / share.sum())
+    return float(brentq(polynomial, *ends, xtol=4 * EPSILON * np.ptp(ends), rtol=4 * EPSILON))
 
 
 def is_logarithmic(grid: Any) -> bool:

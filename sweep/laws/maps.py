@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from fractions import Fraction
 
 import numpy as np
 import xarray as xr
@@ -59,24 +58,9 @@ def exponent_map(y: xr.DataArray, dim: str, levels: Sequence[float] = BORDERS) -
 def contours(field: xr.DataArray, levels: Sequence[float]) -> xr.Dataset:
     """Lines on which a field over two parameters has given values, by linear interpolation between its cells.
 
-    Logarithms are taken of an axis whose grid is logarithmic.
-
-    Parameters
-    ----------
-    field : DataArray
-        Two dimensions, both with number coordinates; NaN where it has no value, which no line crosses.
-    levels : sequence of float
-
-    Returns
-    -------
-    Dataset
-        Along `point`: both coordinates under the names of the dimensions, `level`, and `line`, the number of the line
-        that the point belongs to, from 0 on. No points where no level is met.
-
-    Raises
-    ------
-    SweepError
-        The field has not two dimensions, or an axis has no numbers or fewer than two.
+    Along `point`: both coordinates under the names of the dimensions, `level`, and `line`, the number of the line, from
+    0 on; no points where no level is met. Logarithms are taken of an axis whose grid is logarithmic. Where the field is
+    NaN no line goes. Raises SweepError where it has not two dimensions, each with numbers and two and more of them.
     """
     check_output(field)
     if field.ndim != 2:
@@ -109,9 +93,3 @@ def contours(field: xr.DataArray, levels: Sequence[float]) -> xr.Dataset:
     found.level.attrs = {"units": str(field.attrs.get("units", "1")), "long_name": f"{title(field)} on the line"}
     found.line.attrs = {"units": "1", "long_name": "number of the line"}
     return found
-
-
-def fraction(level: float) -> str:
-    """An exponent as people write it: -1/3, 1/2, 0.27."""
-    near = Fraction(level).limit_denominator(12)
-    return str(near) if abs(float(near) - level) < 1e-9 else f"{level:.3g}"

@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtrc, ndtr, stdtrit
 
-from sweep.laws.loglog import EPSILON, Array, interpolations
+from sweep.laws.curves import alike
+from sweep.laws.loglog import EPSILON, Array, differences
 
 CORRELATIONS = np.array([-0.2, 0.0, 0.2, 0.4, 0.6, 0.7, 0.8, 0.85, 0.9, 0.93, 0.96])
 TRENDS, ENDS = np.linspace(-1.6, 1.6, 5), np.array([0.0, 1.6, 3.2])
@@ -42,8 +43,6 @@ ROUNDING = 16 * EPSILON
 """Relative distance of a point from a curve that is none."""
 FAR = 3.5
 """Sizes of the noise beyond which a point is left out."""
-LINES = 250
-"""Lines that are taken at once, so that what is held stays below some 50 MB."""
 
 
 class Regression(NamedTuple):
@@ -210,42 +209,28 @@ def inliers(t: Array, columns: Array, z: Array) -> NDArray[np.bool_]:
     return inside
 
 
-def alike(present: NDArray[np.bool_], most: int = LINES) -> list[tuple[NDArray[np.bool_], NDArray[np.intp]]]:
-    """Patterns among rows (m, n), and which rows have each; at most so many at once."""
-    if not len(present):
-        return []
-    if present.all():
-        patterns, which = present[:1], np.zeros(len(present), dtype=np.intp)
-    else:
-        patterns, which = np.unique(present, axis=0, return_inverse=True)
-    parts = [(p, np.flatnonzero(which.reshape(-1) == number)) for number, p in enumerate(patterns)]
-    return [(p, rows[i : i + most]) for p, rows in parts for i in range(0, rows.size, most)]
+def roughness(t: Array, z: Array) -> tuple[Array, Array]:
+    """Size of the noise on smooth curves (..., n) without gaps, t rising, and its share of them: 1 where neighbours say
+    nothing of each other. Of repeated t the noise is that within repetitions.
 
-
-def noise_size(t: Array, z: Array) -> Array:
-    """Size of the noise on smooth curves (..., n) without gaps, t rising; of repeated t, that within repetitions."""
-    found: Array = _off_neighbours(t, z)[:, 0].min(axis=0)
-    return found
-
-
-def noise_share(t: Array, off: Array) -> Array:
-    """Share of distances (..., n) from a curve that is noise: 1 where neighbours say nothing of each other."""
-    off_neighbours, alone = _off_neighbours(t, off).swapaxes(0, 1)
-    found: Array = (off_neighbours / np.maximum(alone, 1e-300)).min(axis=0)
-    return found
-
-
-def _off_neighbours(t: Array, z: Array) -> Array:
-    """How far points are off the polynomials through two, four, six and eight neighbours, root mean square, and how far
-    they would be if all were noise; (count, 2, ...). Noise leaves the same in all, a bend ever less."""
+    How far points are off the polynomials through two, four, six and eight neighbours, and how far they would be if all
+    were noise: noise leaves the same in all, a bend ever less.
+    """
     places, which, count = np.unique(t, return_inverse=True, return_counts=True)
     if places.size < t.size:
         off = z - ((z @ np.eye(places.size)[which]) / count)[..., which]
-        pairs = [[off * math.sqrt(t.size / (t.size - places.size)), z]]
+        pairs = [(off * math.sqrt(t.size / (t.size - places.size)), z)]
     else:
-        pairs = [interpolations(t, z, count) for count in (2, 4, 6, 8) if t.size > count + 2]
-    found: Array = np.array([[np.sqrt(np.mean(part**2, axis=-1)) for part in pair] for pair in pairs])
-    return found if pairs else np.stack([np.full((1, *z.shape[:-1]), np.inf), np.ones((1, *z.shape[:-1]))], axis=1)
+        pairs = []
+        for neighbours in (k for k in (2, 4, 6, 8) if t.size > k + 2):
+            nodes = np.arange(t.size - neighbours)[:, None] + np.arange(neighbours + 1)
+            weights = differences(t[nodes])[1]
+            parts = weights / np.sqrt((weights**2).sum(axis=1, keepdims=True)) * z[..., nodes]
+            pairs.append((parts.sum(axis=-1), np.sqrt((parts**2).sum(axis=-1))))
+    if not pairs:
+        return np.full(z.shape[:-1], np.inf), np.full(z.shape[:-1], np.inf)
+    size, alone = (np.sqrt([np.mean(part**2, axis=-1) for part in parts]) for parts in zip(*pairs, strict=True))
+    return size.min(axis=0), (size / np.maximum(alone, 1e-300)).min(axis=0)
 
 
 def corrected(deviance: Any, points: int, numbers: int) -> Any:
@@ -255,24 +240,19 @@ def corrected(deviance: Any, points: int, numbers: int) -> Any:
 
 
 def line_deviance(t: Array, z: Array) -> float:
-    """`Regression.deviance` of the straight line through one line (n,), whatever its noise."""
+    """`Regression.deviance` of the straight line through one line (n,), whatever its noise: that of `regress`, or with
+    outliers, by Student's t of three degrees of freedom, reweighted until nothing changes."""
     columns = np.stack([np.ones_like(t), t - t.mean()], axis=1)
-    return min(float(regress(t, columns, z[None]).deviance[0]), _outlying_deviance(columns, z))
-
-
-def _outlying_deviance(columns: Array, z: Array, freedom: float = 3.0) -> float:
-    """As `deviances` of one line (n,) under Student's t, which has outliers, by reweighting until nothing changes."""
     weights, scale, off = np.ones(z.size), 1.0, z
     for _ in range(50):
         root = np.sqrt(weights)
         off = z - columns @ np.linalg.lstsq(columns * root[:, None], z * root, rcond=None)[0]
         scale = max(float(np.mean(weights * off**2)), 1e-300)
-        weights = (freedom + 1) / (freedom + off**2 / scale)
+        weights = 4 / (3 + off**2 / scale)
     scale = max(scale, float((ROUNDING * (1 + abs(z).max())) ** 2))
-    logs = -0.5 * (freedom + 1) * np.log1p(off**2 / (freedom * scale)).sum()
-    constant = math.lgamma((freedom + 1) / 2) - math.lgamma(freedom / 2) - 0.5 * math.log(freedom * math.pi)
-    both = -2 * (logs + z.size * (constant - 0.5 * math.log(scale)))
-    return float(both - z.size * (1 + math.log(2 * math.pi)))
+    constant = 2 * math.log(2 / (math.pi * math.sqrt(3))) + 1 + math.log(2 * math.pi)
+    outlying = 4 * np.log1p(off**2 / (3 * scale)).sum() + z.size * (math.log(scale) - constant)
+    return min(float(regress(t, columns, z[None]).deviance[0]), float(outlying))
 
 
 def runs_chance(off: Array) -> Array:

@@ -16,8 +16,8 @@ import numpy as np
 
 from sweep.laws.loglog import Array
 
-Parts = tuple[Array | float, Array]
-"""Shift (g, n) and columns (g, n, k) of (1) for each of the q (g, ...); what is the same for all may lack the g."""
+Parts = tuple[Array | float, ...]
+"""Shift and columns of (1) for each q, (g, n) each; what is the same for all q, or at all points, may be less."""
 PartsOf = Callable[[Array, Array, float], Parts]
 
 
@@ -28,7 +28,7 @@ class Law(NamedTuple):
     formula: str
     parts: PartsOf
     """Of q, one behind the other (k, g, 1), s and the span."""
-    numbers: int
+    columns: int
     starts: Sequence[Sequence[float]] = ()
     """Values of each q to start from,"""
     limits: Sequence[tuple[float, float]] = ()
@@ -38,40 +38,42 @@ class Law(NamedTuple):
     power: bool = True
     """Whether it is a power law or several, and not another function."""
 
+    @property
+    def numbers(self) -> int:
+        """That are fitted."""
+        return len(self.starts) + self.columns
 
-def _columns(*columns: Array) -> Array:
-    return np.stack(np.broadcast_arrays(np.float64(1.0), *columns), axis=-1)
-
-
-def _logarithm(q: Array, s: Array, span: float) -> Parts:
-    return np.log(1 + q[0] * (s - 0.5)), _columns(s)
+    def at(self, which: int, value: float) -> Law:
+        """The law of which one of the q has a value."""
+        parts, left = self.parts, [k for k in range(len(self.starts)) if k != which]
+        return self._replace(
+            name=f"{self.name}, {value}",
+            parts=lambda q, s, span: parts(np.insert(q, which, value, axis=0), s, span),
+            starts=[self.starts[k] for k in left],
+            limits=[self.limits[k] for k in left],
+        )
 
 
 def _offset(q: Array, s: Array, span: float) -> Parts:
     """q: exponent per window, and the arc tangent of offset over prefactor at the middle."""
-    return np.log(np.exp(q[0] * (s - 0.5)) + np.tan(q[1])), _columns(0 * s)[..., :1]
+    return np.log(np.exp(q[0] * (s - 0.5)) + np.tan(q[1])), 1.0
 
 
 def _correction(q: Array, s: Array, span: float) -> Parts:
     """q: logarithm of 1 + the correction where it is largest, and how fast it fades from there."""
-    return np.log(1 + np.expm1(q[0]) * np.exp(-q[1] * (s - (q[1] < 0)))), _columns(s)
+    return np.log(1 + np.expm1(q[0]) * np.exp(-q[1] * (s - (q[1] < 0)))), 1.0, s
 
 
 def _log_correction(q: Array, s: Array, span: float) -> Parts:
     """q: logarithm of B per window."""
-    return 0.0, _columns(np.log1p(np.exp(q[0]) * s), s)
-
-
-def _stretched_exponential(q: Array, s: Array, span: float) -> Parts:
-    """q: power per window; the exponent is of size 1 at its large end."""
-    return 0.0, _columns(np.exp(q[0] * (s - (q[0] > 0))))
+    return 0.0, 1.0, np.log1p(np.exp(q[0]) * s), s
 
 
 def _three(q: Array, s: Array, span: float) -> Parts:
     """q: where the first two laws meet, the logarithm of how much further the other two do, and of the width."""
     width, place = np.exp(q[2]), q[0] + np.exp(q[1])
     a, b = (width * np.logaddexp(0, (s - at) / width) for at in (q[0], place))
-    return 0.0, _columns(s - a, a - b, b)
+    return 0.0, 1.0, s - a, a - b, b
 
 
 Bend = Callable[[Any, Any], Any]
@@ -84,7 +86,7 @@ def _bent(bend: Bend) -> PartsOf:
     def parts(q: Array, s: Array, span: float) -> Parts:
         u, width = s - q[0], np.exp(q[1])
         b = width * bend(u / width, q[2] if len(q) > 2 else 0.0)
-        return 0.0, _columns(u - b, b)
+        return 0.0, 1.0, u - b, b
 
     return parts
 
@@ -152,39 +154,47 @@ AT, WIDE, POWER = (-1.0, 2.0), (-7.0, 1.0), (-60.0, 60.0)
 def _two(name: str, formula: str, bend: Bend, shapes: Sequence[float] = (), limits: Any = None) -> Law:
     """Two power laws with a bend."""
     starts, all_limits = (PLACE, WIDTH, shapes)[: 2 + bool(shapes)], (AT, WIDE, limits)[: 2 + bool(shapes)]
-    return Law(name, formula, _bent(bend), 3 + len(starts), starts, all_limits, ("p low", "p high"))
+    return Law(name, formula, _bent(bend), 3, starts, all_limits, ("p low", "p high"))
 
 
-ONE = Law("one law", "A x^p", lambda q, s, span: (0.0, _columns(s)), 2, exponents=("p",))
-LOGARITHM = Law(
-    *("logarithm", "A x^p (1 + B ln x)", _logarithm, 3, ((-1.9, -1.5, -0.5, 0.5, 1.5, 1.9),), ((-2 + 1e-9, 2 - 1e-9),)),
-    exponents=("p",),
-    power=False,
+def _other(
+    name: str, formula: str, parts: PartsOf, columns: int, starts: Any = (), limits: Any = (), p: str = ""
+) -> Law:
+    """A function that is no power law."""
+    return Law(name, formula, parts, columns, starts, limits, (p,) * bool(p), power=False)
+
+
+ONE = Law("one law", "A x^p", lambda q, s, span: (0.0, 1.0, s), 2, exponents=("p",))
+OTHER_FUNCTIONS = (
+    _other(
+        *("logarithm", "A x^p (1 + B ln x)", lambda q, s, span: (np.log(1 + q[0] * (s - 0.5)), 1.0, s), 2),
+        *(((-1.9, -1.5, -0.5, 0.5, 1.5, 1.9),), ((-2 + 1e-9, 2 - 1e-9),), "p"),
+    ),
+    _other("exponential", "A exp(-x/X)", lambda q, s, span: (0.0, 1.0, np.exp(span * (s - 1))), 2),
+    _other(  # q: power per window; the exponent is of size 1 at its large end
+        *(
+            "stretched exponential",
+            "A exp(-(x/X)^b)",
+            lambda q, s, span: (0.0, 1.0, np.exp(q[0] * (s - (q[0] > 0)))),
+            2,
+        ),
+        *((FADES,), (POWER,)),
+    ),
+    _other("cut-off", "A exp(-x/X) x^p", lambda q, s, span: (0.0, 1.0, np.exp(span * (s - 1)), s), 3, p="p"),
+    _other("lognormal", "A exp(-B ln(x/X)^2)", lambda q, s, span: (0.0, 1.0, s, s**2), 3),
 )
-EXPONENTIAL = Law(
-    "exponential", "A exp(-x/X)", lambda q, s, span: (0.0, _columns(np.exp(span * (s - 1)))), 2, power=False
-)
-STRETCHED_EXPONENTIAL = Law(
-    "stretched exponential", "A exp(-(x/X)^b)", _stretched_exponential, 3, (FADES,), (POWER,), power=False
-)
-CUT_OFF = Law(
-    *("cut-off", "A exp(-x/X) x^p", lambda q, s, span: (0.0, _columns(np.exp(span * (s - 1)), s)), 3),
-    exponents=("p",),
-    power=False,
-)
-LOGNORMAL = Law("lognormal", "A exp(-B ln(x/X)^2)", lambda q, s, span: (0.0, _columns(s, s**2)), 3, power=False)
-OFFSET = Law("offset", "A x^p + C", _offset, 3, (FADES, (-1.2, -0.3, 0.1, 0.8, 1.4)), (POWER, (-1.57, 1.57)))
+OFFSET = Law("offset", "A x^p + C", _offset, 1, (FADES, (-1.2, -0.3, 0.1, 0.8, 1.4)), (POWER, (-1.57, 1.57)))
 CORRECTION = Law(
-    *("correction to scaling", "A x^p (1 + B x^-D)", _correction, 4),
+    *("correction to scaling", "A x^p (1 + B x^-D)", _correction, 2),
     *(((-2.5, -0.7, -0.1, 0.1, 0.7, 2.5, 6.0), FADES), ((-30.0, 60.0), (-80.0, 80.0)), ("p",)),
 )
 LOG_CORRECTION = Law(
-    *("logarithmic correction", "A x^p (1 + B ln(x/x0))^c", _log_correction, 4),
+    *("logarithmic correction", "A x^p (1 + B ln(x/x0))^c", _log_correction, 3),
     *(((-1.0, 1.0, 3.0, 5.0),), ((-3.0, 8.0),), ("p",)),
 )
 TWO = _two("two laws", "bend fading exponentially", _exponential)
 THREE = Law(
-    *("three laws", "two bends of one width", _three, 7),
+    *("three laws", "two bends of one width", _three, 4),
     *(((0.15, 0.3, 0.45, 0.6), tuple(np.log((0.2, 0.35, 0.5))), WIDTH[:3]), ((0.02, 0.9), (-2.5, 0.0), WIDE)),
     ("p low", "p middle", "p high"),
 )
@@ -196,5 +206,4 @@ BENDS = (
     _two("two laws, two widths", "one width below, another above", _uneven, (0.0,), (-2.0, 2.0)),
     _two("two laws, stretched bend", "fading as exp(-(ln x)^b)", _integrated(_stretched, *FADING), (0.0,), FADING),
 )
-OTHER_FUNCTIONS = (LOGARITHM, EXPONENTIAL, STRETCHED_EXPONENTIAL, CUT_OFF, LOGNORMAL)
 LAWS = (ONE, *OTHER_FUNCTIONS, OFFSET, CORRECTION, *BENDS, THREE)

@@ -15,11 +15,11 @@ import numpy as np
 import xarray as xr
 
 from sweep.errors import SweepError
-from sweep.laws.curves import Window, check_confidence, described, fits_by_line, in_words, title
-from sweep.laws.fits import Found, all_fitted
+from sweep.laws.curves import Window, check_confidence, described, fit_lines, title
+from sweep.laws.fits import Found, fitted
 from sweep.laws.lines import check_noise, crossover, fit_exponent, rounding
 from sweep.laws.loglog import Array, slopes, tends
-from sweep.laws.noise import BEYOND_DOUBT, corrected, noise_size, regress
+from sweep.laws.noise import BEYOND_DOUBT, roughness
 from sweep.laws.shapes import BENDS, ONE, OTHER_FUNCTIONS, THREE, TWO
 
 TELLING = 16
@@ -49,17 +49,13 @@ EXPONENTS = ("exponent", "exponent_low", "exponent_high")
 """Numbers of each law,"""
 OTHERS = (
     *("crossover", "crossover_low", "crossover_high", "verdict", "regimes", "evidence"),
-    *("width", "level", "residual", "points", "noisy"),
+    *("width", "level", "residual", "noisy"),
 )
 """and those of both, which stand behind them in the result of one line."""
 
 NAMES = {
     "exponent": "exponent of the power law",
-    "exponent_low": "lower end of the confidence interval of the exponent",
-    "exponent_high": "upper end of the confidence interval of the exponent",
     "crossover": "where the two laws meet",
-    "crossover_low": "lower end of the confidence interval of the crossover",
-    "crossover_high": "upper end of the confidence interval of the crossover",
     "verdict": "how many laws are beyond doubt, or what speaks against it",
     "regimes": "2 where two laws are beyond doubt: evidence above 10, meeting in the window; 0 where none is a law",
     "evidence": "by how much AICc and BIC prefer two laws to one, whatever its noise, and to functions that are none",
@@ -151,14 +147,18 @@ def fit_two_laws(
             raise SweepError("window does not go with windows, which say where the two lines are")
         return _in_windows(y, dim, windows, confidence=confidence, noise=noise, sigma=sigma)
     names = [f"{name} {law}" for law in LAWS for name in EXPONENTS] + list(OTHERS)
-    found = fits_by_line(names, lambda t, z, weights: _one(t, z, weights, confidence, noise), y, dim, window, sigma)
+
+    def each(t: Array, z: Array, errors: Array | None, bounds: Array | None) -> list[list[float]]:
+        tried = fitted((ONE, *BENDS, *OTHER_FUNCTIONS, THREE), t, z, errors)
+        return [_one(t, row, laws, confidence, noise) for row, laws in zip(z, tried, strict=True)]
+
+    found = fit_lines(names, ("verdict", VERDICTS), each, y, dim, window, sigma)
     axis = xr.DataArray(list(LAWS), dims="law", name="law")
     both: dict[str, Any] = {name: xr.concat([found[f"{name} {law}"] for law in LAWS], axis) for name in EXPONENTS}
-    both |= {name: found[name] for name in OTHERS} | {"verdict": in_words(found.verdict, VERDICTS)}
-    place, units = (str(c.attrs.get("units", "1")) for c in (y.coords[dim], y))
-    of = dict.fromkeys(("crossover", "crossover_low", "crossover_high"), place) | {"level": units}
+    both |= {name: found[name] for name in (*OTHERS, "points")}
+    units = {"crossover": str(y.coords[dim].attrs.get("units", "1")), "level": str(y.attrs.get("units", "1"))}
     attrs = {"y": title(y), "x": dim, "law": "equation (1) of sweep.laws.two_laws"}
-    return described(xr.Dataset(both), NAMES, of, attrs, confidence)
+    return described(xr.Dataset(both), NAMES, units, attrs, confidence)
 
 
 def _in_windows(y: xr.DataArray, dim: str, windows: tuple[Window, Window], **keys: Any) -> xr.Dataset:
@@ -176,16 +176,22 @@ def _in_windows(y: xr.DataArray, dim: str, windows: tuple[Window, Window], **key
     return found.assign(level=met.ordinate).assign_attrs(met.attrs)
 
 
-def _one(t: Array, z: Array, weights: Array | None, confidence: float, noise: bool | str | None) -> list[float]:
+def _one(t: Array, z: Array, tried: dict[str, Found], confidence: float, noise: bool | str | None) -> list[float]:
     """EXPONENTS of both laws and OTHERS of one line."""
-    tried = all_fitted((ONE, *BENDS, *OTHER_FUNCTIONS, THREE), t, z, weights)
-    two, known = tried[TWO.name], weights is not None
+    two = tried[TWO.name]
     size = math.sqrt(float(two.off @ two.off) / (t.size - 5))
-    noisy = known or (_is_noise(t, z, two.off, size) if noise is None else bool(noise))
+    noisy = two.weights is not None or (_is_noise(t, z, two.off, size) if noise is None else bool(noise))
     word = noise if isinstance(noise, str) else "noise" if noisy else "even"
     ends = _ends(two, t, word, confidence)  # the numbers, and the ends of their intervals
-    if noisy or noise_size(t, two.off) > SMOOTH_TO * size:
-        ends[1:] = _of_other_bends(tried, t, word, confidence, ends)
+    if noisy or roughness(t, two.off)[0] > SMOOTH_TO * size:
+        # over those of every bend of another shape that the points do not rule out
+        judged = {name: tried[name].aicc_under(t, word) for name in (law.name for law in BENDS) if name in tried}
+        alive = [name for name, aicc in judged.items() if aicc <= min(judged.values()) + OTHER_SHAPES]
+        others = np.array([_ends(tried[name], t, word, confidence)[1:] for name in alive])
+        low, high = np.fmin(ends[1], np.fmin.reduce(others[:, 0])), np.fmax(ends[2], np.fmax.reduce(others[:, 1]))
+        further = BEYOND_SHAPES * max(ends[1, 2] - low[2], high[2] - ends[2, 2])
+        low[2], high[2] = low[2] - further, high[2] + further
+        ends[1:] = low, high
     if not noisy:
         ends[1:] = _widened(t, z, *ends)
     ends[1:] = np.where(np.isnan(ends[1:]), [[-np.inf], [np.inf]], ends[1:])  # not determined
@@ -195,13 +201,13 @@ def _one(t: Array, z: Array, weights: Array | None, confidence: float, noise: bo
     width = math.exp(two.numbers[1]) * float(t[-1] - t[0]) / math.log(10)
     if evidence <= 0 and not noisy:  # straight to rounding: nothing meets anywhere
         places, width, level = np.array([np.nan, 0.0, np.inf]), math.nan, math.nan
-    if VERDICTS[verdict] in ("three laws", "no power law"):
+    if verdict in ("three laws", "no power law"):
         p_low, p_high, places = np.full((3, 3), np.nan)
         width = level = math.nan
-    if VERDICTS[verdict] == "no meeting in the window":
+    if verdict == "no meeting in the window":
         places[0] = np.nan
-    residual = math.expm1(min(float(abs(two.off).max()), 700.0))
-    return [*p_low, *p_high, *places, verdict, REGIMES[verdict], evidence, width, level, residual, t.size, noisy]
+    residual, code = math.expm1(min(float(abs(two.off).max()), 700.0)), VERDICTS.index(verdict)
+    return [*p_low, *p_high, *places, code, REGIMES[code], evidence, width, level, residual, noisy]
 
 
 def _is_noise(t: Array, z: Array, off: Array, size: float) -> bool:
@@ -213,8 +219,8 @@ def _is_noise(t: Array, z: Array, off: Array, size: float) -> bool:
     """
     if off.size < TELLING or size <= 8 * rounding(t, z):
         return False
-    share = float(noise_size(t, off)) / size
-    return bool((share > SCATTERED and size < 3 * noise_size(t, z)) or (off.size >= TELLING_MEMORY and share > ROUGH))
+    share = float(roughness(t, off)[0]) / size
+    return bool((share > SCATTERED and size < 3 * roughness(t, z)[0]) or (off.size >= TELLING_MEMORY and share > ROUGH))
 
 
 def _ends(found: Found, t: Array, word: str, confidence: float) -> Array:
@@ -225,27 +231,6 @@ def _ends(found: Found, t: Array, word: str, confidence: float) -> Array:
     return ends
 
 
-def _of_other_bends(tried: dict[str, Found], t: Array, word: str, confidence: float, ends: Array) -> Array:
-    """Intervals that reach over those of every bend of another shape that the points do not rule out."""
-    bends = [tried[law.name] for law in BENDS if law.name in tried]
-    judged = []
-    for found in bends:
-        columns = found.jacobian[:, np.isfinite(found.errors())]
-        if found.weights is None and word != "even" and columns.size:
-            deviance = float(regress(t, columns, found.off[None], word).deviance[0])
-            judged.append(float(corrected(deviance, t.size, found.law.numbers + 2)))
-        else:
-            judged.append(found.aicc)
-    low, high = ends[1:].copy()
-    for found, aicc in zip(bends, judged, strict=True):
-        if aicc <= min(judged) + OTHER_SHAPES:
-            _, below, above = _ends(found, t, word, confidence)
-            low, high = np.fmin(low, below), np.fmax(high, above)
-    further = BEYOND_SHAPES * max(ends[1, 2] - low[2], high[2] - ends[2, 2])
-    low[2], high[2] = low[2] - further, high[2] + further
-    return np.stack([low, high])
-
-
 def _widened(t: Array, z: Array, best: Array, low: Array, high: Array) -> Array:
     """Intervals that reach to where the local exponents tend; of the crossover, to where they are half-way between the
     laws and to where the tangents at the ends of the window meet."""
@@ -254,7 +239,7 @@ def _widened(t: Array, z: Array, best: Array, low: Array, high: Array) -> Array:
     local, mirrored = slopes(t, z, 5), -t[::-1]
     half = np.flatnonzero(np.diff(np.sign(local - (best[0] + best[1]) / 2)))
     place = t[half[np.argmin(abs(t[half] - best[2]))]] if half.size else best[2]
-    doubt = 2.5 * float(noise_size(t, z)) * np.array([_amplified(t), _amplified(mirrored)])
+    doubt = 2.5 * float(roughness(t, z)[0]) * np.array([_amplified(t), _amplified(mirrored)])
     ends = np.array([tends(t, local, doubt[0]), tends(mirrored, local[::-1], doubt[1])])
     low, high = low.copy(), high.copy()
     low[:2], high[:2] = np.minimum(low[:2], ends.min(axis=1) - doubt), np.maximum(high[:2], ends.max(axis=1) + doubt)
@@ -272,30 +257,26 @@ def _amplified(t: Array) -> float:
     return float(np.sqrt((slopes(near, np.eye(near.size), 5)[:, 0] ** 2).sum()))
 
 
-def _verdict(t: Array, tried: dict[str, Found], noisy: bool) -> tuple[int, float]:
-    """Position in VERDICTS, and by how much two laws are better than a line and than other functions.
+def _verdict(t: Array, tried: dict[str, Found], noisy: bool) -> tuple[str, float]:
+    """One of VERDICTS, and by how much two laws are better than a line and than other functions.
 
     By AICc, and BIC for many points. The noise of the line may be of any kind, that of all others is even.
     """
-    two, line = tried[TWO.name], tried[ONE.name]
+    two, line, three = tried[TWO.name], tried[ONE.name], tried.get(THREE.name)
     bends, others = ([tried[law.name] for law in laws if law.name in tried] for laws in (BENDS, OTHER_FUNCTIONS))
 
     def gain(simple: Found, better: Found) -> float:
         return min(simple.aicc - better.aicc, simple.bic - better.bic)
 
     evidence = min(gain(one, two) for one in (line, *others))
-    if (three := tried.get(THREE.name)) is not None:
-        nearest = min((*bends, *others), key=lambda fit: fit.aicc)
-        better = three.aicc < nearest.aicc - OTHER_SHAPES and gain(line, three) > BEYOND_DOUBT
-        if better and noisy and two.weights is None:  # nor with noise of any kind beside two
-            columns = nearest.jacobian[:, np.isfinite(nearest.errors())]
-            deviance = float(regress(t, columns, nearest.off[None]).deviance[0])
-            better = three.aicc < corrected(deviance, t.size, nearest.law.numbers + 2) - BEYOND_DOUBT
-        elif better and not noisy:
+    nearest = min((*bends, *others), key=lambda fit: fit.aicc)
+    if three and three.aicc < nearest.aicc - OTHER_SHAPES and gain(line, three) > BEYOND_DOUBT:
+        if not noisy:
             better = float(three.off @ three.off) < SMALLER**2 * min(float(fit.off @ fit.off) for fit in bends)
+        else:  # nor with noise of any kind beside two
+            better = three.aicc < nearest.aicc_under(t, "noise") - BEYOND_DOUBT
         if better:
-            return VERDICTS.index("three laws"), evidence
+            return "three laws", evidence
     if evidence > BEYOND_DOUBT:
-        return VERDICTS.index("two laws" if 0 <= two.numbers[0] <= 1 else "no meeting in the window"), evidence
-    no_law = max(gain(line, one) for one in others) > BEYOND_DOUBT
-    return VERDICTS.index("no power law" if no_law else "one law"), evidence
+        return "two laws" if 0 <= two.numbers[0] <= 1 else "no meeting in the window", evidence
+    return "no power law" if max(gain(line, one) for one in others) > BEYOND_DOUBT else "one law", evidence

@@ -246,7 +246,7 @@ def test_eight_points_are_enough_and_may_fall_or_have_gaps():
 @pytest.mark.parametrize(
     ("fit", "message"),
     [
-        (lambda y: sweep.compare_laws(y[:7], "x"), "at least 8 points of y, found 7"),
+        (lambda y: sweep.compare_laws(y[:7], "x"), "at least 8 points, found 7 of y"),
         (lambda y: sweep.compare_laws(y.expand_dims(a=[1.0, 2.0]), "x"), "one line"),
         (lambda y: sweep.compare_laws(-y, "x"), "positive values"),
         (lambda y: sweep.fit_two_laws(y, "nu"), "no axis 'nu'"),
