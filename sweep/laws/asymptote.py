@@ -64,20 +64,10 @@ def fit_correction(
 
     Parameters
     ----------
-    y : DataArray
-        Any shape; missing points are left out, and lines with a value that is not positive.
-    dim : str
-        Dimension of `y`, or 1-D coordinate along one; positive and monotone.
-    window : (low, high), optional
-        Ends in the unit of `dim`.
+    y, dim, window, confidence, noise, sigma
+        As of `fit_exponent`.
     end : "high" or "low"
         Where (1) tends to a power law.
-    confidence : float
-        Of the intervals.
-    noise : bool or "even", "uneven", "correlated", "outliers", optional
-        Whether there is noise, or of which kind. Default: as the points show.
-    sigma : number or DataArray, optional
-        Standard errors of the values, in the unit of y; then `noise` is not given.
 
     Returns
     -------

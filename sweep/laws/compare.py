@@ -37,14 +37,8 @@ def compare_laws(y: xr.DataArray, dim: str, window: Window | None = None, *, sig
 
     Parameters
     ----------
-    y : DataArray
-        One dimension; missing points, and those whose sigma is NaN, are left out.
-    dim : str
-        Its dimension, or 1-D coordinate along it; positive and monotone. Equal values are repeated measurements.
-    window : (low, high), optional
-        Ends in the unit of `dim`.
-    sigma : number or DataArray, optional
-        Standard errors of the values, in the unit of y. Default: unknown, and the same share of y for all.
+    y, dim, window, sigma
+        As of `fit_exponent`; y has one dimension. Without `sigma` errors are the same share of y for all points.
 
     Returns
     -------

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from sweep.errors import SweepError
 from sweep.laws.loglog import EPSILON, FEWEST, Array
-from sweep.words import Table, kind, require_dataset
+from sweep.words import Table, kind
 
 Window = tuple[float | None, float | None]
 
@@ -34,14 +34,6 @@ def check_output(y: Any) -> None:
         raise SweepError(f"expected one output, e.g. ds.period; found {kind(y)}")
     if y.dtype.kind not in "fiub":
         raise SweepError(f"{title(y)}: expected real numbers, found {y.dtype}")
-
-
-def check_dataset(name: str, given: Any, maker: str = "", needs: Sequence[str] = ()) -> None:
-    """Raises SweepError where what `sweep.name` was given is no Dataset with these variables; `maker` gives one."""
-    require_dataset(name, given, maker)
-    missing = [variable for variable in needs if variable not in given]
-    if missing:
-        raise SweepError(f"sweep.{name}: this Dataset has no {', '.join(map(str, missing))}")
 
 
 def check_confidence(confidence: float) -> None:
@@ -238,7 +230,8 @@ def stated_error(dataset: xr.Dataset, name: str) -> xr.DataArray:
 
     Of the output's shape; 0 where nothing is stated, inf where no error is known.
     """
-    check_dataset("fit_exponent", dataset, needs=[name])
+    if name not in dataset:
+        raise SweepError(f"bound: this Dataset has no {name}")
     rtol = dataset["rtol"] if "rtol" in dataset.coords else float(dataset.attrs.get("rtol", 0.0))
     found = like(rtol, dataset[name], "rtol")
     if "error_bound" in dataset:

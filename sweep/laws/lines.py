@@ -14,7 +14,6 @@ from sweep.laws.curves import (
     Window,
     alike,
     check_confidence,
-    check_dataset,
     check_end,
     described,
     fit_lines,
@@ -113,15 +112,13 @@ def fit_exponent(
     Returns
     -------
     Dataset
-        `exponent`, `exponent_low`, `exponent_high`, `exponent_error` [1]; `verdict` and `kind`, words; `fits`;
-        `noisy`, 1 where there is noise; `prefactor`, `prefactor_error` (y at dim = 1, in the unit of y); `drift`
-        [1], the change of the exponent from one end of the window to the other by a parabola through the same
-        points; `residual` [1], the largest relative distance of a point from the line; `points`; `low`, `high`,
-        the first and last abscissa used, `start`, `stop`, y there; `centre`, `level`, `level_error`, where the line is
-        known best, y there, and its relative standard error; `limit_low`, `limit_high`, to where the local exponent
-        tends below and above the window, as far as a meeting of two lines allows for: they are no interval of the
-        exponent. The dimensions are those of `y` but `dim`. NaN where there is no exponent. `attrs["summary"]` is a
-        table of exponents, intervals and verdicts for printing.
+        `exponent` with `exponent_low`, `exponent_high`, `exponent_error` [1]; `verdict` and `kind`, words; `fits`;
+        `noisy`; `prefactor`, `prefactor_error` (y at dim = 1, in the unit of y); `drift` [1], the change of the
+        exponent across the window by a parabola; `residual` [1]; `points`; `low`, `high`, the first and last abscissa,
+        `start`, `stop`, y there; `centre`, `level`, `level_error`, where the line is known best, y there, and its
+        relative standard error; `limit_low`, `limit_high`, to where the local exponent tends beyond the window, as far
+        as a meeting of two lines allows for. Each says what it is in its `long_name`. The dimensions are those of `y`
+        but `dim`. NaN where there is no exponent. `attrs["summary"]` is a table for printing.
 
         With `towards` all of these run along `window`, the widest first. The exponent has a *plateau* where, from some
         window on, one power law describes each of at least three, and their intervals have exponents in common: the
@@ -296,8 +293,7 @@ def _range(t: Array, z: Array, confidence: float) -> tuple[float, float]:
         value = float(corrected(t.size * math.log(square), t.size, degree + 2))
         if value < best:
             best = value
-            derivatives = [np.polynomial.chebyshev.chebder(one) for one in np.eye(degree + 1)]
-            steep = np.stack([np.polynomial.chebyshev.chebval(u, d) * np.ones_like(u) for d in derivatives], axis=1)
+            steep = np.polynomial.chebyshev.chebval(u, np.polynomial.chebyshev.chebder(np.eye(degree + 1))).T
             steep = np.linalg.solve(back.T, steep.T).T * 2 / (t[-1] - t[0])
             slope = steep @ (basis.T @ z)
             reach = stdtrit(left, (1 + confidence) / 2) * np.sqrt((steep**2).sum(axis=1) * square / left)
@@ -330,44 +326,29 @@ def _exact(t: Array, z: Array, off: Array, bound: Array, slope: Array) -> dict[s
 
 
 def crossover(low_fit: xr.Dataset, high_fit: xr.Dataset) -> xr.Dataset:
-    """Where two power laws meet: `abscissa` with `abscissa_low`, `abscissa_high`, `abscissa_error`, and `ordinate`.
+    """Where two power laws, from `fit_exponent` over two windows, meet: `abscissa` with its interval, `abscissa_error`,
+    and `ordinate`.
 
     The interval holds all places where the two lines differ by less than their intervals at that place, taken as
     independent (Fieller). Where there is no noise, it is a bound: how far the place moves if a law is not the line
     through its window but goes through the outer end of it with the exponent to which the local one tends there. It
-    does not shrink with the number of points. The error is half the interval.
-
-    Parameters
-    ----------
-    low_fit, high_fit : Dataset
-        From `fit_exponent`, over windows that share at most an end point.
-
-    Raises
-    ------
-    SweepError
-        If the windows overlap or the two lines are parallel within their errors.
+    does not shrink with the number of points. The error is half the interval. Raises SweepError where the windows
+    share more than an end, or the lines are parallel within their errors.
     """
-    for fit in (low_fit, high_fit):
-        check_dataset("crossover", fit, "fit_exponent", ["exponent", "level", "limit_low"])
-    for name in ("y", "x"):
-        if low_fit.attrs.get(name) != high_fit.attrs.get(name):
-            raise SweepError(f"the fits are of different {name}: {low_fit.attrs.get(name)}, {high_fit.attrs.get(name)}")
     if bool(((low_fit.low < high_fit.high) & (high_fit.low < low_fit.high)).any()):
         raise SweepError("the windows of the two fits overlap, so their errors are not independent; take them apart")
-    fits, ends = (low_fit, high_fit), (("limit_low", "start", "low"), ("limit_high", "stop", "high"))
-    swapped = bool((low_fit.centre > high_fit.centre).all())
+    fits, ends = (low_fit, high_fit), [("limit_low", "start", "low"), ("limit_high", "stop", "high")]
     centres = [np.log(fit.centre) for fit in fits]
+    if bool((centres[0] > centres[1]).all()):
+        ends.reverse()
     middle = (centres[0] + centres[1]) / 2  # logarithms counted from here keep their digits
-    lines = [(f.exponent, np.log(f.level), c - middle) for f, c in zip(fits, centres, strict=True)]
-    outer = [  # the lines through the outer ends, towards where the exponents tend
-        (f[limit], np.log(f[value]), np.log(f[end]) - middle)
-        for f, (limit, value, end) in zip(fits, ends[:: -1 if swapped else 1], strict=True)
-    ]
-    wide = []
-    for fit, line in zip(fits, lines, strict=True):
+    lines, outer, wide = [], [], []  # outer: through the outer ends, towards where the exponents tend
+    for fit, centre, (limit, value, end) in zip(fits, centres, ends, strict=True):
+        lines.append((fit.exponent, np.log(fit.level), centre - middle))
+        outer.append((fit[limit], np.log(fit[value]), np.log(fit[end]) - middle))
         reach = ((fit.exponent_high - fit.exponent_low) / 2).where(fit.noisy == 1, fit.exponent_error)
         factor = (reach / fit.exponent_error).where(fit.exponent_error > 0, 1.0)
-        wide.append((reach, fit.level_error * factor, line[2]))
+        wide.append((reach, fit.level_error * factor, centre - middle))
     slope = (lines[1][0] - lines[0][0]).where(abs(lines[1][0] - lines[0][0]) > np.hypot(wide[0][0], wide[1][0]))
     if not slope.notnull().any():
         raise SweepError("the two laws have the same exponent within their errors, so they meet nowhere")

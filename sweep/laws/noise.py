@@ -48,25 +48,15 @@ FAR = 3.5
 class Regression(NamedTuple):
     """Least squares of lines (m,) on k columns under each phi of the grid (p,), over all a and c."""
 
-    weight: Array
-    """Of each phi (p, m), of sum 1."""
-    value: Array
-    """The numbers (p, k, m),"""
-    error: Array
-    """and their standard errors (p, k, m)."""
-    size: Array
-    """Of the noise at each point (m, n), up to a factor."""
-    left: int
-    """Degrees of freedom."""
-    share: Array
-    """Of each phi in the level of `interval` (p,): phi = 0 counts whole, more correlation less."""
-    deviance: Array
-    """Minus twice the logarithm of the likelihood (m,), under the noise that suits best; less n ln 2 pi e. What
-    rounding leaves is no distance."""
-    evidence: Array
-    """Logarithm of the restricted likelihood of each line (m,), summed over the grid."""
-    chance: Array
-    """That the columns behind those that are used tell so much by chance (m,)."""
+    weight: Array  # of each phi (p, m), of sum 1
+    value: Array  # the numbers (p, k, m)
+    error: Array  # and their standard errors (p, k, m)
+    size: Array  # of the noise at each point (m, n), up to a factor
+    left: int  # degrees of freedom
+    share: Array  # of each phi in the level of `interval` (p,): phi = 0 counts whole, more correlation less
+    deviance: Array  # -2 ln likelihood (m,), of the noise that suits best, less n ln 2 pi e; rounding is no distance
+    evidence: Array  # logarithm of the restricted likelihood of each line (m,), summed over the grid
+    chance: Array  # that the columns behind those that are used tell so much by chance (m,)
 
     def mean(self) -> tuple[Array, Array]:
         """The numbers and their standard errors, (m, k) each."""
@@ -110,9 +100,8 @@ class Regression(NamedTuple):
 def regress(t: Array, columns: Array, z: Array, noise: str = "noise", used: int | None = None) -> Regression:
     """Lines z (m, n) on the first `used` of the columns (n, k), under each noise of the word.
 
-    Sums over points are of three kinds alone: over all, over the first and the last, over pairs of neighbours.
-
-    So phi costs no sums, and the columns before any are those of the Cholesky factor before it.
+    Sums over points are of three kinds alone: over all, over the first and the last, over pairs of neighbours. So phi
+    costs no sums, and the columns before any are those of the Cholesky factor before it.
     """
     phi, trend, ends = NOISES[noise]
     (n, k), one = columns.shape, phi[:, None, None]
@@ -128,42 +117,43 @@ def regress(t: Array, columns: Array, z: Array, noise: str = "noise", used: int 
     log_size -= log_size.mean(axis=1, keepdims=True)
     x, y = (np.exp(-log_size)[:, :, None] * part for part in (basis, off))
 
-    def sums(a: Array, b: Array) -> Array:
-        over, outer = a.transpose(0, 2, 1), [0, -1]
-        whole, pairs = over @ b, over[:, :, 1:] @ b[:, :-1] + over[:, :, :-1] @ b[:, 1:]
-        first_and_last = over[:, :, outer] @ b[:, outer]
-        by_phi = phi[:, None, None, None]
-        found: Array = whole + by_phi**2 * (whole - first_and_last) - by_phi * pairs
+    def sums(whole: Array, outer: Array, pairs: Array) -> Array:
+        by_phi = phi.reshape(-1, *[1] * whole.ndim)
+        found: Array = whole + by_phi**2 * (whole - outer) - by_phi * pairs
         return found
 
-    factor = np.linalg.cholesky(sums(x, x))
-    solved = np.linalg.solve(factor, sums(x, y))
-    whole, outer = (y**2).sum(axis=1), y[:, 0] ** 2 + y[:, -1] ** 2
-    square = whole + one**2 * (whole - outer) - 2 * one * (y[:, 1:] * y[:, :-1]).sum(axis=1)
+    def products(a: Array, b: Array) -> Array:
+        over, both = a.transpose(0, 2, 1), [0, -1]
+        pairs = over[:, :, 1:] @ b[:, :-1] + over[:, :, :-1] @ b[:, 1:]
+        return sums(over @ b, over[:, :, both] @ b[:, both], pairs)
+
+    factor = np.linalg.cholesky(products(x, x))
+    solved = np.linalg.solve(factor, products(x, y))
+    square = sums((y**2).sum(axis=1), y[:, 0] ** 2 + y[:, -1] ** 2, 2 * (y[:, 1:] * y[:, :-1]).sum(axis=1))
     squares = np.maximum(square[:, :, None] - np.cumsum(solved**2, axis=2), 1e-28)
     own, (flat, cautious) = -np.log1p(-(one**2)), _priors(phi, n)
-    before = -0.5 * own - 0.5 * (steep**2 + round_**2) / 1.6**2
 
-    def weights(count: int, prior: Array) -> Array:
+    def likelihoods(count: int, prior: Array) -> Array:
         """Logarithms of restricted likelihoods on so many columns, with the prior."""
         determinant = np.log(np.einsum("pskk->psk", factor[:, :, :count, :count])).sum(axis=2)[:, :, None]
-        likely = before - determinant - 0.5 * (n - count) * np.log(squares[:, :, count - 1])
-        return prior[:, None, None] + likely  # type: ignore[no-any-return]
+        before = prior[:, None, None] - 0.5 * own - 0.5 * (steep**2 + round_**2) / 1.6**2
+        found: Array = before - determinant - 0.5 * (n - count) * np.log(squares[:, :, count - 1])
+        return found
 
     chance = np.ones(len(z))
     if k > used:
-        log, ratio = weights(k, flat), squares[:, :, used - 1] / squares[:, :, k - 1] - 1
+        log, ratio = likelihoods(k, flat), squares[:, :, used - 1] / squares[:, :, k - 1] - 1
         weight = np.exp(log - log.max(axis=(0, 1)))
         beyond = fdtrc(k - used, n - k, ratio * (n - k) / (k - used))
         chance = (weight * beyond).sum(axis=(0, 1)) / weight.sum(axis=(0, 1))
 
     rounding = (ROUNDING * (1 + abs(z).max(axis=1))) ** 2
     deviance = (n * np.log(squares[:, :, used - 1] * scale**2 / n + rounding) + own).min(axis=(0, 1))
-    left, inverse = n - used, np.linalg.inv(factor[:, :, :used, :used])
-    inside = np.linalg.inv(back[:used, :used]) @ inverse.transpose(0, 1, 3, 2)
-    value = (inside @ solved[:, :, :used] * scale) + (np.linalg.inv(back[:used, :used]) @ start[:used])
+    left, turn = n - used, np.linalg.inv(back[:used, :used])
+    inside = turn @ np.linalg.inv(factor[:, :, :used, :used]).transpose(0, 1, 3, 2)
+    value = inside @ solved[:, :, :used] * scale + turn @ start[:used]
     variance = (inside**2).sum(axis=3)[..., None] * (squares[:, :, used - 1] / max(left, 1) * scale**2)[:, :, None]
-    log = weights(used, cautious)
+    log = likelihoods(used, cautious)
     highest = log.max(axis=(0, 1))
     weight = np.exp(log - highest)
     total = weight.sum(axis=(0, 1))
@@ -173,8 +163,7 @@ def regress(t: Array, columns: Array, z: Array, noise: str = "noise", used: int 
     middle = np.einsum("psm,pskm->pkm", part, value)
     error = np.sqrt(np.einsum("psm,pskm->pkm", part, variance + (value - middle[:, None]) ** 2))
     size = 1 / np.einsum("psm,sn->mn", weight, np.exp(-log_size))
-    evidence = highest + np.log(total) - left * np.log(scale)
-    share = np.sqrt(1 - np.maximum(phi, 0.0))
+    evidence, share = highest + np.log(total) - left * np.log(scale), np.sqrt(1 - np.maximum(phi, 0.0))
     return Regression(of_phi, middle, error, size, left, share, deviance, evidence, chance)
 
 

@@ -90,19 +90,11 @@ def fit_two_laws(
 
     Parameters
     ----------
-    y : DataArray
-        Any shape; missing points are left out, and lines with a value that is not positive.
-    dim : str
-        Dimension of `y`, or 1-D coordinate along one; positive and monotone.
-    window : (low, high), optional
-        Ends in the unit of `dim`, both included.
-    confidence : float
-        Of the intervals.
+    y, dim, window, confidence, sigma
+        As of `fit_exponent`.
     noise : bool or "even", "uneven", "correlated", "outliers", optional
         Whether there is noise, or of which kind. Default: as the points show; fewer than 16 show nothing, and intervals
         are then wide enough for both.
-    sigma : number or DataArray, optional
-        Standard errors of the values, in the unit of y; then `noise` is not given.
     windows : pair of (low, high), optional
         Fit a straight line in each of two windows, which share at most an end point, and say where the two lines
         meet; nothing is fitted between them.
