@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -28,13 +27,13 @@ def require_cells(name: str, dataset: xr.Dataset) -> None:
         raise SweepError(f"sweep {name}: this is a summary, which keeps no cells; run its study without [summary]")
 
 
-def cell_study(dataset: xr.Dataset, study: Study) -> Study:
-    """The study of the one cell that a Dataset has: everything is fixed but one parameter, an axis of one value.
+def study_of(cells: xr.Dataset, study: Study) -> Study:
+    """The study of cells of a result, as a zip; what is the same in all of them is fixed, as a method may do no other.
 
     Parameters
     ----------
-    dataset : Dataset
-        One cell of a result; its parameters are coordinates without a dimension of the grid.
+    cells : Dataset
+        One cell, without a dimension of the grid, or some along the first one; their method and rtol are the same.
     study : Study
         What the result came from.
 
@@ -43,33 +42,30 @@ def cell_study(dataset: xr.Dataset, study: Study) -> Study:
     SweepError
         A parameter's values are no longer there, or stand in another unit.
     """
-    fixed: dict[str, Any] = {}
+    first = next(field.name for field in study.kernel.parameters if field.default is None)
+    axes, fixed = dict[str, Axis](), dict[str, Any]()
     for field in study.kernel.parameters:
         name = study.follows.get(field.name, field.name)
-        if name not in dataset.coords:
+        if name not in cells.coords:
             raise SweepError(f"{name}: the dataset has lost this coordinate; take a cell of the result as it was read")
-        value = dataset[name].values
-        if value.dtype.kind not in "fiu":
-            fixed[field.name] = float(field.choices[str(value.item())])
-            continue
-        if dataset[name].attrs.get("units", field.unit) != field.unit:
+        column = cells[name]
+        if column.dtype.kind not in "fiu":
+            values = np.vectorize(lambda word, field=field: float(field.choices[str(word)]))(column.values)
+        elif column.attrs.get("units", field.unit) != field.unit:
             raise SweepError(f"{name}: stands in another unit; take a cell of the result as it was read")
-        fixed[field.name] = frozen(value.reshape(study.shape(field))) if field.dims else float(value)
-    first = next(field.name for field in study.kernel.parameters if field.default is None)
-    axes = {first: Axis(first, frozen([fixed.pop(first)]), "values")}
-    plain: dict[str, Any] = {"design": "product", "blocks": (), "where": "", "summary": None, "follows": {}}
-    asked = {name: dataset[name].item() for name in SETTINGS if name in study.axes}
+        else:
+            values = column.values
+        # those that all cells share stand there once
+        values = values.reshape(-1, *study.shape(field))
+        if field.name == first or (values != values[0]).any():
+            axes[field.name] = Axis(
+                field.name, frozen(np.resize(values, (cells[STATUS].size, *values.shape[1:]))), "values"
+            )
+        else:
+            fixed[field.name] = frozen(values[0]) if field.dims else float(values[0])
+    plain: dict[str, Any] = {"design": "zip", "blocks": (), "where": "", "summary": None, "follows": {}}
+    asked = {name: cells[name].values.flat[0].item() for name in SETTINGS if name in study.axes}
     return dataclasses.replace(study, axes=axes, fixed=fixed, **plain, **asked)
-
-
-def together(alone: Sequence[Study]) -> Study:
-    """Studies of one cell each as one; what is the same in all of them stays fixed, as a method may do no other."""
-    cells = [{**study.fixed, **{name: axis.values[0] for name, axis in study.axes.items()}} for study in alone]
-    first = cells[0]
-    swept = [n for n in first if n in alone[0].axes or any(not np.array_equal(cell[n], first[n]) for cell in cells)]
-    axes = {name: Axis(name, frozen([cell[name] for cell in cells]), "values") for name in swept}
-    fixed = {name: value for name, value in first.items() if name not in axes}
-    return dataclasses.replace(alone[0], design="zip", axes=axes, fixed=fixed)
 
 
 @dataclass(frozen=True)
@@ -130,7 +126,7 @@ def report_cell(dataset: xr.Dataset, study: Study) -> CellReport:
         axes = ", ".join(f"{dim} ({n} values)" for dim, n in longer.items())
         raise SweepError(f"sweep cell: name one cell; these axes have several values still: {axes}")
     dataset = dataset.squeeze(list(dataset[STATUS].dims)).compute()
-    alone = cell_study(dataset, study)
+    alone = study_of(dataset, study)
     numbers = [name for name in study.outputs if not dataset[name].dims]
     words, again = {int(status): status for status in Status}, {}
     for method in (study.kernel.methods[k].name for k in usable_methods(alone)):

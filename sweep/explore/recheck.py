@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from kernels.interface import FIRST_REFUSAL, Status
 from sweep.cells.sample import relative_error, solved, with_method
@@ -15,12 +15,9 @@ from sweep.cells.schema import METHOD_USED, STATUS
 from sweep.cells.solve import GIVEN_UP, among
 from sweep.cells.turns import usable_methods
 from sweep.errors import SweepError
-from sweep.explore.one_cell import cell_study, require_cells, together
+from sweep.explore.one_cell import require_cells, study_of
 from sweep.results.statuses import cell_values
 from sweep.study.model import SMALLEST_RTOL, Study
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 CLOSER = 100.0
 """A second opinion is asked for at rtol over this, or at the smallest rtol."""
@@ -110,64 +107,60 @@ def check(dataset: xr.Dataset, study: Study, sample: int = 200, seed: int = 0) -
     if not len(ok):
         raise SweepError("no cell is OK, so there is nothing to check")
     drawn = np.sort(np.random.default_rng(seed).choice(ok, min(sample, len(ok)), replace=False))
-    places = np.transpose(np.unravel_index(drawn, dataset[STATUS].shape))
-    cells = [dataset.isel(dict(zip(dataset[STATUS].dims, place, strict=True))).compute() for place in places]
-    alone = [cell_study(cell, study) for cell in cells]
-    used = [study.kernel.methods[cell[METHOD_USED].item()].name for cell in cells]
-    compared = [field.name for field in study.asked if not field.of_method]
-    own = ":" in study.kernel_name
-    sizes = {name: max(float(abs(cell[name]).max()) for cell in cells) if own else 0.0 for name in compared}
-    compared = [name for name in compared if not own or sizes[name] > NOTHING]
-    beyond, worst = 0, dict[str, Any]()
-    opinions = _second_opinions(alone, used)
-    for i, (other, error, values) in opinions.items():
-        off = {
-            name: float(relative_error(cells[i][name].values[None], values[name][None], sizes[name])[0])
-            for name in compared
+    places = zip(dataset[STATUS].dims, np.unravel_index(drawn, dataset[STATUS].shape), strict=True)
+    cells = dataset.isel({dim: xr.DataArray(place, dims="cell") for dim, place in places}).compute()
+    cells = cells.transpose("cell", ...)
+    used, methods = cells[METHOD_USED].values, [method.name for method in study.kernel.methods]
+    rtol = cells["rtol"].values if "rtol" in study.axes else np.full(len(drawn), study.rtol)
+    by, error, values = _second_opinions(cells, study, rtol)
+
+    judged, own = by >= 0, ":" in study.kernel_name
+    sizes = {field.name: float(abs(cells[field.name]).max()) if own else 0.0 for field in study.asked}
+    compared = [f.name for f in study.asked if not f.of_method and (not own or sizes[f.name] > NOTHING)]
+    off = np.stack([relative_error(cells[name].values, values[name], sizes[name]) for name in compared])
+    beyond, number = int((judged & (off.max(axis=0) > rtol + error)).sum()), int(judged.sum())
+    worst = dict[str, Any]()
+    if number:
+        i = int(np.where(judged, off.max(axis=0) / rtol, -1.0).argmax())
+        output = compared[off[:, i].argmax()]
+        value, again = cells[output].values[i], values[output][i]
+        place = np.unravel_index(np.argmax(abs(value - again)), again.shape)
+        worst = {
+            "cell": cell_values(dataset, int(drawn[i])),
+            "output": output,
+            "values": ((methods[used[i]], value[place].item()), (methods[by[i]], again[place].item())),
+            "off": float(off[:, i].max() / rtol[i]),
         }
-        output = max(off, key=lambda name: off[name])
-        beyond += off[output] > alone[i].rtol + error
-        if not worst or off[output] / alone[i].rtol > worst["off"]:
-            value, again = cells[i][output].values, values[output]
-            place = np.unravel_index(np.argmax(abs(value - again)), again.shape)
-            worst = {
-                "cell": cell_values(dataset, int(drawn[i])),
-                "output": output,
-                "values": ((used[i], value[place].item()), (other, again[place].item())),
-                "off": off[output] / alone[i].rtol,
-            }
-    by_another = sum(other != used[i] for i, (other, *_) in opinions.items())
-    limit = _limit(beyond, len(opinions), len(ok))
-    return Checked(len(ok), len(drawn), len(opinions), by_another, beyond, limit, worst)
+    by_another = int((judged & (by != used)).sum())
+    return Checked(len(ok), len(drawn), number, by_another, beyond, _limit(beyond, number, len(ok)), worst)
 
 
-def _second_opinions(alone: Sequence[Study], used: Sequence[str]) -> dict[int, tuple[str, float, dict[str, Any]]]:
-    """By cell: a method, what it is right to, and its outputs; none of cells that no method solves closely enough.
+def _second_opinions(cells: xr.Dataset, study: Study, rtol: Any) -> tuple[Any, Any, dict[str, Any]]:
+    """Of each cell the number of a method, what that is right to, and its outputs; -1 where none solves it closely.
 
     Where a method finds that the scene has no such answer, the outputs are NaN, and differ from any value.
     """
-    able = [[study.kernel.methods[k].name for k in usable_methods(study)] for study in alone]
+    used, methods = cells[METHOD_USED].values, study.kernel.methods
+    able = np.zeros((len(used), len(methods)), bool)
+    for i, row in enumerate(able):
+        row[list(usable_methods(study_of(cells.isel(cell=i), study)))] = True
+    by, errors = np.full(len(used), -1), np.full(len(used), np.nan)
+    values = {field.name: np.full(cells[field.name].shape, np.nan) for field in study.asked}
     # those that say what they are right to come first, and the method that solved a cell last
-    methods = sorted(alone[0].kernel.methods, key=lambda m: m.bound is None and not m.estimates)
-    turns = itertools.product((GOOD, 1.0), (False, True), (method.name for method in methods))
-    found: dict[int, tuple[str, float, dict[str, Any]]] = {}
-    for good, last, name in turns:
-        for rtol in {study.rtol for study in alone}:
-            todo = [
-                i
-                for i, study in enumerate(alone)
-                if i not in found and study.rtol == rtol and name in able[i] and (name == used[i]) == last
-            ]
-            if not todo:
-                continue
-            closer = max(rtol / CLOSER, SMALLEST_RTOL)
-            cells = solved(with_method(together([alone[i] for i in todo]), name, closer))
-            none = (cells.status >= FIRST_REFUSAL) & ~among(cells.status, GIVEN_UP)
-            for row, i in enumerate(todo):
-                status, error = cells.status[row], 0.0 if none[row] else float(cells.error[row])
-                if none[row] or (status in (Status.OK, Status.INACCURATE) and error <= rtol / good):
-                    found[i] = name, error, {output: column[row] for output, column in cells.outputs.items()}
-    return found
+    order = sorted(range(len(methods)), key=lambda k: methods[k].bound is None and not methods[k].estimates)
+    for good, last, k, asked in itertools.product((GOOD, 1.0), (False, True), order, np.unique(rtol).tolist()):
+        todo = np.flatnonzero((by < 0) & (rtol == asked) & able[:, k] & ((used == k) == last))
+        if not len(todo):
+            continue
+        some = study_of(cells.isel(cell=todo), study)
+        again = solved(with_method(some, methods[k].name, max(asked / CLOSER, SMALLEST_RTOL)))
+        none = (again.status >= FIRST_REFUSAL) & ~among(again.status, GIVEN_UP)
+        error = np.where(none, 0.0, again.error)
+        solves = none | (np.isin(again.status, (Status.OK, Status.INACCURATE)) & (error <= asked / good))
+        by[todo[solves]], errors[todo[solves]] = k, error[solves]
+        for name, column in again.outputs.items():
+            values[name][todo[solves]] = column[solves]
+    return by, errors, values
 
 
 def _limit(beyond: int, judged: int, cells: int) -> float:
