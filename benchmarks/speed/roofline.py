@@ -41,8 +41,7 @@ import sweep
 from kernels import catalogue
 from kernels.interface import FIRST_REFUSAL, Method
 from sweep.cells.grid import Grid, empty_cells
-from sweep.cells.solve import Solver
-from sweep.cells.turns import usable_methods
+from sweep.cells.solve import Solver, usable_methods
 from sweep.show.kernels import starter
 from sweep.study.model import Study
 

@@ -28,8 +28,8 @@ from engine import disk_seconds, foliot, kernel_seconds, run_seconds, seconds, w
 
 import sweep
 from sweep.cells.fingerprint import fingerprint
-from sweep.cells.output_schema import output_schema
 from sweep.cells.partition import boxes
+from sweep.cells.reduce import output_schema
 from sweep.cells.schema import columns
 from sweep.cells.solve import Solver
 from sweep.file import disk

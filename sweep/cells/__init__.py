@@ -1,17 +1,14 @@
 """A grid of cells, how it is cut, and how a cell is solved. Nothing here touches a result's file.
 
 Others may use
-    `grid`           Grid: the cells of a study
-    `partition`      blocks of cells, and row blocks, which a summary reduces to one row
-    `timing`         a timed sample of the grid, and blocks of a size that follows from it
-    `sample`         some cells of a study as a study of their own
-    `schema`         what a result of cells holds, as CF names it
-    `output_schema`  what any result holds, of cells or a summary, and what a part of it does
-    `block`          a study cut into blocks, and how one of them is computed
-    `solve`          Solver: one cell, by the method asked for or by the cheapest
-    `turns`          the methods that may solve a study, and in which order cells are tried by them
-    `guard`          Guard: a bad cell costs one cell
-    `reduce`         Reducer: cells to rows, rows to one
-    `compiling`      tells what is compiled
-    `fingerprint`    what decides the numbers, and in what two of them differ
+    `grid`         Grid: the cells of a study
+    `partition`    blocks of cells, and row blocks, which a summary reduces to one row
+    `timing`       a timed sample of the grid, and blocks of a size that follows from it
+    `sample`       some cells of a study as a study of their own
+    `schema`       what a result of cells holds, as CF names it
+    `solve`        Solver: one cell, by the method asked for or by the cheapest; which methods may solve a study
+    `reduce`       what any result holds, of cells or a summary; Reducer: cells to rows, rows to one
+    `block`        a study cut into blocks, and how one of them is computed; Guard: a bad cell costs one cell
+    `compiling`    tells what is compiled
+    `fingerprint`  what decides the numbers, and in what two of them differ
 """

@@ -1,24 +1,28 @@
-"""A study cut into blocks of rows, how one of them is computed, and what a timed sample says of all."""
+"""A study cut into blocks of rows, how one of them is computed, and what a timed sample says of all.
+
+A bad cell costs one cell: what makes a kernel raise, die or run for ever is found by halving, and FAILED.
+"""
 
 from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Protocol
 
+import numpy as np
+
+from kernels.interface import Status
 from sweep.cells.compiling import Compiling, work_clock
-from sweep.cells.grid import Grid, empty_cells
-from sweep.cells.guard import told
-from sweep.cells.output_schema import part_columns
+from sweep.cells.grid import Cells, Grid, empty_cells
 from sweep.cells.partition import Partition, row_blocks
-from sweep.cells.reduce import Reducer, seconds_a_cell
+from sweep.cells.reduce import Reducer, part_columns, seconds_a_cell
 from sweep.cells.schema import cells_of, columns
+from sweep.cells.solve import NONE, Solver
 from sweep.cells.timing import Sample, take_sample, tolerated
 from sweep.errors import SweepError
 
 if TYPE_CHECKING:
-    from sweep.cells.guard import SolveCells
     from sweep.study.model import Study
 
 SolveBlock = Callable[[int, int, Mapping[str, Any], Any], None]
@@ -65,8 +69,6 @@ def row_shape(study: Study) -> tuple[int, ...]:
 
 def block_solver(study: Study, solver: SolveCells | None = None) -> SolveBlock:
     """Computes rows into the columns of a block; of cells, only those wanted (None: all). For one thread at a time."""
-    from sweep.cells.solve import Solver
-
     solver = solver or Solver(study)
     if study.summary is not None:
         reducer = Reducer(study, solver)
@@ -76,8 +78,6 @@ def block_solver(study: Study, solver: SolveCells | None = None) -> SolveBlock:
 
 def sampled_study(study: Study, compiling: Compiling | None = None) -> Sample:
     """Compiles the kernel and times a sample of the grid. Raises SweepError where the kernel always fails."""
-    from sweep.cells.solve import Solver
-
     compiling = compiling or Compiling(study.kernel, study.kernel_name)
     sample = sampled_by(Solver(replace(study, kernel=compiling.kernel)), study, work_clock)
     compiling.remember()
@@ -115,3 +115,76 @@ def faults_reported(what: str) -> Iterator[None]:
         raise SweepError("out of memory; fewer workers need less; what is finished is kept") from fault
     except Exception as fault:
         raise SweepError(f"{what} ({told(fault)}); what is finished is kept") from fault
+
+
+class SolveCells(Protocol):
+    """What `Solver` does, here or in a process of its own."""
+
+    grid: Grid
+
+    def solve(self, start: int, cells: Cells, wanted: Any = None) -> None:
+        """Fills the columns of the cells from number `start` on. Raises what the kernel does."""
+
+
+class Unsolved(Exception):
+    """What became of cells; its text is the whole reason."""
+
+
+@dataclass(frozen=True)
+class BadCell:
+    """A cell that FAILED: its number, its values on the axes, and what the kernel did."""
+
+    cell: int
+    values: Mapping[str, str]
+    reason: str
+
+    def __str__(self) -> str:
+        values = " ".join(f"{name}={value}" for name, value in self.values.items())
+        return f"cell {self.cell} FAILED ({values}): {self.reason}"
+
+
+class Guard:
+    """Solves cells as a solver does, but never fails because of one.
+
+    Parameters
+    ----------
+    solver : SolveCells
+    report : callable
+        Told of every cell that FAILED.
+    """
+
+    def __init__(self, solver: SolveCells, report: Callable[[BadCell], None]) -> None:
+        self._solver, self._report, self.grid = solver, report, solver.grid
+
+    def solve(self, start: int, cells: Cells, wanted: Any = None) -> None:
+        """As `Solver.solve`; of cells with which it raises, each half is tried. Raises SweepError, MemoryError."""
+        if wanted is not None and not wanted.any():
+            return
+        try:
+            self._solver.solve(start, cells, wanted)
+            return
+        except (SweepError, MemoryError):
+            raise
+        except Exception as fault:
+            reason = told(fault)
+        if cells.number > 1:
+            middle = cells.number // 2
+            for rows in (slice(0, middle), slice(middle, cells.number)):
+                self.solve(start + rows.start, cells.rows(rows), None if wanted is None else wanted[rows])
+            return
+        for column in [*cells.outputs.values(), *([] if cells.error is None else [cells.error])]:
+            column.fill(np.nan)
+        cells.status.fill(Status.FAILED)
+        cells.used.fill(NONE)
+        self._report(BadCell(start, self.grid.cell(start), reason))
+
+
+def told(fault: BaseException) -> str:
+    """What a fault says, in one line."""
+    if isinstance(fault, Unsolved):
+        return str(fault)
+    try:
+        text = str(fault)
+    except Exception:  # a kernel's own exception may fail in its __str__
+        text = ""
+    return " ".join(f"{type(fault).__name__}: {text}".split()).removesuffix(":")

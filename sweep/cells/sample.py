@@ -9,7 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from sweep.cells.block import Guard
 from sweep.cells.grid import Cells, Grid, empty_cells
+from sweep.cells.solve import Solver
 from sweep.errors import SweepError
 from sweep.study.condition import names_in
 from sweep.study.model import SETTINGS, Axis, Study, differs, frozen
@@ -85,9 +87,6 @@ def require_asked(study: Study) -> None:
 
 def solved(study: Study) -> Cells:
     """All cells of a study with their errors, in memory; those at which the kernel raises FAILED."""
-    from sweep.cells.guard import Guard
-    from sweep.cells.solve import Solver
-
     size = Grid(study).size
     cells = empty_cells(study, size)._replace(error=np.empty(size, np.float32))
     Guard(Solver(study), lambda cell: None).solve(0, cells)

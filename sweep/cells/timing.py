@@ -16,7 +16,7 @@ from sweep.cells.schema import Column, cells_of
 from sweep.errors import SweepError
 
 if TYPE_CHECKING:
-    from sweep.cells.guard import SolveCells
+    from sweep.cells.block import SolveCells
 
 LANES = 32
 """Cells that a lane kernel solves at once: it takes as long for one of them."""

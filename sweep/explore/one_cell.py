@@ -11,7 +11,7 @@ import numpy as np
 from kernels.interface import Status
 from sweep.cells.sample import solved, with_method
 from sweep.cells.schema import ERROR_BOUND, METHOD_USED, STATUS
-from sweep.cells.turns import usable_methods
+from sweep.cells.solve import usable_methods
 from sweep.errors import SweepError
 from sweep.results.statuses import flag_words
 from sweep.study.model import SETTINGS, Axis, Study, frozen, short

@@ -15,14 +15,12 @@ from typing import Any
 import numpy as np
 
 from kernels.interface import Status, machine_code_folder
-from sweep.cells.block import faults_reported, row_shape, sampled_by, sampled_study, warm
+from sweep.cells.block import Guard, SolveCells, Unsolved, faults_reported, row_shape, sampled_by, sampled_study, warm
 from sweep.cells.compiling import SILENT_SECONDS, Compiling
 from sweep.cells.fingerprint import fingerprint
 from sweep.cells.grid import Grid, empty_cells
-from sweep.cells.guard import Guard, SolveCells, Unsolved
-from sweep.cells.output_schema import output_schema, part_columns
 from sweep.cells.partition import row_blocks
-from sweep.cells.reduce import strip_bytes
+from sweep.cells.reduce import output_schema, part_columns, strip_bytes
 from sweep.cells.sample import require_asked
 from sweep.cells.solve import Solver
 from sweep.cells.timing import Sample, row_partition, tolerated

@@ -12,8 +12,7 @@ import xarray as xr
 from kernels.interface import FIRST_REFUSAL, Status
 from sweep.cells.sample import relative_error, solved, with_method
 from sweep.cells.schema import METHOD_USED, STATUS
-from sweep.cells.solve import GIVEN_UP, among
-from sweep.cells.turns import usable_methods
+from sweep.cells.solve import GIVEN_UP, among, usable_methods
 from sweep.errors import SweepError
 from sweep.explore.one_cell import require_cells, study_of
 from sweep.results.statuses import cell_values

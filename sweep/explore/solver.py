@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from sweep.cells.block import BadCell, Guard
 from sweep.cells.grid import Grid, empty_cells
-from sweep.cells.guard import BadCell, Guard
 from sweep.cells.solve import Solver
 from sweep.errors import SweepError
 from sweep.study.model import SETTINGS, Study

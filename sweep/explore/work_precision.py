@@ -22,8 +22,7 @@ from kernels.interface import FIRST_REFUSAL, Status
 from sweep.cells.grid import Grid, empty_cells
 from sweep.cells.sample import relative_error, sampled, solved, with_method
 from sweep.cells.schema import STATUS
-from sweep.cells.solve import GIVEN_UP, Solver, among
-from sweep.cells.turns import usable_methods
+from sweep.cells.solve import GIVEN_UP, Solver, among, usable_methods
 from sweep.errors import SweepError
 from sweep.explore.plan import small_duration
 from sweep.runs.run import run

@@ -20,8 +20,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kernels.interface import Status
-from sweep.cells.output_schema import part_columns
 from sweep.cells.partition import Partition, box_shape, boxes, row_blocks
+from sweep.cells.reduce import part_columns
 from sweep.cells.schema import STATUS, Column, Schema
 from sweep.file import disk
 from sweep.file.fletcher import checksum

@@ -11,9 +11,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sweep.cells.output_schema import gathered, output_schema
 from sweep.cells.partition import row_blocks
-from sweep.cells.reduce import pending
+from sweep.cells.reduce import gathered, output_schema, pending
 from sweep.cells.schema import Schema
 from sweep.errors import SweepError
 from sweep.file.foreign import changed_result

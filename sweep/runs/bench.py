@@ -8,8 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from sweep.cells.block import Blocks, block_solver, faults_reported
-from sweep.cells.guard import BadCell, Guard
+from sweep.cells.block import BadCell, Blocks, Guard, block_solver, faults_reported
 from sweep.cells.solve import Solver
 from sweep.runs.isolate import Processes
 from sweep.study.model import Study

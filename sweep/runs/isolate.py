@@ -22,9 +22,9 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, TypeVar
 
+from sweep.cells.block import Unsolved, told
 from sweep.cells.compiling import work_clock
 from sweep.cells.grid import Cells, Grid
-from sweep.cells.guard import Unsolved, told
 from sweep.cells.schema import cells_of, columns
 from sweep.cells.solve import Solver
 from sweep.errors import SweepError

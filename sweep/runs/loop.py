@@ -19,8 +19,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from sweep.cells.block import Blocks, row_shape, sampled_by, sampled_study
 from sweep.cells.compiling import Compiling
-from sweep.cells.output_schema import part_columns
 from sweep.cells.partition import Partition, boxes, row_blocks
+from sweep.cells.reduce import part_columns
 from sweep.cells.timing import UNSAMPLED, Sample, row_partition
 from sweep.errors import SweepError
 from sweep.file.store import Shared

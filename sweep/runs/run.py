@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, TextIO
 import numpy as np
 
 from sweep.cells.block import Blocks
-from sweep.cells.output_schema import gathered
 from sweep.cells.partition import row_blocks
+from sweep.cells.reduce import gathered
 from sweep.errors import SweepError
 from sweep.file.open import in_memory, memory, open_result, open_unfinished
 from sweep.runs.bench import Found

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 from sweep.cells.fingerprint import fingerprint
-from sweep.cells.output_schema import output_schema
+from sweep.cells.reduce import output_schema
 from sweep.cells.sample import require_asked
 from sweep.cells.schema import Schema
 from sweep.errors import SweepError, missing

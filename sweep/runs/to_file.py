@@ -7,8 +7,8 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, Literal
 
 from sweep.cells.fingerprint import difference
-from sweep.cells.output_schema import gathered
 from sweep.cells.partition import row_blocks
+from sweep.cells.reduce import gathered
 from sweep.errors import SweepError
 from sweep.file import disk
 from sweep.file.frame import cuts_of, expected_size

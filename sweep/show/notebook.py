@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 from kernels.interface import is_kept
 from sweep.cells.block import sampled_study
 from sweep.cells.grid import Grid
-from sweep.cells.output_schema import part_columns
 from sweep.cells.partition import row_blocks
-from sweep.cells.turns import turns
+from sweep.cells.reduce import part_columns
+from sweep.cells.solve import turns
 from sweep.errors import SweepError
 from sweep.explore.plan import small_duration
 from sweep.runs.pool import cores

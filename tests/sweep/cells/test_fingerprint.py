@@ -132,7 +132,7 @@ print(sorted(fingerprint(study).items()))
 """
 
 
-@pytest.mark.parametrize("file", ["kernels/foliot/_viscous.py", "sweep/cells/turns.py", "sweep/study/condition.py"])
+@pytest.mark.parametrize("file", ["kernels/foliot/_viscous.py", "sweep/cells/solve.py", "sweep/study/condition.py"])
 def test_another_version_of_foliot_is_another_program(tmp_path, file):
     """Sources are read by another process, as a user's next run does."""
 

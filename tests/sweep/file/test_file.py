@@ -7,8 +7,8 @@ import toy_studies
 import xarray as xr
 
 import sweep
-from sweep.cells.output_schema import output_schema
 from sweep.cells.partition import boxes
+from sweep.cells.reduce import output_schema
 from sweep.file import disk
 from sweep.file.frame import cuts_of, expected_size
 from sweep.file.store import opened

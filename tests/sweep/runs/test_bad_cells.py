@@ -14,8 +14,8 @@ from running import environment, quiet, tall, wait_for
 
 import sweep
 from kernels.interface import Status
+from sweep.cells.block import Guard
 from sweep.cells.grid import Cells
-from sweep.cells.guard import Guard
 from sweep.errors import CELLS_FAILED, MISTAKE, SweepError
 from sweep.file.store import unfinished_of
 from sweep.results.statuses import account
