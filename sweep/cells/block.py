@@ -6,6 +6,7 @@ A bad cell costs one cell: what makes a kernel raise, die or run for ever is fou
 from __future__ import annotations
 
 import contextlib
+import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Protocol
@@ -15,11 +16,11 @@ import numpy as np
 from kernels.interface import Status
 from sweep.cells.compiling import Compiling, work_clock
 from sweep.cells.grid import Cells, Grid, empty_cells
-from sweep.cells.partition import Partition, row_blocks
+from sweep.cells.partition import Partition, boxes, row_blocks
 from sweep.cells.reduce import Reducer, part_columns, seconds_a_cell
 from sweep.cells.schema import cells_of, columns
 from sweep.cells.solve import NONE, Solver
-from sweep.cells.timing import Sample, take_sample, tolerated
+from sweep.cells.timing import LANES, Sample, partition, take_sample, tolerated
 from sweep.errors import SweepError
 
 if TYPE_CHECKING:
@@ -62,9 +63,15 @@ class Blocks:
         return {column.name: column.empty(count) for column in self.columns}
 
 
-def row_shape(study: Study) -> tuple[int, ...]:
-    """The shape in which the rows of a study stand: that of its grid, or of a summary one line."""
-    return Grid(study).shape if study.summary is None else (row_blocks(study).count,)
+def cut(study: Study, workers: int, sample: Sample, block_cells: int | None = None) -> Blocks:
+    """Blocks of about so many cells; by default of as many as a timed sample tells for so many workers."""
+    rows, lanes = row_blocks(study), 1
+    shape = Grid(study).shape if study.summary is None else (rows.count,)
+    if block_cells is None:
+        row_bytes = sum(column.cell_bytes for column in part_columns(study))
+        block_cells = partition(sample, rows.size, row_bytes / rows.mean, workers).cells
+        lanes = LANES if rows.mean == 1 else 1
+    return Blocks(study, boxes(shape, math.ceil(block_cells / rows.mean), lanes))
 
 
 def block_solver(study: Study, solver: SolveCells | None = None) -> SolveBlock:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sweep.cells.partition import Partition, boxes
+from sweep.cells.partition import Partition
 from sweep.cells.schema import Column, cells_of
 from sweep.errors import SweepError
 
@@ -155,12 +155,6 @@ def partition(sample: Sample, size: int, cell_bytes: float, workers: int) -> Par
         cells = max(cells, min(LANES, size / (4 * workers)))
     cells = max(1, math.floor(cells), -(-size // MOST_BLOCKS))
     return Partition(size, min(cells if cells < LANES else -(-cells // LANES) * LANES, size))
-
-
-def row_partition(sample: Sample, rows: Partition, shape: tuple[int, ...], row_bytes: float, workers: int) -> Partition:
-    """The same of rows, which stand in a box of this shape."""
-    blocks = partition(sample, rows.size, row_bytes / rows.mean, workers)
-    return boxes(shape, math.ceil(blocks.cells / rows.mean), LANES if rows.mean == 1 else 1)
 
 
 @contextlib.contextmanager

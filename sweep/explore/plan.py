@@ -15,15 +15,14 @@ from typing import Any
 import numpy as np
 
 from kernels.interface import Status, machine_code_folder
-from sweep.cells.block import Guard, SolveCells, Unsolved, faults_reported, row_shape, sampled_by, sampled_study, warm
+from sweep.cells.block import Guard, SolveCells, Unsolved, cut, faults_reported, sampled_by, sampled_study, warm
 from sweep.cells.compiling import SILENT_SECONDS, Compiling
 from sweep.cells.fingerprint import fingerprint
 from sweep.cells.grid import Grid, empty_cells
-from sweep.cells.partition import row_blocks
-from sweep.cells.reduce import output_schema, part_columns, strip_bytes
+from sweep.cells.reduce import output_schema, strip_bytes
 from sweep.cells.sample import require_asked
 from sweep.cells.solve import Solver
-from sweep.cells.timing import Sample, row_partition, tolerated
+from sweep.cells.timing import Sample, tolerated
 from sweep.errors import SweepError
 from sweep.explore.scaling import advice_on
 from sweep.file.frame import cuts_of, expected_size
@@ -215,25 +214,13 @@ def _is_kept(kernel: str) -> bool:
 
 def _forecast(study: Study, sample: Sample, workers: int, folder: Path, solver: SolveCells) -> Plan:
     """What a timed sample says, and some cells, each solved by itself."""
-    rows, grid, schema = row_blocks(study), Grid(study), output_schema(study, fingerprint(study))
-    row_bytes = sum(column.cell_bytes for column in part_columns(study))
-    blocks = row_partition(sample, rows, row_shape(study), row_bytes, workers)
-    output = expected_size(schema, cuts_of(study, schema, blocks))
+    grid, blocks = Grid(study), cut(study, workers, sample)
+    schema = output_schema(study, fingerprint(study))
+    output = expected_size(schema, cuts_of(study, schema, blocks.partition))
     writing = output / _disk_speed(folder) if output > WORTH_A_TRIAL else 0.0
     # blocks are written while others are computed
-    seconds = RUN_SECONDS + max(sample.cost * rows.size / min(workers, blocks.count), writing)
-
-    ends, others = _chosen(grid)
-    cells = empty_cells(study, len(ends) + len(others))
-    cells.status[:], cells.used[:] = Status.PENDING, -1
-    sampled, until = 0, time.perf_counter() + min(LOOK_SECONDS, SHARE * seconds)
-    for number in (*ends, *others):
-        if sampled >= len(ends) and time.perf_counter() > until:
-            break
-        with tolerated():
-            solver.solve(number, cells.rows(slice(sampled, sampled + 1)))
-        sampled += 1
-    cells = cells.rows(slice(0, sampled))
+    seconds = RUN_SECONDS + max(sample.cost * blocks.rows.size / min(workers, blocks.count), writing)
+    used, status = _looked_at(study, grid, solver, min(LOOK_SECONDS, SHARE * seconds))
 
     def counted(numbers: Any, names: dict[int, str]) -> dict[str, float]:
         found, counts = np.unique(numbers, return_counts=True)
@@ -242,26 +229,26 @@ def _forecast(study: Study, sample: Sample, workers: int, folder: Path, solver: 
     return Plan(
         title=study.title,
         kernel=study.kernel_name,
-        cells=rows.size,
-        shape=dict(zip(grid.dims, grid.shape, strict=True)),
+        cells=blocks.rows.size,
+        shape=study.grid_shape,
         outputs=study.outputs,
         blocks=blocks.count,
-        cells_per_block=rows.bounds(0, blocks.cells)[1],
+        cells_per_block=blocks.cells(0)[1],
         workers=workers,
         output_bytes=output,
-        memory_bytes=2 * workers * (blocks.cells * row_bytes + strip_bytes(study)),
+        memory_bytes=2 * workers * (blocks.partition.cells * blocks.row_bytes + strip_bytes(study)),
         free_bytes=shutil.disk_usage(folder).free,
         folder=str(folder),
         cell_seconds=sample.cost,
         seconds=seconds,
-        methods=counted(cells.used, {-1: "none", **dict(enumerate(m.name for m in study.kernel.methods))}),
-        statuses=counted(cells.status, {int(s): s.name for s in Status}),
-        sampled=sampled,
+        methods=counted(used, {-1: "none", **dict(enumerate(m.name for m in study.kernel.methods))}),
+        statuses=counted(status, {int(s): s.name for s in Status}),
+        sampled=len(status),
     )
 
 
-def _chosen(grid: Grid) -> tuple[list[int], list[int]]:
-    """Numbers of cells at the ends of axes, and of others, each drawn from one of equal shares.
+def _looked_at(study: Study, grid: Grid, solver: SolveCells, seconds: float) -> tuple[Any, Any]:
+    """Methods and statuses of cells at the ends of axes; and, in some seconds, of others, one of each of equal shares.
 
     The ends are those of every axis, in the middle of the others, and of all axes at once: there a scene is most often
     another one, and so is the method.
@@ -269,10 +256,21 @@ def _chosen(grid: Grid) -> tuple[list[int], list[int]]:
     last, axis = np.array(grid.shape) - 1, np.eye(len(grid.shape), dtype=bool)
     middle = last // 2
     places = np.concatenate([[0 * last], [last], np.where(axis, 0, middle), np.where(axis, last, middle)])
-    ends = list(dict.fromkeys(np.ravel_multi_index(tuple(places.T), grid.shape).tolist()))
+    ends = dict.fromkeys(np.ravel_multi_index(tuple(places.T), grid.shape).tolist())
     rng = np.random.default_rng(0)
     drawn = rng.permutation(((np.arange(DRAWN) + rng.random(DRAWN)) * (grid.size / DRAWN)).astype(np.int64))
-    return ends, [number for number in dict.fromkeys(drawn.tolist()) if number not in ends]
+    numbers = dict.fromkeys([*ends, *drawn.tolist()])
+
+    cells = empty_cells(study, len(numbers))
+    cells.status[:], cells.used[:] = Status.PENDING, -1
+    sampled, until = 0, time.perf_counter() + seconds
+    for number in numbers:
+        if sampled >= len(ends) and time.perf_counter() > until:
+            break
+        with tolerated():
+            solver.solve(number, cells.rows(slice(sampled, sampled + 1)))
+        sampled += 1
+    return cells.used[:sampled], cells.status[:sampled]
 
 
 def _disk_speed(folder: Path) -> float:

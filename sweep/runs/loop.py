@@ -7,7 +7,6 @@ worker that does not see the file sends numbers, which the loop puts there.
 from __future__ import annotations
 
 import contextlib
-import math
 import os
 import platform
 import time
@@ -17,11 +16,10 @@ from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ThreadPo
 from datetime import datetime
 from typing import TYPE_CHECKING, Any, Protocol
 
-from sweep.cells.block import Blocks, row_shape, sampled_by, sampled_study
+from sweep.cells.block import Blocks, cut, sampled_by, sampled_study
 from sweep.cells.compiling import Compiling
-from sweep.cells.partition import Partition, boxes, row_blocks
-from sweep.cells.reduce import part_columns
-from sweep.cells.timing import UNSAMPLED, Sample, row_partition
+from sweep.cells.partition import Partition
+from sweep.cells.timing import UNSAMPLED, Sample
 from sweep.errors import SweepError
 from sweep.file.store import Shared
 from sweep.runs.bench import POISONED, Bench, Found, Masks
@@ -79,13 +77,8 @@ class Loop:
         self._processes = Processes(study, task.limit, task.cores) if task.isolate else None
         self._threads = ThreadPoolExecutor(task.cores)
         sample = self._sample() if sampled else UNSAMPLED
-        if partition is None and task.block_cells is not None:
-            partition = boxes(row_shape(study), math.ceil(task.block_cells / row_blocks(study).mean))
-        if partition is None:
-            row_bytes = sum(column.cell_bytes for column in part_columns(study))
-            partition = row_partition(sample, row_blocks(study), row_shape(study), row_bytes, self._cores)
-        self.blocks = Blocks(study, partition)
-        self._weights = sample.weights(partition, self.blocks.rows.first)
+        self.blocks = Blocks(study, partition) if partition else cut(study, self._cores, sample, task.block_cells)
+        self._weights = sample.weights(self.blocks.partition, self.blocks.rows.first)
         self.progress = self.begin([])
 
     def _sample(self) -> Sample:
