@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import math
 import warnings
 from collections import namedtuple
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -63,7 +63,7 @@ class PointSolver:
         SweepError
             A parameter is missing, unknown or given twice.
         """
-        given = list(values)
+        given: Sequence[Any] = values
         if named or len(values) != len(self.names):
             by_name = dict(zip(self.names, values, strict=False))
             for name in named:
@@ -82,8 +82,8 @@ class PointSolver:
         except (TypeError, ValueError) as error:
             raise SweepError(f"{listed(self.names, word='and')}: expected numbers or arrays, found {error}") from None
         shape = points.shape[1:]
-        self._grid.given = dict(zip(self.names, points.reshape(len(self.names), -1), strict=True))
-        cells = empty_cells(self._study, math.prod(shape))
+        self._grid.given = points.reshape(len(self.names), -1)
+        cells = empty_cells(self._study, self._grid.given.shape[1])
         self._solver.solve(0, cells)
         outputs = (cells.outputs[name].reshape(shape + cells.outputs[name].shape[1:]) for name in self._study.outputs)
         columns = (*outputs, cells.status.reshape(shape))
@@ -91,23 +91,24 @@ class PointSolver:
 
 
 class _Points(Grid):
-    """Cells whose values on the axes are set before they are solved: `given`, by the axis' name."""
+    """Cells whose values on the axes are set before they are solved: `given`, shape (axes, cells)."""
 
     def __init__(self, study: Study) -> None:
         super().__init__(study)
-        self.size, self.given = np.iinfo(np.int64).max, dict[str, Any]()
+        self.size, self.given = np.iinfo(np.int64).max, np.empty((len(study.axes), 0))
+        self._places = {name: place for place, name in enumerate(study.axes)}
 
     def spreads(self) -> dict[int, Any]:
         return super().spreads() | dict.fromkeys(self.varying)
 
     def column(self, name: str, start: int, stop: int) -> Any:
-        return self.given[name][start:stop]
+        return self.given[self._places[name], start:stop]
 
     def values(self, name: str, cells: Any) -> Any:
-        return self.given[name][cells]
+        return self.given[self._places[name], cells]
 
     def cell(self, index: int) -> dict[str, str]:
-        return {name: repr(float(values[index])) for name, values in self.given.items()}
+        return {name: repr(float(values[index])) for name, values in zip(self._places, self.given, strict=True)}
 
 
 def _warn(cell: BadCell) -> None:
