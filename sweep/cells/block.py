@@ -9,13 +9,13 @@ import contextlib
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from kernels.interface import Status
 from sweep.cells.compiling import Compiling, work_clock
-from sweep.cells.grid import Cells, Grid, empty_cells
+from sweep.cells.grid import Cells, Grid, SolveCells, empty_cells
 from sweep.cells.partition import Partition, boxes, row_blocks
 from sweep.cells.reduce import Reducer, part_columns, seconds_a_cell
 from sweep.cells.schema import cells_of, columns
@@ -122,15 +122,6 @@ def faults_reported(what: str) -> Iterator[None]:
         raise SweepError("out of memory; fewer workers need less; what is finished is kept") from fault
     except Exception as fault:
         raise SweepError(f"{what} ({told(fault)}); what is finished is kept") from fault
-
-
-class SolveCells(Protocol):
-    """What `Solver` does, here or in a process of its own."""
-
-    grid: Grid
-
-    def solve(self, start: int, cells: Cells, wanted: Any = None) -> None:
-        """Fills the columns of the cells from number `start` on. Raises what the kernel does."""
 
 
 class Unsolved(Exception):

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -128,6 +128,15 @@ class Cells(NamedTuple):
         """Views of some of them."""
         outputs = {name: column[some] for name, column in self.outputs.items()}
         return Cells(outputs, self.status[some], self.used[some], None if self.error is None else self.error[some])
+
+
+class SolveCells(Protocol):
+    """What `Solver` does, here or in a process of its own."""
+
+    grid: Grid
+
+    def solve(self, start: int, cells: Cells, wanted: Any = None) -> None:
+        """Fills the columns of the cells from number `start` on. Raises what the kernel does."""
 
 
 def empty_cells(study: Study, cells: int) -> Cells:

@@ -20,12 +20,11 @@ from numpy.typing import NDArray
 
 from kernels.interface import Field, Status
 from sweep.cells import schema
-from sweep.cells.grid import Box, Cells, empty_cells
+from sweep.cells.grid import Box, Cells, SolveCells, empty_cells
 from sweep.cells.partition import row_blocks
 from sweep.cells.schema import Column, Coordinate, Schema
 
 if TYPE_CHECKING:
-    from sweep.cells.block import SolveCells
     from sweep.study.model import Study
 
 STRIP = 65536

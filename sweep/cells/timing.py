@@ -7,16 +7,14 @@ import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from sweep.cells.grid import SolveCells
 from sweep.cells.partition import Partition
 from sweep.cells.schema import Column, cells_of
 from sweep.errors import SweepError
-
-if TYPE_CHECKING:
-    from sweep.cells.block import SolveCells
 
 LANES = 32
 """Cells that a lane kernel solves at once: it takes as long for one of them."""

@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 
 from kernels.interface import Status, machine_code_folder
-from sweep.cells.block import Guard, SolveCells, Unsolved, cut, faults_reported, sampled_by, sampled_study, warm
+from sweep.cells.block import Guard, Unsolved, cut, faults_reported, sampled_by, sampled_study, warm
 from sweep.cells.compiling import SILENT_SECONDS, Compiling
 from sweep.cells.fingerprint import fingerprint
-from sweep.cells.grid import Grid, empty_cells
+from sweep.cells.grid import Grid, SolveCells, empty_cells
 from sweep.cells.reduce import output_schema, strip_bytes
 from sweep.cells.sample import require_asked
 from sweep.cells.solve import Solver
