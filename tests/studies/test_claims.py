@@ -42,7 +42,7 @@ class Claims(NamedTuple):
 # fmt: off
 TABLE = {
     "balance_isochronism": Claims({
-        "balance_isochronism": {"at": 4, "w": 2}, "balance_isochronism_lift": {"m": 2},
+        "balance_isochronism": {"at": 8, "w": 4}, "balance_isochronism_lift": {"m": 2},
         "balance_isochronism_positions": {"w": 2},
     },
         "balance_isochronism.angle balance_isochronism.interval balance_isochronism.time "

@@ -1,6 +1,7 @@
 """The engine against a naive interpreter of studies, over random studies, however they are cut, stopped and continued.
 
-Studies are drawn from numbers that are fixed, so that every run of the tests sees the same ones.
+Studies are drawn from numbers that are fixed, so that every run of the tests sees the same ones; more of them by night:
+STUDIES=2000 python -m pytest tests/sweep/test_engine.py
 """
 
 import contextlib
@@ -20,6 +21,7 @@ from study_interpreter import interpreted
 import sweep
 from kernels.interface import Status
 
+STUDIES = int(os.environ.get("STUDIES", "120"))
 KERNELS = {"dice:KERNEL": dice.KERNEL, "beads:KERNEL": beads.KERNEL}
 VALUES = {
     "x": [0.5, 1.0, 2.0, 3.0, 5.0, 8.0, 21.0, 34.0, dice.RAISES, -1.0, float("nan")],
@@ -200,7 +202,7 @@ def before(monkeypatch):
     return before
 
 
-@pytest.mark.parametrize("seed", range(160))
+@pytest.mark.parametrize("seed", range(STUDIES))
 def test_every_cell_is_what_the_interpreter_says_however_the_study_is_cut(seed, tmp_path):
     rng, (keys, wanted) = random.Random(seed), drawn_and_expected(seed)
     for _ in range(2):
@@ -220,7 +222,7 @@ def test_a_cell_that_raises_costs_one_cell_wherever_it_stands():
             agree(run(keys), expected(keys))
 
 
-@pytest.mark.parametrize("seed", range(1000, 1100))
+@pytest.mark.parametrize("seed", range(1000, 1000 + STUDIES // 2))
 def test_every_reduction_is_what_the_interpreter_says(seed):
     rng, (keys, wanted) = random.Random(seed), drawn_and_expected(seed, summary=True)
     agree(run(keys, workers=rng.randint(1, 3), block_cells=rng.choice([None, 1, 2, 5, 40])), wanted)

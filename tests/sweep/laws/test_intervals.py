@@ -166,8 +166,7 @@ def test_intervals_of_two_laws_hold_the_truth(size, decades):
     assert (half.exponent_high - half.exponent_low < (found.exponent_high - found.exponent_low)[:, :10]).all()
 
 
-@pytest.mark.parametrize("phi", [0.6, 0.9])
-@pytest.mark.parametrize("points", [25, 61])
+@pytest.mark.parametrize(("phi", "points"), [(0.6, 61), (0.9, 25), (0.9, 61)])
 def test_correlated_noise_is_in_the_intervals_of_two_laws_unless_it_is_said_to_be_independent(phi, points):
     """By least squares alone, intervals hold 54 to 94 %."""
     t = np.log(np.geomspace(1e-3, 1e3, points))
@@ -179,8 +178,7 @@ def test_correlated_noise_is_in_the_intervals_of_two_laws_unless_it_is_said_to_b
         assert min(shares(sweep.fit_two_laws(y, "mu", noise="even"))) < 0.85
 
 
-@pytest.mark.parametrize("name", ["hyperbola", "asymmetric", "stretched", "two widths"])
-@pytest.mark.parametrize("n", [25, 61])
+@pytest.mark.parametrize(("name", "n"), [("hyperbola", 25), ("asymmetric", 61), ("stretched", 25), ("two widths", 61)])
 def test_bends_of_other_shapes_are_in_the_intervals_of_two_laws(name, n):
     """By the fit's own shape alone, they hold 1 to 18 %."""
     t = axis(n, 6.9)
