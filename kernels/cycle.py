@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from kernels.codegen.limit_cycle import FINE, FOUND, ROUGH, Columns, Search, described
+from kernels.codegen.limit_cycle import FOUND, Columns, Search, described
 from kernels.codegen.module import compiling
-from kernels.codegen.return_map import ReturnMap, has_sides, watched
+from kernels.codegen.return_map import TIGHT, ReturnMap, has_sides, watched
 from kernels.interface import FIRST_REFUSAL, Field, Kernel, Method, OnColumns, Status
 from kernels.lanes.wiring import signed
 from kernels.scene import Function, Scene, SceneError, limits_check, scene_of
@@ -130,8 +130,9 @@ def _method(
         if not len(status):
             return
         with compiling(scene.name, name):
-            cells = Columns(parameters, flips.copy(), np.clip(SHARE * rtol, FINE, ROUGH))
-            values, errors = _solved(ReturnMap(scene, name), turns, swept, cells, settle, wanted, status)
+            the_map = ReturnMap(scene, name)
+            cells = Columns(parameters, flips.copy(), np.clip(SHARE * rtol, the_map.fine, the_map.rough))
+            values, errors = _solved(the_map, turns, swept, cells, settle, wanted, status)
         for column, row in zip(found, values, strict=True):
             column[:] = np.where(status < FIRST_REFUSAL, row, np.nan)
         error[:] = 0.0
@@ -185,7 +186,7 @@ def _sizes(the_map: ReturnMap, cells: Columns, z: Any, spread: Any, scale: Any) 
     """The largest size of each state in the cycle, and by how much it may be off."""
     parameters = list(cells.parameters)
     sizes, apart = the_map.turned(parameters, z, cells.flips)
-    off = apart + 1e-12 * scale
+    off = apart + TIGHT * the_map.fine * scale
     for j in the_map.directions:
         by = np.maximum(spread[j], 1e-7 * scale[j])
         moved = z.copy()

@@ -71,7 +71,32 @@ def _followed(module, columns, rtol, of_a_step, together=False, tells=False, sha
 
 
 def _run(module, run, inputs, together, tells):
-    """The results of cells; those that take as many steps side by side, for so lanes wait less for each other."""
+    """The results of cells."""
+    results = np.empty((3 + 2 * len(module.STATES) + tells, len(inputs[0])))
+    for places, found in _at_stops(module, run, inputs, (math.inf,) if together else STOPS, together, tells):
+        results[:, places] = found
+    return results
+
+
+def passages(module, columns, rtol, stops, finer=1.0, tells=False):
+    """The results of each cell at each of those switches, (n_rows, n_stops, n_cells); NaN where it gets there not.
+
+    As `followed` gives them, or if it `tells` as `told`: once, by the method of the higher order.
+    """
+    inputs = [*columns, np.full(len(rtol), stops[-1]), np.maximum(rtol / finer, FINEST), np.zeros(len(rtol))]
+    results = np.full((3 + 2 * len(module.STATES) + tells, len(stops), len(rtol)), np.nan)
+    for begin in range(0, len(rtol), AT_ONCE):
+        part = [column[begin : begin + AT_ONCE] for column in inputs]
+        for k, (places, found) in enumerate(_at_stops(module, module.run_18, part, stops, False, tells)):
+            results[:, k, begin + places] = found
+    return results
+
+
+def _at_stops(module, run, inputs, stops, together, tells):
+    """Places and results of cells at each stop, a number of switches, that go on from the one before, or at their last.
+
+    Those that take as many steps are side by side, for so lanes wait less for each other.
+    """
     cell = getattr(module, "M_TOLD", module.M).cell
     row, rows = first_rows(cell), len(flat(cell))
     found = [*range(row["time"], row["verdict"] + 1), *([row["errors"] + 1] if tells else [])]
@@ -80,11 +105,10 @@ def _run(module, run, inputs, together, tells):
     cells[:, row["interval"] : row["size"]] = np.nan
     if cell.errors:
         cells[:, row["errors"]] = float(tells)
-    results = np.empty((len(found), len(cells)))
-    for stop in (math.inf,) if together else STOPS:
+    for stop in stops:
         cells[:, row["flips"]] = np.minimum(whole, stop)
         to_the_end(run, cells, together)
-        results[:, places] = cells[:, found].T
+        yield places, cells[:, found].T
         count, verdict, steps, before = (cells[:, row[name]] for name in ("count", "verdict", "steps", "before"))
         going = np.flatnonzero((count >= stop) & (count < whole) & (verdict < FIRST_REFUSAL))
         going = going[np.lexsort([key[going].astype(np.int16) for key in (steps, before)])]
@@ -92,7 +116,6 @@ def _run(module, run, inputs, together, tells):
             break
         cells, places, whole = cells[going], places[going], whole[going]
         cells[:, 0] = MOVING
-    return results
 
 
 def once(module, columns, rtol, outputs, status):

@@ -19,16 +19,14 @@ import numpy as np
 from kernels.codegen.columns_algebra import eigenvalues, identity, solved, times
 from kernels.interface import Status
 
-ROUGH = 4e-10
-"""The tolerance of what is followed before Newton's method."""
-FINE, LOOSE = 3e-14, 1e-7
-"""Tolerances of the runs at the tightest, and at the widest to which they are loosened."""
+LOOSE = 1e-7
+"""The widest tolerance of runs."""
 WIDER = 4.0
 """By how much a cell's runs are looser where they are not right to the tolerance before."""
 STEP = 1e-5
 """Of a state's size, that of Newton's differences."""
-STEPS = 2e-3, 2e-4
-"""Of sizes and parameters, those of the differences that are given: the second where the first are too rough."""
+SHORTER = 0.1
+"""Of the steps of differences, those that are tried where the first are too rough."""
 ROUGHER = 20.0
 """Errors of the runs over a step, within which the first differences are good."""
 ROUNDS = 14
@@ -131,19 +129,17 @@ def largest(J):
 
 def described(the_map, cells, z, scale, shift, parameters):
     """Of a cycle at z: its outputs and their errors, by name."""
-    found = _described(the_map, cells, z, scale, shift, parameters, STEPS[0])
+    found = _described(the_map, cells, z, scale, shift, parameters, the_map.step)
     with np.errstate(all="ignore"):
-        for h in STEPS[1:]:
-            rough = np.flatnonzero(~(np.maximum.reduce(found["errors"][1:]) <= ROUGHER * cells.r / STEPS[0]))
-            if len(rough):
-                again = _described(
-                    the_map, cells.taken(rough), z[:, rough], scale[:, rough], shift[:, rough], parameters, h
-                )
-                better = ~(again["errors"] >= found["errors"][:, rough])
-                for key in ("values", "errors"):
-                    found[key][:, rough] = np.where(better, again[key], found[key][:, rough])
-                for key in ("spread", "states"):
-                    found[key][:, rough] = again[key]
+        rough = np.flatnonzero(~(np.maximum.reduce(found["errors"][1:]) <= ROUGHER * cells.r / the_map.step))
+        if len(rough):
+            some, h = cells.taken(rough), SHORTER * the_map.step
+            again = _described(the_map, some, z[:, rough], scale[:, rough], shift[:, rough], parameters, h)
+            better = ~(again["errors"] >= found["errors"][:, rough])
+            for key in ("values", "errors"):
+                found[key][:, rough] = np.where(better, again[key], found[key][:, rough])
+            for key in ("spread", "states"):
+                found[key][:, rough] = again[key]
     return found
 
 
@@ -234,7 +230,7 @@ class Search:
         cycles = np.maximum(self.settle[left] * later, 1.0)
         nothing = np.zeros((len(self.z), len(left)))
         _, z, status = self.map.passed(
-            list(some.parameters), nothing, some.flips * cycles, np.full(len(left), ROUGH), 1.0
+            list(some.parameters), nothing, some.flips * cycles, np.full(len(left), self.map.rough), 1.0
         )
         goes_on = status <= Status.INACCURATE
         over = left[~goes_on & ~np.isin(self.status[left], FOUND)]
@@ -247,7 +243,7 @@ class Search:
     def _settled(self, left, z, doubled=False):
         """Takes what Newton's method makes of z, where that is a cycle."""
         some = self.cells.taken(left)
-        _, P, _ = self.map.passed(list(some.parameters), z, some.flips, np.full(len(left), ROUGH))
+        _, P, _ = self.map.passed(list(some.parameters), z, some.flips, np.full(len(left), self.map.rough))
         sizes = self.map.sizes(list(some.parameters), z, some.flips)
         scale = np.where(sizes > 0.0, sizes, np.where(abs(P) > 0.0, abs(P), 1.0))
         shift = np.zeros(z.shape)
@@ -270,7 +266,7 @@ class Search:
     def _moves(self, some, z, scale):
         """Whether a cycle is more than a point that the surface goes through."""
         half = np.maximum(np.floor(0.5 * some.flips), 1.0)
-        T, middle, _ = self.map.passed(list(some.parameters), z, half, np.full(len(half), ROUGH))
+        T, middle, _ = self.map.passed(list(some.parameters), z, half, np.full(len(half), self.map.rough))
         whole = half == some.flips
         apart = np.maximum.reduce(abs(middle - z) / scale)
         return np.where(whole, T > 0.0, apart > NEAR)
@@ -278,7 +274,7 @@ class Search:
     def _two(self, some, z, scale, shift):
         """Whether half of so many switches do not close the cycle."""
         half = 0.5 * some.flips
-        _, middle, _ = self.map.passed(list(some.parameters), z, half, np.full(len(half), ROUGH))
+        _, middle, _ = self.map.passed(list(some.parameters), z, half, np.full(len(half), self.map.rough))
         return np.maximum.reduce(abs(middle - z - 0.5 * shift) / scale) > NEAR
 
     def _doubled(self, left):
@@ -293,7 +289,11 @@ class Search:
         """Where a motion comes to rest: at an equilibrium to which it has come closer from its first cycle on."""
         some = self.cells.taken(left)
         _, first, _ = self.map.passed(
-            list(some.parameters), np.zeros((len(self.z), len(left))), some.flips, np.full(len(left), ROUGH), 1.0
+            list(some.parameters),
+            np.zeros((len(self.z), len(left))),
+            some.flips,
+            np.full(len(left), self.map.rough),
+            1.0,
         )
         for side in (1.0, -1.0) if len(left) else ():
             z = self._equilibrium(some, self.last[:, left], side)

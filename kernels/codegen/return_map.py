@@ -42,8 +42,17 @@ def rates_of(states, parameters, side, found):
         new = rates(state, Mode(side, natural_signs(state, mode), given, False))
         {results}
 '''
-ROUGH, TIGHT, OTHERS = 4e-10, 1e-12, (1e-12, 1e-11, 1e-10)
-"""Tolerances of the runs that tell the states' sizes."""
+TOLERANCES = {
+    "taylor": (3e-14, 4e-10, 2e-3),
+    "rodas5p": (1e-10, 1e-7, 1e-2),
+    "dop853": (1e-12, 1e-8, 4e-3),
+}
+"""Of runs by each method the tightest, and that of what is wanted roughly; and the step of differences, a share of what
+is changed, where what they leave out and what the tightest runs leave out come to the same."""
+OTHERS = 1.0, 10.0, 100.0
+"""Tolerances of runs whose steps end at other points, over the one of the first."""
+TIGHT = 30.0
+"""Of the tightest tolerance, that of the sizes."""
 APART = 4.0
 """Differences of runs, within which the largest size is."""
 
@@ -59,8 +68,8 @@ class ReturnMap:
 
     def __init__(self, scene, method):
         self.scene, self.method, self.seen = returning(scene), method, watched(scene)
-        how = stated_error.by_one(self.scene) if method == "taylor" else twice_by(method, self.scene)
-        self._how = slid_along(to_rest(how), self.scene, SLIDERS.get(method, (method,)))
+        self.fine, self.rough, self.step = TOLERANCES[method]
+        self._how = to_the_end(self.scene, method)
         self.directions = [j for j in range(len(scene.states)) if j != self.seen]
         """Of the states, those that the map depends on."""
 
@@ -74,18 +83,19 @@ class ReturnMap:
 
     def sizes(self, parameters, before, flips):
         """The largest size of each state on the way to some digits; NaN where the motion does not get there."""
-        return self._sizes(self.scene, parameters, before, flips, ROUGH)
+        return self._sizes(self.scene, parameters, before, flips, self.rough)
 
     def turned(self, parameters, before, flips):
-        """The same to the tolerance TIGHT, where states turn round; and by how much it may be off besides.
+        """The same tightly, where states turn round; and by how much it may be off besides.
 
         Where a turn cannot be told, sizes are those of three runs whose steps end at other points.
         """
-        sizes, off = self._sizes(turning(self.scene, True), parameters, before, flips, TIGHT), np.zeros(before.shape)
+        tight = TIGHT * self.fine
+        sizes, off = self._sizes(turning(self.scene, True), parameters, before, flips, tight), np.zeros(before.shape)
         left = np.flatnonzero(np.isnan(sizes).any(axis=0))
         if len(left):
             some, here, steps = [c[left] for c in parameters], before[:, left], flips[left]
-            runs = [self._sizes(turning(self.scene, False), some, here, steps, rtol) for rtol in OTHERS]
+            runs = [self._sizes(turning(self.scene, False), some, here, steps, many * tight) for many in OTHERS]
             most = np.maximum.reduce(runs)
             apart = most - np.minimum.reduce(runs)
             apart[paired(self.scene)] = 0.0
@@ -107,6 +117,12 @@ class ReturnMap:
         found = np.empty(states.shape)
         rating(self.scene).rates_of(np.ascontiguousarray(states), np.array(parameters), side, found)
         return found
+
+
+def to_the_end(scene, method):
+    """The function of columns that follows the scene by the method: to where switches accumulate, and along kinks."""
+    how = stated_error.by_one(scene) if method == "taylor" else twice_by(method, scene)
+    return slid_along(to_rest(how), scene, SLIDERS.get(method, (method,)))
 
 
 def named(function, names):

@@ -5,6 +5,7 @@ x'' = -omega^2 x - 2 zeta omega x'; at x = 0 the speed's size u becomes kick + g
 
 from kernels.cycle import cycle_kernel
 from kernels.scene import Field
+from kernels.trajectory import motion_kernel, section_kernel
 
 
 def rates(x, v, zeta, omega):
@@ -24,11 +25,10 @@ def start(v0):
     return 0.0, v0
 
 
-KICKED = cycle_kernel(
-    name="kicked",
-    doc="oscillator that is kicked as it passes 0",
-    states=(Field("x", "m", "place"), Field("v", "m/s", "speed")),
-    parameters=(
+PARTS = {
+    "doc": "oscillator that is kicked as it passes 0",
+    "states": (Field("x", "m", "place"), Field("v", "m/s", "speed")),
+    "parameters": (
         Field("zeta", "1", "damping", default=0.0),
         Field("omega", "1/s", "frequency", default=1.0, lower=0.0, open_lower=True),
         Field("kick", "m/s", "speed that a kick adds", default=0.0),
@@ -36,9 +36,10 @@ KICKED = cycle_kernel(
         Field("bend", "s/m", "how that falls with the speed", default=0.0),
         Field("v0", "m/s", "speed at the start", default=0.3),
     ),
-    rates=rates,
-    surface=surface,
-    start=start,
-    switch=switch,
-    example={"zeta": 0.1, "kick": 1.0},
-)
+    "rates": rates,
+    "surface": surface,
+    "start": start,
+    "switch": switch,
+}
+KICKED = cycle_kernel(name="kicked", **PARTS, example={"zeta": 0.1, "kick": 1.0})
+SECTION, MOTION = section_kernel(name="kicked_section", **PARTS), motion_kernel(name="kicked_motion", **PARTS)
