@@ -185,7 +185,7 @@ def figure(found: xr.Dataset, others: dict[str, xr.Dataset]) -> Any:
         text = "each mark a tolerance,\nfrom $10^{-3}$ (top) to $10^{-13}$"
         axes.text(0.02, 0.97, text, va="top", fontsize=7, color="0.35", transform=axes.transAxes)
         axes.set(xlabel="CPU time per cell [s]", ylabel="largest relative error of a cell [1]", ylim=(3e-17, 3))
-        axes.set_xlim(5e-7, 0.5)
+        axes.set_xlim(3e-7, 0.5)
     return page
 
 
