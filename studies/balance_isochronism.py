@@ -198,8 +198,8 @@ def draw_lines(axes: Any, ds: xr.Dataset) -> None:
         look = {"linestyle": "", "color": COLOURS[k], "markerfacecolor": "white", "markersize": 3.6}
         axes.plot(line.a[::4], line.loss[::4], MARKS[k], **look)
         text = f"{1e3 * at:+.0f} mrad" if at else "centre"
-        direct_label(axes, 1.15 * float(line.a.max()), float(theory(line)[int(line.a.argmax())]), text, COLOURS[k],
-                     fontsize=7, ha="left")  # fmt: skip
+        direct_label(axes, 1.15 * float(line.a.max()), float(theory(line)[int(line.a.argmax("w"))]), text, COLOURS[k],
+                     fontsize=6.5, ha="left", va="top" if at == -0.0125 else "center")  # fmt: skip
     axes.plot([], [], "o", color="0.3", markerfacecolor="white", markersize=3.6, label="impulse at, scene")
     axes.plot([], [], color="0.3", linewidth=0.9, label="theory (1)")
     axes.set_yscale("symlog", linthresh=1.0, linscale=0.6)

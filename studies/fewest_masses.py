@@ -193,9 +193,7 @@ def figure(ds: xr.Dataset, times: xr.Dataset) -> Any:
             dear.plot([], [], "o", color="0.3", fillstyle=fill, label=label)
         dear.legend(loc="lower right", fontsize=7)
         names = [name.replace("_", "-") for name in METHODS]
-        dear.set(
-            xscale="log", xlabel="error of the receptance, median [1]", xlim=(3e-5, 3), ylim=(-len(names) - 0.4, 0.6)
-        )
+        dear.set(xscale="log", xlabel="median error of receptance [1]", xlim=(3e-5, 3), ylim=(-len(names) - 0.4, 0.6))
         dear.set_yticks(range(0, -len(names), -1), labels=names)
         dear.set_yticks([], minor=True)
     return page

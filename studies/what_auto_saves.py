@@ -91,7 +91,11 @@ def figure(parts: Sequence[xr.Dataset]) -> Any:
         for k, found in enumerate(parts):
             draw_row(axes, found, -k)
         axes.axvline(1.0, color="black", linewidth=0.8)
-        axes.set(xscale="log", xlabel=f"time over that of auto, at rtol = {SHOWN:g} [1]", ylim=(-len(parts) + 0.4, 0.6))
+        axes.set(
+            xscale="log",
+            xlabel=f"time over that of auto, at rtol = $10^{{{np.log10(SHOWN):.0f}}}$ [1]",
+            ylim=(-len(parts) + 0.4, 0.6),
+        )
         axes.set_yticks(range(0, -len(parts), -1), labels=[found.attrs["title"] for found in parts])
         axes.set_yticks([], minor=True)
         look = {"color": "0.3", "marker": "o", "linestyle": "", "markersize": 4}
