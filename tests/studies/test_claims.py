@@ -79,6 +79,7 @@ TABLE = {
         "law_map_overnight": {"n": [0.25, 1.5, 3.0], "e": [1, 0.99, 0.97, 0.5], "R": 3, "c": 10},
         "law_map_borders": {},
     }, "sensitivity_max law_map_borders.amplitude law_map_borders.crossing_speed", 2),
+    "losses_from_periods": Claims({"losses_from_periods": {}}, "", 7, tell=False),
     "origin_of_half": Claims({"origin_of_half": {"mu": 2}}, "amplitude status", 3),
     "polisher_design": Claims({
         "polisher_design": {"d": [0.3, 0.38], "b": 3, "f": 2, "e": 2},
@@ -86,6 +87,7 @@ TABLE = {
     "polisher_extrema": Claims({"polisher_extrema": {
         "e": [0, 0.01, 0.02, 0.05, 0.08, 0.1, 0.12, 0.14, 0.15, 0.16, 0.1648, 0.1649, 0.165, 0.17, 0.18],
     }}, "A0_e rate_max rate_min theta_lock", 2),
+    "polisher_robust": Claims({"polisher_robust": {}}, "wear_error", 15),
     "polisher_sequence": Claims({"polisher_sequence": {}}, "wear_error", 5),
     "polisher_wear": Claims({
         "polisher_wear": {"e": [0.02, 0.08, 0.1, 0.16], "w_x": [0.5, 0.53, 0.54, 0.56, 0.58], "radius": 2},
