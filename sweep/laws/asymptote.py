@@ -194,5 +194,5 @@ def _mixture(
     )
     ends = [float(end[0]) for end in both.interval(2, confidence)]
     if slow.aicc < found.aicc + AS_WELL and np.isfinite(slow.errors()).all():
-        ends += [float(slow.numbers[3] + end[0]) for end in slow.interval(t, [3], word, confidence)]
+        ends += [float(slow.numbers[3] + end[0]) for end in slow.interval(t, [3], word, confidence)[:2]]
     return min(ends) / span, max(ends) / span

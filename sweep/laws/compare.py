@@ -16,14 +16,14 @@ from sweep.laws.shapes import CORRECTION, LAWS, OFFSET
 from sweep.words import Table
 
 NAMES = {
-    "aicc": ("1", "Akaike's criterion, corrected for few points; of one law with the noise that suits it best"),
-    "bic": ("1", "Bayes' criterion, likewise"),
-    "worse": ("1", "AICc above that of the best law; beyond 10 a law is ruled out"),
-    "numbers": ("1", "numbers that are fitted"),
-    "scatter": ("1", "relative distance of the points from the law, root mean square"),
-    "residual": ("1", "largest relative distance of a point from the law"),
-    "runs": ("1", "chance that independent scatter has so few runs of signs; NaN of fewer than 12 points"),
-    "chi_squared": ("1", "chance that noise of the given sigma has so large a chi-squared; NaN without sigma"),
+    "aicc": "Akaike's criterion, corrected for few points; of one law with the noise that suits it best",
+    "bic": "Bayes' criterion, likewise",
+    "worse": "AICc above that of the best law; beyond 10 a law is ruled out",
+    "numbers": "numbers that are fitted",
+    "scatter": "relative distance of the points from the law, root mean square",
+    "residual": "largest relative distance of a point from the law",
+    "runs": "chance that independent scatter has so few runs of signs; NaN of fewer than 12 points",
+    "chi_squared": "chance that noise of the given sigma has so large a chi-squared; NaN without sigma",
 }
 
 
@@ -91,11 +91,8 @@ def _table(t: Array, z: Array, tried: list[Found]) -> xr.Dataset:
         "formula": [f.law.formula for f in tried],
         "exponents": [_exponents(f, float(t[-1] - t[0])) for f in tried],
     }
-    table = [
-        ("law", values, dict(zip(("units", "long_name"), NAMES.get(name, ()), strict=False)))
-        for name, values in columns.items()
-    ]
-    variables: dict[str, Any] = dict(zip(columns, table, strict=True))
+    about = {name: {"units": "1", "long_name": words} for name, words in NAMES.items()}
+    variables: dict[str, Any] = {name: ("law", column, about.get(name)) for name, column in columns.items()}
     variables |= {"fitted": (("law", "point"), np.exp([z - f.off for f in tried]))}
     variables |= {"x": ("point", np.exp(t)), "y": ("point", np.exp(z)), "law": [f.law.name for f in tried]}
     alive = [f for f in tried if f.aicc <= tried[0].aicc + BEYOND_DOUBT]
@@ -109,12 +106,13 @@ def _table(t: Array, z: Array, tried: list[Found]) -> xr.Dataset:
     text += f"not ruled out beside it: {', '.join(rivals)}" if rivals else alone
     if float(runs_chance(chosen.off)) < RARE or chosen.chi_squared() < RARE:
         text += "; but what it leaves has a shape, so that none of them is the law"
-    rows = list(
-        zip(variables["law"], (f"{worse:.3g}" for worse in columns["worse"]), columns["exponents"], strict=True)
-    )
+    rows = [
+        (f.law.name, f"{f.aicc - tried[0].aicc:.3g}", of) for f, of in zip(tried, columns["exponents"], strict=True)
+    ]
     summary = Table(rows, ("law", "worse in AICc", "exponents")).text(indent="", wide=True)
-    attrs = {"chosen": chosen.law.name, "margin": margin, "verdict": text, "summary": summary}
-    return xr.Dataset(variables, attrs=attrs)
+    return xr.Dataset(
+        variables, attrs={"chosen": chosen.law.name, "margin": margin, "verdict": text, "summary": summary}
+    )
 
 
 def _exponents(found: Found, span: float) -> str:

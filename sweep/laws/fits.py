@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.special import gammaincc, ndtri
 
 from sweep.laws.loglog import Array
-from sweep.laws.noise import RARE, ROUNDING, UNLIKELY, corrected, line_deviance, regress, runs_chance
+from sweep.laws.noise import RARE, ROUNDING, UNLIKELY, Regression, corrected, line_deviance, regress, runs_chance
 from sweep.laws.shapes import ONE, TWO, Law
 
 
@@ -45,24 +45,24 @@ class Found(NamedTuple):
         noise = 1.0 if self.weights is not None else math.sqrt(float(self.off @ self.off) / left)
         return np.where(lost, np.inf, noise * np.sqrt(np.nansum(np.where(lost[:, None], 0.0, change) ** 2, axis=1)))
 
-    def interval(self, t: Array, which: list[int], noise: str, confidence: float) -> tuple[Array, Array]:
-        """Ends of the intervals of some numbers, about them."""
+    def interval(self, t: Array, which: list[int], noise: str, confidence: float) -> tuple[Array, Array, float]:
+        """Ends of the intervals of some numbers, about them, and `aicc_under`."""
         errors = self.errors()
         doubt, known = errors[which], np.isfinite(errors)
         if self.weights is not None or not known[which].all():
             reach = (3 if self.weights is None else ndtri((1 + confidence) / 2)) * doubt
-            return -reach, reach
+            return -reach, reach, self.aicc_under(t, noise)
         line = regress(t, self.jacobian[:, known], self.off[None], noise)
         low, high = np.array([line.interval(int(known[:k].sum()), confidence) for k in which])[:, :, 0].T
-        return np.fmin(low, 0), np.fmax(high, 0)
+        return np.fmin(low, 0), np.fmax(high, 0), self.aicc_under(t, noise, line)
 
-    def aicc_under(self, t: Array, noise: str) -> float:
+    def aicc_under(self, t: Array, noise: str, line: Regression | None = None) -> float:
         """`aicc` with the noise of a word that suits best, where it is not known."""
         columns = self.jacobian[:, np.isfinite(self.errors())]
         if self.weights is not None or noise == "even" or not columns.size:
             return self.aicc
-        deviance = float(regress(t, columns, self.off[None], noise).deviance[0])
-        return float(corrected(deviance, t.size, self.law.numbers + 2))
+        line = line or regress(t, columns, self.off[None], noise)
+        return float(corrected(float(line.deviance[0]), t.size, self.law.numbers + 2))
 
     def chi_squared(self) -> float:
         """Chance of so large a chi-squared; NaN where the noise is not known."""

@@ -174,13 +174,13 @@ def _one(t: Array, z: Array, tried: dict[str, Found], confidence: float, noise: 
     size = math.sqrt(float(two.off @ two.off) / (t.size - 5))
     noisy = two.weights is not None or (_is_noise(t, z, two.off, size) if noise is None else bool(noise))
     word = noise if isinstance(noise, str) else "noise" if noisy else "even"
-    ends = _ends(two, t, word, confidence)  # the numbers, and the ends of their intervals
+    ends, aicc = _ends(two, t, word, confidence)  # the numbers, and the ends of their intervals
     if noisy or roughness(t, two.off)[0] > SMOOTH_TO * size:
         # over those of every bend of another shape that the points do not rule out
-        judged = {name: tried[name].aicc_under(t, word) for name in (law.name for law in BENDS) if name in tried}
-        alive = [name for name, aicc in judged.items() if aicc <= min(judged.values()) + OTHER_SHAPES]
-        others = np.array([_ends(tried[name], t, word, confidence)[1:] for name in alive])
-        low, high = np.fmin(ends[1], np.fmin.reduce(others[:, 0])), np.fmax(ends[2], np.fmax.reduce(others[:, 1]))
+        shaped = [_ends(tried[law.name], t, word, confidence) for law in BENDS[1:] if law.name in tried]
+        least = min(aicc, *(one for _, one in shaped)) + OTHER_SHAPES
+        bends = np.array([ends, *(one for one, of_shape in shaped if of_shape <= least)])
+        low, high = np.fmin.reduce(bends[:, 1]), np.fmax.reduce(bends[:, 2])
         further = BEYOND_SHAPES * max(ends[1, 2] - low[2], high[2] - ends[2, 2])
         low[2], high[2] = low[2] - further, high[2] + further
         ends[1:] = low, high
@@ -215,12 +215,12 @@ def _is_noise(t: Array, z: Array, off: Array, size: float) -> bool:
     return bool((share > SCATTERED and size < 3 * roughness(t, z)[0]) or (off.size >= TELLING_MEMORY and share > ROUGH))
 
 
-def _ends(found: Found, t: Array, word: str, confidence: float) -> Array:
-    """Exponents of both laws and ln of where they meet, and the ends of their intervals, (3, 3)."""
+def _ends(found: Found, t: Array, word: str, confidence: float) -> tuple[Array, float]:
+    """Exponents of both laws and ln of where they meet, and the ends of their intervals, (3, 3); `aicc_under`."""
     span, which = float(t[-1] - t[0]), [len(found.law.starts) + 1, len(found.law.starts) + 2, 0]
-    about = np.stack([np.zeros(3), *found.interval(t, which, word, confidence)])
-    ends: Array = (found.numbers[which] + about) * [1 / span, 1 / span, span] + [0.0, 0.0, t[0]]
-    return ends
+    low, high, aicc = found.interval(t, which, word, confidence)
+    about = np.stack([np.zeros(3), low, high])
+    return (found.numbers[which] + about) * [1 / span, 1 / span, span] + [0.0, 0.0, t[0]], aicc
 
 
 def _widened(t: Array, z: Array, best: Array, low: Array, high: Array) -> Array:
