@@ -113,10 +113,11 @@ def fitted(laws: Sequence[Law], t: Array, z: Array, errors: Array | None = None)
         for k, one in enumerate(_nearest(round_, starts, t, z, weights) if round_ else ()):
             found[k % len(z)][one.law.name] = one
     if ONE in laws and weights is None:
+        k = ONE.numbers + 2
         for line, row in zip(found, z, strict=True):
-            if (deviance := line_deviance(t, row)) < line[ONE.name].deviance:
-                k = ONE.numbers + 2
-                aicc, bic = float(corrected(deviance, t.size, k)), deviance + k * math.log(t.size)
+            deviance = line_deviance(t, row)
+            aicc, bic = float(corrected(deviance, t.size, k)), deviance + k * math.log(t.size)
+            if aicc < line[ONE.name].aicc:
                 line[ONE.name] = line[ONE.name]._replace(deviance=deviance, aicc=aicc, bic=bic)
     return found
 
