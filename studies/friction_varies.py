@@ -15,7 +15,7 @@ ln mu, since alpha = mu/(a^2 phi0) and so ds/dx = -2 s':
     ln(P(a0)/P(a)) = (1 - 2s) x + 2 s' x^2 - (4/3) s'' x^3 + (2/3) s''' x^4 + ...         (3)
 A power mean of a, of exponent 1 - 2s, is the first term alone, and wrong, since s changes with the season;
 noise from swing to swing: sigma of the torque scatters the rate as s sigma, of the friction as abs(2s - 1) sigma,
-both by sqrt(T/tau), and the two at once, of one noise, as (1 - s) sigma.                 (4)
+both by sqrt(T/tau), and the two at once, of one noise, as (1 - s) sigma (`shared` = 0: as two of their own). (4)
 """
 
 from __future__ import annotations

@@ -2,9 +2,10 @@
 
 The torque of half swing i = 0 ... N - 1, per moment of inertia, is
     mu_i = max(mu (1 + sigma x_i), floor),  x_0 = z_0,  x_i = r x_(i-1) + sqrt(1 - r^2) z_i,  r = exp(-1/tau_c)  (1)
-with z standard normal and white, so x is stationary with variance 1. The same noise may be one of its viscous friction,
-a max(1 + sigma_a x_i, 0.01). Each half swing lasts T_i by the exact pieces of `_linear_swing`; the first begins on the
-cycle without noise, where it would last T. The clock shows T for each, so
+with z standard normal and white, so x is stationary with variance 1. Its viscous friction may be noisy as well,
+a max(1 + sigma_a w_i, 0.01), w = shared x + sqrt(1 - shared^2) x', with x' like x but of numbers of its own: torque and
+friction have one noise where shared = 1, independent ones where it is 0. Each half swing lasts T_i by the exact pieces
+of `_linear_swing`; the first begins on the cycle without noise, where it would last T. The clock shows T for each, so
     its gain at the n-th switch is D_n = sum of T - T_i over i < n, at the true time t_n = sum of T_i,             (2)
 and between switches D runs straight from D_n to D_(n+1). Over all, it gains 86 400 D_N/t_N seconds a day. With
 y_j = (D(j tau) - D(j tau - tau))/tau for j = 1 ... M, M whole averaging times tau, it scatters by 86 400 times
@@ -12,7 +13,9 @@ y_j = (D(j tau) - D(j tau - tau))/tau for j = 1 ... M, M whole averaging times t
 floor = h + (mu - h)/100, where h is the least torque with which a swing from rest at the switch comes to the next
 switch and is not held by stiction: R_s without a hairspring. So noise never stops the clock.
 To first order long times see white noise as y = s sigma sqrt(T/tau) (s the sensitivity, `foliot`), and correlated
-noise as that times sqrt((1 + r)/(1 - r)); to second order noise of the torque slows the clock by a share of sigma^2.
+noise as that times sqrt((1 + r)/(1 - r)); with noise of the friction s sigma becomes the root of (s sigma)^2 +
+((2 s - 1) sigma_a)^2 - 2 shared s sigma (2 s - 1) sigma_a. To second order noise of the torque slows the clock by a
+share of sigma^2.
 The noise hangs on seed and i alone: cells of equal seed have the same noise, whatever else they have.
 Derived here; the model without noise is that of Hoyng & Nieuwenhuizen, arXiv:1604.06681.
 """
@@ -60,12 +63,15 @@ class Clock(NamedTuple):
     floor: float
     nominal: float
     tau: float
+    shared: float
+    own: float
 
 
 class Run(NamedTuple):
-    """x and the speed, t and D of (2) after a half swing, and how many had their torque raised to the floor."""
+    """x, x' and the speed, t and D of (2) after a half swing, and how many had their torque raised to the floor."""
 
     x: float
+    apart: float
     speed: float
     t: float
     gain: float
@@ -102,13 +108,15 @@ def _closed(averages, run, time, clock):
 
 
 @jit_call
-def _beat(run, averages, z, clock):
+def _beat(run, averages, z, z_apart, clock):
     """One half swing with the torque of (1), and whether it comes to the switch."""
-    x = where(run.t > 0.0, fma(clock.remembered, run.x, clock.fresh * z), z)
+    begun = run.t > 0.0
+    x = where(begun, fma(clock.remembered, run.x, clock.fresh * z), z)
+    apart = where(begun, fma(clock.remembered, run.apart, clock.fresh * z_apart), z_apart)
     torque = fma(clock.sigma, x, 1.0)
     short = not_(torque > clock.floor)
     torque = where(short, clock.floor, torque)
-    friction = larger(fma(clock.sigma_a, x, 1.0), LEAST_FRICTION + 0.0 * x)
+    friction = larger(fma(clock.sigma_a, fma(clock.shared, x, clock.own * apart), 1.0), LEAST_FRICTION + 0.0 * x)
     d, rho, rho_s, gamma, n, kappa, e, slack = clock.scene
     scene = Scene(d * friction, rho, rho_s, gamma, n, kappa, e, slack)
     start = scene.e * run.speed
@@ -119,29 +127,36 @@ def _beat(run, averages, z, clock):
     if any_lane(passes):
         averages = choose(passes, _closed(averages, run, legs.time, clock), averages)
     truncated = where(short, run.truncated + 1.0, run.truncated)
-    return Run(x, legs.speed, later, run.gain + (clock.nominal - legs.time), truncated), averages, goes_on
+    return Run(x, apart, legs.speed, later, run.gain + (clock.nominal - legs.time), truncated), averages, goes_on
 
 
 @jit_call
-def _run(first, seed, half_swings, clock, speed, active, radii, turns):
+def _run(first, seed, half_swings, clock, speed, active, radii, turns, radii_apart, turns_apart):
     """All half swings of the active cells of a group, and those of them that did not come to a switch."""
     count = half_swings[cells_at(first)]
     zero = 0.0 * speed
-    run, averages = Run(zero, speed, zero, zero, zero), Averages(zero, zero, zero, zero)
+    run, averages = Run(zero, zero, speed, zero, zero, zero), Averages(zero, zero, zero, zero)
+    two_noises = any_lane(clock.own > 0.0)
     stopped = count < 0.0
     most = 0.0
     for cell in range(GROUP):
         most = max(most, half_swings[first + cell])
     for chunk in range(int(min(most, HALF_SWING_LIMIT)) // (2 * PAIRS) + 1):
-        philox.fill(first, seed, chunk * PAIRS, PAIRS, radii, turns)
+        philox.fill(first, seed, chunk * PAIRS, PAIRS, 0, radii, turns)
+        if two_noises:
+            philox.fill(first, seed, chunk * PAIRS, PAIRS, 1, radii_apart, turns_apart)
         for j in range(PAIRS):
             row = cells_at(j * GROUP)
             z_0, z_1 = philox.gaussians(radii[row], turns[row])
+            apart_0, apart_1 = zero, zero
+            if two_noises:
+                apart_0, apart_1 = philox.gaussians(radii_apart[row], turns_apart[row])
             for second in range(2):
                 active = active & (2.0 * (chunk * PAIRS + j) + second < count)
                 if not any_lane(active):
                     break
-                new, newer, goes_on = _beat(run, averages, where(second > 0, z_1, z_0), clock)
+                z, z_apart = where(second > 0, z_1, z_0), where(second > 0, apart_1, apart_0)
+                new, newer, goes_on = _beat(run, averages, z, z_apart, clock)
                 stopped = stopped | (active & not_(goes_on))
                 active = active & goes_on
                 run, averages = choose(active, new, run), choose(active, newer, averages)
@@ -149,7 +164,7 @@ def _run(first, seed, half_swings, clock, speed, active, radii, turns):
 
 
 @jit
-def segments(first, columns, radii, turns):
+def segments(first, columns, radii, turns, radii_apart, turns_apart):
     """Every half swing from exact pieces. `rtol` is meant of rates as fractions: 1e-9 of a day is 8.6e-5 s."""
     i = cells_at(first)
     scene, units = _units.without_dimensions(_units.without_drag(read(LinearFoliot, columns, i)))
@@ -168,9 +183,12 @@ def segments(first, columns, radii, turns):
 
     m_tau, e_tau = mantissa_exponent(columns.averaging_time[i])
     tau = scale(m_tau / units.t, e_tau - units.e_t)
-    clock = Clock(scene, columns.sigma[i], columns.sigma_a[i], remembered, fresh, floor, cycle.half_period, tau)
+    sigma, sigma_a, shared = columns.sigma[i], columns.sigma_a[i], columns.shared[i]
+    own = sqrt((1.0 - shared) * (1.0 + shared))
+    clock = Clock(scene, sigma, sigma_a, remembered, fresh, floor, cycle.half_period, tau, shared, own)
     runs = units.fine & (found < FIRST_REFUSAL) & (least < 1.0)
-    run, averages, stopped = _run(first, columns.seed, columns.half_swings, clock, cycle.speed, runs, radii, turns)
+    numbers = radii, turns, radii_apart, turns_apart
+    run, averages, stopped = _run(first, columns.seed, columns.half_swings, clock, cycle.speed, runs, *numbers)
     t, closed = where(runs, run.t, 1.0), averages.closed
     enough = closed > 1.0
     deviation = sqrt(averages.squares / (2.0 * where(enough, closed - 1.0, 1.0)))
@@ -196,7 +214,8 @@ def segments(first, columns, radii, turns):
 @jit
 def _uniforms():
     """Rows for random numbers."""
-    return np.empty(PAIRS * GROUP), np.empty(PAIRS * GROUP)
+    n = PAIRS * GROUP
+    return np.empty(n), np.empty(n), np.empty(n), np.empty(n)
 
 
 @jit
@@ -213,6 +232,8 @@ PARAMETERS = (
           upper=philox.SEED_LIMIT, integer=True),
     Field("averaging_time", "s", "averaging time of the scatter", default=SECONDS_PER_DAY, lower=0.0, open_lower=True),
     Field("sigma_a", "1", "standard deviation of the friction of a half swing over a", default=0.0, lower=0.0),
+    Field("shared", "1", "correlation of the friction's noise with the torque's: 1 one noise, 0 independent ones",
+          default=1.0, lower=-1.0, upper=1.0),
 )  # fmt: skip
 
 FOLIOT_NOISE = kernel(

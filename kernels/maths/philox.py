@@ -39,10 +39,11 @@ def _uniform(high, low):
 
 
 @jit_call
-def fill(first, seed, place, n, radii, turns):
+def fill(first, seed, place, n, stream, radii, turns):
     """Two uniform numbers for each of n places from `place` on, for each cell of a group, into rows of two buffers.
 
-    Cells with the same seed have the same numbers; beside each other they are made once.
+    Cells with the same seed have the same numbers; beside each other they are made once. A seed has as many
+    independent streams as are wanted.
     """
     for cell in range(GROUP):
         same = cell > 0 and seed[first + cell] == seed[first + cell - 1]
@@ -53,7 +54,7 @@ def fill(first, seed, place, n, radii, turns):
                 radii[at], turns[at] = radii[at - 1], turns[at - 1]
             else:
                 count = place + j
-                words = philox((count & _WORD, count >> 32, 0, 0), (key & _WORD, key >> 32))
+                words = philox((count & _WORD, count >> 32, stream, 0), (key & _WORD, key >> 32))
                 radii[at], turns[at] = _uniform(words[0], words[1]), _uniform(words[2], words[3])
 
 

@@ -46,11 +46,11 @@ def test_the_generator_gives_the_published_numbers(counter, key, answer):
     assert tuple(int(w) for w in philox.philox(counter, key)) == answer == philox_by_its_paper(counter, key)
 
 
-def noise(seed, n, place=0):
+def noise(seed, n, place=0, stream=0):
     """The normal numbers of half swings, by Box & Muller from the generator's words, independent of the kernel."""
     numbers = []
     for j in range(place, place + (n + 1) // 2):
-        w = philox_by_its_paper((j % 2**32, j >> 32, 0, 0), (seed % 2**32, seed >> 32))
+        w = philox_by_its_paper((j % 2**32, j >> 32, stream, 0), (seed % 2**32, seed >> 32))
         u, turn = (((high << 21) + (low >> 11) + 0.5) / 2**53 for high, low in (w[:2], w[2:]))
         r = math.sqrt(-2 * math.log(u))
         numbers += [r * math.cos(2 * math.pi * turn), r * math.sin(2 * math.pi * turn)]
@@ -75,7 +75,7 @@ def run(*, method="segments", **named):
 LINEAR = {"a": 0.3, "R": 0.1, "k": 0.2, "e": 0.8}
 
 
-def followed(torques, a=0.0, R=0.0, k=0.0, e=1.0):
+def followed(torques, a=0.0, R=0.0, k=0.0, e=1.0, frictions=None):
     """T - T_i of every half swing, T and the torque-free start from the oracle's cycle; mu = phi0 = 1, in 40 digits.
 
     A half swing of torque m is one of torque 1 with all other forces divided by m and times by sqrt(m).
@@ -83,9 +83,9 @@ def followed(torques, a=0.0, R=0.0, k=0.0, e=1.0):
     with mp.workdps(40):
         period, _, v, _, _ = foliot_oracles.cycle(1.0, 1.0, a=a, R=R, k=k, e=e)
         late = []
-        for m in torques:
+        for m, share in zip(torques, np.ones(len(torques)) if frictions is None else frictions, strict=True):
             m = mpf(float(m))
-            law = foliot_oracles.law_of(m, 1, a, R, 0, 0, k, e)
+            law = foliot_oracles.law_of(m, 1, a * mpf(float(share)), R, 0, 0, k, e)
             swing = foliot_oracles.Flows.half_swing(law, v / mp.sqrt(m))
             v = swing.speed * mp.sqrt(m)
             late.append(period / 2 - swing.time / mp.sqrt(m))
@@ -129,6 +129,18 @@ def test_a_run_is_that_of_40_digits(seed, terms, sigma, tau_c, tau):
     assert found["rate_error_s_per_day"][0] == pytest.approx(rate, rel=1e-10, abs=1e-9)
     assert found["rate_scatter_s_per_day"][0] == pytest.approx(scatter, rel=1e-10, abs=1e-9)
     assert found["truncated"][0] == (wanted <= floor).mean()
+    assert status[0] == Status.OK
+
+
+@pytest.mark.parametrize("shared", [1.0, 0.3, 0.0, -1.0] if COMPILED else [0.3])
+def test_friction_has_as_much_noise_of_its_own_as_it_does_not_share(shared):
+    sigma, sigma_a, tau_c, seed, n = 0.05, 0.2, 3.0, 11, 60 if COMPILED else 20
+    x, apart = (correlated(noise(seed, n, stream=stream), tau_c) for stream in (0, 1))
+    w = shared * x + math.sqrt(1 - shared**2) * apart
+    rate, _ = scatter_of(*followed(1 + sigma * x, **LINEAR, frictions=1 + sigma_a * w), 17.0)
+    keys = {"sigma": sigma, "sigma_a": sigma_a, "tau_c": tau_c, "seed": seed, "half_swings": n, "averaging_time": 17.0}
+    found, status = run(shared=[shared, 0.7], rtol=1e-13, **keys, **LINEAR)  # beside a cell that shares otherwise
+    assert found["rate_error_s_per_day"][0] == pytest.approx(rate, rel=1e-10)
     assert status[0] == Status.OK
 
 
@@ -181,6 +193,23 @@ def test_long_times_scatter_by_the_sensitivity(terms, tau_c):
     memory = (1 / (1 - m) + (1 / (1 - r) if tau_c else 0)) / per
     assert abs(measured - 1) < 4 * error + 1.5 * memory
     assert memory < 0.06
+
+
+@pytest.mark.skipif(not COMPILED, reason="a million half swings in plain Python")
+def test_independent_noises_of_torque_and_friction_add_by_squares():
+    """The gain is s x sigma - (2 s - 1) w sigma_a; within 4 standard errors, as above. Takes a second: long times."""
+    cycle, _ = solve(FOLIOT, "segments", [1.0], [1.0], a=[3.0])
+    half, s = 0.5 * cycle["period"][0], cycle["sensitivity"][0]
+    per, shared = 200, np.repeat([0.0, 0.6, 1.0], SEEDS)
+    found, _ = run(
+        a=3.0, sigma=0.01, sigma_a=0.01, shared=shared, seed=np.tile(np.arange(SEEDS), 3), half_swings=LONG,
+        averaging_time=per * half, rtol=1e-9,
+    )  # fmt: skip
+    theory = s**2 + (2 * s - 1) ** 2 - 2 * np.array([0.0, 0.6, 1.0]) * s * (2 * s - 1)
+    measured = (found["rate_scatter_s_per_day"].reshape(3, SEEDS) ** 2).mean(1) / (DAY * 0.01) ** 2 * per
+    error = math.sqrt(3 / (SEEDS * (LONG / per - 2)))
+    assert abs(measured / theory - 1).max() < 4 * error + 0.01
+    assert np.ptp(theory) > 0.5 * theory.max()
 
 
 @pytest.mark.skipif(not COMPILED, reason="a million half swings in plain Python")
