@@ -94,9 +94,9 @@ class Refiner:
     ) -> None:
         self.tolerance, self.most, self._solve = tolerance, most_cells, solve
         self.parts, self.axes = [_flat(dataset.load())], list(study.axes)
-        first = {name: self.parts[0][name].values for name in self.axes}
-        self.box = Box.of(first)
-        self.points, self.values = self.box.points(first), np.stack(list(first.values()), axis=1)
+        self.box = Box.of(self.parts[0], self.axes)
+        self.points = self.box.points(self.parts[0])
+        self.values = np.stack([self.parts[0][name].values for name in self.axes], axis=1)
         self.first = len(self.points)
         self.origins = np.stack([np.arange(self.first)] * 2, axis=1)
         self._known = [dict(zip(_keys(t), v, strict=True)) for t, v in zip(self.points.T, self.values.T, strict=True)]

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -45,13 +45,12 @@ class Box:
     logarithmic: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, values: Mapping[str, Array]) -> Box:
-        """The box of cells with these values of their axes."""
-        low = np.array([v.min() for v in values.values()])
-        high = np.array([v.max() for v in values.values()])
-        return cls(tuple(values), low, high, (low > 0) & (high >= LOGARITHMIC * low))
+    def of(cls, cells: Mapping[Any, Any], names: Collection[str]) -> Box:
+        """The box of cells, such as those of a Dataset, over some axes."""
+        low, high = np.array([(float(cells[name].min()), float(cells[name].max())) for name in names]).T
+        return cls(tuple(names), low, high, (low > 0) & (high >= LOGARITHMIC * low))
 
-    def points(self, values: Mapping[str, Array]) -> Array:
+    def points(self, values: Mapping[Any, Any]) -> Array:
         """Places (n, axes) of axis values."""
         columns = np.stack([np.asarray(values[name], dtype=np.float64) for name in self.names], axis=1)
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -89,7 +88,7 @@ def axes_of(dataset: xr.Dataset) -> list[str]:
     names = [name for name in names if np.ptp(dataset[name].values) > 0]
     if not 2 <= len(names) <= MOST_AXES:
         return []
-    places = Box.of({name: dataset[name].values for name in names}).points({n: dataset[n].values for n in names})
+    places = Box.of(dataset, names).points(dataset)
     corners = np.unique(places[((places == 0) | (places == 1)).all(axis=1)], axis=0)
     return names if len(corners) == 2 ** len(names) else []
 
@@ -135,8 +134,8 @@ def interpolated(dataset: xr.Dataset, at: Mapping[str, Sequence[float] | Array])
     grids = {name: np.asarray(values, dtype=np.float64) for name, values in at.items()}
     mesh = dict(zip(grids, (m.ravel() for m in np.meshgrid(*grids.values(), indexing="ij")), strict=True))
     shape = tuple(len(values) for values in grids.values())
-    box = Box.of({name: dataset[name].values for name in names})
-    points, places = box.points({n: dataset[n].values for n in names}), box.points(mesh)
+    box = Box.of(dataset, names)
+    points, places = box.points(dataset), box.points(mesh)
     corners, shares, *_ = located(points, places)
     nearest = np.take_along_axis(corners, shares.argmax(axis=1)[:, None], 1)[:, 0]  # with the largest share
     found = xr.Dataset(coords={name: (name, values, dataset[name].attrs) for name, values in grids.items()})

@@ -126,7 +126,7 @@ def evened(dataset: xr.Dataset, axes: int = MOST_AXES) -> xr.Dataset:
     names = axes_of(dataset)
     if not names:
         return dataset
-    box = Box.of({name: dataset[name].values for name in names})
+    box = Box.of(dataset, names)
     axes = min(axes, len(names))
     even, middle = np.linspace(0.0, 1.0, round(SIDE ** (2 / axes))), np.array([0.5])
     return interpolated(dataset, {name: box.values(k, even if k < axes else middle) for k, name in enumerate(names)})
