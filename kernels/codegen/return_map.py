@@ -92,14 +92,16 @@ class ReturnMap:
         """
         tight = TIGHT * self.fine
         sizes, off = self._sizes(turning(self.scene, True), parameters, before, flips, tight), np.zeros(before.shape)
-        left = np.flatnonzero(np.isnan(sizes).any(axis=0))
-        if len(left):
-            some, here, steps = [c[left] for c in parameters], before[:, left], flips[left]
-            runs = [self._sizes(turning(self.scene, False), some, here, steps, many * tight) for many in OTHERS]
-            most = np.maximum.reduce(runs)
-            apart = most - np.minimum.reduce(runs)
-            apart[paired(self.scene)] = 0.0
-            sizes[:, left], off[:, left] = most, APART * apart
+        for scene, sure in (
+            (turning(self.scene, False), paired(self.scene)),
+            (self.scene, np.full(len(before), False)),
+        ):
+            left = np.flatnonzero(np.isnan(sizes).any(axis=0))
+            if len(left):
+                some, here, steps = [c[left] for c in parameters], before[:, left], flips[left]
+                runs = [self._sizes(scene, some, here, steps, many * tight) for many in OTHERS]
+                sizes[:, left] = np.maximum.reduce(runs)
+                off[:, left] = np.where(sure[:, None], 0.0, APART * (sizes[:, left] - np.minimum.reduce(runs)))
         return sizes, np.where(np.isnan(off), np.inf, off)
 
     def _sizes(self, scene, parameters, before, flips, rtol):

@@ -1,0 +1,109 @@
+"""How does van der Pol's oscillator go over from a sine to a relaxation oscillation?
+
+    sweep run studies/relaxation.toml --allow-import
+    python studies/relaxation.py relaxation.h5
+
+draws relaxation.png. Weak friction leaves a sine of amplitude 2; strong friction makes x creep and jump, with a period
+that grows as the friction. Both limits and what comes next to them are known.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from _common import Groups, Statement, compared, differing, direct_label, read_result, report
+
+from kernels.interface import Status
+
+SLOW = 3.0 - 2.0 * math.log(2.0)
+"""Period over mu of strong friction."""
+NEXT = 7.0143
+"""What comes next, times mu^-1/3: 3 times the first zero of Ai, 2.33811."""
+AT_ONE = 6.663286859323130
+"""Period at mu = 1, by a Taylor series of order 24 at 25 digits."""
+
+NOTES = """\
+Weak: T = 2 pi (1 + mu^2/16), largest x 2 + mu^2/96, multiplier exp(-2 pi mu).
+Strong (Dorodnicyn 1947): T = (3 - 2 ln 2) mu + 7.0143 mu^-1/3."""
+
+
+def weak(ds: xr.Dataset) -> list[Statement]:
+    """The limit of weak friction."""
+    here = ds.isel({"mu": 0})
+    mu = float(here.mu)
+    return [
+        compared("(T/2 pi - 1)/mu^2", "1/16", (float(here.period) / (2.0 * math.pi) - 1.0) / mu**2, 1.0 / 16.0, 1e-3),
+        compared("(largest x - 2)/mu^2", "1/96", (float(here.x_size) - 2.0) / mu**2, 1.0 / 96.0, 1e-3),
+        compared(
+            "multiplier at the weakest", "exp(-2 pi mu)", float(here.multiplier), math.exp(-2 * math.pi * mu), 1e-4
+        ),
+    ]
+
+
+def strong(ds: xr.Dataset) -> list[Statement]:
+    """The limit of strong friction."""
+    late = ds.where(ds.mu >= 1e3, drop=True)
+    more = late.period - SLOW * late.mu
+    slope = np.polyfit(np.log(late.mu), np.log(more), 1)[0]
+    last = ds.isel({"mu": -1})
+    return [
+        compared("T at the strongest", "(3 - 2 ln 2) mu + 7.0143 mu^-1/3", float(last.period),
+                 SLOW * float(last.mu) + NEXT * float(last.mu) ** (-1 / 3), 1e-7),
+        differing("exponent of T - (3 - 2 ln 2) mu", "-1/3", float(slope), -1.0 / 3.0, 0.02),
+        differing("d ln T/d ln mu at the strongest", "1", float(last.period_by_mu), 1.0, 1e-4),
+    ]  # fmt: skip
+
+
+def figure(ds: xr.Dataset) -> Any:
+    """Period with its limits; what is left of it beyond the strong one; largest x and multiplier."""
+    from sweep.show import charts
+
+    with charts.style():
+        page = charts.new_figure(charts.PAGE, 62.0)
+        panels = page.subplots(1, 3)
+        a, b, c = panels
+        a.plot(ds.mu, ds.period, color=charts.COLOURS[0])
+        a.plot(ds.mu, SLOW * ds.mu, color="0.5", linestyle="--", linewidth=0.8)
+        a.axhline(2.0 * math.pi, color="0.5", linestyle=":", linewidth=0.8)
+        a.set(xscale="log", yscale="log", xlabel=r"friction $\mu$", ylabel="period $T$", ylim=(3.0, 3e4))
+        direct_label(a, 1500.0, 200.0, r"$(3-2\,\ln 2)\,\mu$", "0.4")
+        direct_label(a, 0.1, 4.4, r"$2\pi$", "0.4")
+        b.plot(ds.mu, ds.period - SLOW * ds.mu, color=charts.COLOURS[0])
+        b.plot(ds.mu, NEXT * ds.mu ** (-1 / 3), color="0.5", linestyle="--", linewidth=0.8)
+        b.set(xscale="log", yscale="log", xlabel=r"friction $\mu$", ylabel=r"$T-(3-2\,\ln 2)\,\mu$")
+        direct_label(b, 400.0, 4.0, r"$7.0143\,\mu^{-1/3}$", "0.4")
+        c.plot(ds.mu, ds.x_size, color=charts.COLOURS[0], label="largest $x$")
+        c.plot(ds.mu, ds.multiplier.clip(0.0), color=charts.COLOURS[1], linestyle="--", label="multiplier")
+        c.plot(ds.mu, ds.period_by_mu, color=charts.COLOURS[2], linestyle="-.", label=r"d ln $T$/d ln $\mu$")
+        c.set(xscale="log", xlabel=r"friction $\mu$", ylim=(-0.05, 2.2))
+        c.legend(loc="center right", fontsize=6, bbox_to_anchor=(1.0, 0.68))
+        for axes, letter in zip(panels, "abc", strict=True):
+            charts.letter(axes, letter)
+    return page
+
+
+def conclude(path: str) -> tuple[Groups, list[str], Any]:
+    """Statements and the figure."""
+    ds = read_result(path, "relaxation_scene:KERNEL", ["mu"], "relaxation.toml")
+    share = float((ds.status == Status.OK).mean())
+    near = ds.period.sel(mu=1.0, method="nearest")
+    cells = [
+        Statement("cells that are OK", "all", f"{share:.0%}", None, share == 1.0),
+        compared("T at mu = 1", "6.66328686", float(near), AT_ONE, 1e-8),
+    ]
+    groups = {"Cells": cells, "Weak friction": weak(ds), "Strong friction": strong(ds)}
+    return groups, NOTES.splitlines(), lambda: figure(ds)
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Table and figure of the result that is named; 1 if a statement does not hold."""
+    return report(__file__, ["relaxation.h5"], arguments, conclude)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
