@@ -102,7 +102,7 @@ TABLE = {
         "stability_maps_spring": {"k": [1.5, 1.999], "step": 12},
     }, "amplitude crossing_speed rate_calls steps time status stability_maps_oscillator.clock "
         "stability_maps_oscillator.error stability_maps_oscillator.interval stability_maps_oscillator.pace", 1),
-    "relaxation": Claims({"relaxation": {"mu": [0.01, 1.0, 1e3, 10**3.5, 1e4]}}, ""),
+    "relaxation": Claims({"relaxation": {"mu": [0.01, 1.0, 1e3, 10**3.5, 1e4]}}, "", 1),
     "stick_slip": Claims({
         "stick_slip": {"method": ["taylor", "dop853"], "belt": [0.02, 0.3], "fall": [0.02, 0.3]},
     }, "interval place speed", 2, tell=False),
