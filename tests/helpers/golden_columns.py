@@ -89,7 +89,7 @@ PLAIN = {
     "polisher_wear": 1,
     "polisher_wear_point": 2,
     "foliot_ripple": 2,
-    "foliot_steps": 3,
+    "foliot_steps": 1,
     "foliot_noise": 4,
 }
 """Cells of each method that are computed in plain Python; 8 of other kernels, one of scenes of one's own."""

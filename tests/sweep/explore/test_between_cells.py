@@ -1,14 +1,12 @@
 """What lies between cells: borders on maps, values inside a box of scattered cells, lines in it, and their errors."""
 
-import itertools
-
 import numpy as np
 import pytest
 import xarray as xr
 from scipy.interpolate import LinearNDInterpolator
 
 import sweep
-from sweep.explore.mesh import errors_inside, simplices, stretch
+from sweep.explore.mesh import stretch
 from sweep.explore.scattered import axes_of, heights, on_lines
 from sweep.laws.maps import contours
 
@@ -148,47 +146,3 @@ def test_lines_hold_what_was_computed_and_say_how_to_ask_for_others():
         assert on_lines(one_end, "a").sizes["b"] == 5
     with pytest.raises(sweep.SweepError, match=r"--at b=1.0 \(2 cells\)"):
         on_lines(ds.isel(cell=np.r_[0, 4, 20, 24, 30:85]), "a")
-
-
-# errors of straight lines between cells
-
-
-def judged(points, values):
-    """Simplices, how far straight lines are off in them, and the edges to cut."""
-    corners = simplices(points)
-    return corners, *errors_inside(points, values, np.zeros(len(points), int), corners)
-
-
-@pytest.mark.parametrize("axes", [1, 2, 3])
-def test_of_a_parabola_the_error_is_found_exactly_and_the_edge_that_bends_most_is_cut(axes):
-    """In the middle of an edge e straight lines are off by e H e / 8, H the matrix of second derivatives."""
-    rng = np.random.default_rng(axes)
-    points = rng.random((40 * axes, axes))
-    matrix = rng.normal(size=(axes, axes))
-    matrix = matrix + matrix.T
-
-    def parabola(at):
-        return np.einsum("ni,ij,nj->n", at, matrix, at) / 2 + at @ np.arange(axes) + 1.0
-
-    corners, size, cut = judged(points, parabola(points))
-    first, second = np.array(list(itertools.combinations(range(axes + 1), 2))).T
-    edge = points[corners[:, first]] - points[corners[:, second]]
-    middle = abs(np.einsum("nki,ij,nkj->nk", edge, matrix, edge)) / 8
-    inside = abs(parabola(points)[corners].mean(axis=1) - parabola(points[corners].mean(axis=1)))
-    expected = 1.6 * np.maximum(middle.max(axis=1), inside)  # a factor for what is no parabola
-    np.testing.assert_allclose(size, expected, rtol=1e-3, atol=1e-3 * np.median(size))
-    ends = points[cut[:, 0]] - points[cut[:, 1]]
-    of_cut = abs(np.einsum("ni,ij,nj->n", ends, matrix, ends)) / 8
-    assert (of_cut >= 0.89 * middle.max(axis=1)).all()
-
-
-def test_a_kink_is_not_taken_for_the_parabola_through_it_and_a_wave_is_cut_across():
-    """Between -1/8 and 1/8, straight lines are off abs(x) by 1/8; the parabola says a quarter of that."""
-    x = np.arange(-7, 8, 2) / 8
-    corners, size, _ = judged(x[:, None], abs(x))
-    middle = np.flatnonzero(x[corners].sum(axis=1) == 0)
-    assert 0.7 / 8 < size[middle] < 1.5 / 8
-    grid = np.meshgrid(np.linspace(0, 1, 9), np.linspace(0, 1, 9))
-    points = np.stack([g.ravel() for g in grid], axis=1)
-    _, _, ends = judged(points, np.sin(3 * points[:, 0]))
-    assert (abs(points[ends[:, 0], 0] - points[ends[:, 1], 0]) > 0.1).all()

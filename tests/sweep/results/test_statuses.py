@@ -11,11 +11,8 @@ from toy_studies import build
 import sweep
 from kernels.interface import Status
 from sweep.cli import main
-from sweep.file.reading import StoredFile
 from sweep.results.statuses import (
     account,
-    count_statuses,
-    summary_text,
 )
 from sweep.study.toml import to_toml
 
@@ -73,27 +70,3 @@ def test_the_results_of_a_folder_are_listed_with_what_became_of_them(tmp_path):
     assert c.cells == 23
     assert 0 < c.done < 1
     assert "not the result of a sweep" in d.fault
-
-
-HEIGHTS = [1.0, -1.0, np.nan, 4.0, 9.0, 16.0]
-STUDIES = {
-    "product": {"axes": {"height": HEIGHTS, "v0": [0.0, 1.0, np.nan]}},
-    "words": {"axes": {"height": HEIGHTS, "method": ["rough", "exact", "auto"]}},
-    "zip": {"axes": {"height": HEIGHTS, "v0": [1.0, 0.0, 1.0, 0.0, 1.0, 0.0]}, "design": "zip"},
-    "one cell": {"axes": {"height": [-1.0]}},
-    "summary": {"axes": {"height": HEIGHTS, "v0": [0.0, 1.0, np.nan]}, "summary": {"outputs": {"fall_time": ["min"]}}},
-    "summary of one axis": {
-        "axes": {"height": HEIGHTS, "v0": [0.0, 1.0]},
-        "summary": {"outputs": {"fall_time": ["mean"]}, "over": ["v0"]},
-    },
-}
-
-
-@pytest.mark.parametrize("name", STUDIES)
-def test_a_run_counts_the_cells_of_its_file_as_their_reader_does(tmp_path, name):
-    study, output = build(**STUDIES[name]), tmp_path / "out.h5"
-    sweep.run(study, output, progress=False).close()
-    with StoredFile(output) as found, sweep.open_result(output) as dataset:
-        assert summary_text(found) == summary_text(dataset)
-        assert count_statuses(found) == count_statuses(dataset)
-        assert account(found).refused > 0

@@ -83,16 +83,6 @@ def test_from_a_tenth_on_the_time_left_is_within_a_factor_of_two(name, slow, wor
         assert 0.5 * (end - now) - 0.03 * end <= left <= 2.0 * (end - now) + 0.03 * end, (share, left, end - now)
 
 
-def test_every_block_comes_once_also_one_that_comes_again():
-    assert sorted(from_everywhere(range(7, 1000))) == list(range(7, 1000))
-    run = Run(COSTS["dear last"], 100, 3)
-    assert len(list(run.ends())) == len(run.costs)
-    assert run.progress.left == 0.0
-    for weight in run.weights:
-        run.progress.again(1, weight)
-    assert run.progress.left == pytest.approx(run.now, rel=0.3)
-
-
 def test_a_block_that_takes_far_longer_than_thought_is_not_done_at_any_moment():
     """The last one of a hundred takes a minute, not the second that the others did: it was never 0 s to its end."""
     now = 0.0
