@@ -17,7 +17,7 @@ from kernels.codegen.module import compiling
 from kernels.codegen.return_map import TIGHT, ReturnMap, has_sides, watched
 from kernels.interface import FIRST_REFUSAL, Field, Kernel, Method, OnColumns, Status
 from kernels.lanes.wiring import signed
-from kernels.scene import Function, Scene, SceneError, limits_check, scene_of
+from kernels.scene import Function, Scene, SceneError, bare, limits_check, scene_of
 
 __all__ = ["cycle_kernel"]
 
@@ -72,7 +72,7 @@ def cycle_kernel(
     SceneError
         As `scene_kernel`, and where the surface watches more than one state, or one that turns.
     """
-    scene = scene_of(name, doc, states, parameters, rates, surface, start, switch)
+    scene = bare(scene_of(name, doc, states, parameters, rates, surface, start, switch))
     turning = {scene.states.index(state): float(turn) for state, turn in (turns or {}).items()}
     if watched(scene) in turning:
         raise SceneError(f"{name}: the state that the surface watches cannot turn; let the switch put it back")

@@ -2,10 +2,14 @@
 
     u' = rates(u, side, parameters),  a switch where surface(u, side, parameters) falls through 0         (1)
 
-The functions are plain Python of named scalars; each asks by name for the states, parameters and `side` that it needs.
+A scene may have several surfaces, each with its own jump; what is 0 at one of them is located as a kink is (`record`).
+The functions are plain Python of named scalars; each asks by name for the states, parameters and `side` that it needs,
+and for the time `t`, which is 0 at the start, or `start_time`, unless a state or a parameter is called t.
 They are called once, with objects that record what is done to them (`expression`), and written out as compiled
 functions for one cell and for lanes (`module`), in a file that can be read. In them are allowed + - * / ** abs,
-and sqrt, exp, log, sin, cos, power, sign, maximum, minimum and where of this module. power(abs(u), n), u a state and
+and sqrt, exp, log, sin, cos, tan, arcsin, arccos, arctan, sinh, cosh, tanh, hypot, power, sign, floor, mod, maximum,
+minimum and where of this module; numpy's of these names are the same, and so are math's in the module that the function
+is written in. power(abs(u), n), u a state and
 n > -1 any number, has no Taylor series at u = 0; there it is followed as `integrate.powers` says, right to the same
 tolerance. Of what is not a state, power and sqrt want something above 0 (else OUT_OF_RANGE).
 
@@ -18,7 +22,7 @@ that starts on the surface and falls switches at once. What rounding alone may m
 import keyword
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -26,16 +30,39 @@ import numpy as np
 from kernels.codegen import followed_twice, stated_error
 from kernels.codegen.accumulated import to_rest
 from kernels.codegen.module import build, compiling
-from kernels.codegen.record import RESERVED
+from kernels.codegen.record import RESERVED, asks_for_time, named_functions
 from kernels.codegen.slid_along import slid_along
 from kernels.codegen.stepped import twice_by
 from kernels.interface import Field, Kernel, Method, OnColumns, Status
 from kernels.lanes.wiring import signed
-from kernels.source_text.expression import SceneError, cos, exp, log, maximum, minimum, power, sign, sin, sqrt, where
+from kernels.source_text.expression import (
+    SceneError,
+    arccos,
+    arcsin,
+    arctan,
+    cos,
+    cosh,
+    exp,
+    floor,
+    hypot,
+    log,
+    maximum,
+    minimum,
+    mod,
+    pi,
+    power,
+    sign,
+    sin,
+    sinh,
+    sqrt,
+    tan,
+    tanh,
+    where,
+)
 
 __all__ = [
-    "Field", "Scene", "SceneError", "cos", "exp", "log", "maximum", "minimum", "power", "scene_kernel", "sign", "sin",
-    "sqrt", "where",
+    "Field", "Scene", "SceneError", "arccos", "arcsin", "arctan", "cos", "cosh", "exp", "floor", "hypot", "log",
+    "maximum", "minimum", "mod", "pi", "power", "scene_kernel", "sign", "sin", "sinh", "sqrt", "tan", "tanh", "where",
 ]  # fmt: skip
 
 MOST_FLIPS = 1_000_000
@@ -45,6 +72,8 @@ SLIDERS = {"taylor": ("dop853", "rodas5p")}
 """Methods by which a method follows what slides along a kink, where that is not itself."""
 Function = Callable[..., Any]
 """Of named scalars, as its author writes it."""
+Functions = Function | Mapping[str, Function]
+"""One, or one for each of several surfaces by their names."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,12 +86,15 @@ class Scene:
     states : names of the states
     parameters : names of the parameters
     rates : (states, side, parameters) -> the time derivative of each state
-    surface : (states, side, parameters) -> what falls through 0 at the switch
+    surface : (states, side, parameters) -> what falls through 0 at the switch; or {name: such a function}
     start : (parameters) -> the states at time 0, where side is 1
-    switch : (states, side, parameters) -> the states just behind the switch; None: they do not jump
+    switch : (states, side, parameters) -> the states just behind the switch; None: they do not jump; or for some of the
+        surfaces {name: such a function}
     most_kinks : between two switches, after which a cell is given up; None: a thousand
     slides : whether motion goes on along a kink onto which both sides press it (`sliding`), or sticks there
     exact_start : whether what rounding takes from the surface's value at the start does not count
+    start_time : a number, or (parameters) -> one: then the last state is the time `t`, of which the functions know
+        nothing but that they may ask for it
 
     At a switch `side` turns from 1 to -1 or back. Where abs(u) or sign(u) occurs, u = 0 is a *kink*: the motion is
     followed up to it and begun anew behind it.
@@ -73,12 +105,13 @@ class Scene:
     states: tuple[str, ...]
     parameters: tuple[str, ...]
     rates: Function
-    surface: Function
+    surface: Functions
     start: Function
-    switch: Function | None = None
+    switch: Functions | None = None
     most_kinks: int | None = None
     slides: bool = False
     exact_start: bool = False
+    start_time: Function | float | None = None
 
     def __post_init__(self) -> None:
         names = [*self.states, *self.parameters]
@@ -89,6 +122,8 @@ class Scene:
             raise SceneError("a scene's states and parameters need names of their own")
         if not self.states:
             raise SceneError("a scene needs a state")
+        if isinstance(self.surface, Mapping) and not self.surface:
+            raise SceneError("a scene needs a surface")
 
 
 def scene_kernel(
@@ -98,9 +133,10 @@ def scene_kernel(
     states: Sequence[Field],
     parameters: Sequence[Field],
     rates: Function,
-    surface: Function,
+    surface: Functions,
     start: Function,
-    switch: Function | None = None,
+    switch: Functions | None = None,
+    start_time: Function | float | None = None,
     source: str = "a study's own",
     example: Mapping[str, float] | None = None,
 ) -> Kernel:
@@ -110,6 +146,7 @@ def scene_kernel(
     ----------
     states, parameters : what they are called, their units; a state's Field is also that of the output
     rates, surface, start, switch : as in `Scene`
+    start_time : what `t` is at the start, where one of the functions asks for it: a number, or (parameters) -> one
     example : parameters at which the scene runs well
 
     Returns
@@ -123,7 +160,7 @@ def scene_kernel(
     SceneError
         Where the functions ask for what is not there, or do what cannot be recorded.
     """
-    scene = scene_of(name, doc, states, parameters, rates, surface, start, switch)
+    scene = scene_of(name, doc, states, parameters, rates, surface, start, switch, start_time)
     fields, outputs = (*parameters, flips_field(40.0, MOST_FLIPS)), (*TIMES, *states)
     return Kernel(
         name=name,
@@ -150,13 +187,27 @@ def scene_of(
     states: Sequence[Field],
     parameters: Sequence[Field],
     rates: Function,
-    surface: Function,
+    surface: Functions,
     start: Function,
-    switch: Function | None,
+    switch: Functions | None,
+    start_time: Function | float | None = None,
 ) -> Scene:
-    """The scene of states and parameters that are given as fields."""
+    """The scene of states and parameters that are given as fields; the time is its last state if it is asked for."""
     of_states, of_parameters = (tuple(field.name for field in fields) for fields in (states, parameters))
-    return Scene(name, doc, of_states, of_parameters, rates, surface, start, switch)
+    scene = Scene(name, doc, of_states, of_parameters, rates, surface, start, switch)
+    functions = (rates, *named_functions(surface).values(), *named_functions(switch).values())
+    if asks_for_time(functions, (*of_states, *of_parameters)):
+        return replace(scene, states=(*of_states, "t"), start_time=0.0 if start_time is None else start_time)
+    if start_time is not None:
+        raise SceneError(f"start_time of the scene {name}: none of its functions asks for the time t")
+    return scene
+
+
+def bare(scene: Scene) -> Scene:
+    """The scene, where it has one surface and no clock. Raises SceneError."""
+    if scene.start_time is not None or isinstance(scene.surface, Mapping):
+        raise SceneError(f"{scene.name}: here a scene has one surface, and for the time a state, such as a phase")
+    return scene
 
 
 def flips_field(default: float, most: float) -> Field:

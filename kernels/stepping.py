@@ -18,7 +18,7 @@ from kernels.codegen.stepped import methods_of, stepped
 from kernels.integrate.events import LOCATIONS, METHODS
 from kernels.interface import Field, Kernel, Method, Status
 from kernels.lanes.wiring import signed
-from kernels.scene import TIMES, Function, Scene, flips_field, limits_check, scene_of
+from kernels.scene import TIMES, Function, Scene, SceneError, flips_field, limits_check, scene_of
 
 __all__ = ["METHODS", "stepped_kernel", "stepping_fields", "stepping_methods"]
 
@@ -86,7 +86,7 @@ def stepping_methods(
 
 
 def _fill_plainly(time: Any, interval: Any, states: Any, reach: Any, columns: Any) -> None:
-    for column, row in zip(columns, (time, interval, *states), strict=True):
+    for column, row in zip(columns, (time, interval, *states), strict=False):  # the time may be a further state
         column[:] = row
 
 
@@ -100,6 +100,7 @@ def stepped_kernel(
     surface: Function,
     start: Function,
     switch: Function | None = None,
+    start_time: Function | float | None = None,
     source: str = "",
     example: Mapping[str, float] | None = None,
 ) -> Kernel:
@@ -111,7 +112,9 @@ def stepped_kernel(
         Of the scene's parameters, `flips`, `step` and `location`; its outputs are `time` of the last switch, `interval`
         since the one before, each state just before it, and `error`, `steps`, `rate_calls`.
     """
-    scene = scene_of(name, doc, states, parameters, rates, surface, start, switch)
+    if not callable(surface):
+        raise SceneError(f"the scene {name}: at a fixed step there is one surface")
+    scene = scene_of(name, doc, states, parameters, rates, surface, start, switch, start_time)
     fields, outputs = (*parameters, *stepping_fields()), (*TIMES, *states, *COST)
     return Kernel(
         name=name,

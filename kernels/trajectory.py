@@ -16,7 +16,7 @@ from kernels.codegen.at_times import at_switches, at_times
 from kernels.codegen.module import compiling
 from kernels.interface import FIRST_REFUSAL, Field, Kernel, Method, Status
 from kernels.lanes.wiring import signed
-from kernels.scene import Function, Scene, flips_field, limits_check, scene_of
+from kernels.scene import Function, Functions, Scene, bare, flips_field, limits_check, scene_of
 
 __all__ = ["motion_kernel", "section_kernel"]
 
@@ -35,9 +35,10 @@ def section_kernel(
     states: Sequence[Field],
     parameters: Sequence[Field],
     rates: Function,
-    surface: Function,
+    surface: Functions,
     start: Function,
-    switch: Function | None = None,
+    switch: Functions | None = None,
+    start_time: Function | float | None = None,
     source: str = "a study's own",
     example: Mapping[str, float] | None = None,
 ) -> Kernel:
@@ -48,7 +49,7 @@ def section_kernel(
     Kernel
         Along `passage`, the numbers of the switches that a study asks for, rising: `time` and each state just before.
     """
-    scene = scene_of(name, doc, states, parameters, rates, surface, start, switch)
+    scene = scene_of(name, doc, states, parameters, rates, surface, start, switch, start_time)
     along = Field("passage", "1", "number of the switch, from the start", lower=1.0, upper=MOST, integer=True)
     outputs = tuple(
         replace(f, dims=("passage",), gaps=True) for f in (Field("time", "s", "time of the switch"), *states)
@@ -56,7 +57,7 @@ def section_kernel(
 
     def solved(method: str, columns: list[Any], rtol: Any, stops: Any) -> Any:
         rows, error, status = at_switches(scene, method, columns, rtol, stops)
-        return np.delete(rows, 1, axis=0), error, status
+        return np.delete(rows, 1, axis=0)[: 1 + len(states)], error, status
 
     return _kernel(scene, source, parameters, outputs, along, solved, example)
 
@@ -82,7 +83,7 @@ def motion_kernel(
         Along `at`, rising times after the start: each state then. Its further parameter `flips` is the number of
         switches that are followed at most: TOO_SHORT where later times are asked for, which are NaN.
     """
-    scene = scene_of(name, doc, states, parameters, rates, surface, start, switch)
+    scene = bare(scene_of(name, doc, states, parameters, rates, surface, start, switch))
     along = Field("at", "s", "time after the start", lower=0.0, open_lower=True)
     outputs = tuple(replace(f, dims=("at",), gaps=True) for f in states)
 

@@ -60,7 +60,7 @@ def to_rest(how):
         if len(those):
             early = [*(c[cells[those]] for c in columns[:-1]), np.full(len(those), 2.0)]
             sizes = followed_twice.followed(module, early, np.full(len(those), ROUGHLY))[2 + len(module.STATES) : -1]
-            rests, values, error = _limits(followed, those, last[those], sizes)
+            rests, values, error = _limits(followed, those, last[those], sizes[: len(outputs) - 2])
             good = cells[those[rests]]
             for column, row in zip(outputs, values, strict=True):
                 column[good] = row[rests]

@@ -45,8 +45,9 @@ Written by kernels.scene from the functions of the scene; do not change it here.
 import math
 
 from kernels.maths.intervals import (
-    above, added, half_squared, hidden_by_exp, hidden_by_over, hidden_by_power, hidden_by_root, largest, most,
-    multiplied, of_cos, of_exp, of_log, of_power, of_sin, of_sqrt, over, smallest, times, widened,
+    above, added, half_squared, hidden_by_arcsin, hidden_by_arctan, hidden_by_exp, hidden_by_hypot, hidden_by_over,
+    hidden_by_power, hidden_by_root, hidden_by_sinh, hidden_by_tanh, largest, most, multiplied, of_arccos, of_arcsin,
+    of_cos, of_cosh, of_exp, of_hypot, of_log, of_power, of_sin, of_sqrt, over, smallest, times, widened,
 )
 from kernels.codegen.module import cell_of, kept
 from kernels.integrate.carried import Changes
@@ -58,7 +59,9 @@ from kernels.integrate.taylor_leg import Series, to_event
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.refill import each_refilled
 from kernels.lanes.vectors import dot, fma, horner, not_, magnitude, any_lane, sqrt, where
-from kernels.maths.elementary import exp, log, power, sincos
+from kernels.maths.elementary import (
+    arccos, arcsin, arctan, cosh, exp, floor, floor_between, hypot, log, power, sincos, sinh, tanh,
+)
 from kernels.maths.pairs import two_sum
 
 STATES = {states}
@@ -174,7 +177,7 @@ DRIVEN = '''
 @jit_call
 def advance_{leg}(memory, i):
     """Every lane on, until one has finished."""
-    return advance({m}, leg_{leg}, memory, i, {tells}, {slides})
+    return advance({m}, leg_{leg}, memory, i, {tells}, {slides}, {surfaces})
 
 
 @kept
@@ -378,7 +381,11 @@ class Writer:
 
     def driven(self, leg, m="M", tells="None"):
         """The text of `run_{leg}`."""
-        return filled(DRIVEN, leg=leg, m=m, tells=tells, slides="M.slides" if self.scene.slides else "None")
+        further = self.recorded.surfaces
+        return filled(
+            DRIVEN, leg=leg, m=m, tells=tells, slides="M.slides" if self.scene.slides else "None",
+            surfaces=tuple(float(j in further) for j in range(self.kinks)) if further else None,
+        )  # fmt: skip
 
     def _lost(self):
         if self.scene.exact_start:

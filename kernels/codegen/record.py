@@ -1,12 +1,13 @@
 """What a scene's functions do, recorded: the graphs of its rates, surface, switch and start."""
 
 import inspect
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from kernels.codegen.sliding import slid
-from kernels.source_text.expression import ADD, FUNCTIONS, NUMBER, SCALED, Expression, Graph, SceneError
+from kernels.source_text.expression import ADD, FUNCTIONS, NUMBER, SCALED, Expression, Graph, SceneError, math_recorded
 
 RESERVED = ("side", "flips", "time", "interval", "rtol", "status")
 """Names that a scene's states and parameters cannot have."""
@@ -18,8 +19,10 @@ class Recorded:
 
     `events` are (offset, factor, u): each fires where offset + factor u falls through 0; the first is the switch, the
     others are the kinks. The switch's has the factor ".way": -1 while the motion is behind the surface, where its event
-    is that it comes up. `timed` are the rates per unit of time, an input ".unit" in seconds. `onto` and `speeds` are
-    those of `sliding.slid`.
+    is that it comes up. `timed` are the rates per unit of time, an input ".unit" in seconds. `surfaces` are the numbers
+    of the kinks that are further surfaces: of these ".sign_j", and of the first ".way", are 1 in `switched` where they
+    are met, else -1. `shared`: whether one of them is a kink of the rates too. `onto` and `speeds` are those of
+    `sliding.slid`.
     """
 
     graph: Graph
@@ -30,6 +33,8 @@ class Recorded:
     started: tuple[Expression, ...]
     events: tuple[tuple[Expression, Expression, Expression], ...]
     nested: int
+    surfaces: tuple[int, ...] = ()
+    shared: bool = False
     onto: tuple[Expression, ...] = ()
     speeds: tuple[tuple[Expression, Expression], ...] = ()
 
@@ -39,16 +44,23 @@ def record(scene):
     graph = Graph()
     states = {name: graph.series(name) for name in scene.states}
     constants = {name: graph.constant(name) for name in (*scene.parameters, "side")}
-    rates = _called(graph, scene, "rates", states | constants, len(states))
-    surface = _called(graph, scene, "surface", states | constants, 1)[0]
-    if not surface.varies:
-        raise SceneError(f"surface of the scene {scene.name}: it does not depend on a state, so no motion meets it")
-    switched = tuple(states.values())
-    if scene.switch is not None:
-        switched = _called(graph, scene, "switch", states | constants, len(states))
+    has_clock = scene.start_time is not None
+    declared, clock = len(states) - has_clock, (graph.of(1.0),) * has_clock
+    rates = _called(graph, scene, "rates", scene.rates, states | constants, declared) + clock
+    surfaces = named_functions(scene.surface)
+    found = [_surface(graph, scene, name, function, states | constants) for name, function in surfaces.items()]
+    surface, known = found[0], {graph.parts(u)[1] for u in graph.kinks}
+    shared = any(graph.parts(u)[1] in known for u in found[1:])
+    for u in found[1:]:
+        graph.side_of(u)
+    numbers = tuple(graph.kinks[u] for u in found[1:])
+    met = dict(zip(surfaces, (".way", *(f".sign_{j}" for j in numbers)), strict=True))
+    switched = _switched(graph, scene, states, constants, met, declared)
     unit = graph.constant(".unit")
     timed = tuple(graph.timed(rate, unit) for rate in rates)
-    started = _called(graph, scene, "start", constants, len(states))
+    started = _called(graph, scene, "start", scene.start, constants, declared)
+    if has_clock:
+        started += _called(graph, scene, "start_time", scene.start_time, constants, 1)
     kinks = [(graph.of(0.0), graph.constant(f".sign_{j}"), u) for j, u in enumerate(graph.kinks)]
     way = graph.constant(".way")
     offset, factor, u = _affine(graph, surface)
@@ -63,14 +75,60 @@ def record(scene):
         started,
         events,
         _nested(events, dict(zip(states.values(), rates, strict=True))),
+        numbers,
+        shared,
     )
     return slid(recorded, scene.states) if scene.slides else recorded
 
 
-def _called(graph, scene, role, named, length):
+def asks_for_time(functions, names):
+    """Whether one of them asks for `t`, where no state and no parameter is called so."""
+    return "t" not in names and any("t" in _asked(function) for function in functions if function)
+
+
+def _asked(function):
+    """The names that it asks for; none where Python does not know them, which is said when it is recorded."""
+    try:
+        return inspect.signature(function).parameters
+    except (TypeError, ValueError):
+        return ()
+
+
+def named_functions(functions):
+    """{name: function} of what may be one function without a name, or none."""
+    return dict(functions) if isinstance(functions, Mapping) else {"": functions}
+
+
+def _surface(graph, scene, name, function, named):
+    """What falls through 0 at a switch."""
+    surface = _called(graph, scene, f"surface {name}".rstrip(), function, named, 1)[0]
+    if not surface.varies:
+        raise SceneError(f"surface of the scene {scene.name}: it does not depend on a state, so no motion meets it")
+    return surface
+
+
+def _switched(graph, scene, states, constants, met, declared):
+    """The states behind a switch; where several surfaces are met at once, by the switch of one after the other."""
+    switches, behind = named_functions(scene.switch), tuple(states.values())
+    if switches.keys() - met.keys() - {""}:
+        raise SceneError(f"switch of the scene {scene.name}: there is no surface {min(switches.keys() - met.keys())!r}")
+    for name, function in switches.items():
+        if function is not None:
+            role, named = f"switch {name}".rstrip(), dict(zip(states, behind, strict=True)) | constants
+            jumped = _called(graph, scene, role, function, named, declared) + behind[declared:]
+            if name:
+                share = 0.5 * (1.0 + graph.constant(met[name]))
+                jumped = tuple(
+                    x if x is y else share * x + (1.0 - share) * y for x, y in zip(jumped, behind, strict=True)
+                )
+            behind = jumped
+    return behind
+
+
+def _called(graph, scene, role, function, named, length):
     """What a function of some of the named scalars returns, as expressions."""
     try:
-        return _recorded(graph, getattr(scene, role), named, length)
+        return _recorded(graph, function, named, length)
     except SceneError as error:
         raise SceneError(f"{role} of the scene {scene.name}: {error}") from None
     except Exception as error:
@@ -79,11 +137,14 @@ def _called(graph, scene, role, named, length):
 
 
 def _recorded(graph, function, named, length):
+    if not callable(function):
+        return (graph.of(function),)
     wanted = inspect.signature(function).parameters
     unknown = [name for name in wanted if name not in named]
     if unknown:
         raise SceneError(f"it asks for {unknown[0]!r}; there are {', '.join(named)}")
-    found = function(**{name: named[name] for name in wanted})
+    with math_recorded(function):
+        found = function(**{name: named[name] for name in wanted})
     found = found if isinstance(found, tuple | list | np.ndarray) else (found,)
     if len(found) != length:
         raise SceneError(f"it returns {len(found)} values instead of {length}")

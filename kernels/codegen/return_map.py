@@ -20,7 +20,7 @@ from kernels.codegen.slid_along import slid_along
 from kernels.codegen.sliding import made
 from kernels.codegen.stepped import stepped, twice_by
 from kernels.interface import Status
-from kernels.source_text.expression import INPUT, NUMBER, Expression, SceneError, needed
+from kernels.source_text.expression import INPUT, NUMBER, Expression, SceneError, math_recorded, needed
 from kernels.source_text.template import filled, listed
 
 SLIDERS = {"taylor": ("dop853", "rodas5p")}
@@ -136,7 +136,8 @@ def named(function, names):
 
 def asked(function, values):
     """What a scene's function returns for those of the values that it asks for, as a tuple."""
-    found = function(**{name: values[name] for name in inspect.signature(function).parameters})
+    with math_recorded(function):
+        found = function(**{name: values[name] for name in inspect.signature(function).parameters})
     return tuple(found) if isinstance(found, tuple | list | np.ndarray) else (found,)
 
 

@@ -13,10 +13,12 @@ def slid_along(how, scene, methods):
     """The function of columns `how`, whose cells that stick are followed from their start by these methods, that slide.
 
     A cell goes to the next method where one finds no end of its slide; with none left it STICKS.
-    Powers of abs(u) are followed to u = 0 by the Taylor method alone (`integrate.powers`); their scenes stay so.
+    Powers of abs(u) are followed to u = 0 by the Taylor method alone (`integrate.powers`); their scenes stay so, and
+    those in which a kink is a surface too.
     """
-    graph = record(scene).graph
-    if graph.powers or not graph.kinks:
+    recorded = record(scene)
+    graph = recorded.graph
+    if graph.powers or recorded.shared or len(graph.kinks) == len(recorded.surfaces):
         return how
     sliding = replace(scene, slides=True)
     ways = [twice_by(method, sliding) for method in methods]

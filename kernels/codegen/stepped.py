@@ -60,9 +60,10 @@ def _is_speed(recorded, scene, place, expression):
 def methods_of(scene):
     """The names of the methods that can do the scene: pairs (x, v) with x' = v; for Moreau's one, kinks at v = 0."""
     recorded = record(scene)
-    n = len(scene.states)
+    timed = scene.start_time is not None
+    n = len(scene.states) - timed
     paired = n % 2 == 0 and all(_is_speed(recorded, scene, j, recorded.rates[j]) for j in range(0, n, 2))
-    dry = paired and n == 2 and all(_is_speed(recorded, scene, 0, u) for u in recorded.graph.kinks)
+    dry = paired and n == 2 and not timed and all(_is_speed(recorded, scene, 0, u) for u in recorded.graph.kinks)
     lacks = {"semi_implicit": paired, "verlet": paired, "moreau": dry}
     return tuple(name for name in METHODS if lacks.get(name, True))
 

@@ -14,7 +14,7 @@ from kernels.integrate.records import Cell, Mode
 from kernels.lanes.codes import BAD_INPUT, GRAZING, INACCURATE, OUT_OF_RANGE, REFUSED, STEP_LIMIT, STICKS
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.symbols import fold, over_tuples, symbolic
-from kernels.lanes.tuples import joined, reached, read, write
+from kernels.lanes.tuples import any_of, joined, reached, read, write
 from kernels.lanes.vectors import any_lane, choose, exponent, fma, magnitude, not_, pow2, sqrt, where
 
 KINK_LIMIT = 1000
@@ -162,12 +162,33 @@ def either_unsure(unsure, judged):
     return unsure | judged[1]
 
 
+@symbolic
+def which_met(signs, surfaces, first, met):
+    """The signs, of surfaces 1 where they are met and else -1."""
+    further = tuple(
+        where(s > 0.5, where(x, 1.0, -1.0), sign) for sign, s, x in zip(signs[:-1], surfaces, met, strict=True)
+    )
+    return joined(further, (where(first, 1.0, -1.0),))
+
+
+@symbolic
+def held_by(m, state, side, signs, parameters, unit, surfaces, on):
+    """The signs behind a switch: 1 for a surface that the motion is on and has no rate from, which holds it."""
+    events = m.jet(state, Mode(side, signs, parameters, False), unit, ()).events[1:]
+    held = tuple(
+        (s > 0.5) & (o > 0.5) & (u[1] <= 0.0) & (u[1] >= 0.0)
+        for s, o, (offset, factor, u) in zip(surfaces, on, events, strict=True)
+    )
+    return joined(tuple(where(x, 1.0, sign) for x, sign in zip(held, signs[:-1], strict=True)), signs[-1:])
+
+
 @jit
 @over_tuples
-def advance(m, leg, memory, i, tells, slides):
+def advance(m, leg, memory, i, tells, slides, surfaces):
     """Every lane on from event to event, until one has finished; whether one has.
 
-    `tells` : `carried.Changes` where the error is carried along, else None; `slides` : None where no motion slides
+    `tells` : `carried.Changes` where the error is carried along, else None; `slides` : None where no motion slides;
+    `surfaces` : 1 for each kink that is a further surface, at which the motion switches too; None where there is none
     """
     cell = read(memory, i, m.cell)
     parameters, flips, tolerance, shake = cell.parameters, cell.flips, cell.tolerance, cell.shake
@@ -198,6 +219,13 @@ def advance(m, leg, memory, i, tells, slides):
         if any_lane(fresh):
             signs, on, faint = pressed(m, state, mode, on, left, BLUR * tolerance, fresh)
             verdict = where(faint & (verdict < GRAZING), GRAZING, verdict)
+    if surfaces is not None:  # what starts on a surface and falls switches at once
+        falls = tuple(
+            fresh & (o > 0.5) & (s > 0.5) & (sign < 0.0)
+            for o, s, sign in zip(on[1:], surfaces, signs[:-1], strict=True)
+        )
+        signs = joined(tuple(where(x, 1.0, sign) for x, sign in zip(falls, signs[:-1], strict=True)), signs[-1:])
+        on = joined(on[:1], tuple(where(x, 0.0, o) for x, o in zip(falls, on[1:], strict=True)))
     done = active & not_(active)
     for _ in range(EVENTS):
         moving = active & (verdict < REFUSED)
@@ -219,6 +247,13 @@ def advance(m, leg, memory, i, tells, slides):
         time = where(moving, fma(found.t, unit, time), time)
         since = where(moving, fma(found.t, unit, since), since)
         switches = moving & (on[0] > 0.5) & (signs[-1] > 0.0)
+        if surfaces is not None:
+            first = switches
+            met = tuple(
+                moving & (o > 0.5) & (s > 0.5) & (sign > 0.0)
+                for o, s, sign in zip(on[1:], surfaces, signs[:-1], strict=True)
+            )
+            switches = switches | any_of(met)
         kinks_met = where(switches, 0.0, where(moving, kinks_met + 1.0, kinks_met))
         if slides is not None:  # at the end of a slide the kink's sign is 0, and stays so
             held = tuple(moving & (magnitude(sign) < 0.5) for sign in signs[:-1])
@@ -236,20 +271,30 @@ def advance(m, leg, memory, i, tells, slides):
                 interval, at = where(watched, since, interval), choose(watched, state, at)
                 errors = carried.stated(errors, watched, time, since, size)
             since = where(switches, 0.0, since)
+            if surfaces is not None:
+                mode = Mode(side, which_met(signs, surfaces, first, met), parameters, False)
             errors = carried.behind(tells, errors, state, mode, switches)
             before_it = m.surface(state, mode)
             gaps = m.kinks(state, mode)
-            jumped, side = m.switched(state, mode), where(switches, -side, side)
+            jumped = m.switched(state, mode)
+            mode, side = Mode(side, signs, parameters, False), where(switches, -side, side)
             gaps_behind = m.kinks(jumped, Mode(side, signs, parameters, False))
             near = tuple(
                 where(magnitude(x) <= 2.0 * magnitude(y), o, 0.0)
                 for x, y, o in zip(gaps_behind, gaps, on[1:], strict=True)
             )
             new_signs, kinks_on = settled(m, jumped, side, parameters, unit, near)
+            if surfaces is not None:
+                new_signs = held_by(m, jumped, side, new_signs, parameters, unit, surfaces, kinks_on)
             state, signs = choose(switches, jumped, state), choose(switches, new_signs, signs)
             mode = Mode(side, signs, parameters, False)
             after, extent = m.surface(state, mode), m.made(state, mode)[0][0]
             still = magnitude(after) <= fma(1e-12, extent, 2.0 * magnitude(before_it))
+            if surfaces is not None:
+                _, factor, u = m.jet(state, mode, unit, ()).events[0]
+                sinks = switches & first & still & (factor * u[1] < 0.0)
+                signs = joined(signs[:-1], (where(sinks, -1.0, signs[-1]),))
+                still = still & first
             on = choose(switches, joined((where(still, 1.0, 0.0),), kinks_on), on)
             way = where(switches & (after < 0.0) & not_(still), -1.0, signs[-1])
             signs = joined(signs[:-1], (way,))

@@ -6,7 +6,7 @@ numba's wheels give lanes no vector math library, and a library's last digits di
 import math
 
 from kernels.lanes.jit import jit
-from kernels.lanes.vectors import exponent, fma, horner, magnitude, nearest, pow2, where
+from kernels.lanes.vectors import exponent, fma, horner, magnitude, nearest, pow2, sqrt, where
 
 LN2 = math.log(2.0)
 NORMAL_LOW, NORMAL_HIGH = 2.3e-308, 1.79e308
@@ -95,8 +95,8 @@ def in_unit(x, e):
 @jit
 def exp(x):
     """e^x within 1 ulp; 0 below -745, inf above 710."""
-    x = where(x > -760.0, x, -760.0)
-    x = where(x < 720.0, x, 720.0)
+    x = where(x < -760.0, -760.0, x)  # NaN stays
+    x = where(x > 720.0, 720.0, x)
     n = nearest(x * _LOG2_E)
     r = fma(-n, _LN2_LOW, fma(-n, _LN2_HIGH, x))  # abs(r) <= 0.347
     return scale(1.0 + fma(r * r, horner(r, _INVERSE_FACTORIALS), r), n)
@@ -188,8 +188,8 @@ def log1p(u):
 @jit
 def expm1(x):
     """e^x - 1 within 1.5 ulp; -1 below -745, inf above 710."""
-    x = where(x > -760.0, x, -760.0)
-    x = where(x < 720.0, x, 720.0)
+    x = where(x < -760.0, -760.0, x)  # NaN stays
+    x = where(x > 720.0, 720.0, x)
     n = nearest(x * _LOG2_E)
     r = fma(-n, _LN2_LOW, fma(-n, _LN2_HIGH, x))
     part = fma(r * r, horner(r, _INVERSE_FACTORIALS), r)
@@ -234,6 +234,72 @@ def arctan(x):
     value = where(middle, 0.5 * _HALF_PI[0] + value, value)
     value = where(steep, _HALF_PI[0] - (value - _HALF_PI[1]), value)
     return where(x < 0.0, -value, value)
+
+
+@jit
+def tanh(x):
+    """Hyperbolic tangent within 3 ulp: of t = e^(-2 abs(x)) - 1 it is -t/(2 + t)."""
+    t = expm1(-2.0 * magnitude(x))
+    value = -t / (2.0 + t)
+    return where(x < 0.0, -value, value)
+
+
+@jit
+def cosh(x):
+    """Hyperbolic cosine within 3 ulp; inf where it is no float64."""
+    half = exp(0.5 * magnitude(x))
+    return (0.5 * half) * half + (0.5 / half) / half
+
+
+@jit
+def sinh(x):
+    """Hyperbolic sine within 3 ulp: of t = e^abs(x) - 1 it is (t + t/(t + 1))/2; +-inf where it is no float64."""
+    a = magnitude(x)
+    near = a < 20.0
+    t, half = expm1(where(near, a, 0.0)), exp(0.5 * a)
+    value = where(near, 0.5 * (t + t / (t + 1.0)), (0.5 * half) * half)
+    return where(x < 0.0, -value, value)
+
+
+@jit
+def arcsin(x):
+    """Inverse sine within 4 ulp; NaN beyond [-1, 1]."""
+    return arctan(x / sqrt((1.0 - x) * (1.0 + x)))
+
+
+@jit
+def arccos(x):
+    """Inverse cosine within 4 ulp; NaN beyond [-1, 1]."""
+    return 2.0 * arctan(sqrt((1.0 - x) / (1.0 + x)))
+
+
+@jit
+def hypot(x, y):
+    """sqrt(x^2 + y^2) within 2 ulp, without overflow on the way."""
+    a, b = magnitude(x), magnitude(y)
+    most = where(a > b, a, b)
+    _, e = mantissa_exponent(where(most > 0.0, most, 1.0))
+    a, b = in_unit(a, e), in_unit(b, e)
+    value = scale(sqrt(fma(a, a, b * b)), e)
+    return where((magnitude(x) < math.inf) & (magnitude(y) < math.inf), value, magnitude(x) + magnitude(y))
+
+
+@jit
+def floor(x):
+    """The largest integer that is not above x, for abs(x) < 2^51; NaN beyond."""
+    n = nearest(x)
+    return where(magnitude(x) < 2.0**51, where(n > x, n - 1.0, n), math.nan)
+
+
+@jit
+def floor_between(x, sign):
+    """The integer n below x that is even where the sign is 1, odd where it is -1; x may be 1/2 out of [n, n + 1].
+
+    For abs(x) < 2^50; NaN beyond.
+    """
+    odd = where(sign < 0.0, 1.0, 0.0)
+    n = 2.0 * nearest(0.5 * (x - 0.5 - odd)) + odd
+    return where(magnitude(x) < 2.0**50, n, math.nan)
 
 
 @jit

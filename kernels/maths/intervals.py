@@ -8,7 +8,7 @@ import math
 
 from kernels.lanes.jit import jit
 from kernels.lanes.vectors import magnitude, not_, sqrt, where
-from kernels.maths.elementary import exp, log, power, sincos
+from kernels.maths.elementary import arccos, arcsin, cosh, exp, hypot, log, power, sincos
 
 CHANGE, LOG_CHANGE = 8.0, 2.0
 """Factor by which what has no polynomial (exp u, 1/u, sqrt u, ln u, u^n) may change and still be seen where a step
@@ -129,6 +129,38 @@ def _of_wave(wide, low, high, low_slope, high_slope):
 
 
 @jit
+def within_one(u):
+    """The part of an interval in [-1, 1]; NaN stays."""
+    return where(u[0] < -1.0, -1.0, u[0]), where(u[1] > 1.0, 1.0, u[1])
+
+
+@jit
+def of_arcsin(u):
+    """arcsin u."""
+    low, high = within_one(u)
+    return arcsin(low), arcsin(high)
+
+
+@jit
+def of_arccos(u):
+    """arccos u."""
+    low, high = within_one(u)
+    return arccos(high), arccos(low)
+
+
+@jit
+def of_cosh(u):
+    """cosh u."""
+    return cosh(smallest(u)), cosh(largest(u))
+
+
+@jit
+def of_hypot(u, w):
+    """sqrt(u^2 + w^2)."""
+    return hypot(smallest(u), smallest(w)), hypot(largest(u), largest(w))
+
+
+@jit
 def of_power(u, n):
     """u^n."""
     low, high = above(u)
@@ -159,3 +191,43 @@ def hidden_by_root(value, u, root):
 def hidden_by_power(value, of_value, u, raised):
     """What of u^n cannot be seen where u has that value: all, where u comes too close to 0, or u^n grows too much."""
     return where((u[0] * CHANGE >= value) & (raised[1] <= CHANGE * of_value), 0.0, raised[1])
+
+
+@jit
+def hidden_by_step(nearer, further, of_u):
+    """What of a function with steep places cannot be seen: all that it changes by, where its slope may grow too much.
+
+    `nearer` and `further` are 1 over the slope, where it is steepest and where the function is known.
+    """
+    return where(nearer * CHANGE >= further, 0.0, of_u[1] - of_u[0])
+
+
+@jit
+def hidden_by_tanh(value, u, of_u):
+    """What of tanh u cannot be seen where u has that value."""
+    near, far = cosh(smallest(u)), cosh(value)
+    return where(near <= 1e150, hidden_by_step(near * near, far * far, of_u), of_u[1] - of_u[0])
+
+
+@jit
+def hidden_by_arctan(value, u, of_u):
+    """What of arctan u cannot be seen where u has that value."""
+    return hidden_by_step(1.0 + smallest(u) * smallest(u), 1.0 + value * value, of_u)
+
+
+@jit
+def hidden_by_arcsin(value, u, of_u):
+    """What of arcsin u and arccos u cannot be seen where u has that value."""
+    return hidden_by_step(1.0 - largest(u) * largest(u), 1.0 - value * value, of_u)
+
+
+@jit
+def hidden_by_sinh(value, u):
+    """What of sinh u and cosh u cannot be seen where u has that value: all, where they grow too much."""
+    return where(largest(u) - magnitude(value) <= LOG_CHANGE, 0.0, cosh(largest(u)))
+
+
+@jit
+def hidden_by_hypot(value, of_u):
+    """What of a root of squares cannot be seen where it has that value: all, where it comes too close to 0."""
+    return hidden_by_step(of_u[0] * of_u[0], value * value, of_u)

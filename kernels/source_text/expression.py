@@ -6,19 +6,26 @@ product keeps its constants apart, `scaled(constant, series)`: c v abs(v) is (2 
 half a square needs the fewest operations.
 
 abs(u) and sign(u) bend or jump where u = 0: each such u is a *kink*. Between kinks the sign of u is a constant, an
-input of the graph; an integrator stops at a kink and turns the sign round.
+input of the graph; an integrator stops at a kink and turns the sign round. floor(u) is one where sin(pi u) = 0, whose
+sign tells whether the integer is even.
 """
 
+import contextlib
 import math
 import sys
+import threading
 from dataclasses import dataclass
 from numbers import Real
+from types import SimpleNamespace
 
 FLOAT_MAX = sys.float_info.max
 NUMBER, INPUT, ADD, MUL, HALF_SQUARE, SCALED, DIV = "number", "input", "add", "mul", "half_square", "scaled", "div"
 
 
-FUNCTIONS = "use + - * / ** abs and sqrt, exp, log, sin, cos, power, sign, maximum, minimum, where of kernels.scene"
+FUNCTIONS = (
+    "use + - * / ** % // abs and sqrt, exp, log, sin, cos, tan, arcsin, arccos, arctan, sinh, cosh, tanh, hypot, "
+    "power, sign, floor, mod, maximum, minimum, where of kernels.scene or numpy"
+)
 INSTEAD = "say it with where(x > y, a, b), maximum, minimum, abs, sign or side"
 
 
@@ -32,6 +39,9 @@ class Comparison:
 
     above: "Expression"
     negated: bool = False
+
+    def __array_function__(self, function, types, arguments, named):
+        return self.above.__array_function__(function, types, arguments, named)
 
     def __bool__(self):
         raise SceneError(f"it compares values to branch on them, which is not recorded; {INSTEAD}")
@@ -64,6 +74,21 @@ class Expression:
 
     def __rtruediv__(self, other):
         return self.graph.divide(other, self)
+
+    def __mod__(self, other):
+        return mod(self, other)
+
+    def __rmod__(self, other):
+        return mod(other, self)
+
+    def __floordiv__(self, other):
+        return floor(self / other)
+
+    def __rfloordiv__(self, other):
+        return floor(other / self)
+
+    def __floor__(self):
+        return floor(self)
 
     def __pow__(self, exponent):
         return self.graph.power(self, exponent)
@@ -106,7 +131,7 @@ class Expression:
         return Comparison(self - other, negated=True)
 
     def __float__(self):
-        raise SceneError("it calls a function of plain numbers (of math, or a cast) with a value; " + FUNCTIONS)
+        raise SceneError("it calls a function of plain numbers (a cast, or math's) with a value; " + FUNCTIONS)
 
     def __array_ufunc__(self, ufunc, method, *inputs, **named):
         """numpy's functions that have a counterpart here; also what numpy makes of a product with its numbers."""
@@ -114,6 +139,13 @@ class Expression:
         if known is None or method != "__call__" or named:
             raise SceneError(f"numpy's {ufunc.__name__} is not recorded; {FUNCTIONS}")
         return known(*(self.graph.of(value) for value in inputs))
+
+    def __array_function__(self, function, types, arguments, named):
+        """numpy's functions that are none of single numbers: where, clip."""
+        known = _OF_NUMPY.get(function.__name__)
+        if known is None or named:
+            raise SceneError(f"numpy's {function.__name__} is not recorded; {FUNCTIONS}")
+        return known(*arguments)
 
 
 class Graph:
@@ -202,12 +234,33 @@ class Graph:
         constant = c if _is(d, 1.0) else self._node(DIV, (c, d), False)
         return self._scaled(constant, u if _is(w, 1.0) else self._node(DIV, (u, w), True))
 
-    def function(self, name, x):
-        """sqrt, exp, log, sin or cos."""
+    def function(self, name, *args):
+        """A function that has its name as its kind."""
+        args = tuple(map(self.of, args))
+        if name == "sqrt" and self._is_side(args[0]):
+            return self.power(args[0], 0.5)
+        return self._node(name, args, name != "floor" and any(x.varies for x in args))
+
+    def slopes(self, x):
+        """The arguments of a function without a recurrence of its own, each with its partial derivative."""
+        u, *others = x.args
+        found = {
+            "tanh": lambda: (1.0 - x * x,),
+            "arctan": lambda: (1.0 / (1.0 + u * u),),
+            "arcsin": lambda: (1.0 / self.function("sqrt", (1.0 - u) * (1.0 + u)),),
+            "arccos": lambda: (-1.0 / self.function("sqrt", (1.0 - u) * (1.0 + u)),),
+            "sinh": lambda: (self.function("cosh", u),),
+            "cosh": lambda: (self.function("sinh", u),),
+            "hypot": lambda: (u / x, others[0] / x),
+        }[x.kind]()
+        return list(zip(x.args, found, strict=True))
+
+    def floor(self, x):
+        """The largest integer not above x: between two kinks a constant."""
         x = self.of(x)
-        if name == "sqrt" and self._is_side(x):
-            return self.power(x, 0.5)
-        return self._node(name, (x,), x.varies)
+        if not x.varies:
+            return self.function("floor", x)
+        return self.function("floor", x, self.side_of(self.function("sin", math.pi * x)))
 
     def power(self, x, exponent):
         """x^exponent, the exponent a constant; by products where it is a small integer. x > 0 otherwise."""
@@ -231,7 +284,7 @@ class Graph:
     def _power_of_side(self, x, exponent):
         """(c s u)^n = c^n (s u)^n, s the sign of u."""
         constant, u = x.args
-        side = self._side_of(u)
+        side = self.side_of(u)
         node = self._node("power_of_side", (self._scaled(side, u), exponent), True)
         self.powers.setdefault(node, len(self.powers))
         if constant is side:
@@ -246,15 +299,15 @@ class Graph:
         c, u = self.parts(self.of(x))
         if not u.varies:
             return self._node("abs", (c,), False)
-        return self._node("abs", (c,), False) * self._side_of(u) * u if not _is(c, 1.0) else self._side_of(u) * u
+        return self._node("abs", (c,), False) * self.side_of(u) * u if not _is(c, 1.0) else self.side_of(u) * u
 
     def sign(self, x):
         c, u = self.parts(self.of(x))
         if not u.varies:
             return self._node("sign", (c,), False)
-        return self._side_of(u) if _is(c, 1.0) else self._node("sign", (c,), False) * self._side_of(u)
+        return self.side_of(u) if _is(c, 1.0) else self._node("sign", (c,), False) * self.side_of(u)
 
-    def _side_of(self, u):
+    def side_of(self, u):
         """The sign of a series, constant between kinks."""
         return self.constant(f".sign_{self.kinks.setdefault(u, len(self.kinks))}")
 
@@ -285,11 +338,12 @@ def needed(*roots):
 
 
 def _function(name, of_number):
-    def call(x):
-        return x.graph.function(name, x) if isinstance(x, Expression) else of_number(x)
+    def call(*args):
+        graph = next((x.graph for x in args if isinstance(x, Expression)), None)
+        return graph.function(name, *args) if graph else of_number(*args)
 
     call.__name__ = name
-    call.__doc__ = f"{name}(x) of a number or of what a scene's function is called with."
+    call.__doc__ = f"{name} of numbers or of what a scene's function is called with."
     return call
 
 
@@ -298,6 +352,29 @@ exp = _function("exp", math.exp)
 log = _function("log", math.log)
 sin = _function("sin", math.sin)
 cos = _function("cos", math.cos)
+arcsin = _function("arcsin", math.asin)
+arccos = _function("arccos", math.acos)
+arctan = _function("arctan", math.atan)
+sinh = _function("sinh", math.sinh)
+cosh = _function("cosh", math.cosh)
+tanh = _function("tanh", math.tanh)
+hypot = _function("hypot", math.hypot)
+pi = math.pi
+
+
+def tan(x):
+    """sin(x)/cos(x)."""
+    return sin(x) / cos(x)
+
+
+def floor(x):
+    """The largest integer that is not above x; where x passes an integer a kink."""
+    return x.graph.floor(x) if isinstance(x, Expression) else math.floor(x)
+
+
+def mod(x, divisor):
+    """x - divisor floor(x/divisor), between 0 and the divisor; a kink where it jumps."""
+    return x - divisor * floor(x / divisor)
 
 
 def power(x, exponent):
@@ -335,10 +412,34 @@ def _chosen(above, x, y):
     return share * x + (1.0 - share) * y
 
 
-_OF_NUMPY = {
+_NAMED = {
+    f.__name__: f
+    for f in (sqrt, exp, log, sin, cos, tan, arcsin, arccos, arctan, sinh, cosh, tanh, hypot, floor, maximum, minimum)
+}
+_OF_NUMPY = _NAMED | {
     "add": lambda x, y: x + y, "subtract": lambda x, y: x - y, "multiply": lambda x, y: x * y,
     "divide": lambda x, y: x / y, "power": power, "float_power": power, "negative": lambda x: -x, "absolute": abs,
-    "fabs": abs, "square": lambda x: x * x, "sqrt": sqrt, "exp": exp, "log": log, "sin": sin, "cos": cos, "sign": sign,
-    "maximum": maximum, "minimum": minimum, "greater": lambda x, y: x > y, "less": lambda x, y: x < y,
+    "fabs": abs, "square": lambda x: x * x, "sign": sign, "ceil": lambda x: -floor(-x), "remainder": mod,
+    "floor_divide": lambda x, y: floor(x / y), "reciprocal": lambda x: 1.0 / x,
+    "greater": lambda x, y: x > y, "less": lambda x, y: x < y,
     "greater_equal": lambda x, y: x >= y, "less_equal": lambda x, y: x <= y,
+    "where": where, "clip": lambda x, low, high: minimum(maximum(x, low), high),
 }  # fmt: skip
+_OF_MATH = _NAMED | {"asin": arcsin, "acos": arccos, "atan": arctan, "fabs": abs, "pow": power}
+_RECORDING = threading.RLock()
+"""One thread at a time changes the names of a module."""
+
+
+@contextlib.contextmanager
+def math_recorded(function):
+    """Within it, names of `math` in the module of a function stand for what is recorded, and does numbers as well."""
+    scope = getattr(function, "__globals__", {})
+    ours = {id(getattr(math, name)): of for name, of in _OF_MATH.items() if hasattr(math, name)}
+    ours[id(math)] = SimpleNamespace(**vars(math) | {n: of for n, of in _OF_MATH.items() if hasattr(math, n)})
+    with _RECORDING:
+        before = {name: x for name, x in scope.items() if id(x) in ours}
+        scope.update({name: ours[id(x)] for name, x in before.items()})
+        try:
+            yield
+        finally:
+            scope.update(before)

@@ -81,21 +81,19 @@ class Enclosures:
     _interval_of_power_of_side = _interval_of_power
 
     def _interval_of_sin(self, x):
-        return f"of_{x.kind}({self.interval(x.args[0])})"
+        return f"of_{x.kind}({', '.join(map(self.interval, x.args))})"
 
-    _interval_of_cos = _interval_of_sin
+    _interval_of_cos = _interval_of_sqrt = _interval_of_exp = _interval_of_log = _interval_of_sin
+    _interval_of_arcsin = _interval_of_arccos = _interval_of_cosh = _interval_of_hypot = _interval_of_sin
+
+    def _interval_of_tanh(self, x):
+        u = self.interval(x.args[0])
+        return f"({x.kind}({u}[0]), {x.kind}({u}[1]))"
+
+    _interval_of_arctan = _interval_of_sinh = _interval_of_tanh
 
     def _interval_of_power_over_base(self, x):
         return "(-math.inf, math.inf)"
-
-    def _interval_of_sqrt(self, x):
-        return f"of_sqrt({self.interval(x.args[0])})"
-
-    def _interval_of_exp(self, x):
-        return f"of_exp({self.interval(x.args[0])})"
-
-    def _interval_of_log(self, x):
-        return f"of_log({self.interval(x.args[0])})"
 
     def _excess(self, x):
         # powers are for `integrate.powers`, from kink to kink
@@ -159,6 +157,30 @@ class Enclosures:
         inside, plain = self.interval(u), self._plain(x)
         own = f"hidden_by_power({self.lines.value(u)}, {self.lines.value(x)}, {inside}, {plain})"
         return [own, self._passed_on(u, f"magnitude({self.lines.value(n)}) * {plain}[1] / above({inside})[0]")]
+
+    def _excess_of_steep(self, x, kind=None):
+        """Of a function with steep places; its slope is largest where its interval is widest."""
+        u = x.args[0]
+        own = f"hidden_by_{kind or x.kind}({self.lines.value(u)}, {self.interval(u)}, {self._plain(x)})"
+        return [own, *self._by_slopes(x)]
+
+    _excess_of_tanh = _excess_of_arctan = _excess_of_arcsin = _excess_of_steep
+
+    def _excess_of_arccos(self, x):
+        return self._excess_of_steep(x, "arcsin")
+
+    def _excess_of_sinh(self, x):
+        u = x.args[0]
+        return [f"hidden_by_sinh({self.lines.value(u)}, {self.interval(u)})", *self._by_slopes(x)]
+
+    _excess_of_cosh = _excess_of_sinh
+
+    def _excess_of_hypot(self, x):
+        return [f"hidden_by_hypot({self.lines.value(x)}, {self._plain(x)})", *map(self.excess, x.args)]
+
+    def _by_slopes(self, x):
+        """What the arguments hide, by the largest slope."""
+        return [self.excess(u) and self._passed_on(u, self._largest(slope)) for u, slope in x.graph.slopes(x)]
 
     def _excess_of_wave(self, x):
         return [self.excess(x.args[0])]

@@ -13,7 +13,8 @@ from kernels.source_text.template import filled, listed
 ULP = 2.0**-52
 SLOPES = {
     "sqrt": "0.5 / {value}", "exp": "{value}", "log": "1.0 / magnitude({u})", "sin": "1.0", "cos": "1.0",
-    "abs": "1.0", "sign": "0.0",
+    "abs": "1.0", "sign": "0.0", "floor": "0.0", "power": "magnitude({n} * {value} / {u})",
+    "power_of_side": "magnitude({n} * {value} / {u})",
 }  # fmt: skip
 
 LOST = '''
@@ -33,6 +34,14 @@ def {name}(state, mode):
     {lines}
     return {sizes}
 '''
+
+
+def slopes(lines, x):
+    """The arguments of a function that its rounding comes from, each with what it changes by per unit, as text."""
+    if x.kind not in SLOPES:
+        return [(u, f"magnitude({lines.value(slope)})") for u, slope in x.graph.slopes(x)]
+    value, u, *n = map(lines.value, (x, *x.args))
+    return [(x.args[0], SLOPES[x.kind].format(value=f"magnitude({value})", u=u, n=n[0] if n else ""))]
 
 
 class Losses:
@@ -60,17 +69,14 @@ class Losses:
             return []
         if x.kind == INPUT:
             return [self.lost(self._started[x.args[0]])] if x.args[0] in self._started else []
-        value, u = self.lines.value(x), x.args[0]
+        value = self.lines.value(x)
         if x.kind == ADD:
             a, b = (self.lines.value(term) for term in x.args)
             return [f"magnitude(two_sum({a}, {b})[1])", *(self.lost(term) for term in x.args)]
         if x.kind in (MUL, SCALED, HALF_SQUARE, DIV):
             return self._terms_of_product(x, value)
-        slope = SLOPES.get(x.kind, "magnitude({n} * {value} / {u})")
-        n = self.lines.value(x.args[1]) if len(x.args) > 1 else ""
-        slope = slope.format(value=f"magnitude({value})", u=self.lines.value(u), n=n)
-        rounded = None if x.kind in ("abs", "sign") else f"{ULP!r} * magnitude({value})"
-        return [rounded, self.lost(u) and f"{self.lost(u)} * {slope}"]
+        rounded = None if x.kind in ("abs", "sign", "floor") else f"{ULP!r} * magnitude({value})"
+        return [rounded, *(self.lost(u) and f"{self.lost(u)} * {slope}" for u, slope in slopes(self.lines, x))]
 
     def _terms_of_product(self, x, value):
         u, w = x.args if len(x.args) == 2 else (x.args[0], x.args[0])
@@ -111,6 +117,8 @@ class Sizes:
         return self._reused[x.index]
 
     def _made(self, x):
+        if x.kind not in (ADD, MUL, SCALED, HALF_SQUARE, DIV):
+            return self._made_by_function(x)
         parts = [self.of(u) for u in x.args]
         if x.kind == ADD:
             return " + ".join(parts)
@@ -118,14 +126,14 @@ class Sizes:
             return " * ".join(parts)
         if x.kind == HALF_SQUARE:
             return f"0.5 * {parts[0]} * {parts[0]}"
-        value, u = self.lines.value(x), self.lines.value(x.args[0])
-        if x.kind == DIV:
-            w = self.lines.value(x.args[1])
-            return f"{parts[0]} * {parts[1]} / ({w} * {w})"
-        slope = SLOPES.get(x.kind, "magnitude({n} * {value} / {u})")
-        n = self.lines.value(x.args[1]) if len(x.args) > 1 else ""
-        slope = slope.format(value=f"magnitude({value})", u=u, n=n)
-        return f"fma({slope}, {parts[0]}, magnitude({value}))"
+        w = self.lines.value(x.args[1])
+        return f"{parts[0]} * {parts[1]} / ({w} * {w})"
+
+    def _made_by_function(self, x):
+        total = f"magnitude({self.lines.value(x)})"
+        for u, slope in slopes(self.lines, x):
+            total = f"fma({slope}, {self.of(u)}, {total})"
+        return total
 
 
 def made(writer):

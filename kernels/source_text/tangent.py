@@ -13,7 +13,7 @@ from kernels.source_text.template import filled, listed
 
 SHORT, FED_BACK, LONG = {12: 4, 18: 4}, {12: 6, 18: 6}, {12: 9, 18: 12}
 """Order of the changes' series on a step of the motion's: terms fall by about a quarter each, so to some 1e-3. Those of
-exp, sin and cos, and of linear rates, first grow, as x^k/k!; those of states that feed back on one another may too."""
+exp, sin, cos, sinh, cosh and linear rates first grow, as x^k/k!; those of states that feed back on one another may."""
 
 TANGENT = '''
 @jit
@@ -30,7 +30,7 @@ def {name}_{order}(state, mode, unit, inner, changes, cores):
 def short(writer, order):
     """Order of the changes' series beside one of the motion of that order."""
     kinds = {x.kind for x in needed(*writer.recorded.rates) if x.varies}
-    grow_first = kinds & {"exp", "sin", "cos"} or kinds <= {INPUT, ADD, SCALED}
+    grow_first = kinds & {"exp", "sin", "cos", "sinh", "cosh"} or kinds <= {INPUT, ADD, SCALED}
     return (LONG if grow_first else FED_BACK if writer.feeds_back() else SHORT)[order]
 
 
@@ -104,6 +104,11 @@ class Tangents:
 
     def _cos(self, x, u):
         return self._by(-self._graph.function("sin", u), u)
+
+    def _of_slopes(self, x, *_):
+        return self._sum(*(self._by(slope, u) for u, slope in self._graph.slopes(x)))
+
+    _tanh = _arctan = _arcsin = _arccos = _sinh = _cosh = _hypot = _of_slopes
 
     def _power(self, x, u, n):
         return self._by(n * (x / u), u)

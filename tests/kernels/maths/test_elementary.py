@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from columns import relative_error
 from loops import each_cell
-from mpmath import atan, atanh, cbrt, cos, exp, expm1, log, log1p, mp, mpf, sin
+from mpmath import acos, asin, atan, atanh, cbrt, cos, cosh, exp, expm1, hypot, log, log1p, mp, mpf, sin, sinh, tanh
 
 from kernels.lanes.columns import entry
 from kernels.lanes.jit import COMPILED, jit
@@ -117,3 +117,71 @@ def test_elementary_functions_at_the_ends_of_their_ranges():
     assert sines[0] == 0.0
     assert angles[2:4].tolist() == [np.pi / 2, -np.pi / 2]
     assert powers[:2].tolist() == [1.0, 1e-310]  # 0^0 = 1
+
+
+@jit
+def _hyperbolic(i, x, y, u, tanhs, sinhs, coshs, arcsins, arccosines, roots, floors, held):
+    tanhs[i], sinhs[i], coshs[i] = elementary.tanh(x[i]), elementary.sinh(x[i]), elementary.cosh(x[i])
+    arcsins[i], arccosines[i] = elementary.arcsin(u[i]), elementary.arccos(u[i])
+    roots[i] = elementary.hypot(x[i], y[i])
+    floors[i] = elementary.floor(x[i])
+    held[i] = elementary.floor_between(x[i], y[i])
+
+
+@entry()
+def hyperbolic(x, y, u, tanhs, sinhs, coshs, arcsins, arccosines, roots, floors, held):
+    each_cell(_hyperbolic, (x, y, u, tanhs, sinhs, coshs, arcsins, arccosines, roots, floors, held))
+
+
+def evaluate_hyperbolic(x, y, u):
+    outputs = [np.empty(len(x)) for _ in range(8)]
+    hyperbolic(*(np.ascontiguousarray(c, float) for c in (x, y, u)), *outputs)
+    return outputs
+
+
+def test_hyperbolic_and_inverse_functions_are_right_to_a_few_ulp_wherever_they_are_numbers():
+    random = np.random.default_rng(9)
+    n = 500 if COMPILED else 60
+    sizes = np.concatenate([10.0 ** random.uniform(-300, 2.85, n), random.uniform(0, 30, n)])
+    x, y = random.choice([-1, 1], 2 * n) * sizes, 10.0 ** random.uniform(-307, 307, 2 * n)
+    edges = 1.0 - 10.0 ** random.uniform(-16, 0, n)
+    u = random.choice([-1, 1], 2 * n) * np.concatenate([edges, 10.0 ** random.uniform(-300, 0, n)])
+    found = evaluate_hyperbolic(x, y, u)
+    of_x, of_u = [mpf(float(v)) for v in x], [mpf(float(v)) for v in u]
+    functions = (tanh, sinh, cosh, asin, acos)
+    for values, function, exact in zip(found, functions, (of_x, of_x, of_x, of_u, of_u), strict=False):
+        assert relative_error(values, [function(v) for v in exact]).max() < 5e-16, function
+    x = np.append(x, [1.7e308, 0.0, 3e-320])
+    y = np.append(np.where(y > 1.0, x[:-3] * random.uniform(0.1, 10, 2 * n), y), [-1e307, 0.0, 4e-320])
+    roots = evaluate_hyperbolic(x, y, np.zeros_like(x))[5]
+    assert (
+        relative_error(roots[:-2], [hypot(mpf(float(a)), mpf(float(b))) for a, b in zip(x, y, strict=True)][:-2]).max()
+        < 3e-16
+    )
+    assert roots[-2] == 0.0
+    assert roots[-1] == pytest.approx(5e-320, rel=1e-3)
+
+
+def test_hyperbolic_and_inverse_functions_at_the_ends_of_their_ranges():
+    x, u = [np.inf, -np.inf, np.nan, 800.0, 0.0], [1.0, -1.0, np.nan, 1.0000001, 0.0]
+    tanhs, sinhs, coshs, arcsins, arccosines, roots, *_ = evaluate_hyperbolic(x, np.ones(5), u)
+    np.testing.assert_array_equal(tanhs, [1.0, -1.0, np.nan, 1.0, 0.0])
+    np.testing.assert_array_equal(sinhs, [np.inf, -np.inf, np.nan, np.inf, 0.0])
+    np.testing.assert_array_equal(coshs, [np.inf, np.inf, np.nan, np.inf, 1.0])
+    np.testing.assert_array_equal(arcsins, [np.pi / 2, -np.pi / 2, np.nan, np.nan, 0.0])
+    np.testing.assert_array_equal(arccosines[:4], [0.0, np.pi, np.nan, np.nan])
+    np.testing.assert_array_equal(roots, [np.inf, np.inf, np.nan, np.sqrt(640001.0), 1.0])
+    assert np.isnan(evaluate([np.nan], [1.0])[0][0])  # exp
+
+
+def test_a_floor_is_that_of_all_numbers_and_goes_on_as_it_is_half_a_unit_beyond():
+    x = np.concatenate([np.random.default_rng(10).uniform(-1e6, 1e6, 200), np.arange(-6, 6) / 2, [1e15, 2.0**52]])
+    even = np.where(np.floor(x) % 2 == 0, 1.0, -1.0)
+    *_, floors, held = evaluate_hyperbolic(x, even, np.zeros_like(x))
+    np.testing.assert_array_equal(floors[:-1], np.floor(x[:-1]))
+    np.testing.assert_array_equal(held[:-1], np.floor(x[:-1]))
+    assert np.isnan(floors[-1])
+    assert np.isnan(held[-1])
+    x = np.array([0.9, 1.2, 1.49, -0.49, 6.3])  # of the integers 0, 0, 0, 0, 5
+    *_, held = evaluate_hyperbolic(x, np.array([1.0, 1.0, 1.0, 1.0, -1.0]), np.zeros(5))
+    np.testing.assert_array_equal(held, [0.0, 0.0, 0.0, 0.0, 5.0])

@@ -7,6 +7,7 @@ import pytest
 from mpmath import mp
 
 from kernels.lanes.vectors import dot, fma, magnitude, where
+from kernels.maths import elementary
 from kernels.source_text import expression as E
 from kernels.source_text.series import Lines
 from kernels.source_text.tangent import Tangents
@@ -14,8 +15,19 @@ from kernels.source_text.tangent import Tangents
 ORDER = 9
 PLAIN = {
     "dot": dot, "fma": fma, "where": where, "magnitude": magnitude, "sqrt": math.sqrt, "exp": math.exp,
-    "log": math.log, "power": math.pow, "sincos": lambda x: (math.sin(x), math.cos(x)),
+    "log": math.log, "power": math.pow, "sincos": lambda x: (math.sin(x), math.cos(x)), "tanh": math.tanh,
+    "arctan": math.atan, "arcsin": math.asin, "arccos": math.acos, "sinh": math.sinh, "cosh": math.cosh,
+    "hypot": math.hypot, "floor": math.floor, "floor_between": elementary.floor_between,
 }  # fmt: skip
+
+
+def side(graph, kink):
+    """1, as everything is above 0 here, or for the kink of a floor, sin(pi x), the sign of that."""
+    lines = Lines({"u": "u"})
+    value = lines.value(kink)
+    scope = {**PLAIN, "u": 0.7}
+    exec("\n".join(lines.text) + f"\nvalue = {value}", scope)
+    return math.copysign(1.0, scope["value"])
 
 
 def coefficients(function, order=ORDER, **constants):
@@ -26,7 +38,7 @@ def coefficients(function, order=ORDER, **constants):
     result = function(u, **named)
     # u' = r, r' = s, s' = 6/5: a cubic
     rates = {"u": rate, "r": inner, "s": graph.of(1.2)}
-    signs = {f"sign_{j}": 1.0 for j in range(len(graph.kinks))}
+    signs = {f"sign_{j}": side(graph, kink) for j, kink in enumerate(graph.kinks)}
     lines = Lines({name: name for name in ("u", "r", "s", *named)} | {f".{name}": name for name in signs}, rates)
     last = lines.coefficients(result, order)
     scope = {**PLAIN, **constants, **signs, "u": 0.7, "r": 1.0, "s": -1.0}
@@ -52,6 +64,17 @@ CASES = {
     "sin": (lambda u: E.sin(3.0 * u), lambda u: mp.sin(3 * u)),
     "cos": (lambda u: E.cos(u * u) * E.sin(u * u), lambda u: mp.cos(u * u) * mp.sin(u * u)),
     "power": (lambda u: E.power(u, 1.7), lambda u: u ** mp.mpf(1.7)),
+    "tan": (lambda u: E.tan(0.5 * u), lambda u: mp.tan(u / 2)),
+    "tanh": (lambda u: E.tanh(2.0 * u), lambda u: mp.tanh(2 * u)),
+    "arctan": (lambda u: E.arctan(2.0 * u), lambda u: mp.atan(2 * u)),
+    "arcsin": (lambda u: E.arcsin(0.5 * u), lambda u: mp.asin(u / 2)),
+    "arccos": (lambda u: E.arccos(0.5 * u), lambda u: mp.acos(u / 2)),
+    "sinh": (lambda u: E.sinh(u * u), lambda u: mp.sinh(u * u)),
+    "cosh": (lambda u: E.cosh(3.0 * u), lambda u: mp.cosh(3 * u)),
+    "hypot": (lambda u: E.hypot(u, 2.0 - u * u), lambda u: mp.sqrt(u * u + (2 - u * u) ** 2)),
+    "hypot of a constant": (lambda u: E.hypot(3.0, u), lambda u: mp.sqrt(9 + u * u)),
+    "floor": (lambda u: u * E.floor(5.0 * u), lambda u: 3 * u),
+    "mod": (lambda u: E.mod(u, 0.25), lambda u: u - mp.mpf(0.5)),
     "abs": (lambda u: u * abs(u) - 2.0 * abs(-3.0 * u), lambda u: u * u - 6 * u),
     "sign": (lambda u: E.sign(-2.0 * u) * u, lambda u: -u),
     "all": (
@@ -95,7 +118,8 @@ def test_a_derivative_along_a_change_is_that_of_the_function(name):
     u = graph.series("u")
     result = ours(u)
     change = Tangents(graph, ["u"]).of(result)
-    lines = Lines({"u": "u", ".delta_u": "delta"} | {f".sign_{j}": "1.0" for j in range(len(graph.kinks))})
+    signs = {f".sign_{j}": str(side(graph, kink)) for j, kink in enumerate(graph.kinks)}
+    lines = Lines({"u": "u", ".delta_u": "delta"} | signs)
     value = lines.value(change)
     scope = {**PLAIN, "u": 0.7, "delta": 0.3}
     exec("\n".join(lines.text) + f"\nresult = {value}", scope)

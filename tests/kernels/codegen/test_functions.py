@@ -1,0 +1,156 @@
+"""What a scene's functions may ask for: each function along a ramp against its integral, and the time `t`."""
+
+import math
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import functions_scene
+import numpy as np
+import pytest
+from columns import solve
+from functions_scene import FUNCTIONS, SMOOTH
+from mpmath import mp, mpf
+
+from kernels.interface import Status
+from kernels.lanes.jit import COMPILED
+from kernels.scene import Field, SceneError, scene_kernel
+from kernels.stepping import stepped_kernel
+
+plain = pytest.mark.skipif(COMPILED, reason="40 CPU s of compilation; run with NUMBA_DISABLE_JIT=1")
+
+
+def antiderivatives(c, d):
+    """Of each function of the scene, of u."""
+
+    def of_mod(u):
+        n = mp.floor(u / d)
+        return d * d * (n + (u / d - n) ** 2) / 2
+
+    return {
+        "tanh": lambda u: abs(u) + mp.log1p(mp.exp(-2 * abs(u))),
+        "arctan": lambda u: u * mp.atan(u) - mp.log1p(u * u) / 2,
+        "arcsin": lambda u: u * mp.asin(u / c) + mp.sqrt(c * c - u * u),
+        "arccos": lambda u: u * mp.acos(u / c) - mp.sqrt(c * c - u * u),
+        "tan": lambda u: -c * mp.log(mp.cos(u / c)),
+        "sinh": mp.cosh,
+        "cosh": mp.sinh,
+        "hypot": lambda u: (u * mp.sqrt(u * u + d * d) + d * d * mp.asinh(u / d)) / 2,
+        "floor": lambda u: mp.floor(u) * (u - (mp.floor(u) + 1) / 2),
+        "mod": of_mod,
+    }
+
+
+@plain
+@pytest.mark.parametrize(
+    ("a", "b", "c", "d"),
+    [(-0.5, 2.0, 1.6, 0.75), (1.0, 2.25, 3.3, 7.0), (-3.5, 4.0, 3.5 * (1 + 1e-9), 9.0), (-1e-3, 2e-3, 1.01e-3, 1e-3)],
+)
+def test_every_function_is_integrated_over_any_range(a, b, c, d):
+    """Through steep places, up to the ends of arcsin, from an integer on and over many."""
+    outputs, status = solve(FUNCTIONS, "taylor_once", [a], b, c, d, flips=1.0, rtol=1e-12)
+    assert status[0] == Status.OK
+    with mp.workdps(50):
+        start = mpf(a)
+        for name, of in antiderivatives(mpf(c), mpf(d)).items():
+            way = [of(start + mpf(b) * j / 32) - of(start) for j in range(33)]
+            assert abs(mpf(float(outputs[name][0])) - way[-1]) <= mpf(1e-11) * max(map(abs, way)), name
+
+
+@plain
+def test_what_a_function_does_not_take_is_out_of_range():
+    _, status = solve(FUNCTIONS, "taylor_once", [0.5], 2.0, 2.0, 1.0, flips=1.0)
+    assert status[0] == Status.OUT_OF_RANGE
+
+
+def test_lanes_a_cell_alone_and_plain_python_have_the_same_bits_and_narrow_steps_are_seen():
+    """x' = tanh((t - 1)/w) + hypot(t, w) and y' = mod(t, 0.7), by time from -3 on; y jumps by 1 at a second surface."""
+    w = np.array([1e-3, 0.01, 0.1, 1.0] if COMPILED else [0.01])
+    outputs, status = solve(SMOOTH, "taylor", w, flips=2.0, rtol=1e-9)
+    assert (status == Status.OK).all()
+    with mp.workdps(40):
+        for i, width in enumerate(w):
+            v = mpf(float(width))
+
+            def of_x(t, v=v):
+                rise = v * (abs(t - 1) / v + mp.log1p(mp.exp(-2 * abs(t - 1) / v)))
+                return rise + (t * mp.sqrt(t * t + v * v) + v * v * mp.asinh(t / v)) / 2
+
+            x = of_x(mpf(4)) - of_x(mpf(-3))
+            sizes = [abs(of_x(mpf(-3 + j / 8)) - of_x(mpf(-3))) for j in range(57)]
+            assert abs(mpf(float(outputs["x"][i])) - x) <= 1e-9 * max(sizes)
+    y = antiderivatives(1, mpf(0.7))["mod"]
+    assert abs(mpf(float(outputs["y"][0])) - (y(mpf(4)) - y(mpf(-3)) + 1)) < 1e-9
+    if not COMPILED:
+        return print(*(values[0].hex() for values in outputs.values()))
+    again, _ = solve(SMOOTH, "taylor", w[1:2], flips=2.0, rtol=1e-9)
+    many, _ = solve(SMOOTH, "taylor", np.resize(w, 37), flips=2.0, rtol=1e-9)
+    here = [values[0].hex() for values in again.values()]
+    assert [values[1].hex() for values in outputs.values()] == here
+    assert [values[33].hex() for values in many.values()] == here
+    command = [sys.executable, "-m", "pytest", "-q", "-s", "-n", "0", "-p", "no:cacheprovider", __file__, "-k", "lanes"]
+    plain_run = subprocess.run(
+        command,
+        cwd=Path(__file__).parents[3],
+        env=os.environ | {"NUMBA_DISABLE_JIT": "1"},
+        capture_output=True,
+        text=True,
+    )
+    assert " ".join(here) in plain_run.stdout, plain_run.stdout
+
+
+def fields(*names):
+    return tuple(Field(name, "1", name) for name in names)
+
+
+FORCED = {
+    "name": "forced", "doc": "x' = cos(w t) from start_time on", "states": fields("x"),
+    "parameters": fields("w", "end", "since"), "rates": lambda t, w: np.cos(w * t),
+    "surface": lambda t, since, end: since + end - t, "start": lambda: 0.0, "start_time": lambda since: since,
+}  # fmt: skip
+
+
+@plain
+@pytest.mark.parametrize("since", [0.0, -3.0, 1e3])
+def test_the_time_is_asked_for_without_a_state_and_counts_from_the_start_time(since):
+    """The output `time` counts from the start."""
+    w, end = 1.3, 7.0
+    true = float((mp.sin(mpf(w) * (mpf(since) + 7)) - mp.sin(mpf(w) * since)) / mpf(w))
+    kernel, steps = scene_kernel(**FORCED), stepped_kernel(**FORCED)
+    assert [o.name for o in kernel.outputs] == ["time", "interval", "x"]
+    outputs, status = solve(kernel, "taylor", [w], end, since, flips=1.0, rtol=1e-9)
+    assert status[0] == Status.OK
+    assert outputs["time"][0] == pytest.approx(7.0, rel=1e-9)
+    assert outputs["x"][0] == pytest.approx(true, abs=1e-9)
+    outputs, _ = solve(steps, "rk4", [w], end, since, flips=1.0, step=0.5)
+    assert outputs["x"][0] == pytest.approx(true, abs=1e-2)
+
+
+@plain
+def test_a_state_or_a_parameter_called_t_is_that():
+    kernel = scene_kernel(**FORCED | {"states": fields("t"), "rates": lambda t: 2.0, "start_time": None})
+    outputs, _ = solve(kernel, "taylor_once", [1.0], 7.0, 0.0, flips=1.0)
+    assert outputs["time"][0] == pytest.approx(3.5, rel=1e-12)
+    for changed in ({"states": fields("t")}, {"rates": lambda w: w, "surface": lambda x, end: end - x}):
+        with pytest.raises(SceneError, match="start_time"):
+            scene_kernel(**FORCED | changed)
+
+
+@plain
+def test_a_floor_jumps_where_it_should_and_a_motion_pressed_onto_the_jump_slides_along_it():
+    """x' = c - floor(x) - t/2, up to t = 1: through x = 1 without a stop, and held there from both sides."""
+    kernel = scene_kernel(
+        name="stairs", doc="", states=fields("x"), parameters=fields("c", "x0"),
+        rates=lambda x, t, c: c - x // 1 - 0.5 * t, surface=lambda t: 1.0 - t, start=lambda x0: x0,
+    )  # fmt: skip
+    passed = (mpf(1.6) - mp.sqrt(mpf(1.6) ** 2 - mpf(0.8))) * 2
+    true = 1 + mpf(0.6) * (1 - passed) - (1 - passed**2) / 4
+    for c, x0, x in ((1.6, 0.2, float(true)), (0.9, 0.8, 1.0)):
+        outputs, status = solve(kernel, "taylor" if x == 1.0 else "taylor_once", [c], x0, flips=1.0, rtol=1e-10)
+        assert status[0] == Status.OK
+        assert outputs["x"][0] == pytest.approx(x, rel=1e-9)
+
+
+def test_names_of_math_are_what_they_were_once_a_scene_is_recorded():
+    assert functions_scene.math is math

@@ -1,0 +1,115 @@
+"""Several surfaces, each with its jump: walls, a section beside an impact, and a mode of more than two values."""
+
+import pytest
+from columns import solve
+
+from kernels.cycle import cycle_kernel
+from kernels.interface import Status
+from kernels.lanes.jit import COMPILED
+from kernels.scene import Field, SceneError, scene_kernel, where
+from kernels.stepping import stepped_kernel
+from kernels.trajectory import motion_kernel
+
+
+def fields(*names):
+    return tuple(Field(name, "1", name) for name in names)
+
+
+WALLS = {
+    "name": "walls", "doc": "a ball between two walls and above a floor, without a force",
+    "states": fields("x", "v", "y", "w"), "parameters": fields("e", "x0", "y0", "v0"),
+    "rates": lambda v, w: (v, 0.0, w, 0.0),
+    "surface": {"left": lambda x: x, "right": lambda x: 1.0 - x, "floor": lambda y: y},
+    "switch": {
+        "left": lambda x, v, y, w: (x, -v, y, w),
+        "right": lambda x, v, y, w, e: (x, -e * v, y, w),
+        "floor": lambda x, v, y, w: (x, v, y, -w),
+    },
+    "start": lambda x0, y0, v0: (x0, v0, y0, -1.0),
+}  # fmt: skip
+SHIFTED = {
+    "name": "gears", "doc": "a mode of three values, the gear",
+    "states": fields("x", "mode"), "parameters": fields("a"),
+    "rates": lambda x, mode, a: (a * where(mode > 1.5, 4.0, where(mode > 0.5, 2.0, 1.0)), 0.0),
+    "surface": {"one": lambda x: 1.0 - x, "two": lambda x: 3.0 - x, "end": lambda x: 7.0 - x},
+    "switch": {"one": lambda x: (x, 1.0), "two": lambda x: (x, 2.0), "end": lambda: (0.0, 0.0)},
+    "start": lambda: (0.0, 0.0),
+}  # fmt: skip
+plain = pytest.mark.skipif(COMPILED, reason="compiled in test_functions; run with NUMBA_DISABLE_JIT=1")
+
+
+def found(kernel, method, *cell, flips, rtol=1e-9):
+    outputs, status = solve(kernel, method, [cell[0]], *cell[1:], flips=float(flips), rtol=rtol)
+    return {name: values[0] for name, values in outputs.items()}, status[0]
+
+
+@pytest.fixture(scope="module")
+def walls():
+    return scene_kernel(**WALLS)
+
+
+@plain
+@pytest.mark.parametrize(
+    ("flips", "time", "x", "v", "w"),
+    [(1, 0.5, 1.0, 1.0, -1.0), (2, 1.75, 0.375, -0.5, -1.0), (3, 2.5, 0.0, -0.5, 1.0), (4, 4.5, 1.0, 0.5, 1.0)],
+)
+def test_each_surface_has_its_own_jump(walls, flips, time, x, v, w):
+    """From the middle to the right wall, which takes half of the speed; the floor is met on the way back."""
+    outputs, status = found(walls, "taylor_once", 0.5, 0.5, 1.75, 1.0, flips=flips)
+    assert status == Status.OK
+    assert [outputs[name] for name in ("time", "x", "v", "w")] == pytest.approx([time, x, v, w], abs=1e-12)
+
+
+@plain
+def test_surfaces_that_are_met_at_once_all_jump_and_a_start_that_falls_from_one_jumps_at_once(walls):
+    """Into the corner at t = 0.5, to the right wall at 1.5; a ball on the right wall that goes on to the right."""
+    outputs, status = found(walls, "taylor_once", 0.5, 0.5, 0.5, -1.0, flips=2)
+    assert status == Status.OK
+    assert [outputs[name] for name in ("time", "x", "v", "y", "w")] == pytest.approx([1.5, 1, 1, 1, 1], abs=1e-12)
+    outputs, status = found(walls, "taylor_once", 0.5, 1.0, 4.0, 1.0, flips=2)
+    assert [outputs[name] for name in ("time", "x", "v")] == pytest.approx([2.0, 0.0, -0.5], abs=1e-12)
+
+
+@plain
+@pytest.mark.parametrize("method", ["taylor", "dop853", "rodas5p"])
+def test_a_section_beside_an_impact_is_passed_and_counts_behind_it_too(method):
+    """A falling ball: its top, v through 0, before the floor where it is thrown up by e; resting there it sticks."""
+    kernel = scene_kernel(
+        name="bounce", doc="", states=fields("x", "v"), parameters=fields("e"), rates=lambda v: (v, -1.0),
+        surface={"top": lambda v: v, "floor": lambda x: x}, switch={"floor": lambda x, v, e: (x, -e * v)},
+        start=lambda: (0.5, 0.0),
+    )  # fmt: skip
+    for flips, time, x, v in ((1, 0, 0.5, 0), (2, 1, 0, -1), (3, 1.5, 0.125, 0), (4, 2, 0, -0.5), (5, 2.25, 1 / 32, 0)):
+        outputs, status = found(kernel, method, 0.5, flips=flips)
+        assert status == Status.OK
+        assert [outputs[name] for name in ("time", "x", "v")] == pytest.approx([time, x, v], abs=1e-8)
+    assert found(kernel, method, 0.0, flips=5)[1] != Status.OK
+
+
+@plain
+@pytest.mark.parametrize("method", ["taylor", "dop853"])
+def test_a_state_of_rate_0_that_a_switch_sets_is_a_mode_of_any_number_of_values(method):
+    kernel = scene_kernel(**SHIFTED)
+    for flips, time, x, mode in ((1, 1, 1, 0), (2, 2, 3, 1), (3, 3, 7, 2), (5, 5, 3, 1)):
+        outputs, status = found(kernel, method, 1.0, flips=flips)
+        assert status == Status.OK
+        assert [outputs[name] for name in ("time", "x", "mode")] == pytest.approx([time, x, mode], abs=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("changed", "says"),
+    [
+        ({"switch": {"up": lambda x, v, y, w: (x, v, y, w)}}, "'up'"), ({"surface": {}}, "a surface"),
+        ({"surface": {"left": lambda x: x, "right": lambda e: e}}, "state"),
+        ({"switch": {"left": lambda x: x}}, "switch left.*1 values"),
+    ],
+)  # fmt: skip
+def test_surfaces_and_switches_that_do_not_fit_are_refused(changed, says):
+    with pytest.raises(SceneError, match=says):
+        scene_kernel(**WALLS | changed)
+
+
+@pytest.mark.parametrize("kernel_of", [stepped_kernel, cycle_kernel, motion_kernel])
+def test_where_there_is_one_surface_more_are_refused(kernel_of):
+    with pytest.raises(SceneError, match="one surface"):
+        kernel_of(**WALLS)
