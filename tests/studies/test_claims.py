@@ -127,8 +127,10 @@ TABLE = {
         "depth": [0.0, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5],
     }}, ""),
     "verge_losses": Claims({
-        "verge_losses": {"I_c": 2.5e-6 * 10 ** (np.array([0, 4, 5, 6, 8, 12, 16]) / 4), "flips": 3000, "rtol": 1e-9},
-        "verge_losses_wheel": {"flips": 3000, "rtol": 1e-9},
+        "verge_losses": {
+            "I_c": 2.5e-6 * 10 ** (np.array([0, 4, 5, 6, 8, 12, 16]) / 4), "tau": 2, "flips": 3000, "rtol": 1e-9,
+        },
+        "verge_losses_wheel": {"tau": 2, "flips": 3000, "rtol": 1e-9},
     }, "angle gap interval time status verge_losses_wheel.drag verge_losses_wheel.rubbing "
         "verge_losses_wheel.recoil verge_losses_wheel.speed verge_losses_wheel.wheel", 1),
 }
