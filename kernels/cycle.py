@@ -28,6 +28,8 @@ METHODS = {
 }
 SHARE = 3e-6
 """Of rtol, the tolerance of the runs: their differences are divided by thousandths."""
+ONE = 1e-8
+"""What is known of a multiplier, where it cannot be told from 1, for its cycle to be none that others come to."""
 MOST_FLIPS, MOST_CYCLES = 1000.0, 1000.0
 SEARCH = (
     Field("flips", "1", "switches a cycle", default=2.0, lower=1.0, upper=MOST_FLIPS, integer=True),
@@ -178,7 +180,7 @@ def _solved(
         errors[row, there] = np.where(off >= 0.0, off, math.inf)
     m = 1 + 2 * n + len(turns)
     apart = abs(values[m, there] - 1.0) > errors[m, there]
-    status[there[~apart & (errors[m, there] < 1e-3)]] = Status.NO_CYCLE
+    status[there[~apart & (errors[m, there] < ONE)]] = Status.NO_CYCLE
     return values, errors
 
 

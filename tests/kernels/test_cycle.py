@@ -6,12 +6,13 @@ import rich_scene
 from columns import checked, estimated, solve
 from kicked_scene import KICKED
 from mpmath import mp, mpf
+from scipy.integrate import solve_ivp
 
 from kernels.cycle import cycle_kernel
 from kernels.foliot.cycle import FOLIOT
 from kernels.interface import Status
 from kernels.lanes.jit import COMPILED
-from kernels.scene import Field, SceneError
+from kernels.scene import Field, SceneError, sin
 
 pytestmark = pytest.mark.skipif(not COMPILED, reason="a cycle takes minutes as plain Python")
 
@@ -119,3 +120,22 @@ def test_a_cycle_of_half_the_sides_and_a_surface_of_two_states_are_refused():
         cycle_kernel(**own, rates=lambda x, v: (v, -x), surface=lambda x, v, side: side * (x + v))
     with pytest.raises(SceneError, match="turn"):
         cycle_kernel(**own, rates=lambda x, v: (v, -x), surface=lambda x, side: side * x, turns={"x": 1.0})
+
+
+def test_a_phase_that_is_locked_to_its_drive_goes_on_by_whole_turns():
+    """phi' = bias + sin(theta) - sin(phi), theta' = 1: locked, and between two steps."""
+    turn = 2.0 * np.pi
+    junction = cycle_kernel(
+        name="junction", doc="driven junction", states=(Field("phi", "rad", "phase"), Field("theta", "rad", "drive")),
+        parameters=(Field("bias", "1", "current"),), turns={"phi": turn}, start=lambda: (0.0, 0.0),
+        rates=lambda phi, theta, bias: (bias + sin(theta) - sin(phi), 1.0), surface=lambda theta: turn - theta,
+        switch=lambda phi, theta: (phi, theta - turn),
+    )  # fmt: skip
+    cells = {"bias": np.array([0.0, 0.3, 1.2, 0.9]), "flips": 1.0, "settle": 16.0}
+    found, status = solve(junction, "taylor", **cells, asked=("period", "phi", "phi_turns"))
+    assert list(status[:3]) == [Status.OK] * 3
+    assert list(found["phi_turns"][:3]) == [0.0, 0.0, 1.0]
+    assert status[3] == Status.NOT_CONVERGED
+    own = solve_ivp(lambda t, y: [1.2 + np.sin(t) - np.sin(y[0])], (0.0, 12 * turn), [0.0], rtol=1e-11, atol=1e-12)
+    assert np.cos(own.y[0, -1] - found["phi"][2]) == pytest.approx(1.0, abs=1e-15)
+    assert np.sin(own.y[0, -1] - found["phi"][2]) == pytest.approx(0.0, abs=1e-8)
