@@ -11,6 +11,7 @@ import math
 
 import numpy as np
 
+from kernels.integrate.driver import GOLDEN
 from kernels.interface import FIRST_REFUSAL, Status
 from kernels.lanes.refill import MOVING, fresh, to_the_end
 from kernels.lanes.tuples import first_rows, flat
@@ -26,10 +27,10 @@ AT_ONCE = 8192
 STOPS = 2.0, 4.0, math.inf
 """Switches behind which cells are put in the order of the steps of their last two legs, from event to event."""
 ROUGH, FINER = 2.0, 16.0
-ROUNDINGS, GOLDEN = 8.0, 0.6180339887498949
-"""By how many roundings a parameter is changed at most, and what makes that differ from one to the next."""
-MANY = 2.0
-"""Times as many are the parameters of scenes changed by, and so many is an event missed by."""
+ROUNDINGS = 8.0
+"""By how many roundings a parameter is changed at most."""
+MANY = 4.0
+"""Times as many are the parameters of scenes changed by: beside them those of the steps of a run are few."""
 TIGHTER, TIGHT = 1e-3, 1e-13
 """The second tolerance, over the first one, and at most: what is stiff may come to rest only in the last digits."""
 TRIED_AGAIN = Status.INACCURATE, Status.GRAZING, Status.STEP_LIMIT, Status.OUT_OF_RANGE
@@ -46,7 +47,7 @@ def followed(module, columns, rtol, finer=1.0, together=False, shake=0.0):
     rtol : tolerance of each step, a column; it chooses the order
     finer : by how much the steps are to be better than that
     together : lanes in lockstep, in the order of the cells
-    shake : by how many of its roundings each event is missed, in turn early and late, and each state at the start
+    shake : 1 or -1 where each event is missed by some roundings, and each state at the start (`driver.missed_by`)
     """
     return _followed(module, columns, rtol, rtol / finer, together, shake=shake)
 
@@ -141,8 +142,8 @@ def twice(module, columns, rtol, outputs, status, finest=0.0):
 
 def _compared(module, columns, rtol, wanted):
     """The results of the finer of two runs to the tolerance `rtol`, and the status where `wanted` is to be met."""
-    rough = followed(module, off_by_roundings(columns, MANY), rtol, ROUGH, shake=MANY)
-    other = followed(module, off_by_roundings(columns, -MANY), rtol, ROUGH, shake=-MANY)
+    rough = followed(module, off_by_roundings(columns, MANY), rtol, ROUGH, shake=1.0)
+    other = followed(module, off_by_roundings(columns, -MANY), rtol, ROUGH, shake=-1.0)
     fine = followed(module, columns, rtol, ROUGH * FINER)
     states = len(module.STATES)
     status = status_of(fine, 2 + states)

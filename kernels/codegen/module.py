@@ -149,7 +149,8 @@ def at_kink(xs):
 
 CHANGES = """
 CHANGES_{order} = Changes(
-    rate_changes, event_changes, jump_changes, made_of_rates, made_of_events, inner_{order}, {rough}
+    rate_changes, event_changes, jump_changes, made_of_rates, made_of_events, inner_{order}, rough_{order},
+    {fed_back},
 )
 """
 
@@ -192,10 +193,10 @@ _PREFIXES = "s|d|box|most|half|over|and_one|half_over|delta|made"
 _NUMBERED = re.compile(rf"\w*_\d+|n\d+|({_PREFIXES})_\w*")
 
 
-def cell_of(states, parameters, kinks, tells=False, spreads=False):
+def cell_of(states, parameters, kinks, tells=False):
     """A cell of zeros, as large as a scene's."""
-    u, spread = (0.0,) * states, (0.0,) * states * spreads
-    errors = Errors(0.0, 0.0, 0.0, 0.0, u, 0.0, 0.0, spread, 0.0, 0.0, u) if tells else ()
+    u = (0.0,) * states
+    errors = Errors(0.0, 0.0, 0.0, 0.0, u, 0.0, 0.0, u, 0.0, 0.0, 0.0, u) if tells else ()
     marks = (0.0,) * (kinks + 1)
     wanted, so_far = (0.0, (0.0,) * parameters, 0.0, 0.0, 0.0), (0.0, 0.0, u, u, 0.0)
     return Cell(*wanted, *so_far, u, 0.0, marks, 0.0, 0.0, marks, 0.0, 0.0, 0.0, 0.0, 0.0, errors)
@@ -326,8 +327,8 @@ class Writer:
         ) + "".join(text for _, text, _ in texts)  # fmt: skip
 
     def _tangents(self, lines, order, powers):
-        """Of changes, and of the spread where there is one, that is wanted roughly (`tangent.tangent`)."""
-        lengths = {"inner": short(self, order)} | ({"rough": SHORT[order]} if self.feeds_back() else {})
+        """Of changes, and of the spread, that is wanted roughly (`tangent.tangent`)."""
+        lengths = {"inner": short(self, order), "rough": SHORT[order]}
         return [(part, *tangent(self, lines, order, powers, part, length)) for part, length in lengths.items()]
 
     def _power(self, i):
@@ -367,17 +368,13 @@ class Writer:
         summed, seen, told = self._summed(), self._seen(), f"CHANGES_{order}" if tells else "None"
         way = {s: "BY_SUM" if s in summed else "BY_SERIES" for s in self.states} | {None: "BY_SERIES"}
         m, ways = "M_TOLD" if tells else "M", listed(way[s] for s in self.states)
-        changes = self._changes(order) if tells else ""
+        changes = filled(CHANGES, order=order, fed_back=self.feeds_back() or None) if tells else ""
         return self.series(order, len(self.recorded.graph.powers), tells) + changes + filled(
             LEG, m=m, order=order, ways=ways, watched=listed(way[s] for s in seen),
             summed=tuple(float(s in summed) for s in self.states), unseen=tuple(float(s is None) for s in seen),
             error=told, hides=self.hides() or None,
             at_kink="at_kink" if self.recorded.nested else None,
         ) + self.driven(order, m, told)  # fmt: skip
-
-    def _changes(self, order):
-        """The text of what is written of the error for one order."""
-        return filled(CHANGES, order=order, rough=f"rough_{order}" if self.feeds_back() else None)
 
     def driven(self, leg, m="M", tells="None"):
         """The text of `run_{leg}`."""

@@ -21,7 +21,7 @@ TEXT = '''
 
 from {module} import *
 
-M_TOLD = M._replace(cell=cell_of({cell}, True, {spreads}))
+M_TOLD = M._replace(cell=cell_of({cell}, True))
 '''
 
 STATED = 1.5
@@ -55,7 +55,7 @@ def telling(scene):
     )
     cell = f"{len(writer.states)}, {len(writer.parameters)}, {writer.kinks}"
     parts = [
-        TEXT.format(name=scene.name, module=build(scene).__name__, cell=cell, spreads=writer.feeds_back()).lstrip(),
+        TEXT.format(name=scene.name, module=build(scene).__name__, cell=cell).lstrip(),
         sizes(writer, "made_of_rates", made.format("rates"), writer.recorded.rates),
         sizes(writer, "made_of_events", made.format("events but for their offsets"), values),
     ]

@@ -3,17 +3,18 @@
 What a step leaves out is told by the defect of its polynomial U(t) of order p at the end, f(U(h)) - U'(h), which grows
 as t^p, so that it comes to h/(p + 1) times that; f(U(h)) is the first coefficient of the next step. A state that is the
 sum of another one, w, leaves out w_p h^(p+1)/(p + 1). As it grows, what is left out, l, changes the rates too, and with
-them the states by h/(p + 2) Df l more. What rounding takes is added so that errors grow. From step to step the error
-follows the tangent of the motion, of low order. At an event e the motion is late by
+them the states by h/(p + 2) Df l more. From step to step the error follows the tangent of the motion, of low order. At
+an event e the motion is late by
     -(De off)/(De f),                                                                                     (1)
 and compared there, each at its own time, states are off by f times that more; behind it goes on what the jump leaves of
 it. That is to first order; `late` is infinite, and so is the error, where the event bends, or comes so soon after the
 one before, that it may not do.
 
-Errors of some steps may cancel but for what is not known of them, and where states feed back on one another the motion
-may make that large again. There what a step leaves out is taken to its next order: with l' = f(U) - U' + Df l and
-l'' = f'(U) - U'' at the end, l = h (2 l'/(p + 2) - h l''/((p + 1) (p + 2))). And the *spread* is carried along as the
-error is: VAGUE of what each step leaves out, added so that it grows. Where states do not, the spread is ().
+Errors of some steps may cancel but for what is not known of them, and the motion may make that large again. So the
+*spread* is carried beside the error, as that is: what rounding takes, and VAGUE of what each step leaves out, added so
+that it grows; and behind an event that rounding misplaces by dt, dt times what the rates change by there. Where states
+feed back on one another, what a step leaves out is taken to its next order: with l' = f(U) - U' + Df l and
+l'' = f'(U) - U'' at the end, l = h (2 l'/(p + 2) - h l''/((p + 1) (p + 2))).
 
 Generic in one cell or lanes; `m` is a `taylor_leg.Series`, and where its `error` is None none is carried: all is ().
 """
@@ -49,6 +50,7 @@ class Changes(NamedTuple):
     of_rates, of_events, behind : what they change of each rate, of each event's value, of the state behind a switch
     rates_made, events_made : (state, mode) -> what rates, and events but for their offsets, are made of, in size
     tangent, rough : (state, mode, unit, inner, changes, cores) -> what each change is evaluated from (`taylor.Way`)
+    fed_back : None where no state's change comes back to it by way of another one
     """
 
     of_rates: object
@@ -58,6 +60,7 @@ class Changes(NamedTuple):
     events_made: object
     tangent: object
     rough: object
+    fed_back: object
 
 
 class Error(NamedTuple):
@@ -73,12 +76,16 @@ class Error(NamedTuple):
 
 
 class Late(NamedTuple):
-    """The error at the event that ends a leg: of each state, of the leg's time; and the spread of both."""
+    """The error at the event that ends a leg: of each state, of the leg's time; the spread of both.
+
+    noise : time by which rounding may misplace the event, by itself
+    """
 
     off: tuple
     late: float
     spread: tuple
     spread_late: float
+    noise: float
 
 
 class Here(NamedTuple):
@@ -110,10 +117,11 @@ def wider(m, margins, state, mode, errors):
     """The events' margins, with their errors at the start of a leg."""
     if m.error is None:
         return margins
-    changes = m.error.of_events(state, mode, errors.off)
+    changes, vague = (m.error.of_events(state, mode, x) for x in (errors.off, errors.spread))
     told = errors.told > 0.5
     return tuple(
-        where(told, fma(DOUBT, magnitude(x), margin), margin) for x, margin in zip(changes, margins, strict=True)
+        where(told, fma(DOUBT, magnitude(x) + magnitude(y), margin), margin)
+        for x, y, margin in zip(changes, vague, margins, strict=True)
     )
 
 
@@ -135,19 +143,18 @@ def left_out(m, error, full, state, mode, unit, defects, bends):
     `defects` and `bends` are f - U' and f' - U''; for a power's core there is no f'.
     """
     weight, n = error.weight, m.order + 1
-    if not error.spread:
-        parts = zip(m.summed, error.off, defects, strict=True)
-        return error._replace(off=tuple(where(summed > 0.5, x, fma(weight, d, x)) for summed, x, d in parts))
     parts = zip(m.summed, error.left, defects, strict=True)
-    left = tuple(where(summed > 0.5, x, weight * defect) for summed, x, defect in parts)
-    share, twice = weight * (n / (n + 1.0)), 2.0 * n / (n + 1.0)
-    more = m.error.of_rates(state, mode, left)
-    if full is None:
-        left = tuple(
-            where(summed > 0.5, x, fma(share, unit * by - weight * bend, twice * x))
-            for summed, x, by, bend in zip(m.summed, left, more, bends, strict=True)
-        )
-    off = tuple(fma(share, unit * by, x + y) for by, x, y in zip(more, error.off, left, strict=True))
+    left, off = tuple(where(summed > 0.5, x, weight * defect) for summed, x, defect in parts), error.off
+    if m.error.fed_back is not None:
+        share, twice = weight * (n / (n + 1.0)), 2.0 * n / (n + 1.0)
+        more = m.error.of_rates(state, mode, left)
+        if full is None:
+            left = tuple(
+                where(summed > 0.5, x, fma(share, unit * by - weight * bend, twice * x))
+                for summed, x, by, bend in zip(m.summed, left, more, bends, strict=True)
+            )
+        off = tuple(fma(share, unit * by, x) for by, x in zip(more, off, strict=True))
+    off = tuple(x + y for x, y in zip(off, left, strict=True))
     spread = tuple(further(x, VAGUE * magnitude(y)) for x, y in zip(error.spread, left, strict=True))
     return error._replace(off=off, spread=spread, left=left)
 
@@ -158,24 +165,20 @@ def changes(m, error, state, mode, unit, pieces, cores):
     if m.error is None:
         return ()
     off = m.error.tangent(state, mode, unit, pieces.inner, error.off, cores)
-    return off, m.error.rough(state, mode, unit, pieces.rough, error.spread, cores) if error.spread else ()
+    return off, m.error.rough(state, mode, unit, pieces.rough, error.spread, cores)
 
 
 @symbolic
 def moved(m, error, changes, state, mode, unit, x, pieces, coarse):
-    """The error after a time x, with what rounding and cores of powers take; and what sums leave out."""
+    """The error after a time x; its spread, with what rounding and cores of powers take; and what sums leave out."""
     n = m.order + 1
     power, share = natural_power(x, n), 1.0 / n
     lasts = tuple(curve[-1][-1] for curve in pieces.of_states)
-    off = tuple(way.value(x, curve) for way, curve in zip(m.ways, changes[0], strict=True))
-    if not error.spread:
-        parts = zip(m.summed, lasts, off, strict=True)
-        off = tuple(where(summed > 0.5, fma(unit * last, power * share, y), y) for summed, last, y in parts)
-    parts = zip(off, m.error.rates_made(state, mode), state, strict=True)
-    off = tuple(further(y, ULP * fma(x * unit, noise, magnitude(u))) for y, noise, u in parts)
+    off, spread = (tuple(way.value(x, curve) for way, curve in zip(m.ways, curves, strict=True)) for curves in changes)
+    parts = zip(spread, m.error.rates_made(state, mode), state, strict=True)
+    spread = tuple(further(y, ULP * fma(x * unit, noise, magnitude(u))) for y, noise, u in parts)
     for left in coarse:
-        off = tuple(further(y, by) for y, by in zip(off, left, strict=True))
-    spread = tuple(way.value(x, curve) for way, curve in zip(m.ways, changes[1], strict=False))
+        spread = tuple(further(y, by) for y, by in zip(spread, left, strict=True))
     left = tuple(
         where(summed > 0.5, unit * power * share * last, 0.0) for summed, last in zip(m.summed, lasts, strict=True)
     )
@@ -225,26 +228,26 @@ def at_event(m, error, changes, full, state, mode, unit, ends, here, pieces, cor
     defects = tuple(unit * rate - slope(end, u) for rate, u in zip(rates, pieces.states, strict=True))
     error = left_out(m, error, full, ends, mode, unit, defects, bends)
     power = natural_power(end, m.order - 1)
-    of_each = tuple(
-        where(unseen > 0.5, further(change, magnitude(factor) * last_term(end, u) * power), change)
-        for unseen, change, (_, factor, u) in zip(
-            m.unseen, m.error.of_events(ends, mode, error.off), pieces.events, strict=True
+    noises = tuple(
+        fma(ULP, noise + magnitude(offset), where(unseen > 0.5, magnitude(factor) * last_term(end, u) * power, 0.0))
+        for unseen, noise, (offset, factor, u) in zip(
+            m.unseen, m.error.events_made(ends, mode), pieces.events, strict=True
         )
     )
-    parts = zip(m.error.events_made(ends, mode), pieces.events, strict=True)
-    noises = tuple(noise + magnitude(event[0]) for noise, event in parts)
     parts = zip(pieces.events, m.watched, pieces.of_events, strict=True)
     bends = tuple(event[1] * way.rates(end, curve)[2] for event, way, curve in parts)
-    change, noise, bend = (of_event(values, which) for values in (of_each, noises, bends))
-    per_time = unit * of_event(m.error.of_events(ends, mode, rates), which)
-    by = -further(change, ULP * noise) / per_time
-    doubtful = (magnitude(bend * by) * STRAIGHT > magnitude(per_time)) | (magnitude(by) * ORDERLY > here.t)
-    late, spread_late = where(doubtful | here.others, math.inf, by), 0.0 * end
-    if error.spread:
-        spread_late = -of_event(m.error.of_events(ends, mode, error.spread), which) / per_time
+    noise, bend = (of_event(values, which) for values in (noises, bends))
+    change, vague, per_unit = (
+        of_event(m.error.of_events(ends, mode, changed), which) for changed in (error.off, error.spread, rates)
+    )
+    per_time = unit * per_unit
+    by, spread_late, noise = -change / per_time, -vague / per_time, magnitude(noise / per_time)
+    most_by = magnitude(by) + magnitude(spread_late) + noise
+    doubtful = (magnitude(bend) * most_by * STRAIGHT > magnitude(per_time)) | (most_by * ORDERLY > here.t)
+    late = where(doubtful | here.others, math.inf, by)
     off = tuple(fma(unit * rate, late, x) for rate, x in zip(rates, error.off, strict=True))
-    spread = tuple(fma(unit * rate, spread_late, x) for rate, x in zip(rates, error.spread, strict=False))
-    return Late(off, late, spread, spread_late)
+    spread = tuple(fma(unit * rate, spread_late, x) for rate, x in zip(rates, error.spread, strict=True))
+    return Late(off, late, spread, spread_late, noise)
 
 
 @symbolic
@@ -252,8 +255,8 @@ def started(errors, state, fresh):
     """The errors of fresh lanes: a start is rounded."""
     if not errors:
         return ()
-    parts = zip(state, errors.off, strict=True)
-    return errors._replace(off=tuple(where(fresh, ULP * magnitude(u), x) for u, x in parts))
+    parts = zip(state, errors.spread, strict=True)
+    return errors._replace(spread=tuple(where(fresh, ULP * magnitude(u), x) for u, x in parts))
 
 
 @symbolic
@@ -269,26 +272,27 @@ def later(errors, at_event, unit):
         spread_lag=fma(spread_late, unit, errors.spread_lag),
         off=at_event.off,
         spread=at_event.spread,
+        noise=at_event.noise * unit,
     )
 
 
 @symbolic
-def faded(largest, new, spread, switches):
+def faded(largest, new, spread, noise, switches):
     """The largest error so far at a switch, fading."""
-    new = magnitude(new) + magnitude(spread)
+    new = magnitude(new) + magnitude(spread) + noise
     return where(switches, most(FADES * largest, new), largest)
 
 
 @symbolic
-def at_switch(errors, switches):
-    """The errors of the lanes that switch."""
+def at_switch(errors, rates, switches):
+    """The errors of the lanes that switch; `rates` are those before."""
     if not errors:
         return ()
-    spread = errors.spread or tuple(0.0 for x in errors.off)
+    parts = zip(errors.once, errors.off, errors.spread, rates, strict=True)
     return errors._replace(
-        latest=faded(errors.latest, errors.late, errors.spread_late, switches),
-        lagged=faded(errors.lagged, errors.lag, errors.spread_lag, switches),
-        once=tuple(faded(*parts, switches) for parts in zip(errors.once, errors.off, spread, strict=True)),
+        latest=faded(errors.latest, errors.late, errors.spread_late, errors.noise, switches),
+        lagged=faded(errors.lagged, errors.lag, errors.spread_lag, errors.noise, switches),
+        once=tuple(faded(x, off, spread, magnitude(rate) * errors.noise, switches) for x, off, spread, rate in parts),
     )
 
 
@@ -303,12 +307,21 @@ def stated(errors, watched, time, since, size):
 
 
 @symbolic
-def behind(m, errors, state, mode, switches):
-    """The errors behind a switch."""
+def behind(m, errors, state, mode, rates, switches):
+    """The errors behind a switch, and what it makes of the rates before it, as of changes of the states."""
+    if not errors:
+        return (), rates
+    lag, spread_lag = where(switches, 0.0, errors.lag), where(switches, errors.noise, errors.spread_lag)
+    off, spread, rates = (choose(switches, m.behind(state, mode, x), x) for x in (errors.off, errors.spread, rates))
+    return errors._replace(off=off, lag=lag, spread=spread, spread_lag=spread_lag), rates
+
+
+@symbolic
+def misplaced(m, errors, rates, state, mode, lanes):
+    """The errors behind an event that is misplaced by itself: for that time the rates were those before it."""
     if not errors:
         return ()
-    lag, spread_lag = where(switches, 0.0, errors.lag), where(switches, 0.0, errors.spread_lag)
-    off, spread = choose(switches, m.behind(state, mode, errors.off), errors.off), ()
-    if errors.spread:
-        spread = choose(switches, m.behind(state, mode, errors.spread), errors.spread)
-    return errors._replace(off=off, lag=lag, spread=spread, spread_lag=spread_lag)
+    parts = zip(errors.spread, rates, m.rates(state, mode), strict=True)
+    return errors._replace(
+        spread=tuple(where(lanes, further(x, magnitude(f - g) * errors.noise), x) for x, f, g in parts)
+    )

@@ -24,6 +24,9 @@ EVENTS = 1_000_000
 BLUR = 16.0
 """Tolerances of the surface's value at the start that rounding may take from it: rtol/2 in the finer run."""
 ONE_ULP = 2.0**-52
+SHAKEN, GOLDEN = 4.0, 0.6180339887498949
+"""Roundings that an event is missed by at most; and what the share of it goes on by from one event to the next, so that
+no two of some events one behind the other are missed alike: what is between them would not show it."""
 
 
 class Start(NamedTuple):
@@ -111,6 +114,21 @@ def open_for(m, state, mode, on):
         for o, (size, rate) in zip(on, m.made(state, mode), strict=True)
     )
     return fold(longer, 0.0 * mode.side, (), blurs)
+
+
+@symbolic
+def missed_by(shake):
+    """Roundings that an event is missed by; `shake` is 0 for none, else a sign, and 1 and the part of all of it."""
+    by = SHAKEN * (2.0 * magnitude(shake) - 3.0)
+    return where(magnitude(shake) > 0.5, where(shake < 0.0, -by, by), 0.0)
+
+
+@symbolic
+def shaken_on(shake):
+    """What `missed_by` takes for the next event."""
+    part = magnitude(shake) + GOLDEN
+    part = where(part < 2.0, part, part - 1.0)
+    return where(magnitude(shake) > 0.5, where(shake < 0.0, -part, part), 0.0)
 
 
 @symbolic
@@ -211,7 +229,8 @@ def advance(m, leg, memory, i, tells, slides, surfaces):
         verdict = where(fresh, where(start.beyond | endless, BAD_INPUT, unsure), verdict)
         errors = carried.started(errors, state, fresh)
     state = tuple(
-        where(fresh, fma(ONE_ULP * odd * shake, u, u), u) for odd, u in zip(m.alternating, state, strict=True)
+        where(fresh, fma(ONE_ULP * odd * missed_by(shake), u, u), u)
+        for odd, u in zip(m.alternating, state, strict=True)
     )
     if slides is not None:
         left = tuple(0.0 * side for sign in signs[:-1])
@@ -241,9 +260,9 @@ def advance(m, leg, memory, i, tells, slides, surfaces):
         state, size, h, on = choose(moving, found.state, state), reached(size, found.reach), found.h, found.on
         mode = Mode(side, signs, parameters, False)
         place = open_for(m, state, mode, on)
-        shaken, shake = moving & (magnitude(shake) > 0.0), -shake
-        rates = m.rates(state, mode)
-        state = tuple(where(shaken, fma(shake * place, rate, u), u) for rate, u in zip(rates, state, strict=True))
+        shaken, shake = moving & (magnitude(shake) > 0.0), shaken_on(shake)
+        rates, off = m.rates(state, mode), missed_by(shake) * place
+        state = tuple(where(shaken, fma(off, rate, u), u) for rate, u in zip(rates, state, strict=True))
         time = where(moving, fma(found.t, unit, time), time)
         since = where(moving, fma(found.t, unit, since), since)
         switches = moving & (on[0] > 0.5) & (signs[-1] > 0.0)
@@ -264,7 +283,7 @@ def advance(m, leg, memory, i, tells, slides, surfaces):
         if any_lane(switches):
             mode = Mode(side, signs, parameters, False)
             count = where(switches, count + 1.0, count)
-            errors = carried.at_switch(errors, switches)
+            errors = carried.at_switch(errors, rates, switches)
             watched = switches & ((count < 1.5) | (count >= flips))
             if any_lane(watched):
                 verdict = where(watched & m.underflows(state, mode, unit), OUT_OF_RANGE, verdict)
@@ -273,7 +292,7 @@ def advance(m, leg, memory, i, tells, slides, surfaces):
             since = where(switches, 0.0, since)
             if surfaces is not None:
                 mode = Mode(side, which_met(signs, surfaces, first, met), parameters, False)
-            errors = carried.behind(tells, errors, state, mode, switches)
+            errors, rates = carried.behind(tells, errors, state, mode, rates, switches)
             before_it = m.surface(state, mode)
             gaps = m.kinks(state, mode)
             jumped = m.switched(state, mode)
@@ -303,6 +322,7 @@ def advance(m, leg, memory, i, tells, slides, surfaces):
             mode = Mode(side, signs, parameters, False)
             signs, on, faint = pressed(m, state, mode, on, left, BLUR * tolerance, moving)
             verdict = where(faint & (verdict < GRAZING), GRAZING, verdict)
+        errors = carried.misplaced(m, errors, rates, state, Mode(side, signs, parameters, False), moving)
         steps, before = where(active, found.tried, steps), where(active, steps, before)
         verdict = where(moving & (kinks_met > m.most_kinks), STEP_LIMIT, verdict)
         done = active & (found.grazing | (verdict >= REFUSED) | (count >= flips))

@@ -82,7 +82,7 @@ class Pieces(NamedTuple):
 class Cell(NamedTuple):
     """All that a lane knows of its cell between two events; the first entry is the lane's stage, inputs follow.
 
-    shake : by how many of its roundings each event is missed, in turn early and late, and each state at the start
+    shake : by how many of its roundings each event is missed, and each state at the start (`driver.missed_by`)
     time, interval, at, size, verdict : results: of the last switch; interval and states there; states' sizes; status
     unit, h : of time, in seconds; the next step, in units
     count, since, kinks_met : switches; time and kinks since the last one
@@ -119,6 +119,7 @@ class Errors(NamedTuple):
 
     told, error : whether it is heeded; the largest of the last switch, relative
     late, lag, off : of time, of time since the last switch, of each state; and the spread of each
+    noise : time by which rounding may misplace the last event
     latest, lagged, once : the largest so far at a switch, fading
     """
 
@@ -130,6 +131,7 @@ class Errors(NamedTuple):
     spread_late: float
     spread_lag: float
     spread: tuple
+    noise: float
     latest: float
     lagged: float
     once: tuple
