@@ -60,7 +60,7 @@ from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.refill import each_refilled
 from kernels.lanes.vectors import dot, fma, horner, not_, magnitude, any_lane, sqrt, where
 from kernels.maths.elementary import (
-    arccos, arcsin, arctan, cosh, exp, floor, floor_between, hypot, log, power, sincos, sinh, tanh,
+    arccos, arcsin, arctan, cosh, exp_or_nan as exp, floor, floor_between, hypot, log, power, sincos, sinh, tanh,
 )
 from kernels.maths.pairs import two_sum
 

@@ -16,7 +16,7 @@ mp.dps = 50
 
 @jit
 def _functions(i, x, u, power, root, late, lost):
-    power[i] = elementary.exp(x[i])
+    power[i] = elementary.exp_or_nan(x[i])
     root[i] = elementary.cbrt(u[i])
     late[i] = elementary.exp_remainder(u[i])
     lost[i] = elementary.log_remainder(u[i])
