@@ -24,7 +24,7 @@ CELLS = 40
     ("name", "method"),
     [
         ("blow_up", "dop853"), ("windows", "taylor"), ("behind", "dop853"), ("stick_and_break_away", "taylor"),
-        ("moving_surface", "dop853"), ("moving_surface", "taylor"),
+        ("moving_surface", "dop853"), ("moving_surface", "taylor"), ("pulses", "taylor"),
     ],
 )  # fmt: skip
 def test_what_is_ok_is_right_and_most_of_what_can_be_solved_is_ok(name, method):
