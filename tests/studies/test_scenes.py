@@ -60,7 +60,8 @@ def cross_beats(tau, I_l, I_r, c, R, k, d, phi0, sway, nu, count):
     leaves.direction = -1
     while len(found) < count:
         rest.direction = -rising
-        leg = solve_ivp(rates, (t, t + 100), y, events=(leaves, rest), **FINE)
+        # scipy finds events on its dense output, which is off by 1e-7 on the long steps that it takes by itself
+        leg = solve_ivp(rates, (t, t + 100), y, events=(leaves, rest), max_step=1e-3, **FINE)
         t, y = leg.t[-1], leg.y[:, -1]
         if len(leg.t_events[0]):
             found.append(t - last)
