@@ -24,7 +24,7 @@ EVENTS = 1_000_000
 BLUR = 16.0
 """Tolerances of the surface's value at the start that rounding may take from it: rtol/2 in the finer run."""
 ONE_ULP = 2.0**-52
-SHAKEN, GOLDEN = 4.0, 0.6180339887498949
+SHAKEN, GOLDEN = 2.0, 0.6180339887498949
 """Roundings that an event is missed by at most; and what the share of it goes on by from one event to the next, so that
 no two of some events one behind the other are missed alike: what is between them would not show it."""
 
