@@ -68,8 +68,6 @@ __all__ = [
 MOST_FLIPS = 1_000_000
 SERIES = "Taylor series of order 12 or 18 in lanes, no switch passed over"
 LOCATED = "in lanes, switches on its dense output; followed twice"
-SLIDERS = {"taylor": ("dop853", "rodas5p")}
-"""Methods by which a method follows what slides along a kink, where that is not itself."""
 Function = Callable[..., Any]
 """Of named scalars, as its author writes it."""
 Functions = Function | Mapping[str, Function]
@@ -220,7 +218,7 @@ def _methods(scene: Scene, parameters: list[str], outputs: list[str]) -> tuple[M
     module = build(scene)
 
     def method(name: str, doc: str, how: Function, bound: OnColumns | None = None) -> Method:
-        how = how if bound else slid_along(to_rest(how), scene, SLIDERS.get(name, (name,)))
+        how = how if bound else slid_along(to_rest(how), scene, name)
         return Method(name, doc, _solve((scene.name, name), how, module, parameters, outputs), bound)
 
     return (

@@ -35,10 +35,10 @@ def at_switches(scene, method, columns, rtol, stops):
     ended = (verdict >= FIRST_REFUSAL) | np.isnan(verdict)
     rows = np.where(ended, np.nan, found[: 2 + n])
     worst = np.fmax.reduce(np.where(ended, 0.0, verdict), axis=0)
-    first = np.fmax.reduce(verdict, axis=0)
-    status = np.where(ended.all(axis=0), first, np.where(ended.any(axis=0), Status.COMES_TO_REST, worst))
-    rests = ended.any(axis=0) & (first != Status.STICKS) & ~ended.all(axis=0)
-    return rows, error, np.where(rests, Status.TOO_SHORT, status).astype(np.int8)
+    why = np.fmax.reduce(verdict, axis=0)
+    short = np.where(why == Status.STICKS, Status.COMES_TO_REST, Status.TOO_SHORT)
+    status = np.where(ended.all(axis=0), why, np.where(ended.any(axis=0), short, worst))
+    return rows, error, status.astype(np.int8)
 
 
 def _once(scene, method, columns, rtol, stops):
@@ -49,12 +49,18 @@ def _once(scene, method, columns, rtol, stops):
         return found[:-1], stated_error.STATED * np.fmax.reduce(found[-1], axis=0)
     run, n = getattr(stepped(scene), f"run_{method}"), len(scene.states)
     runs = SimpleNamespace(STATES=scene.states, M=build(scene).M, run_18=run)
+    rough, finer, many = followed_twice.ROUGH, followed_twice.FINER, followed_twice.MANY
     ends = [*columns, np.full(len(rtol), stops[-1])]
-    rough = followed_twice.passages(runs, followed_twice.off_by_roundings(ends)[:-1], rtol, stops, 2.0)
-    fine = followed_twice.passages(runs, columns, rtol, stops, 32.0)
+    first, other = (
+        followed_twice.passages(
+            runs, followed_twice.off_by_roundings(ends, sign * many)[:-1], rtol, stops, rough, shake=sign
+        )
+        for sign in (1.0, -1.0)
+    )
+    fine = followed_twice.passages(runs, columns, rtol, stops, rough * finer)
     with np.errstate(all="ignore"):
         scale = np.concatenate([abs(fine[:2]), fine[2 + n : -1]])
-        apart = abs(fine[: 2 + n] - rough[: 2 + n]) / np.where(scale > 0.0, scale, 1.0)
+        apart = np.fmax(abs(fine - first), abs(other - first))[: 2 + n] / np.where(scale > 0.0, scale, 1.0)
     return fine, np.fmax.reduce(apart.reshape(-1, apart.shape[-1]), axis=0)
 
 

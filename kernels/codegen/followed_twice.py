@@ -79,12 +79,13 @@ def _run(module, run, inputs, together, tells):
     return results
 
 
-def passages(module, columns, rtol, stops, finer=1.0, tells=False):
+def passages(module, columns, rtol, stops, finer=1.0, tells=False, shake=0.0):
     """The results of each cell at each of those switches, (n_rows, n_stops, n_cells); NaN where it gets there not.
 
     As `followed` gives them, or if it `tells` as `told`: once, by the method of the higher order.
     """
-    inputs = [*columns, np.full(len(rtol), stops[-1]), np.maximum(rtol / finer, FINEST), np.zeros(len(rtol))]
+    one = np.ones(len(rtol))
+    inputs = [*columns, stops[-1] * one, np.maximum(rtol / finer, FINEST), shake * one]
     results = np.full((3 + 2 * len(module.STATES) + tells, len(stops), len(rtol)), np.nan)
     for begin in range(0, len(rtol), AT_ONCE):
         part = [column[begin : begin + AT_ONCE] for column in inputs]

@@ -23,8 +23,6 @@ from kernels.interface import Status
 from kernels.source_text.expression import INPUT, NUMBER, Expression, SceneError, math_recorded, needed
 from kernels.source_text.template import filled, listed
 
-SLIDERS = {"taylor": ("dop853", "rodas5p")}
-"""Methods by which a method follows what slides along a kink, where that is not itself."""
 FRESH = "from_start"
 RATES = '''
 """Rates of {name} in columns of states: written by kernels; do not change it here."""
@@ -124,7 +122,7 @@ class ReturnMap:
 def to_the_end(scene, method):
     """The function of columns that follows the scene by the method: to where switches accumulate, and along kinks."""
     how = stated_error.by_one(scene) if method == "taylor" else twice_by(method, scene)
-    return slid_along(to_rest(how), scene, SLIDERS.get(method, (method,)))
+    return slid_along(to_rest(how), scene, method)
 
 
 def named(function, names):

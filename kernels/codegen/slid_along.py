@@ -8,9 +8,12 @@ from kernels.codegen.record import record
 from kernels.codegen.stepped import twice_by
 from kernels.interface import Status
 
+SLIDERS = {"taylor": ("dop853", "rodas5p")}
+"""Methods by which a method follows what slides along a kink, where that is not itself."""
 
-def slid_along(how, scene, methods):
-    """The function of columns `how`, whose cells that stick are followed from their start by these methods, that slide.
+
+def slid_along(how, scene, method):
+    """The function of columns `how`, whose cells that stick are followed from their start by methods that slide.
 
     A cell goes to the next method where one finds no end of its slide; with none left it STICKS.
     Powers of abs(u) are followed to u = 0 by the Taylor method alone (`integrate.powers`); their scenes stay so, and
@@ -21,7 +24,7 @@ def slid_along(how, scene, methods):
     if graph.powers or recorded.shared or len(graph.kinks) == len(recorded.surfaces):
         return how
     sliding = replace(scene, slides=True)
-    ways = [twice_by(method, sliding) for method in methods]
+    ways = [twice_by(one, sliding) for one in SLIDERS.get(method, (method,))]
 
     def solve(module, columns, rtol, outputs, status):
         how(module, columns, rtol, outputs, status)

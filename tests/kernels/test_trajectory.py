@@ -11,9 +11,10 @@ from kernels.lanes.jit import COMPILED
 pytestmark = pytest.mark.skipif(not COMPILED, reason="an order of 18 takes long as plain Python")
 
 
-def test_a_section_is_the_map_of_kicks():
+@pytest.mark.parametrize("method", ["taylor", "dop853"])
+def test_a_section_is_the_map_of_kicks(method):
     gain, passages = np.array([2.8, 3.2, 3.5]), np.array([1.0, 2.0, 7.0, 40.0])
-    found, status, error = estimated(SECTION, "taylor", gain=gain, bend=1.0, along=[passages])
+    found, status, error = estimated(SECTION, method, gain=gain, bend=1.0, along=[passages])
     assert (status == Status.OK).all()
     speed, true = np.full(3, 0.3), []
     for passage in range(1, 41):
