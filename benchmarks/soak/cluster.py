@@ -28,7 +28,6 @@ import toy_studies  # noqa: E402
 from clusters import served  # noqa: E402
 from distributed import Client  # noqa: E402
 
-from sweep.runs.cluster import Cluster  # noqa: E402
 from sweep.runs.run import run  # noqa: E402
 
 
@@ -40,17 +39,6 @@ def timed(study, path=None, **keys) -> float:
     begun = time.monotonic()
     run(study, path, progress=False, block_cells=1, **keys).close()
     return time.monotonic() - begun
-
-
-def counted(tasks: list[int]):
-    """Notes how many blocks each task holds."""
-    real = Cluster.submit
-
-    def submit(self, masks):
-        tasks.append(len(masks))
-        return real(self, masks)
-
-    Cluster.submit = submit
 
 
 def killing(client: Client, kills: int, rng: random.Random, ended: threading.Event, done: list[int]) -> None:
@@ -99,8 +87,6 @@ def main() -> int:
     arguments.add_argument("--kills", type=int, default=20)
     arguments.add_argument("--seed", type=int, default=1)
     given = arguments.parse_args()
-    tasks: list[int] = []
-    counted(tasks)
     with (
         served(workers=2, failures=10) as (address, _),
         Client(address, set_as_default=False) as client,
@@ -108,15 +94,13 @@ def main() -> int:
     ):
         folder = Path(name)
         timed(falls(10), cluster=client)
-        tasks.clear()
         seconds = timed(falls(given.blocks), cluster=client)
-        each, of_cluster = 1e6 * seconds / given.blocks, len(tasks)
+        each = 1e6 * seconds / given.blocks
         here = timed(falls(given.blocks), workers=2)
-        print(f"{given.blocks} blocks in memory: {seconds:.1f} s, {each:.0f} us a block, {of_cluster} tasks")
+        print(f"{given.blocks} blocks in memory: {seconds:.1f} s, {each:.0f} us a block")
         print(f"  by two threads here: {here:.1f} s; ratio {seconds / here:.2f}")
-        tasks.clear()
         elsewhere = timed(falls(given.stored), folder / "cluster.h5", cluster=client)
-        print(f"{given.stored} blocks stored by two workers: {elsewhere:.1f} s, {len(tasks)} tasks")
+        print(f"{given.stored} blocks stored by two workers: {elsewhere:.1f} s")
         here = timed(falls(given.stored), folder / "here.h5", workers=2)
         print(f"{given.stored} blocks stored by two threads here: {here:.1f} s; ratio {elsewhere / here:.2f}")
     with tempfile.TemporaryDirectory() as name:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+import threading
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -34,6 +35,7 @@ class Blocks:
 
     def __init__(self, study: Study, partition: Partition) -> None:
         self.partition, self.columns, self.rows = partition, part_columns(study), row_blocks(study)
+        self._here = threading.local()
 
     @property
     def count(self) -> int:
@@ -57,21 +59,27 @@ class Blocks:
         """How a block is called in messages."""
         return "cells {} to {}".format(*self.cells(block))
 
-    def empty(self, rows: int | None = None) -> dict[str, Any]:
-        """Columns of so many rows, by default of those of the largest block."""
-        count = min(self.partition.cells, self.partition.size) if rows is None else rows
-        return {column.name: column.empty(count) for column in self.columns}
+    def empty(self, rows: int) -> dict[str, Any]:
+        """Columns of so many rows."""
+        return {column.name: column.empty(rows) for column in self.columns}
+
+    def own(self, block: int) -> dict[str, Any]:
+        """Columns of a block, made once in each thread, for new ones cost more than a cheap kernel."""
+        if not hasattr(self._here, "columns"):
+            self._here.columns = self.empty(min(self.partition.cells, self.partition.size))
+        start, stop = self.bounds(block)
+        return {name: column[: stop - start] for name, column in self._here.columns.items()}
 
 
-def cut(study: Study, workers: int, sample: Sample, block_cells: int | None = None) -> Blocks:
-    """Blocks of about so many cells; by default of as many as a timed sample tells for so many workers."""
+def cut(study: Study, workers: int, sample: Sample, block_cells: int | None = None, least: float = 0.0) -> Partition:
+    """Blocks of about so many cells; by default of what a timed sample tells for so many workers, `least` seconds."""
     rows, lanes = row_blocks(study), 1
     shape = Grid(study).shape if study.summary is None else (rows.count,)
     if block_cells is None:
         row_bytes = sum(column.cell_bytes for column in part_columns(study))
-        block_cells = partition(sample, rows.size, row_bytes / rows.mean, workers).cells
+        block_cells = partition(sample, rows.size, row_bytes / rows.mean, workers, least).cells
         lanes = LANES if rows.mean == 1 else 1
-    return Blocks(study, boxes(shape, math.ceil(block_cells / rows.mean), lanes))
+    return boxes(shape, math.ceil(block_cells / rows.mean), lanes)
 
 
 def block_solver(study: Study, solver: SolveCells | None = None) -> SolveBlock:
@@ -170,8 +178,9 @@ class Guard:
             for rows in (slice(0, middle), slice(middle, cells.number)):
                 self.solve(start + rows.start, cells.rows(rows), None if wanted is None else wanted[rows])
             return
-        for column in [*cells.outputs.values(), *([] if cells.error is None else [cells.error])]:
-            column.fill(np.nan)
+        for column in cells.columns:
+            if column.dtype.kind == "f":
+                column.fill(np.nan)
         cells.status.fill(Status.FAILED)
         cells.used.fill(NONE)
         self._report(BadCell(start, self.grid.cell(start), reason))

@@ -124,6 +124,11 @@ class Cells(NamedTuple):
         """How many cells."""
         return len(self.status)
 
+    @property
+    def columns(self) -> list[Any]:
+        """All of them: outputs, status, used, and errors where there are any."""
+        return [*self.outputs.values(), self.status, self.used, *([] if self.error is None else [self.error])]
+
     def rows(self, some: slice) -> Cells:
         """Views of some of them."""
         outputs = {name: column[some] for name, column in self.outputs.items()}

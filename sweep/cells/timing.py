@@ -139,10 +139,10 @@ def _places(size: int, count: int, cells: int) -> list[int]:
     return [min(max(middle - cells // 2, 0), size - cells) for middle in middles]
 
 
-def partition(sample: Sample, size: int, cell_bytes: float, workers: int) -> Partition:
-    """Blocks of about 1/200 of each worker's share, within bounds of time, bytes and number."""
+def partition(sample: Sample, size: int, cell_bytes: float, workers: int, least: float = 0.0) -> Partition:
+    """Blocks of about 1/200 of each worker's share, within bounds of time (`least` seconds), bytes and number."""
     cost, (shortest, longest) = max(sample.cost, 1e-12), BLOCK_SECONDS
-    seconds = max(cost * size / (200 * workers), shortest)
+    seconds = max(cost * size / (200 * workers), shortest, least)
     # by the cheapest probe: on a busy machine some take ten times as long as they should, and blocks would be short
     worth_a_call = CALLS * sample.call / max(float(np.min(sample.costs)), 1e-12)
     share = size / (1 if workers == 1 else LEAST_BLOCKS * workers)

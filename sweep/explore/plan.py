@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from kernels.interface import Status, machine_code_folder
-from sweep.cells.block import Guard, Unsolved, cut, faults_reported, sampled_by, sampled_study, warm
+from sweep.cells.block import Blocks, Guard, Unsolved, cut, faults_reported, sampled_study
 from sweep.cells.compiling import SILENT_SECONDS, Compiling
 from sweep.cells.fingerprint import fingerprint
 from sweep.cells.grid import Grid, SolveCells, empty_cells
@@ -191,12 +191,12 @@ def plan(
 
     # every run of a kernel that may crash, or never end, begins processes, and compiles it, anew
     processes = Processes(study, None if cell_timeout is None else seconds_of("cell_timeout", cell_timeout), 1)
-    solver = processes.solver()
     try:
         begun = time.monotonic()
-        warm(solver, study)
-        starting = time.monotonic() - begun
-        found = _forecast(study, sampled_by(solver, study, solver.clock), crew, folder, solver)
+        sample = processes.sampled()
+        solver = processes.solver()
+        starting = time.monotonic() - begun - solver.seconds
+        found = _forecast(study, sample, crew, folder, solver)
         try:
             advice = solver.call(ADVICE_SECONDS, advice_on, study.to_json(), SHARE * found.seconds)
         except Unsolved as fault:
@@ -214,7 +214,7 @@ def _is_kept(kernel: str) -> bool:
 
 def _forecast(study: Study, sample: Sample, workers: int, folder: Path, solver: SolveCells) -> Plan:
     """What a timed sample says, and some cells, each solved by itself."""
-    grid, blocks = Grid(study), cut(study, workers, sample)
+    grid, blocks = Grid(study), Blocks(study, cut(study, workers, sample))
     schema = output_schema(study, fingerprint(study))
     output = expected_size(schema, cuts_of(study, schema, blocks.partition))
     writing = output / _disk_speed(folder) if output > WORTH_A_TRIAL else 0.0

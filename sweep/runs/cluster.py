@@ -19,7 +19,6 @@ import time
 import weakref
 from collections.abc import Callable, Mapping
 from concurrent.futures import CancelledError, Future
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -31,9 +30,10 @@ from sweep.cells.fingerprint import difference, fingerprint
 from sweep.cells.solve import Solver
 from sweep.errors import Incomplete, SweepError
 from sweep.file import disk
-from sweep.runs.bench import POISONED, Bench, Done, Found, Masks
+from sweep.file.store import Shared
 from sweep.runs.isolate import Processes
 from sweep.runs.log import log
+from sweep.runs.loop import Bench, Done, Found
 from sweep.study.model import Study
 
 CONNECT_SECONDS = 10
@@ -53,8 +53,8 @@ class Cluster:
         self._client = _connected(address) if self._own else address
         if self._client.asynchronous:
             raise SweepError("cluster: the client is asynchronous; pass one that is not")
-        self.executor: Any = self._client.get_executor(pure=False)
-        self.threads, self._asked, self._gone = -1, -ASK_SECONDS, False
+        self.threads, self._looked, self._gone = -1, -ASK_SECONDS, False
+        self._asked: Any = weakref.WeakSet()
 
     def __enter__(self) -> Cluster:
         self.look()
@@ -67,57 +67,66 @@ class Cluster:
 
     def look(self) -> None:
         """Counts the threads of all workers, now and then. Raises SweepError."""
-        if time.monotonic() - self._asked < ASK_SECONDS:
+        if time.monotonic() - self._looked < ASK_SECONDS:
             return
         try:
             threads = sum(self._client.nthreads().values())
         except Exception as fault:
-            raise self.lost(fault) from fault
+            raise self._lost(fault) from fault
         if threads != self.threads:
             log(f"the cluster has {threads} threads", "workers", threads=threads)
             if not threads:
                 self._note("the cluster has no workers; waiting for the first")
-        self.threads, self._asked = threads, time.monotonic()
+        self.threads, self._looked = threads, time.monotonic()
 
     def begin(self, *words: Any) -> None:
         """Tells the workers what is to be computed, as `Remote` takes it, which dask makes where it is needed."""
         self._remote = self._client.submit(Remote, *words, pure=False)
 
-    def submit(self, masks: Masks) -> Future[Answer]:
-        """A future of what `compute` gives on a worker. Raises SweepError."""
+    def submit(self, job: int, wanted: Any, label: str) -> Future[Done]:
+        """A future of a block that a worker computes. Raises SweepError, now or when it is asked for its result.
+
+        That of `client.get_executor()` trips over a task that fails with its worker and is answered at that moment.
+        """
+        found = Future[Done]()
         try:
-            future: Future[Answer] = self.executor.submit(compute, self._remote, masks)
-            return future
+            asked = self._client.submit(compute, self._remote, job, wanted, pure=False)
         except Exception as fault:
-            raise self.lost(fault) from fault
+            raise self._lost(fault) from fault
+        self._asked.add(asked)
+
+        async def settle() -> None:
+            try:
+                found.set_result(await asked)
+            except BaseException as fault:
+                found.set_exception(self._told(fault, label))
+
+        self._client.loop.add_callback(settle)
+        return found
 
     def cancel(self) -> None:
         """Takes back what no worker has begun."""
         if not self._gone:
             with contextlib.suppress(Exception):
-                self.executor.shutdown(wait=False)
+                self._client.cancel(list(self._asked))
 
-    def outcome(self, future: Future[Any], blocks: str) -> list[Done] | None:
-        """What a future gives, of blocks computed there or here; None where the answer got lost. Raises SweepError."""
-        try:
-            found: Answer | list[Done] = future.result()
-            return found.found if isinstance(found, Answer) else found
-        except CancelledError as fault:
-            raise self.lost(fault) from fault
-        except distributed.KilledWorker as fault:
-            raise SweepError(f"{blocks}: {POISONED}") from fault
-        except SweepError:
-            raise
-        except Exception as fault:
-            # distributed's executor trips over a task that fails with its worker and is answered at that moment
-            if isinstance(fault, TypeError) and Answer.__name__ in str(fault):
-                return None
-            raise SweepError(
-                f"cluster: a worker failed ({type(fault).__name__}: {fault}); what is finished is kept; every machine "
-                "of the cluster needs the same version of foliot"
-            ) from fault
+    def _told(self, fault: BaseException, label: str) -> SweepError:
+        """What became of a block that was not computed."""
+        if isinstance(fault, SweepError):
+            return fault
+        if isinstance(fault, CancelledError) or not isinstance(fault, Exception):
+            return self._lost(fault)
+        if isinstance(fault, distributed.KilledWorker):
+            return SweepError(
+                f"{label}: every worker that took them died; the logs of the workers may tell why, too little memory "
+                "is most common; what is finished is kept; isolated, a cell of which its process dies is FAILED alone"
+            )
+        return SweepError(
+            f"cluster: a worker failed ({type(fault).__name__}: {fault}); what is finished is kept; every machine of "
+            "the cluster needs the same version of foliot"
+        )
 
-    def lost(self, fault: BaseException) -> Incomplete:
+    def _lost(self, fault: BaseException) -> Incomplete:
         """What is reported where the scheduler does not answer any more; it is not asked again."""
         self._gone = True
         return Incomplete(
@@ -178,10 +187,9 @@ class Remote:
         except SweepError as fault:
             raise SweepError(f"{where}: {fault}") from None
         if changed:
-            lines = "\n".join(f"  {line}" for line in changed)
             raise SweepError(
                 f"{where}: what computes there is not what was asked for here; install the same versions on every "
-                f"machine\n{lines}"
+                "machine" + "".join(f"\n  {line}" for line in changed)
             )
         processes = None
         if isolated is None:
@@ -189,38 +197,35 @@ class Remote:
         else:
             processes = Processes(study, isolated[0], os.cpu_count() or 1, isolated[1])
             weakref.finalize(self, processes.end)
-        self._fd = fd = None if shared is None else shared.opened()
-        if fd is not None:
-            weakref.finalize(self, os.close, fd)
+        blocks = Blocks(study, partition)
+        sink = _Sink(blocks, shared)
+        weakref.finalize(self, sink.close)
+        return Bench(study, blocks, sink, processes)
 
-        def kept(job: int, arrays: Mapping[str, Any]) -> Found:
-            """The digests of what is written, or the numbers, which lie where nothing else will."""
-            if fd is None:
-                return {name: column.copy() for name, column in arrays.items()}
-            with disk.refusing(Path(shared.path)):
-                digests: bytes = shared.table.write(fd, job, arrays)
-            return digests
 
-        return Bench(study, Blocks(study, partition), kept, processes=processes)
+class _Sink:
+    """Where blocks of a worker go: the file, if it sees that; else their numbers are sent."""
 
-    def sync(self) -> None:
-        """Returns when all that was written is on the disk. Raises SweepError."""
+    def __init__(self, blocks: Blocks, shared: Shared | None) -> None:
+        self.room, self._shared = blocks.own, shared
+        self._fd = None if shared is None else shared.opened()
+
+    def put(self, job: int, arrays: Mapping[str, Any]) -> Found:
+        """The digests of what is written, and on the disk; or the numbers, which lie where nothing else will."""
+        if self._shared is None or self._fd is None:
+            return {name: column.copy() for name, column in arrays.items()}
+        with disk.refusing(Path(self._shared.path)):
+            digests = self._shared.table.write(self._fd, job, arrays)
+            disk.fsync(self._fd)
+        return digests
+
+    def close(self) -> None:
         if self._fd is not None:
-            with disk.refusing(Path(self._words[3].path)):
-                disk.fsync(self._fd)
+            os.close(self._fd)
 
 
-@dataclass(frozen=True)
-class Answer:
-    """What became of some blocks."""
-
-    found: list[Done]
-
-
-def compute(remote: Remote, masks: Masks) -> Answer:
-    """Computes some blocks on a worker; when it returns, those that are written are on the disk. Raises SweepError."""
+def compute(remote: Remote, job: int, wanted: Any) -> Done:
+    """Computes a block on a worker. Raises SweepError."""
     with remote.turn:
         bench = remote.bench
-    found = bench.blocks(masks)
-    remote.sync()
-    return Answer(found)
+    return bench.block(job, wanted)

@@ -22,11 +22,12 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, TypeVar
 
-from sweep.cells.block import Unsolved, told
+from sweep.cells.block import Unsolved, sampled_by, told
 from sweep.cells.compiling import work_clock
 from sweep.cells.grid import Cells, Grid
 from sweep.cells.schema import cells_of, columns
 from sweep.cells.solve import Solver
+from sweep.cells.timing import Sample
 from sweep.errors import SweepError
 from sweep.file.open import memory
 from sweep.study.model import Study
@@ -55,17 +56,10 @@ class Died(Unsolved):
 
 
 class Processes:
-    """The processes of a run on this machine.
+    """The processes, `count` of them, of a run on this machine.
 
-    Parameters
-    ----------
-    study : Study
-    limit : float, optional
-        Seconds that a cell may take; None: `CELL_SECONDS`, or longer where cells do.
-    count : int
-        How many there will be.
-    cost : float
-        Seconds that the dearest cell of the timed sample takes; 0: not known yet.
+    A cell may take `limit` seconds; None: `CELL_SECONDS`, or longer where cells do. `cost` is what the dearest cell of
+    the timed sample takes; 0: not known yet.
     """
 
     def __init__(self, study: Study, limit: float | None, count: int, cost: float = 0.0) -> None:
@@ -74,8 +68,15 @@ class Processes:
         self.most_bytes = MEMORY_SHARE * memory() / count
         self.good: int | None = None  # a cell that is known to end
         self.over, self.alone, self.dearest = False, threading.Lock(), 0.0
-        self.idle: list[Isolated] = []
+        self._idle: list[Isolated] = []
         self._solvers: list[Isolated] = []
+
+    def sampled(self) -> Sample:
+        """A timed sample, as `sampled_study` takes it."""
+        solver = self.solver()
+        found = sampled_by(solver, self.study, lambda: solver.seconds)
+        self._idle.append(solver)
+        return found
 
     def seconds(self, cells: int) -> float:
         """What some cells may take. One of a sample is not waited for to its end: it is left out, but never FAILED."""
@@ -87,8 +88,8 @@ class Processes:
 
     def solver(self) -> Isolated:
         """A solver with a process of its own, for one thread at a time; one that is idle, if there is any."""
-        if self.idle:
-            return self.idle.pop()
+        if self._idle:
+            return self._idle.pop()
         self._solvers.append(Isolated(self))
         return self._solvers[-1]
 
@@ -103,14 +104,9 @@ class Isolated:
     """Does what `Solver` does in a process of its own, which is begun anew whenever it is needed."""
 
     def __init__(self, processes: Processes) -> None:
-        self._all, self.grid = processes, processes.grid
+        self._all, self.grid, self._lock = processes, processes.grid, threading.Lock()
         self._process: Any = None
-        self._lock = threading.Lock()
-        self.seconds = 0.0
-
-    def clock(self) -> float:
-        """Seconds that its process has spent on cells."""
-        return self.seconds
+        self.seconds = 0.0  # that its process has spent on cells
 
     def solve(self, start: int, cells: Cells, wanted: Any = None) -> None:
         """As `Solver.solve`. Raises Unsolved where the kernel raises, dies or takes too long; SweepError at the end.
@@ -118,13 +114,13 @@ class Isolated:
         One cell alone is tried again, for a process may die of what it did before, or with others; and then no other
         cell is tried so meanwhile, lest each be blamed for the other.
         """
-        limit = self._all.seconds(cells.number)
+        limit, crew = self._all.seconds(cells.number), self._all
         for trial in range(1, TRIALS + 1):
             try:
-                with self._all.alone if trial > 1 else contextlib.nullcontext():
-                    arrays, reason, seconds, most = self.call(limit, _solve, start, cells.number, wanted)
+                with crew.alone if trial > 1 else contextlib.nullcontext():
+                    found, reason, seconds, most = self.call(limit, _solve, start, cells.number, wanted)
                     no_memory = reason.startswith(MemoryError.__name__)
-                    if no_memory or most > self._all.most_bytes:
+                    if no_memory or most > crew.most_bytes:
                         self.end()
                     if reason:
                         raise Died(reason) if no_memory else Unsolved(reason)
@@ -133,21 +129,27 @@ class Isolated:
                 if cells.number > 1 or trial == TRIALS:
                     raise
         self.seconds += seconds
-        self._all.dearest = max(self._all.dearest, seconds / cells.number)
-        self._all.good = start if self._all.good is None else self._all.good
-        found = cells_of(arrays)
-        for column, values in zip(
-            [*cells.outputs.values(), cells.status, cells.used, cells.error],
-            [*(found.outputs[name] for name in cells.outputs), found.status, found.used, found.error],
-            strict=True,
-        ):
-            if column is not None:
-                column[...] = values
+        crew.dearest = max(crew.dearest, seconds / cells.number)
+        crew.good = start if crew.good is None else crew.good
+        for column, values in zip(cells.columns, found, strict=False):
+            column[...] = values
 
     def call(self, limit: float, function: Callable[..., R], *words: Any) -> R:
-        """What a function gives in the process, within so many seconds. Raises Unsolved, Died, SweepError."""
-        if self._process is None or self._all.over:
-            self._begin()
+        """What a function gives in the process, within so many seconds. Raises Unsolved, Died, SweepError.
+
+        No seconds count while the machine sleeps or the process compiles; compiling has a limit of its own.
+        """
+        for _ in range(STARTS):
+            if self._process is not None or (reason := self._begin()) is None:
+                break
+            # a process that has not loaded the kernel is never asked for cells: they would be blamed for it
+            self.end()
+            time.sleep(START_SECONDS)
+        else:
+            raise SweepError(
+                f"{self._all.study.kernel_name}: no process of its own can be started and load it ({reason}); what is "
+                "finished is kept. The name of the folder TMPDIR must be short, and ulimit -n and -u large enough"
+            )
         process, late = self._process, False
         try:
             return _asked(process, limit, function, *words)
@@ -161,27 +163,19 @@ class Isolated:
             raise Died(f"its process died of {signal.Signals(-code).name}")
         raise Died("its process died" if code is None else f"its process ended with {code}")
 
-    def _begin(self) -> None:
-        """Starts a process that has loaded the kernel, and solved a cell that is known to end. Raises SweepError."""
-        for _ in range(STARTS):
-            try:
-                with self._lock:
-                    if self._all.over:
-                        raise SweepError("the run is being stopped")
-                    self._process = _started()
-                _asked(self._process, LOAD_SECONDS, _load, *self._all.words, self._all.good)
-                return
-            except SweepError:
-                raise
-            except Exception as fault:
-                # a process that has not loaded the kernel is never asked for cells: they would be blamed for it
-                reason = told(fault)
-                self.end()
-                time.sleep(START_SECONDS)
-        raise SweepError(
-            f"{self._all.study.kernel_name}: no process of its own can be started and load it ({reason}); what is "
-            "finished is kept. The name of the folder TMPDIR must be short, and ulimit -n and -u large enough"
-        )
+    def _begin(self) -> str | None:
+        """Starts a process that has loaded the kernel, and solved a cell that is known to end; or why it has not."""
+        try:
+            with self._lock:
+                if self._all.over:
+                    raise SweepError("the run is being stopped")
+                self._process = process = _started()
+            _asked(process, LOAD_SECONDS, _load, *self._all.words, self._all.good)
+        except SweepError:
+            raise
+        except Exception as fault:
+            return told(fault)
+        return None
 
     def end(self, seconds: float = 0.0, process: Any = None) -> int | None:
         """Kills the process; its exit status, if that is known in so many seconds."""
@@ -294,14 +288,14 @@ def _load(text: str, paths: tuple[str, ...], good: int | None) -> None:
         _solve(good, 1, None)
 
 
-def _solve(start: int, count: int, wanted: Any) -> tuple[Any, str, float, float]:
-    """Columns of cells, or why there are none; seconds, and most bytes that the process ever had."""
-    arrays = {column.name: column.empty(count) for column in columns(_here["study"])}
+def _solve(start: int, count: int, wanted: Any) -> tuple[list[Any], str, float, float]:
+    """Columns of cells, and why they are not solved; seconds, and most bytes that the process ever had."""
+    cells = cells_of({column.name: column.empty(count) for column in columns(_here["study"])})
     begun, reason = work_clock(), ""
     try:
-        _here["solver"].solve(start, cells_of(arrays), wanted)
+        _here["solver"].solve(start, cells, wanted)
     except BaseException as fault:
-        arrays, reason = {}, told(fault)
+        reason = told(fault)
     seconds = work_clock() - begun
-    kilobytes = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (1024 if sys.platform == "darwin" else 1)
-    return arrays, reason, seconds, 1024 * kilobytes
+    unit = 1 if sys.platform == "darwin" else 1024
+    return ([] if reason else cells.columns), reason, seconds, unit * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

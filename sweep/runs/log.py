@@ -18,8 +18,6 @@ from sweep.words import printable
 
 LOG = logging.getLogger("sweep")
 LOG.addHandler(logging.NullHandler())
-FIELDS = "fields"
-"""Attribute of a record with what a line of JSON tells apart."""
 
 
 def log_path(output: Path) -> Path:
@@ -35,20 +33,18 @@ def log(text: str, event: str = "note", **fields: Any) -> None:
     event : what kind of line it is: "begin", "progress", "failed", "note", "end"
     fields : what a line of JSON tells apart, numbers and texts
     """
-    LOG.info("%s", text, extra={FIELDS: {"event": event, **fields}})
+    LOG.info("%s", text, extra={"fields": {"event": event, **fields}})
 
 
 class _Handler(logging.FileHandler):
     """Writes to the end of a file; a disk that is full does not end the run, neither now nor when it is closed."""
 
-    def __init__(self, path: Path, as_json: bool) -> None:
-        super().__init__(path, encoding="utf-8")
-        self._as_json = as_json
+    as_json = False
 
     def format(self, record: logging.LogRecord) -> str:
         text, at = record.getMessage(), time.localtime(record.created)
-        if self._as_json:
-            fields = getattr(record, FIELDS, {})
+        if self.as_json:
+            fields = getattr(record, "fields", {})
             return json.dumps({"time": time.strftime("%Y-%m-%dT%H:%M:%S%z", at), "text": text, **fields})
         return f"{time.strftime('%Y-%m-%d %H:%M:%S', at)}  {printable(' '.join(text.splitlines()))}"
 
@@ -68,7 +64,8 @@ def logging_to(path: Path | None, as_json: bool = False) -> Iterator[None]:
         return
     if path.is_fifo():  # to open it would wait for a reader
         raise SweepError(f"{path} is a pipe, where the log of the run is to be written; remove it")
-    handler, level = _Handler(path, as_json), LOG.level
+    handler, level = _Handler(path, encoding="utf-8"), LOG.level
+    handler.as_json = as_json
     LOG.setLevel(logging.INFO)
     LOG.addHandler(handler)
     try:

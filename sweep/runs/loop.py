@@ -1,7 +1,7 @@
-"""The loop of a run: numbers of blocks go to an executor of concurrent.futures, threads here or dask's, and come back.
+"""The loop of a run: numbers of blocks go to an executor, threads here or the workers of a cluster, and come back.
 
-A thread computes a block on a `Bench` and puts it into a sink: the arrays of a run in memory, or the file. Only a
-worker that does not see the file sends numbers, which the loop puts there.
+Wherever a block is computed, it is on a `Bench`, which puts it into a sink: the arrays of a run in memory, the file,
+or, of a worker that does not see the file, what sends its numbers. Those the loop puts into the sink of the run.
 """
 
 from __future__ import annotations
@@ -9,26 +9,29 @@ from __future__ import annotations
 import contextlib
 import os
 import platform
+import threading
 import time
-from collections import Counter, deque
+from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ThreadPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from dataclasses import dataclass
 from datetime import datetime
 from typing import TYPE_CHECKING, Any, Protocol
 
-from sweep.cells.block import Blocks, cut, sampled_by, sampled_study
+from sweep.cells.block import BadCell, Blocks, Guard, block_solver, cut, faults_reported, sampled_study
 from sweep.cells.compiling import Compiling
 from sweep.cells.partition import Partition
+from sweep.cells.solve import Solver
 from sweep.cells.timing import UNSAMPLED, Sample
-from sweep.errors import SweepError
+from sweep.errors import missing
 from sweep.file.store import Shared
-from sweep.runs.bench import POISONED, Bench, Found, Masks
 from sweep.runs.extend import Precomputed, Reused
 from sweep.runs.isolate import Processes, kernel_paths
 from sweep.runs.log import log
 from sweep.runs.pool import CtrlC, TimeUp, endless, passed
 from sweep.runs.progress import Progress, from_everywhere
 from sweep.runs.task import Task, now
+from sweep.study.model import Study
 
 if TYPE_CHECKING:
     from sweep.runs.cluster import Cluster
@@ -39,47 +42,89 @@ GRACE_SECONDS, KILL_SECONDS = 1.3, 0.3
 """What blocks at work have to end in when a run stops; and then, when the processes are killed that solve cells."""
 SAMPLE_SECONDS = 1.0
 """What the timed sample may take although the time is up: it gives blocks a size by which the run is continued."""
-TASK_SECONDS, TASK_BYTES = 0.5, 32 << 20
-"""Blocks of a cluster that are shorter, and together no larger, go to a worker several at a time."""
-MOST_LOST = 3
-"""Times that a block is tried again whose answer got lost."""
+ELSEWHERE_SECONDS = 0.5
+"""What a block of a cluster should take at least, beside which the scheduler's millisecond is nothing."""
 MOST_TOLD = 1000
 """Cells that FAILED which are told one by one."""
 
+Found = bytes | Mapping[str, Any] | None
+"""A block that is not in the sink of the run yet: digests of what a worker has written to the file, or its numbers."""
+
 
 class Sink(Protocol):
-    """Where blocks go: `room` gives the columns to fill, if it has any; `put` takes a block, in any thread."""
+    """Where blocks go: `room` gives the columns to fill, `put` takes a block and gives what is still to be put."""
 
-    @property
-    def room(self) -> Callable[[int], Mapping[str, Any]] | None: ...
-    def put(self, job: int, found: Found) -> None: ...
-    def tick(self) -> None: ...
+    def room(self, job: int) -> Mapping[str, Any]: ...
+    def put(self, job: int, arrays: Any) -> Found: ...
+
+
+@dataclass(frozen=True)
+class Done:
+    """A block that is computed, the seconds it took, its cells that FAILED, and what is still to be put."""
+
+    block: int
+    seconds: float
+    bad: Sequence[BadCell] = ()
+    found: Found = None
+
+
+class Bench:
+    """Computes blocks into a sink, in any thread; each has a solver of its own, or a process of `processes`."""
+
+    def __init__(self, study: Study, blocks: Blocks, sink: Sink, processes: Processes | None = None) -> None:
+        self._study, self._blocks, self._sink, self._processes = study, blocks, sink, processes
+        self._here = threading.local()
+
+    def block(self, job: int, wanted: Any = None) -> Done:
+        """Computes a block; of its cells only those wanted, by default all. Raises SweepError."""
+        here, (start, stop) = self._here, self._blocks.bounds(job)
+        with faults_reported(f"{self._blocks.label(job)} cannot be computed or kept"):
+            if not hasattr(here, "solve"):
+                here.bad = []
+                cells = Solver(self._study) if self._processes is None else self._processes.solver()
+                here.solve = block_solver(self._study, Guard(cells, here.bad.append))
+            here.bad.clear()
+            begun = time.perf_counter()
+            arrays = self._sink.room(job)
+            here.solve(start, stop, arrays, wanted)
+            found = self._sink.put(job, arrays)
+            return Done(job, time.perf_counter() - begun, [*here.bad], found)
 
 
 class Loop:
     """Times a sample of the grid, where it is to be `sampled`, and cuts it into blocks; then computes them.
 
-    The workers of a `cluster` do so, or threads here. How the rows are cut may be settled already (`partition`), and
-    some cells may be known (`reused`). `ctrl_c` is asked now and then.
+    The workers of the task's cluster do so, where anything is `to_do`, or threads here. How the rows are cut may be
+    settled already (`partition`), and some cells may be known (`reused`). Until `stack` ends, Ctrl-C and SIGTERM are
+    held back.
     """
 
     def __init__(
         self,
         task: Task,
-        ctrl_c: CtrlC,
-        cluster: Cluster | None = None,
+        stack: contextlib.ExitStack,
         partition: Partition | None = None,
+        to_do: bool = True,
         sampled: bool = True,
         reused: Reused | Precomputed | None = None,
     ) -> None:
-        self.task, self._ctrl_c, self._cluster, self._reused, study = task, ctrl_c, cluster, reused, task.study
-        self.began, self._failed = now(), 0
+        self.task, self._reused, study = task, reused, task.study
+        self.began, self._failed, self.progress = now(), 0, Progress(1, False)
+        self._ctrl_c = stack.enter_context(CtrlC())
+        self._cluster: Cluster | None = None
+        if task.cluster is not None and to_do:
+            try:
+                from sweep.runs.cluster import Cluster
+            except ImportError:
+                raise missing("a cluster needs distributed", "cluster") from None
+            self._cluster = stack.enter_context(Cluster(task.cluster, task.note))
         self._processes = Processes(study, task.limit, task.cores) if task.isolate else None
         self._threads = ThreadPoolExecutor(task.cores)
-        sample = self._sample() if sampled else UNSAMPLED
-        self.blocks = Blocks(study, partition) if partition else cut(study, self._cores, sample, task.block_cells)
+        stack.callback(self._close)
+        sample = self._sample() if to_do and sampled else UNSAMPLED
+        least = 0.0 if self._cluster is None else ELSEWHERE_SECONDS
+        self.blocks = Blocks(study, partition or cut(study, self._crew, sample, task.block_cells, least))
         self._weights = sample.weights(self.blocks.partition, self.blocks.rows.first)
-        self.progress = self.begin([])
 
     def _sample(self) -> Sample:
         """The sample, taken in a thread, so that Ctrl-C and the time to stop are seen while a kernel is compiled."""
@@ -88,9 +133,7 @@ class Loop:
         def take() -> Sample:
             if processes is None:
                 return sampled_study(study, Compiling(study.kernel, study.kernel_name, self.task.note))
-            solver = processes.solver()
-            found = sampled_by(solver, study, solver.clock)
-            processes.idle.append(solver)
+            found = processes.sampled()
             processes.cost = float(found.costs.max())
             return found
 
@@ -99,23 +142,30 @@ class Loop:
             while not wait([sample], TICK).done:
                 self._ctrl_c.check()
                 if time.monotonic() - begun > SAMPLE_SECONDS:
-                    self.check_time()
+                    self._check_time()
             return sample.result()
         except BaseException:
             self._stop([sample])
             raise
 
     @property
-    def _cores(self) -> int:
+    def _crew(self) -> int:
         """How many blocks are computed at a time."""
         return self.task.cores if self._cluster is None else max(1, self._cluster.threads)
 
-    def begin(self, jobs: Sequence[int]) -> Progress:
-        """Where the run stands when the blocks `jobs` are still to do."""
-        left, work = sum(map(self._cells, jobs)), float(self._weights[list(jobs)].sum())
-        size = self.blocks.rows.size
-        self.progress = Progress(size, self.task.progress, self.task.name, size - left, work)
-        return self.progress
+    def begin(self, jobs: Sequence[int]) -> None:
+        """Begins to tell of the progress, where the blocks `jobs` are to do, and logs what is computed where."""
+        task, total, machine = self.task, self.blocks.rows.size, platform.uname()
+        done = total - sum(map(self._cells, jobs))
+        self.progress = Progress(total, task.progress, task.name, done, float(self._weights[list(jobs)].sum()))
+        versions = task.schema.attrs["versions"]
+        log(
+            f"begins: {task.name}, kernel {task.study.kernel_name}, {done:,} of {total:,} cells done before, "
+            f"{self.blocks.count:,} blocks, {task.cores} cores, process {os.getpid()} on {machine.node} "
+            f"({machine.system} {machine.machine}), {versions}",
+            "begin", kernel=task.study.kernel_name, cells=done, of=total, cores=task.cores, process=os.getpid(),
+            machine=machine.node, versions=versions,
+        )  # fmt: skip
 
     def _cells(self, job: int) -> int:
         """How many cells a block has."""
@@ -132,81 +182,60 @@ class Loop:
         end = now()
         return {"created": end, "end": end, "cells_per_second": f"{self.progress.rate:.6e}"}
 
-    def compute(self, jobs: Sequence[int], sink: Sink, shared: Shared | None = None) -> None:
-        """Computes blocks into a sink; workers that see the file `shared` write them there.
+    def compute(
+        self, jobs: Sequence[int], sink: Sink, shared: Shared | None = None, tick: Callable[[], None] = lambda: None
+    ) -> None:
+        """Computes blocks into a sink; workers that see the file `shared` write them there. `tick` is called often.
 
         After a fault, Ctrl-C or SIGTERM no block is begun, and those at work are put into the sink if they end.
         Raises SweepError, TimeUp, KeyboardInterrupt, Terminated.
         """
-        cluster, processes = self._cluster, self._processes
-        bench = Bench(self.task.study, self.blocks, sink.put, sink.room, processes)
+        cluster, known, study = self._cluster, self._reused, self.task.study
+        bench = Bench(study, self.blocks, sink, self._processes)
         if cluster is not None:
-            study, seen = self.task.study, shared if self._reused is None else None
-            isolated = None if processes is None else (processes.limit, processes.cost)
-            words = study.to_json(), dict(self.task.fingerprint), self.blocks.partition, seen
-            cluster.begin(*words, kernel_paths(study), isolated)
-        queue, lost = deque(from_everywhere(jobs)), Counter[int]()
-        most = max(1, TASK_BYTES // max(1, self.blocks.partition.cells * self.blocks.row_bytes))
-        under_way: dict[Future[Any], Masks] = {}
-
-        def begin(jobs: Iterable[int]) -> None:
-            """Submits blocks; those of which all cells are known are put together here."""
-            known = self._reused
-            masks = {job: None if known is None else known.missing(*self.blocks.bounds(job)) for job in jobs}
-            if cluster is None or all(mask is not None and not mask.any() for mask in masks.values()):
-                under_way[self._threads.submit(bench.blocks, masks)] = masks
-            else:
-                under_way[cluster.submit(masks)] = masks
-
+            isolated = None if self._processes is None else (self._processes.limit, self._processes.cost)
+            words = study.to_json(), dict(self.task.fingerprint), self.blocks.partition
+            cluster.begin(*words, shared if known is None else None, kernel_paths(study), isolated)
+        queue, under_way = deque(from_everywhere(jobs)), set[Future[Done]]()
         try:
             while queue or under_way:
                 self._ctrl_c.check()
-                self.check_time()
-                while queue and len(under_way) < 2 + 3 * self._cores:
-                    # short blocks go to a worker elsewhere several at a time, and one by one in the end
-                    known = 0.0 if cluster is None else self.progress.block_seconds
-                    count = min(TASK_SECONDS / known, most, len(queue) / (2 * self._cores)) if known else 1
-                    begin([queue.popleft() for _ in range(max(1, int(count)))])
-                for future in wait(under_way, TICK, FIRST_COMPLETED).done:
-                    masks = under_way.pop(future)
-                    if not self._take(future, masks, sink):
-                        for job in masks:
-                            lost[job] += 1
-                            if lost[job] > MOST_LOST:
-                                raise SweepError(f"{self.blocks.label(job)}: {POISONED}")
-                            begin([job])
+                self._check_time()
+                while queue and len(under_way) < 2 + 3 * self._crew:
+                    job = queue.popleft()
+                    wanted = None if known is None else known.missing(*self.blocks.bounds(job))
+                    # a block of which all cells are known is put together here
+                    if cluster is None or (wanted is not None and not wanted.any()):
+                        under_way.add(self._threads.submit(bench.block, job, wanted))
+                    else:
+                        under_way.add(cluster.submit(job, wanted, self.blocks.label(job)))
+                done, under_way = wait(under_way, TICK, FIRST_COMPLETED)
+                for future in done:
+                    self._take(future.result(), sink)
                 if cluster is not None:
                     cluster.look()
-                self.progress.crew = self._cores
+                self.progress.crew = self._crew
                 self.progress.tick()
-                sink.tick()
+                tick()
         except BaseException:
             self._stop(under_way)
-            for future, masks in under_way.items():
-                with contextlib.suppress(Exception, CancelledError):
-                    if future.done():
-                        self._take(future, masks, sink)
+            for future in under_way:
+                if future.done() and not future.cancelled() and future.exception() is None:
+                    self._take(future.result(), sink)
             raise
 
-    def _take(self, future: Future[Any], jobs: Iterable[int], sink: Sink) -> bool:
-        """Has what a worker sent put into the sink, and tells of cells that FAILED; of too many only how many they are.
-
-        False where the answer got lost. Raises what went wrong.
-        """
-        labels = ", ".join(map(self.blocks.label, jobs))
-        found = future.result() if self._cluster is None else self._cluster.outcome(future, labels)
-        for done in found or ():
-            if done.found is not None:
-                sink.put(done.block, done.found)
-            for cell in done.bad:
-                self._failed += 1
-                if self._failed <= MOST_TOLD:
-                    log(str(cell), "failed", cell=cell.cell, values=dict(cell.values), reason=cell.reason)
-                    self.progress.tell(str(cell))
-                elif self._failed == MOST_TOLD + 1:
-                    self.progress.note("more cells FAILED; from here on they are counted only")
-            self.progress.add(self._cells(done.block), self._weights[done.block], done.seconds)
-        return found is not None
+    def _take(self, done: Done, sink: Sink) -> None:
+        """Has what a worker sent put into the sink, and tells of cells that FAILED; of too many only how many."""
+        if done.found is not None:
+            sink.put(done.block, done.found)
+        for cell in done.bad:
+            self._failed += 1
+            if self._failed <= MOST_TOLD:
+                log(str(cell), "failed", cell=cell.cell, values=dict(cell.values), reason=cell.reason)
+                self.progress.tell(str(cell))
+            elif self._failed == MOST_TOLD + 1:
+                self.progress.note("more cells FAILED; from here on they are counted only")
+        self.progress.add(self._cells(done.block), self._weights[done.block], done.seconds)
 
     def _stop(self, computing: Iterable[Future[Any]]) -> None:
         """Lets what is computed here end; what takes too long is killed, or given up."""
@@ -215,30 +244,17 @@ class Loop:
         self._threads.shutdown(wait=False, cancel_futures=True)
         if wait(computing, GRACE_SECONDS if self._cluster is None else 0.0).not_done and self._processes is not None:
             self._processes.end()
-        left = wait(computing, KILL_SECONDS).not_done
-        if left and self._cluster is None:
+        if wait(computing, KILL_SECONDS).not_done and self._cluster is None:
             endless.set()
 
-    def close(self) -> None:
+    def _close(self) -> None:
         """Ends the progress line, all threads that can be ended, and all processes."""
         self._threads.shutdown(wait=False)
         if self._processes is not None:
             self._processes.end()
         self.progress.stop()
 
-    def check_time(self) -> None:
+    def _check_time(self) -> None:
         """Raises TimeUp when it is time to stop."""
         if passed(self.task.end):
             raise TimeUp(f"it is {datetime.now():%H:%M}")
-
-    def log_begin(self) -> None:
-        """The first line of a run in its log: what is computed, where, by which versions."""
-        task, done, total, machine = self.task, self.progress.done, self.progress.total, platform.uname()
-        versions = task.schema().attrs.get("versions", "")
-        log(
-            f"begins: {task.name}, kernel {task.study.kernel_name}, {done:,} of {total:,} cells done before, "
-            f"{self.blocks.count:,} blocks, {task.cores} cores, process {os.getpid()} on {machine.node} "
-            f"({machine.system} {machine.machine}), {versions}",
-            "begin", kernel=task.study.kernel_name, cells=done, of=total, cores=task.cores, process=os.getpid(),
-            machine=machine.node, versions=versions,
-        )  # fmt: skip

@@ -36,14 +36,12 @@ class Progress:
 
     Parameters
     ----------
-    total : int
-        Cells of the grid.
+    total, done : int
+        Cells of the grid, and those that were there before.
     stream : text stream, bool or None
         None and True: stderr; False: say nothing.
     name : str
         Begins every line.
-    done : int
-        Cells that were there before.
     work : float
         Seconds that the blocks to come should take altogether, or any measure of them.
     clock : callable
@@ -65,31 +63,21 @@ class Progress:
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._stream: Any = sys.stderr if stream is None or stream is True else stream or None
-        self.total, self.done, self.computed, self.crew = total, done, 0, 1
-        self._name, self._clock = printable(name), clock
+        self.total, self.done, self.crew = total, done, 1
+        self._before, self._name, self._clock = done, printable(name), clock
         self._bar: Any = None
         shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
         notebook = self._stream is sys.stderr and type(shell).__name__ == "ZMQInteractiveShell"
         self._live = self._stream is not None and (self._stream.isatty() or notebook)
         self._begun = self._last = self._logged = clock()
-        self._told: float | None = None
+        self._said: float | None = None
         self._work_left, self._blocks = work, 0
         self._spent = self._first_round = np.zeros(2)  # the work of blocks that are done, and their seconds
 
     @property
-    def seconds(self) -> float:
-        """Since the beginning."""
-        return self._clock() - self._begun
-
-    @property
     def rate(self) -> float:
         """Cells per second computed here."""
-        return self.computed / max(self.seconds, 1e-9)
-
-    @property
-    def block_seconds(self) -> float:
-        """What a block takes on average, 0 where none is done."""
-        return float(self._spent[1]) / max(self._blocks, 1)
+        return (self.done - self._before) / max(self._clock() - self._begun, 1e-9)
 
     @property
     def left(self) -> float | None:
@@ -107,27 +95,26 @@ class Progress:
 
     def add(self, cells: int, work: float, seconds: float) -> None:
         """Counts the cells of a block as done, which was so much work and took so long."""
-        self.done, self.computed, self._blocks = self.done + cells, self.computed + cells, self._blocks + 1
+        self.done, self._blocks, self._last = self.done + cells, self._blocks + 1, self._clock()
         self._work_left -= work
         self._spent = self._spent + np.array([max(work, 1e-9), seconds])
         if self._blocks == self.crew:
             self._first_round = self._spent
-        self._last = self._clock()
         self.tick()
 
     def again(self, cells: int, work: float) -> None:
         """A block has to be computed once more."""
-        self.done -= cells
-        self._work_left += work
+        self.done, self._before, self._work_left = self.done - cells, self._before - cells, self._work_left + work
 
     def tick(self) -> None:
         """Says something if it is time to."""
-        if (now := self._clock()) - self._logged >= LOG_SECONDS:
+        now = self._clock()
+        if now - self._logged >= LOG_SECONDS:
             self._logged = now
-            log(self.line(), "progress", **self._fields())
-        if self._stream is None or self.seconds < QUIET_SECONDS:
-            return
-        if self._live or self._told is None or now - self._told >= min(LINE_SECONDS, self.seconds / 3):
+            self._log(self.line())
+        since = now - self._begun
+        due = self._live or self._said is None or now - self._said >= min(LINE_SECONDS, since / 3)
+        if since >= QUIET_SECONDS and due:
             self._say(self.line())
 
     def note(self, text: str) -> None:
@@ -149,9 +136,9 @@ class Progress:
 
     def end(self) -> None:
         """Says how it ended, where anything was said before."""
-        text = f"{self._counts()}, {speed(self.rate)}, took {duration(self.seconds)}"
-        log(text, "progress", **self._fields(), seconds=round(self.seconds, 1))
-        if self._told is not None:
+        took = self._clock() - self._begun
+        self._log(text := f"{self._counts()}, {speed(self.rate)}, took {duration(took)}", seconds=round(took, 1))
+        if self._said is not None:
             self._say(text)
         self.stop()
 
@@ -166,18 +153,19 @@ class Progress:
         left = self.left
         return self._counts() + ("" if left is None else f", {speed(self.rate)}, {one_digit(left)} left")
 
-    def _fields(self) -> dict[str, Any]:
-        left = None if self.left is None else round(self.left, 1)
-        return {"cells": self.done, "of": self.total, "cells_per_second": round(self.rate, 3), "seconds_left": left}
-
     def _counts(self) -> str:
         share = 100 * self.done / self.total if self.total else 100.0
         # 100 % only when all is done
         shown = f"{min(share, 99.9):.1f}" if self.done < self.total else "100"
         return f"{self.done:,}/{self.total:,} cells ({shown} %)"
 
+    def _log(self, text: str, **more: float) -> None:
+        left = None if self.left is None else round(self.left, 1)
+        fields = {"cells": self.done, "of": self.total, "cells_per_second": round(self.rate, 3), "seconds_left": left}
+        log(text, "progress", **fields, **more)
+
     def _say(self, text: str) -> None:
-        self._told = self._clock()
+        self._said = self._clock()
         if not self._live:
             self.tell(text)
             return

@@ -15,11 +15,9 @@ from sweep.cells.partition import row_blocks
 from sweep.cells.reduce import gathered
 from sweep.errors import SweepError
 from sweep.file.open import in_memory, memory, open_result, open_unfinished
-from sweep.runs.bench import Found
 from sweep.runs.extend import TAKEN_OVER, Precomputed
 from sweep.runs.loop import Loop
-from sweep.runs.pool import CtrlC
-from sweep.runs.task import Task, joined
+from sweep.runs.task import Task
 from sweep.runs.to_file import Ending, run_to_file
 from sweep.study.keys import KEYS
 from sweep.study.read import Given
@@ -172,22 +170,19 @@ class _Memory:
         """Where a block lies."""
         return {name: array[slice(*self._blocks.bounds(job))] for name, array in self.arrays.items()}
 
-    def put(self, job: int, found: Found) -> None:
+    def put(self, job: int, arrays: Mapping[str, Any]) -> None:
         """Takes a block, which lies there already if it was computed here."""
-        assert isinstance(found, Mapping)
         for name, place in self.room(job).items():
-            if not np.may_share_memory(place, found[name]):
-                place[...] = found[name]
-
-    def tick(self) -> None:
-        """Nothing is to be done now and then."""
+            if not np.may_share_memory(place, arrays[name]):
+                place[...] = arrays[name]
 
 
 def _run_in_memory(task: Task) -> xr.Dataset:
-    with CtrlC() as ctrl_c, joined(task) as cluster, contextlib.closing(Loop(task, ctrl_c, cluster)) as loop:
+    with contextlib.ExitStack() as stack:
+        loop = Loop(task, stack)
         sink, jobs = _Memory(loop.blocks), range(loop.blocks.count)
-        progress = loop.begin(jobs)
+        loop.begin(jobs)
         loop.compute(jobs, sink)
-        progress.end()
+        loop.progress.end()
     found = sink.arrays if task.study.summary is None else gathered(task.study, sink.arrays)
-    return in_memory(task.schema(start=loop.began, **loop.endings()), found)
+    return in_memory(task.said({"start": loop.began, **loop.endings()}), found)

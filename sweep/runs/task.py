@@ -2,26 +2,23 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
+from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import Any, TextIO
 
 from sweep.cells.fingerprint import fingerprint
 from sweep.cells.reduce import output_schema
 from sweep.cells.sample import require_asked
 from sweep.cells.schema import Schema
-from sweep.errors import SweepError, missing
+from sweep.errors import SweepError
 from sweep.runs.pool import cores, deadline, whole_number
 from sweep.runs.progress import Progress
 from sweep.study.model import Study
 from sweep.words import as_path, seconds_of
-
-if TYPE_CHECKING:
-    from sweep.runs.cluster import Cluster
 
 
 @dataclass
@@ -81,26 +78,16 @@ class Task:
         """Says something at once."""
         Progress(1, self.progress, self.name).note(text)
 
-    def schema(self, **attrs: str) -> Schema:
+    @cached_property
+    def schema(self) -> Schema:
+        """What its result holds."""
+        return output_schema(self.study, self.fingerprint)
+
+    def said(self, attrs: Mapping[str, str]) -> Schema:
         """What its result holds, with further attributes."""
-        schema = output_schema(self.study, self.fingerprint)
-        return replace(schema, attrs={**schema.attrs, **attrs})
+        return replace(self.schema, attrs={**self.schema.attrs, **attrs})
 
 
 def now() -> str:
     """The time as ISO 8601 in UTC."""
     return datetime.now(UTC).isoformat(timespec="seconds")
-
-
-@contextlib.contextmanager
-def joined(task: Task) -> Iterator[Cluster | None]:
-    """The cluster of a task; None where none is asked for. Raises SweepError."""
-    if task.cluster is None:
-        yield None
-        return
-    try:
-        from sweep.runs.cluster import Cluster
-    except ImportError:
-        raise missing("a cluster needs distributed", "cluster") from None
-    with Cluster(task.cluster, task.note) as cluster:
-        yield cluster

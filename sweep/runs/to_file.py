@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, Literal
 
@@ -16,20 +17,14 @@ from sweep.file.open import stored_fingerprint
 from sweep.file.reading import StoredFile
 from sweep.file.store import Store, lock_of, opened, unfinished_of
 from sweep.file.verify import check_whole, verify
-from sweep.runs.bench import Found
 from sweep.runs.extend import Precomputed, Reused, has_failed, is_of_another_version, obstacle
 from sweep.runs.loop import Loop
-from sweep.runs.pool import CtrlC, Terminated, TimeUp
-from sweep.runs.task import Task, joined
+from sweep.runs.pool import Terminated, TimeUp
+from sweep.runs.task import Task
 from sweep.words import quantity
 
 MOST_ATTEMPTS = 3
 """Times that damaged blocks are computed again before the disk is given up."""
-EXTENDABLE = (
-    "where its axes have only got more values, --extend computes the new cells alone; those of another version it "
-    "keeps if a sample of them still has the same bits"
-)
-
 
 Ending = Literal["done before", "complete", "unfinished", "not begun"]
 """What became of an output: the last two where the time was up before the end, or before the first block."""
@@ -40,7 +35,7 @@ def run_to_file(task: Task, precomputed: Precomputed | None = None) -> Ending:
     left = unfinished_of(task.output).exists() or lock_of(task.output).exists()
     if not left and _is_complete(task):
         return "done before"
-    with opened(task.output) as store, contextlib.ExitStack() as stack:
+    with opened(task.output) as store:
         # looked at again, for another run may have ended before this one had the lock
         if _is_complete(task):
             found = _found(store, task)
@@ -48,49 +43,19 @@ def run_to_file(task: Task, precomputed: Precomputed | None = None) -> Ending:
                 store.discard()
             return "done before"
         _take_up(store, task)
-        to_do = store.file is None or bool(store.missing())
-        reused: Reused | Precomputed | None = precomputed
-        if to_do and reused is None and (task.extend or task.retry_failed) and not task.force and task.output.exists():
-            check_whole(task.output)
-            reused = stack.enter_context(contextlib.closing(Reused(task.output, task.study, task.retry_failed)))
-            if task.extend and is_of_another_version(stored_fingerprint(task.output), task.fingerprint):
-                task.note("another version has computed it; a sample of its cells is computed again")
-                reused.check_sample()
-        # held back from here on, wherever they would leave half a file behind
-        ctrl_c = stack.enter_context(CtrlC())
-        cluster = stack.enter_context(joined(task)) if to_do else None
         try:
-            partition = None if store.file is None else store.table.blocks
-            loop = Loop(task, ctrl_c, cluster, partition, to_do and precomputed is None, reused)
-        except TimeUp as reason:
-            task.note(f"stopped before the first block, for {reason}")
-            return "not begun" if store.file is None else "unfinished"
-        stack.enter_context(contextlib.closing(loop))
-        progress = loop.begin(range(loop.blocks.count) if store.file is None else store.missing())
-        loop.log_begin()
-        if store.file is None:
-            _begin(store, loop, reused, cluster is not None)
-        sink = stack.enter_context(_Stored(store, loop, reused))
-        try:
-            for _ in range(MOST_ATTEMPTS):
-                if missing := store.missing():
-                    loop.compute(missing, sink, None if cluster is None else store.shared())
-                    sink.settle()
-                damaged = store.finish(loop.endings(), None if task.study.summary is None else sink.gathered)
-                if not damaged:
-                    progress.end()
-                    return "complete"
-                for block in damaged:
-                    loop.again(block)
+            _computed(store, task, precomputed)
+            return "complete"
         except (KeyboardInterrupt, Terminated, TimeUp) as reason:
-            store.commit()
-            why = f"stopped, for {reason}" if isinstance(reason, TimeUp) else "stopped"
-            kept = f"{store.count} of {loop.blocks.count} blocks are kept"
-            progress.note(f"{why}; {kept}, run the same command again to continue")
+            kept = "before the first block"
+            if store.file is not None:
+                store.commit()
+                kept = f"{store.count} of {store.table.blocks.count} blocks are kept"
+            why = f", for {reason}" if isinstance(reason, TimeUp) else ""
+            task.note(f"stopped{why}; {kept}, run the same command again to continue")
             if isinstance(reason, TimeUp):
-                return "unfinished"
+                return "not begun" if store.file is None else "unfinished"
             raise
-    raise SweepError(f"{store.path}: what is written there comes back damaged again and again; the disk is failing")
 
 
 def _is_complete(task: Task) -> bool:
@@ -109,11 +74,15 @@ def _is_complete(task: Task) -> bool:
     if task.extend and not hindrance:
         return False
     what = f"cannot be extended, for {hindrance}" if task.extend else "holds the result of another study or version"
-    cure = f"choose another name, or overwrite it with --force{'' if hindrance else f'; {EXTENDABLE}'}"
+    extendable = (
+        "; where its axes have only got more values, --extend computes the new cells alone; those of another version "
+        "it keeps if a sample of them still has the same bits"
+    )
+    cure = f"choose another name, or overwrite it with --force{'' if hindrance else extendable}"
     raise SweepError(f"{task.output}: {what}; {cure}\n{_changes(stored, task)}")
 
 
-def _changes(stored: Any, task: Task) -> str:
+def _changes(stored: Mapping[str, str], task: Task) -> str:
     return "\n".join(f"  {line}" for line in difference(dict(stored), dict(task.fingerprint)))
 
 
@@ -132,26 +101,53 @@ def _take_up(store: Store, task: Task) -> None:
     left = _found(store, task)
     if left is None and task.repair and not task.force and task.output.exists():
         store.reopen(verify(task.output).blocks or ())
-        return
-    if left is None:
-        store.discard()
-        return
-    if left.fingerprint == dict(task.fingerprint):
+    elif left is not None and left.fingerprint == dict(task.fingerprint):
         store.resume(left)
-        return
-    left.close()
-    if not task.force:
+    elif left is None or task.force:
+        if left is not None:
+            left.close()
+        store.discard()
+    else:
+        left.close()
         raise SweepError(
             f"{store.path}: the unfinished result of another study or version; finish that one first, choose another "
             f"name, or give it up with --force\n{_changes(left.fingerprint, task)}"
         )
-    store.discard()
 
 
-def _begin(store: Store, loop: Loop, reused: Reused | Precomputed | None, shared: bool) -> None:
+def _computed(store: Store, task: Task, known: Reused | Precomputed | None) -> None:
+    """Computes what is missing, and puts the result in its place."""
+    with contextlib.ExitStack() as stack:
+        to_do, sampled = store.file is None or bool(store.missing()), known is None
+        if to_do and known is None and (task.extend or task.retry_failed) and not task.force and task.output.exists():
+            check_whole(task.output)
+            known = stack.enter_context(contextlib.closing(Reused(task.output, task.study, task.retry_failed)))
+            if task.extend and is_of_another_version(stored_fingerprint(task.output), task.fingerprint):
+                task.note("another version has computed it; a sample of its cells is computed again")
+                known.check_sample()
+        # signals are held back from here on, wherever they would leave half a file behind
+        loop = Loop(task, stack, None if store.file is None else store.table.blocks, to_do, sampled, known)
+        loop.begin(range(loop.blocks.count) if store.file is None else store.missing())
+        if store.file is None:
+            _begin(store, loop, known)
+        sink = stack.enter_context(_Stored(store, loop, known))
+        for _ in range(MOST_ATTEMPTS):
+            if missing := store.missing():
+                loop.compute(missing, sink, None if task.cluster is None else store.shared(), sink.tick)
+                sink.settle()
+            damaged = store.finish(loop.endings(), None if task.study.summary is None else sink.gathered)
+            if not damaged:
+                loop.progress.end()
+                return
+            for block in damaged:
+                loop.again(block)
+    raise SweepError(f"{store.path}: what is written there comes back damaged again and again; the disk is failing")
+
+
+def _begin(store: Store, loop: Loop, known: Reused | Precomputed | None) -> None:
     """Makes the file. Raises SweepError where it has no room on the disk."""
     task = loop.task
-    schema = task.schema(start=loop.began, **(reused.attrs if reused else {}))
+    schema = task.said({"start": loop.began, **(known.attrs if known else {})})
     cuts = cuts_of(task.study, schema, loop.blocks.partition)
     needed, free = expected_size(schema, cuts), disk.free(task.output.parent)
     if needed > free:
@@ -159,18 +155,17 @@ def _begin(store: Store, loop: Loop, reused: Reused | Precomputed | None, shared
             f"{task.output}: needs {quantity(needed)}, only {quantity(free)} are free here; free some space, choose "
             "another folder with -o, fewer outputs, or keep a [summary] instead of every cell"
         )
-    store.begin(schema, cuts, shared)
+    store.begin(schema, cuts, task.cluster is not None)
 
 
 class _Stored:
     """Where blocks of a run to a file go; they are brought to the disk by a thread beside those that compute."""
 
-    room = None
-
-    def __init__(self, store: Store, loop: Loop, reused: Reused | Precomputed | None) -> None:
-        self._store, self._blocks, self._study, self._reused = store, loop.blocks, loop.task.study, reused
-        self._syncing = ThreadPoolExecutor(1)
-        self._last: Future[None] | None = None
+    def __init__(self, store: Store, loop: Loop, known: Reused | Precomputed | None) -> None:
+        self._store, self._blocks, self._study, self._known = store, loop.blocks, loop.task.study, known
+        self.room = loop.blocks.own
+        self._syncing, self._last = ThreadPoolExecutor(1), Future[None]()
+        self._last.set_result(None)
 
     def __enter__(self) -> _Stored:
         return self
@@ -178,27 +173,26 @@ class _Stored:
     def __exit__(self, *fault: object) -> None:
         self._syncing.shutdown()
 
-    def put(self, job: int, found: Found) -> None:
+    def put(self, job: int, found: bytes | Mapping[str, Any]) -> None:
         """Stores a block, with the cells that are known, or acknowledges one that a worker has written."""
         if isinstance(found, bytes):
             self._store.take(job, found)
-        elif found is not None:
-            if self._reused is not None:
-                # what came from elsewhere may be read only
-                found = {name: c if c.flags.writeable else c.copy() for name, c in found.items()}
-                self._reused.fill(*self._blocks.bounds(job), found)
-            self._store.put(job, found)
+            return
+        if self._known is not None:
+            # what came from elsewhere may be read only
+            found = {name: c if c.flags.writeable else c.copy() for name, c in found.items()}
+            self._known.fill(*self._blocks.bounds(job), found)
+        self._store.put(job, found)
 
     def tick(self) -> None:
         """Acknowledges what is written, if it is time to. Raises SweepError."""
-        if self._last is None or self._last.done():
+        if self._last.done():
             self.settle()
             self._last = self._syncing.submit(self._store.tick)
 
     def settle(self) -> None:
         """Returns when nothing is being brought to the disk. Raises SweepError where it could not be."""
-        if self._last is not None:
-            self._last.result()
+        self._last.result()
 
     def gathered(self, file: StoredFile, block: int) -> dict[str, Any]:
         """A block of a summary's output, from its rows."""

@@ -6,7 +6,6 @@ import os
 import signal
 import threading
 import time
-from concurrent.futures import Future
 from datetime import datetime, timedelta
 
 import pytest
@@ -18,7 +17,6 @@ from sweep.cli import main
 from sweep.command.outcome import explained
 from sweep.errors import INCOMPLETE, SweepError
 from sweep.results.statuses import account
-from sweep.runs import cluster as clusters
 
 # a lost connection is what some of these tests are about; dask leaves its sockets to the collector
 pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning")
@@ -150,36 +148,6 @@ def test_a_block_of_which_every_worker_dies_ends_the_run_and_is_named(client, ou
     with pytest.raises(SweepError, match=r"every worker that took them died.*isolated"):
         elsewhere(study, output, cluster=client, block_cells=1, until=datetime.now() + timedelta(seconds=100))
     same(quiet(study, output), quiet(study))  # nobody dies of it here
-
-
-@pytest.mark.parametrize("times", [1, 99])
-def test_an_answer_that_gets_lost_in_the_executor_is_asked_for_again(address, times):
-    """As where a worker dies at the moment at which its task is answered."""
-    lost = []
-
-    class Losing(clusters.distributed.Client):
-        def get_executor(self, **keys):
-            executor = super().get_executor(**keys)
-            real = executor.submit
-
-            def submit(function, run, masks):
-                future = real(function, run, masks)
-                if 7 in masks and len(lost) < times:
-                    lost.append(masks)
-                    future = Future()
-                    future.set_exception(TypeError("cannot unpack non-iterable Answer object"))
-                return future
-
-            executor.submit = submit
-            return executor
-
-    with Losing(address, set_as_default=False) as client:
-        if times > 10:
-            with pytest.raises(SweepError, match="cells 7 to 8: every worker"):
-                elsewhere(tall(20), cluster=client, block_cells=1)
-        else:
-            same(elsewhere(tall(20), cluster=client, block_cells=1), quiet(tall(20)))
-    assert 1 <= len(lost) < 10
 
 
 def test_a_cluster_without_workers_is_waited_for_and_says_so(output):
