@@ -8,6 +8,7 @@ so let none but friends reach it, or use its TLS. Of files, nothing is ever unpi
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import gc
 import logging
@@ -81,7 +82,8 @@ class Cluster:
 
     def begin(self, *words: Any) -> None:
         """Tells the workers what is to be computed, as `Remote` takes it, which dask makes where it is needed."""
-        self._remote = self._client.submit(Remote, *words, pure=False)
+        paths = [str(Path(path).resolve()) for path in sys.path]
+        self._remote = self._client.submit(Remote, *words, paths, pure=False)
 
     def submit(self, job: int, wanted: Any, label: str) -> Future[Done]:
         """A future of a block that a worker computes. Raises SweepError, now or when it is asked for its result.
@@ -98,8 +100,15 @@ class Cluster:
         async def settle() -> None:
             try:
                 found.set_result(await asked)
-            except BaseException as fault:
-                found.set_exception(self._told(fault, label))
+            except SweepError as fault:
+                found.set_exception(fault)
+            except (CancelledError, asyncio.CancelledError, OSError) as fault:
+                found.set_exception(self._lost(fault))
+            except Exception as fault:
+                what = f"{label} cannot be computed ({type(fault).__name__}: {fault}); what is finished is kept"
+                found.set_exception(
+                    SweepError(f"cluster: {what}; isolated, a cell of which its process dies is FAILED")
+                )
 
         self._client.loop.add_callback(settle)
         return found
@@ -109,22 +118,6 @@ class Cluster:
         if not self._gone:
             with contextlib.suppress(Exception):
                 self._client.cancel(list(self._asked))
-
-    def _told(self, fault: BaseException, label: str) -> SweepError:
-        """What became of a block that was not computed."""
-        if isinstance(fault, SweepError):
-            return fault
-        if isinstance(fault, CancelledError) or not isinstance(fault, Exception):
-            return self._lost(fault)
-        if isinstance(fault, distributed.KilledWorker):
-            return SweepError(
-                f"{label}: every worker that took them died; the logs of the workers may tell why, too little memory "
-                "is most common; what is finished is kept; isolated, a cell of which its process dies is FAILED alone"
-            )
-        return SweepError(
-            f"cluster: a worker failed ({type(fault).__name__}: {fault}); what is finished is kept; every machine of "
-            "the cluster needs the same version of foliot"
-        )
 
     def _lost(self, fault: BaseException) -> Incomplete:
         """What is reported where the scheduler does not answer any more; it is not asked again."""
@@ -165,8 +158,9 @@ class Remote:
     """A run as a worker knows it; where dask moves it to, it is made anew.
 
     Of the study as JSON; its fingerprint where the run was started (a worker with another one refuses); how the rows
-    are cut; the file that blocks are to be written to (None: their numbers are sent); where to look for the module of a
-    kernel of the user's own, whose study was allowed to run it; limit and cost of `Processes` (None: no isolation).
+    are cut; the file that blocks are to be written to (None: their numbers are sent); limit and cost of `Processes`
+    (None: no isolation); where to look for the module of a kernel of the user's own, which the study was allowed to
+    run.
     """
 
     def __init__(self, *words: Any) -> None:
@@ -178,9 +172,10 @@ class Remote:
     @cached_property
     def bench(self) -> Bench:
         """Loads and compiles the kernel. Raises SweepError where what computes here is not what was asked for."""
-        text, mark, partition, shared, paths, isolated = self._words
+        text, mark, partition, shared, isolated, paths = self._words
         where = f"worker on {socket.gethostname()}"
-        sys.path.extend(path for path in paths if path not in sys.path and Path(path).is_dir())
+        if ":" in mark["kernel"]:
+            sys.path.extend(path for path in paths if path not in sys.path and Path(path).is_dir())
         try:
             study = Study.from_json(text, allow_import=True)
             changed = difference(mark, fingerprint(study))

@@ -64,7 +64,7 @@ class Processes:
 
     def __init__(self, study: Study, limit: float | None, count: int, cost: float = 0.0) -> None:
         self.study, self.limit, self.cost, self.grid = study, limit, cost, Grid(study)
-        self.words = study.to_json(), kernel_paths(study)
+        self.text = study.to_json()
         self.most_bytes = MEMORY_SHARE * memory() / count
         self.good: int | None = None  # a cell that is known to end
         self.over, self.alone, self.dearest = False, threading.Lock(), 0.0
@@ -114,45 +114,31 @@ class Isolated:
         One cell alone is tried again, for a process may die of what it did before, or with others; and then no other
         cell is tried so meanwhile, lest each be blamed for the other.
         """
-        limit, crew = self._all.seconds(cells.number), self._all
+        crew, limit = self._all, self._all.seconds(cells.number)
         for trial in range(1, TRIALS + 1):
             try:
                 with crew.alone if trial > 1 else contextlib.nullcontext():
-                    found, reason, seconds, most = self.call(limit, _solve, start, cells.number, wanted)
-                    no_memory = reason.startswith(MemoryError.__name__)
-                    if no_memory or most > crew.most_bytes:
-                        self.end()
-                    if reason:
-                        raise Died(reason) if no_memory else Unsolved(reason)
+                    columns, seconds, most = self.call(limit, _solve, start, cells.number, wanted)
                 break
             except Died:
                 if cells.number > 1 or trial == TRIALS:
                     raise
+        if most > crew.most_bytes:
+            self.end()
         self.seconds += seconds
         crew.dearest = max(crew.dearest, seconds / cells.number)
         crew.good = start if crew.good is None else crew.good
-        for column, values in zip(cells.columns, found, strict=False):
+        for column, values in zip(cells.columns, columns, strict=False):  # errors come last, and may not be wanted
             column[...] = values
 
     def call(self, limit: float, function: Callable[..., R], *words: Any) -> R:
-        """What a function gives in the process, within so many seconds. Raises Unsolved, Died, SweepError.
-
-        No seconds count while the machine sleeps or the process compiles; compiling has a limit of its own.
-        """
-        for _ in range(STARTS):
-            if self._process is not None or (reason := self._begin()) is None:
-                break
-            # a process that has not loaded the kernel is never asked for cells: they would be blamed for it
-            self.end()
-            time.sleep(START_SECONDS)
-        else:
-            raise SweepError(
-                f"{self._all.study.kernel_name}: no process of its own can be started and load it ({reason}); what is "
-                "finished is kept. The name of the folder TMPDIR must be short, and ulimit -n and -u large enough"
-            )
-        process, late = self._process, False
+        """What a function gives in the process, within so many seconds. Raises Unsolved, Died, SweepError."""
+        process, late = self._process or self._begin(), False
         try:
             return _asked(process, limit, function, *words)
+        except Died:
+            self.end()
+            raise
         except (OSError, EOFError, AttributeError) as fault:
             late = isinstance(fault, TimeoutError)
         code = self.end(BURY_SECONDS, process)
@@ -163,19 +149,27 @@ class Isolated:
             raise Died(f"its process died of {signal.Signals(-code).name}")
         raise Died("its process died" if code is None else f"its process ended with {code}")
 
-    def _begin(self) -> str | None:
-        """Starts a process that has loaded the kernel, and solved a cell that is known to end; or why it has not."""
-        try:
-            with self._lock:
-                if self._all.over:
-                    raise SweepError("the run is being stopped")
-                self._process = process = _started()
-            _asked(process, LOAD_SECONDS, _load, *self._all.words, self._all.good)
-        except SweepError:
-            raise
-        except Exception as fault:
-            return told(fault)
-        return None
+    def _begin(self) -> Any:
+        """A process that has loaded the kernel, and solved a cell that is known to end. Raises SweepError."""
+        for _ in range(STARTS):
+            try:
+                with self._lock:
+                    if self._all.over:
+                        raise SweepError("the run is being stopped")
+                    process = self._process = _started()
+                _asked(process, LOAD_SECONDS, _load, self._all.text, self._all.good)
+                return process
+            except SweepError:
+                raise
+            except Exception as fault:
+                # a process that has not loaded the kernel is never asked for cells: they would be blamed for it
+                reason = told(fault)
+                self.end()
+                time.sleep(START_SECONDS)
+        raise SweepError(
+            f"{self._all.study.kernel_name}: no process of its own can be started and load it ({reason}); what is "
+            "finished is kept. The name of the folder TMPDIR must be short, and ulimit -n and -u large enough"
+        )
 
     def end(self, seconds: float = 0.0, process: Any = None) -> int | None:
         """Kills the process; its exit status, if that is known in so many seconds."""
@@ -189,7 +183,7 @@ class Isolated:
 
 
 def _asked(process: Any, limit: float, function: Callable[..., R], *words: Any) -> R:
-    """What a function gives in a process. Raises TimeoutError, EOFError or OSError where it died, Unsolved.
+    """What a function gives in a process. Raises TimeoutError, EOFError or OSError where it died, Unsolved, Died.
 
     No seconds count while the machine sleeps or the process compiles; compiling has a limit of its own.
     """
@@ -200,20 +194,10 @@ def _asked(process: Any, limit: float, function: Callable[..., R], *words: Any) 
         if wait([process.pipe], min(LOOK_SECONDS, left[False])):
             found, reason = process.pipe.recv()
             if reason:
-                raise Unsolved(reason)
+                raise (Died if reason.startswith(MemoryError.__name__) else Unsolved)(reason)
             return found  # type: ignore[no-any-return]
         left[bool(process.compiling.value)] -= min(time.monotonic() - begun, 2 * LOOK_SECONDS)
     raise TimeoutError
-
-
-def kernel_paths(study: Study) -> tuple[str, ...]:
-    """Folder of a kernel of the user's own, who has allowed it here by reading the study."""
-    name = study.kernel_name.partition(":")[0]
-    file = getattr(sys.modules.get(name), "__file__", None) if ":" in study.kernel_name else None
-    if file is None:
-        return ()
-    path = Path(file).resolve()
-    return (str(path.parents[name.count(".") + (path.name == "__init__.py")]),)
 
 
 _starting = threading.Lock()
@@ -279,8 +263,7 @@ def _serve(pipe: Any, flag: Any) -> None:
             pipe.send(answer)
 
 
-def _load(text: str, paths: tuple[str, ...], good: int | None) -> None:
-    sys.path.extend(path for path in paths if path not in sys.path)
+def _load(text: str, good: int | None) -> None:
     study = Study.from_json(text, allow_import=True)
     _here["study"], _here["solver"] = study, Solver(study)
     work_clock.watch()
@@ -288,14 +271,10 @@ def _load(text: str, paths: tuple[str, ...], good: int | None) -> None:
         _solve(good, 1, None)
 
 
-def _solve(start: int, count: int, wanted: Any) -> tuple[list[Any], str, float, float]:
-    """Columns of cells, and why they are not solved; seconds, and most bytes that the process ever had."""
+def _solve(start: int, count: int, wanted: Any) -> tuple[list[Any], float, float]:
+    """Columns of cells, the seconds that they took, and most bytes that the process ever had."""
     cells = cells_of({column.name: column.empty(count) for column in columns(_here["study"])})
-    begun, reason = work_clock(), ""
-    try:
-        _here["solver"].solve(start, cells, wanted)
-    except BaseException as fault:
-        reason = told(fault)
-    seconds = work_clock() - begun
-    unit = 1 if sys.platform == "darwin" else 1024
-    return ([] if reason else cells.columns), reason, seconds, unit * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    begun = work_clock()
+    _here["solver"].solve(start, cells, wanted)
+    seconds, unit = work_clock() - begun, 1 if sys.platform == "darwin" else 1024
+    return cells.columns, seconds, unit * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

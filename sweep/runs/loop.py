@@ -11,24 +11,32 @@ import os
 import platform
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from datetime import datetime
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TextIO
 
 from sweep.cells.block import Blocks, cut, sampled_study
 from sweep.cells.compiling import Compiling
+from sweep.cells.fingerprint import fingerprint
 from sweep.cells.partition import Partition
+from sweep.cells.reduce import output_schema
+from sweep.cells.sample import require_asked
+from sweep.cells.schema import Schema
 from sweep.cells.timing import UNSAMPLED, Sample
-from sweep.errors import missing
+from sweep.errors import SweepError, missing
 from sweep.file.store import Shared
 from sweep.runs.bench import Bench, Done, Sink
 from sweep.runs.extend import Precomputed, Reused
-from sweep.runs.isolate import Processes, kernel_paths
+from sweep.runs.isolate import Processes
 from sweep.runs.log import log
-from sweep.runs.pool import CtrlC, TimeUp, endless, passed
+from sweep.runs.pool import CtrlC, TimeUp, cores, deadline, endless, passed, whole_number
 from sweep.runs.progress import Progress, from_everywhere
-from sweep.runs.task import Task, now
+from sweep.study.model import Study
+from sweep.words import as_path, seconds_of
 
 if TYPE_CHECKING:
     from sweep.runs.cluster import Cluster
@@ -43,6 +51,73 @@ ELSEWHERE_SECONDS = 0.5
 """What a block of a cluster should take at least, beside which the scheduler's millisecond is nothing."""
 MOST_TOLD = 1000
 """Cells that FAILED which are told one by one."""
+
+
+@dataclass
+class Task:
+    """What a run was asked for, as `run` was, and what is meant by it. Raises SweepError where it cannot be meant.
+
+    Attributes
+    ----------
+    output : Path
+        Where a run to a file writes, all links followed.
+    cores, end, limit
+        What `workers`, `until` and `cell_timeout` mean.
+    fingerprint : mapping of str to str
+        Of the study and of this program, or what is given instead.
+    """
+
+    study: Study
+    path: str | os.PathLike[str] | None = None
+    workers: int | None = None
+    force: bool = False
+    progress: bool | TextIO | None = None
+    block_cells: int | None = None
+    extend: bool = False
+    until: str | datetime | None = None
+    cluster: Any = None
+    repair: bool = False
+    isolate: bool = False
+    cell_timeout: float | str | None = None
+    retry_failed: bool = False
+    fingerprint: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.fingerprint = dict(self.fingerprint or fingerprint(self.study))
+        self.output = Path(os.path.realpath(as_path("." if self.path is None else self.path)))
+        if not self.output.parent.is_dir():
+            raise SweepError(f"{self.path}: there is no folder {self.output.parent}")
+        self.cores = cores() if self.workers is None else whole_number("workers", self.workers)
+        if self.block_cells is not None:
+            whole_number("block_cells", self.block_cells)
+        self.end = deadline(self.until)
+        self.limit = None if self.cell_timeout is None else seconds_of("cell_timeout", self.cell_timeout)
+        self.isolate = self.isolate or self.limit is not None
+        if self.cluster is not None and self.workers is not None:
+            raise SweepError("workers, cluster: a cluster brings its own workers; give one of the two")
+        require_asked(self.study)
+        if self.path is None and self.until is not None:
+            raise SweepError("until: give a path as well, or what is computed by then would be lost")
+        if self.extend and self.retry_failed:
+            raise SweepError("extend, retry_failed: give one of the two; each continues another result")
+
+    @property
+    def name(self) -> str:
+        """What the run is called in its messages."""
+        return self.study.title or "sweep" if self.path is None else self.output.name
+
+    def note(self, text: str) -> None:
+        """Says something at once."""
+        Progress(1, self.progress, self.name).note(text)
+
+    @cached_property
+    def schema(self) -> Schema:
+        """What its result holds."""
+        return output_schema(self.study, self.fingerprint)
+
+    def said(self, attrs: Mapping[str, str]) -> Schema:
+        """What its result holds, with further attributes."""
+        return replace(self.schema, attrs={**self.schema.attrs, **attrs})
 
 
 class Loop:
@@ -63,7 +138,7 @@ class Loop:
         reused: Reused | Precomputed | None = None,
     ) -> None:
         self.task, self._reused, study = task, reused, task.study
-        self.began, self._failed, self.progress = now(), 0, Progress(1, False)
+        self.began, self._failed, self.progress = _now(), 0, Progress(1, False)
         self._ctrl_c = stack.enter_context(CtrlC())
         self._cluster: Cluster | None = None
         if task.cluster is not None and to_do:
@@ -133,7 +208,7 @@ class Loop:
 
     def endings(self) -> dict[str, str]:
         """What a result says of its run that is known at the end."""
-        end = now()
+        end = _now()
         return {"created": end, "end": end, "cells_per_second": f"{self.progress.rate:.6e}"}
 
     def compute(
@@ -149,7 +224,7 @@ class Loop:
         if cluster is not None:
             isolated = None if self._processes is None else (self._processes.limit, self._processes.cost)
             words = study.to_json(), dict(self.task.fingerprint), self.blocks.partition
-            cluster.begin(*words, shared if known is None else None, kernel_paths(study), isolated)
+            cluster.begin(*words, shared if known is None else None, isolated)
         queue, under_way = deque(from_everywhere(jobs)), set[Future[Done]]()
         try:
             while queue or under_way:
@@ -212,3 +287,8 @@ class Loop:
         """Raises TimeUp when it is time to stop."""
         if passed(self.task.end):
             raise TimeUp(f"it is {datetime.now():%H:%M}")
+
+
+def _now() -> str:
+    """The time as ISO 8601 in UTC."""
+    return datetime.now(UTC).isoformat(timespec="seconds")

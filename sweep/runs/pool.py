@@ -31,14 +31,11 @@ class CtrlC:
     The second one strikes at once. Other handlers than Python's own are left alone.
     """
 
-    def __init__(self) -> None:
-        self._pressed: int | None = None
-        own = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
-        self._own: dict[signal.Signals, Any] = dict(own)
-
     def __enter__(self) -> CtrlC:
+        self._pressed: int | None = None
         here = threading.current_thread() is threading.main_thread()
-        self._own = {number: own for number, own in self._own.items() if here and signal.getsignal(number) is own}
+        own: dict[int, Any] = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
+        self._own = {number: python for number, python in own.items() if here and signal.getsignal(number) is python}
         for number in self._own:
             signal.signal(number, self._press)
         return self

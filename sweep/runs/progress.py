@@ -86,18 +86,14 @@ class Progress:
             return 0.0 if self._blocks else None
         # kernels are loaded in the first round, which does not count when there were three
         work, seconds = self._spent - (self._first_round if self._blocks >= 3 * self.crew else 0.0)
-        block = self._spent[0] / self._blocks
-        # the blocks at work are half done
-        to_come = seconds / work * max(self._work_left / self.crew - block / 2, block / 2)
-        waited = self._clock() - self._last
+        to_come, waited = seconds / work * self._work_left / self.crew, self._clock() - self._last
         # where none has ended for longer than all should take, it may take as long again
         return float(max(to_come - waited if waited < to_come else waited, SHORTEST))
 
     def add(self, cells: int, work: float, seconds: float) -> None:
         """Counts the cells of a block as done, which was so much work and took so long."""
-        self.done, self._blocks, self._last = self.done + cells, self._blocks + 1, self._clock()
-        self._work_left -= work
-        self._spent = self._spent + np.array([max(work, 1e-9), seconds])
+        self.done, self._work_left, self._last = self.done + cells, self._work_left - work, self._clock()
+        self._blocks, self._spent = self._blocks + 1, self._spent + np.array([max(work, 1e-9), seconds])
         if self._blocks == self.crew:
             self._first_round = self._spent
         self.tick()

@@ -16,8 +16,7 @@ from sweep.cells.reduce import gathered
 from sweep.errors import SweepError
 from sweep.file.open import in_memory, memory, open_result, open_unfinished
 from sweep.runs.extend import TAKEN_OVER, Precomputed
-from sweep.runs.loop import Loop
-from sweep.runs.task import Task
+from sweep.runs.loop import Loop, Task
 from sweep.runs.to_file import Ending, run_to_file
 from sweep.study.keys import KEYS
 from sweep.study.read import Given
@@ -133,22 +132,11 @@ def store_cells(
     taken_over: str = "",
     attrs: Mapping[str, str] | None = None,
 ) -> xr.Dataset:
-    """Writes the result of cells that are solved already, a file like that of `run`.
+    """Writes the result of cells that are solved already, a file like that of `run`. Raises SweepError as `run`.
 
-    Parameters
-    ----------
-    arrays : mapping of outputs and of `schema.ANCILLARY` to ndarray, shape (cells, ...)
-    mark : mapping, optional
-        Its fingerprint, where that is not the one of the study and of this program.
-    taken_over : str
-        Which program has computed the cells, where it was another.
-    attrs : mapping, optional
-        Further attributes of the file.
-
-    Raises
-    ------
-    SweepError
-        As `run`.
+    Their columns are `arrays`, of shape (cells, ...), of outputs and of `schema.ANCILLARY`. `mark` is their
+    fingerprint, where that is not the one of the study and of this program; `taken_over` says which program has
+    computed them, where it was another; `attrs` are further attributes of the file.
     """
     block = max(1, min(row_blocks(study).count, STORED_AT_ONCE))
     task = Task(study, path, 1, force, progress=False, block_cells=block, fingerprint=mark or {})

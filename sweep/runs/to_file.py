@@ -18,9 +18,8 @@ from sweep.file.reading import StoredFile
 from sweep.file.store import Store, lock_of, opened, unfinished_of
 from sweep.file.verify import check_whole, verify
 from sweep.runs.extend import Precomputed, Reused, has_failed, is_of_another_version, obstacle
-from sweep.runs.loop import Loop
+from sweep.runs.loop import Loop, Task
 from sweep.runs.pool import Terminated, TimeUp
-from sweep.runs.task import Task
 from sweep.words import quantity
 
 MOST_ATTEMPTS = 3

@@ -123,8 +123,8 @@ def test_an_address_where_nobody_answers_is_one_clear_line(output, where):
 
 
 def test_a_worker_with_another_version_refuses(client, output, monkeypatch):
-    real = sweep.runs.task.fingerprint
-    monkeypatch.setattr("sweep.runs.task.fingerprint", lambda study: {**real(study), "source toy": "other"})
+    real = sweep.runs.loop.fingerprint
+    monkeypatch.setattr("sweep.runs.loop.fingerprint", lambda study: {**real(study), "source toy": "other"})
     with pytest.raises(SweepError, match=r"worker on .*versions(.|\n)*source toy"):
         elsewhere(tall(3), output, cluster=client)
 
@@ -145,7 +145,7 @@ def test_workers_killed_in_the_middle_cost_nothing_but_time(client, output, monk
 
 def test_a_block_of_which_every_worker_dies_ends_the_run_and_is_named(client, output):
     study = tall(60, "slow:LETHAL")
-    with pytest.raises(SweepError, match=r"every worker that took them died.*isolated"):
+    with pytest.raises(SweepError, match=r"cells 12 to 13 .*KilledWorker.*isolated"):
         elsewhere(study, output, cluster=client, block_cells=1, until=datetime.now() + timedelta(seconds=100))
     same(quiet(study, output), quiet(study))  # nobody dies of it here
 
