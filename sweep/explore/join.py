@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -13,14 +12,14 @@ import xarray as xr
 import xxhash
 
 from kernels.interface import Status
-from sweep.cells.fingerprint import difference, fingerprint, is_of_program
+from sweep.cells.fingerprint import fingerprint, is_of_program
 from sweep.cells.grid import Grid
-from sweep.cells.schema import ANCILLARY, ERROR_BOUND, STATUS, cell_schema
+from sweep.cells.schema import ANCILLARY, STATUS, cell_schema
 from sweep.errors import SweepError
 from sweep.file.open import in_memory, memory
 from sweep.results.diff import diff, two_results
 from sweep.runs.run import store_cells
-from sweep.study.model import SETTINGS, Axis, Block, Study, frozen
+from sweep.study.model import SETTINGS, Axis, Block, Study, frozen, setting
 from sweep.words import listed
 
 PAIR = ("first", "second")
@@ -80,73 +79,67 @@ def join(
     if 2 * sum(dataset.nbytes for dataset in results) > memory():
         raise SweepError("the two results together do not fit into the memory")
     studies = [Study.from_json(str(dataset.attrs["study_json"]), declared=True) for dataset in results]
-    joined, whole = _fitted(axis, labels, studies, results)
-    joined = replace(joined, text="", title=studies[0].title)
+    if axis is None:
+        study, whole = _along_difference(studies, results)
+    else:
+        _require_same(axis, labels, studies, results[0])
+        study, whole = _with_axis(studies[0], results, Axis(axis, frozen([0.0, 1.0]), "values", labels))
+    study = replace(study, text="", title=studies[0].title)
 
-    grid = Grid(joined)
-    arrays: dict[str, Any] = {}
-    for name in (*joined.outputs, *ANCILLARY):
+    grid, arrays = Grid(study), dict[str, Any]()
+    versions = "\n".join(f"{k}: {d.attrs.get('versions', '')}" for k, d in zip(labels, results, strict=True))
+    digest = xxhash.xxh3_128(versions.encode())
+    for name in (*study.outputs, *ANCILLARY):
         values = whole[name].transpose(*grid.dims, ...).values
         arrays[name] = np.ascontiguousarray(values.reshape(grid.size, *values.shape[len(grid.dims) :]))
-    versions = "\n".join(f"{k}: {d.attrs.get('versions', '')}" for k, d in zip(labels, results, strict=True))
-
-    # the program that both were computed by, and a digest of all cells and labels
-    digest = xxhash.xxh3_128(versions.encode())
-    for column in arrays.values():
-        digest.update(column)
-    old, new = (json.loads(str(dataset.attrs["fingerprint"])) for dataset in results)
-    program = {name: text for name, text in old.items() if is_of_program(name) and new.get(name) == text}
-    others = "; ".join(line for line in difference(old, new) if is_of_program(line.partition(":")[0]))
-    said = {name: text for name, text in fingerprint(joined).items() if not is_of_program(name)}
-    mark = {**said, **program, "joined": f"of two results (digest {digest.hexdigest()}). {others}".strip()}
+        digest.update(arrays[name])
+    # of other cells or labels it is another result, and no run continues it
+    mark = {**fingerprint(study), "joined": f"of two results (digest {digest.hexdigest()})"}
     if path is None:
-        return in_memory(cell_schema(joined, mark), arrays)
-    return store_cells(joined, path, arrays, force, mark, versions)
+        return in_memory(cell_schema(study, mark), arrays)
+    return store_cells(study, path, arrays, force, mark, versions)
 
 
-def _fitted(
-    axis: str | None, labels: tuple[str, ...], studies: Sequence[Study], results: Sequence[xr.Dataset]
-) -> tuple[Study, xr.Dataset]:
-    """The study of both along a new axis or what they differ in, and the numbers in its dimensions."""
-    first, second = studies
+def _apart(first: Study, second: Study) -> list[str]:
+    """What two studies differ in: "axes.mu", "fixed.a", "rtol"; of axes that run together "points"."""
     old, new = (
         {name: text for name, text in fingerprint(study).items() if name != "study" and not is_of_program(name)}
-        for study in studies
+        for study in (first, second)
     )
-    # "axes.mu", "fixed.a", "rtol"; of axes that run together "points"
     apart = sorted(name for name in {*old, *new} if old.get(name) != new.get(name))
     if first.dims == second.dims and len(first.dims) == 1 and first.design != "product":
-        apart = list(dict.fromkeys("points" if name.startswith("axes.") else name for name in apart))
-    differ = f"they differ in {listed(apart, word='and')}"
-    if axis is not None:
-        if apart:
-            raise SweepError(f"along {axis} all else is to be the same; {differ}")
-        taken = (*results[0].variables, *SETTINGS, *results[0].dims)
-        if not isinstance(axis, str) or not axis.isidentifier() or axis in taken:
-            raise SweepError(f'"{axis}" cannot be the name of a new axis; choose another')
-        if len(labels) != 2 or len(set(labels)) != 2 or not all(isinstance(label, str) and label for label in labels):
-            raise SweepError("a new axis needs two labels that differ")
-        return _with_axis(first, results, Axis(axis, frozen([0.0, 1.0]), "values", labels))
+        return list(dict.fromkeys("points" if name.startswith("axes.") else name for name in apart))
+    return apart
 
-    unfit = "the results do not fit together:"
-    if len(apart) != 1:
-        raise SweepError(f"{unfit} {differ if apart else 'they do not differ; name a new axis'}")
-    group, _, name = apart[0].rpartition(".")
-    if group == "axes" or apart == ["points"]:
+
+def _require_same(axis: Any, labels: tuple[Any, ...], studies: Sequence[Study], dataset: xr.Dataset) -> None:
+    """Raises SweepError where two results cannot stand along a new axis of two labels."""
+    if apart := _apart(*studies):
+        raise SweepError(f"along {axis} all else is to be the same; they differ in {listed(apart, word='and')}")
+    if not isinstance(axis, str) or not axis.isidentifier() or axis in (*dataset.variables, *SETTINGS, *dataset.dims):
+        raise SweepError(f'"{axis}" cannot be the name of a new axis; choose another')
+    if len(labels) != 2 or len(set(labels)) != 2 or not all(isinstance(label, str) and label for label in labels):
+        raise SweepError("a new axis needs two labels that differ")
+
+
+def _along_difference(studies: Sequence[Study], results: Sequence[xr.Dataset]) -> tuple[Study, xr.Dataset]:
+    """The study of both along the one thing that they differ in, and the numbers in its dimensions."""
+    first, second = studies
+    apart = _apart(first, second)
+    differ = f"they differ in {listed(apart, word='and')}" if apart else "they do not differ; name a new axis"
+    group, _, name = apart[0].rpartition(".") if len(apart) == 1 else ("", "", "")
+    if group == "axes" or name == "points":
         return _longer(first, second, results, name if first.design == "product" else next(iter(first.dims)))
     if group != "fixed" and name not in SETTINGS:
-        raise SweepError(f"{unfit} {differ}")
-    if name == "method":
-        methods = first.method, second.method
-        codes = {"auto": -1.0} | {method.name: float(code) for code, method in enumerate(first.kernel.methods)}
-        return _with_axis(first, results, Axis(name, frozen([codes[m] for m in methods]), "values", methods))
-    values = [study.rtol if name == "rtol" else study.fixed.get(name) for study in studies]
+        raise SweepError(f"the results do not fit together: {differ}")
+    field = setting(name, first.kernel) if name in SETTINGS else first.kernel.parameter(name)
+    values: list[Any] = [getattr(study, name) if name in SETTINGS else study.fixed.get(name) for study in studies]
     if any(value is None or np.ndim(value) for value in values):
-        raise SweepError(f"{unfit} they differ in {name}, which is not one number in both")
-    choices = {} if name == "rtol" else first.kernel.parameter(name).choices
-    words = {float(number): word for word, number in choices.items()}
-    said = tuple(words[float(value)] for value in values) if words else None  # type: ignore[arg-type]
-    return _with_axis(first, results, Axis(name, frozen(values), "values", said))
+        raise SweepError(f"the results do not fit together: they differ in {name}, which is not one number in both")
+    numbers = [float(field.choices.get(value, value)) for value in values]
+    words = {float(number): word for word, number in field.choices.items()}
+    said = tuple(words[number] for number in numbers) if words else None
+    return _with_axis(first, results, Axis(name, frozen(numbers), "values", said))
 
 
 def _with_axis(study: Study, results: Sequence[xr.Dataset], axis: Axis) -> tuple[Study, xr.Dataset]:
@@ -158,11 +151,9 @@ def _with_axis(study: Study, results: Sequence[xr.Dataset], axis: Axis) -> tuple
         joined = replace(joined, design="blocks", blocks=(Block("product", (axis.name,)), *own))
         # dimensions of points have other names in a study of blocks
         names = {axes: dim for dim, axes in joined.dims.items()}
-        renamed = {dim: names[axes] for dim, axes in study.dims.items() if dim != names[axes]}
-        results = [dataset.rename(renamed) for dataset in results]
-    values = axis.words if axis.words is not None else axis.values
+        results = [dataset.rename({dim: names[axes] for dim, axes in study.dims.items()}) for dataset in results]
     whole = xr.concat([_numbers(dataset, study) for dataset in results], dim=axis.name)
-    return joined, whole.assign_coords({axis.name: list(values)})
+    return joined, whole.assign_coords({axis.name: list(axis.words if axis.words is not None else axis.values)})
 
 
 def _longer(a: Study, b: Study, results: Sequence[xr.Dataset], dim: str) -> tuple[Study, xr.Dataset]:
@@ -182,7 +173,7 @@ def _longer(a: Study, b: Study, results: Sequence[xr.Dataset], dim: str) -> tupl
     fresh = [place for place, there in enumerate(here) if there is None]
     if shared:
         found = diff(first.isel({dim: [here[place] for place in shared]}), second.isel({dim: shared}))
-        if found.statuses or any(distance.cells for distance in found.outputs.values()):
+        if not found.same:
             raise SweepError(f"the results do not fit together: cells that are in both differ\n{found}")
     whole = xr.concat([_numbers(first, a), _numbers(second, b).isel({dim: fresh})], dim=dim)
     axes = dict(a.axes)
@@ -201,5 +192,4 @@ def _longer(a: Study, b: Study, results: Sequence[xr.Dataset], dim: str) -> tupl
 
 def _numbers(dataset: xr.Dataset, study: Study) -> xr.Dataset:
     """Outputs and what is said of them, without coordinates."""
-    found = dataset if ERROR_BOUND in dataset else dataset.assign({ERROR_BOUND: dataset[STATUS] * np.float32(np.nan)})
-    return found[[*study.outputs, *ANCILLARY]].drop_vars(list(dataset.coords)).compute()
+    return dataset[[*study.outputs, *ANCILLARY]].drop_vars(list(dataset.coords)).compute()

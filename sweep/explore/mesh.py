@@ -87,10 +87,9 @@ def largest(corners: Indices, of_edges: Array) -> Indices:
     return np.take_along_axis(corners, edges(corners.shape[1] - 1)[of_edges.argmax(axis=1)], 1)
 
 
-def are_too_few(points: Array) -> bool:
-    """Whether there are fewer points than tell a parabola over a simplex."""
-    number, axes = points.shape
-    return bool(number < axes + 1 + len(edges(axes)))
+def fewest(axes: int) -> int:
+    """Points that tell a parabola over a simplex."""
+    return (axes + 1) * (axes + 2) // 2
 
 
 def with_beyond(corners: Indices) -> Indices:
@@ -131,7 +130,7 @@ def errors_inside(points: Array, heights: Array, kind: Indices, corners: Indices
     size, cut = np.full(len(corners), np.inf), largest(corners, lengths)
     for number in np.unique(kind[kind >= 0]):
         members, here = np.flatnonzero(kind == number), np.flatnonzero((kind[corners] == number).all(axis=1))
-        if not len(here) or are_too_few(points[members]):
+        if not len(here) or len(members) < fewest(axes):
             continue
         around, sizes = with_beyond(np.searchsorted(members, corners[here])), []
         for side in (-1, 1) if axes == 1 else (0,):
@@ -186,7 +185,7 @@ def stretch(points: Array, heights: Array) -> Array:
     """The matrix (axes, axes) by which points are multiplied before those of these heights are joined."""
     axes, valued = points.shape[1], np.isfinite(heights)
     inside, found = points[valued], np.eye(axes)
-    if axes == 1 or are_too_few(inside):
+    if axes == 1 or len(inside) < fewest(axes):
         return found
     (row, column), pairs = np.triu_indices(axes), edges(axes)
     for _ in range(ROUNDS):

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from kernels.interface import Status, machine_code_folder
-from sweep.cells.block import Blocks, Guard, Unsolved, cut, faults_reported, sampled_study
+from sweep.cells.block import Blocks, Guard, cut, faults_reported, sampled_study
 from sweep.cells.compiling import SILENT_SECONDS, Compiling
 from sweep.cells.fingerprint import fingerprint
 from sweep.cells.grid import Grid, SolveCells, empty_cells
@@ -24,7 +24,7 @@ from sweep.cells.sample import require_asked
 from sweep.cells.solve import Solver
 from sweep.cells.timing import Sample, tolerated
 from sweep.errors import SweepError
-from sweep.explore.scaling import advice_on
+from sweep.explore.scaling import scaling
 from sweep.file.frame import cuts_of, expected_size
 from sweep.file.open import memory
 from sweep.runs.isolate import Processes
@@ -34,18 +34,15 @@ from sweep.study.read import Given
 from sweep.study.read import study as as_study
 from sweep.words import Table, duration, paragraph, quantity, seconds_of
 
-TRIAL = 32 << 20
-"""Bytes written to see how fast the disk is,"""
-WORTH_A_TRIAL = 1 << 28
-"""where so many are to be written."""
-ADVICE_SECONDS = 10.0
-"""What looking for superfluous axes may take, of a kernel that may not end."""
+TRIAL, WORTH_A_TRIAL = 32 << 20, 1 << 28
+"""Bytes written to see how fast the disk is, where so many are to be written."""
 DRAWN = 64
 """Cells beside the ends of axes that are solved to see their methods and statuses,"""
-LOOK_SECONDS = 1.0
-"""or as many as can be in this time,"""
-SHARE = 0.25
-"""or in this share of the run. So long may looking for superfluous axes take, too."""
+LOOK_SECONDS, SHARE = 1.0, 0.25
+"""or as many as can be in this time, or this share of the run. So long may looking for superfluous axes take, too."""
+ADVICE_CELLS, ADVICE_SECONDS = 500, 0.1
+"""Cells that are solved for it, about; and what it may always take."""
+NO_ADVICE = "superfluous axes are not looked for, which may take as long as the run; sweep.scaling(study) does"
 RUN_SECONDS = 0.15
 """What any run to a file takes beside its cells: opening, a sample, the end."""
 
@@ -100,23 +97,20 @@ class Plan:
     @property
     def warnings(self) -> list[str]:
         """What should be seen to before the run."""
-        found = []
-        if self.output_bytes > self.free_bytes:
-            needed = quantity(self.output_bytes)
-            found.append(f"the disk is too small: {needed} needed, {quantity(self.free_bytes)} free in {self.folder}")
-        if self.memory_bytes > memory():
-            found.append(f"the memory is too small: {quantity(self.memory_bytes)} needed, {quantity(memory())} there")
-        return found
+        resources = (
+            ("disk", self.output_bytes, self.free_bytes, f"free in {self.folder}"),
+            ("memory", self.memory_bytes, memory(), "there"),
+        )
+        return [
+            f"the {what} is too small: {quantity(needed)} needed, {quantity(there)} {where}"
+            for what, needed, there, where in resources
+            if needed > there
+        ]
 
     def __str__(self) -> str:
         def shares(found: dict[str, float]) -> str:
-            """Neither none nor all, where it is not."""
-            sample = f" of a sample of {self.sampled:,} cell{'s' * (self.sampled > 1)}"
-            texts = [
-                f"{name} {'< 1' if share < 0.005 else '> 99' if 0.995 < share < 1 else format(100 * share, '.0f')} %"
-                for name, share in found.items()
-            ]
-            return ", ".join(texts) + sample if found else ""
+            texts = ", ".join(f"{name} {100 * share:.3g} %" for name, share in found.items())
+            return f"{texts} of a sample of {self.sampled:,} cell{'s' * (self.sampled > 1)}"
 
         when = "just now; the machine code is kept" if _is_kept(self.kernel) else "of it, before the first cell"
         shape = " x ".join(f"{name} {n:,}" for name, n in self.shape.items())
@@ -179,32 +173,29 @@ def plan(
     folder = Path(path).absolute().parent if path is not None else Path.cwd()
     if not folder.is_dir():
         raise SweepError(f"{path}: there is no folder {folder}")
-    if not isolate and cell_timeout is None:
-        compiling = Compiling(study.kernel, study.kernel_name, note)
-        sample = sampled_study(study, compiling)
-        found = _forecast(study, sample, crew, folder, Guard(Solver(study), lambda cell: None))
-        with faults_reported(f"{study.kernel_name}: the kernel failed"):
-            advice = advice_on(study, SHARE * found.seconds)
-        compiled = sum(compiling.seconds.values())
-        again = 0.0 if _is_kept(study.kernel_name) else compiled
-        return replace(found, seconds=found.seconds + again, compile_seconds=compiled, scaling=advice)
-
-    # every run of a kernel that may crash, or never end, begins processes, and compiles it, anew
-    processes = Processes(study, None if cell_timeout is None else seconds_of("cell_timeout", cell_timeout), 1)
-    try:
+    if isolate or cell_timeout is not None:
+        # every run of a kernel that may crash, or never end, begins processes, and compiles it, anew
+        processes = Processes(study, None if cell_timeout is None else seconds_of("cell_timeout", cell_timeout), 1)
         begun = time.monotonic()
-        sample = processes.sampled()
-        solver = processes.solver()
-        starting = time.monotonic() - begun - solver.seconds
-        found = _forecast(study, sample, crew, folder, solver)
         try:
-            advice = solver.call(ADVICE_SECONDS, advice_on, study.to_json(), SHARE * found.seconds)
-        except Unsolved as fault:
-            advice = f"not known; while cells were tried at random, {fault}"
-    finally:
-        processes.end()
-    compiled = starting if starting > SILENT_SECONDS else 0.0
-    return replace(found, seconds=starting + found.seconds, compile_seconds=compiled, scaling=advice)
+            sample, solver = processes.sampled(), processes.solver()
+            starting = time.monotonic() - begun - solver.seconds
+            found = _forecast(study, sample, crew, folder, solver)
+        finally:
+            processes.end()
+        compiled = starting if starting > SILENT_SECONDS else 0.0
+        return replace(found, seconds=starting + found.seconds, compile_seconds=compiled, scaling=NO_ADVICE)
+
+    compiling = Compiling(study.kernel, study.kernel_name, note)
+    sample = sampled_study(study, compiling)
+    found = _forecast(study, sample, crew, folder, Guard(Solver(study), lambda cell: None))
+    advice = NO_ADVICE
+    if ADVICE_CELLS * found.cell_seconds < max(SHARE * found.seconds, ADVICE_SECONDS):
+        with faults_reported(f"{study.kernel_name}: the kernel failed"):
+            advice = scaling(study).advice
+    compiled = sum(compiling.seconds.values())
+    again = 0.0 if _is_kept(study.kernel_name) else compiled
+    return replace(found, seconds=found.seconds + again, compile_seconds=compiled, scaling=advice)
 
 
 def _is_kept(kernel: str) -> bool:
@@ -289,7 +280,5 @@ def _disk_speed(folder: Path) -> float:
 def small_duration(seconds: float) -> str:
     """Seconds as people say them where there may be few: `5.1 ns`, `20 us`, `3.4 ms`, `2.0 s`."""
     seconds = float(f"{seconds:.3g}")
-    for unit, size in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6)):
-        if seconds >= size:
-            return f"{seconds / size:.3g} {unit}"
-    return f"{seconds / 1e-9:.3g} ns"
+    unit, size = next(((u, s) for u, s in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6)) if seconds >= s), ("ns", 1e-9))
+    return f"{seconds / size:.3g} {unit}"

@@ -1,11 +1,8 @@
 """Cells where they are needed: a finished sweep refined until straight lines between cells are accurate to a tolerance.
 
-Cells are joined to simplices, intervals along one axis, in a box stretched to where an output bends. What is there is
-judged first: the cells around a simplex tell how far straight lines are off in it (`mesh`). Where that is more than the
-tolerance, the edge that bends most is cut in the middle, and the cells around are judged again (`refiner`). So is the
-edge across a border between statuses, down to a fixed share of the first grid's step. Where values scatter, so that
-further cells are off as much as those before, none are added. What is judged is logarithmic where values are positive,
-as a scaling law wants it; elsewhere errors are relative to the largest value.
+What is there is judged first: the cells around tell how far straight lines between neighbours are off. Where that is
+too much, and across a border between statuses, cells are put between them (`refiner`). Errors are those of logarithms
+where values are positive, as a scaling law wants it; elsewhere they are relative to the largest value.
 
 Cells of one axis are a sweep over its values like any other. Cells of more axes lie anywhere, as those of a zip design.
 """
@@ -13,7 +10,7 @@ Cells of one axis are a sweep over its values like any other. Cells of more axes
 from __future__ import annotations
 
 import dataclasses
-import hashlib
+import itertools
 import json
 import math
 import os
@@ -26,14 +23,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kernels.interface import Status
-from sweep.cells.fingerprint import fingerprint
 from sweep.cells.schema import ANCILLARY, STATUS, cell_schema
 from sweep.errors import SweepError
 from sweep.explore.mesh import Array
 from sweep.explore.refiner import SAME, Refiner
 from sweep.explore.scattered import MOST_AXES, REFINED_TO, axes_of
 from sweep.file import disk
-from sweep.file.open import in_memory, open_result
+from sweep.file.open import in_memory
 from sweep.file.overwriting import check_target
 from sweep.runs.run import run, store_cells
 from sweep.study.model import Axis, Study, frozen
@@ -86,8 +82,7 @@ class Refinement:
     noise: float = 0.0
 
     def __str__(self) -> str:
-        cells = self.dataset[STATUS].size
-        text = f"{cells:,} cells, {self.added:,} of them added"
+        text = f"{self.dataset[STATUS].size:,} cells, {self.added:,} of them added"
         if len(self.unseen) == 1:
             text += f"; an even grid as fine has {self.uniform:,}"
         text += f"\ninterpolation error left: {self.error:.2g}, as the cells around tell"
@@ -129,7 +124,7 @@ def refine(
         Relative error of the interpolation.
     path : path, optional
         Where all cells are written at the end, an HDF5 file as of `run`; the rounds on the way are kept beside it until
-        then, so that what was computed is not lost. None: in memory.
+        then, and the same call continues after the last of them. None: in memory.
     study : Study, optional
         That of the dataset; default: the one in its attributes.
     most_cells : int
@@ -137,13 +132,13 @@ def refine(
     workers, isolate, cell_timeout
         As of `run`.
     force : bool
-        Overwrite the result of another study.
+        Overwrite what is at `path`, and give up the rounds of an earlier call.
 
     Raises
     ------
     SweepError
         The dataset is not a finished product of number axes, and was not refined before; an output does not exist or
-        has a coordinate of its own; `path` cannot be written.
+        has a coordinate of its own; `path` is there already, or cannot be written.
 
     Examples
     --------
@@ -157,34 +152,32 @@ def refine(
     study = study or as_study(dataset)
     names = [y] if isinstance(y, str) else list(y)
     _require(dataset, study, names, tolerance)
-    title = f"{study.title}, refined"
     target = None if path is None else as_path(path)
-    rounds = None if target is None else _folder_of_rounds(target, title, dataset.encoding.get("source"), force)
+    rounds = None if target is None else _folder_of_rounds(target, dataset.encoding.get("source"), force)
+    numbers = itertools.count(1)
     options: dict[str, Any] = {"workers": workers, "isolate": isolate, "cell_timeout": cell_timeout}
 
     def of(values: Mapping[str, Array], design: str = "zip") -> Study:
         axes = {name: Axis(name, frozen(column), "values") for name, column in values.items()}
-        return dataclasses.replace(study, design=design, blocks=(), axes=axes, title=title)
+        return dataclasses.replace(study, design=design, blocks=(), axes=axes, title=f"{study.title}, refined")
 
     def solve(values: Mapping[str, Array]) -> xr.Dataset:
         """A round of cells; of one that an earlier call has computed, the file is there."""
-        further = of(values)
-        if rounds is None:
-            return run(further, progress=False, **options)
-        name = hashlib.sha256(repr(sorted(fingerprint(further).items())).encode()).hexdigest()[:16]
-        with run(further, rounds / f"{name}.h5", **options) as found:
+        file = None if rounds is None else rounds / f"{next(numbers)}.h5"
+        with run(of(values), file, progress=file is not None, **options) as found:
             return found.load()
 
     cells = Refiner(dataset, study, names, tolerance, most_cells, solve)
     cells.refine()
-    order = np.lexsort(cells.values.T[::-1])
-    whole = of(dict(zip(cells.axes, cells.values[order].T, strict=True)), "product" if len(cells.axes) == 1 else "zip")
+    values = {name: cells.column(name) for name in cells.axes}
+    order = np.lexsort(list(values.values())[::-1])
+    whole = of({name: column[order] for name, column in values.items()}, "product" if len(values) == 1 else "zip")
     arrays = {name: cells.column(name)[order] for name in (*study.outputs, *ANCILLARY)}
     attrs = {REFINED_TO: json.dumps(dict.fromkeys(names, tolerance))}
-    if target is None:
+    if target is None or rounds is None:
         return report(cells, in_memory(cell_schema(whole, {}), arrays).assign_attrs(attrs))
     found = report(cells, store_cells(whole, target, arrays, force, attrs=attrs))
-    shutil.rmtree(rounds, ignore_errors=True)  # type: ignore[arg-type]
+    shutil.rmtree(rounds, ignore_errors=True)
     return found
 
 
@@ -210,15 +203,13 @@ def _require(dataset: xr.Dataset, study: Study, names: Sequence[str], tolerance:
         raise SweepError("the sweep is not finished; run it to its end first")
 
 
-def _folder_of_rounds(target: Path, title: str, source: str | None, force: bool) -> Path:
+def _folder_of_rounds(target: Path, source: str | None, force: bool) -> Path:
     """Where the rounds on the way to a result are kept. Raises SweepError where it is not to be written."""
-    check_target(target, force=True, read=[Path(source)] if source else [])
-    if target.exists() and not force:
-        with open_result(target) as there:
-            if there.attrs["title"] != title:
-                raise SweepError(f"{target}: holds another result; name another file, or overwrite it with --force")
+    check_target(target, force=force, read=[Path(source)] if source else [])
     rounds = target.with_name(f"{target.name}.rounds")
     with disk.refusing(target):
+        if force:
+            shutil.rmtree(rounds, ignore_errors=True)
         rounds.mkdir(exist_ok=True)
     return rounds
 

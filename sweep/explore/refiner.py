@@ -1,9 +1,10 @@
 """Rounds of cuts of edges between cells, until straight lines between them are accurate to a tolerance.
 
-In every round cells are joined to simplices, each of which is judged: inside of one status by the cells around it
-(`mesh`), across a border between statuses by how long its edges are. An edge of each that is not good enough is cut in
-the middle. Where cuts lessen nothing, more of them are of no use: an edge is left alone once it is as short as is
-allowed, or beside a pole; and where errors stay as they are all over a region, values are noisy there.
+In every round cells are joined to simplices, intervals along one axis, in a box stretched to where an output bends.
+Each is judged: inside of one status by the cells around it (`mesh`), across a border between statuses by the length of
+its edges. Where that is not good enough an edge is cut in the middle, down to a fixed share of the first grid's step.
+Beside a pole, where cuts lessen nothing, edges are left alone; where errors stay as they are all over a region, values
+are noisy, and no more cells are added.
 """
 
 from __future__ import annotations
@@ -47,8 +48,6 @@ NOISE_SIZE = 8.0
 SAME = 2.0**-40
 """Distance of places along an axis, from 0 to 1, that are the same."""
 
-Solve = Callable[[Mapping[str, Array]], "xr.Dataset"]
-
 
 class Judged(NamedTuple):
     """Simplices: their corners, errors, the edges (m, 2) to cut, and whether these need a cut, are not to be cut
@@ -74,34 +73,32 @@ class Refiner:
         Outputs.
     solve : callable
         Given values of the axes, as a zip of them: a Dataset of these cells.
-
-    Attributes
-    ----------
-    points, values : ndarray, shape (cells, axes)
-        Where the cells lie in a box from 0 to 1, and on the axes.
-    origins : ndarray of int, shape (cells, 2)
-        The two cells that each was put between; of the first ones, itself.
-    first : int
-        How many cells there were.
-    found : Judged
-        All that is left, of every output.
-    noise : dict of str to float
-        How far values of an output scatter, which more cells do not lessen; 0 where they do.
     """
 
     def __init__(
-        self, dataset: xr.Dataset, study: Study, names: Sequence[str], tolerance: float, most_cells: int, solve: Solve
+        self,
+        dataset: xr.Dataset,
+        study: Study,
+        names: Sequence[str],
+        tolerance: float,
+        most_cells: int,
+        solve: Callable[[Mapping[str, Array]], xr.Dataset],
     ) -> None:
-        self.tolerance, self.most, self._solve = tolerance, most_cells, solve
-        self.parts, self.axes = [_flat(dataset.load())], list(study.axes)
-        self.box = Box.of(self.parts[0], self.axes)
-        self.points = self.box.points(self.parts[0])
-        self.values = np.stack([self.parts[0][name].values for name in self.axes], axis=1)
+        self.tolerance, self.most, self._solve, self.axes = tolerance, most_cells, solve, list(study.axes)
+        cells = dataset.load()
+        if cells[STATUS].ndim > 1:
+            # all along one dimension, which is the first one of traces too
+            cells = cells.stack(cell=list(cells[STATUS].dims), create_index=False).transpose("cell", ...)
+        self.parts, self.box = [cells], Box.of(cells, self.axes)
+        self.points = self.box.points(cells)  # from 0 to 1, shape (cells, axes)
         self.first = len(self.points)
+        # the two cells that each was put between; of the first ones, itself
         self.origins = np.stack([np.arange(self.first)] * 2, axis=1)
-        self._known = [dict(zip(_keys(t), v, strict=True)) for t, v in zip(self.points.T, self.values.T, strict=True)]
+        values = [cells[name].values for name in self.axes]
+        self._known = [dict(zip(_keys(t), v, strict=True)) for t, v in zip(self.points.T, values, strict=True)]
         even = study.design != "product"
         self._steps = np.array([self.first ** (1 / len(self.axes)) if even else len(k) - 1 for k in self._known])
+        # how far values of an output scatter, which more cells do not lessen; 0 where they do
         self.noise = dict.fromkeys(names, 0.0)
         self._to_cut: dict[str, list[tuple[int, float]]] = {name: [] for name in names}
 
@@ -140,13 +137,13 @@ class Refiner:
 
     def _add(self, points: Array, ends: Indices | None = None) -> None:
         """Solves further cells, maybe in the middles between two others; a value that an axis has is taken again."""
-        values = np.empty(points.shape)
-        for k, known in enumerate(self._known):
-            there = self.box.values(k, points[:, k])
-            values[:, k] = [known.setdefault(t, v) for t, v in zip(_keys(points[:, k]), there, strict=True)]
+        values = {}
+        for k, (name, known) in enumerate(zip(self.axes, self._known, strict=True)):
+            there = zip(_keys(points[:, k]), self.box.values(k, points[:, k]), strict=True)
+            values[name] = np.array([known.setdefault(place, value) for place, value in there])
+        self.parts.append(self._solve(values))
         itself = len(self.points) + np.arange(len(points))
-        self.parts.append(_flat(self._solve(dict(zip(self.axes, values.T, strict=True)))))
-        self.points, self.values = np.concatenate([self.points, points]), np.concatenate([self.values, values])
+        self.points = np.concatenate([self.points, points])
         self.origins = np.concatenate([self.origins, np.stack([itself] * 2, axis=1) if ends is None else ends])
 
     def _judged(self, name: str, stretched: Array) -> Judged:
@@ -235,10 +232,3 @@ def _keys(places: Array) -> list[float]:
     """Places along an axis, alike where rounding alone tells them apart."""
     found: list[float] = np.round(places / SAME).tolist()
     return found
-
-
-def _flat(dataset: xr.Dataset) -> xr.Dataset:
-    """With all its cells along one dimension, which is the first one of traces too."""
-    if dataset[STATUS].ndim == 1:
-        return dataset
-    return dataset.stack(cell=list(dataset[STATUS].dims), create_index=False).transpose("cell", ...)

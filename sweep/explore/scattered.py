@@ -132,31 +132,30 @@ def interpolated(dataset: xr.Dataset, at: Mapping[str, Sequence[float] | Array])
     if set(at) != set(names):
         raise SweepError(f"at: expected values of {', '.join(names)}, found {', '.join(at) or 'none'}")
     grids = {name: np.asarray(values, dtype=np.float64) for name, values in at.items()}
-    mesh = dict(zip(grids, (m.ravel() for m in np.meshgrid(*grids.values(), indexing="ij")), strict=True))
-    shape = tuple(len(values) for values in grids.values())
-    box = Box.of(dataset, names)
-    points, places = box.points(dataset), box.points(mesh)
+    mesh = np.meshgrid(*grids.values(), indexing="ij")
+    box, shape, status = Box.of(dataset, names), mesh[0].shape, dataset[STATUS].values
+    points = box.points(dataset)
+    places = box.points({name: column.ravel() for name, column in zip(grids, mesh, strict=True)})
     corners, shares, *_ = located(points, places)
     nearest = np.take_along_axis(corners, shares.argmax(axis=1)[:, None], 1)[:, 0]  # with the largest share
+    valued = status[nearest] < FIRST_REFUSAL
     found = xr.Dataset(coords={name: (name, values, dataset[name].attrs) for name, values in grids.items()})
-    status, error = dataset[STATUS].values, np.zeros(len(places))
-    refined, inaccurate = json.loads(dataset.attrs.get(REFINED_TO, "{}")), np.zeros(len(places), bool)
+
+    def put(name: Any, values: Any) -> None:
+        found[name] = (tuple(grids), values.reshape(shape), dataset[name].attrs)
+
+    refined, inaccurate = json.loads(dataset.attrs.get(REFINED_TO, "{}")), status[nearest] == Status.INACCURATE
+    error = np.zeros(len(places))
     for name, variable in dataset.data_vars.items():
         if variable.dims == dataset[STATUS].dims and variable.dtype.kind == "f" and name != ERROR_BOUND:
             between, off = _between(variable.values, points, places, status)
-            values = np.where(np.isnan(variable.values[nearest]), np.nan, between)
-            found[name] = (tuple(grids), values.reshape(shape), variable.attrs)
+            put(name, np.where(np.isnan(variable.values[nearest]), np.nan, between))
             if name in refined or not refined:
                 error = np.maximum(error, off)
                 inaccurate |= ~(off <= refined.get(name, sys.float_info.max))
-    inaccurate |= status[nearest] == Status.INACCURATE
-    inaccurate &= status[nearest] < FIRST_REFUSAL
-    told = np.where(inaccurate, np.int8(Status.INACCURATE), status[nearest])
-    found[STATUS] = (tuple(grids), told.reshape(shape), dataset[STATUS].attrs)
+    put(STATUS, np.where(inaccurate & valued, np.int8(Status.INACCURATE), status[nearest]))
     if ERROR_BOUND in dataset:
-        known = np.fmax(error, dataset[ERROR_BOUND].values[nearest])
-        bound = np.where(status[nearest] < FIRST_REFUSAL, known, np.nan)
-        found[ERROR_BOUND] = (tuple(grids), bound.reshape(shape), dataset[ERROR_BOUND].attrs)
+        put(ERROR_BOUND, np.where(valued, np.fmax(error, dataset[ERROR_BOUND].values[nearest]), np.nan))
     return found.assign_attrs(dataset.attrs)
 
 
@@ -214,39 +213,28 @@ def on_lines(dataset: xr.Dataset, x: str) -> xr.Dataset:
     names = axes_of(dataset)
     if x not in names:
         return dataset
-    others = [name for name in names if name != x]
-    values, dims = dataset[x].values, dataset[STATUS].dims
-    cell = str(dims[0])
+    others, values, (cell,) = [name for name in names if name != x], dataset[x].values, dataset[STATUS].dims
     places = np.stack([dataset[name].values for name in others], axis=1)
     lines, line, count = np.unique(places, axis=0, return_inverse=True, return_counts=True)
     line = line.ravel()
     long = count >= FEWEST_ON_A_LINE
     for end in (values.min(), values.max()):
         long &= np.isin(np.arange(len(lines)), line[values == end])
-
-    def longest(some: NDArray[np.bool_]) -> str:
-        """How to ask for that one of some lines that has most cells."""
-        most = int(np.where(some, count, -1).argmax())
-        at = " ".join(f"--at {name}={float(value)!r}" for name, value in zip(others, lines[most], strict=True))
-        return f"e.g. {at} ({count[most]} cells)"
-
+    at = " ".join(f"--at {n}={float(v)!r}" for n, v in zip(others, lines[count.argmax()], strict=True))
+    longest = f"e.g. {at} ({count.max()} cells)"
     if not long.any():
         raise SweepError(
-            f"{x}: no {FEWEST_ON_A_LINE} cells lie on one line from end to end of it; pick another axis, or "
-            f"{longest(count > 0)}"
+            f"{x}: no {FEWEST_ON_A_LINE} cells lie on one line from end to end of it; pick another axis, or {longest}"
         )
-    told = f"{count[long].sum()} of {count.sum()} cells lie on {long.sum()} lines from end to end of {x}; take one by "
-    told += f"--at, {longest(long)}"
-    shorter = (count[~long] >= FEWEST_ON_A_LINE).any()
-    told += f", or a shorter one, {longest(~long)}." if shorter else f"; no shorter line has {FEWEST_ON_A_LINE}."
-    across = others[0] if len(others) == 1 else "line"
-    labels = lines[:, 0]
+    told = f"{count[long].sum()} of {count.sum()} cells lie on {long.sum()} lines from end to end of {x}"
+    across, labels = others[0], lines[:, 0]
     if len(others) > 1:
+        across = "line"
         labels = np.array([", ".join(f"{n} = {v:.6g}" for n, v in zip(others, place, strict=True)) for place in lines])
-    outputs = [name for name, v in dataset.data_vars.items() if v.dims == dims and v.dtype == np.float64]
-    cells = dataset[outputs].drop_vars([n for n, c in dataset.coords.items() if c.dims == dims])
-    cells = cells.assign_coords({across: (dims, np.arange(len(lines))[line]), x: (dims, values)})
+    outputs = [name for name, v in dataset.data_vars.items() if v.dims == (cell,) and v.dtype == np.float64]
+    cells = dataset[outputs].drop_vars([n for n, c in dataset.coords.items() if c.dims == (cell,)])
+    cells = cells.assign_coords({across: (cell, np.arange(len(lines))[line]), x: (cell, values)})
     both: Any = {cell: [across, x]}
-    found = cells.isel({cell: long[line]}).set_index(both).unstack(cell)
+    found = cells.isel({cell: long[line]}).set_index(both).unstack(str(cell))
     found = found.assign_coords({across: labels[long], x: found[x].assign_attrs(dataset[x].attrs)})
-    return found.assign_attrs(lines=told)
+    return found.assign_attrs(lines=f"{told}; take any line by --at, {longest}.")

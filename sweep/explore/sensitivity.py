@@ -63,10 +63,9 @@ def sensitivity(dataset: xr.Dataset, y: str | xr.DataArray) -> xr.Dataset:
     if study is None or study.design not in ("saltelli", "morris"):
         raise SweepError('the design of the result is neither "saltelli" nor "morris"; sensitivity needs one of these')
     found = dataset[y] if isinstance(y, str) and y in dataset else y
-    if not isinstance(found, xr.DataArray):
-        raise SweepError(f"there is no output {found!r}; there are {', '.join(map(str, dataset.data_vars))}")
-    if found.dims != dataset["status"].dims:
-        raise SweepError("y: expected one value a cell; choose a place along its other dimensions")
+    if not isinstance(found, xr.DataArray) or found.dims != dataset["status"].dims:
+        known = ", ".join(str(name) for name, v in dataset.data_vars.items() if v.dims == dataset["status"].dims)
+        raise SweepError(f"there is no output {y!r} of one value a cell; there are {known}")
     values = np.asarray(found.values, float)
     lost = int((~np.isfinite(values)).sum())
     if lost:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import warnings
 from collections import namedtuple
 from collections.abc import Sequence
@@ -16,7 +17,7 @@ from sweep.errors import SweepError
 from sweep.study.model import SETTINGS, Study
 from sweep.study.read import Given
 from sweep.study.read import study as as_study
-from sweep.words import did_you_mean, listed
+from sweep.words import listed
 
 
 class PointSolver:
@@ -42,6 +43,8 @@ class PointSolver:
         self._study, self._grid = study, _Points(study)
         self._solver = Guard(Solver(study, self._grid), _warn)
         self._solved: Any = namedtuple("solved", self.fields)  # type: ignore[misc]  # as many as the study asks for
+        one = inspect.Parameter.POSITIONAL_OR_KEYWORD
+        self._signature = inspect.Signature([inspect.Parameter(name, one) for name in self.names])
 
     def __call__(self, *values: Any, **named: Any) -> Any:
         """Outputs and status of cells.
@@ -61,29 +64,19 @@ class PointSolver:
         Raises
         ------
         SweepError
-            A parameter is missing, unknown or given twice.
+            A parameter is missing, unknown, given twice, or no number.
         """
         given: Sequence[Any] = values
-        if named or len(values) != len(self.names):
-            by_name = dict(zip(self.names, values, strict=False))
-            for name in named:
-                if name not in self.names:
-                    hint = did_you_mean(name, self.names) or f"; it takes {listed(self.names, word='and')}"
-                    raise SweepError(f"{name}: the study has no such axis{hint}")
-                if name in by_name:
-                    raise SweepError(f"{name} is given twice")
-            by_name |= named
-            if (count := max(len(by_name), len(values))) != len(self.names):
-                expected = listed(self.names, word="and")
-                raise SweepError(f"expected {expected}, found {count} of {len(self.names)} values")
-            given = [by_name[name] for name in self.names]
         try:
+            if named or len(values) != len(self.names):
+                given = self._signature.bind(*values, **named).args
             points = np.array(np.broadcast_arrays(*given), np.float64)
         except (TypeError, ValueError) as error:
-            raise SweepError(f"{listed(self.names, word='and')}: expected numbers or arrays, found {error}") from None
+            expected = listed(self.names, word="and")
+            raise SweepError(f"expected numbers, or arrays of them, for {expected}: {error}") from None
         shape = points.shape[1:]
-        self._grid.given = points.reshape(len(self.names), -1)
-        cells = empty_cells(self._study, self._grid.given.shape[1])
+        self._grid.given = dict(zip(self.names, points.reshape(len(self.names), -1), strict=True))
+        cells = empty_cells(self._study, points[0].size)
         self._solver.solve(0, cells)
         outputs = (cells.outputs[name].reshape(shape + cells.outputs[name].shape[1:]) for name in self._study.outputs)
         columns = (*outputs, cells.status.reshape(shape))
@@ -91,24 +84,23 @@ class PointSolver:
 
 
 class _Points(Grid):
-    """Cells whose values on the axes are set before they are solved: `given`, shape (axes, cells)."""
+    """Cells whose values on the axes are set before they are solved: `given`, by axis."""
 
     def __init__(self, study: Study) -> None:
         super().__init__(study)
-        self.size, self.given = np.iinfo(np.int64).max, np.empty((len(study.axes), 0))
-        self._places = {name: place for place, name in enumerate(study.axes)}
+        self.size, self.given = np.iinfo(np.int64).max, dict[str, Any]()
 
     def spreads(self) -> dict[int, Any]:
         return super().spreads() | dict.fromkeys(self.varying)
 
     def column(self, name: str, start: int, stop: int) -> Any:
-        return self.given[self._places[name], start:stop]
+        return self.given[name][start:stop]
 
     def values(self, name: str, cells: Any) -> Any:
-        return self.given[self._places[name], cells]
+        return self.given[name][cells]
 
     def cell(self, index: int) -> dict[str, str]:
-        return {name: repr(float(values[index])) for name, values in zip(self._places, self.given, strict=True)}
+        return {name: repr(float(values[index])) for name, values in self.given.items()}
 
 
 def _warn(cell: BadCell) -> None:

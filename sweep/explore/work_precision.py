@@ -10,6 +10,7 @@ shares of cells and counts of work are not.
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -33,8 +34,7 @@ from sweep.words import Table, did_you_mean, listed, page, paragraph
 
 TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13)
 CELLS = 1024
-ROUNDS = 5
-LEAST_SECONDS = 0.01
+ROUNDS, LEAST_SECONDS = 5, 0.01
 FINE = tuple(10.0**-k for k in range(14, 5, -1))
 """Values of rtol that a reference is tried at: in each cell the least at which it says OK counts."""
 GIVEN, ROUNDING = "the truth given", 2.0**-53
@@ -138,40 +138,55 @@ def work_precision(
         raise SweepError(f"cells: expected at least 1, found {cells}")
     part = sampled(as_study(study), cells)
     able = [part.kernel.methods[number].name for number in usable_methods(part)]
-    if not able:
-        raise SweepError("no method of the kernel can do this study")
     names = ["auto", *able] if methods is None else list(dict.fromkeys(methods))
-    for name in names if reference is None else [*names, reference]:
-        if name not in able and (name != "auto" or name == reference):
-            hint = did_you_mean(name, able) or f"; there are auto, {', '.join(able)}"
-            raise SweepError(f"no method {name} that can do this study{hint}")
+    _require(names, reference, able)
     if isolate or cell_timeout is not None:
         part = _without_failing(part, ["auto", *able], cell_timeout, note)
     against = _given(part, truth) if truth is not None else _best(part, [reference] if reference else able)
-    missing = []
-    for method in part.kernel.methods if methods is None else ():
-        if method.name not in able:
-            terms = [name for name in method.excludes if name in part.terms]
-            lacks = [name for name in method.lacks if name in part.outputs]
-            missing.append(f"{method.name} {'cannot do' if terms else 'does not give'} {', '.join(terms or lacks)}")
     rows = [_measured(part, name, rtol, against) for name in names for rtol in tolerances]
     columns = {key: np.array([row[key] for row in rows]).reshape(len(names), -1) for key in rows[0]}
     columns["seconds"] = _seconds(part, names, tolerances)
-    about = {key: {"units": "s" if key == "seconds" else "1", "long_name": LONG_NAMES[key]} for key in columns}
     found = xr.Dataset(
-        {key: (("method", "rtol"), values, about[key]) for key, values in columns.items()},
+        {
+            key: (("method", "rtol"), values, {"units": "s" if key == "seconds" else "1", "long_name": LONG_NAMES[key]})
+            for key, values in columns.items()
+        },
         {"method": names, "rtol": tolerances},
     )
+    missing = [] if methods is not None else _missing(part, able)
     return found.assign_attrs(
         title=part.title,
         kernel=part.kernel_name,
         cells=against.judged,
-        open_cells=Grid(part).size - against.judged,
+        open_cells=len(against.floor) - against.judged,
         reference=against.source,
         reference_error=float(against.floor[against.sound].max(initial=0.0)) if against.sound.any() else math.nan,
         missing="; ".join(missing),
-        omissions="; ".join([*missing, *omissions(found)]),
+        omissions="; ".join([*missing, *_omissions(found)]),
     )
+
+
+def _require(names: Sequence[str], reference: str | None, able: Sequence[str]) -> None:
+    """Raises SweepError where a method that is asked for cannot do the study, or none is asked for."""
+    if not able:
+        raise SweepError("no method of the kernel can do this study")
+    if not names:
+        raise SweepError(f"methods: expected at least one of auto, {', '.join(able)}; found none")
+    for name, known in [*((name, ["auto", *able]) for name in names), *([(reference, able)] if reference else [])]:
+        if name not in known:
+            hint = did_you_mean(name, able) or f"; there are {', '.join(known)}"
+            raise SweepError(f"no method {name} that can do this study{hint}")
+
+
+def _missing(study: Study, able: Sequence[str]) -> list[str]:
+    """Which methods cannot do a study, and why."""
+    found = []
+    for method in study.kernel.methods:
+        if method.name not in able:
+            terms = [name for name in method.excludes if name in study.terms]
+            lacks = [name for name in method.lacks if name in study.outputs]
+            found.append(f"{method.name} {'cannot do' if terms else 'does not give'} {', '.join(terms or lacks)}")
+    return found
 
 
 def _without_failing(
@@ -179,11 +194,10 @@ def _without_failing(
 ) -> Study:
     """The cells at which no method fails, found in processes of their own. Raises SweepError where there is none."""
     good = np.ones(Grid(study).size, bool)
-    for method in methods:  # auto also tries, on cells, methods that cannot do the whole study
-        for rtol in EXTREMES:
-            trial = with_method(study, method, rtol)
-            found = run(trial, progress=False, isolate=True, cell_timeout=cell_timeout)
-            good &= found[STATUS].values.ravel() != Status.FAILED
+    # auto also tries, on cells, methods that cannot do the whole study
+    for method, rtol in itertools.product(methods, EXTREMES):
+        found = run(with_method(study, method, rtol), progress=False, isolate=True, cell_timeout=cell_timeout)
+        good &= found[STATUS].values.ravel() != Status.FAILED
     if good.all():
         return study
     text = f"the kernel fails at {(~good).sum()} of {good.size} cells, e.g. {_cell(study, int(good.argmin()))}"
@@ -222,19 +236,15 @@ def precision_text(found: xr.Dataset, complete: bool = False) -> str:
     return page(table, paragraph(basis), paragraph(left_out))
 
 
-def omissions(found: xr.Dataset) -> list[str]:
+def _omissions(found: xr.Dataset) -> list[str]:
     """What fails where, in words."""
-    lines = []
-    for name in found["method"].values:
+    lines, faults = [], (("unsolved", "does not solve", "unsolved_as"), ("silent", "is silently wrong in", "silent_at"))
+    for name, (key, verb, where) in itertools.product(found["method"].values, faults):
         row = found.sel({"method": name})
-        for key, verb, where in (
-            ("unsolved", "does not solve", "unsolved_as"),
-            ("silent", "is silently wrong in", "silent_at"),
-        ):
-            shares, places = row[key].values, row[where].values
-            if shares.any():
-                at = ", ".join(f"{100 * s:.3g} % at {r:.0e}" for s, r in zip(shares, row.rtol.values, strict=True) if s)
-                lines.append(f"{name} {verb} {at}, first {next(place for place in places if place)}")
+        if row[key].any():
+            shares = zip(row[key].values, row.rtol.values, strict=True)
+            at = ", ".join(f"{100 * share:.3g} % at {rtol:.0e}" for share, rtol in shares if share)
+            lines.append(f"{name} {verb} {at}, first {next(place for place in row[where].values if place)}")
     return lines
 
 
@@ -325,8 +335,6 @@ def _measured(study: Study, name: str, rtol: float, against: _Reference) -> dict
     unsolved = against.sound & ~valued
     wrong = sure & ~(error <= rtol + against.floor) | against.void & (status == Status.OK)
     first, worst = int(unsolved.argmax()), int(np.where(sure, error, -1.0).argmax())
-    # no number between two cells: errors may be infinite
-    low, high = np.quantile(error[valued], (0.1, 0.9), method="inverted_cdf") if valued.any() else [math.nan] * 2
     counts = {method: int((used == i).sum()) for i, method in enumerate(methods)}
     shares = {
         "ok": against.sound & (status == Status.OK),
@@ -335,8 +343,11 @@ def _measured(study: Study, name: str, rtol: float, against: _Reference) -> dict
         "unsolved": unsolved,
         "silent": wrong,
     }
+    # NaN where there are none; no number between two cells, for errors may be infinite
+    errors = error[valued] if valued.any() else np.array([math.nan])
+    low, high = np.quantile(errors, (0.1, 0.9), method="inverted_cdf")
     return {
-        "error_median": np.median(error[valued]) if valued.any() else math.nan,
+        "error_median": np.median(errors),
         "error_low": low,
         "error_high": high,
         "error_worst": error[worst] if sure.any() else math.nan,
@@ -355,16 +366,14 @@ def _seconds(study: Study, names: Sequence[str], tolerances: Sequence[float]) ->
     Time is what this thread spends: what else runs on the machine matters less.
     """
     best = np.full((len(names), len(tolerances)), math.inf)
-    for _ in range(ROUNDS):
-        for i, name in enumerate(names):
-            for j, rtol in enumerate(tolerances):
-                trial = with_method(study, name, rtol)
-                cells, solver = empty_cells(trial, Grid(trial).size), Solver(trial)
-                count, begin = 0, time.thread_time()
-                while (spent := time.thread_time() - begin) < LEAST_SECONDS or not count:
-                    solver.solve(0, cells)
-                    count += 1
-                best[i, j] = min(best[i, j], spent / count / cells.number)
+    for _, (i, name), (j, rtol) in itertools.product(range(ROUNDS), enumerate(names), enumerate(tolerances)):
+        trial = with_method(study, name, rtol)
+        cells, solver = empty_cells(trial, Grid(trial).size), Solver(trial)
+        count, begin = 0, time.thread_time()
+        while (spent := time.thread_time() - begin) < LEAST_SECONDS or not count:
+            solver.solve(0, cells)
+            count += 1
+        best[i, j] = min(best[i, j], spent / count / cells.number)
     return best
 
 

@@ -63,10 +63,10 @@ def test_what_is_refused_is_nan_and_says_why():
 @pytest.mark.parametrize(
     ("values", "named", "word"),
     [
-        ((1.0,), {}, "1 of 2"),
-        ((1.0, 2.0, 3.0), {}, "3 of 2"),
-        ((1.0,), {"hight": 2.0}, "did you mean height"),
-        ((1.0,), {"height": 2.0}, "twice"),
+        ((1.0,), {}, "v0"),
+        ((1.0, 2.0, 3.0), {}, "too many"),
+        ((1.0,), {"hight": 2.0}, "for height and v0"),
+        ((1.0,), {"height": 2.0}, "multiple values"),
         (("x", 1.0), {}, "numbers"),
         (([1.0, 2.0], [1.0, 2.0, 3.0]), {}, "numbers"),
     ],

@@ -223,6 +223,7 @@ def test_no_more_cells_are_taken_than_are_wanted_and_a_tenth_lies_beyond_low_and
     ("options", "word"),
     [
         ({"methods": ["exakt"]}, "did you mean exact"),
+        ({"methods": []}, "methods"),
         ({"reference": "magic"}, "magic"),
         *(({"tolerances": tolerances}, "rtol") for tolerances in ([0.0], [np.nan], [np.inf], [])),
         ({"cells": 0}, "cells"),
