@@ -23,10 +23,10 @@ if TYPE_CHECKING:
     from sweep.laws.asymptote import fit_correction as fit_correction
     from sweep.laws.collapse import fit_collapse as fit_collapse
     from sweep.laws.compare import compare_laws as compare_laws
+    from sweep.laws.exponents import exponent_map as exponent_map
     from sweep.laws.exponents import local_exponent as local_exponent
     from sweep.laws.exponents import where_exponent as where_exponent
     from sweep.laws.lines import fit_exponent as fit_exponent
-    from sweep.laws.maps import exponent_map as exponent_map
     from sweep.laws.two_laws import fit_two_laws as fit_two_laws
     from sweep.results.diff import diff as diff
     from sweep.results.export import export as export

@@ -291,6 +291,8 @@ def verdicts(sets: int, rng: np.random.Generator) -> Iterator[str]:
         "x^-.5 exp(-x/20)": -0.5 * np.log(x) - x / 20,
         "lognormal": -(u**2) / 2,
         "x^-.5 (1 + ln x)": -0.5 * np.log(x) + np.log1p(np.log(x)),
+        "sech(x/10)": -np.log(np.cosh(x / 10)),
+        "exp(-x/5) + .1 exp(-x/40)": np.log(np.exp(-x / 5) + 0.1 * np.exp(-x / 40)),
     }
     for name, z in others.items():
         y = curve(np.log(x), z + noise)

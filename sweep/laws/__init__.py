@@ -1,13 +1,12 @@
 """Scaling laws: xarray in, xarray out. Knows neither studies nor cells nor files.
 
 Others may use
-    `exponents`  local exponents, where curves pass a value
-    `lines`      straight lines in log-log, in one window or ever smaller ones; where two of them meet
-    `two_laws`   two power laws with a bend, fitted at once
+    `exponents`  local exponents, where curves pass a value, exponents over two parameters
+    `lines`      straight lines in log-log, in one window or ever smaller ones
+    `two_laws`   two power laws with a bend, fitted at once; where two straight lines meet
     `compare`    which law of the table
     `asymptote`  corrections to scaling
     `collapse`   exponents of a collapse
-    `maps`       exponents over two parameters, borders as lines
     `curves`     stated_error: what a result says its values are right to
     `loglog`     is_logarithmic, spans_decades: what an axis is drawn and interpolated by
 

@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from sweep.laws.curves import Window, check_confidence, check_end, described, fit_lines, title
+from sweep.laws.curves import Window, check_end, check_options, described, fit_lines, title
 from sweep.laws.fits import Found, fitted
-from sweep.laws.lines import check_noise, rounding
+from sweep.laws.lines import rounding
 from sweep.laws.loglog import Array, slope_bounds, slopes
 from sweep.laws.noise import regress, roughness
-from sweep.laws.shapes import CORRECTION, LOG_CORRECTION
+from sweep.laws.shapes import CORRECTION, LOG_CORRECTION, Law
 
 SCATTERS = 0.3
 """Share of the distances from (1) that is noise between neighbours, from which on they are noise."""
@@ -30,8 +30,6 @@ CAUTION = 0.5
 FADES = np.exp(np.linspace(-6.0, 6.0, 25)), 0.3, 80.0
 """How fast a correction may fade, per window: those tried about the best, to the power of its relative error, and the
 least and largest."""
-MANY = 10**7
-"""Degrees of freedom of a normal distribution."""
 VERDICTS = ("a power law with a correction", "no power law with a correction", "no law at this end")
 NAMES = {
     "exponent": "exponent far out",
@@ -90,50 +88,43 @@ def fit_correction(
     >>> print(f"{float(sweep.fit_correction(ds.period, 'mu').exponent):.4f}")
     -0.3334
     """
-    check_confidence(confidence)
+    check_options(confidence, noise, sigma)
     check_end("end", end)
-    check_noise(noise, sigma)
     sign = 1.0 if end == "high" else -1.0
 
-    def each(t: Array, z: Array, errors: Array | None, bounds: Array | None) -> list[tuple[float, ...]]:
+    def each(t: Array, z: Array, errors: Array | None, bounds: Array | None) -> dict[str, Any]:
         if end == "low":
             t, z, errors = -t[::-1], z[:, ::-1], None if errors is None else errors[:, ::-1]
         tried = fitted((CORRECTION, LOG_CORRECTION), t, z, errors)
-        parts = ((row, None if errors is None else errors[k], tried[k]) for k, row in enumerate(z))
-        return [_one(t, *part, sign, confidence, noise) for part in parts]
+        every = [_one(t, row, laws, sign, confidence, noise) for row, laws in zip(z, tried, strict=True)]
+        return {name: [one[name] for one in every] for name in every[0]}
 
-    names = ("exponent_low", "exponent_high", *NAMES)
-    found = fit_lines(names, ("verdict", VERDICTS), each, y, dim, window, sigma)
+    found = fit_lines(each, y, dim, window, sigma)
     law = f"{title(y)} = A {dim}^p (1 + B {dim}^-D), {end} end"
     return described(found, NAMES, {}, {"y": title(y), "x": dim, "law": law}, confidence)
 
 
 def _one(
-    t: Array,
-    z: Array,
-    errors: Array | None,
-    tried: dict[str, Found],
-    sign: float,
-    confidence: float,
-    noise: bool | str | None,
-) -> tuple[float, ...]:
-    """Ends of the interval and NAMES of one line; t runs towards the end where (1) is a power law, and exponents take
-    `sign`."""
+    t: Array, z: Array, tried: dict[str, Found], sign: float, confidence: float, noise: bool | str | None
+) -> dict[str, Any]:
+    """Numbers of one line; t runs towards the end where (1) is a power law, and exponents take `sign`."""
     found, fits = tried[CORRECTION.name], True
     exponent, fade, left = _outer(found, t)
     size = float(np.sqrt(np.mean(found.off**2)))
     scatters = bool(roughness(t, found.off)[0] > SCATTERS * size if noise is None else noise)
-    noisy = errors is not None or (scatters and size > float(8 * rounding(t, z)))
+    noisy = found.sigma is not None or (scatters and size > float(8 * rounding(t, z)))
     word = noise if isinstance(noise, str) else "noise"
     if not noisy:
         low, high = _by_half(t, z, exponent)
     else:
         fits = not found.denied(t, word)
-        low, high = _mixture(t, z, errors, tried, word, confidence) if fits else (math.nan, math.nan)
+        low, high = _mixture(t, z, tried, word, confidence) if fits else (math.nan, math.nan)
     ends = sorted(sign * one for one in (low, high, exponent))[::2] if fits else (math.nan, math.nan)
-    verdict = 1 if not fits else 0 if abs(left) < 1 else 2
+    verdict = VERDICTS[1 if not fits else 0 if abs(left) < 1 else 2]
     residual = math.expm1(min(float(abs(found.off).max()), 700.0))
-    return *ends, sign * exponent, verdict, sign * fade, left, residual, noisy, verdict == 0
+    of = {"exponent": sign * exponent, "exponent_low": ends[0], "exponent_high": ends[1], "verdict": verdict}
+    of |= {"correction_exponent": sign * fade, "correction": left, "residual": residual, "noisy": noisy}
+    return of | {"fits": verdict == VERDICTS[0]}
 
 
 def _outer(found: Found, t: Array) -> tuple[float, float, float]:
@@ -161,38 +152,37 @@ def _by_half(t: Array, z: Array, exponent: float) -> tuple[float, float]:
     return exponent - reach, exponent + reach
 
 
-def _mixture(
-    t: Array, z: Array, errors: Array | None, tried: dict[str, Found], word: str, confidence: float
-) -> tuple[float, float]:
+def _fading(fade: float) -> Law:
+    """(1) with a given D."""
+
+    def parts(q: Array, s: Array, span: float) -> Any:
+        return CORRECTION.parts(np.stack([q[0], np.full_like(q[0], fade)]), s, span)
+
+    return CORRECTION._replace(name=str(fade), parts=parts, starts=CORRECTION.starts[:1], limits=CORRECTION.limits[:1])
+
+
+def _mixture(t: Array, z: Array, tried: dict[str, Found], word: str, confidence: float) -> tuple[float, float]:
     """Ends of the interval of the exponent, over all D and noises."""
-    found, slow, span, known = (
-        tried[CORRECTION.name],
-        tried[LOG_CORRECTION.name],
-        float(t[-1] - t[0]),
-        errors is not None,
-    )
+    found, slow, span = tried[CORRECTION.name], tried[LOG_CORRECTION.name], float(t[-1] - t[0])
     steps, least, most = FADES
     best = float(np.clip(abs(found.numbers[1]), least, most))
     doubt = float(np.nan_to_num(found.errors()[1], posinf=best)) / best
     fades = best * steps ** np.clip(doubt, 0.01, 0.5)
-    fades = fades[(fades >= least) & (fades <= most)]
-    laws = [CORRECTION.at(1, float(fade)) for fade in fades]
-    parts, evidence = [], []
-    for one in fitted(laws, t, z[None], None if errors is None else errors[None])[0].values():
+    laws = [_fading(float(fade)) for fade in fades[(fades >= least) & (fades <= most)]]
+    parts = []
+    for one in fitted(laws, t, z[None], None if found.sigma is None else found.sigma[None])[0].values():
         if np.isfinite(one.jacobian).all() and np.isfinite(one.errors()).all():
-            part = regress(t, one.jacobian, one.off[None], "even" if known else word)
-            if known:
-                part = part._replace(error=one.errors()[None, :, None], left=MANY)
+            part = regress(t, one.jacobian, one.off[None], word, sigma=one.sigma)
             parts.append(part._replace(value=part.value + one.numbers[:, None]))
-            evidence.append(-0.5 * one.deviance if known else float(part.evidence[0]))
-    shares = np.exp(np.array(evidence) - max(evidence))
+    evidence = np.array([float(part.evidence[0]) for part in parts])
+    shares = np.exp(evidence - evidence.max())
     both = parts[0]._replace(
         weight=np.concatenate([one.weight * share for one, share in zip(parts, shares / shares.sum(), strict=True)]),
         value=np.concatenate([one.value for one in parts]),
         error=np.concatenate([one.error for one in parts]),
         share=CAUTION * np.concatenate([one.share for one in parts]),
     )
-    ends = [float(end[0]) for end in both.interval(2, confidence)]
+    ends = both.interval(2, confidence)[:, 0].tolist()
     if slow.aicc < found.aicc + AS_WELL and np.isfinite(slow.errors()).all():
-        ends += [float(slow.numbers[3] + end[0]) for end in slow.interval(t, [3], word, confidence)[:2]]
+        ends += slow.interval(t, [3], word, confidence)[0][:, 0].tolist()
     return min(ends) / span, max(ends) / span

@@ -14,12 +14,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
-from scipy.special import gammaincc, ndtri
 
 from sweep.errors import SweepError
-from sweep.laws.curves import check_confidence, check_output, described, log_of, positive_axis, relative_sigma, title
+from sweep.laws.curves import check_options, check_output, described, log_of, positive_axis, relative_sigma, title
 from sweep.laws.loglog import Array
-from sweep.laws.noise import RARE, ROUNDING, UNLIKELY, regress
+from sweep.laws.noise import ROUNDING, regress
 
 NAMES = {
     "x_exponent": "a of x / L^a",
@@ -72,7 +71,7 @@ def fit_collapse(y: xr.DataArray, dim: str, over: str, *, sigma: Any = None, con
     >>> print(f"{float(sweep.fit_collapse(y, 'x', 'L').x_exponent):.3f}")
     1.500
     """
-    check_confidence(confidence)
+    check_options(confidence)
     points, count = _points(y, dim, over, sigma)
     # exponents that leave neighbours in L with something in common, and no more than 8
     most = min(8.0, 0.9 * float(np.ptp(points.t)) / float(np.diff(np.unique(points.size)).min()))
@@ -85,12 +84,11 @@ def fit_collapse(y: xr.DataArray, dim: str, over: str, *, sigma: Any = None, con
     points = Points(*(column[inside] for column in points))
     a = points.best(a - 0.3 * (1 + abs(a)), a + 0.3 * (1 + abs(a)), 41)
     columns, b, off = _jacobian(points, a)
-    low, high, fits = _intervals(points, columns, off, sigma is not None, confidence)
+    ends, fits = _intervals(points, columns, off, sigma is not None, confidence)
     found = {"x_exponent": a, "y_exponent": b, "residual": float(np.sqrt(np.mean(off**2))), "points": points.t.size}
     found |= {"dropped": count - points.t.size, "fits": int(fits)}
     for k, name in enumerate(("x_exponent", "y_exponent")):
-        ends = (found[name] + low[k], found[name] + high[k]) if fits else (math.nan, math.nan)
-        found[f"{name}_low"], found[f"{name}_high"] = ends
+        found[f"{name}_low"], found[f"{name}_high"] = found[name] + ends[k] if fits else (math.nan, math.nan)
     result = xr.Dataset(found).assign(verdict="one curve" if fits else "not one curve")
     law = f"{title(y)} = {over}^b f({dim} / {over}^a)"
     return described(result, NAMES, {}, {"y": title(y), "x": dim, "over": over, "law": law}, confidence)
@@ -184,23 +182,18 @@ def _jacobian(points: Points, a: float) -> tuple[Array, float, Array]:
     return matrix, float(numbers[0]), points.z - columns @ numbers
 
 
-def _intervals(points: Points, columns: Array, off: Array, known: bool, confidence: float) -> tuple[Array, Array, bool]:
+def _intervals(points: Points, columns: Array, off: Array, known: bool, confidence: float) -> tuple[Array, bool]:
     """Ends of the intervals of a and b, about them, and whether the curves are one.
 
     They are not where chi-squared says so, or where a level, a slope and a bow of each curve are better by far.
     """
-    k, u, root = columns.shape[1], points.t - points.t.mean(), points.root[:, None]
+    k, u = columns.shape[1], points.t - points.t.mean()
     own = [here * u**power for here in points.size == np.unique(points.size)[1:, None] for power in range(3)]
     basis, beside = np.linalg.qr(columns)[0], np.column_stack(own)
     left, moved, _ = np.linalg.svd(beside - basis @ (basis.T @ beside), full_matrices=False)
     beside = left[:, moved > 1e-6 * moved.max()][:, : max(0, off.size - k - 3)]
-    every, scaled = np.column_stack([columns, beside]) * root, off * points.root
-    found = regress(np.arange(float(off.size)), every, scaled[None], "even" if known else "correlated", k)
-    smooth = abs(off).max() <= 1e-6 * (1 + np.ptp(points.z))
-    fits = bool(smooth or not found.chance[0] < UNLIKELY)
-    if known:
-        fits &= bool(gammaincc((off.size - k) / 2, float((scaled**2).sum()) / 2) > RARE)
-        reach = ndtri((1 + confidence) / 2) * np.sqrt(np.diag(np.linalg.inv(every[:, :k].T @ every[:, :k])))
-        return -reach, reach, fits
-    low, high = np.array([found.interval(number, confidence) for number in (0, 1)])[:, :, 0].T
-    return np.minimum(low, 0), np.maximum(high, 0), fits
+    every, places = np.column_stack([columns, beside]), np.arange(float(off.size))
+    found = regress(places, every, off[None], "correlated", k, 1 / points.root if known else None)
+    smooth = not known and abs(off).max() <= 1e-6 * (1 + np.ptp(points.z))
+    ends = np.array([found.interval(number, confidence)[:, 0] for number in (0, 1)])
+    return np.clip(ends, [[-np.inf, 0.0]], [[0.0, np.inf]]), bool(smooth or not found.denied[0])

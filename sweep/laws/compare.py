@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from scipy.special import gammaincc
 
-from sweep.laws.curves import FEWEST_OF_LINE, Window, fit_lines, one_line, title
+from sweep.laws.curves import Window, fit_lines, one_line, title
 from sweep.laws.fits import Found, fitted
 from sweep.laws.loglog import Array
-from sweep.laws.noise import BEYOND_DOUBT, RARE, runs_chance
+from sweep.laws.noise import BEYOND_DOUBT, runs_chance
 from sweep.laws.shapes import CORRECTION, LAWS, OFFSET
 from sweep.words import Table
 
@@ -33,7 +34,8 @@ def compare_laws(y: xr.DataArray, dim: str, window: Window | None = None, *, sig
     A law with more numbers is believed only where AICc prefers it by more than 10 to every law with fewer: so many
     times e^5 more likely, and a margin that correlated, uneven or outlying noise does not bridge, which one law is
     tried with. The laws are one, two (with bends of five shapes) and three power laws, an offset, a correction to
-    scaling; and functions that are none: logarithm, exponential, stretched exponential, cut-off, lognormal.
+    scaling; and functions that are none: logarithm, exponential, stretched exponential, cut-off, lognormal, two
+    exponentials.
 
     Parameters
     ----------
@@ -64,67 +66,67 @@ def compare_laws(y: xr.DataArray, dim: str, window: Window | None = None, *, sig
     'offset'
     """
     one_line(y, "compare laws of")
-    found: list[xr.Dataset] = []
+    found = xr.Dataset()
 
-    def compared(t: Array, z: Array, errors: Array | None, bounds: Array | None) -> Array:
-        fits = sorted(fitted(LAWS, t, z, errors)[0].values(), key=lambda fit: fit.aicc)
-        found.append(_table(t, z[0], fits))
-        return np.zeros((1, 1))
+    def compared(t: Array, z: Array, errors: Array | None, bounds: Array | None) -> dict[str, Any]:
+        nonlocal found
+        found = _table(t, z[0], sorted(fitted(LAWS, t, z, errors)[0].values(), key=lambda fit: fit.aicc))
+        return {"chosen": [found.chosen]}
 
-    fit_lines(("kind",), ("kind", ("compared",)), compared, y, dim, window, sigma, fewest=FEWEST_OF_LINE)
+    fit_lines(compared, y, dim, window, sigma)
     for name, of in (("x", y[dim]), ("y", y), ("fitted", y)):
-        found[0][name].attrs = {"units": str(of.attrs.get("units", "1"))}
-    return found[0].assign_attrs({"y": title(y), "x": dim} | found[0].attrs)
+        found[name].attrs = {"units": str(of.attrs.get("units", "1"))}
+    return found.assign_attrs({"y": title(y), "x": dim} | found.attrs)
 
 
 def _table(t: Array, z: Array, tried: list[Found]) -> xr.Dataset:
     """All that `compare_laws` says of laws, the best first."""
+    least, span = tried[0].aicc, float(t[-1] - t[0])
+
+    def chi_squared(f: Found) -> float:
+        """Chance of so large a one; NaN where the noise is not known."""
+        return math.nan if f.sigma is None else float(gammaincc((t.size - f.law.numbers) / 2, f.square / 2))
+
     columns: dict[str, list[Any]] = {
         "aicc": [f.aicc for f in tried],
         "bic": [f.bic for f in tried],
-        "worse": [f.aicc - tried[0].aicc for f in tried],
+        "worse": [f.aicc - least for f in tried],
         "numbers": [f.law.numbers for f in tried],
         "scatter": [math.sqrt(float(np.mean(f.off**2))) for f in tried],
         "residual": [math.expm1(min(float(abs(f.off).max()), 700.0)) for f in tried],
         "runs": [float(runs_chance(f.off)) for f in tried],
-        "chi_squared": [f.chi_squared() for f in tried],
+        "chi_squared": [chi_squared(f) for f in tried],
         "formula": [f.law.formula for f in tried],
-        "exponents": [_exponents(f, float(t[-1] - t[0])) for f in tried],
+        "exponents": [_exponents(f, span) for f in tried],
     }
+    alive = [f for f in tried if f.aicc <= least + BEYOND_DOUBT]
+    chosen = min(alive, key=lambda f: (f.law.numbers, f.aicc))
+    margin = min((f.aicc for f in tried if f is not chosen), default=math.inf) - chosen.aicc
+    text = f"{chosen.law.name} ({chosen.law.formula}): " + "no power law; " * (not chosen.law.power)
+    if rivals := [f.law.name for f in alive if f is not chosen]:
+        text += f"not ruled out beside it: {', '.join(rivals)}"
+    else:
+        text += f"all others are worse by {margin:.3g} and more in AICc"
+    if chosen.denied(t, "even"):
+        text += "; but what it leaves has a shape, so that none of them is the law"
+    rows = zip(
+        [f.law.name for f in tried], (f"{one:.3g}" for one in columns["worse"]), columns["exponents"], strict=True
+    )
+    summary = Table(list(rows), ("law", "worse in AICc", "exponents")).text(indent="", wide=True)
     about = {name: {"units": "1", "long_name": words} for name, words in NAMES.items()}
     variables: dict[str, Any] = {name: ("law", column, about.get(name)) for name, column in columns.items()}
     variables |= {"fitted": (("law", "point"), np.exp([z - f.off for f in tried]))}
     variables |= {"x": ("point", np.exp(t)), "y": ("point", np.exp(z)), "law": [f.law.name for f in tried]}
-    alive = [f for f in tried if f.aicc <= tried[0].aicc + BEYOND_DOUBT]
-    chosen = min(alive, key=lambda f: (f.law.numbers, f.aicc))
-    margin = min((f.aicc for f in tried if f is not chosen), default=math.inf) - chosen.aicc
-    rivals = [f.law.name for f in alive if f is not chosen]
-    text = f"{chosen.law.name} ({chosen.law.formula}): "
-    if not chosen.law.power:
-        text += "no power law; "
-    alone = f"all others are worse by {margin:.3g} and more in AICc"
-    text += f"not ruled out beside it: {', '.join(rivals)}" if rivals else alone
-    if float(runs_chance(chosen.off)) < RARE or chosen.chi_squared() < RARE:
-        text += "; but what it leaves has a shape, so that none of them is the law"
-    rows = [
-        (f.law.name, f"{f.aicc - tried[0].aicc:.3g}", of) for f, of in zip(tried, columns["exponents"], strict=True)
-    ]
-    summary = Table(rows, ("law", "worse in AICc", "exponents")).text(indent="", wide=True)
-    return xr.Dataset(
-        variables, attrs={"chosen": chosen.law.name, "margin": margin, "verdict": text, "summary": summary}
-    )
+    attrs = {"chosen": chosen.law.name, "margin": margin, "verdict": text, "summary": summary}
+    return xr.Dataset(variables, attrs=attrs)
 
 
 def _exponents(found: Found, span: float) -> str:
     """The exponents with their standard errors, as of independent noise."""
-    law = found.law
-    names = law.exponents or ("p",) * (law is OFFSET)
-    places = range(len(names)) if law is OFFSET else range(found.numbers.size - len(names), found.numbers.size)
-    doubt = found.errors()
-    parts = [
-        f"{name} = {found.numbers[k] / span:.4g} +- {doubt[k] / span:.1g}"
-        for name, k in zip(names, places, strict=True)
-    ]
+    law, doubt = found.law, found.errors()
+    names = ("p",) if law is OFFSET else law.exponents
+    first = 0 if law is OFFSET else found.numbers.size - len(names)
+    parts = [f"{name} = {found.numbers[k] / span:.4g} +- {doubt[k] / span:.1g}" for k, name in enumerate(names, first)]
     if law is CORRECTION:
         parts.append(f"D = {found.numbers[1] / span:.3g}")
     return ", ".join(parts) or "none"

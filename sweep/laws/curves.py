@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import difflib
-import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -13,15 +12,14 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from sweep.errors import SweepError
-from sweep.laws.loglog import EPSILON, FEWEST, Array
-from sweep.words import Table, kind
+from sweep.laws.loglog import EPSILON, FEWEST, Array, alike
+from sweep.laws.noise import NOISES
+from sweep.words import kind
 
 Window = tuple[float | None, float | None]
 
 FEWEST_OF_LINE = 8
 """Points from which on laws with more numbers than a line are fitted."""
-LINES = 250
-"""Lines that are taken at once, so that what is held stays below some 50 MB."""
 MOST_SIGMA = 1e6
 """Relative standard error beyond which a logarithm says nothing."""
 MOST_ROWS = 20
@@ -36,10 +34,15 @@ def check_output(y: Any) -> None:
         raise SweepError(f"{title(y)}: expected real numbers, found {y.dtype}")
 
 
-def check_confidence(confidence: float) -> None:
-    """Raises SweepError where it is no share."""
+def check_options(confidence: float, noise: bool | str | None = None, sigma: Any = None) -> None:
+    """Raises SweepError where confidence is no share, noise none of the words, or both noise and sigma are given."""
     if not 0 < confidence < 1:
         raise SweepError(f"confidence: expected a number between 0 and 1, found {confidence}")
+    words = [word for word in NOISES if word != "noise"]
+    if not (noise is None or isinstance(noise, bool) or noise in words):
+        raise SweepError(f"noise: expected True, False or one of {', '.join(words)}; found {noise!r}")
+    if noise is not None and sigma is not None:
+        raise SweepError("noise does not go with sigma, which says all of the noise; give one of them")
 
 
 def check_end(name: str, end: str) -> None:
@@ -118,9 +121,7 @@ def log_of(y: xr.DataArray) -> xr.DataArray:
 
 
 def fit_lines(
-    names: Sequence[str],
-    words: tuple[str, Sequence[str]],
-    function: Callable[[Array, Array, Array | None, Array | None], Any],
+    function: Callable[[Array, Array, Array | None, Array | None], dict[str, Any]],
     y: xr.DataArray,
     dim: str,
     window: Window | None,
@@ -128,11 +129,11 @@ def fit_lines(
     bounds: xr.DataArray | None = None,
     fewest: int = FEWEST_OF_LINE,
 ) -> xr.Dataset:
-    """Numbers of each line of y in a window under these names, and `points`, how many of its values are there.
+    """What a function finds of each line of y in a window, and `points`, how many of its values are there.
 
     `function` of ln x (n,), rising, and ln y, relative standard errors (None where `sigma` is) and bounds (m, n) of m
-    lines without gaps gives numbers (m, names). One of them, words[0], stands for one of the words[1]. NaN where there
-    are too few points; raises SweepError where that is so of all lines, or no line is positive.
+    lines without gaps gives numbers and words (m,) by name. Of lines that are not positive, or have too few points, the
+    numbers are NaN and the words say so; raises SweepError where that is so of all lines.
     """
     dimension, x = positive_axis(y, dim, repeated=True)
     here = {dimension: np.flatnonzero(inside_window(x, window, dim))}
@@ -152,7 +153,7 @@ def fit_lines(
         None if one is None else one.isel(here).transpose(..., dimension).values.reshape(z.shape) for one in others
     )
     present = np.isfinite(z) if errors is None else np.isfinite(z) & np.isfinite(errors)
-    numbers = np.full((len(z), len(names)), np.nan)
+    columns: dict[str, Any] = {}
     for pattern, which in alike(present):
         at = np.flatnonzero(pattern)
         at = at[np.argsort(t[at], kind="stable")]
@@ -160,31 +161,26 @@ def fit_lines(
             grid = np.ix_(which, at)
             given = (None if one is None else one[grid] for one in (errors, bound))
             with np.errstate(all="ignore"):  # what overflows is infinite
-                numbers[which] = function(t[at], z[grid], *given)
-    count, codes = present.sum(axis=1).reshape(lines), numbers[:, names.index(words[0])].reshape(lines)
-    if np.isnan(codes).all():
+                found = function(t[at], z[grid], *given)
+            for name, column in found.items():
+                word = np.asarray(column).dtype.kind == "U"
+                columns.setdefault(name, np.full(len(z), "" if word else np.nan, object if word else np.float64))
+                columns[name][which] = column
+    count = present.sum(axis=1).reshape(lines)
+    if not columns:
         low, high = ends(window, dim)
         raise SweepError(
             f"a fit needs at least {fewest} points, found {count.max()} of {title(y)} in the window {low:g} to "
             f"{high:g} of {dim}; choose a wider one"
         )
-    every = np.array([*words[1], "not positive", "too few points"])
-    texts = every[np.where(bad, -2, np.nan_to_num(codes, nan=-1)).astype(np.int64)]
-    columns = {name: numbers[:, k].reshape(lines) for k, name in enumerate(names)} | {"points": count, words[0]: texts}
+    missing = np.where(bad, "not positive", "too few points").reshape(-1)
+    for name, column in columns.items():
+        texts = column if column.dtype == np.float64 else np.where(column == "", missing, column).astype(str)
+        columns[name] = texts.reshape(lines)
     coords = {name: one for name, one in part.coords.items() if dimension not in one.dims}
-    return xr.Dataset({name: (part.dims[:-1], column) for name, column in columns.items()}, coords)
-
-
-def alike(present: NDArray[np.bool_], most: int = LINES) -> list[tuple[NDArray[np.bool_], NDArray[np.intp]]]:
-    """Patterns among rows (m, n), and which rows have each; at most so many at once."""
-    if not len(present):
-        return []
-    if present.all():
-        patterns, which = present[:1], np.zeros(len(present), dtype=np.intp)
-    else:
-        patterns, which = np.unique(present, axis=0, return_inverse=True)
-    parts = [(p, np.flatnonzero(which.reshape(-1) == number)) for number, p in enumerate(patterns)]
-    return [(p, rows[i : i + most]) for p, rows in parts for i in range(0, rows.size, most)]
+    return xr.Dataset(
+        {name: (part.dims[:-1], column) for name, column in (columns | {"points": count}).items()}, coords
+    )
 
 
 def like(given: Any, y: xr.DataArray, what: str) -> xr.DataArray:
@@ -254,18 +250,9 @@ def described(
     for name, (words, unit) in every.items():
         found[name].attrs = {"units": unit, "long_name": words}
     found.attrs = {**attrs, "confidence": confidence}
-    numbers = [str(name) for name in found.data_vars if f"{name}_low" in found]
-    texts = [str(name) for name, variable in found.data_vars.items() if variable.dtype.kind == "U"]
-    table = found[[*texts, *(name + end for name in numbers for end in ("", "_low", "_high"))]]
-    dims, rows = list(table.sizes), []
-    for place in itertools.islice(np.ndindex(*table.sizes.values()), MOST_ROWS):
-        one = table.isel(dict(zip(dims, place, strict=True)))
-        labels = [one[dim].item() if dim in one.coords else place[i] for i, dim in enumerate(dims)]
-        values = [[float(one[name + end]) for end in ("", "_low", "_high")] for name in numbers]
-        row = [f"{one:.6g}" if isinstance(one, float) else str(one) for one in labels]
-        row += [f"{value:.6g} ({low:.6g} to {high:.6g})" for value, low, high in values]
-        rows.append((*row, *(str(one[text].item()) for text in texts)))
-    more = math.prod(table.sizes.values()) - len(rows)
-    heading = (*map(str, dims), *(f"{name} ({100 * confidence:g} %)" for name in numbers), *texts)
-    found.attrs["summary"] = Table(rows, heading).text(indent="", wide=True) + f"\nand {more} more" * (more > 0)
+    columns = [name + end for name in names if f"{name}_low" in found for end in ("", "_low", "_high")]
+    columns += [name for name in names if found[name].dtype.kind == "U"]
+    table = found[columns] if found.sizes else found[columns].expand_dims("line")
+    rows = table.to_dataframe().reset_index()[[*table.sizes, *columns]]
+    found.attrs["summary"] = rows.to_string(index=False, max_rows=MOST_ROWS, float_format="{:.6g}".format)
     return found

@@ -13,11 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import gammaincc, ndtri
 
 from sweep.laws.loglog import Array
-from sweep.laws.noise import RARE, ROUNDING, UNLIKELY, Regression, corrected, line_deviance, regress, runs_chance
-from sweep.laws.shapes import ONE, TWO, Law
+from sweep.laws.noise import ROUNDING, corrected, line_deviance, regress
+from sweep.laws.shapes import ONE, Law
 
 
 class Found(NamedTuple):
@@ -27,58 +26,48 @@ class Found(NamedTuple):
     numbers: Array
     jacobian: Array
     off: Array
-    weights: Array | None
-    """One over the variance of each point, where it is known."""
-    deviance: float
+    sigma: Array | None
+    """Standard errors of the points, where they are known."""
     aicc: float
     bic: float
 
+    @property
+    def square(self) -> float:
+        """Sum of squares, of what is known of the noise."""
+        return float(((self.off if self.sigma is None else self.off / self.sigma) ** 2).sum())
+
     def errors(self) -> Array:
-        """Standard errors of the numbers; inf of what the points do not determine."""
-        columns = self.jacobian if self.weights is None else self.jacobian * np.sqrt(self.weights)[:, None]
+        """Standard errors of the numbers beside independent noise; inf of what the points do not determine."""
+        columns = self.jacobian if self.sigma is None else self.jacobian / self.sigma[:, None]
         size = np.sqrt((columns**2).sum(axis=0)) + 1e-300
         _, moved, directions = np.linalg.svd(columns / size, full_matrices=False)
         seen = moved > 1e-8 * moved.max(initial=0.0)
         change = directions.T / size[:, None] / np.where(seen, moved, np.nan)
         lost = (directions[~seen] ** 2).sum(axis=0) > 1e-6
-        left = self.off.size - self.law.numbers
-        noise = 1.0 if self.weights is not None else math.sqrt(float(self.off @ self.off) / left)
+        noise = 1.0 if self.sigma is not None else math.sqrt(self.square / (self.off.size - self.law.numbers))
         return np.where(lost, np.inf, noise * np.sqrt(np.nansum(np.where(lost[:, None], 0.0, change) ** 2, axis=1)))
 
-    def interval(self, t: Array, which: list[int], noise: str, confidence: float) -> tuple[Array, Array, float]:
-        """Ends of the intervals of some numbers, about them, and `aicc_under`."""
-        errors = self.errors()
-        doubt, known = errors[which], np.isfinite(errors)
-        if self.weights is not None or not known[which].all():
-            reach = (3 if self.weights is None else ndtri((1 + confidence) / 2)) * doubt
-            return -reach, reach, self.aicc_under(t, noise)
-        line = regress(t, self.jacobian[:, known], self.off[None], noise)
-        low, high = np.array([line.interval(int(known[:k].sum()), confidence) for k in which])[:, :, 0].T
-        return np.fmin(low, 0), np.fmax(high, 0), self.aicc_under(t, noise, line)
+    def interval(self, t: Array, which: list[int], noise: str, confidence: float) -> tuple[Array, float]:
+        """Ends of the intervals of some numbers (2, k), infinite where they are not determined; `aicc` with the noise
+        of the word that suits best, where it is not known."""
+        known, aicc = np.flatnonzero(np.isfinite(self.errors())).tolist(), self.aicc
+        ends = np.array([[-np.inf] * len(which), [np.inf] * len(which)])
+        if known:
+            line = regress(t, self.jacobian[:, known], self.off[None], noise, sigma=self.sigma)
+            for place, number in enumerate(which):
+                if number in known:
+                    ends[:, place] = line.interval(known.index(number), confidence)[:, 0]
+            if self.sigma is None and noise != "even":
+                aicc = float(corrected(float(line.deviance[0]), t.size, self.law.numbers + 2))
+        return self.numbers[which] + np.clip(ends, [[-np.inf], [0.0]], [[0.0], [np.inf]]), aicc
 
-    def aicc_under(self, t: Array, noise: str, line: Regression | None = None) -> float:
-        """`aicc` with the noise of a word that suits best, where it is not known."""
-        columns = self.jacobian[:, np.isfinite(self.errors())]
-        if self.weights is not None or noise == "even" or not columns.size:
-            return self.aicc
-        line = line or regress(t, columns, self.off[None], noise)
-        return float(corrected(float(line.deviance[0]), t.size, self.law.numbers + 2))
-
-    def chi_squared(self) -> float:
-        """Chance of so large a chi-squared; NaN where the noise is not known."""
-        if self.weights is None:
-            return math.nan
-        return float(gammaincc((self.off.size - self.law.numbers) / 2, float((self.off**2 * self.weights).sum()) / 2))
-
-    def denied(self, t: Array, noise: str, more: int = 3) -> bool:
-        """Whether the points are not the law and noise: by chi-squared where it is known, by the signs of neighbours
-        where it is known or even, else by so many polynomials beside the law that tell far more."""
-        if self.weights is not None or noise == "even":
-            return bool(self.chi_squared() < RARE or runs_chance(self.off) < RARE)
+    def denied(self, t: Array, noise: str) -> bool:
+        """Whether the points are not the law and noise; unless that is independent, by polynomials beside the law."""
+        more = 0 if self.sigma is not None or noise == "even" else 3
         columns = self.jacobian[:, np.isfinite(self.errors())]
         beside = np.polynomial.chebyshev.chebvander(2 * (t - t[0]) / (t[-1] - t[0]) - 1, 1 + more)[:, 2:]
         every = np.concatenate([columns, beside], axis=1)
-        return bool(regress(t, every, self.off[None], noise, columns.shape[1]).chance[0] < UNLIKELY)
+        return bool(columns.size and regress(t, every, self.off[None], noise, columns.shape[1], self.sigma).denied[0])
 
 
 DAMPINGS = 10.0 ** np.array([-7.0, -4.0, -3.0, -2.0, -1.5, -1.0, -0.5, 0.0, 1.0, 3.0])
@@ -94,40 +83,30 @@ def fitted(laws: Sequence[Law], t: Array, z: Array, errors: Array | None = None)
     """For each line of z (m, n) the laws, by name, that are nearest to it, t rising; not those that have not two more
     points than numbers. `errors` (m, n) are standard errors, where they are known.
 
-    The law ONE is of the noise that suits it best, where that is not known; bends with a shape start from TWO.
+    The law ONE is of the noise that suits it best, where that is not known.
     """
-    most = MOST_LINES if errors is None else 1
-    if len(z) > most:
-        parts = [slice(i, i + most) for i in range(0, len(z), most)]
-        return [line for i in parts for line in fitted(laws, t, z[i], None if errors is None else errors[i])]
-    weights = None if errors is None else errors[0] ** -2.0
     laws = [law for law in laws if t.size >= law.numbers + 2]
-    shaped = [law for law in laws if TWO in laws and law.exponents == TWO.exponents and law is not TWO]
-    plain = [law for law in laws if law not in shaped]
-    starts = [_start(law, t, z, weights) for law in plain]
     found: list[dict[str, Found]] = [{} for _ in z]
-    for round_ in (plain, shaped):
-        if round_ is shaped and shaped:
-            near = np.array([line[TWO.name].numbers[:2] for line in found])
-            starts = [np.pad(near, [(0, 0), (0, len(law.starts) - 2)]) for law in shaped]
-        for k, one in enumerate(_nearest(round_, starts, t, z, weights) if round_ else ()):
-            found[k % len(z)][one.law.name] = one
-    if ONE in laws and weights is None:
+    most = MOST_LINES if errors is None else 1
+    for first in range(0, len(z) if laws else 0, most):
+        part = z[first : first + most]
+        for k, one in enumerate(_nearest(laws, t, part, None if errors is None else errors[first])):
+            found[first + k % len(part)][one.law.name] = one
+    if ONE in laws and errors is None:
         k = ONE.numbers + 2
         for line, row in zip(found, z, strict=True):
             deviance = line_deviance(t, row)
             aicc, bic = float(corrected(deviance, t.size, k)), deviance + k * math.log(t.size)
             if aicc < line[ONE.name].aicc:
-                line[ONE.name] = line[ONE.name]._replace(deviance=deviance, aicc=aicc, bic=bic)
+                line[ONE.name] = line[ONE.name]._replace(aicc=aicc, bic=bic)
     return found
 
 
-def _start(law: Law, t: Array, z: Array, weights: Array | None) -> Array:
+def _start(law: Law, t: Array, z: Array, root: Array) -> Array:
     """The q (m, q) of a grid that are nearest to lines z (m, n)."""
-    tries = np.array(list(itertools.product(*law.starts)), dtype=np.float64)
     if not law.starts:
         return np.zeros((len(z), 0))
-    root = np.ones_like(t) if weights is None else np.sqrt(weights)
+    tries = np.array(list(itertools.product(*law.starts)), dtype=np.float64)
     parts = _parts([law], [tries], t)
     exist = np.asarray(np.isfinite(parts).all(axis=(0, 2)))
     basis = np.linalg.qr((np.where(exist[:, None], parts[1:], 0.0) * root).transpose(1, 2, 0))[0]
@@ -137,14 +116,14 @@ def _start(law: Law, t: Array, z: Array, weights: Array | None) -> Array:
     return found
 
 
-def _nearest(laws: Sequence[Law], starts: list[Array], t: Array, z: Array, weights: Array | None) -> list[Found]:
-    """Each law fitted to each line z (m, n), from its start (m, q); law by law."""
-    root = np.ones_like(t) if weights is None else np.sqrt(weights)
-    most, lines = max(1, *(len(law.starts) for law in laws)), len(z)
+def _nearest(laws: Sequence[Law], t: Array, z: Array, errors: Array | None) -> list[Found]:
+    """Each law fitted to each line z (m, n); law by law."""
+    root, lines = np.ones_like(t) if errors is None else 1 / errors, len(z)
+    most = max(1, *(len(law.starts) for law in laws))
     # rows are laws times lines; q that a law does not have are 0 and stay so
-    q = np.concatenate([np.pad(start, [(0, 0), (0, most - start.shape[1])]) for start in starts])
-    limits = np.zeros((len(laws), most, 2))
+    q, limits = np.zeros((len(laws) * lines, most)), np.zeros((len(laws), most, 2))
     for k, law in enumerate(laws):
+        q[k * lines : (k + 1) * lines, : len(law.starts)] = _start(law, t, z, root)
         limits[k, : len(law.starts)] = np.reshape(law.limits, (-1, 2))
     low, high = np.repeat(limits, lines, axis=0)[:, None].transpose(3, 0, 1, 2)
     steps = STEP * np.concatenate([np.eye(most), -np.eye(most)])
@@ -203,18 +182,16 @@ def _nearest(laws: Sequence[Law], starts: list[Array], t: Array, z: Array, weigh
         off[taken], b[taken], basis[taken], back[taken] = (part[better, best] for part in tried)
         rows = taken[(square - least >= 1e-6 * square)[better]]
     rows = np.arange(len(q))
-    by_q, columns = derivatives(rows)[0], parts(rows, q[:, None])[1:, :, 0]
+    by_q, columns, n = derivatives(rows)[0], parts(rows, q[:, None])[1:, :, 0], t.size
     found = []
-    for row in range(len(q)):
-        law = laws[row // lines]
-        part, numbers = off[row], np.concatenate([q[row, : len(law.starts)], b[row, : law.columns]])
+    for row, law in enumerate(law for law in laws for _ in z):
+        numbers = np.concatenate([q[row, : len(law.starts)], b[row, : law.columns]])
         jacobian = np.concatenate([by_q[row, : len(law.starts)], columns[: law.columns, row]]).T
         floor = (ROUNDING * (1 + abs(z[row % lines]).max())) ** 2  # what rounding leaves
-        square = float(part @ part)
-        deviance = t.size * math.log(square / t.size + floor) if weights is None else square
-        k = law.numbers + (weights is None)
-        aicc, bic = float(corrected(deviance, t.size, k)), deviance + k * math.log(t.size)
-        found.append(Found(law, numbers, np.array(jacobian), part / root, weights, deviance, aicc, bic))
+        square, k = float(off[row] @ off[row]), law.numbers + (errors is None)
+        deviance = n * math.log(square / n + floor) if errors is None else square
+        aicc, bic = float(corrected(deviance, n, k)), deviance + k * math.log(n)
+        found.append(Found(law, numbers, np.array(jacobian), off[row] / root, errors, aicc, bic))
     return found
 
 

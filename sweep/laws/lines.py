@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from typing import Any
 
@@ -12,9 +13,8 @@ from scipy.special import gammaincc, ndtri, stdtrit
 from sweep.errors import SweepError
 from sweep.laws.curves import (
     Window,
-    alike,
-    check_confidence,
     check_end,
+    check_options,
     described,
     fit_lines,
     log_of,
@@ -22,18 +22,15 @@ from sweep.laws.curves import (
     stated_bound,
     title,
 )
-from sweep.laws.loglog import EPSILON, FEWEST, Array, slope_bounds, slopes, tends
-from sweep.laws.noise import NOISES, RARE, UNLIKELY, corrected, inliers, regress, roughness, runs_chance
+from sweep.laws.loglog import EPSILON, FEWEST, Array, alike, slope_bounds, slopes, tends
+from sweep.laws.noise import RARE, corrected, inliers, regress, roughness, runs_chance
 
 METHOD = "least squares in log-log; the interval is of what `kind` says"
-
-KINDS = ("exact", "bounded", "curved", "bent", "weighted", *NOISES)
-"""What distances from a line are; of lines that have no exponent it says why."""
-
 SMOOTH = 0.12
 """Share of the distances from a line that is noise, below which they are a bend and no noise."""
 FEWEST_FOR_BEND = 8
 """Points from which on a bend is looked for among noise."""
+FEWEST_IN_WINDOW, MOST_WINDOWS = 8, 8
 
 FIT_NAMES = {
     "exponent": "exponent of the power law",
@@ -57,7 +54,6 @@ FIT_NAMES = {
     "limit_low": "to where the local exponent tends below the window; no end of an interval; NaN where there is noise",
     "limit_high": "to where the local exponent tends above the window; no end of an interval; NaN where there is noise",
 }
-NUMBERS = ("exponent_low", "exponent_high", *(n for n in FIT_NAMES if n not in ("verdict", "noisy", "points")))
 
 
 def fit_exponent(
@@ -78,13 +74,11 @@ def fit_exponent(
     - *exact*, *bounded*: rounding, or within stated error bounds; all that such errors can do to the exponent.
     - *weighted*: `sigma` is given; by the normal distribution, if chi-squared and the runs test allow it.
     - *noise*: noise of which nothing is known. It may be autocorrelated, louder at one end, at both or in the middle,
-      and have outliers: the interval holds the exponents that are densest over a mixture of such noises, weighted by
-      how well each describes the points. The price is a wider interval beside few points: of even noise, 2.4 times
-      that of least squares for 12, 1.2 times for 25 and the same for 100 points.
+      and have outliers; the interval is over a mixture of such noises. The price is a wider interval beside few points.
     - *even*, *uneven*, *correlated*, *outliers*: only if `noise` says so. Of *even* noise the interval is that of
       ordinary least squares, and the runs test may deny it.
     - *curved*, *bent*: no power law, without and among noise. `fits` is 0 and the interval is the range of the local
-      exponent in the window, in which the exponent of every window inside lies.
+      exponent in the window.
 
     Parameters
     ----------
@@ -102,9 +96,8 @@ def fit_exponent(
     sigma : number or DataArray, optional
         Standard errors of the values, in the unit of y; they say all of the noise, so `noise` is not given.
     bound : number, DataArray or Dataset, optional
-        Largest relative error of the values, which is not noise; of a Dataset, the result that y is an output of, what
-        it states for each cell: `rtol`, or `error_bound` where that is INACCURATE. Default: the `rtol` in the
-        attributes of y.
+        Largest relative error of the values, which is not noise; of the result that y is an output of, what it states
+        for each cell. Default: the `rtol` in the attributes of y.
     towards : "high" or "low", optional
         Fit ever smaller windows that all reach to this end, 1, 1/1.5, 1/1.5^2 ... of the range of ln dim, to see
         whether the exponent comes to rest: y has one dimension, `window` is not given.
@@ -112,18 +105,12 @@ def fit_exponent(
     Returns
     -------
     Dataset
-        `exponent` with `exponent_low`, `exponent_high`, `exponent_error` [1]; `verdict` and `kind`, words; `fits`;
-        `noisy`; `prefactor`, `prefactor_error` (y at dim = 1, in the unit of y); `drift` [1], the change of the
-        exponent across the window by a parabola; `residual` [1]; `points`; `low`, `high`, the first and last abscissa,
-        `start`, `stop`, y there; `centre`, `level`, `level_error`, where the line is known best, y there, and its
-        relative standard error; `limit_low`, `limit_high`, to where the local exponent tends beyond the window, as far
-        as a meeting of two lines allows for. Each says what it is in its `long_name`. The dimensions are those of `y`
-        but `dim`. NaN where there is no exponent. `attrs["summary"]` is a table for printing.
+        `exponent` with its interval and standard error, `verdict`, `kind` and more, each with a `long_name`. The
+        dimensions are those of `y` but `dim`. NaN where there is no exponent. `attrs["summary"]` is a table.
 
-        With `towards` all of these run along `window`, the widest first. The exponent has a *plateau* where, from some
-        window on, one power law describes each of at least three, and their intervals have exponents in common: the
-        attributes are `plateau` (1 found, 0 denied), if found `exponent`, `exponent_low`, `exponent_high` of its widest
-        window, and `verdict`, a sentence.
+        With `towards` all run along `window`, the widest first. The exponent has a *plateau* where, from some window
+        on, one power law describes each of at least three, and their intervals have exponents in common: `attrs` have
+        `plateau` (1 or 0), its `exponent`, `exponent_low`, `exponent_high`, and `verdict`, a sentence.
 
     Raises
     ------
@@ -136,32 +123,19 @@ def fit_exponent(
     >>> import sweep
     >>> foliot = {"kernel": "foliot", "outputs": ["period"], "fixed": {"phi0": 1.0, "a": 1.0}}
     >>> ds = sweep.run(**foliot, axes={"mu": np.geomspace(1e5, 1e7, 9)})
-    >>> found = sweep.fit_exponent(ds.period, "mu")
-    >>> print(f"{float(found.exponent):.4f}")
+    >>> print(f"{float(sweep.fit_exponent(ds.period, 'mu').exponent):.4f}")
     -0.3334
     """
     if towards is not None:
         return _by_window(y, dim, window, towards, confidence=confidence, noise=noise, sigma=sigma, bound=bound)
-    check_confidence(confidence)
-    check_noise(noise, sigma)
-
-    def each(t: Array, z: Array, errors: Array | None, bounds: Array | None) -> Array:
-        fit = _alike(t, z, errors, bounds, confidence, noise)
-        return np.stack([np.broadcast_to(fit[name], len(z)) for name in NUMBERS], axis=1)
-
-    fit = fit_lines(NUMBERS, ("kind", KINDS), each, y, dim, window, sigma, stated_bound(y, bound), FEWEST)
-    smooth = np.isin(fit.kind, ["exact", "bounded", "curved"])
-    fit["noisy"] = fit.kind.dims, np.where(np.isnan(fit.fits), np.nan, ~smooth)
-    words = np.where(fit.fits == 1, "one power law", np.where(fit.fits == 0, "no power law", fit.kind))
-    fit["verdict"] = fit.kind.dims, words
+    check_options(confidence, noise, sigma)
+    each = functools.partial(_fit, confidence=confidence, noise=noise)
+    fit = fit_lines(each, y, dim, window, sigma, stated_bound(y, bound), FEWEST)
     units, place = str(y.attrs.get("units", "1")), str(y.coords[dim].attrs.get("units", "1"))
     of = dict.fromkeys(("prefactor", "prefactor_error", "level", "start", "stop"), units)
     of |= dict.fromkeys(("low", "high", "centre"), place)
     law = f"{title(y)} = prefactor {dim}^exponent"
     return described(fit, FIT_NAMES, of, {"law": law, "y": title(y), "x": dim, "method": METHOD}, confidence)
-
-
-FEWEST_IN_WINDOW, MOST_WINDOWS = 8, 8
 
 
 def _by_window(y: xr.DataArray, dim: str, window: Window | None, end: str, **keys: Any) -> xr.Dataset:
@@ -193,15 +167,6 @@ def _by_window(y: xr.DataArray, dim: str, window: Window | None, end: str, **key
     return found.assign_attrs(plateau=0, verdict=text)
 
 
-def check_noise(noise: bool | str | None, sigma: Any = None) -> None:
-    """Raises SweepError where it is none of the words, or stands beside sigma."""
-    words = [word for word in NOISES if word != "noise"]
-    if not (noise is None or isinstance(noise, bool) or noise in words):
-        raise SweepError(f"noise: expected True, False or one of {', '.join(words)}; found {noise!r}")
-    if noise is not None and sigma is not None:
-        raise SweepError("noise does not go with sigma, which says all of the noise; give one of them")
-
-
 def rounding(t: Array, z: Array) -> Array:
     """What rounding of both coordinates leaves of lines (..., n)."""
     slope = abs(z[..., -1] - z[..., 0]) / abs(t[-1] - t[0])
@@ -209,10 +174,10 @@ def rounding(t: Array, z: Array) -> Array:
     return found
 
 
-def _alike(
-    t: Array, z: Array, sigma: Array | None, bound: Any, confidence: float, noise: bool | str | None
+def _fit(
+    t: Array, z: Array, sigma: Array | None, bound: Any, *, confidence: float, noise: bool | str | None
 ) -> dict[str, Any]:
-    """NUMBERS (m,) of lines z (m, n) without gaps, t rising: least squares, and then by what the distances are."""
+    """Of lines z (m, n) without gaps, t rising: least squares, and then by what the distances are."""
     share = np.ones_like(z) if sigma is None else sigma**-2.0
     share = share / share.mean(axis=1, keepdims=True)
     centre, level = (share * t).mean(axis=1), (share * z).mean(axis=1)
@@ -221,10 +186,15 @@ def _alike(
     slope = (share * u * (z - level[:, None])).sum(axis=1) / spread
     off = z - level[:, None] - slope[:, None] * u
     size = np.sqrt((share * off * off).sum(axis=1) / max(n - 2, 1))
-    fit: dict[str, Any] = {name: np.full(len(z), np.nan) for name in NUMBERS}
-    fit |= {"exponent": slope, "level": level, "exponent_error": size / np.sqrt(spread), "level_error": size / n**0.5}
-    fit |= {"low": np.exp(t[0]), "high": np.exp(t[-1]), "centre": np.exp(centre)}
-    fit |= {"start": np.exp(z[:, 0]), "stop": np.exp(z[:, -1])}
+    fit: dict[str, Any] = {"exponent": slope, "level": level, "low": np.exp(t[0]), "high": np.exp(t[-1])}
+    fit |= {"start": np.exp(z[:, 0]), "stop": np.exp(z[:, -1]), "centre": np.exp(centre)}
+    fit |= {
+        "exponent_error": size / np.sqrt(spread),
+        "level_error": size / n**0.5,
+        "kind": np.full(len(z), "weighted", "U10"),
+    }
+    fit |= {name: np.full(len(z), np.nan) for name in ("exponent_low", "exponent_high", "limit_low", "limit_high")}
+    fit |= {"fits": np.ones(len(z)), "noisy": np.ones(len(z))}
     # the parabola that fits best, beside the line
     bow = u * u - spread[:, None] / n - (share * u**3).sum(axis=1, keepdims=True) / spread[:, None] * u
     fit["drift"] = 2 * (share * bow * off).sum(axis=1) / (share * bow * bow).sum(axis=1) * (t[-1] - t[0])
@@ -234,21 +204,18 @@ def _alike(
         chance = gammaincc((n - 2) / 2, ((off / sigma) ** 2).sum(axis=1) / 2) if n > 2 else np.ones(len(z))
         fit |= {"exponent_error": error, "level_error": (sigma**-2.0).sum(axis=1) ** -0.5}
         fit |= {"exponent_low": slope - reach, "exponent_high": slope + reach}
-        fit |= {"kind": KINDS.index("weighted"), "fits": (chance > RARE) & ~(runs_chance(off) < RARE)}
+        fit["fits"] = (chance > RARE) & ~(runs_chance(off) < RARE)
     else:
-        noisy = (abs(off).max(axis=1) > least) & (n > FEWEST)
+        noisy = (abs(off).max(axis=1) > least) & (n > FEWEST) & (noise is None or bool(noise))
         if noise is None:
             within = bound.any(axis=1) & (abs(off) <= 2 * bound).all(axis=1)
             noisy &= (size > least) & ~within & (roughness(t, off)[1] > SMOOTH)
-        else:
-            noisy &= bool(noise)
-        word, parts = noise if isinstance(noise, str) else "noise", []
         if (which := np.flatnonzero(noisy)).size:
-            parts.append((which, _noisy(t, z[which], centre[which], word, confidence)))
+            word = noise if isinstance(noise, str) else "noise"
+            for name, values in _noisy(t, z[which], centre[which], word, confidence).items():
+                fit[name][which] = values
         if (which := np.flatnonzero(~noisy)).size:
-            parts.append((which, _exact(t, *(part[which] for part in (z, off, bound, slope)))))
-        for which, found in parts:
-            for name, values in found.items():
+            for name, values in _exact(t, *(part[which] for part in (z, off, bound, slope))).items():
                 fit[name][which] = values
     level, slope = fit["level"], fit["exponent"]
     residual = np.expm1(np.minimum(abs(z - level[:, None] - slope[:, None] * u).max(axis=1), 700))
@@ -256,31 +223,28 @@ def _alike(
     relative = np.hypot(fit["level_error"], centre * fit["exponent_error"])
     fit |= {"residual": residual, "prefactor": prefactor, "prefactor_error": prefactor * relative}
     fit |= {"exponent_low": np.fmin(fit["exponent_low"], slope), "exponent_high": np.fmax(fit["exponent_high"], slope)}
-    return fit | {"level": np.exp(level)}
+    return fit | {"level": np.exp(level), "verdict": np.where(fit["fits"] == 1, "one power law", "no power law")}
 
 
-def _noisy(t: Array, z: Array, centre: Array, word: str, confidence: float) -> dict[str, Array]:
+def _noisy(t: Array, z: Array, centre: Array, word: str, confidence: float) -> dict[str, Any]:
     """Lines beside noise: their numbers, or the range of the slope where they bend."""
     u = 2 * (t - t[0]) / (t[-1] - t[0]) - 1
     powers = 4 if word == "noise" and t.size >= FEWEST_FOR_BEND else 2
     columns = np.polynomial.chebyshev.chebvander(u, powers - 1).astype(np.float64)
     columns[:, 1] = t - centre[0]
     inside = inliers(t, columns[:, :2], z) if word in ("noise", "outliers") else np.ones(z.shape, bool)
-    names = ("level", "exponent", "level_error", "exponent_error", "exponent_low", "exponent_high", "fits", "kind")
-    found = np.empty((len(names), len(z)))
+    kind, fits, both, errors, ends = np.full(len(z), word, "U10"), np.ones(len(z)), *np.empty((3, 2, len(z)))
     for pattern, rows in alike(inside):
         line = regress(t[pattern], columns[pattern], z[rows][:, pattern], word, 2)
         # a point that is left out counts as one that is not known
         wider = t.size / pattern.sum()
-        (value, error), between = line.mean(), np.array(line.interval(1, confidence))
-        found[:2, rows], found[2:4, rows] = value.T, error.T * wider
-        found[4:6, rows] = value[:, 1] + wider * (between - value[:, 1])
-        off = z[rows] - value @ columns[:, :2].T
-        found[6, rows] = ~(runs_chance(off) < RARE) if word == "even" else 1
-        found[7, rows] = KINDS.index(word)
-        for row in rows[line.chance < UNLIKELY]:
-            found[4:, row] = *_range(t[pattern], z[row, pattern], confidence), 0, KINDS.index("bent")
-    return dict(zip(names, found, strict=True))
+        value, error = line.mean()
+        both[:, rows], errors[:, rows], fits[rows] = value.T, error.T * wider, ~line.denied
+        ends[:, rows] = value[:, 1] + wider * (line.interval(1, confidence) - value[:, 1])
+        for row in rows[line.denied] if powers > 2 else ():
+            kind[row], ends[:, row] = "bent", _range(t[pattern], z[row, pattern], confidence)
+    found = {"level": both[0], "exponent": both[1], "level_error": errors[0], "exponent_error": errors[1]}
+    return found | {"exponent_low": ends[0], "exponent_high": ends[1], "fits": fits, "kind": kind}
 
 
 def _range(t: Array, z: Array, confidence: float) -> tuple[float, float]:
@@ -300,7 +264,7 @@ def _range(t: Array, z: Array, confidence: float) -> tuple[float, float]:
     return float((slope - reach).min()), float((slope + reach).max())
 
 
-def _exact(t: Array, z: Array, off: Array, bound: Array, slope: Array) -> dict[str, Array]:
+def _exact(t: Array, z: Array, off: Array, bound: Array, slope: Array) -> dict[str, Any]:
     """Where there is no noise: bounds for what rounding and stated errors do, or the range of the local exponent."""
     first = np.append(True, np.diff(t) > 0)  # repetitions are alike
     t, z, off, bound = t[first], z[:, first], off[:, first], bound[:, first]
@@ -308,9 +272,9 @@ def _exact(t: Array, z: Array, off: Array, bound: Array, slope: Array) -> dict[s
     error = bound + least[:, None]
     reach = (abs(u) * error).sum(axis=1) / (u @ u) + least / np.ptp(t)
     straight = (abs(off) <= 2 * bound + 8 * least[:, None]).all(axis=1)
-    kind = np.where(straight, np.where(bound.any(axis=1), KINDS.index("bounded"), KINDS.index("exact")), 0)
+    kind = np.where(straight, np.where(bound.any(axis=1), "bounded", "exact"), "curved")
     found = {"exponent_low": slope - reach, "exponent_high": slope + reach, "limit_low": slope.copy()}
-    found |= {"limit_high": slope.copy(), "fits": straight.astype(float), "kind": kind}
+    found |= {"limit_high": slope.copy(), "fits": straight, "kind": kind, "noisy": 0.0 * slope}
     if t.size < FEWEST:
         return found
     bent = np.flatnonzero(~straight)
@@ -318,59 +282,7 @@ def _exact(t: Array, z: Array, off: Array, bound: Array, slope: Array) -> dict[s
     doubt = (abs(local - rough) + by_error).max(axis=1)
     found["exponent_low"][bent] = np.minimum(local.min(axis=1) - doubt, slope[bent])
     found["exponent_high"][bent] = np.maximum(local.max(axis=1) + doubt, slope[bent])
-    found["kind"][bent] = KINDS.index("curved")
     for i, row in enumerate(bent):
         found["limit_low"][row] = tends(t, local[i], by_error[i, 0])[1]
         found["limit_high"][row] = tends(-t[::-1], local[i, ::-1], by_error[i, -1])[1]
     return found
-
-
-def crossover(low_fit: xr.Dataset, high_fit: xr.Dataset) -> xr.Dataset:
-    """Where two power laws, from `fit_exponent` over two windows, meet: `abscissa` with its interval, `abscissa_error`,
-    and `ordinate`.
-
-    The interval holds all places where the two lines differ by less than their intervals at that place, taken as
-    independent (Fieller). Where there is no noise, it is a bound: how far the place moves if a law is not the line
-    through its window but goes through the outer end of it with the exponent to which the local one tends there. It
-    does not shrink with the number of points. The error is half the interval. Raises SweepError where the windows
-    share more than an end, or the lines are parallel within their errors.
-    """
-    if bool(((low_fit.low < high_fit.high) & (high_fit.low < low_fit.high)).any()):
-        raise SweepError("the windows of the two fits overlap, so their errors are not independent; take them apart")
-    fits, ends = (low_fit, high_fit), [("limit_low", "start", "low"), ("limit_high", "stop", "high")]
-    centres = [np.log(fit.centre) for fit in fits]
-    if bool((centres[0] > centres[1]).all()):
-        ends.reverse()
-    middle = (centres[0] + centres[1]) / 2  # logarithms counted from here keep their digits
-    lines, outer, wide = [], [], []  # outer: through the outer ends, towards where the exponents tend
-    for fit, centre, (limit, value, end) in zip(fits, centres, ends, strict=True):
-        lines.append((fit.exponent, np.log(fit.level), centre - middle))
-        outer.append((fit[limit], np.log(fit[value]), np.log(fit[end]) - middle))
-        reach = ((fit.exponent_high - fit.exponent_low) / 2).where(fit.noisy == 1, fit.exponent_error)
-        factor = (reach / fit.exponent_error).where(fit.exponent_error > 0, 1.0)
-        wide.append((reach, fit.level_error * factor, centre - middle))
-    slope = (lines[1][0] - lines[0][0]).where(abs(lines[1][0] - lines[0][0]) > np.hypot(wide[0][0], wide[1][0]))
-    if not slope.notnull().any():
-        raise SweepError("the two laws have the same exponent within their errors, so they meet nowhere")
-
-    def meeting(low: Any, high: Any) -> xr.DataArray:
-        """Where two lines (slope, level, place of that level) meet."""
-        gap: xr.DataArray = low[1] - low[0] * low[2] - high[1] + high[0] * high[2]
-        return gap / (high[0] - low[0])  # type: ignore[no-any-return]
-
-    there = meeting(*lines)
-    pairs = [(a, b) for a in (lines[0], outer[0]) for b in (lines[1], outer[1])]
-    moved = xr.concat([abs(meeting(*pair) - there).fillna(0.0) for pair in pairs], "which").max("which")
-    # (slope (x - there))^2 = sum of (level error)^2 + (slope error (x - centre))^2, a quadratic in x - there
-    square = slope**2 - wide[0][0] ** 2 - wide[1][0] ** 2
-    linear = sum(p**2 * (there - c) for p, _, c in wide)
-    root = np.sqrt(linear**2 + square * sum(level**2 + (p * (there - c)) ** 2 for p, level, c in wide))
-    place = (middle + there).where(slope.notnull())
-    below, above = (place + (linear + sign * root) / square + sign * moved for sign in (-1, 1))
-    found = xr.Dataset({"abscissa": np.exp(place), "abscissa_low": np.exp(below), "abscissa_high": np.exp(above)})
-    found["abscissa_error"] = (found.abscissa_high - found.abscissa_low) / 2
-    found["ordinate"] = np.exp(np.log(low_fit.level) + low_fit.exponent * (place - centres[0]))
-    for name in map(str, found.data_vars):
-        units = low_fit["level" if name == "ordinate" else "centre"].attrs["units"]
-        found[name].attrs = {"units": units, "long_name": f"{name} where the two laws meet"}
-    return found.assign_attrs({name: low_fit.attrs[name] for name in ("y", "x", "method", "confidence")})

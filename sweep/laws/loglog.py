@@ -28,6 +28,9 @@ NEAR, WIDEST = 6, 6
 FEW = 20
 """Points below which noise is not told from a bend."""
 
+LINES = 250
+"""Lines that are taken at once, so that what is held stays below some 50 MB."""
+
 EPSILON = float(np.finfo(np.float64).eps)
 
 
@@ -81,13 +84,23 @@ def _by_runs(t: Array, z: Array, function: Callable[[Array, Array], Array]) -> A
         return function(t, z)
     rows = z.reshape(-1, t.size)
     found = np.full(rows.shape, np.nan)
-    patterns, which = np.unique(np.isfinite(rows), axis=0, return_inverse=True)
-    for number, pattern in enumerate(patterns):
-        alike = np.flatnonzero(which.reshape(-1) == number)
+    for pattern, which in alike(np.isfinite(rows)):
         for start, stop in runs(pattern):
             if stop - start >= FEWEST:
-                found[alike, start:stop] = function(t[start:stop], rows[alike, start:stop])
+                found[which, start:stop] = function(t[start:stop], rows[which, start:stop])
     return found.reshape(z.shape)
+
+
+def alike(present: NDArray[np.bool_]) -> list[tuple[NDArray[np.bool_], NDArray[np.intp]]]:
+    """Patterns among rows (m, n), and which rows have each, at most LINES at once."""
+    if not len(present):
+        return []
+    if present.all():
+        patterns, which = present[:1], np.zeros(len(present), dtype=np.intp)
+    else:
+        patterns, which = np.unique(present, axis=0, return_inverse=True)
+    parts = [(p, np.flatnonzero(which.reshape(-1) == number)) for number, p in enumerate(patterns)]
+    return [(p, rows[i : i + LINES]) for p, rows in parts for i in range(0, rows.size, LINES)]
 
 
 def runs(present: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
@@ -197,22 +210,14 @@ def brackets(c: Array, value: float) -> list[int]:
 
 def root(t: Array, c: Array, bracket: int, value: float, points: int) -> float:
     """Where the polynomial through `points` neighbours of t[bracket], t[bracket + 1] passes `value` between these."""
+    from scipy.interpolate import BarycentricInterpolator
     from scipy.optimize import brentq
 
     start, stop = next((a, b) for a, b in runs(np.isfinite(c)) if a <= bracket < b)
     first = min(max(bracket - points // 2 + 1, start), max(stop - points, start))
-    near = slice(first, min(first + points, stop))
-    nodes, heights, ends = t[near], c[near] - value, t[bracket : bracket + 2]
-    weights = differences(nodes[None])[1][0]
-
-    def polynomial(at: float) -> float:
-        away = at - nodes
-        if not away.all():
-            return float(heights[away == 0][0])
-        share = weights / away
-        return float((share * heights).sum() / share.sum())
-
-    return float(brentq(polynomial, *ends, xtol=4 * EPSILON * np.ptp(ends), rtol=4 * EPSILON))
+    near, ends = slice(first, min(first + points, stop)), t[bracket : bracket + 2]
+    polynomial = BarycentricInterpolator(t[near], c[near] - value)
+    return float(brentq(lambda at: float(polynomial(at)), *ends, xtol=4 * EPSILON * np.ptp(ends), rtol=4 * EPSILON))
 
 
 def is_logarithmic(grid: Any) -> bool:

@@ -14,10 +14,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import fdtrc, ndtr, stdtrit
+from scipy.special import fdtrc, gammaincc, ndtr, stdtrit
 
-from sweep.laws.curves import alike
-from sweep.laws.loglog import EPSILON, Array, differences
+from sweep.laws.loglog import EPSILON, Array, alike, differences
 
 CORRELATIONS = np.array([-0.2, 0.0, 0.2, 0.4, 0.6, 0.7, 0.8, 0.85, 0.9, 0.93, 0.96])
 TRENDS, ENDS = np.linspace(-1.6, 1.6, 5), np.array([0.0, 1.6, 3.2])
@@ -36,13 +35,15 @@ NOISES = {
 BEYOND_DOUBT = 10.0
 """Difference of AICc from which on a law is taken instead of a simpler one."""
 RARE = 1e-3
-"""Probability below which a test denies, where the noise is known,"""
+"""Probability below which a test denies, where the noise is known or independent,"""
 UNLIKELY = 0.01
 """and where it may be of any kind."""
 ROUNDING = 16 * EPSILON
 """Relative distance of a point from a curve that is none."""
 FAR = 3.5
 """Sizes of the noise beyond which a point is left out."""
+MANY = 10**7
+"""Degrees of freedom of a normal distribution."""
 
 
 class Regression(NamedTuple):
@@ -56,7 +57,7 @@ class Regression(NamedTuple):
     share: Array  # of each phi in the level of `interval` (p,): phi = 0 counts whole, more correlation less
     deviance: Array  # -2 ln likelihood (m,), of the noise that suits best, less n ln 2 pi e; rounding is no distance
     evidence: Array  # logarithm of the restricted likelihood of each line (m,), summed over the grid
-    chance: Array  # that the columns behind those that are used tell so much by chance (m,)
+    denied: NDArray[np.bool_]  # whether the points are not the columns and noise (m,)
 
     def mean(self) -> tuple[Array, Array]:
         """The numbers and their standard errors, (m, k) each."""
@@ -64,21 +65,20 @@ class Regression(NamedTuple):
         square = np.einsum("pm,pkm->km", self.weight, self.error**2 + (self.value - middle) ** 2)
         return middle.T, np.sqrt(square).T
 
-    def interval(self, number: int, confidence: float) -> tuple[Array, Array]:
-        """Ends of the interval of one number (m,).
+    def interval(self, number: int, confidence: float) -> Array:
+        """Ends of the interval of one number (2, m).
 
         It holds the values that are denser, in the mixture of Student's t of all phi, than the ends of the intervals
         of each phi alone are on average, where phi = 0 counts whole and more correlation less. Of all intervals that
         hold as often beside correlated noise, such are the narrowest beside independent noise (Pratt, 1961).
         """
         value, error = self.value[:, number], self.error[:, number] + 1e-300
-        reach = float(stdtrit(self.left, (1 + confidence) / 2))
+        reach, sides = float(stdtrit(self.left, (1 + confidence) / 2)), np.array([[-1.0], [1.0]])
         if len(value) == 1:
-            return value[0] - reach * error[0], value[0] + reach * error[0]
+            return value + sides * reach * error
         height, power = self.weight / error, -0.5 * (self.left + 1)
         level = np.einsum("p,pm->m", self.share, height) * (1 + reach**2 / self.left) ** power
         best = np.take_along_axis(value, height.argmax(axis=0)[None], axis=0)[0]
-        sides = np.array([[-1.0], [1.0]])
 
         def dense(reached: Array) -> NDArray[np.bool_]:
             """Whether values so far below and above the densest noise's own (2, m) are above the level."""
@@ -93,44 +93,33 @@ class Regression(NamedTuple):
             half = 0.5 * (inside + outside)
             in_ = dense(half)
             inside, outside = np.where(in_, half, inside), np.where(in_, outside, half)
-        low, high = best + sides * inside
-        return low, high
+        ends: Array = best + sides * inside
+        return ends
 
 
-def regress(t: Array, columns: Array, z: Array, noise: str = "noise", used: int | None = None) -> Regression:
+def regress(
+    t: Array, columns: Array, z: Array, noise: str = "noise", used: int | None = None, sigma: Array | None = None
+) -> Regression:
     """Lines z (m, n) on the first `used` of the columns (n, k), under each noise of the word.
 
-    Sums over points are of three kinds alone: over all, over the first and the last, over pairs of neighbours. So phi
-    costs no sums, and the columns before any are those of the Cholesky factor before it.
+    `sigma` (n,) says all of the noise, where it is known. Points are denied by chi-squared of known noise; by columns
+    behind those that are used, which tell too much for chance; without such, of independent noise, by runs of signs.
     """
+    if sigma is not None:
+        noise, columns, z = "even", columns / sigma[:, None], z / sigma
     phi, trend, ends = NOISES[noise]
     (n, k), one = columns.shape, phi[:, None, None]
     used = k if used is None else used
+    left = n - used
     basis, back = np.linalg.qr(columns)
     start = basis.T @ z.T
     off = z.T - basis[:, :used] @ start[:used]
     scale = abs(off).max(axis=0) + 1e-300
-    off /= scale
     u = 2 * (t - t[0]) / (t[-1] - t[0]) - 1
     steep, round_ = (grid.reshape(-1, 1) for grid in np.meshgrid(trend, ends, indexing="ij"))
     log_size = steep * u + round_ * abs(u)
     log_size -= log_size.mean(axis=1, keepdims=True)
-    x, y = (np.exp(-log_size)[:, :, None] * part for part in (basis, off))
-
-    def sums(whole: Array, outer: Array, pairs: Array) -> Array:
-        by_phi = phi.reshape(-1, *[1] * whole.ndim)
-        found: Array = whole + by_phi**2 * (whole - outer) - by_phi * pairs
-        return found
-
-    def products(a: Array, b: Array) -> Array:
-        over, both = a.transpose(0, 2, 1), [0, -1]
-        pairs = over[:, :, 1:] @ b[:, :-1] + over[:, :, :-1] @ b[:, 1:]
-        return sums(over @ b, over[:, :, both] @ b[:, both], pairs)
-
-    factor = np.linalg.cholesky(products(x, x))
-    solved = np.linalg.solve(factor, products(x, y))
-    square = sums((y**2).sum(axis=1), y[:, 0] ** 2 + y[:, -1] ** 2, 2 * (y[:, 1:] * y[:, :-1]).sum(axis=1))
-    squares = np.maximum(square[:, :, None] - np.cumsum(solved**2, axis=2), 1e-28)
+    factor, solved, squares = _sums(phi, *(np.exp(-log_size)[:, :, None] * part for part in (basis, off / scale)))
     own, (flat, cautious) = -np.log1p(-(one**2)), _priors(phi, n)
 
     def likelihoods(count: int, prior: Array) -> Array:
@@ -140,19 +129,19 @@ def regress(t: Array, columns: Array, z: Array, noise: str = "noise", used: int 
         found: Array = before - determinant - 0.5 * (n - count) * np.log(squares[:, :, count - 1])
         return found
 
-    chance = np.ones(len(z))
     if k > used:
         log, ratio = likelihoods(k, flat), squares[:, :, used - 1] / squares[:, :, k - 1] - 1
         weight = np.exp(log - log.max(axis=(0, 1)))
         beyond = fdtrc(k - used, n - k, ratio * (n - k) / (k - used))
-        chance = (weight * beyond).sum(axis=(0, 1)) / weight.sum(axis=(0, 1))
-
-    rounding = (ROUNDING * (1 + abs(z).max(axis=1))) ** 2
-    deviance = (n * np.log(squares[:, :, used - 1] * scale**2 / n + rounding) + own).min(axis=(0, 1))
-    left, turn = n - used, np.linalg.inv(back[:used, :used])
+        denied = (weight * beyond).sum(axis=(0, 1)) / weight.sum(axis=(0, 1)) < UNLIKELY
+    else:
+        denied = (noise == "even") & (runs_chance(off.T) < RARE)
+    # the numbers of each noise, and their mixture over sizes a, c
+    square, turn = squares[:, :, used - 1] * scale**2, np.linalg.inv(back[:used, :used])
     inside = turn @ np.linalg.inv(factor[:, :, :used, :used]).transpose(0, 1, 3, 2)
     value = inside @ solved[:, :, :used] * scale + turn @ start[:used]
-    variance = (inside**2).sum(axis=3)[..., None] * (squares[:, :, used - 1] / max(left, 1) * scale**2)[:, :, None]
+    of_point = square / max(left, 1) if sigma is None else np.ones_like(square)
+    variance = (inside**2).sum(axis=3)[..., None] * of_point[:, :, None]
     log = likelihoods(used, cautious)
     highest = log.max(axis=(0, 1))
     weight = np.exp(log - highest)
@@ -163,8 +152,36 @@ def regress(t: Array, columns: Array, z: Array, noise: str = "noise", used: int 
     middle = np.einsum("psm,pskm->pkm", part, value)
     error = np.sqrt(np.einsum("psm,pskm->pkm", part, variance + (value - middle[:, None]) ** 2))
     size = 1 / np.einsum("psm,sn->mn", weight, np.exp(-log_size))
+    rounding = (ROUNDING * (1 + abs(z).max(axis=1))) ** 2
+    deviance = (n * np.log(square / n + rounding) + own).min(axis=(0, 1))
     evidence, share = highest + np.log(total) - left * np.log(scale), np.sqrt(1 - np.maximum(phi, 0.0))
-    return Regression(of_phi, middle, error, size, left, share, deviance, evidence, chance)
+    if sigma is not None:
+        deviance = square[0, 0]
+        denied |= gammaincc(left / 2, deviance / 2) < RARE
+        left, evidence = MANY, -0.5 * deviance
+    return Regression(of_phi, middle, error, size, left, share, deviance, evidence, denied)
+
+
+def _sums(phi: Array, x: Array, y: Array) -> tuple[Array, Array, Array]:
+    """Least squares of y (s, n, m) on x (s, n, k), each s a size of the noise, under each phi: the Cholesky factor
+    (p, s, k, k), products with its columns (p, s, k, m), and sums of squares on the first, two ... columns likewise.
+
+    Sums over points are of three kinds alone: over all, over the first and the last, over pairs of neighbours. So phi
+    costs no sums, and the columns before any are those of the Cholesky factor before it.
+    """
+
+    def products(a: Array, b: Array) -> Array:
+        over, both, by_phi = a.transpose(0, 2, 1), [0, -1], phi[:, None, None, None]
+        pairs, whole = over[:, :, 1:] @ b[:, :-1] + over[:, :, :-1] @ b[:, 1:], over @ b
+        found: Array = whole + by_phi**2 * (whole - over[:, :, both] @ b[:, both]) - by_phi * pairs
+        return found
+
+    factor = np.linalg.cholesky(products(x, x))
+    solved = np.linalg.solve(factor, products(x, y))
+    whole, outer, pairs = (y**2).sum(axis=1), y[:, 0] ** 2 + y[:, -1] ** 2, 2 * (y[:, 1:] * y[:, :-1]).sum(axis=1)
+    square = whole + phi[:, None, None] ** 2 * (whole - outer) - phi[:, None, None] * pairs
+    squares = np.maximum(square[:, :, None] - np.cumsum(solved**2, axis=2), 1e-28)
+    return np.asarray(factor), np.asarray(solved), np.asarray(squares)
 
 
 def _priors(phi: Array, points: int) -> tuple[Array, Array]:

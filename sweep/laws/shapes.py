@@ -16,9 +16,9 @@ import numpy as np
 
 from sweep.laws.loglog import Array
 
-Parts = tuple[Array | float, ...]
-"""Shift and columns of (1) for each q, (g, n) each; what is the same for all q, or at all points, may be less."""
-PartsOf = Callable[[Array, Array, float], Parts]
+Parts = Callable[[Array, Array, float], tuple[Array | float, ...]]
+"""Of q, one behind the other (k, g, 1), s and the span: shift and columns of (1) for each q, (g, n) each; what is the
+same for all q, or at all points, may be less."""
 
 
 class Law(NamedTuple):
@@ -26,10 +26,9 @@ class Law(NamedTuple):
 
     name: str
     formula: str
-    parts: PartsOf
-    """Of q, one behind the other (k, g, 1), s and the span."""
+    parts: Parts
     columns: int
-    starts: Sequence[Sequence[float]] = ()
+    starts: Sequence[Any] = ()
     """Values of each q to start from,"""
     limits: Sequence[tuple[float, float]] = ()
     """and the least and largest that it may have."""
@@ -43,33 +42,18 @@ class Law(NamedTuple):
         """That are fitted."""
         return len(self.starts) + self.columns
 
-    def at(self, which: int, value: float) -> Law:
-        """The law of which one of the q has a value."""
-        parts, left = self.parts, [k for k in range(len(self.starts)) if k != which]
-        return self._replace(
-            name=f"{self.name}, {value}",
-            parts=lambda q, s, span: parts(np.insert(q, which, value, axis=0), s, span),
-            starts=[self.starts[k] for k in left],
-            limits=[self.limits[k] for k in left],
-        )
 
-
-def _offset(q: Array, s: Array, span: float) -> Parts:
+def _offset(q: Array, s: Array, span: float) -> Any:
     """q: exponent per window, and the arc tangent of offset over prefactor at the middle."""
     return np.log(np.exp(q[0] * (s - 0.5)) + np.tan(q[1])), 1.0
 
 
-def _correction(q: Array, s: Array, span: float) -> Parts:
+def _correction(q: Array, s: Array, span: float) -> Any:
     """q: logarithm of 1 + the correction where it is largest, and how fast it fades from there."""
     return np.log(1 + np.expm1(q[0]) * np.exp(-q[1] * (s - (q[1] < 0)))), 1.0, s
 
 
-def _log_correction(q: Array, s: Array, span: float) -> Parts:
-    """q: logarithm of B per window."""
-    return 0.0, 1.0, np.log1p(np.exp(q[0]) * s), s
-
-
-def _three(q: Array, s: Array, span: float) -> Parts:
+def _three(q: Array, s: Array, span: float) -> Any:
     """q: where the first two laws meet, the logarithm of how much further the other two do, and of the width."""
     width, place = np.exp(q[2]), q[0] + np.exp(q[1])
     a, b = (width * np.logaddexp(0, (s - at) / width) for at in (q[0], place))
@@ -80,23 +64,15 @@ Bend = Callable[[Any, Any], Any]
 """b(v; k), which tends to 0 far below and to v far above."""
 
 
-def _bent(bend: Bend) -> PartsOf:
+def _bent(bend: Bend) -> Parts:
     """Two laws that meet at q0 with a bend of width exp(q1), of shape q2 where it has one."""
 
-    def parts(q: Array, s: Array, span: float) -> Parts:
+    def parts(q: Array, s: Array, span: float) -> Any:
         u, width = s - q[0], np.exp(q[1])
         b = width * bend(u / width, q[2] if len(q) > 2 else 0.0)
         return 0.0, 1.0, u - b, b
 
     return parts
-
-
-def _exponential(v: Any, k: Any) -> Any:
-    return np.logaddexp(0, v)
-
-
-def _hyperbola(v: Any, k: Any) -> Any:
-    return 0.5 * (v + np.hypot(v, 1))
 
 
 def _uneven(v: Any, k: Any) -> Any:
@@ -111,29 +87,24 @@ GRID = np.sinh(np.linspace(-9.0, 9.0, 361))
 """Where slopes of bends without a closed form are integrated, in widths."""
 
 
-@functools.cache
-def _surface(slope: Bend, least: float, most: float) -> Any:
-    """b - ln(1 + e^v) over asinh v and k, by trapezia of the slope, moved so that b tends to v."""
-    from scipy.interpolate import CubicHermiteSpline, RectBivariateSpline
-
-    shapes, rows = np.linspace(least, most, 41), []
-    for k in shapes:
-        steep = slope(GRID, k)
-        rise = np.concatenate([[0.0], np.cumsum(0.5 * (steep[1:] + steep[:-1]) * np.diff(GRID))])
-        moved = GRID + GRID[-1] - rise[-1]
-        inside = np.clip(moved, GRID[0], GRID[-1])
-        b = CubicHermiteSpline(GRID, rise, steep)(inside) + np.maximum(moved - inside, 0.0)
-        rows.append(b - np.logaddexp(0, GRID))
-    return RectBivariateSpline(np.arcsinh(GRID), shapes, np.array(rows).T)
-
-
 def _integrated(slope: Bend, least: float, most: float) -> Bend:
-    """The bend of a slope that rises from 0 to 1, as k says."""
+    """The bend of a slope that rises from 0 to 1, as k between two values says."""
 
-    def bend(v: Any, k: Any) -> Any:
-        return np.logaddexp(0, v) + _surface(slope, least, most).ev(np.arcsinh(np.clip(v, GRID[0], GRID[-1])), k)
+    @functools.cache
+    def surface() -> Any:
+        """b - ln(1 + e^v) over asinh v and k, by trapezia of the slope, moved so that b tends to v."""
+        from scipy.interpolate import CubicHermiteSpline, RectBivariateSpline
 
-    return bend
+        shapes, rows = np.linspace(least, most, 41), []
+        for k in shapes:
+            steep = slope(GRID, k)
+            rise = np.append(0.0, np.cumsum(0.5 * (steep[1:] + steep[:-1]) * np.diff(GRID)))
+            moved = GRID + GRID[-1] - rise[-1]
+            inside = np.clip(moved, GRID[0], GRID[-1])
+            rows.append(CubicHermiteSpline(GRID, rise, steep)(inside) + moved - inside - np.logaddexp(0, GRID))
+        return RectBivariateSpline(np.arcsinh(GRID), shapes, np.array(rows).T)
+
+    return lambda v, k: np.logaddexp(0, v) + surface().ev(np.arcsinh(np.clip(v, GRID[0], GRID[-1])), k)
 
 
 def _powered(v: Any, k: Any) -> Any:
@@ -146,64 +117,91 @@ def _stretched(v: Any, k: Any) -> Any:
     return np.exp(-np.logaddexp(0, -np.sign(v) * abs(v) ** np.exp(k)))
 
 
-PLACE, WIDTH = tuple(np.linspace(0.1, 0.9, 7)), tuple(np.log((0.01, 0.04, 0.12, 0.3)))
-FADES = (-12.0, -6.0, -2.5, 2.5, 6.0, 12.0)
-AT, WIDE, POWER = (-1.0, 2.0), (-7.0, 1.0), (-60.0, 60.0)
+PLACE, WIDTH, AT, WIDE = np.linspace(0.1, 0.9, 7), np.log((0.01, 0.04, 0.12, 0.3)), (-1.0, 2.0), (-7.0, 1.0)
+FADES, POWER = (-12.0, -6.0, -2.5, 2.5, 6.0, 12.0), (-60.0, 60.0)
+SKEW, FADING = (-2.5, 2.5), (-1.2, 0.8)
 
 
-def _two(name: str, formula: str, bend: Bend, shapes: Sequence[float] = (), limits: Any = None) -> Law:
-    """Two power laws with a bend."""
-    starts, all_limits = (PLACE, WIDTH, shapes)[: 2 + bool(shapes)], (AT, WIDE, limits)[: 2 + bool(shapes)]
-    return Law(name, formula, _bent(bend), 3, starts, all_limits, ("p low", "p high"))
-
-
-def _other(
-    name: str, formula: str, parts: PartsOf, columns: int, starts: Any = (), limits: Any = (), p: str = ""
-) -> Law:
-    """A function that is no power law."""
-    return Law(name, formula, parts, columns, starts, limits, (p,) * bool(p), power=False)
+def _two(name: str, formula: str, bend: Bend, *shape: tuple[float, float]) -> Law:
+    """Two power laws with a bend, whose shape has these limits."""
+    starts = (PLACE, WIDTH, (0.0,))
+    return Law(name, formula, _bent(bend), 3, starts[: 2 + len(shape)], (AT, WIDE, *shape), ("p low", "p high"))
 
 
 ONE = Law("one law", "A x^p", lambda q, s, span: (0.0, 1.0, s), 2, exponents=("p",))
-OTHER_FUNCTIONS = (
-    _other(
-        *("logarithm", "A x^p (1 + B ln x)", lambda q, s, span: (np.log(1 + q[0] * (s - 0.5)), 1.0, s), 2),
-        *(((-1.9, -1.5, -0.5, 0.5, 1.5, 1.9),), ((-2 + 1e-9, 2 - 1e-9),), "p"),
-    ),
-    _other("exponential", "A exp(-x/X)", lambda q, s, span: (0.0, 1.0, np.exp(span * (s - 1))), 2),
-    _other(  # q: power per window; the exponent is of size 1 at its large end
-        *(
-            "stretched exponential",
-            "A exp(-(x/X)^b)",
-            lambda q, s, span: (0.0, 1.0, np.exp(q[0] * (s - (q[0] > 0)))),
-            2,
-        ),
-        *((FADES,), (POWER,)),
-    ),
-    _other("cut-off", "A exp(-x/X) x^p", lambda q, s, span: (0.0, 1.0, np.exp(span * (s - 1)), s), 3, p="p"),
-    _other("lognormal", "A exp(-B ln(x/X)^2)", lambda q, s, span: (0.0, 1.0, s, s**2), 3),
+TWO = _two("two laws", "bend fading exponentially", lambda v, k: np.logaddexp(0, v))
+BENDS = (
+    TWO,
+    _two("two laws, hyperbola", "bend fading as 1/ln x", lambda v, k: 0.5 * (v + np.hypot(v, 1))),
+    _two("two laws, asymmetric bend", "fading faster on one side", _integrated(_powered, *SKEW), SKEW),
+    _two("two laws, two widths", "one width below, another above", _uneven, (-2.0, 2.0)),
+    _two("two laws, stretched bend", "fading as exp(-(ln x)^b)", _integrated(_stretched, *FADING), FADING),
+)
+THREE = Law(
+    "three laws",
+    "two bends of one width",
+    _three,
+    columns=4,
+    starts=((0.15, 0.3, 0.45, 0.6), np.log((0.2, 0.35, 0.5)), WIDTH[:3]),
+    limits=((0.02, 0.9), (-2.5, 0.0), WIDE),
+    exponents=("p low", "p middle", "p high"),
 )
 OFFSET = Law("offset", "A x^p + C", _offset, 1, (FADES, (-1.2, -0.3, 0.1, 0.8, 1.4)), (POWER, (-1.57, 1.57)))
 CORRECTION = Law(
-    *("correction to scaling", "A x^p (1 + B x^-D)", _correction, 2),
-    *(((-2.5, -0.7, -0.1, 0.1, 0.7, 2.5, 6.0), FADES), ((-30.0, 60.0), (-80.0, 80.0)), ("p",)),
+    "correction to scaling",
+    "A x^p (1 + B x^-D)",
+    _correction,
+    columns=2,
+    starts=((-2.5, -0.7, -0.1, 0.1, 0.7, 2.5, 6.0), FADES),
+    limits=((-30.0, 60.0), (-80.0, 80.0)),
+    exponents=("p",),
 )
-LOG_CORRECTION = Law(
-    *("logarithmic correction", "A x^p (1 + B ln(x/x0))^c", _log_correction, 3),
-    *(((-1.0, 1.0, 3.0, 5.0),), ((-3.0, 8.0),), ("p",)),
+LOG_CORRECTION = Law(  # q: logarithm of B per window
+    "logarithmic correction",
+    "A x^p (1 + B ln(x/x0))^c",
+    lambda q, s, span: (0.0, 1.0, np.log1p(np.exp(q[0]) * s), s),
+    columns=3,
+    starts=((-1.0, 1.0, 3.0, 5.0),),
+    limits=((-3.0, 8.0),),
+    exponents=("p",),
 )
-TWO = _two("two laws", "bend fading exponentially", _exponential)
-THREE = Law(
-    *("three laws", "two bends of one width", _three, 4),
-    *(((0.15, 0.3, 0.45, 0.6), tuple(np.log((0.2, 0.35, 0.5))), WIDTH[:3]), ((0.02, 0.9), (-2.5, 0.0), WIDE)),
-    ("p low", "p middle", "p high"),
+LOGARITHM = Law(
+    "logarithm",
+    "A x^p (1 + B ln x)",
+    lambda q, s, span: (np.log(1 + q[0] * (s - 0.5)), 1.0, s),
+    columns=2,
+    starts=((-1.9, -1.5, -0.5, 0.5, 1.5, 1.9),),
+    limits=((-2 + 1e-9, 2 - 1e-9),),
+    exponents=("p",),
+    power=False,
 )
-SKEW, FADING = (-2.5, 2.5), (-1.2, 0.8)
-BENDS = (
-    TWO,
-    _two("two laws, hyperbola", "bend fading as 1/ln x", _hyperbola),
-    _two("two laws, asymmetric bend", "fading faster on one side", _integrated(_powered, *SKEW), (0.0,), SKEW),
-    _two("two laws, two widths", "one width below, another above", _uneven, (0.0,), (-2.0, 2.0)),
-    _two("two laws, stretched bend", "fading as exp(-(ln x)^b)", _integrated(_stretched, *FADING), (0.0,), FADING),
+STRETCHED = Law(  # q: power per window; the exponent is of size 1 at its large end
+    "stretched exponential",
+    "A exp(-(x/X)^b)",
+    lambda q, s, span: (0.0, 1.0, np.exp(q[0] * (s - (q[0] > 0)))),
+    columns=2,
+    starts=(FADES,),
+    limits=(POWER,),
+    power=False,
 )
+EXPONENTIAL = Law("exponential", "A exp(-x/X)", lambda q, s, span: (0.0, 1.0, np.exp(span * (s - 1))), 2, power=False)
+CUT_OFF = Law(
+    "cut-off",
+    "A exp(-x/X) x^p",
+    lambda q, s, span: (0.0, 1.0, np.exp(span * (s - 1)), s),
+    columns=3,
+    exponents=("p",),
+    power=False,
+)
+LOGNORMAL = Law("lognormal", "A exp(-B ln(x/X)^2)", lambda q, s, span: (0.0, 1.0, s, s**2), 3, power=False)
+TWO_EXPONENTIALS = Law(  # (1) of two laws over x instead of ln x; among them 1/cosh(x/X)
+    "two exponentials",
+    "A exp(-x/X), with a bend to exp(-x/Y)",
+    lambda q, s, span: TWO.parts(q, np.exp(span * (s - 1)), span),
+    columns=3,
+    starts=TWO.starts,
+    limits=TWO.limits,
+    power=False,
+)
+OTHER_FUNCTIONS = (LOGARITHM, EXPONENTIAL, STRETCHED, CUT_OFF, LOGNORMAL, TWO_EXPONENTIALS)
 LAWS = (ONE, *OTHER_FUNCTIONS, OFFSET, CORRECTION, *BENDS, THREE)

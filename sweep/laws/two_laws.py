@@ -15,9 +15,9 @@ import numpy as np
 import xarray as xr
 
 from sweep.errors import SweepError
-from sweep.laws.curves import Window, check_confidence, described, fit_lines, title
+from sweep.laws.curves import Window, check_options, described, fit_lines, title
 from sweep.laws.fits import Found, fitted
-from sweep.laws.lines import check_noise, crossover, fit_exponent, rounding
+from sweep.laws.lines import fit_exponent, rounding
 from sweep.laws.loglog import Array, slopes, tends
 from sweep.laws.noise import BEYOND_DOUBT, roughness
 from sweep.laws.shapes import BENDS, ONE, OTHER_FUNCTIONS, THREE, TWO
@@ -33,26 +33,17 @@ SMOOTH_TO = 1e-5
 """Share up to which the points are smooth, and no noise moves the limits to which local exponents tend."""
 SMALLER = 0.2
 """Share of the distances from two laws that three must leave, where there is no noise, to be believed."""
-
 OTHER_SHAPES = 20.0
 """Difference of AICc from which on a bend of another shape is ruled out; more than for a second law, since the truth
 may be between the shapes that are tried."""
 BEYOND_SHAPES = 0.5
 """Share of what other shapes add to where the laws meet, added again: the true one may be none of them."""
 
-LAWS = ("low", "high")
-VERDICTS = ("one law", "two laws", "three laws", "no power law", "no meeting in the window")
-REGIMES = (1, 2, 3, 0, 0)
+VERDICTS = {"one law": 1, "two laws": 2, "three laws": 3, "no power law": 0, "no meeting in the window": 0}
 """Numbers of laws, by verdict."""
-
+LAW = xr.DataArray(["low", "high"], dims="law", name="law")
 EXPONENTS = ("exponent", "exponent_low", "exponent_high")
-"""Numbers of each law,"""
-OTHERS = (
-    *("crossover", "crossover_low", "crossover_high", "verdict", "regimes", "evidence"),
-    *("width", "level", "residual", "noisy"),
-)
-"""and those of both, which stand behind them in the result of one line."""
-
+"""Numbers of each law."""
 NAMES = {
     "exponent": "exponent of the power law",
     "crossover": "where the two laws meet",
@@ -79,14 +70,12 @@ def fit_two_laws(
 ) -> xr.Dataset:
     """Two power laws with a smooth crossover, equation (1), and whether one law would do.
 
-    Intervals: where there is noise, those of the same mixture of noises as of `fit_exponent`, and they also reach over
+    Where there is noise, intervals are those of the same mixture of noises as of `fit_exponent`, and also reach over
     those of bends of other shapes that the points do not rule out (AICc within 20): hyperbolic, asymmetric, of two
-    widths, stretched. They are wider than 95 % for a truth like (1), and no promise for a truth like none of them.
-
-    Where there is none, as in a simulation, the uncertainty is how far the truth is from (1): the interval of an
-    exponent then also reaches to the local exponent at its end of the window and, three times over, to the limit to
-    which that tends; that of the crossover to where the local exponent is half-way between the two, and to where the
-    tangents at the ends meet. What noise there is beneath is added.
+    widths, stretched. They are no promise for a truth like none of these. Where there is none, the uncertainty is how
+    far the truth is from (1): the interval of an exponent then reaches to where the local exponent tends at its end of
+    the window; that of the crossover to where the local exponent is half-way between the two, and to where the
+    tangents at the ends meet.
 
     Parameters
     ----------
@@ -104,15 +93,14 @@ def fit_two_laws(
     Dataset
         `exponent`, `exponent_low`, `exponent_high` along `law` ("low", "high"); `crossover` with its interval, in
         the unit of `dim`; `verdict`: "two laws" where they are beyond doubt, "one law" where one does as well, "three
-        laws", "no power law" where a logarithm, an exponential, stretched or not, a cut-off or a lognormal does as well
-        and one law does not, "no meeting in the window"; `regimes`, how many laws; `evidence` (difference of AICc or
-        BIC); `width` [decades], `level` (y where the laws meet), `residual`, `points`, `noisy`. There are no exponents
-        and intervals where the verdict is "three laws" or "no power law", and where fewer than eight points are left.
+        laws", "no power law" where another function does as well and one law does not, "no meeting in the window";
+        `regimes`, how many laws; `evidence` (difference of AICc or BIC); `width` [decades], `level` (y where the laws
+        meet), `residual`, `points`, `noisy`. NaN where the verdict is "three laws" or "no power law", and of fewer than
+        eight points.
 
-        With `windows`: `exponent`, `exponent_low`, `exponent_high` along `law`; `crossover`, `crossover_low`,
-        `crossover_high`, `crossover_error` (half the interval), `level`. Where there is noise, the interval follows
-        from those of the two lines. Where there is none, it is a bound: how far the place moves if a law is not the
-        line through its window but goes through the outer end of it with the exponent to which the local one tends.
+        With `windows`: exponents with intervals; `crossover` with its interval and `crossover_error`, half of that;
+        `level`. Without noise the interval is a bound: how far the place moves if a law is not the line through its
+        window but goes through the outer end of it with the exponent to which the local one tends.
 
     Raises
     ------
@@ -125,81 +113,71 @@ def fit_two_laws(
     >>> import sweep
     >>> foliot = {"kernel": "foliot", "outputs": ["period"], "fixed": {"phi0": 1.0, "a": 1.0}}
     >>> ds = sweep.run(**foliot, axes={"mu": np.geomspace(1e-3, 1e6, 91)})
-    >>> found = sweep.fit_two_laws(ds.period, "mu")
-    >>> [f"{e:.2f}" for e in found.exponent.values]
+    >>> [f"{e:.2f}" for e in sweep.fit_two_laws(ds.period, "mu").exponent.values]
     ['-1.00', '-0.34']
     >>> met = sweep.fit_two_laws(ds.period, "mu", windows=((1e-3, 1e-2), (1e5, 1e6)))
     >>> print(f"{float(met.crossover):.1f}")
     0.6
     """
-    check_confidence(confidence)
-    check_noise(noise, sigma)
+    check_options(confidence, noise, sigma)
     if windows is not None:
         if window is not None:
             raise SweepError("window does not go with windows, which say where the two lines are")
         return _in_windows(y, dim, windows, confidence=confidence, noise=noise, sigma=sigma)
-    names = [f"{name} {law}" for law in LAWS for name in EXPONENTS] + list(OTHERS)
 
-    def each(t: Array, z: Array, errors: Array | None, bounds: Array | None) -> list[list[float]]:
+    def each(t: Array, z: Array, errors: Array | None, bounds: Array | None) -> dict[str, Any]:
         tried = fitted((ONE, *BENDS, *OTHER_FUNCTIONS, THREE), t, z, errors)
-        return [_one(t, row, laws, confidence, noise) for row, laws in zip(z, tried, strict=True)]
+        every = [_one(t, row, laws, confidence, noise) for row, laws in zip(z, tried, strict=True)]
+        return {name: [one[name] for one in every] for name in every[0]}
 
-    found = fit_lines(names, ("verdict", VERDICTS), each, y, dim, window, sigma)
-    axis = xr.DataArray(list(LAWS), dims="law", name="law")
-    both: dict[str, Any] = {name: xr.concat([found[f"{name} {law}"] for law in LAWS], axis) for name in EXPONENTS}
-    both |= {name: found[name] for name in (*OTHERS, "points")}
+    found = fit_lines(each, y, dim, window, sigma)
+    both = {name: xr.concat([found[f"{name} {law}"] for law in LAW.values], LAW) for name in EXPONENTS}
     units = {"crossover": str(y.coords[dim].attrs.get("units", "1")), "level": str(y.attrs.get("units", "1"))}
     attrs = {"y": title(y), "x": dim, "law": "equation (1) of sweep.laws.two_laws"}
-    return described(xr.Dataset(both), NAMES, units, attrs, confidence)
+    return described(found.assign(both), NAMES, units, attrs, confidence)
 
 
-def _in_windows(y: xr.DataArray, dim: str, windows: tuple[Window, Window], **keys: Any) -> xr.Dataset:
-    """Two straight lines, and where they meet."""
-    try:
-        low, high = windows
-    except (TypeError, ValueError):
-        raise SweepError(f"windows: expected two, ((low, high), (low, high)); found {windows!r}") from None
-    fits = [fit_exponent(y, dim, one, **keys) for one in (low, high)]
-    met = crossover(*fits)
-    law = xr.DataArray(list(LAWS), dims="law", name="law")
-    found = xr.concat([fit[list(EXPONENTS)] for fit in fits], dim=law, combine_attrs="override")
-    for end in ("", "_low", "_high", "_error"):
-        found[f"crossover{end}"] = met[f"abscissa{end}"]
-    return found.assign(level=met.ordinate).assign_attrs(met.attrs)
-
-
-def _one(t: Array, z: Array, tried: dict[str, Found], confidence: float, noise: bool | str | None) -> list[float]:
-    """EXPONENTS of both laws and OTHERS of one line."""
-    two = tried[TWO.name]
+def _one(t: Array, z: Array, tried: dict[str, Found], confidence: float, noise: bool | str | None) -> dict[str, Any]:
+    """Numbers of one line."""
+    two, span = tried[TWO.name], float(t[-1] - t[0])
     size = math.sqrt(float(two.off @ two.off) / (t.size - 5))
-    noisy = two.weights is not None or (_is_noise(t, z, two.off, size) if noise is None else bool(noise))
+    noisy = two.sigma is not None or (_is_noise(t, z, two.off, size) if noise is None else bool(noise))
     word = noise if isinstance(noise, str) else "noise" if noisy else "even"
-    ends, aicc = _ends(two, t, word, confidence)  # the numbers, and the ends of their intervals
+
+    def ends(found: Found) -> tuple[Array, float]:
+        """Of the intervals of both exponents and of ln of where they meet, (2, 3); AICc."""
+        q = len(found.law.starts)
+        of, aicc = found.interval(t, [q + 1, q + 2, 0], word, confidence)
+        return of * [1 / span, 1 / span, span] + [0.0, 0.0, t[0]], aicc
+
+    (low, high), aicc = ends(two)
+    best = np.array([*two.numbers[3:5] / span, t[0] + span * two.numbers[0]])
     if noisy or roughness(t, two.off)[0] > SMOOTH_TO * size:
         # over those of every bend of another shape that the points do not rule out
-        shaped = [_ends(tried[law.name], t, word, confidence) for law in BENDS[1:] if law.name in tried]
+        own, shaped = (low[2], high[2]), [ends(tried[law.name]) for law in BENDS[1:] if law.name in tried]
         least = min(aicc, *(one for _, one in shaped)) + OTHER_SHAPES
-        bends = np.array([ends, *(one for one, of_shape in shaped if of_shape <= least)])
-        low, high = np.fmin.reduce(bends[:, 1]), np.fmax.reduce(bends[:, 2])
-        further = BEYOND_SHAPES * max(ends[1, 2] - low[2], high[2] - ends[2, 2])
+        every = np.array([(low, high), *(one for one, of_shape in shaped if of_shape <= least)])
+        low, high = every[:, 0].min(axis=0), every[:, 1].max(axis=0)
+        further = BEYOND_SHAPES * max(own[0] - low[2], high[2] - own[1])
         low[2], high[2] = low[2] - further, high[2] + further
-        ends[1:] = low, high
+        low, high = np.where(np.isnan(low), -np.inf, low), np.where(np.isnan(high), np.inf, high)  # not determined
     if not noisy:
-        ends[1:] = _widened(t, z, *ends)
-    ends[1:] = np.where(np.isnan(ends[1:]), [[-np.inf], [np.inf]], ends[1:])  # not determined
+        low, high = _widened(t, z, best, low, high)
     verdict, evidence = _verdict(t, tried, noisy)
-    p_low, p_high, places = ends.T
-    level, places = float(np.exp(two.numbers[2])), np.exp(places)
-    width = math.exp(two.numbers[1]) * float(t[-1] - t[0]) / math.log(10)
+    of_laws = zip(EXPONENTS, (best, low, high), strict=True)
+    found = {f"{name} {law}": of[k] for name, of in of_laws for k, law in enumerate(LAW.values)}
+    found |= {"crossover": math.exp(best[2]), "crossover_low": np.exp(low[2]), "crossover_high": np.exp(high[2])}
+    found |= {"level": np.exp(two.numbers[2]), "width": math.exp(two.numbers[1]) * span / math.log(10)}
     if evidence <= 0 and not noisy:  # straight to rounding: nothing meets anywhere
-        places, width, level = np.array([np.nan, 0.0, np.inf]), math.nan, math.nan
+        found |= {"crossover": math.nan, "crossover_low": 0.0, "crossover_high": np.inf, "width": math.nan}
+        found["level"] = math.nan
     if verdict in ("three laws", "no power law"):
-        p_low, p_high, places = np.full((3, 3), np.nan)
-        width = level = math.nan
+        found = dict.fromkeys(found, math.nan)
     if verdict == "no meeting in the window":
-        places[0] = np.nan
-    residual, code = math.expm1(min(float(abs(two.off).max()), 700.0)), VERDICTS.index(verdict)
-    return [*p_low, *p_high, *places, code, REGIMES[code], evidence, width, level, residual, noisy]
+        found["crossover"] = math.nan
+    residual = math.expm1(min(float(abs(two.off).max()), 700.0))
+    found |= {"verdict": verdict, "regimes": VERDICTS[verdict], "evidence": evidence}
+    return found | {"residual": residual, "noisy": noisy}
 
 
 def _is_noise(t: Array, z: Array, off: Array, size: float) -> bool:
@@ -215,38 +193,25 @@ def _is_noise(t: Array, z: Array, off: Array, size: float) -> bool:
     return bool((share > SCATTERED and size < 3 * roughness(t, z)[0]) or (off.size >= TELLING_MEMORY and share > ROUGH))
 
 
-def _ends(found: Found, t: Array, word: str, confidence: float) -> tuple[Array, float]:
-    """Exponents of both laws and ln of where they meet, and the ends of their intervals, (3, 3); `aicc_under`."""
-    span, which = float(t[-1] - t[0]), [len(found.law.starts) + 1, len(found.law.starts) + 2, 0]
-    low, high, aicc = found.interval(t, which, word, confidence)
-    about = np.stack([np.zeros(3), low, high])
-    return (found.numbers[which] + about) * [1 / span, 1 / span, span] + [0.0, 0.0, t[0]], aicc
-
-
-def _widened(t: Array, z: Array, best: Array, low: Array, high: Array) -> Array:
+def _widened(t: Array, z: Array, best: Array, low: Array, high: Array) -> tuple[Array, Array]:
     """Intervals that reach to where the local exponents tend; of the crossover, to where they are half-way between the
     laws and to where the tangents at the ends of the window meet."""
     first = np.append(True, np.diff(t) > 0)
     t, z = t[first], z[first]
-    local, mirrored = slopes(t, z, 5), -t[::-1]
+    local, near = slopes(t, z, 5), np.eye(min(5, t.size))
     half = np.flatnonzero(np.diff(np.sign(local - (best[0] + best[1]) / 2)))
-    place = t[half[np.argmin(abs(t[half] - best[2]))]] if half.size else best[2]
-    doubt = 2.5 * float(roughness(t, z)[0]) * np.array([_amplified(t), _amplified(mirrored)])
-    ends = np.array([tends(t, local, doubt[0]), tends(mirrored, local[::-1], doubt[1])])
-    low, high = low.copy(), high.copy()
-    low[:2], high[:2] = np.minimum(low[:2], ends.min(axis=1) - doubt), np.maximum(high[:2], ends.max(axis=1) + doubt)
-    steep = np.concatenate([ends, (ends[:, 0] - doubt)[:, None], (ends[:, 0] + doubt)[:, None]], axis=1)
+    places = [t[half[np.argmin(abs(t[half] - best[2]))]]] if half.size else []
+    low, high, steep = low.copy(), high.copy(), []
+    for law, (at, of) in enumerate(((t, local), (-t[::-1], local[::-1]))):
+        # what noise there is moves the local exponent at the end
+        doubt = 2.5 * float(roughness(t, z)[0]) * math.sqrt((slopes(at[:5], near, 5)[:, 0] ** 2).sum())
+        end, limit = tends(at, of, doubt)
+        low[law], high[law] = min(low[law], end - doubt, limit - doubt), max(high[law], end + doubt, limit + doubt)
+        steep.append((end, limit, end - doubt, end + doubt))
     # where lines of these slopes through the first and the last point meet
-    pairs = [pair for pair in itertools.product(*steep) if pair[0] != pair[1]]
-    meetings = [float((z[-1] - z[0] + p * t[0] - q * t[-1]) / (p - q)) for p, q in pairs]
-    low[2], high[2] = min(low[2], place, *meetings), max(high[2], place, *meetings)
-    return np.stack([low, high])
-
-
-def _amplified(t: Array) -> float:
-    """Standard error of the local exponent at the start of a window, for values with errors of size 1."""
-    near = t[:5]
-    return float(np.sqrt((slopes(near, np.eye(near.size), 5)[:, 0] ** 2).sum()))
+    places += [(z[-1] - z[0] + p * t[0] - q * t[-1]) / (p - q) for p, q in itertools.product(*steep) if p != q]
+    low[2], high[2] = min(low[2], *places), max(high[2], *places)
+    return low, high
 
 
 def _verdict(t: Array, tried: dict[str, Found], noisy: bool) -> tuple[str, float]:
@@ -264,11 +229,73 @@ def _verdict(t: Array, tried: dict[str, Found], noisy: bool) -> tuple[str, float
     nearest = min((*bends, *others), key=lambda fit: fit.aicc)
     if three and three.aicc < nearest.aicc - OTHER_SHAPES and gain(line, three) > BEYOND_DOUBT:
         if not noisy:
-            better = float(three.off @ three.off) < SMALLER**2 * min(float(fit.off @ fit.off) for fit in bends)
+            better = three.square < SMALLER**2 * min(fit.square for fit in bends)
         else:  # nor with noise of any kind beside two
-            better = three.aicc < nearest.aicc_under(t, "noise") - BEYOND_DOUBT
+            better = three.aicc < nearest.interval(t, [], "noise", 0.5)[1] - BEYOND_DOUBT
         if better:
             return "three laws", evidence
     if evidence > BEYOND_DOUBT:
         return "two laws" if 0 <= two.numbers[0] <= 1 else "no meeting in the window", evidence
     return "no power law" if max(gain(line, one) for one in others) > BEYOND_DOUBT else "one law", evidence
+
+
+def _in_windows(y: xr.DataArray, dim: str, windows: tuple[Window, Window], **keys: Any) -> xr.Dataset:
+    """Two straight lines, and where they meet."""
+    try:
+        low, high = windows
+    except (TypeError, ValueError):
+        raise SweepError(f"windows: expected two, ((low, high), (low, high)); found {windows!r}") from None
+    fits = [fit_exponent(y, dim, one, **keys) for one in (low, high)]
+    found = xr.concat([fit[list(EXPONENTS)] for fit in fits], dim=LAW, combine_attrs="override")
+    met = crossover(*fits)
+    return found.assign(met.data_vars).assign_attrs(met.attrs)
+
+
+def crossover(low_fit: xr.Dataset, high_fit: xr.Dataset) -> xr.Dataset:
+    """Where two power laws, from `fit_exponent` over two windows, meet: `crossover` with its interval,
+    `crossover_error`, half of that, and `level`.
+
+    The interval holds all places where the two lines differ by less than their intervals at that place, taken as
+    independent (Fieller), and, without noise, where lines through the outer ends of the windows meet, with the
+    exponents to which the local ones tend there. Raises SweepError where the windows share more than an end, or the
+    lines are parallel within their errors.
+    """
+    if bool(((low_fit.low < high_fit.high) & (high_fit.low < low_fit.high)).any()):
+        raise SweepError("the windows of the two fits overlap, so their errors are not independent; take them apart")
+    fits, ends = (low_fit, high_fit), [("limit_low", "start", "low"), ("limit_high", "stop", "high")]
+    centres = [np.log(fit.centre) for fit in fits]
+    if bool((centres[0] > centres[1]).all()):
+        ends.reverse()
+    middle = (centres[0] + centres[1]) / 2  # logarithms counted from here keep their digits
+    lines, outer, wide = [], [], []  # outer: through the outer ends, towards where the exponents tend
+    for fit, centre, (limit, value, end) in zip(fits, centres, ends, strict=True):
+        lines.append((fit.exponent, np.log(fit.level), centre - middle))
+        outer.append((fit[limit], np.log(fit[value]), np.log(fit[end]) - middle))
+        reach = ((fit.exponent_high - fit.exponent_low) / 2).where(fit.noisy == 1, fit.exponent_error)
+        factor = (reach / fit.exponent_error).where(fit.exponent_error > 0, 1.0)
+        wide.append((reach, fit.level_error * factor, centre - middle))
+    slope = (lines[1][0] - lines[0][0]).where(abs(lines[1][0] - lines[0][0]) > np.hypot(wide[0][0], wide[1][0]))
+    if not slope.notnull().any():
+        raise SweepError("the two laws have the same exponent within their errors, so they meet nowhere")
+
+    def meeting(low: Any, high: Any) -> xr.DataArray:
+        """Where two lines (slope, level, place of that level) meet."""
+        gap: xr.DataArray = low[1] - low[0] * low[2] - high[1] + high[0] * high[2]
+        return gap / (high[0] - low[0])  # type: ignore[no-any-return]
+
+    there = meeting(*lines)
+    pairs = [(a, b) for a in (lines[0], outer[0]) for b in (lines[1], outer[1])]
+    moved = xr.concat([abs(meeting(*pair) - there).fillna(0.0) for pair in pairs], "which").max("which")
+    # (slope (x - there))^2 = sum of (level error)^2 + (slope error (x - centre))^2, a quadratic in x - there
+    square = slope**2 - wide[0][0] ** 2 - wide[1][0] ** 2
+    linear = sum(p**2 * (there - c) for p, _, c in wide)
+    root = np.sqrt(linear**2 + square * sum(level**2 + (p * (there - c)) ** 2 for p, level, c in wide))
+    place = (middle + there).where(slope.notnull())
+    below, above = (place + (linear + sign * root) / square + sign * moved for sign in (-1, 1))
+    found = xr.Dataset({"crossover": np.exp(place), "crossover_low": np.exp(below), "crossover_high": np.exp(above)})
+    found["crossover_error"] = (found.crossover_high - found.crossover_low) / 2
+    found["level"] = np.exp(np.log(low_fit.level) + low_fit.exponent * (place - centres[0]))
+    for name in map(str, found.data_vars):
+        units = low_fit["level" if name == "level" else "centre"].attrs["units"]
+        found[name].attrs = {"units": units, "long_name": f"{name} where the two laws meet"}
+    return found.assign_attrs({name: low_fit.attrs[name] for name in ("y", "x", "method", "confidence")})

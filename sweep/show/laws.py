@@ -125,8 +125,8 @@ def laws(
 ) -> Laws:
     """What `sweep fit` finds; `y` and `noise` as of `output_of` and `fit_exponent`. Raises SweepError."""
     from sweep.laws.curves import FEWEST_OF_LINE, stated_error
-    from sweep.laws.lines import crossover, fit_exponent
-    from sweep.laws.two_laws import fit_two_laws
+    from sweep.laws.lines import fit_exponent
+    from sweep.laws.two_laws import crossover, fit_two_laws
 
     y = output_of(dataset, y)
     if len(windows) > 2:
@@ -298,7 +298,7 @@ def _bend_cells(bend: xr.Dataset) -> tuple[str, ...]:
 
 def _meeting_cells(meeting: xr.Dataset) -> tuple[str, ...]:
     v = _numbers(meeting)
-    return f"{v['abscissa']:.6g}", f"+- {v['abscissa_error']:.1e}", f"{v['ordinate']:.6g}"
+    return f"{v['crossover']:.6g}", f"+- {v['crossover_error']:.1e}", f"{v['level']:.6g}"
 
 
 def comparison(dataset: xr.Dataset, y: str | None, x: str, windows: Sequence[Sequence[float]] = ()) -> xr.Dataset:

@@ -8,7 +8,7 @@ from scipy.interpolate import LinearNDInterpolator
 import sweep
 from sweep.explore.mesh import stretch
 from sweep.explore.scattered import axes_of, heights, on_lines
-from sweep.laws.maps import contours
+from sweep.laws.exponents import contours
 
 MU, A = np.geomspace(1e-3, 1e3, 121), np.geomspace(0.1, 10, 41)
 

@@ -157,6 +157,7 @@ NO_POWER_LAWS = {
     "stretched exponential": -((LINEAR / 20) ** 0.6),
     "cut-off": -0.5 * np.log(LINEAR) - LINEAR / 20,
     "lognormal": -0.5 * np.log(LINEAR / 10) ** 2,
+    "two exponentials": np.log(np.exp(-LINEAR / 5) + 0.1 * np.exp(-LINEAR / 40)),
 }
 
 
@@ -171,6 +172,15 @@ def test_other_functions_are_called_no_power_law_and_have_no_exponents(name, noi
     compared = sweep.compare_laws(line(z, LINEAR), "x")
     assert float(compared.worse.sel(law=name)) < 10
     assert noise or (compared.chosen == name and "no power law" in compared.verdict)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+def test_a_hyperbolic_secant_is_no_power_law_and_two_laws_are_no_exponentials(noise):
+    scatter = noise * np.random.default_rng(2).standard_normal(40)
+    for x in (LINEAR, np.geomspace(0.1, 30.0, 40)):
+        found = sweep.fit_two_laws(line(-np.log(np.cosh(x / 10)) + scatter, x), "x")
+        assert str(found.verdict.values) == "no power law"
+    assert int(sweep.fit_two_laws(line(two(T, 0.0, -1.0, -2.0, 0.0, 0.0)[20:40], X[20:40]), "x").regimes) == 2
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.01])
