@@ -34,22 +34,16 @@ FLAT = 1e-9
 """Volume, in products of its edges, below which a simplex is none."""
 AROUND = {1: 4, 2: 12, 3: 20}
 """Cells around a simplex that are taken, beside its corners; with more axes twice the unknowns."""
-SAFETY = 1.6
-"""Times the parabola's error."""
-MISFIT = {1: 5.0}
-"""Times what the parabola leaves, and 2.5 with more axes: a kink in the middle between cells of one axis is told at
-half its size from either side."""
-LEAST_BASIS = 0.3
-"""Of (1) with all c_ij = 1 in a cell around; its inverse is the weight of that cell."""
+SAFETY, MISFIT = 1.6, {1: 5.0}
+"""Times the parabola's error; and times what the parabola leaves, 2.5 with more axes: a kink in the middle between
+cells of one axis is told at half its size from either side."""
+LEAST_BASIS, RIDGE, BATCH = 0.3, 1e-12, 2_000
+"""Of the fit: a cell's weight is the inverse of (1) with all c_ij = 1, or of the first; simplices at a time."""
 NEARLY = 0.9
 """Share of the largest bend of an edge."""
-RIDGE = 1e-12
-BATCH = 2_000
-"""Simplices whose parabolas are fitted at a time."""
-ROUNDS = 3
-"""Of a stretch; the first joins the cells of the box as it is, where simplices reach across more of the bends."""
-MOST = 3000
-"""Simplices whose mean a stretch takes."""
+ROUNDS, MOST = 3, 3000
+"""Of a stretch: the first joins the cells of the box as it is, where simplices reach across more of the bends; and
+simplices whose mean it takes."""
 FLATTEST, STRAIGHT = 1e-5, 1e-9
 """Least share of the mean bend that a direction has: by 300 a box is stretched at most; what is taken for rounding."""
 

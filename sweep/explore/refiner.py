@@ -27,52 +27,39 @@ if TYPE_CHECKING:
 
 LEVELS = {1: (20, 10, 20), 2: (10, 5, 5), 3: (6, 3, 3)}
 FURTHER_LEVELS = (4, 2, 2)
-"""How often a step of the first grid may be cut in two, by number of axes: inside of a status, for a jump cannot be
-interpolated; across a border between statuses, where no value is right inside the last cut; and beside such a border,
-where values may go to infinity."""
+"""How often a step of the first grid may be halved, by number of axes: inside of a status, for a jump has no straight
+line; across a border between statuses; and beside one, where values may go to infinity."""
 GROWTH, SETTLED = 1.5, 1.02
-"""Cells, as a multiple, after which boxes are stretched anew; likewise before a refinement ends, since those who read
-the result stretch it by all of its cells."""
+"""Factors of the number of cells after which boxes are stretched anew: on the way, and at the end, since those who
+read the result stretch it by all of its cells."""
 LESSENING = 0.5
-"""Share of how far a cell is off the line between those that it was put between, compared with the cell that it
-descends from, as many cuts ago as there are axes: of a smooth output it is a quarter."""
+"""A cut along each axis leaves a quarter of the distance from a straight line, where an output is smooth; of noise, and
+of the volume that is to be cut in it, more than this share."""
 CUTS, STAYS, JUMP = 6, 0.9, 0.2
-"""Cuts after which values change as much from cell to cell as before, which is so at poles: in the latter half of them
-by more than this share of what they did in the first one; and at most once less than that share of the change lies on
-one side of the cell put between two others, as at a jump."""
-LATEST = 128
-"""Cells that were added last, which tell noise: most of them are not off by less; and what is to be cut fills more than
-half of what it did with 2^axes times fewer cells, which is not so around a jump or a pole."""
-NOISE_SIZE = 8.0
-"""Error of a simplex in noise, at most, as a multiple of how far such a cell is off the line between two others."""
+"""At a pole the change from cell to cell stays above a share of what it was so many cuts before, and lies on both sides
+of a new cell: at a jump one of them has less than a share of the other."""
+LATEST, NOISE_SIZE = 128, 8.0
+"""Cells added last, which tell noise; the error of a simplex in it, as a multiple of how far they are off, at most."""
 SAME = 2.0**-40
 """Distance of places along an axis, from 0 to 1, that are the same."""
 
 
 class Judged(NamedTuple):
-    """Simplices: their corners, errors, the edges (m, 2) to cut, and whether these need a cut, are not to be cut
-    although they do, lie inside of one status, lie beside a border of statuses."""
+    """Simplices, and what is to become of them."""
 
     corners: Indices
-    size: Array
-    ends: Indices
-    wanted: NDArray[np.bool_]
-    finest: NDArray[np.bool_]
-    valued: NDArray[np.bool_]
-    beside: NDArray[np.bool_]
+    size: Array  # the error of straight lines in each
+    ends: Indices  # of the edge to cut, (m, 2)
+    wanted: NDArray[np.bool_]  # the error is too large
+    finest: NDArray[np.bool_]  # but the edge is not to be cut
+    valued: NDArray[np.bool_]  # inside of one status
+    beside: NDArray[np.bool_]  # beside a border of statuses
 
 
 class Refiner:
     """Cells joined to simplices, whose edges are cut until outputs can be interpolated.
 
-    Parameters
-    ----------
-    dataset : Dataset
-        The first cells.
-    names : sequence of str
-        Outputs.
-    solve : callable
-        Given values of the axes, as a zip of them: a Dataset of these cells.
+    It begins with a dataset; `solve` makes further ones, of cells with given values of the axes.
     """
 
     def __init__(

@@ -143,26 +143,28 @@ def work_precision(
     if isolate or cell_timeout is not None:
         part = _without_failing(part, ["auto", *able], cell_timeout, note)
     against = _given(part, truth) if truth is not None else _best(part, [reference] if reference else able)
-    rows = [_measured(part, name, rtol, against) for name in names for rtol in tolerances]
-    columns = {key: np.array([row[key] for row in rows]).reshape(len(names), -1) for key in rows[0]}
-    columns["seconds"] = _seconds(part, names, tolerances)
-    found = xr.Dataset(
-        {
-            key: (("method", "rtol"), values, {"units": "s" if key == "seconds" else "1", "long_name": LONG_NAMES[key]})
-            for key, values in columns.items()
-        },
-        {"method": names, "rtol": tolerances},
-    )
+    found = _chart(part, names, tolerances, against)
     missing = [] if methods is not None else _missing(part, able)
-    return found.assign_attrs(
-        title=part.title,
-        kernel=part.kernel_name,
-        cells=against.judged,
-        open_cells=len(against.floor) - against.judged,
-        reference=against.source,
-        reference_error=float(against.floor[against.sound].max(initial=0.0)) if against.sound.any() else math.nan,
-        missing="; ".join(missing),
-        omissions="; ".join([*missing, *_omissions(found)]),
+    return found.assign_attrs(missing="; ".join(missing), omissions="; ".join([*missing, *_omissions(found)]))
+
+
+def _chart(study: Study, names: Sequence[str], tolerances: Sequence[float], against: _Reference) -> xr.Dataset:
+    """What is measured of each method at each tolerance."""
+    rows = [_measured(study, name, rtol, against) for name in names for rtol in tolerances]
+    columns = {key: np.array([row[key] for row in rows]).reshape(len(names), -1) for key in rows[0]}
+    columns["seconds"] = _seconds(study, names, tolerances)
+    about = {key: {"units": "s" if key == "seconds" else "1", "long_name": LONG_NAMES[key]} for key in columns}
+    return xr.Dataset(
+        {key: (("method", "rtol"), values, about[key]) for key, values in columns.items()},
+        {"method": list(names), "rtol": list(tolerances)},
+        {
+            "title": study.title,
+            "kernel": study.kernel_name,
+            "cells": against.judged,
+            "open_cells": len(against.floor) - against.judged,
+            "reference": against.source,
+            "reference_error": float(max(against.floor[against.sound], default=math.nan)),
+        },
     )
 
 
@@ -172,9 +174,9 @@ def _require(names: Sequence[str], reference: str | None, able: Sequence[str]) -
         raise SweepError("no method of the kernel can do this study")
     if not names:
         raise SweepError(f"methods: expected at least one of auto, {', '.join(able)}; found none")
-    for name, known in [*((name, ["auto", *able]) for name in names), *([(reference, able)] if reference else [])]:
-        if name not in known:
-            hint = did_you_mean(name, able) or f"; there are {', '.join(known)}"
+    for name in names if reference is None else [*names, reference]:
+        if name not in able and (name != "auto" or name == reference):
+            hint = did_you_mean(name, able) or f"; there are auto, {', '.join(able)}"
             raise SweepError(f"no method {name} that can do this study{hint}")
 
 
@@ -213,27 +215,24 @@ def precision_text(found: xr.Dataset, complete: bool = False) -> str:
 
     Without them, cells that are neither OK nor unsolved carry a remark, INACCURATE among them.
     """
-    work = [name for name in WORK if name in found] if complete else []
-    more = ("inaccurate", "worst cell") if complete else ()
-    headings = ("method", "rtol", "median", "worst", "time", *(name.replace("_", " ") for name in work))
+    work, more = ([name for name in WORK if name in found], ["inaccurate"]) if complete else ([], [])
     rows = []
-    for name in found["method"].values:
-        for rtol in found["rtol"].values:
-            cell = found.sel({"method": name, "rtol": rtol})
-            # of the reference itself nothing can be said but that it is below its floor
-            floor = found.attrs["reference_error"] if name == found.attrs["reference"] else -1.0
-            off = [float(cell[key]) for key in ("error_median", "error_worst")]
-            row = [str(name), f"{rtol:.0e}", *("reference" if e <= floor else f"{e:.1e}" for e in off)]
-            row += [small_duration(float(cell.seconds)), *(f"{float(cell[key]):.4g}" for key in work)]
-            row += [f"{100 * float(cell[key]):.3g} %" for key in ("ok", "unsolved", "silent", *more[:1])]
-            rows.append([*row, str(cell.worst_cell.item())] if complete else row)
+    for cell in found.to_dataframe().reset_index().itertuples():
+        # of the reference itself nothing can be said but that it is below its floor
+        floor = found.attrs["reference_error"] if cell.method == found.attrs["reference"] else -1.0
+        off = ("reference" if error <= floor else f"{error:.1e}" for error in (cell.error_median, cell.error_worst))
+        counts = (f"{getattr(cell, name):.4g}" for name in work)
+        shares = (f"{100 * getattr(cell, name):.3g} %" for name in ("ok", "unsolved", "silent", *more))
+        row = (cell.method, f"{cell.rtol:.0e}", *off, small_duration(cell.seconds), *counts, *shares)
+        rows.append((*row, cell.worst_cell) if complete else row)
+    headings = ("method", "rtol", "median", "worst", "time", *work, "ok", "unsolved", "silent", *more, "worst cell")
     basis = f"errors against {found.attrs['reference']}, in {found.attrs['cells']} cells"
     basis += f", itself right to {found.attrs['reference_error']:.1e}"
     if found.attrs["open_cells"]:
         basis += f"; {found.attrs['open_cells']} cells left aside, of which it is not sure"
     left_out = f"Omissions: {found.attrs['omissions']}" if found.attrs["omissions"] else ""
-    table = Table(rows, (*headings, "ok", "unsolved", "silent", *more)).text(wide=complete)
-    return page(table, paragraph(basis), paragraph(left_out))
+    columns = [name.replace("_", " ") for name in headings[: None if complete else -1]]
+    return page(Table(rows, columns).text(wide=complete), paragraph(basis), paragraph(left_out))
 
 
 def _omissions(found: xr.Dataset) -> list[str]:
