@@ -12,7 +12,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING
@@ -193,16 +193,13 @@ def scaling(study: Given) -> Scaling:
     # an output that scales with what does not lead cannot be freed of units
     stuck = [row for lead, row in held.items() if lead not in present]
     axes = tuple(name for name in study.axes if name in weights)
-
-    def rank(names: Sequence[str]) -> int:
-        """Dimension of what scalings do to some fields."""
-        return int(np.linalg.matrix_rank(np.array([weights[name] for name in names]))) if names else 0
+    unswept = np.array([row for name, row in weights.items() if name not in axes])
 
     return Scaling(
         groups=tuple(groups),
         scales={o.name: group(against(o.name)) for o in study.asked if not any(row[o.name] for row in stuck)},
         axes=axes,
-        free=rank(list(weights)) - rank([name for name in weights if name not in axes]),
+        free=len(held) - int(np.linalg.matrix_rank(unswept) if unswept.size else 0),
         others=tuple(name for name in study.axes if name in fields and name not in axes),
         tried=tried,
     )

@@ -3,7 +3,7 @@
 Neighbours are the corners of the simplices (intervals, triangles, tetrahedra) of Delaunay's triangulation of the cells,
 in coordinates in which each axis reaches from 0 to 1, in logarithms where it reaches from a positive value to twice
 that. Outputs that are positive everywhere are taken in logarithms too. For each output the box is first stretched to
-where it bends (`metric`), so that cells are joined along what it does not depend on.
+where it bends (`mesh`), so that cells are joined along what it does not depend on.
 """
 
 from __future__ import annotations
