@@ -122,11 +122,10 @@ def diff(a: xr.Dataset, b: xr.Dataset | None = None, rtol: float = 0.0) -> Diffe
     if set(a[STATUS].dims) != set(b[STATUS].dims):
         dims = [listed(map(str, d[STATUS].dims), word="and") for d in (a, b)]
         raise SweepError(f"the cells run along {dims[0]} in one result and along {dims[1]} in the other")
-    for dim in a[STATUS].dims:
+    for dim in (dim for dim in a[STATUS].dims if dim not in a.coords):
         # cells without a value of their own are told apart by their number, so they must be the same ones
-        along = [name for name, c in a.coords.items() if c.dims[:1] == (dim,) and dim not in a.coords]
-        same = all(name in b.coords and a[name].equals(b[name]) for name in along)
-        if dim not in a.coords and (a.sizes[dim] != b.sizes[dim] or not same):
+        along = [name for name, c in a.coords.items() if c.dims[:1] == (dim,)]
+        if a.sizes[dim] != b.sizes[dim] or not all(name in b.coords and a[name].equals(b[name]) for name in along):
             raise SweepError(f"the points along {dim} are not the same in both; compare results of one design")
     first, second = xr.align(a, b, join="inner", copy=False)
 
@@ -138,8 +137,8 @@ def diff(a: xr.Dataset, b: xr.Dataset | None = None, rtol: float = 0.0) -> Diffe
     words, compared = [flag_words(d[STATUS]) for d in (first, second)], [*found.outputs, STATUS]
     for x, y in zip(*(pieces(d[compared], cells) for d in (first, second)), strict=True):
         for name, distance in found.outputs.items():
-            one, other = x[name].transpose(*cells, ...), y[name]
-            apart = _relative(one.values, other.transpose(*one.dims).values)
+            one = x[name].transpose(*cells, ...)
+            apart = _relative(one.values, y[name].transpose(*one.dims).values)
             apart = apart.max(axis=tuple(range(len(cells), one.ndim)), initial=0.0)
             distance.cells += int((apart > rtol).sum())
             if apart.size and apart.max() > distance.largest:

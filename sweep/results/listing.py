@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from sweep.errors import SweepError
@@ -12,7 +12,7 @@ from sweep.file.open import changed, open_result
 from sweep.results.statuses import Account, account, count_statuses
 from sweep.words import Table, as_path
 
-UNFINISHED = re.compile(r"(.+\.(?:h5|nc))\.(?:parts|unfinished)")
+UNFINISHED = re.compile(r"(.+\.(?:h5|nc))\.unfinished")
 """What a sweep that still runs has beside its output."""
 HEADINGS = ("result", "cells", "done", "account", "when", "version", "question")
 LATER = ("when", "version")
@@ -45,8 +45,8 @@ class Listed:
     question: str = ""
     cells: int = 0
     done: float = 0.0
-    statuses: dict[str, int] | None = None
-    account: Account | None = None
+    statuses: dict[str, int] = field(default_factory=dict)
+    account: Account = field(default_factory=Account)
     when: str = ""
     version: str = ""
     fault: str = ""
@@ -56,8 +56,7 @@ class Listed:
         """Texts below `HEADINGS`."""
         if self.fault:
             return self.path.name, "", "", "", "", "", self.fault
-        counts = self.account.by_kind if self.account else {}
-        cells = ", ".join(f"{n:,} {kind}" for kind, n in counts.items() if n)
+        cells = ", ".join(f"{n:,} {kind}" for kind, n in self.account.by_kind.items() if n)
         done = f"{int(1000 * self.done) / 10:g} %"
         return self.path.name, f"{self.cells:,}", done, cells, self.when[:16], self.version, self.question
 

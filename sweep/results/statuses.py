@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Hashable, Iterator, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import astuple, dataclass, field
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -101,27 +101,20 @@ def count_statuses(dataset: Cells, examples: bool = True) -> list[StatusCount]:
 
     Reads a few million cells at a time.
     """
-    if is_summary(dataset):
-        counts = {name: (cells, 0) for name, cells in _summed(dataset, BY_STATUS).items()}
-        examples = False
-    else:
-        names = {int(status): status.name for status in Status}
-        tallied = sorted(_tally(dataset[STATUS]).items())
-        counts = {names.get(code, f"status {code}"): found for code, found in tallied}
+    counts = _counts(dataset, BY_STATUS, STATUS, {int(status): status.name for status in Status})
+    shown = examples and not is_summary(dataset)
     total = sum(cells for cells, _ in counts.values())
     return [
-        StatusCount(name, cells, total, cell_values(dataset, first) if examples and name != Status.OK.name else {})
+        StatusCount(name, cells, total, cell_values(dataset, first) if shown and name != Status.OK.name else {})
         for name, (cells, first) in counts.items()
     ]
 
 
 def count_methods(dataset: Cells) -> dict[str, int]:
     """How many cells each method solved; those that none did are left out."""
-    if is_summary(dataset):
-        return {name: n for name, n in _summed(dataset, BY_METHOD).items() if name != "none"}
-    names = str(dataset[METHOD_USED].attrs["flag_meanings"]).split()[1:]
-    counts = _tally(dataset[METHOD_USED])
-    return {name: counts[number][0] for number, name in enumerate(names) if number in counts}
+    words = {} if is_summary(dataset) else flag_words(dataset[METHOD_USED])
+    counts = _counts(dataset, BY_METHOD, METHOD_USED, words)
+    return {name: cells for name, (cells, _) in counts.items() if name != "none"}
 
 
 def summary_text(dataset: Cells) -> str:
@@ -131,26 +124,23 @@ def summary_text(dataset: Cells) -> str:
     return "\n".join([f"{account(dataset)}" + (f"; solved by {used}" if used else ""), *others])
 
 
-def _summed(dataset: Cells, name: str) -> dict[str, int]:
-    """Cells of each status or method of a summary, over all it keeps; those that do not occur are left out."""
-    counts = dataset[name]
-    words = dataset[str(counts.dims[-1])].values
-    total = counts.values.reshape(-1, len(words)).sum(axis=0)
-    return {str(word): int(n) for word, n in zip(words, total, strict=True) if n}
-
-
-def _tally(column: xr.DataArray | Numbers) -> dict[int, tuple[int, int]]:
-    """How many cells have each code, and the number of the first of them."""
+def _counts(dataset: Cells, by_word: str, codes: str, words: Mapping[int, str]) -> dict[str, tuple[int, int]]:
+    """How many cells have each status or method that occurs, and the number of the first of them; of a summary, 0."""
+    if is_summary(dataset):
+        counts = dataset[by_word]
+        names = dataset[str(counts.dims[-1])].values
+        total = counts.values.reshape(-1, len(names)).sum(axis=0)
+        return {str(name): (int(n), 0) for name, n in zip(names, total, strict=True) if n}
     found: dict[int, tuple[int, int]] = {}
     done = 0
-    for piece in flat_pieces(column):
+    for piece in flat_pieces(dataset[codes]):
         # numpy.unique would sort the cells
         for code in np.flatnonzero(np.bincount(piece.astype(np.int16) + 128, minlength=256)) - 128:
             here = piece == code
             cells, first = found.get(int(code), (0, done + int(here.argmax())))
             found[int(code)] = cells + int(here.sum()), first
         done += len(piece)
-    return found
+    return {words.get(code, f"status {code}"): counted for code, counted in sorted(found.items())}
 
 
 def boxes(shape: Sequence[int], most: int = NUMBERS_AT_ONCE) -> Iterator[tuple[slice, ...]]:

@@ -60,7 +60,7 @@ def test_the_results_of_a_folder_are_listed_with_what_became_of_them(tmp_path):
     sweep.run(build(axes={"height": [1.0, -1.0]}, question="How long does it fall?"), tmp_path / "a.h5").close()
     sweep.run(build(axes={"height": [1.0, 2.0, 3.0]}, summary={}), tmp_path / "b.h5").close()
     interrupted(tall(23), tmp_path / "c.h5")
-    for name in ("d.h5", "e.h5.parts", "f.nc.unfinished", "g.h5.parts.old", "h.txt.parts", ".i.h5.log"):
+    for name in ("d.h5", "e.h5.unfinished", "f.nc.unfinished", "g.h5.unfinished.old", "h.txt.unfinished", ".i.h5.log"):
         (tmp_path / name).write_text("no result")
     found = sweep.list_results(tmp_path)
     assert [one.path.name for one in found] == ["a.h5", "b.h5", "c.h5", "d.h5", "e.h5", "f.nc"]
