@@ -84,9 +84,6 @@ FLAGGED = ("#D55E00", "#000000", "#CC79A7", "#666666")
 HATCHES = ("////", "\\\\\\\\", "....", "xxxx", "----")
 """Patterns of cells without a value, told apart without colour."""
 
-NAME_SPACE = 0.11
-"""Part of a map's height that a region must reach from the place of its name in all directions."""
-
 KINDS = (".png", ".svg", ".pdf")
 """Suffixes of pictures."""
 
@@ -97,10 +94,12 @@ def result_figure(dataset: xr.Dataset, y: str | None = None, x: str | None = Non
     with style():
         figure = new_figure(120.0, 82.0)
         axes = figure.subplots()
-        if shown.mapped:
-            _draw_map(axes, shown)
-        else:
-            _draw_lines(axes, shown)
+        (_draw_map if shown.mapped else _draw_lines)(axes, shown)
+        if shown.mapped or not shown.joined:  # what is drawn lies everywhere
+            handles, names = axes.get_legend_handles_labels()
+            figure.legend(handles, names, loc="outside lower center", ncols=3) if names else None
+        elif shown.across or shown.codes():
+            axes.legend()
         title = "\n".join(part for part in (_plain(dataset.attrs.get("title", "")), shown.held) if part)
         axes.set_title(title, wrap=True)
     return figure
@@ -115,19 +114,18 @@ def precision_figure(found: xr.Dataset) -> Figure:
     with style():
         figure = new_figure(PAGE, 92.0 + 4.0 * -(-(len(names) + 4) // 4))
         panels = figure.subplots(1, 2, sharex=True, sharey=True)
-        for axes, key, text in zip(panels, ("error_median", "error_worst"), ("median", "worst"), strict=True):
-            draw_precision(axes, found, key)
-            axes.set_title(f"{text} of {attrs['cells']} cells")
+        for axes, key in zip(panels, ("median", "worst"), strict=True):
+            draw_precision(axes, found, f"error_{key}")
+            axes.set_title(f"{key} of {attrs['cells']} cells")
         low, high = panels[0].get_xlim()
         wide = np.sqrt(max(LEAST_SPAN * low / high, 1.0))
         panels[0].set(ylabel=f"relative error against {attrs['reference']} [1]", xlim=(low / wide, high * wide))
-        lines = dict(zip(*reversed(panels[0].get_legend_handles_labels()), strict=True))
+        lines = {line.get_label(): line for line in panels[0].get_lines()}
         handles = {}
         for name in names:
             silent = bool((found.silent.sel({"method": name}) > 0).any())
-            handles[name + " (solves no cell)" * (name not in lines) + " (silently wrong)" * silent] = lines.get(
-                name, Line2D([], [], linestyle="")
-            )
+            text = name + " (solves no cell)" * (name not in lines) + " (silently wrong)" * silent
+            handles[text] = lines.get(name, Line2D([], [], linestyle=""))
         handles |= precision_marks(found)
         figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=4, fontsize=7)
         figure.suptitle(_plain(attrs["title"]), fontsize=9)
@@ -277,10 +275,6 @@ def _draw_lines(axes: Any, shown: View) -> None:
             axes.plot(x[valued], y[valued], **look)
             axes.plot(x[empty], np.zeros(empty.sum()), transform=axes.get_xaxis_transform(), **look)
         axes.plot([], [], mark, color=colour, markerfacecolor="none", label=shown.meanings.get(code, str(code)))
-    if (shown.across or shown.codes()) and shown.joined:
-        axes.legend()
-    elif shown.across or shown.codes():  # points lie everywhere
-        axes.figure.legend(loc="outside lower center", ncols=3)
 
 
 def _draw_map(axes: Any, shown: View) -> None:
@@ -288,50 +282,24 @@ def _draw_map(axes: Any, shown: View) -> None:
     grids = shown.values(shown.x), shown.values(str(shown.across))
     axes.set(xlabel=label(coordinate(shown.y, shown.x), 80), ylabel=label(coordinate(shown.y, str(shown.across))))
     axes.set(**{f"{k}scale": "log" if is_logarithmic(grid) else "linear" for k, grid in zip("xy", grids, strict=True)})
-    corners = [edges(grid.astype(np.float64)) for grid in grids]
+    x, y = (edges(grid.astype(np.float64)) for grid in grids)
     norm = LogNorm() if spans_decades(shown.y) else Normalize()
-    mesh = axes.pcolormesh(*corners, np.ma.masked_invalid(shown.y.values), norm=norm, cmap="viridis", rasterized=True)
+    mesh = axes.pcolormesh(x, y, np.ma.masked_invalid(shown.y.values), norm=norm, cmap="viridis", rasterized=True)
     axes.figure.colorbar(mesh, ax=axes, label=label(shown.y))
-    keys: list[Any] = []
     for code, hatch, colour in zip(shown.codes(), itertools.cycle(HATCHES), itertools.cycle(FLAGGED), strict=False):
         here, name = shown.status == code, shown.meanings.get(code, str(code))
         empty = here & ~np.isfinite(shown.y.values)
         if (here & ~empty).any():
-            around = (np.concatenate([ends[:1], c, ends[-1:]]) for c, ends in zip(grids, corners, strict=True))
+            around = (np.concatenate([ends[:1], grid, ends[-1:]]) for grid, ends in zip(grids, (x, y), strict=True))
             axes.contour(*around, np.pad(here, 1), levels=[0.5], colors=[colour])
-        look: dict[str, Any] = {"facecolor": "0.94", "edgecolor": "0.45", "linewidth": 0.0, "hatch": hatch}
         if empty.any():
-            axes.add_collection(PolyCollection(list(_runs(corners, empty)), **look))
-        if not _name(axes, corners, here, name):
-            keys.append(Patch(label=name, **look) if empty.any() else Line2D([], [], color=colour, label=name))
-    if keys:
-        axes.figure.legend(handles=keys, loc="outside lower center", ncols=3)
-
-
-def _runs(corners: list[Any], here: Any) -> Iterator[Any]:
-    """A rectangle for each run of cells side by side."""
-    x, y = corners
-    for row, cells in enumerate(here):
-        ends = np.flatnonzero(np.diff(np.concatenate([[False], cells, [False]]).astype(int)))
-        for left, right in zip(x[ends[::2]], x[ends[1::2]], strict=True):
-            yield [(left, y[row]), (right, y[row]), (right, y[row + 1]), (left, y[row + 1])]
-
-
-def _name(axes: Any, corners: list[Any], here: Any, name: str) -> bool:
-    """Writes the name of a region where it is widest, if it has room there; whether it has."""
-    from scipy.ndimage import distance_transform_edt
-
-    inside = np.pad(here, 1)
-    aspect = here.shape[0] / here.shape[1]
-    depth = distance_transform_edt(inside, sampling=(1.0, aspect))[1:-1, 1:-1]
-    widest = np.argwhere(depth > 0.999 * depth.max())
-    row, column = widest[abs(widest - widest.mean(axis=0)).sum(axis=1).argmin()]
-    if depth[row, column] < NAME_SPACE * here.shape[0]:
-        return False
-    at = [
-        np.sqrt(c[i] * c[i + 1]) if c[0] > 0 else (c[i] + c[i + 1]) / 2
-        for c, i in zip(corners, (column, row), strict=True)
-    ]
-    box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 1.5}
-    axes.text(*at, name, ha="center", va="center", fontsize=7, bbox=box, zorder=5)
-    return True
+            # a rectangle for each run of cells side by side
+            runs = [
+                [(x[left], y[row]), (x[right], y[row]), (x[right], y[row + 1]), (x[left], y[row + 1])]
+                for row, cells in enumerate(empty)
+                for left, right in np.flatnonzero(np.diff(np.pad(cells.astype(int), 1))).reshape(-1, 2)
+            ]
+            look: dict[str, Any] = {"facecolor": "0.94", "edgecolor": "0.45", "linewidth": 0.0, "hatch": hatch}
+            axes.add_collection(PolyCollection(runs, label=name, **look))
+        else:
+            axes.plot([], [], color=colour, label=name)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import itertools
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,13 +17,11 @@ from sweep.cells.schema import ANCILLARY, STATUS
 from sweep.errors import SweepError
 from sweep.file import disk
 from sweep.results.statuses import flag_words
-from sweep.show.view import preferred
-from sweep.words import Table, cell, did_you_mean, listed, page, paragraph
+from sweep.show.view import one_of, preferred
+from sweep.words import Table, cell, listed, page, paragraph
 
 if TYPE_CHECKING:
     import xarray as xr
-
-Cells = tuple[list[str], tuple[str, ...]]
 
 MOST_ROWS = 40
 POINTS = 12
@@ -48,26 +47,15 @@ COMPARED = (
 
 
 def pick(dataset: xr.Dataset, choices: Sequence[str]) -> xr.Dataset:
-    """The part of a result where axes have the given values, up to rounding in the sixth digit.
+    """The part of a result where axes have the given values, "axis=value" each, up to rounding in the sixth digit.
 
-    Parameters
-    ----------
-    choices : sequence of str
-        "axis=value" each.
-
-    Raises
-    ------
-    SweepError
-        There is no such axis, or it has no such value.
+    Raises SweepError where there is no such axis, or it has no such value.
     """
     for choice in choices:
         name, equals, value = choice.partition("=")
         if not equals:
             raise SweepError(f'--at {choice}: expected axis=value, e.g. "mu=0.1"')
-        axes = [str(n) for n, c in dataset.coords.items() if c.ndim == 1]
-        if name not in axes:
-            hint = did_you_mean(name, axes) or f"; there are {listed(axes, word='and')}"
-            raise SweepError(f"--at {choice}: no axis {name}{hint}")
+        one_of(name, [str(n) for n, c in dataset.coords.items() if c.ndim == 1], f"--at {choice}: no axis {name}")
         values, dim = dataset[name].values, str(dataset[name].dims[0])
         if values.dtype.kind in "fiu":
             try:
@@ -90,10 +78,7 @@ def pick(dataset: xr.Dataset, choices: Sequence[str]) -> xr.Dataset:
 def output_of(dataset: xr.Dataset, y: str | None) -> str:
     """The output `y`, by default the one that is drawn. Raises SweepError where there is no such output."""
     outputs = [str(name) for name in dataset.data_vars if name not in ANCILLARY]
-    if y is not None and y not in outputs:
-        hint = did_you_mean(y, outputs) or f"; there are {listed(outputs, word='and')}"
-        raise SweepError(f"--y {y}: no such output{hint}")
-    return preferred(outputs) if y is None else y
+    return preferred(outputs) if y is None else one_of(y, outputs, f"--y {y}: no such output")
 
 
 @dataclass(frozen=True)
@@ -131,19 +116,16 @@ def laws(
     y = output_of(dataset, y)
     if len(windows) > 2:
         raise SweepError(f"--window: expected one or two, found {len(windows)}")
-    limits: list[tuple[float, float] | None] = [*sorted((low, high) for low, high in windows)] or [None]
-    column, keys = dataset[y], {"confidence": confidence, "noise": noise}
+    limits: list[Any] = sorted((low, high) for low, high in windows) or [None]
+    column, keys, bend, meeting = dataset[y], {"confidence": confidence, "noise": noise}, None, None
     bound = stated_error(dataset, y)
     fits = tuple(fit_exponent(column, x, window, bound=bound, **keys) for window in limits)  # type: ignore[arg-type]
-    meeting = crossover(fits[0], fits[1]) if len(fits) == 2 else None
-    bend = None
-    if meeting is None and column.sizes[str(column[x].dims[0])] >= FEWEST_OF_LINE:
-        try:
-            bend = fit_two_laws(column, x, limits[0], **keys)  # type: ignore[arg-type]
-        except SweepError:  # the window leaves too few points
-            pass
-        else:
-            bend = bend if bool((bend.regimes == 2).any()) else None
+    if len(fits) == 2:
+        meeting = crossover(*fits)
+    elif column.sizes[str(column[x].dims[0])] >= FEWEST_OF_LINE:
+        with contextlib.suppress(SweepError):  # the window leaves too few points
+            found = fit_two_laws(column, x, limits[0], **keys)  # type: ignore[arg-type]
+            bend = found if bool((found.regimes == 2).any()) else None
     remark = " ".join(filter(None, (dataset.attrs.get("lines", ""), _remark(dataset, y))))
     return Laws(y, x, fits, bend, meeting, confidence, remark)
 
@@ -164,23 +146,20 @@ def _remark(dataset: xr.Dataset, y: str) -> str:
 def laws_text(found: Laws, complete: bool = False) -> str:
     """The laws as people read them: exponents and their intervals; by wish all columns and what they mean."""
 
-    def table(title: str, of: xr.Dataset, heading: Sequence[str], cells: Sequence[Cells], keep: int | None) -> str:
+    def table(title: str, of: Sequence[xr.Dataset], heading: Sequence[str], cells: Any, keep: int | None) -> str:
         """A row for each line: its place on the other axes, and the first cells of what is fitted."""
-        rows = [(*labels, *row[:keep]) for labels, row in cells]
-        text = Table(rows[:MOST_ROWS], (*_dims(of), *heading[:keep]), title).text()
+        rows = [(*labels, *cells(one)[:keep]) for fit in of for labels, one in _lines(fit)]
+        text = Table(rows[:MOST_ROWS], (*_dims(of[0]), *heading[:keep]), title).text()
         more = len(rows) - MOST_ROWS
         return text + (f"\n  and {more} more; choose with --at axis=value" if more > 0 else "")
 
     heading = ("window", "p", "interval", "points", "drift", "residual", f"{found.y} at {found.x} = 1")
-    cells = [(labels, _fit_cells(one)) for fit in found.fits for labels, one in _lines(fit)]
-    texts = [table(f"{found.y} ~ {found.x}^p", found.fits[0], heading, cells, None if complete else 3)]
+    texts = [table(f"{found.y} ~ {found.x}^p", found.fits, heading, _fit_cells, None if complete else 3)]
     if found.bend is not None:
         heading = ("p low", "interval", "p high", "interval", f"{found.x} between", "interval", "bend")
-        cells = [(labels, _bend_cells(one)) for labels, one in _lines(found.bend)]
-        texts.append(table("two laws with a smooth bend", found.bend, heading, cells, None if complete else 5))
+        texts.append(table("two laws with a smooth bend", [found.bend], heading, _bend_cells, None if complete else 5))
     if found.meeting is not None:
-        cells = [(labels, _meeting_cells(one)) for labels, one in _lines(found.meeting)]
-        texts.append(table("the two laws meet", found.meeting, (found.x, "", found.y), cells, None))
+        texts.append(table("the two laws meet", [found.meeting], (found.x, "", found.y), _meeting_cells, None))
     return page(*texts, *map(paragraph, (found.remark, found.explanation if complete else REST)))
 
 
@@ -197,12 +176,8 @@ def exponents_text(found: xr.Dataset, x: str, complete: bool = False) -> str:
 
 def sensitivity_text(found: xr.Dataset) -> str:
     """Indices of `sensitivity`, a row a parameter."""
-    names = [str(name) for name in found.data_vars]
-    rows = [
-        (str(one), *(f"{found[name].sel(parameter=one).item():.4g}" for name in names))
-        for one in found.parameter.values
-    ]
-    return Table(rows, ("parameter", *(name.replace("_", " ") for name in names))).text()
+    rows = [(*labels, *(f"{value:.4g}" for value in _numbers(one).values())) for labels, one in _lines(found)]
+    return Table(rows, ("parameter", *(str(name).replace("_", " ") for name in found.data_vars))).text()
 
 
 def law_rows(found: Laws) -> Iterator[tuple[str, ...]]:
@@ -223,16 +198,17 @@ def law_rows(found: Laws) -> Iterator[tuple[str, ...]]:
 def write_laws(found: Laws, path: Path) -> None:
     """The laws as csv: a row for each line and window; of two laws a row each. Raises SweepError."""
     parts = [(fit, "one") for fit in found.fits]
-    if found.bend is not None:
-        parts += [(found.bend.sel(law=law), law) for law in ("low", "high")]
-    if found.meeting is not None:
-        parts.append((found.meeting, "meeting"))
-    rows: list[dict[str, Any]] = []
-    for fit, law in parts:
-        for labels, one in _lines(fit):
-            place = {"y": fit.attrs["y"], "x": fit.attrs["x"], "law": law, **dict(zip(_dims(fit), labels, strict=True))}
-            rows.append(place | _numbers(one))
-    _write(rows, path)
+    parts += [] if found.bend is None else [(found.bend.sel(law=law), law) for law in ("low", "high")]
+    parts += [] if found.meeting is None else [(found.meeting, "meeting")]
+    start = {"y": found.y, "x": found.x}
+    _write(
+        [
+            start | {"law": law} | dict(zip(_dims(fit), labels, strict=True)) | _numbers(one)
+            for fit, law in parts
+            for labels, one in _lines(fit)
+        ],
+        path,
+    )
 
 
 def _write(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
@@ -254,11 +230,10 @@ def _numbers(one: xr.Dataset) -> dict[str, Any]:
 def _lines(dataset: xr.Dataset, along: str = "law") -> Iterator[tuple[list[str], xr.Dataset]]:
     """Each line's place on the other axes, as people write it (a number where it has no name), and what is of it."""
     dims = _dims(dataset, along)
-    for position in itertools.product(*(range(dataset.sizes[dim]) for dim in dims)):
-        places = dict(zip(dims, position, strict=True))
-        one = dataset.isel(places)
-        values = (one[dim].item() if dim in one.coords else str(place) for dim, place in places.items())
-        yield [value if isinstance(value, str) else f"{value:.6g}" for value in values], one
+    for position in np.ndindex(*(dataset.sizes[dim] for dim in dims)):
+        one = dataset.isel(dict(zip(dims, position, strict=True)))
+        places = [one[dim].item() if dim in one.coords else str(k) for dim, k in zip(dims, position, strict=True)]
+        yield [value if isinstance(value, str) else f"{value:.6g}" for value in places], one
 
 
 def _fit_cells(fit: xr.Dataset) -> tuple[str, ...]:
@@ -266,15 +241,9 @@ def _fit_cells(fit: xr.Dataset) -> tuple[str, ...]:
     low, high = v["exponent_low"], v["exponent_high"]
     # of an exponent that does not fit, as many digits as the range of the local one has in common
     digits = 8 if v["fits"] == 1 else 3 if abs(high - low) < 0.1 * abs(v["exponent"]) else 2
-    return (
-        f"{v['low']:.4g} to {v['high']:.4g}",
-        f"{v['exponent']:.{digits}g}",
-        ("" if v["fits"] == 1 else "runs from ") + _interval(low, high),
-        f"{v['points']}",
-        f"{v['drift']:.1e}",
-        f"{v['residual']:.1e}",
-        f"{v['prefactor']:.6g}",
-    )
+    interval = ("" if v["fits"] == 1 else "runs from ") + _interval(low, high)
+    window, rest = f"{v['low']:.4g} to {v['high']:.4g}", (f"{v['drift']:.1e}", f"{v['residual']:.1e}")
+    return window, f"{v['exponent']:.{digits}g}", interval, f"{v['points']}", *rest, f"{v['prefactor']:.6g}"
 
 
 def _interval(low: float, high: float) -> str:
@@ -289,11 +258,9 @@ def _bend_cells(bend: xr.Dataset) -> tuple[str, ...]:
     if bend.regimes.item() != 2:
         return *("-",) * 4, "one law does as well", "-", "-"
     cells = []
-    for one in (bend.sel(law=law) for law in ("low", "high")):
-        cells += [f"{one.exponent.item():.6g}", _interval(one.exponent_low.item(), one.exponent_high.item())]
-    place = _interval(bend.crossover_low.item(), bend.crossover_high.item())
-    width = f"{bend.width.item():.2g} decades wide, residual {bend.residual.item():.1e}"
-    return *cells, f"{bend.crossover.item():.6g}", place, width
+    for one, name in ((bend.sel(law="low"), "exponent"), (bend.sel(law="high"), "exponent"), (bend, "crossover")):
+        cells += [f"{one[name].item():.6g}", _interval(one[f"{name}_low"].item(), one[f"{name}_high"].item())]
+    return *cells, f"{bend.width.item():.2g} decades wide, residual {bend.residual.item():.1e}"
 
 
 def _meeting_cells(meeting: xr.Dataset) -> tuple[str, ...]:
@@ -320,11 +287,11 @@ def comparison(dataset: xr.Dataset, y: str | None, x: str, windows: Sequence[Seq
 def comparison_text(found: xr.Dataset, complete: bool = False) -> str:
     """Which laws are ruled out, and the verdict; by wish all columns and what they mean."""
     rows = []
-    for law, one in _laws_of(found):
+    for one in _laws_of(found):
         told = "ruled out" if one["worse"] > RULED_OUT else str(one["exponents"])
         runs = "-" if np.isnan(one["runs"]) else f"{one['runs']:.2g}" if one["runs"] >= 1e-4 else "< 1e-4"
         more = (f"{one['bic'] - float(found.bic.min()):.4g}", str(one["numbers"]), runs) if complete else ()
-        rows.append((law, f"{one['worse']:.4g}", *more, f"{one['residual']:.1e}", told))
+        rows.append((one["law"], f"{one['worse']:.4g}", *more, f"{one['residual']:.1e}", told))
     heading = ("law", "AICc worse by", *(("BIC", "numbers", "chance of runs") if complete else ()), "residual")
     title = f"{found.attrs['y']} over {found.attrs['x']}, {found.sizes['point']} points"
     notes = (f"Chosen: {found.attrs['verdict']}.", COMPARED if complete else "BIC and more, and what it means: --all.")
@@ -333,13 +300,10 @@ def comparison_text(found: xr.Dataset, complete: bool = False) -> str:
 
 def write_comparison(found: xr.Dataset, path: Path) -> None:
     """The table as csv, a row for each law. Raises SweepError."""
-    start = {"y": found.attrs["y"], "x": found.attrs["x"]}
-    _write(
-        [start | {"law": law, "chosen": int(law == found.attrs["chosen"])} | one for law, one in _laws_of(found)], path
-    )
+    start, chosen = {"y": found.attrs["y"], "x": found.attrs["x"]}, found.attrs["chosen"]
+    _write([start | {"law": one["law"], "chosen": int(one["law"] == chosen)} | one for one in _laws_of(found)], path)
 
 
-def _laws_of(found: xr.Dataset) -> Iterable[tuple[str, dict[str, Any]]]:
-    names = [str(name) for name, variable in found.data_vars.items() if variable.dims == ("law",)]
-    for i, law in enumerate(found.law.values):
-        yield str(law), {name: found[name].values[i].item() for name in names}
+def _laws_of(found: xr.Dataset) -> list[dict[str, Any]]:
+    rows: list[dict[str, Any]] = found.drop_dims("point").to_dataframe().reset_index().to_dict("records")
+    return rows

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -36,8 +35,6 @@ LARGEST_SCAN = 1 << 28
 MOST_FAILED = 20
 """Cells that FAILED which are reported one by one."""
 
-Rows = Iterator[tuple[str, ...]]
-
 
 def result_text(path: Path, dataset: xr.Dataset) -> str:
     """All about a result."""
@@ -45,7 +42,7 @@ def result_text(path: Path, dataset: xr.Dataset) -> str:
         paragraph("\n".join(head(path, dataset))),
         settings(dataset).text(),
         *(table.text() for table in sections(dataset)),
-        Table(_failed(Path(path), dataset), title="FAILED, and why").text(),
+        _failed(Path(path), dataset).text(),
     )
 
 
@@ -89,25 +86,24 @@ def sections(dataset: xr.Dataset) -> list[Table]:
     along = [str(n) for n, c in columns.items() if c.dims == (n,) and n not in cells | gone]
     fixed = [str(n) for n, c in columns.items() if not c.dims or (set(c.dims) <= set(along) and n not in along)]
 
-    def coordinates(names: Sequence[str], word: str, title: str) -> Table:
-        rows = (_coordinate(dataset[name]) for name in names)
-        return Table(rows, (word, "unit", "values", "from, to", "meaning"), title)
+    def table(names: Sequence[str], shown: Callable[[xr.DataArray], Any], word: str, title: str, *head: str) -> Table:
+        """Name, unit, what is shown of each variable, and what it means."""
+        rows = []
+        for one in (dataset[name] for name in names):
+            unit = f"[{one.attrs['units']}]" if "units" in one.attrs else ""
+            rows.append((str(one.name), unit, *shown(one), str(one.attrs.get("long_name", ""))))
+        return Table(rows, (word, "unit", *head, "meaning"), title)
 
-    def variables(
-        names: Sequence[str], shown: Callable[[xr.DataArray], str], word: str, head: str, title: str
-    ) -> Table:
-        return Table(
-            (_row(dataset[name], shown(dataset[name])) for name in names), (word, "unit", head, "meaning"), title
-        )
-
+    total = account(dataset).total
+    methods = [(name, f"{n:,}", f"{100 * n / total:.1f} %") for name, n in count_methods(dataset).items()]
     tables = [
-        coordinates(axes, "axis", "axes"),
-        coordinates(over, "axis", "reduced over"),
-        variables(fixed, _value, "parameter", "value", "fixed"),
-        coordinates(along, "coordinate", "along"),
-        variables(outputs, _extent if scanned else lambda output: "", kind, "from, to", f"{kind}s"),
+        table(axes, _grid, "axis", "axes", "values", "from, to"),
+        table(over, _grid, "axis", "reduced over", "values", "from, to"),
+        table(fixed, lambda one: [_value(one)], "parameter", "fixed", "value"),
+        table(along, _grid, "coordinate", "along", "values", "from, to"),
+        table(outputs, lambda one: [_extent(one) if scanned else ""], kind, f"{kind}s", "from, to"),
         status_table(dataset, "status"),
-        Table(_method_rows(dataset), ("method", "cells", "share"), "methods used"),
+        Table(methods, ("method", "cells", "share"), "methods used"),
     ]
     return [table for table in tables if table.rows]
 
@@ -117,13 +113,8 @@ def outputs_of(dataset: xr.Dataset) -> list[str]:
     return [str(name) for name in dataset.data_vars if name not in ANCILLARY]
 
 
-def _row(variable: xr.DataArray, *shown: str) -> tuple[str, ...]:
-    """Name, unit, what is shown of it, and what it means."""
-    unit = f"[{variable.attrs['units']}]" if "units" in variable.attrs else ""
-    return str(variable.name), unit, *shown, str(variable.attrs.get("long_name", ""))
-
-
-def _coordinate(coordinate: xr.DataArray) -> tuple[str, ...]:
+def _grid(coordinate: xr.DataArray) -> tuple[str, str]:
+    """How many values, and which."""
     values = coordinate.values
     if values.ndim > 1:
         shown = f"{short(values[0])} to {short(values[-1])}"
@@ -133,7 +124,7 @@ def _coordinate(coordinate: xr.DataArray) -> tuple[str, ...]:
         shown = ", ".join(f"{v:.6g}" for v in values)
     else:
         shown = f"{values[0]:.6g} to {values[-1]:.6g}"
-    return _row(coordinate, f"{len(values):,} value{'s' * (len(values) > 1)}", shown)
+    return f"{len(values):,} value{'s' * (len(values) > 1)}", shown
 
 
 def _value(variable: xr.DataArray) -> str:
@@ -161,16 +152,13 @@ def status_table(dataset: xr.Dataset, title: str = "") -> Table:
     places = {} if is_summary(dataset) else _places(dataset)
     for count in count_statuses(dataset):
         texts = [Status[count.name].doc if count.name in Status.__members__ else "", places.get(count.name, "")]
-        if count.example:
-            texts.append(f"e.g. {' '.join(f'{name}={value}' for name, value in count.example.items())}")
+        texts += [f"e.g. {_named(count.example)}"] if count.example else []
         rows.append((f"{count.cells:,}", count.name, kind_of(count.name), "; ".join(filter(None, texts))))
     return Table(rows, ("cells", "status", "kind", "meaning, and where"), title)
 
 
-def _method_rows(dataset: xr.Dataset) -> Rows:
-    total = account(dataset).total
-    for name, cells in count_methods(dataset).items():
-        yield name, f"{cells:,}", f"{100 * cells / total:.1f} %"
+def _named(cell: Mapping[str, str]) -> str:
+    return " ".join(f"{name}={value}" for name, value in cell.items())
 
 
 def _places(dataset: xr.Dataset) -> dict[str, str]:
@@ -201,17 +189,17 @@ def _span(values: Any) -> str:
     return " and ".join(filter(None, [" to ".join(ends), "nan" if len(numbers) < len(values) else ""]))
 
 
-def _numbers(dataset: xr.Dataset, status: Status) -> Iterator[int]:
-    """Of the cells that have a status."""
-    done = 0
-    for piece in flat_pieces(dataset[STATUS]):
-        yield from (done + np.flatnonzero(piece == status)).tolist()
-        done += len(piece)
-
-
-def _failed(path: Path, dataset: xr.Dataset) -> Rows:
+def _failed(path: Path, dataset: xr.Dataset) -> Table:
     """The first cells that FAILED, and what their kernel did, as the log of the run has it."""
-    known = reasons(path)
-    for number in itertools.islice(known if is_summary(dataset) else _numbers(dataset, Status.FAILED), MOST_FAILED):
-        cell = {} if is_summary(dataset) else cell_values(dataset, number)
-        yield f"cell {number}", " ".join(f"{name}={value}" for name, value in cell.items()), known.get(number, "")
+    known, summed = reasons(path), is_summary(dataset)
+    numbers, done = list(known)[:MOST_FAILED] if summed else [], 0
+    for piece in () if summed else flat_pieces(dataset[STATUS]):
+        numbers += (done + np.flatnonzero(piece == Status.FAILED)[:MOST_FAILED]).tolist()
+        done += len(piece)
+        if len(numbers) >= MOST_FAILED:
+            break
+    rows = [
+        (f"cell {number}", "" if summed else _named(cell_values(dataset, number)), known.get(number, ""))
+        for number in numbers[:MOST_FAILED]
+    ]
+    return Table(rows, title="FAILED, and why")

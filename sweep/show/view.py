@@ -17,7 +17,7 @@ from sweep.errors import SweepError
 from sweep.explore.scattered import MOST_AXES, Box, axes_of, interpolated
 from sweep.laws.loglog import is_logarithmic
 from sweep.results.statuses import flag_words
-from sweep.words import did_you_mean
+from sweep.words import did_you_mean, listed
 
 GREEK = frozenset(
     (
@@ -83,7 +83,8 @@ def view(dataset: xr.Dataset, y: str | None = None, x: str | None = None) -> Vie
     known = [str(n) for n, v in dataset.data_vars.items() if v.ndim and n not in ANCILLARY and v.dtype.kind in "fiu"]
     if not known:
         raise SweepError("there is nothing to draw: no output runs along an axis")
-    name = _one_of(y or preferred(known), known, "there is no output {!r} to draw")
+    name = y or preferred(known)
+    one_of(name, known, f"there is no output {name!r} to draw")
     if x is None:
         dataset = evened(dataset, axes=2)
     output, cells = dataset[name], dataset["status"].dims if "status" in dataset else ()
@@ -94,7 +95,7 @@ def view(dataset: xr.Dataset, y: str | None = None, x: str | None = None) -> Vie
         if not axes:
             raise SweepError(f"{name} has no number axis to draw it along")
         x = max(axes, key=lambda axis: output[axis].size)
-    x = _one_of(x, known, f"there is no number axis {{!r}} to draw {name} along")
+    one_of(x, known, f"there is no number axis {x!r} to draw {name} along")
     along = str(output[x].dims[0])
     others = sorted((str(d) for d in output.dims if d != along), key=lambda d: -dataset.sizes[d])
     across = others[0] if others else None
@@ -114,10 +115,10 @@ def view(dataset: xr.Dataset, y: str | None = None, x: str | None = None) -> Vie
     return View(values, codes, {} if status is None else flag_words(shown["status"]), x, along, across, words)
 
 
-def _one_of(name: str, known: Sequence[str], fault: str) -> str:
+def one_of(name: str, known: Sequence[str], fault: str) -> str:
+    """The name. Raises SweepError where it is not known: the fault, and a name that is."""
     if name not in known:
-        hint = did_you_mean(name, known) or f"; there are {', '.join(known) or 'none'}"
-        raise SweepError(fault.format(name) + hint)
+        raise SweepError(fault + (did_you_mean(name, known) or f"; there are {listed(known, word='and') or 'none'}"))
     return name
 
 
