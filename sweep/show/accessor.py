@@ -64,20 +64,7 @@ class SweepAccessor:
         return where(self._dataset, condition)
 
     def fit(self, y: str, x: str, **options: Any) -> xr.Dataset:
-        """The exponent of an output along an axis, of cells that have values: as `sweep.fit_exponent`.
-
-        Parameters
-        ----------
-        y, x : str
-            An output, and the axis of the power law.
-        **options
-            `window` and others of `sweep.fit_exponent`.
-
-        Raises
-        ------
-        SweepError
-            There is no such output or axis.
-        """
+        """The exponent of an output along an axis, of cells that have values: as `sweep.fit_exponent`."""
         from sweep.laws.lines import fit_exponent
         from sweep.show.laws import output_of
 
@@ -90,13 +77,7 @@ class SweepAccessor:
         return status_table(self._dataset)
 
     def cell(self, *, allow_import: bool = False, **values: float | str) -> CellReport:
-        """What there is to say of one cell, named by the values of its axes: as the command `sweep cell`.
-
-        Raises
-        ------
-        SweepError
-            An axis has no such value, or the values name more than one cell.
-        """
+        """What there is to say of one cell, named by the values of its axes: as the command `sweep cell`."""
         from sweep.explore.one_cell import report_cell
         from sweep.show.laws import pick
         from sweep.study.read import study
@@ -105,19 +86,9 @@ class SweepAccessor:
         return report_cell(part, study(self._dataset, allow_import=allow_import))
 
     def check(self, sample: int = 200, seed: int = 0, *, allow_import: bool = False) -> Checked:
-        """Solve some OK cells again by another method and compare: as the command `sweep check`.
+        """Solve some OK cells, so many at most, again by another method and compare: as the command `sweep check`.
 
-        Parameters
-        ----------
-        sample, seed : int
-            How many cells at most, and which.
-        allow_import : bool
-            Allow a kernel named "module:NAME", whose module is imported.
-
-        Raises
-        ------
-        SweepError
-            The result is a summary or has no OK cell.
+        `allow_import` allows a kernel named "module:NAME", whose module is imported.
         """
         from sweep.explore.recheck import check
         from sweep.study.read import study

@@ -50,24 +50,22 @@ class KernelPage:
         for method in kernel.methods:
             cannot = f"; cannot do {listed(method.excludes)}" if method.excludes else ""
             lacks = f"; does not give {listed(method.lacks)}" if method.lacks else ""
-            error = "states its error" if method.bound else "keeps rtol"
-            methods.append((method.name, error, method.doc + cannot + lacks))
-        parameters = [
-            (*_unit(f), limits(f), _default(f), f.doc + _along(f, ", one for each ")) for f in kernel.parameters
-        ]
+            methods.append(
+                (method.name, "states its error" if method.bound else "keeps rtol", method.doc + cannot + lacks)
+            )
+        parameters, outputs, along = (
+            [(f.name, f"[{f.unit}]", *more(f)) for f in fields]
+            for fields, more in (
+                (kernel.parameters, lambda f: (limits(f), _default(f), f.doc + _along(f, ", one for each "))),
+                (kernel.outputs, lambda f: (_along(f, "along "), f.doc)),
+                (kernel.along, lambda f: (limits(f), f.doc)),
+            )
+        )
         cheapest = 'methods, cheapest first; "auto" takes the first whose error bound meets rtol'
         return [
             Table(parameters, ("parameter", "unit", "allowed", "default", "meaning"), "parameters"),
-            Table(
-                ((*_unit(f), _along(f, "along "), f.doc) for f in kernel.outputs),
-                ("output", "unit", "", "meaning"),
-                "outputs",
-            ),
-            Table(
-                ((*_unit(f), limits(f), f.doc) for f in kernel.along),
-                ("coordinate", "unit", "allowed", "meaning"),
-                "coordinates that all cells share",
-            ),
+            Table(outputs, ("output", "unit", "", "meaning"), "outputs"),
+            Table(along, ("coordinate", "unit", "allowed", "meaning"), "coordinates that all cells share"),
             Table(methods, ("method", "error", "how"), cheapest),
         ]
 
@@ -121,27 +119,14 @@ def kernels(name: str | None = None, allow_import: bool = False) -> Catalogue | 
 
 
 def catalogue_text(complete: bool = False) -> str:
-    """A line for each kernel; by wish its parameters, outputs and methods as well, and all statuses."""
-    if not complete:
-        rest = "`sweep kernels NAME` describes one of them, `sweep kernels --all` all of them and the statuses."
-        return page(
-            Table((name, _first(load_kernel(name))) for name in catalogue.KERNELS).text(indent=""), paragraph(rest)
-        )
-    texts = []
-    for name in catalogue.KERNELS:
-        kernel = load_kernel(name)
-        parameters = (
-            f"{f.name} [{f.unit}]" + ("" if f.default is None else f" = {_default(f, '')}") for f in kernel.parameters
-        )
-        rows = [
-            ("parameters", ", ".join(parameters)),
-            ("outputs", ", ".join(f"{f.name} [{f.unit}]{_along(f, ' along ')}" for f in kernel.outputs)),
-            ("methods", ", ".join(method.name for method in kernel.methods)),
-        ]
-        texts.append(paragraph(f"{name}: {_first(kernel)}") + "\n" + Table(rows).text())
-    kinds = {kind: ", ".join(status.name for status in Status if status.kind == kind) for kind in KINDS}
-    statuses = Table(((kind, f"{KINDS[kind]}: {names}") for kind, names in kinds.items()), title="statuses of cells")
-    return page(*texts, statuses.text())
+    """A line for each kernel; by wish all about each, and all statuses."""
+    if complete:
+        names = {kind: ", ".join(status.name for status in Status if status.kind == kind) for kind in KINDS}
+        statuses = Table(((kind, f"{KINDS[kind]}: {names[kind]}") for kind in KINDS), title="statuses of cells")
+        return page(*map(repr, Catalogue().values()), statuses.text())
+    rest = "`sweep kernels NAME` describes one of them, `sweep kernels --all` all of them and the statuses."
+    rows = ((name, _first(load_kernel(name))) for name in catalogue.KERNELS)
+    return page(Table(rows).text(indent=""), paragraph(rest))
 
 
 def write_starter(name: str, path: Path, allow_import: bool = False, force: bool = False) -> None:
@@ -203,17 +188,12 @@ def _first(kernel: Kernel) -> str:
     return kernel.doc.splitlines()[0]
 
 
-def _unit(field: Field) -> tuple[str, str]:
-    return field.name, f"[{field.unit}]"
-
-
 def _along(field: Field, words: str) -> str:
     return f"{words}{listed(field.dims, word='and')}" if field.dims else ""
 
 
-def _default(field: Field, word: str = "default ") -> str:
-    if field.default is None:
+def _default(field: Field) -> str:
+    words, value = {float(number): choice for choice, number in field.choices.items()}, field.default
+    if value is None:
         return "required"
-    words = {float(number): choice for choice, number in field.choices.items()}
-    value = field.default
-    return word + (value if isinstance(value, str) else words.get(value, f"{value:g}"))
+    return f"default {value if isinstance(value, str) else words.get(value, f'{value:g}')}"
