@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kernels.interface import Status
-from sweep.cells.compiling import Compiling, work_clock
+from sweep.cells.compiling import compiling_told, work_clock
 from sweep.cells.grid import Cells, Grid, SolveCells, empty_cells
 from sweep.cells.partition import Partition, boxes, row_blocks
 from sweep.cells.reduce import Reducer, part_columns, seconds_a_cell
@@ -91,12 +91,10 @@ def block_solver(study: Study, solver: SolveCells | None = None) -> SolveBlock:
     return lambda start, stop, arrays, wanted: solver.solve(start, cells_of(arrays), wanted)
 
 
-def sampled_study(study: Study, compiling: Compiling | None = None) -> Sample:
-    """Compiles the kernel and times a sample of the grid. Raises SweepError where the kernel always fails."""
-    compiling = compiling or Compiling(study.kernel, study.kernel_name)
-    sample = sampled_by(Solver(replace(study, kernel=compiling.kernel)), study, work_clock)
-    compiling.remember()
-    return sample
+def sampled_study(study: Study, note: Callable[[str], None] = lambda text: None) -> Sample:
+    """Compiles the kernel, which is noted, and times a sample of the grid. Raises SweepError where it always fails."""
+    with compiling_told(study.kernel_name, note):
+        return sampled_by(Solver(study), study, work_clock)
 
 
 def sampled_by(solver: SolveCells, study: Study, clock: Callable[[], float]) -> Sample:

@@ -1,4 +1,4 @@
-"""Compiling a kernel's functions takes seconds: it is told while it lasts, measured, and remembered for the next time.
+"""Compiling a kernel's functions takes seconds: it is told while it lasts, and measured.
 
 A function of columns is compiled when it is called first. How long numba compiles meanwhile, numba itself tells.
 """
@@ -6,25 +6,15 @@ A function of columns is compiled when it is called first. How long numba compil
 from __future__ import annotations
 
 import contextlib
-import functools
-import json
-import os
 import sys
 import threading
 import time
-from collections.abc import Callable
-from dataclasses import replace
-from pathlib import Path
+from collections.abc import Callable, Iterator
 from types import SimpleNamespace
 from typing import Any
 
-from kernels.interface import Kernel, is_kept, machine_code_folder
-from sweep.words import duration
-
 SILENT_SECONDS = 1.0
 """What is compiled in less time is not told."""
-TABLE = "compile_seconds.json"
-"""File beside the folders of machine code."""
 
 
 class WorkClock:
@@ -34,18 +24,20 @@ class WorkClock:
     ----------
     flag : number with a `value`
         How many compilations, one for another, are going on; others may look at it.
+    compiled : float
+        Seconds that were spent on those.
     """
 
     def __init__(self) -> None:
         self.flag: Any = SimpleNamespace(value=0)
-        self._compiling, self._begun, self._watched = 0.0, 0.0, False
+        self.compiled, self._begun, self._watched = 0.0, 0.0, False
         self._lock = threading.Lock()
 
     def __call__(self) -> float:
         self.watch()
         with self._lock:
             now = self._begun if self.flag.value else time.perf_counter()
-            return now - self._compiling
+            return now - self.compiled
 
     def watch(self) -> None:
         """From now on, if numba is loaded."""
@@ -67,80 +59,27 @@ class WorkClock:
                 return  # it began before it was watched
             self.flag.value -= 1
             if not self.flag.value:
-                self._compiling += time.perf_counter() - self._begun
+                self.compiled += time.perf_counter() - self._begun
 
 
 work_clock = WorkClock()
 """That of this process."""
 
 
-class Compiling:
-    """Watches the first calls of a kernel's functions, and notes a line while one is compiled.
+@contextlib.contextmanager
+def compiling_told(name: str, note: Callable[[str], None]) -> Iterator[None]:
+    """Notes that a kernel is compiled, once, where that takes long."""
+    work_clock.watch()
+    done = threading.Event()
 
-    `kernel` is the same, watched; `seconds` is what compiling took, by method, where it took longer than is told.
-    """
-
-    def __init__(self, kernel: Kernel, name: str, note: Callable[[str], None] | None = None) -> None:
-        self._name, self._note = name, note
-        self.seconds: dict[str, float] = {}
-        methods = [
-            replace(m, solve=self._watched(m.name, m.solve), bound=m.bound and self._watched(m.name, m.bound))
-            for m in kernel.methods
-        ]
-        self.kernel = replace(kernel, check=self._watched("check", kernel.check), methods=tuple(methods))
-
-    def remember(self) -> None:
-        """For the next time that it is compiled, by another version or on another day."""
-        table = _table()
-        if self.seconds and table is not None:
-            seconds = _read(table) | {f"{self._name}.{m}": round(s, 2) for m, s in self.seconds.items()}
-            part = table.with_name(f"{table.name}.{os.getpid()}")
-            with contextlib.suppress(OSError):
-                part.write_text(json.dumps(seconds, indent=1, sort_keys=True), "ascii")
-                part.replace(table)
-
-    def _watched(self, method: str, function: Callable[..., None]) -> Callable[..., None]:
-        called = is_kept(function)
-
-        @functools.wraps(function)
-        def call(*columns: Any) -> None:
-            nonlocal called
-            if called:
-                function(*columns)
-                return
-            done = threading.Event()
-            threading.Thread(target=self._tell, args=(method, done), daemon=True).start()
-            begun, worked = time.perf_counter(), work_clock()
-            try:
-                function(*columns)
-            finally:
-                done.set()
-                called = True
-                taken = time.perf_counter() - begun - (work_clock() - worked)
-                if taken > SILENT_SECONDS:
-                    self.seconds[method] = self.seconds.get(method, 0.0) + taken
-
-        return call
-
-    def _tell(self, method: str, done: threading.Event) -> None:
-        """Tells that a function is compiled, if it is before its first call is done."""
-        while self._note is not None and not done.wait(SILENT_SECONDS):
+    def tell() -> None:
+        while not done.wait(SILENT_SECONDS):
             if work_clock.flag.value:
-                what, table = f"{self._name}.{method}", _table()
-                known = None if table is None else _read(table).get(what)
-                self._note(f"compiling {what} ..." + (f" (about {duration(known)} when last done)" if known else ""))
+                note(f"compiling {name} ...")
                 return
 
-
-def _table() -> Path | None:
-    folder = machine_code_folder()
-    return None if folder is None else folder.parent / TABLE
-
-
-def _read(table: Path) -> dict[str, float]:
-    """Seconds by kernel and method; nothing where it cannot be read."""
+    threading.Thread(target=tell, daemon=True).start()
     try:
-        found = json.loads(table.read_text("ascii"))
-        return {str(what): float(seconds) for what, seconds in found.items() if 0 < float(seconds) < 1e4}
-    except (OSError, ValueError, TypeError, AttributeError):
-        return {}
+        yield
+    finally:
+        done.set()

@@ -37,6 +37,8 @@ and wait less for the last ones, it is enough for calls to take less than 2 % of
 LEAST_BLOCKS = 8
 """where so many blocks are left for each of several workers."""
 BLOCK_BYTES, MOST_BLOCKS = 8 << 20, 100_000
+GOLDEN = 0.6180339887498949
+"""Multiples of it, modulo 1, fill an interval evenly and fall into step with the length of no axis."""
 
 Clock = Callable[[], float]
 
@@ -133,10 +135,9 @@ def take_sample(solver: SolveCells, columns: Sequence[Column], size: int, clock:
 
 def _places(size: int, count: int, cells: int) -> list[int]:
     """First cells of probes, from the middle on, so that every beginning of the list is spread over the grid."""
-    bits = max(1, (count - 1).bit_length())
-    turned = (int(f"{i:0{bits}b}"[::-1], 2) for i in range(1 << bits))
-    middles = [(2 * ((i + count // 2) % count) + 1) * size // (2 * count) for i in turned if i < count]
-    return [min(max(middle - cells // 2, 0), size - cells) for middle in middles]
+    order = np.argsort((np.arange(count) - count // 2) * GOLDEN % 1.0)
+    middles = (2 * order + 1) * size // (2 * count)
+    return list(map(int, np.clip(middles - cells // 2, 0, size - cells)))
 
 
 def partition(sample: Sample, size: int, cell_bytes: float, workers: int, least: float = 0.0) -> Partition:

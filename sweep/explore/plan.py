@@ -16,7 +16,7 @@ import numpy as np
 
 from kernels.interface import Status, machine_code_folder
 from sweep.cells.block import Blocks, Guard, cut, faults_reported, sampled_study
-from sweep.cells.compiling import SILENT_SECONDS, Compiling
+from sweep.cells.compiling import SILENT_SECONDS, work_clock
 from sweep.cells.fingerprint import fingerprint
 from sweep.cells.grid import Grid, SolveCells, empty_cells
 from sweep.cells.reduce import output_schema, strip_bytes
@@ -186,14 +186,15 @@ def plan(
         compiled = starting if starting > SILENT_SECONDS else 0.0
         return replace(found, seconds=starting + found.seconds, compile_seconds=compiled, scaling=NO_ADVICE)
 
-    compiling = Compiling(study.kernel, study.kernel_name, note)
-    sample = sampled_study(study, compiling)
+    before = work_clock.compiled
+    sample = sampled_study(study, note or (lambda text: None))
     found = _forecast(study, sample, crew, folder, Guard(Solver(study), lambda cell: None))
     advice = NO_ADVICE
     if ADVICE_CELLS * found.cell_seconds < max(SHARE * found.seconds, ADVICE_SECONDS):
         with faults_reported(f"{study.kernel_name}: the kernel failed"):
             advice = scaling(study).advice
-    compiled = sum(compiling.seconds.values())
+    took = work_clock.compiled - before
+    compiled = took if took > SILENT_SECONDS else 0.0
     again = 0.0 if _is_kept(study.kernel_name) else compiled
     return replace(found, seconds=found.seconds + again, compile_seconds=compiled, scaling=advice)
 

@@ -20,7 +20,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 from sweep.cells.block import Blocks, cut, sampled_study
-from sweep.cells.compiling import Compiling
 from sweep.cells.fingerprint import fingerprint
 from sweep.cells.partition import Partition
 from sweep.cells.reduce import output_schema
@@ -161,7 +160,7 @@ class Loop:
 
         def take() -> Sample:
             if processes is None:
-                return sampled_study(study, Compiling(study.kernel, study.kernel_name, self.task.note))
+                return sampled_study(study, self.task.note)
             found = processes.sampled()
             processes.cost = float(found.costs.max())
             return found

@@ -14,6 +14,7 @@ from typing import Any, TextIO
 
 import numpy as np
 
+from sweep.cells.timing import GOLDEN
 from sweep.runs.log import log
 from sweep.words import SHORTEST, duration, one_digit, printable, speed
 
@@ -21,8 +22,6 @@ QUIET_SECONDS = 1.0
 """A run that ends sooner says nothing."""
 LINE_SECONDS, LOG_SECONDS = 30.0, 60.0
 """How often a line is told where there is no bar, the first ones sooner; and one is logged."""
-GOLDEN = 0.6180339887498949
-"""Multiples of it, modulo 1, fill an interval evenly and fall into step with the length of no axis."""
 
 
 def from_everywhere(jobs: Iterable[int]) -> list[int]:
