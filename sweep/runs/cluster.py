@@ -12,6 +12,7 @@ import asyncio
 import contextlib
 import gc
 import logging
+import math
 import os
 import socket
 import sys
@@ -38,8 +39,6 @@ from sweep.runs.log import log
 from sweep.study.model import Study
 
 CONNECT_SECONDS = 10
-ASK_SECONDS = 2.0
-"""How often the scheduler is asked for its workers."""
 
 
 class Cluster:
@@ -54,7 +53,7 @@ class Cluster:
         self._client = _connected(address) if self._own else address
         if self._client.asynchronous:
             raise SweepError("cluster: the client is asynchronous; pass one that is not")
-        self.threads, self._looked, self._gone = -1, -ASK_SECONDS, False
+        self.threads, self._looked, self._gone = -1, -math.inf, False
         self._asked: Any = weakref.WeakSet()
 
     def __enter__(self) -> Cluster:
@@ -68,7 +67,7 @@ class Cluster:
 
     def look(self) -> None:
         """Counts the threads of all workers, now and then. Raises SweepError."""
-        if time.monotonic() - self._looked < ASK_SECONDS:
+        if time.monotonic() - self._looked < 2.0:
             return
         try:
             threads = sum(self._client.nthreads().values())

@@ -38,15 +38,10 @@ SEVERAL_SECONDS, SLACK = 1.0, 10.0
 """Several cells may take this and so many times what they should; then they are halved."""
 LOAD_SECONDS = 180.0
 """What loading and compiling a kernel may take."""
-MEMORY_SHARE = 0.5
-"""Share of the memory that all processes may have before they are replaced."""
 TRIALS = 3
 """Times that a cell is tried alone of which a process dies."""
-STARTS, START_SECONDS = 10, 0.5
-"""Times that a process is started anew which dies before it has loaded the kernel, and the pause before that."""
-LOOK_SECONDS, BURY_SECONDS = 0.2, 1.0
-"""How often it is looked whether time goes by, or the machine slept; and what an exit status is waited for."""
-PR_SET_PDEATHSIG = 1
+LOOK_SECONDS = 0.2
+"""How often it is looked whether time goes by, or the machine slept."""
 
 R = TypeVar("R")
 
@@ -65,7 +60,7 @@ class Processes:
     def __init__(self, study: Study, limit: float | None, count: int, cost: float = 0.0) -> None:
         self.study, self.limit, self.cost, self.grid = study, limit, cost, Grid(study)
         self.text = study.to_json()
-        self.most_bytes = MEMORY_SHARE * memory() / count
+        self.most_bytes = memory() / (2 * count)  # that a process may ever have had before it is replaced
         self.good: int | None = None  # a cell that is known to end
         self.over, self.alone, self.dearest = False, threading.Lock(), 0.0
         self._idle: list[Isolated] = []
@@ -141,7 +136,7 @@ class Isolated:
             raise
         except (OSError, EOFError, AttributeError) as fault:
             late = isinstance(fault, TimeoutError)
-        code = self.end(BURY_SECONDS, process)
+        code = self.end(1.0, process)
         # one that died by itself, as late as that, is not late
         if late and code in (None, -signal.SIGKILL):
             raise Unsolved(f"took longer than {limit:.3g} s")
@@ -151,7 +146,7 @@ class Isolated:
 
     def _begin(self) -> Any:
         """A process that has loaded the kernel, and solved a cell that is known to end. Raises SweepError."""
-        for _ in range(STARTS):
+        for _ in range(10):
             try:
                 with self._lock:
                     if self._all.over:
@@ -165,7 +160,7 @@ class Isolated:
                 # a process that has not loaded the kernel is never asked for cells: they would be blamed for it
                 reason = told(fault)
                 self.end()
-                time.sleep(START_SECONDS)
+                time.sleep(0.5)
         raise SweepError(
             f"{self._all.study.kernel_name}: no process of its own can be started and load it ({reason}); what is "
             "finished is kept. The name of the folder TMPDIR must be short, and ulimit -n and -u large enough"
@@ -250,7 +245,7 @@ def _serve(pipe: Any, flag: Any) -> None:
     if sys.platform == "linux":
         with contextlib.suppress(OSError):
             Path("/proc/self/oom_score_adj").write_text("1000")
-        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+        ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
     run: Any = multiprocessing.parent_process()
     threading.Thread(target=lambda: (run.join(), os._exit(0)), daemon=True).start()
     with contextlib.suppress(EOFError, OSError):

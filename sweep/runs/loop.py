@@ -12,7 +12,7 @@ import platform
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from functools import cached_property
@@ -42,12 +42,6 @@ if TYPE_CHECKING:
 
 TICK = 0.2
 """Seconds after which progress is told even if nothing has finished."""
-GRACE_SECONDS, KILL_SECONDS = 1.3, 0.3
-"""What blocks at work have to end in when a run stops; and then, when the processes are killed that solve cells."""
-SAMPLE_SECONDS = 1.0
-"""What the timed sample may take although the time is up: it gives blocks a size by which the run is continued."""
-ELSEWHERE_SECONDS = 0.5
-"""What a block of a cluster should take at least, beside which the scheduler's millisecond is nothing."""
 MOST_TOLD = 1000
 """Cells that FAILED which are told one by one."""
 
@@ -150,7 +144,8 @@ class Loop:
         self._threads = ThreadPoolExecutor(task.cores)
         stack.callback(self._close)
         sample = self._sample() if to_do and sampled else UNSAMPLED
-        least = 0.0 if self._cluster is None else ELSEWHERE_SECONDS
+        # a block of a cluster takes so long that the scheduler's millisecond is nothing
+        least = 0.0 if self._cluster is None else 0.5
         self.blocks = Blocks(study, partition or cut(study, self._crew, sample, task.block_cells, least))
         self._weights = sample.weights(self.blocks.partition, self.blocks.rows.first)
 
@@ -169,7 +164,8 @@ class Loop:
         try:
             while not wait([sample], TICK).done:
                 self._ctrl_c.check()
-                if time.monotonic() - begun > SAMPLE_SECONDS:
+                # it gives blocks a size by which the run is continued, so it has a second although the time is up
+                if time.monotonic() - begun > 1.0:
                     self._check_time()
             return sample.result()
         except BaseException:
@@ -237,8 +233,8 @@ class Loop:
                         under_way.add(self._threads.submit(bench.block, job, wanted))
                     else:
                         under_way.add(cluster.submit(job, wanted, self.blocks.label(job)))
-                done, under_way = wait(under_way, TICK, FIRST_COMPLETED)
-                for future in done:
+                for future in wait(under_way, TICK, FIRST_COMPLETED).done:
+                    under_way.remove(future)
                     self._take(future.result(), sink)
                 if cluster is not None:
                     cluster.look()
@@ -248,8 +244,8 @@ class Loop:
         except BaseException:
             self._stop(under_way)
             for future in under_way:
-                if future.done() and not future.cancelled() and future.exception() is None:
-                    self._take(future.result(), sink)
+                with contextlib.suppress(Exception, CancelledError):
+                    self._take(future.result(0.0), sink)
             raise
 
     def _take(self, done: Done, sink: Sink) -> None:
@@ -266,13 +262,13 @@ class Loop:
         self.progress.add(self._cells(done.block), self._weights[done.block], done.seconds)
 
     def _stop(self, computing: Iterable[Future[Any]]) -> None:
-        """Lets what is computed here end; what takes too long is killed, or given up."""
+        """Lets what is computed here end within a second or so; then its process is killed, or its thread given up."""
         if self._cluster is not None:
             self._cluster.cancel()
         self._threads.shutdown(wait=False, cancel_futures=True)
-        if wait(computing, GRACE_SECONDS if self._cluster is None else 0.0).not_done and self._processes is not None:
+        if wait(computing, 1.3 if self._cluster is None else 0.0).not_done and self._processes is not None:
             self._processes.end()
-        if wait(computing, KILL_SECONDS).not_done and self._cluster is None:
+        if wait(computing, 0.3).not_done and self._cluster is None:
             endless.set()
 
     def _close(self) -> None:

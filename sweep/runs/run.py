@@ -28,9 +28,6 @@ if TYPE_CHECKING:
 
     from sweep.study.model import Study
 
-STORED_AT_ONCE = 1 << 16
-"""Cells of a block of those that are solved already."""
-
 
 def run(
     study: Given | None = None,
@@ -138,7 +135,7 @@ def store_cells(
     fingerprint, where that is not the one of the study and of this program; `taken_over` says which program has
     computed them, where it was another; `attrs` are further attributes of the file.
     """
-    block = max(1, min(row_blocks(study).count, STORED_AT_ONCE))
+    block = max(1, min(row_blocks(study).count, 1 << 16))
     task = Task(study, path, 1, force, progress=False, block_cells=block, fingerprint=mark or {})
     run_to_file(task, Precomputed(arrays, {**(attrs or {}), **({TAKEN_OVER: taken_over} if taken_over else {})}))
     return open_result(task.output)

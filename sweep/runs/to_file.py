@@ -22,9 +22,6 @@ from sweep.runs.loop import Loop, Task
 from sweep.runs.pool import Terminated, TimeUp
 from sweep.words import quantity
 
-MOST_ATTEMPTS = 3
-"""Times that damaged blocks are computed again before the disk is given up."""
-
 Ending = Literal["done before", "complete", "unfinished", "not begun"]
 """What became of an output: the last two where the time was up before the end, or before the first block."""
 
@@ -130,7 +127,7 @@ def _computed(store: Store, task: Task, known: Reused | Precomputed | None) -> N
         if store.file is None:
             _begin(store, loop, known)
         sink = stack.enter_context(_Stored(store, loop, known))
-        for _ in range(MOST_ATTEMPTS):
+        for _ in range(3):  # times that damaged blocks are computed before the disk is given up
             if missing := store.missing():
                 loop.compute(missing, sink, None if task.cluster is None else store.shared(), sink.tick)
                 sink.settle()
