@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import itertools
 import shutil
 import sys
 from pathlib import Path
@@ -18,8 +19,7 @@ sys.path[:0] = [p for p in PATHS if p not in sys.path]
 
 import sweep  # noqa: E402
 from sweep.errors import SweepError  # noqa: E402
-from sweep.file.layout import ENDING_BYTES  # noqa: E402
-from sweep.file.reading import StoredFile  # noqa: E402
+from sweep.file.reading import ENDING_BYTES, StoredFile  # noqa: E402
 from sweep.file.store import Store, unfinished_of  # noqa: E402
 from sweep.file.verify import verify  # noqa: E402
 from sweep.runs.run import complete  # noqa: E402
@@ -73,40 +73,42 @@ def damage(rng, path, strange):
     kind, content = rng.choice(DAMAGES), bytearray(path.read_bytes())
     with StoredFile(path) as file:
         table, ending, finished = file.tables[file.work], file.ending_at, bool(file.ending)
+        chunks = [[span(column, block) for column in table.columns] for block in range(table.blocks.count)]
+        stands = [slice(0, table.digests_at + table.digests.size), *itertools.chain(*chunks)]
     block, other = rng.sample(range(table.blocks.count), 2)
-    place = rng.choice(table.places)
-    chunk = span(place, block)
+    number = rng.randrange(len(table.columns))
     if kind in ("flip", "zeroed"):
         length = 1 if kind == "flip" else 512
         at = rng.randrange(len(content) - length)
         if not finished and ending - length < at < ending + ENDING_BYTES:
             return damage(rng, path, strange)  # what is written over at the end
+        if kind == "flip" and not content[at] and not any(one.start <= at < one.stop for one in stands):
+            return damage(rng, path, strange)  # between chunks and pages of HDF5's tables nothing stands
         content[at : at + length] = bytes(length) if kind == "zeroed" else [content[at] ^ 1 << rng.randrange(8)]
     elif kind in ("cut", "empty", "missing"):
         content = content[: rng.randrange(len(content)) if kind == "cut" else 0]
     elif kind == "longer":
         content += rng.randbytes(100)
     else:
-        rows = [slice(table.digests + b * table.row_bytes, table.digests + (b + 1) * table.row_bytes)
+        rows = [slice(table.digests_at + b * table.row_bytes, table.digests_at + (b + 1) * table.row_bytes)
                 for b in (block, other)]  # fmt: skip
         if kind == "swapped":
-            there = span(place, other)
-            content[chunk], content[there] = content[there], content[chunk]
+            one, two = chunks[block][number], chunks[other][number]
+            content[one], content[two] = content[two], content[one]
         elif kind == "swapped whole":
-            for p in table.places:
-                one, two = span(p, block), span(p, other)
+            for one, two in zip(chunks[block], chunks[other], strict=True):
                 content[one], content[two] = content[two], content[one]
             content[rows[0]], content[rows[1]] = content[rows[1]], content[rows[0]]
         else:
-            for at in [*(span(p, block) for p in table.places), rows[0]]:
+            for at in [*chunks[block], rows[0]]:
                 content[at] = strange[at]
     path.unlink() if kind == "missing" else path.write_bytes(content)
     return kind
 
 
-def span(place, block):
+def span(column, block):
     """Where a chunk of a column is, with its checksum."""
-    return slice(int(place.at[block]), int(place.at[block]) + place.size + place.check)
+    return slice(int(column.at[block]), int(column.at[block]) + column.size + column.check)
 
 
 def by_h5py(path):

@@ -82,7 +82,7 @@ def prepare(kind, output):
 def done(path):
     """Blocks of an unfinished result that are acknowledged, and how many there are."""
     with StoredFile(path) as file:
-        found = file.done[file.work]
+        found = file.tables[file.work].done
         return set(np.flatnonzero(found).tolist()), len(found)
 
 

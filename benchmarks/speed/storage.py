@@ -178,9 +178,9 @@ def unchecked(file: StoredFile) -> None:
     table = file.tables["cells"]
     bounds = [table.blocks.bounds(block) for block in range(table.blocks.count)]
     with ThreadPoolExecutor(READERS) as pool:
-        for place in table.places:
-            numbers = place.empty(table.blocks.size)
-            parts = [((numbers[slice(*found)],), int(place.at[block])) for block, found in enumerate(bounds)]
+        for column in table.columns:
+            numbers = column.empty(table.blocks.size)
+            parts = [((numbers[slice(*found)],), int(column.at[block])) for block, found in enumerate(bounds)]
             list(pool.map(lambda part: disk.read_all(file.fd, *part), parts))
 
 

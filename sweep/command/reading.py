@@ -38,18 +38,13 @@ def solving(arguments: argparse.Namespace, study: Study) -> dict[str, Any]:
 
 @contextlib.contextmanager
 def opened(arguments: argparse.Namespace, name: str = "result") -> Iterator[xr.Dataset]:
-    """A result that is named, with --at, --where and --unit; one that is not complete where the command takes it.
-
-    Where another program has changed it, what goes wrong with it is reported as that.
-    """
-    from sweep.file.open import changed
-
+    """A result that is named, with --at, --where and --unit; one that is not complete where the command takes it."""
     path: Path = getattr(arguments, name)
     if path.suffix == ".toml":
         raise SweepError(f"{path} is a study, not a result; compute it with: sweep run {path}")
     if not path.exists() and path.with_name(path.name + ".unfinished").exists():
         say(f"{path}: unfinished; cells that are not computed yet are NaN and PENDING", file=sys.stderr)
-    with sweep.open_result(path) as found, changed(path):
+    with sweep.open_result(path) as found:
         if "end" not in found.attrs and not getattr(arguments, "unfinished", True):
             raise SweepError(f"{path}: unfinished; continue it with sweep run, or take what there is with --unfinished")
         if getattr(arguments, "at", None):

@@ -9,8 +9,7 @@ import xarray as xr
 from xarray.backends import BackendArray, BackendEntrypoint
 from xarray.core import indexing
 
-from sweep.file.foreign import changed_result
-from sweep.file.reading import Changed, Numbers, StoredFile
+from sweep.file.reading import Numbers, StoredFile
 
 
 class Column(BackendArray):
@@ -21,23 +20,19 @@ class Column(BackendArray):
 
     def __getitem__(self, key: Any) -> Any:
         return indexing.explicit_indexing_adapter(
-            key, self.shape, indexing.IndexingSupport.OUTER, self.numbers.__getitem__
+            key, self.shape, indexing.IndexingSupport.BASIC, self.numbers.__getitem__
         )
 
 
 class Result(BackendEntrypoint):
-    """A result as xarray opens it; one that another program has changed is opened as it is."""
+    """A result as xarray opens it."""
 
     def open_dataset(self, filename_or_obj: Any, *, drop_variables: Any = None) -> xr.Dataset:
         """Raises SweepError when damaged numbers are read; OSError, ValueError and their like at once."""
         path = Path(filename_or_obj)
-        try:
-            file = StoredFile(path)
-        except Changed:
-            return changed_result(path)
-        columns = {}
+        file, columns = StoredFile(path), {}
         for name, numbers in file.columns().items():
-            chunks = dict(zip(numbers.dims, (*numbers.table.box, *numbers.place.shape), strict=True))
+            chunks = dict(zip(numbers.dims, (*numbers.table.box, *numbers.own), strict=True))
             lazy = indexing.LazilyIndexedArray(Column(numbers))
             columns[name] = xr.Variable(numbers.dims, lazy, dict(numbers.attrs), {"preferred_chunks": chunks})
         found = xr.Dataset(columns, {name: (c.dims, c.values, c.attrs) for name, c in file.coords.items()}, file.attrs)

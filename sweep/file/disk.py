@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import fcntl
-import glob
+import io
 import os
 import shutil
 from collections.abc import Iterator, Sequence
@@ -20,8 +20,6 @@ from sweep.errors import SweepError
 
 NO_SUCH_CALL = (errno.EINVAL, errno.EOPNOTSUPP, errno.ENOSYS)
 """What a file system says that cannot reserve space."""
-MOST_BUFFERS = 1000
-"""Pieces that one call may write or read; systems allow 1024."""
 
 
 def open_file(path: Path | str, flags: int) -> int:
@@ -32,11 +30,6 @@ def open_file(path: Path | str, flags: int) -> int:
 def write(fd: int, pieces: Sequence[memoryview], offset: int) -> int:
     """Bytes of the pieces that were written at `offset`, one piece behind the other; maybe not all. Raises OSError."""
     return os.pwritev(fd, pieces, offset)
-
-
-def read(fd: int, pieces: Sequence[memoryview], offset: int) -> int:
-    """Bytes that were read from `offset` on into the pieces, maybe not all of them. Raises OSError."""
-    return os.preadv(fd, pieces, offset)
 
 
 def fsync(fd: int) -> None:
@@ -77,13 +70,13 @@ def write_all(fd: int, pieces: Sequence[Any], offset: int) -> None:
 
 def read_all(fd: int, buffers: Sequence[Any], offset: int) -> None:
     """Fills arrays with the bytes from `offset` on. Raises EOFError where the file ends early, OSError."""
-    _through(read, fd, buffers, offset)
+    _through(os.preadv, fd, buffers, offset)
 
 
 def _through(call: Any, fd: int, pieces: Sequence[Any], offset: int) -> None:
     left = [view for piece in pieces if (view := as_bytes(piece))]
     while left:
-        count = call(fd, left[:MOST_BUFFERS], offset)
+        count = call(fd, [*left], offset)
         if not count:
             raise EOFError("the file ends early")
         offset += count
@@ -93,12 +86,34 @@ def _through(call: Any, fd: int, pieces: Sequence[Any], offset: int) -> None:
             left[0] = left[0][count:]
 
 
-def place_of(fd: int) -> str:
-    """Where the file of a descriptor is now, as far as the system tells; else nothing."""
-    try:
-        return str(Path(f"/proc/self/fd/{fd}").readlink())
-    except OSError:
-        return ""
+def as_bytes(piece: Any) -> memoryview:
+    """The bytes of bytes or of a C-contiguous array."""
+    view = memoryview(piece)
+    return view.cast("B") if view.nbytes else memoryview(b"")
+
+
+class Raw(io.RawIOBase):
+    """An open file as HDF5 reads it, whatever has its name by now."""
+
+    def __init__(self, fd: int) -> None:
+        self.fd, self.at, self.size = fd, 0, os.fstat(fd).st_size
+
+    def seek(self, offset: int, whence: int = 0) -> int:
+        self.at = offset + (self.size if whence == os.SEEK_END else 0)
+        return self.at
+
+    def tell(self) -> int:
+        return self.at
+
+    def truncate(self, size: int | None = None) -> int:
+        self.size = self.at if size is None else size
+        return self.size
+
+    def readinto(self, buffer: Any) -> int:
+        found = os.pread(self.fd, len(buffer), self.at)
+        buffer[:] = found.ljust(len(buffer), b"\0")
+        self.at += len(buffer)
+        return len(buffer)
 
 
 def sync_folder(path: Path) -> None:
@@ -121,34 +136,26 @@ def sync_tree(path: Path) -> None:
 def replacing(target: Path) -> Iterator[Path]:
     """A file beside `target` to write to, or to put a folder at; synced, it takes the place of `target` at the end.
 
-    Raises SweepError where the system refuses; what was there before then stays.
+    Raises SweepError where the system refuses, or another process writes it; what was there before then stays.
     """
-    mark = f".{target.name}.{os.uname().nodename}."
-    part = target.with_name(f"{mark}{os.getpid()}.tmp")
+    part, lock = (target.with_name(f".{target.name}.{end}") for end in ("tmp", "lock"))
     try:
-        _discard_left(target, mark)
-        part.touch()  # says in plain words that there is no such folder, or no permission
-        yield part
-        sync_tree(part)
-        _take_place(part, target)
-        sync_folder(target.parent)
+        with locked(lock) as ours:
+            if not ours:
+                raise SweepError(f"{target}: is being written by another process")
+            _discard(part)  # what one has left that was killed
+            try:
+                part.touch()  # says in plain words that there is no such folder, or no permission
+                yield part
+                sync_tree(part)
+                if target.is_dir() or part.is_dir():
+                    _discard(target)  # a folder cannot be replaced in one step
+                rename(part, target)
+                sync_folder(target.parent)
+            finally:
+                _discard(part)
     except OSError as fault:
         raise SweepError(f"{target} cannot be written: {fault.strerror or fault}") from None
-    finally:
-        _discard(part)
-
-
-def _discard_left(target: Path, mark: str) -> None:
-    """Removes what processes of this machine left that were killed while they wrote to the same name."""
-    for path in target.parent.glob(f"{glob.escape(mark)}*"):
-        number, _, suffix = path.name.removeprefix(mark).partition(".")
-        if number.isdecimal() and (suffix == "tmp" or (suffix == "old" and target.exists())):
-            try:
-                os.kill(int(number), 0)
-            except ProcessLookupError:
-                _discard(path)
-            except (OSError, OverflowError):
-                continue  # it lives, and is somebody else's; or no process has that number
 
 
 def _discard(path: Path) -> None:
@@ -159,52 +166,23 @@ def _discard(path: Path) -> None:
         path.unlink(missing_ok=True)
 
 
-def _take_place(part: Path, target: Path) -> None:
-    """Renames `part`. A folder cannot be replaced in one step: the old one is kept until the new one has its place."""
-    if not target.exists() or not (target.is_dir() or part.is_dir()):
-        rename(part, target)
-        return
-    old = part.with_suffix(".old")
-    rename(target, old)
-    try:
-        rename(part, target)
-    except BaseException:
-        old.rename(target)
-        raise
-    _discard(old)
-
-
 @contextlib.contextmanager
 def locked(path: Path) -> Iterator[bool]:
     """Whether this process holds the lock of a name; the system frees it when the process ends, however it ends.
 
     The file of that name is removed at the end. Raises OSError.
     """
-    fd = _try_lock(path)
+    fd, ours = open_file(path, os.O_CREAT | os.O_RDWR), False
     try:
-        yield fd is not None
+        # who held it may have removed the file meanwhile
+        with contextlib.suppress(BlockingIOError, FileNotFoundError):
+            fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            ours = path.stat().st_ino == os.fstat(fd).st_ino
+        yield ours
     finally:
-        if fd is not None:
+        if ours:
             with contextlib.suppress(OSError):
                 remove(path)
-            os.close(fd)
-
-
-def _try_lock(path: Path) -> int | None:
-    while True:
-        fd = open_file(path, os.O_CREAT | os.O_RDWR)
-        try:
-            fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            # who held the lock may have removed the file meanwhile
-            with contextlib.suppress(FileNotFoundError):
-                if path.stat().st_ino == os.fstat(fd).st_ino:
-                    return fd
-        except BlockingIOError:
-            os.close(fd)
-            return None
-        except BaseException:
-            os.close(fd)
-            raise
         os.close(fd)
 
 
@@ -213,25 +191,14 @@ def free(path: Path) -> int:
     return shutil.disk_usage(path).free
 
 
-def refusal(fault: OSError | RuntimeError, path: Path) -> SweepError:
-    """One line for a call that the system refused; HDF5 tells of some as RuntimeError."""
-    number = getattr(fault, "errno", None)
-    if number in (errno.ENOSPC, errno.EDQUOT):
-        return SweepError(f"{path}: the disk is full; free some space, then run the same command again to continue")
-    reason = os.strerror(number) if number else str(fault).splitlines()[0]
-    return SweepError(f"{path}: cannot be written ({reason})")
-
-
 @contextlib.contextmanager
 def refusing(path: Path) -> Iterator[None]:
     """What the system refuses is a SweepError of one line."""
     try:
         yield
     except OSError as fault:
-        raise refusal(fault, path) from fault
-
-
-def as_bytes(piece: Any) -> memoryview:
-    """The bytes of bytes or of a C-contiguous array."""
-    view = memoryview(piece)
-    return view.cast("B") if view.nbytes else memoryview(b"")
+        if fault.errno in (errno.ENOSPC, errno.EDQUOT):
+            what = "the disk is full; free some space, then run the same command again to continue"
+        else:
+            what = f"cannot be written ({fault.strerror or str(fault).splitlines()[0]})"
+        raise SweepError(f"{path}: {what}") from fault

@@ -1,4 +1,4 @@
-"""A result before its first number: HDF5 makes all of it, and says of each chunk where it is.
+"""A result before its first number: HDF5 makes all of it; but for numbers, digests and the ending it stays as it is.
 
 HDF5 checks every byte of names, attributes and coordinates that it reads: texts have a fixed length and stand in object
 headers, coordinates are one chunk with a checksum each, single numbers stand in headers too. The zeros that it writes
@@ -8,10 +8,9 @@ chunk stands a checksum that is wrong, so that nobody takes what is not computed
 
 from __future__ import annotations
 
-import io
+import json
 import math
 import os
-import secrets
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,18 +24,7 @@ from sweep.cells.reduce import part_columns
 from sweep.cells.schema import STATUS, Column, Schema
 from sweep.file import disk
 from sweep.file.fletcher import checksum
-from sweep.file.layout import (
-    BYTES,
-    ENDING,
-    ENDING_BYTES,
-    GROUP,
-    PIECE,
-    SEAL,
-    Place,
-    Table,
-    contents,
-    sealed,
-)
+from sweep.file.reading import BYTES, ENDING_BYTES, FORMAT, StoredFile, digest_before
 from sweep.study.model import ARRAY
 
 if TYPE_CHECKING:
@@ -51,10 +39,15 @@ GATHERED_BYTES = 8 << 20
 """Bytes of the rows that are reduced to groups at a time."""
 COMPACT = 1 << 15
 """Attributes up to which HDF5 keeps them in an object header."""
-LONG = 1 << 14
-"""Bytes of a coordinate to which the study in the file refers."""
+LONG = 1 << 12
+"""Bytes of a coordinate to which the study in the file refers, so that its text fits into an object header."""
 WRONG = b"\xff" * 4
 """A checksum that zeros have not."""
+LONG_NAMES = {
+    "key": "xxh3_128 of all that stands before it in the file",
+    "ending": "when the run ended, and how fast it was: JSON, and its xxh3_128 digest",
+    "digests": "xxh3_128 of each chunk of each column, zeros where it is not computed yet",
+}
 
 
 @dataclass(frozen=True)
@@ -124,60 +117,40 @@ def create(path: Path, schema: Schema, cuts: Mapping[str, Cut], shared: bool = F
     OSError
     """
     image = _Image()
-    tables, ending = _laid_out(image, schema, cuts, SHARED_WORTH_A_PAGE if shared else WORTH_A_PAGE)
+    _lay_out(image, schema, cuts, SHARED_WORTH_A_PAGE if shared else WORTH_A_PAGE)
     fd = disk.open_file(path, os.O_CREAT | os.O_TRUNC | os.O_RDWR)
     try:
-        disk.reserve(fd, image.size + len(contents(tables, ending)) + SEAL.size)
+        disk.reserve(fd, image.size)
         for at, page in image.pages.items():
             disk.write_all(fd, (page[: image.size - at],), at)
-        for place in (place for table in tables.values() for place in table.places if place.check):
-            _write_pending(fd, place)
-        disk.write_all(fd, (sealed(fd, tables, ending, image.size),), image.size)
+        with StoredFile(path) as file:
+            for column in (column for table in file.tables.values() for column in table.columns if column.check):
+                pending = WRONG
+                if column.name == STATUS:
+                    pending = bytes([Status.PENDING]) * column.size
+                    pending += checksum(pending, column.size)
+                for at in column.at.tolist():
+                    disk.write_all(fd, (pending,), at + column.size + column.check - len(pending))
+            disk.write_all(fd, (digest_before(fd, file.key_at),), file.key_at)
         disk.fsync(fd)
     finally:
         os.close(fd)
 
 
-def _write_pending(fd: int, place: Place) -> None:
-    """Says of each chunk of a column that it is not computed yet; of short ones behind each other at once."""
-    size, piece = place.size + place.check, WRONG
-    if place.name == STATUS:
-        words = np.full(place.size, Status.PENDING, "i1")
-        piece = words.tobytes() + checksum(words, place.size)
-    elif size < PAGE:
-        piece = bytes(place.size) + WRONG
-    starts = (place.at + (size - len(piece))).tolist()
-    some = max(1, PIECE // size) if place.step == len(piece) else 1
-    for chunks in (starts[:1], *(starts[k : k + some] for k in range(1, len(starts), some))):
-        disk.write_all(fd, (piece * len(chunks),), chunks[0])
-
-
-class _Image(io.RawIOBase):
+class _Image(disk.Raw):
     """The file as HDF5 writes it, in memory, but for chunks of zeros.
 
     Attributes
     ----------
     pages : dict of int to bytearray
         What was written, by where it begins.
-    size : int
     chunk : int
         Bytes of the chunks that are left out.
     """
 
     def __init__(self) -> None:
         self.pages: dict[int, bytearray] = {}
-        self.size = self.chunk = self._at = 0
-
-    def seek(self, offset: int, whence: int = 0) -> int:
-        self._at = offset + (self.size if whence == os.SEEK_END else 0)
-        return self._at
-
-    def tell(self) -> int:
-        return self._at
-
-    def truncate(self, size: int | None = None) -> int:
-        self.size = self._at if size is None else size
-        return self.size
+        self.at = self.size = self.chunk = 0
 
     def readinto(self, buffer: Any) -> int:
         for page, here, there in self._pieces(len(buffer)):
@@ -186,26 +159,26 @@ class _Image(io.RawIOBase):
 
     def write(self, piece: Any) -> int:
         # HDF5 writes nothing else of a chunk's length that begins with zeros: its tables begin with addresses
-        if len(piece) == self.chunk and bytes(piece[:BYTES]) == bytes(BYTES):
-            self._at += len(piece)
+        if len(piece) == self.chunk and not any(piece[:BYTES]):
+            self.at += len(piece)
         else:
             for page, here, there in self._pieces(len(piece)):
                 page[here] = piece[there]
-        self.size = max(self.size, self._at)
+        self.size = max(self.size, self.at)
         return len(piece)
 
     def _pieces(self, count: int) -> Iterator[tuple[bytearray, slice, slice]]:
         """So many bytes from here on: a page, where they are in it, and which of them they are."""
-        begin, end = self._at, self._at + count
-        while self._at < end:
-            page = self._at // PAGE * PAGE
-            start, self._at = self._at, min(end, page + PAGE)
-            here = slice(start - page, self._at - page)
-            yield self.pages.setdefault(page, bytearray(PAGE)), here, slice(start - begin, self._at - begin)
+        begin, end = self.at, self.at + count
+        while self.at < end:
+            start, page = self.at, self.at // PAGE * PAGE
+            self.at = min(end, page + PAGE)
+            here, there = slice(start - page, self.at - page), slice(start - begin, self.at - begin)
+            yield self.pages.setdefault(page, bytearray(PAGE)), here, there
 
 
-def _laid_out(image: _Image, schema: Schema, cuts: Mapping[str, Cut], aligned: int) -> tuple[dict[str, Table], int]:
-    """Has HDF5 write all that is no number, and find a place for each number; objects of so many bytes are aligned."""
+def _lay_out(image: _Image, schema: Schema, cuts: Mapping[str, Cut], aligned: int) -> None:
+    """Has HDF5 write all that is no number, and then find a place for each; objects of so many bytes are aligned."""
     import h5netcdf
     import h5py
     from h5py import h5f, h5fd, h5p
@@ -215,63 +188,72 @@ def _laid_out(image: _Image, schema: Schema, cuts: Mapping[str, Cut], aligned: i
     access.set_libver_bounds(h5f.LIBVER_V110, h5f.LIBVER_V110)
     access.set_alignment(aligned, PAGE)
     access.set_fileobj_driver(h5fd.fileobj_driver, image)
-    # each thing behind the last one, so that chunks are at equal distances
+    # each thing behind the last one
     made.set_file_space_strategy(h5f.FSPACE_STRATEGY_NONE, False, 1)
     made.set_attr_phase_change(COMPACT, 0)
     made.set_attr_creation_order(h5p.CRT_ORDER_TRACKED | h5p.CRT_ORDER_INDEXED)
     made.set_link_creation_order(h5p.CRT_ORDER_TRACKED | h5p.CRT_ORDER_INDEXED)
+    dims = {c.name: c.dims for c in schema.coordinates}
     with h5py.File(h5f.create(b"result", h5f.ACC_TRUNC, made, access)) as plain, h5netcdf.File(plain, "r+") as file:
         # xarray's way to mark what belongs to the coordinates of all variables, and of one
-        shared = [c.name for c in schema.coordinates if c.dims and not set(c.dims) & {c.name, *schema.grid.dims}]
-        _say(file, {**_attrs(schema), **({"coordinates": " ".join(shared)} if shared else {})})
+        away = [c.name for c in schema.coordinates if c.dims and not set(c.dims) & {c.name, *schema.grid.dims}]
+        _say(file, {**_attrs(schema), **({"coordinates": " ".join(away)} if away else {})})
         file.dimensions = schema.sizes
         for coordinate in schema.coordinates:
-            values, dims, attrs = np.asarray(coordinate.values), coordinate.dims, dict(coordinate.attrs)
-            if values.dtype.kind == "U":  # as characters, as netCDF has them
-                words = np.array([word.encode() for word in values.ravel()])
-                values = words.view("S1").reshape(*values.shape, words.dtype.itemsize)
-                dims, attrs = (*dims, f"string{words.dtype.itemsize}"), {**attrs, "_Encoding": "utf-8"}
-                if dims[-1] not in file.dimensions:
-                    file.dimensions[dims[-1]] = words.dtype.itemsize
-            if dims:
-                _say(
-                    file.create_variable(coordinate.name, dims, values.dtype, data=values, dcpl=_how(values.shape)),
-                    attrs,
-                )
-                continue
-            # h5py and h5netcdf would not keep a single number in its object header
-            space, kind = h5py.h5s.create(h5py.h5s.SCALAR), h5py.h5t.py_create(values.dtype)
-            single = h5py.Dataset(h5py.h5d.create(plain.id, coordinate.name.encode(), kind, space, _how(())))
-            single[()] = values
-            _say(single, attrs)
-        group = file.create_group(GROUP)
-        group.dimensions.update({"byte": BYTES, "character": ENDING_BYTES})
-        about = "when the run ended, and how fast it was: JSON, and its xxh3_128 digest"
-        _say(group.create_variable("ending", ("character",), "u1", dcpl=_how(None)), {"long_name": about})
-        for name, cut in cuts.items():
-            lengths = {f"{name}_block": cut.blocks.count, f"{name}_column": len(cut.columns)}
-            group.dimensions.update(lengths)
-            about = "xxh3_128 of each chunk of each column, zeros where it is not computed yet"
-            digests = group.create_variable(f"{name}_digests", (*lengths, "byte"), "u1", dcpl=_how(None))
-            _say(digests, {"long_name": about})
+            _write_coordinate(file, plain, coordinate)
         for column in schema.columns:
-            dims = (*schema.grid.dims, *column.dims)
-            beside = [c.name for c in schema.coordinates if c.dims != (c.name,) and set(c.dims) <= set(dims)]
-            variable = file.create_variable(column.name, dims, column.dtype, dcpl=_how(cuts["cells"].chunk(column)))
+            dims[column.name] = over = (*schema.grid.dims, *column.dims)
+            beside = [c.name for c in schema.coordinates if c.dims != (c.name,) and set(c.dims) <= set(over)]
+            variable = file.create_variable(column.name, over, column.dtype, dcpl=_how(cuts["cells"].chunk(column)))
             _say(variable, {**column.attrs, **({"coordinates": " ".join(beside)} if beside else {})})
-        if "rows" in cuts:
-            rows, cut = file.create_group("rows"), cuts["rows"]
-            rows.dimensions["row"] = cut.blocks.size
-            for column in cut.columns:
-                own = {f"{column.name} {k}": length for k, length in enumerate(column.shape)}
-                rows.dimensions.update(own)
-                rows.create_variable(column.name, ("row", *own), column.dtype, dcpl=_how(cut.chunk(column)))
-        key, tables = secrets.token_hex(BYTES), {}
+        tables: dict[str, dict[str, Any]] = {}
         for name, cut in cuts.items():
-            places = tuple(_placed(plain if name == "cells" else plain[name], image, cut, c) for c in cut.columns)
-            at = int(plain[f"{GROUP}/{name}_digests"].id.get_offset())
-            tables[name] = Table(name, cut.grid, cut.blocks, places, at, key)
-        return tables, int(plain[ENDING].id.get_offset())
+            paths = [column.name if name == "cells" else f"{name}/{column.name}" for column in cut.columns]
+            blocks = (cut.blocks.size, cut.blocks.cells, cut.blocks.row)
+            tables[name] = {"grid": cut.grid, "blocks": blocks, "paths": paths}
+            for column, path in zip(cut.columns, paths if name == "rows" else (), strict=False):
+                how = _how(cut.chunk(column))
+                plain.create_dataset(path, (*cut.grid, *column.shape), column.dtype, dcpl=how)
+        integrity = plain.create_group("integrity")
+        _say(integrity, {"format": FORMAT, "contents": json.dumps({"tables": tables, "dims": dims})})
+        shapes: dict[str, tuple[int, ...]] = {"key": (BYTES,), "ending": (ENDING_BYTES,)}
+        shapes |= {f"{name}_digests": (cut.blocks.count, len(cut.columns), BYTES) for name, cut in cuts.items()}
+        made_of = {name: integrity.create_dataset(name, shape, "u1", dcpl=_how(None)) for name, shape in shapes.items()}
+        for name, data in made_of.items():
+            _say(data, {"long_name": LONG_NAMES.get(name, LONG_NAMES["digests"])})
+        # from here on nothing is made, and places alone are found, that of the key first
+        plain.flush()
+        for data in made_of.values():
+            data[...] = np.zeros(data.shape, "u1")
+        for path in (path for table in tables.values() for path in table["paths"]):
+            data = plain[path]
+            if data.chunks is None:
+                data[()] = np.nan if data.dtype.kind == "f" else -1
+            else:
+                image.chunk = data.dtype.itemsize * math.prod(data.chunks) + len(WRONG)
+                data.id.write_direct_chunk((0,) * data.ndim, bytes(image.chunk))
+
+
+def _write_coordinate(file: Any, plain: Any, coordinate: Any) -> None:
+    """Words as characters, as netCDF has them; a single number in its object header."""
+    import h5py
+
+    values, dims, attrs = np.asarray(coordinate.values), coordinate.dims, dict(coordinate.attrs)
+    if values.dtype.kind == "U":
+        words = np.array([word.encode() for word in values.ravel()])
+        values = words.view("S1").reshape(*values.shape, words.dtype.itemsize)
+        dims, attrs = (*dims, f"string{words.dtype.itemsize}"), {**attrs, "_Encoding": "utf-8"}
+        if dims[-1] not in file.dimensions:
+            file.dimensions[dims[-1]] = words.dtype.itemsize
+    if dims:
+        how = _how(values.shape)
+        _say(file.create_variable(coordinate.name, dims, values.dtype, data=values, dcpl=how), attrs)
+        return
+    # h5py and h5netcdf would not keep it there
+    space, kind = h5py.h5s.create(h5py.h5s.SCALAR), h5py.h5t.py_create(values.dtype)
+    single = h5py.Dataset(h5py.h5d.create(plain.id, coordinate.name.encode(), kind, space, _how(())))
+    single[()] = values
+    _say(single, attrs)
 
 
 def _how(chunk: tuple[int, ...] | None) -> Any:
@@ -287,7 +269,7 @@ def _how(chunk: tuple[int, ...] | None) -> Any:
     if chunk == ():
         how.set_layout(h5d.COMPACT)
         return how
-    how.set_alloc_time(h5d.ALLOC_TIME_LATE if chunk else h5d.ALLOC_TIME_EARLY)
+    how.set_alloc_time(h5d.ALLOC_TIME_LATE)
     if chunk:
         how.set_chunk(chunk)
         how.set_fletcher32()
@@ -303,25 +285,3 @@ def _say(thing: Any, attrs: Mapping[str, Any]) -> None:
             text = value.encode()
             value = np.array(text, h5py.string_dtype("utf-8", max(2, len(text))))
         thing.attrs[name] = value
-
-
-def _placed(group: Any, image: _Image, cut: Cut, column: Column) -> Place:
-    """Has HDF5 find a place for each chunk of a column. Raises OSError where it places them in another way."""
-    dataset, count = group[column.name], cut.blocks.count
-    size = column.cell_bytes * math.prod(box_shape(cut.grid, cut.blocks.cells))
-    if dataset.chunks is None:
-        dataset[()] = np.nan if dataset.dtype.kind == "f" else -1
-        first = int(dataset.id.get_offset())
-        return Place(column.name, dataset.dtype.str, column.shape, size, 0, 1, first, first, 0)
-    image.chunk = size + len(WRONG)
-    group.file.flush()  # so that nothing comes between the chunks
-    dataset.id.write_direct_chunk((0,) * dataset.ndim, bytes(image.chunk))
-    counts = [-(-n // length) for n, length in zip(dataset.shape, dataset.chunks, strict=True)]
-    corners = np.array(np.unravel_index(np.minimum((0, 1, 2, count - 1), count - 1), counts)).T * dataset.chunks
-    infos = [dataset.id.get_chunk_info_by_coord(tuple(corner)) for corner in corners.tolist()]
-    first, second, third, last = (int(info.byte_offset) for info in infos)
-    step = third - second
-    # each chunk takes no less than a step, so that they are at equal distances if they are so in sum
-    if last != second + max(0, count - 2) * step or count != math.prod(counts):
-        raise OSError(f"HDF5 has not placed the chunks of {column.name} one behind the other")
-    return Place(column.name, dataset.dtype.str, column.shape, size, len(WRONG), count, first, second, step)

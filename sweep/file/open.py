@@ -1,12 +1,11 @@
-"""Results as xarray Datasets: of a finished sweep, of one that still runs, or changed by another program."""
+"""Results as xarray Datasets: of a finished sweep, of one that still runs, or exported to HDF5."""
 
 from __future__ import annotations
 
 import contextlib
 import errno
-import json
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,9 +14,7 @@ from sweep.cells.partition import row_blocks
 from sweep.cells.reduce import gathered, output_schema, pending
 from sweep.cells.schema import Schema
 from sweep.errors import SweepError
-from sweep.file.foreign import changed_result
-from sweep.file.layout import DAMAGE
-from sweep.file.reading import Changed, StoredFile
+from sweep.file.reading import DAMAGE, StoredFile
 from sweep.file.store import unfinished_of
 from sweep.study.model import Study
 from sweep.words import as_path
@@ -60,21 +57,11 @@ def open_result(path: str | os.PathLike[str], strict: bool = False, *, chunks: A
     True s
     """
     output = as_path(path)
-    while True:
-        place = output if output.exists() else unfinished_of(output)
-        before = _identity(place)
-        if before is None:
-            raise SweepError(f"{output}: no such file, and no sweep that writes it")
-        try:
-            found = _open(place, strict, chunks)
-        except SweepError:
-            # a sweep that ends, or begins anew, puts another file there meanwhile
-            if _identity(place) == before:
-                raise
-            continue
-        if _identity(place) == before:
-            return found
-        found.close()
+    # a sweep that ends meanwhile puts its file in another place
+    for place in (output, unfinished_of(output), output):
+        with contextlib.suppress(FileNotFoundError, NotADirectoryError):
+            return _open(place, strict, chunks)
+    raise SweepError(f"{output}: no such file, and no sweep that writes it")
 
 
 def open_unfinished(path: str | os.PathLike[str]) -> xr.Dataset:
@@ -82,35 +69,29 @@ def open_unfinished(path: str | os.PathLike[str]) -> xr.Dataset:
     return _open(unfinished_of(Path(path)))
 
 
-def _identity(path: Path) -> tuple[int, int] | None:
-    """Which file has a name at this moment; None: none has."""
-    try:
-        found = path.stat()
-    except (FileNotFoundError, NotADirectoryError, ValueError):
-        return None
-    return found.st_dev, found.st_ino
-
-
 def _open(place: Path, strict: bool = False, chunks: Any = None) -> xr.Dataset:
-    """A file, whether it is finished or not. Raises SweepError."""
+    """A file, whether it is finished or not. Raises SweepError, and FileNotFoundError and its like."""
     import xarray as xr
 
     from sweep.file.columns import Result
 
     try:
         large = place.stat().st_size > MEMORY_SHARE * memory()
-        with contextlib.suppress(Changed), StoredFile(place) as file:
+        with StoredFile(place) as file:
             if not file.ending:
                 if place.suffix != unfinished_of(place).suffix:
                     raise OSError("what was written at its end is damaged")
-                left, count = int((~file.done[file.work]).sum()), file.tables[file.work].blocks.count
-                missing = f"{left} of {count} blocks are missing" if left else "all is computed but not checked yet"
+                done = file.tables[file.work].done
+                left = int((~done).sum())
+                missing = f"{left} of {done.size} blocks are missing" if left else "all is computed but not checked yet"
                 if strict:
                     raise SweepError(f"{place}: unfinished, {missing}; run its sweep again to continue")
                 if file.work == "rows":
                     rows = _of_rows(file)
                     return rows if chunks is None else rows.chunk(chunks)
         return xr.open_dataset(os.fspath(place), engine=Result, chunks="auto" if large and chunks is None else chunks)
+    except (FileNotFoundError, NotADirectoryError):
+        raise
     except DAMAGE as fault:
         raise unreadable(place, fault) from None
 
@@ -118,12 +99,11 @@ def _open(place: Path, strict: bool = False, chunks: Any = None) -> xr.Dataset:
 def _of_rows(file: StoredFile) -> xr.Dataset:
     """The Dataset of an unfinished summary: of the rows that are there."""
     study = Study.from_json(file.attrs["study_json"], declared=True)
-    rows, blocks = pending(study, 0, row_blocks(study).count), file.tables["rows"].blocks
-    for name, column in file.columns("rows").items():
-        for block in range(blocks.count):
-            if file.is_sound("rows", block):
-                cells = slice(*blocks.bounds(block))
-                rows[name][cells] = column[cells]
+    rows, table = pending(study, 0, row_blocks(study).count), file.tables["rows"]
+    for block in filter(table.is_sound, range(table.blocks.count)):
+        cells = slice(*table.blocks.bounds(block))
+        for column in table.columns:
+            rows[column.name][cells] = column[cells]
     plan = output_schema(study, file.fingerprint)
     return in_memory(replace(plan, attrs={**plan.attrs, **file.attrs}), gathered(study, rows))
 
@@ -142,12 +122,8 @@ def in_memory(plan: Schema, arrays: Mapping[str, Any]) -> xr.Dataset:
 def stored_fingerprint(output: Path) -> dict[str, str]:
     """Fingerprint of a result. Raises SweepError where the file cannot be read, or is none of ours."""
     try:
-        try:
-            with StoredFile(output) as file:
-                return file.fingerprint
-        except Changed:
-            with changed_result(output) as found:
-                return dict(json.loads(found.attrs["fingerprint"]))
+        with StoredFile(output) as file:
+            return file.fingerprint
     except DAMAGE as fault:
         raise unreadable(output, fault) from None
 
@@ -158,23 +134,6 @@ def memory() -> int:
         return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     except (AttributeError, ValueError, OSError):
         return 8 << 30
-
-
-@contextlib.contextmanager
-def changed(output: Path) -> Iterator[None]:
-    """Whatever goes wrong within with a result that is not as it was written, that is told. Raises SweepError."""
-    try:
-        yield
-    except (*DAMAGE, ArithmeticError) as fault:
-        opened = output if output.exists() else unfinished_of(output)
-        try:
-            StoredFile(opened).close()
-        except (*DAMAGE, SweepError):
-            if isinstance(fault, OSError) and fault.errno:
-                raise fault from None
-            what = f"{type(fault).__name__}: {fault}".splitlines()[0]
-            raise SweepError(f"{output}: was changed by another program, and is no result any more ({what})") from None
-        raise  # the file is as it was written, and the fault is ours
 
 
 def unreadable(output: Path, fault: Exception) -> SweepError:

@@ -19,6 +19,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -28,8 +29,7 @@ from sweep.cells.schema import Schema
 from sweep.errors import Incomplete, SweepError
 from sweep.file import disk
 from sweep.file.frame import PAGE, Cut, create
-from sweep.file.layout import DAMAGE, Table, read_bytes
-from sweep.file.reading import StoredFile, ending_text
+from sweep.file.reading import BYTES, DAMAGE, StoredFile, Table, ending_text, read_bytes
 
 SYNC_SECONDS = 0.2
 """How often blocks are brought to the disk, and it is looked whether the file is still in its place."""
@@ -50,40 +50,28 @@ def lock_of(output: Path) -> Path:
 
 @dataclass(frozen=True)
 class Shared:
-    """A file that other processes write blocks to.
-
-    Attributes
-    ----------
-    path : str
-        Where the process that has the lock sees it.
-    size : int
-    seal : bytes
-        At the end of this file; another process that finds it in a file of this path sees the same file.
-    table : Table
-    """
+    """A file that other processes write blocks to, if they see it by the path at which the owner of its lock does."""
 
     path: str
-    size: int
-    seal: bytes
-    table: Table
+    key: bytes
 
     def opened(self) -> int | None:
         """A file descriptor; None where this process does not see the file, or may not write to it."""
         try:
-            fd = disk.open_file(self.path, os.O_RDWR)
-        except OSError:
-            return None
-        if self.is_same(fd):
-            return fd
-        os.close(fd)
+            if self._file.key == self.key:
+                return disk.open_file(self.path, os.O_RDWR)
+        except (*DAMAGE, SweepError):
+            pass
         return None
 
-    def is_same(self, fd: int) -> bool:
-        """Whether an open file still is the one: not cut, and its end not overwritten."""
-        try:
-            return read_bytes(fd, self.size - len(self.seal), self.size) == self.seal
-        except (OSError, EOFError):
-            return False
+    @cached_property
+    def _file(self) -> StoredFile:
+        return StoredFile(Path(self.path))
+
+    @property
+    def table(self) -> Table:
+        """What is computed."""
+        return self._file.tables[self._file.work]
 
 
 class Store:
@@ -101,7 +89,7 @@ class Store:
         self.output, self.path = output, unfinished_of(output)
         self.temporary = self.path.with_name(self.path.name + ".tmp")
         self.file: StoredFile | None = None
-        self._fd, self._done = -1, np.zeros(0, bool)
+        self._fd, self._size, self._done = -1, 0, np.zeros(0, bool)
         self._waiting: deque[tuple[int, bytes]] = deque()
         self._synced, self._committing = time.monotonic(), threading.Lock()
         self._checked: Future[list[int]] | None = None
@@ -118,10 +106,12 @@ class Store:
         if not self.path.exists():
             return None
         try:
-            return StoredFile(self.path)
+            file = StoredFile(self.path)
+            if file.attrs and all(column.at.size for column in file.tables[file.work].columns):
+                return file
         except DAMAGE as fault:
             if isinstance(fault, OSError) and fault.errno:
-                raise disk.refusal(fault, self.path) from fault
+                raise SweepError(f"{self.path}: cannot be read ({fault.strerror})") from fault
         raise SweepError(
             f"{self.path}: damaged beside its numbers, or not of this version; remove it, or give it up with --force"
         )
@@ -146,24 +136,26 @@ class Store:
 
         def check() -> list[int]:
             left = itertools.takewhile(lambda block: not self._closing.is_set(), done)
-            return sorted({block for block, _ in file.damaged(file.work, left)})
+            return file.tables[file.work].damaged(left)
 
         self._checked = ThreadPoolExecutor(1).submit(check)
 
     def _open(self, file: StoredFile) -> None:
         with disk.refusing(self.path):
             self._fd = disk.open_file(self.path, os.O_RDWR)
-        self.file, self._done = file, file.done[file.work].copy()
-        self._shared = Shared(str(self.path), os.fstat(self._fd).st_size, file.seal, self.table)
+        self.file, self._done = file, file.tables[file.work].done.copy()
+        self._size = os.fstat(self._fd).st_size
 
     def _check(self) -> None:
         """Raises Incomplete where the file is not what it was, or not where it was: not a byte of ours goes there."""
-        if not self._shared.is_same(self._fd):
+        assert self.file is not None
+        ours = os.fstat(self._fd)
+        at = self.file.key_at
+        if ours.st_size < self._size or read_bytes(self._fd, at, BYTES) != self.file.key:
             raise Incomplete(
                 f"{self.path}: was cut or overwritten by another program while the run wrote to it, and cannot be "
                 "continued; remove it and run the same command again"
             )
-        ours = os.fstat(self._fd)
         try:
             if os.path.samestat(self.path.stat(), ours):
                 return
@@ -174,8 +166,8 @@ class Store:
         if not ours.st_nlink:
             raise Incomplete(f"{self.path}: was removed while the run wrote to it; what was computed is lost")
         raise Incomplete(
-            f"{self.path}: was moved while the run wrote to it, to {disk.place_of(self._fd) or 'another place'}; all "
-            "blocks that were computed are kept there; move it back, and the same command continues"
+            f"{self.path}: was moved while the run wrote to it; all blocks that were computed are kept there; move it "
+            "back, and the same command continues"
         )
 
     @property
@@ -221,14 +213,7 @@ class Store:
                 self.table.write_digests(self._fd, waiting)
         self._done[list(waiting)] = True
 
-    def damaged(self) -> list[int]:
-        """Blocks of earlier runs that turned out to be damaged; they are not done any more. Raises SweepError."""
-        checked, self._checked = self._checked, None
-        found = checked.result() if checked is not None else []
-        self.undo(found)
-        return found
-
-    def undo(self, blocks: Iterable[int]) -> None:
+    def _undo(self, blocks: Iterable[int]) -> None:
         """Takes blocks out of those that are done. Raises SweepError."""
         with disk.refusing(self.path):
             self.table.write_digests(self._fd, dict.fromkeys(blocks, bytes(self.table.row_bytes)))
@@ -247,20 +232,22 @@ class Store:
         list of int
             Blocks that turned out to be damaged, or are not acknowledged, which have to be computed again first.
         """
+        assert self.file is not None
         with disk.refusing(self.output):
             self.commit()
-            self.damaged()
+            checked, self._checked = self._checked, None
+            self._undo(checked.result() if checked is not None else [])
             found = self.missing()
             if not found and gather is not None:
                 found = self._gathered(gather)
-                self.undo(found)
+                self._undo(found)
             if found:
                 return found
-            self._end(texts)
+            disk.write_all(self._fd, (ending_text(texts),), self.file.ending_at)
             disk.fsync(self._fd)
             with StoredFile(self.path) as file:
-                last = file.tables["cells"].blocks.count - 1
-                if not file.ending or not all(file.is_sound("cells", block) for block in {0, last // 2, last}):
+                table, last = file.tables["cells"], file.tables["cells"].blocks.count - 1
+                if not file.ending or table.damaged({0, last // 2, last}):
                     raise SweepError(
                         f"{self.output}: differs when read back from what was written; the disk may be failing"
                     )
@@ -271,19 +258,14 @@ class Store:
     def _gathered(self, gather: Gather) -> list[int]:
         """Writes the columns of a summary; gives the blocks of rows that turned out to be damaged, where some did."""
         with StoredFile(self.path) as file:
-            found = sorted({block for block, _ in file.damaged("rows", range(self.table.blocks.count))})
+            found = file.tables["rows"].damaged(range(self.table.blocks.count))
             if found:
                 return found
             table = file.tables["cells"]
             digests = {block: table.write(self._fd, block, gather(file, block)) for block in range(table.blocks.count)}
-        disk.sync_numbers(self._fd)
-        table.write_digests(self._fd, digests)
+            disk.sync_numbers(self._fd)
+            table.write_digests(self._fd, digests)
         return []
-
-    def _end(self, texts: Mapping[str, str]) -> None:
-        """Writes what is known at the end; nothing: takes back that the run has ended. Raises OSError."""
-        assert self.file is not None
-        disk.write_all(self._fd, (ending_text(texts),), self.file.ending_at)
 
     def reopen(self, damaged: Iterable[int]) -> None:
         """Takes a finished result up again, some blocks of which are to be computed again. Raises SweepError."""
@@ -293,15 +275,14 @@ class Store:
             file = self.found()
             assert file is not None
             self._open(file)
-            self._end({})
-            self.undo(damaged)
-            os.close(self._fd)
-            file.close()
-            self.resume(StoredFile(self.path))
+            disk.write_all(self._fd, (ending_text({}),), file.ending_at)
+            self._undo(damaged)
 
     def shared(self) -> Shared | None:
         """What another process needs to write blocks to the file; None where blocks of two would share a page."""
-        return None if any((place.at % PAGE).any() for place in self.table.places) else self._shared
+        assert self.file is not None
+        paged = not any((column.at % PAGE).any() for column in self.table.columns)
+        return Shared(str(self.path), self.file.key) if paged else None
 
     def discard(self) -> None:
         """Removes what is there. Raises SweepError."""

@@ -10,10 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from sweep.errors import SweepError
-from sweep.file.foreign import changed_result
-from sweep.file.layout import DAMAGE, Table
 from sweep.file.open import OF_DAMAGE, unreadable
-from sweep.file.reading import Changed, StoredFile
+from sweep.file.reading import DAMAGE, StoredFile, Table
 from sweep.file.store import unfinished_of
 from sweep.words import as_path
 
@@ -67,17 +65,11 @@ def verify(path: str | os.PathLike[str]) -> Verdict:
     place = output if output.exists() else unfinished_of(output)
     if not place.exists():
         raise SweepError(f"{output}: no such file, and no sweep that writes it")
-    if not place.is_file():
-        raise unreadable(place, ValueError("it is no regular file"))
     try:
-        try:
-            with StoredFile(place) as file:
-                return _verdict(output, file)
-        except Changed:
-            changed_result(place).close()
-            return Verdict(output, False, "", ("was changed by another program, which left its digests out",))
+        with StoredFile(place) as file:
+            return _verdict(output, file)
     except DAMAGE as fault:
-        if isinstance(fault, OSError) and fault.errno and fault.errno not in OF_DAMAGE:
+        if not place.is_file() or (isinstance(fault, OSError) and fault.errno and fault.errno not in OF_DAMAGE):
             raise unreadable(place, fault) from None
         text = (str(fault).splitlines() or [type(fault).__name__])[0]
         structure = "its structure is damaged, or it is not the result of a sweep"
@@ -86,40 +78,38 @@ def verify(path: str | os.PathLike[str]) -> Verdict:
 
 def _verdict(output: Path, file: StoredFile) -> Verdict:
     """Compares all digests. Raises one of DAMAGE."""
-    checked = f"{file.path.stat().st_size:,} bytes checked"
-    if file.path == output and not file.ending:
-        return Verdict(output, False, checked, ("what was written at its end is damaged",))
     findings: list[str] = []
-    damaged: dict[str, list[int]] = {}
+    if file.attrs and not file.is_as_made():  # HDF5 checks texts and coordinates as it reads them
+        findings.append("its structure is not as it was made: damaged, or changed by another program")
+    if file.path == output and not file.ending:
+        findings.append("what was written at its end is damaged")
+    mendable, damaged = not findings, set[int]()
     # the columns of a summary are made at its end
     for name in file.tables if file.ending else (file.work,):
-        table, done = file.tables[name], file.done[name]
-        bad = list(file.damaged(name, range(len(done)) if file.ending else np.flatnonzero(done).tolist()))
-        damaged[name] = sorted({block for block, _ in bad})
-        for number, place in enumerate(table.places):
-            told = (
-                f"{place.name}: damaged between its cells {{:,}} and {{:,}}",
-                f"{place.name}: damaged in {{}} more places",
-            )
-            findings += _told(*told, table, [block for block, column in bad if column == number])
-    if file.ending:
-        blocks = tuple(damaged[file.work]) if findings else None
-        return Verdict(output, not findings, checked, tuple(findings), blocks)
-    done = file.done[file.work]
-    missing = np.flatnonzero(~done).tolist()
-    findings += _told(f"missing: {file.work} {{:,}} to {{:,}}", "missing: {} more", file.tables[file.work], missing)
+        table = file.tables[name]
+        for column in table.columns:
+            there = np.arange(column.at.size)[table.done | bool(file.ending)].tolist()
+            bad = [block for block in there if column.read(block) is None]
+            damaged.update(bad if name == file.work else ())
+            findings += _lines(f"{column.name}: damaged between its cells {{:,}} and {{:,}}", table, bad)
+    if file.path == output:
+        blocks = tuple(sorted(damaged)) if findings and mendable else None
+        return Verdict(output, not findings, f"{file.path.stat().st_size:,} bytes checked", tuple(findings), blocks)
+    table = file.tables[file.work]
+    missing = np.flatnonzero(~table.done).tolist()
+    findings += _lines(f"missing: {file.work} {{:,}} to {{:,}}", table, missing)
     findings = findings or ["all blocks are there, but it has not ended; run the sweep again to finish"]
-    checked = f"unfinished, {int(done.sum()):,} of {done.size:,} blocks there and checked"
+    checked = f"unfinished, {table.blocks.count - len(missing):,} of {table.blocks.count:,} blocks there and checked"
     return Verdict(output, False, checked, tuple(findings))
 
 
-def _told(text: str, more: str, table: Table, blocks: list[int]) -> Iterator[str]:
+def _lines(text: str, table: Table, blocks: list[int]) -> Iterator[str]:
     """A line for each run of blocks, with its first cell and the last but one; of many, how many there are more."""
     runs = np.split(np.array(blocks, np.int64), np.flatnonzero(np.diff(blocks) > 1) + 1) if blocks else []
     for run in runs[:MOST_TOLD]:
         yield text.format(table.blocks.bounds(int(run[0]))[0], table.blocks.bounds(int(run[-1]))[1])
     if len(runs) > MOST_TOLD:
-        yield more.format(f"{len(runs) - MOST_TOLD:,}")
+        yield f"{text.partition(':')[0]}: {len(runs) - MOST_TOLD:,} more places"
 
 
 def check_whole(output: Path) -> None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from sweep.errors import SweepError
-from sweep.file.open import changed, open_result
+from sweep.file.open import open_result
 from sweep.results.statuses import Account, account, count_statuses
 from sweep.words import Table, as_path
 
@@ -103,7 +103,7 @@ def list_results(folder: str | os.PathLike[str] = ".") -> Listing:
 
 def _listed(path: Path) -> Listed:
     try:
-        with open_result(path) as dataset, changed(path):
+        with open_result(path) as dataset:
             attrs, cells = dataset.attrs, account(dataset)
             return Listed(
                 path=path,

@@ -21,9 +21,8 @@ from sweep.cells.grid import Grid
 from sweep.cells.partition import box_slices
 from sweep.cells.schema import METHOD_USED, STATUS, columns
 from sweep.errors import SweepError
-from sweep.file.layout import DAMAGE
 from sweep.file.open import unreadable
-from sweep.file.reading import StoredFile
+from sweep.file.reading import DAMAGE, StoredFile
 from sweep.results.statuses import flat_pieces
 from sweep.study.model import Axis, Study
 

@@ -70,7 +70,7 @@ def kept(output):
     if not unfinished_of(output).exists():
         return []
     with StoredFile(unfinished_of(output)) as file:
-        return np.flatnonzero(file.done[file.work]).tolist()
+        return np.flatnonzero(file.tables[file.work].done).tolist()
 
 
 def place(output, name, cell, table="cells"):
@@ -79,7 +79,7 @@ def place(output, name, cell, table="cells"):
         column = file.columns(table)[name]
         block = column.table.blocks.index(cell)
         start = column.table.blocks.bounds(block)[0]
-        return int(column.place.at[block]) + (cell - start) * column.place.empty(1).nbytes
+        return int(column.at[block]) + (cell - start) * column.empty(1).nbytes
 
 
 def fail_on(monkeypatch, name, turn, number):

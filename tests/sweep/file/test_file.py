@@ -11,7 +11,6 @@ from sweep.cells.partition import boxes
 from sweep.cells.reduce import output_schema
 from sweep.file import disk
 from sweep.file.frame import cuts_of, expected_size
-from sweep.file.store import opened
 
 PHASE = {"outputs": ["fall_time", "drop"], "along": {"phase": [0.0, 0.5, 1.0]}}
 STUDIES = {
@@ -63,28 +62,15 @@ def test_the_size_of_a_result_is_known_before_it_is_computed(tmp_path, cells):
     assert (tmp_path / "out.h5").stat().st_size == pytest.approx(found, rel=0.05)
 
 
-@pytest.mark.parametrize("count", [1, 2, 3, 20_000])
-def test_chunks_are_where_hdf5_says(tmp_path, count):
-    """20,000: HDF5 then writes some of its tables while it places chunks."""
-    axes, fixed = {"mu": np.linspace(0.5, 1.0, 8 * count)}, {"phi0": 1.0, "a": 1.0}
-    study = sweep.study(kernel="foliot", outputs=["period"], axes=axes, fixed=fixed)
-    schema = output_schema(study, {})
-    with opened(tmp_path / "out.h5") as store:
-        store.begin(schema, cuts_of(study, schema, boxes(schema.grid.shape, 8)))
-        with h5py.File(store.path) as file:
-            for place in store.table.places:
-                chunks = []
-                file[place.name].id.chunk_iter(chunks.append)
-                assert place.at.tolist() == [chunk.byte_offset for chunk in chunks]
-
-
-@pytest.mark.parametrize("number", [b"3", b"5"])
-def test_a_file_of_another_format_is_refused_by_its_number(tmp_path, number):
+def test_a_file_of_another_format_is_refused_by_its_number(tmp_path):
     path = tmp_path / "out.h5"
     run(path, axes={"height": [1.0, 2.0]}).close()
-    path.write_bytes(path.read_bytes()[:-2] + number + b"\n")
+    with h5py.File(path, "r+") as file:
+        file["integrity"].attrs["format"] = 4
     for function in (sweep.open_result, sweep.verify):
-        with pytest.raises(sweep.SweepError, match="this version of foliot reads format 4 alone"):
+        with pytest.raises(
+            sweep.SweepError, match=r"another format \(4\); this version of foliot reads format 5 alone"
+        ):
             function(path)
 
 
@@ -100,7 +86,8 @@ def test_digests_reach_the_disk_behind_their_numbers(tmp_path, monkeypatch):
         begin, row, end = table.id.get_offset(), table[0].size, table.id.get_offset() + table.size
         chunks = [file["fall_time"].id.get_chunk_info(k).byte_offset for k in range(5)]
     written = [(k, *call) for k, call in enumerate(calls) if call != "sync"]
-    digests = [(k, (at - begin) // row, sum(map(len, pieces)) // row) for k, at, pieces in written if begin <= at < end]
+    digests = [(k, (at - begin) // row, sum(map(len, pieces)) // row) for k, at, pieces in written
+               if begin <= at < end and any(map(any, pieces))]  # fmt: skip
     digests = [(k, block + i) for k, block, count in digests for i in range(count)]
     assert {block for _, block in digests} == set(range(5))
     for last, block in digests:

@@ -1,7 +1,6 @@
 """csv and netCDF4: what is written reads back, to the last bit, and nothing half-written stays."""
 
 import csv
-import os
 import signal
 import subprocess
 import sys
@@ -15,6 +14,7 @@ from running import environment
 
 import sweep
 from sweep.errors import SweepError
+from sweep.file import disk
 
 
 def result():
@@ -94,18 +94,17 @@ sweep.export(sweep.run(kernel="foliot", axes={"mu": [1.0]}, fixed={"phi0": 1.0, 
 
 @pytest.mark.parametrize("suffix", [".csv", ".nc", ".zarr"])
 def test_what_an_export_left_that_was_killed_goes_with_the_next_one(tmp_path, suffix):
-    """One that lives, here or on another machine that sees the folder, keeps what is its own."""
     target = tmp_path / f"out{suffix}"
     killed = subprocess.run([sys.executable, "-c", KILLED, target], env=environment())
-    left = list(tmp_path.iterdir())
-    assert (killed.returncode, len(left)) == (-signal.SIGKILL, 1)
-    name = left[0].name
-    lives = name.replace(f".{name.split('.')[-2]}.", f".{os.getppid()}.")
-    others = [tmp_path / lives, tmp_path / f".out{suffix}.far.9.tmp"]
-    for other in others:
-        other.touch()
+    assert (killed.returncode, target.exists()) == (-signal.SIGKILL, False)
+    assert list(tmp_path.iterdir())
     sweep.export(result(), target)
-    assert sorted(tmp_path.iterdir()) == sorted([target, *others])
+    assert list(tmp_path.iterdir()) == [target]
+
+
+def test_two_exports_do_not_write_to_the_same_file_at_a_time(tmp_path):
+    with disk.replacing(tmp_path / "out.csv"), pytest.raises(SweepError, match="another process"):
+        sweep.export(result(), tmp_path / "out.csv")
 
 
 def test_a_summary_is_a_table_with_a_column_for_each_bin_and_status(tmp_path):

@@ -37,14 +37,14 @@ def test_commands_on_a_damaged_result_end_with_a_message(whole, tmp_path):
         assert set(fuzz_result(random.Random(seed), whole, tmp_path)) <= {0, 2}, seed
 
 
-def test_a_structure_in_which_hdf5_would_loop_for_ever_is_not_shown_to_it(whole, tmp_path):
+def test_a_heap_in_which_hdf5_would_loop_for_ever_is_not_shown_to_it(whole, tmp_path):
     """HDF5 2.0 comes to no end with zeros in its heap of references."""
     path, content = tmp_path / "out.h5", bytearray(whole.read_bytes())
     at = content.index(b"GCOL") + 16
     content[at : at + 512] = bytes(512)
     path.write_bytes(content)
-    with pytest.raises(SweepError, match="damaged"):
-        sweep.open_result(path)
+    with sweep.open_result(path) as found, sweep.open_result(whole) as sound:
+        assert found.identical(sound)
     assert not sweep.verify(path).whole
 
 
@@ -61,14 +61,16 @@ def virtual(file, secret):
 
 
 def external_link(file, secret):
-    file["other"] = h5py.ExternalLink(str(secret), "/")
+    del file["status"]
+    file["status"] = h5py.ExternalLink(str(secret), "/")
 
 
-def round_itself(file, secret):
-    file["integrity/round"] = file["integrity"]
+def group_elsewhere(file, secret):
+    del file["integrity"]
+    file["integrity"] = h5py.ExternalLink(str(secret), "/")
 
 
-@pytest.mark.parametrize("lead_away", [external_storage, virtual, external_link, round_itself])
+@pytest.mark.parametrize("lead_away", [external_storage, virtual, external_link, group_elsewhere])
 def test_a_result_leads_to_no_other_file(whole, tmp_path, lead_away):
     secret = tmp_path / "secret"
     os.mkfifo(secret)  # who opened it would wait for ever
@@ -123,7 +125,6 @@ CHANGES = [
     (without_dimension, 2),
     (of_another_shape, 2),
     (short_chunk, 2),
-    (with_attribute("/", "rtol", np.arange(5.0)), 2),
     (with_attribute("/", "end", np.zeros(3)), 0),
     (with_attribute("height", "units", 5), 2),
     (with_attribute("status", "flag_meanings", 3.0), 0),

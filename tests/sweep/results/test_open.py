@@ -15,7 +15,6 @@ from kernels.interface import Status
 from sweep import SweepError, open_result, run
 from sweep.cells.fingerprint import fingerprint
 from sweep.cli import main
-from sweep.file.open import changed
 from sweep.file.store import unfinished_of
 from sweep.study.model import Study
 
@@ -72,13 +71,6 @@ def test_an_unfinished_result_is_not_taken_for_a_finished_one_where_that_is_aske
     with pytest.raises(SweepError, match=r"[12] of 4 blocks"):
         open_result(unfinished, strict=True)
     open_result(stored, strict=True).close()
-
-
-@pytest.mark.parametrize("name", ["unfinished", "stored"])
-def test_a_fault_of_the_program_is_not_told_as_a_change_of_the_result(name, request):
-    path = request.getfixturevalue(name)
-    with open_result(path), pytest.raises(TypeError, match="ours"), changed(path):
-        raise TypeError("ours")
 
 
 def test_large_results_come_in_pieces_and_are_the_same(unfinished, stored, monkeypatch):

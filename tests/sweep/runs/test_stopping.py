@@ -169,7 +169,6 @@ def test_an_output_that_is_moved_or_spoilt_ends_the_run_within_seconds_and_keeps
     assert (process.returncode, str(unfinished_of(output)) in said) == (3, True)
     moved = {"renamed": tmp_path / "here" / "other", "folder moved": unfinished_of(tmp_path / "moved" / "stones.h5")}
     if deed in moved:
-        assert str(moved[deed]) in said
         moved[deed].rename(unfinished_of(tmp_path / "back.h5"))
         assert solved(tmp_path / "back.h5") >= kept
 
