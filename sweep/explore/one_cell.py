@@ -48,19 +48,16 @@ def study_of(cells: xr.Dataset, study: Study) -> Study:
         name = study.follows.get(field.name, field.name)
         if name not in cells.coords:
             raise SweepError(f"{name}: the dataset has lost this coordinate; take a cell of the result as it was read")
-        column = cells[name]
-        if column.dtype.kind not in "fiu":
-            values = np.vectorize(lambda word, field=field: float(field.choices[str(word)]))(column.values)
-        elif column.attrs.get("units", field.unit) != field.unit:
+        values = cells[name].values
+        if field.choices and values.dtype.kind not in "fiu":
+            values = np.array([float(field.choices[str(word)]) for word in values.ravel()])
+        elif cells[name].attrs.get("units", field.unit) != field.unit:
             raise SweepError(f"{name}: stands in another unit; take a cell of the result as it was read")
-        else:
-            values = column.values
         # those that all cells share stand there once
         values = values.reshape(-1, *study.shape(field))
         if field.name == first or (values != values[0]).any():
-            axes[field.name] = Axis(
-                field.name, frozen(np.resize(values, (cells[STATUS].size, *values.shape[1:]))), "values"
-            )
+            column = np.resize(values, (cells[STATUS].size, *values.shape[1:]))
+            axes[field.name] = Axis(field.name, frozen(column), "values")
         else:
             fixed[field.name] = frozen(values[0]) if field.dims else float(values[0])
     plain: dict[str, Any] = {"design": "zip", "blocks": (), "where": "", "summary": None, "follows": {}}

@@ -32,20 +32,19 @@ from sweep.words import require_dataset
 if TYPE_CHECKING:
     import xarray as xr
 
-Array = NDArray[np.float64]
-
 CELLS = 24
 """On which scalings are tried."""
 RTOL, AGREEMENT = 1e-9, 30.0
 """Cells are solved to that at least, for a loose tolerance lets pass what does not hold; outputs may differ by that
 multiple of it."""
 FACTORS = (1.7, 0.4)
-POWERS = tuple(sign * power / 2 for power in range(1, 7) for sign in (1, -1))
+POWERS = tuple(sign * Fraction(power, 2) for power in range(1, 7) for sign in (1, -1))
 """That a number without unit is tried with."""
 LARGEST_DENOMINATOR, LARGEST_COMMON = 200, 4
-"""Of a weight; and the largest by which a group is raised to have whole powers."""
-NOTHING = 1e-9
-"""Of a weight, by rounding."""
+"""Of an output's weight; and the largest by which a group is raised to have whole powers."""
+
+Weights = Mapping[str, Fraction]
+ONE = Fraction(1)
 
 
 @dataclass(frozen=True)
@@ -174,27 +173,26 @@ def scaling(study: Given) -> Scaling:
     arrays = any(field.dims for field in study.kernel.parameters)
     present = [] if arrays else [name for name in weights if name not in study.along]
 
-    def against(name: str) -> dict[str, float]:
+    def against(name: str) -> dict[str, Fraction]:
         """Powers of the parameters that lead, whose product scales against a field or an output."""
         return {lead: -row[name] for lead, row in held.items()}
 
-    def group(powers: Mapping[str, float], most: int = 1) -> Group:
+    def group(powers: Weights, most: int = 1) -> Group:
         """Their product, raised to whole powers where their denominator is no larger."""
-        exact = {name: _fraction(powers[name]) for name in present if powers.get(name)}
-        common = math.lcm(*(power.denominator for power in exact.values()))
-        return Group(tuple((name, power * (common if common <= most else 1)) for name, power in exact.items()))
+        common = math.lcm(*(power.denominator for power in powers.values()))
+        raised = {name: power * (common if common <= most else 1) for name, power in powers.items()}
+        return Group(tuple((name, raised[name]) for name in present if raised.get(name)))
 
     groups = []
     for i, name in enumerate(present):
         if name not in held:
             like = next((other for other in present[:i] if weights[other] == weights[name]), None)
             # R/mu rather than R/(a^2 phi0)
-            groups.append(group({**({like: -1.0} if like else against(name)), name: 1.0}, LARGEST_COMMON))
+            groups.append(group({**({like: -ONE} if like else against(name)), name: ONE}, LARGEST_COMMON))
     # an output that scales with what does not lead cannot be freed of units
     stuck = [row for lead, row in held.items() if lead not in present]
     axes = tuple(name for name in study.axes if name in weights)
-    unswept = np.array([row for name, row in weights.items() if name not in axes])
-
+    unswept = np.array([row for name, row in weights.items() if name not in axes], float)
     return Scaling(
         groups=tuple(groups),
         scales={o.name: group(against(o.name)) for o in study.asked if not any(row[o.name] for row in stuck)},
@@ -205,13 +203,13 @@ def scaling(study: Given) -> Scaling:
     )
 
 
-def _held(study: Study) -> tuple[dict[str, dict[str, float]], int]:
-    """Scalings that hold on random cells, by the fields that lead them, whose weight is 1 in one and 0 in the others;
-    each has the weights of fields and outputs. And the number of cells."""
+def _held(study: Study) -> tuple[dict[str, Weights], int]:
+    """Scalings that hold on random cells, weights of fields and outputs, by the field that leads each: its weight is 1,
+    and 0 in the others. And the number of cells."""
     study = dataclasses.replace(study, rtol=min(study.rtol, RTOL))
     along = [field for field in study.kernel.along if len(study.along[field.name])]
     fields = [*(field for field in study.kernel.parameters if _is_scalable(study, field)), *along]
-    units = {f.name: {base: float(p) for base, p in exponents(f.unit).items() if p} for f in fields}
+    units = {f.name: {base: p for base, p in exponents(f.unit).items() if p} for f in fields}
     # fields of the simplest unit lead; numbers without one, and what is no number of a cell, come last
     fields.sort(key=lambda f: (f in along, bool(f.dims), not units[f.name], sum(map(abs, units[f.name].values()))))
     names = [field.name for field in fields]
@@ -219,24 +217,32 @@ def _held(study: Study) -> tuple[dict[str, dict[str, float]], int]:
     old = solved(cells)
 
     # a coordinate may be a share of something, whatever its unit
-    changes = [{field.name: 0.0} for field in along]
+    changes: list[Weights] = [{}, *({field.name: 0 * ONE} for field in along)]
     changes += [{name: power} for name in names if not units[name] for power in POWERS]
 
-    def first(unit: Mapping[str, float]) -> Array | None:
+    def first(unit: Weights) -> Weights | None:
         """Of the scalings by a unit, as declared or with a change, one that holds."""
-        declared = {name: sum(k * units[name].get(base, 0.0) for base, k in unit.items()) for name in names}
-        tried = (_tried(cells, old, declared | change) for change in ({}, *changes))
+        declared = {name: sum((k * units[name].get(base, 0) for base, k in unit.items()), 0 * ONE) for name in names}
+        tried = (_tried(cells, old, {**declared, **change}) for change in changes)
         return next((row for row in tried if row is not None), None)
 
-    by_unit = {base: first({base: 1.0}) for base in sorted({base for powers in units.values() for base in powers})}
+    by_unit = {base: first({base: ONE}) for base in sorted({base for powers in units.values() for base in powers})}
     failed = [base for base, row in by_unit.items() if row is None]
-    pairs = [first({one: 1.0, other: k}) for one, other in itertools.combinations(failed, 2) for k in (1.0, -1.0)]
-    every = [*names, *old.outputs]
-    rows, leads = _echelon(
-        np.reshape([row for row in (*by_unit.values(), *pairs) if row is not None], (-1, len(every)))
-    )
-    held = {every[lead]: dict(zip(every, row, strict=True)) for lead, row in zip(leads, rows.tolist(), strict=True)}
+    pairs = [first({one: ONE, other: k}) for one, other in itertools.combinations(failed, 2) for k in (ONE, -ONE)]
+    rows = [row for row in (*by_unit.values(), *pairs) if row is not None]
+    held = dict[str, Weights]()
+    for name in names:  # their reduced echelon form
+        if lead := next((row for row in rows if row[name]), None):
+            reduced = {n: weight / lead[name] for n, weight in lead.items()}
+            held[name], rows = reduced, [row for row in rows if row is not lead]
+            rows = [_without(name, reduced, row) for row in rows]
+            held |= {n: _without(name, reduced, row) for n, row in held.items() if n != name}
     return held, int(_valued(old).sum())
+
+
+def _without(name: str, lead: Weights, row: Weights) -> Weights:
+    """A scaling less as much of another one as makes a weight 0."""
+    return {n: weight - row[name] * lead[n] for n, weight in row.items()}
 
 
 def _is_scalable(study: Study, field: Field) -> bool:
@@ -251,48 +257,28 @@ def _is_scalable(study: Study, field: Field) -> bool:
     return bool(np.any(study.fixed[field.name]))
 
 
-def _tried(study: Study, old: Cells, weights: Mapping[str, float]) -> Array | None:
+def _tried(study: Study, old: Cells, weights: Weights) -> Weights | None:
     """Weights of fields, and of outputs as they come out, if these scale; statuses may change as rounding decides."""
-    fine, found = _valued(old), np.zeros(len(old.outputs))
+    fine, found = _valued(old), dict.fromkeys(old.outputs, 0 * ONE)
     if not fine.any():
         return None
     for factor in FACTORS:
-        new = solved(multiplied(study, {name: factor**weight for name, weight in weights.items() if weight}))
+        new = solved(multiplied(study, {name: factor ** float(weight) for name, weight in weights.items() if weight}))
         was, now = (np.where(c.status == Status.INACCURATE, Status.OK, c.status) for c in (old, new))
         if (was != now).any():
             return None
-        for k, (name, values) in enumerate(old.outputs.items()):
+        for name, values in old.outputs.items():
             before, after = values[fine], new.outputs[name][fine]
             usable = np.isfinite(before) & (before * after > 0)
             if factor == FACTORS[0] and usable.any():
-                found[k] = _fraction(np.log(np.median(after[usable] / before[usable])) / math.log(factor))
-            if not np.allclose(after, factor ** found[k] * before, AGREEMENT * study.rtol, 0, equal_nan=True):
+                weight = math.log(np.median(after[usable] / before[usable])) / math.log(factor)
+                found[name] = Fraction(weight).limit_denominator(LARGEST_DENOMINATOR)
+            expected = factor ** float(found[name]) * before
+            if not np.allclose(after, expected, AGREEMENT * study.rtol, 0, equal_nan=True):
                 return None
-    return np.array([*weights.values(), *found])
+    return {**weights, **found}
 
 
 def _valued(cells: Cells) -> NDArray[np.bool_]:
     found: NDArray[np.bool_] = (cells.status < FIRST_REFUSAL) & (cells.status != Status.PENDING)
     return found
-
-
-def _fraction(weight: float) -> Fraction:
-    return Fraction(weight).limit_denominator(LARGEST_DENOMINATOR)
-
-
-def _echelon(matrix: Array) -> tuple[Array, list[int]]:
-    """Reduced row echelon form, and the columns of its pivots."""
-    rows = matrix.copy()
-    pivots: list[int] = []
-    for column in range(rows.shape[1]):
-        done = len(pivots)
-        if not abs(rows[done:, column]).max(initial=0.0) > NOTHING:
-            rows[done:, column] = 0
-            continue
-        pivot = done + int(abs(rows[done:, column]).argmax())
-        rows[[done, pivot]] = rows[[pivot, done]]
-        rows[done] /= rows[done, column]
-        others = np.arange(len(rows)) != done
-        rows[others] -= rows[others, column : column + 1] * rows[done]
-        pivots.append(column)
-    return rows[: len(pivots)], pivots

@@ -30,7 +30,7 @@ from sweep.runs.run import run
 from sweep.study.model import Study, frozen
 from sweep.study.read import Given
 from sweep.study.read import study as as_study
-from sweep.words import Table, did_you_mean, listed, page, paragraph
+from sweep.words import Table, did_you_mean, page, paragraph
 
 TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13)
 CELLS = 1024
@@ -271,16 +271,10 @@ def _given(study: Study, values: Mapping[str, Any]) -> _Reference:
     """Values of some outputs in all cells of a study; NaN in all of them: there is nothing to give."""
     size = Grid(study).size
     shapes = {name: (size, *shape) for name, shape in study.shapes.items()}
-    taken = {}
-    for name, column in values.items():
-        if name not in shapes:
-            hint = did_you_mean(name, shapes) or f"; the study asks for {listed(shapes, word='and')}"
-            raise SweepError(f"truth: the study does not ask for {name}{hint}")
-        taken[name] = np.asarray(column, np.float64)
-        if taken[name].shape != shapes[name]:
-            raise SweepError(f"truth: {name} has the shape {taken[name].shape}, its cells {shapes[name]}")
-    if not taken:
-        raise SweepError("truth: no output is given")
+    taken = {name: np.asarray(column, np.float64) for name, column in values.items()}
+    given = {name: column.shape for name, column in taken.items()}
+    if not given or given.items() - shapes.items():
+        raise SweepError(f"truth: expected arrays of outputs, of the shapes {shapes}; found {given or 'none'}")
     void = np.all([np.isnan(column).reshape(size, -1).all(axis=1) for column in taken.values()], axis=0)
     return _Reference(GIVEN, taken, np.where(void, np.inf, ROUNDING), void)
 

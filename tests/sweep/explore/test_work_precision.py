@@ -227,7 +227,7 @@ def test_no_more_cells_are_taken_than_are_wanted_and_a_tenth_lies_beyond_low_and
         ({"reference": "magic"}, "magic"),
         *(({"tolerances": tolerances}, "rtol") for tolerances in ([0.0], [np.nan], [np.inf], [])),
         ({"cells": 0}, "cells"),
-        ({"truth": {"impact_sped": [1.0] * 4}}, "did you mean impact_speed"),
+        ({"truth": {"impact_sped": [1.0] * 4}}, "impact_speed"),
         ({"truth": {"impact_speed": [1.0] * 3}}, r"\(4,\)"),
         ({"truth": {}}, "truth"),
     ],
