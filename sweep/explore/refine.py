@@ -152,9 +152,7 @@ def refine(
     study = study or as_study(dataset)
     names = [y] if isinstance(y, str) else list(y)
     _require(dataset, study, names, tolerance)
-    target = None if path is None else as_path(path)
-    rounds = None if target is None else _folder_of_rounds(target, dataset.encoding.get("source"), force)
-    numbers = itertools.count(1)
+    rounds, numbers = _folder_of_rounds(path, dataset, force), itertools.count(1)
     options: dict[str, Any] = {"workers": workers, "isolate": isolate, "cell_timeout": cell_timeout}
 
     def of(values: Mapping[str, Array], design: str = "zip") -> Study:
@@ -174,9 +172,9 @@ def refine(
     whole = of({name: column[order] for name, column in values.items()}, "product" if len(values) == 1 else "zip")
     arrays = {name: cells.column(name)[order] for name in (*study.outputs, *ANCILLARY)}
     attrs = {REFINED_TO: json.dumps(dict.fromkeys(names, tolerance))}
-    if target is None or rounds is None:
+    if path is None or rounds is None:
         return report(cells, in_memory(cell_schema(whole, {}), arrays).assign_attrs(attrs))
-    found = report(cells, store_cells(whole, target, arrays, force, attrs=attrs))
+    found = report(cells, store_cells(whole, path, arrays, force, attrs=attrs))
     shutil.rmtree(rounds, ignore_errors=True)
     return found
 
@@ -203,8 +201,11 @@ def _require(dataset: xr.Dataset, study: Study, names: Sequence[str], tolerance:
         raise SweepError("the sweep is not finished; run it to its end first")
 
 
-def _folder_of_rounds(target: Path, source: str | None, force: bool) -> Path:
+def _folder_of_rounds(path: str | os.PathLike[str] | None, dataset: xr.Dataset, force: bool) -> Path | None:
     """Where the rounds on the way to a result are kept. Raises SweepError where it is not to be written."""
+    if path is None:
+        return None
+    target, source = as_path(path), dataset.encoding.get("source")
     check_target(target, force=force, read=[Path(source)] if source else [])
     rounds = target.with_name(f"{target.name}.rounds")
     with disk.refusing(target):
