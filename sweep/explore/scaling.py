@@ -37,7 +37,8 @@ CELLS = 24
 RTOL, AGREEMENT = 1e-9, 30.0
 """Cells are solved to that at least, for a loose tolerance lets pass what does not hold; outputs may differ by that
 multiple of it."""
-FACTORS = (1.7, 0.4)
+FACTORS = (2.0, 0.25)
+"""By powers of two numbers change no digit, and motions that never repeat stay the same."""
 POWERS = tuple(sign * Fraction(power, 2) for power in range(1, 7) for sign in (1, -1))
 """That a number without unit is tried with."""
 LARGEST_DENOMINATOR, LARGEST_COMMON = 200, 4
