@@ -51,8 +51,6 @@ ESTIMATES = ("error", "wear_error")
 
 LONG_NAMES = {
     "error_median": "median relative error of a cell, over its outputs",
-    "error_low": "a tenth of the cells have a smaller relative error",
-    "error_high": "a tenth of the cells have a larger relative error",
     "error_worst": "largest relative error of a cell that the method calls right",
     "seconds": "time per cell on one core",
     "ok": "share of cells that the method calls right",
@@ -110,12 +108,11 @@ def work_precision(
     Returns
     -------
     Dataset
-        Over `method` and `rtol`: `error_median`, between `error_low` and `error_high` (a tenth of the cells beyond
-        each), `error_worst`, `seconds`; shares of cells `ok`, `remarked`, `inaccurate`, `unsolved`, `silent`; texts
-        `worst_cell`, `unsolved_as`, `silent_at`, `methods_used`; and means of the outputs asked for that count work.
-        Attributes `reference`, `reference_error` (the largest error of the truth itself), `cells` (in which methods can
-        be told right or wrong), `open_cells` (in which they cannot), `missing` (which methods cannot do the study) and
-        `omissions` (these, and what fails where).
+        Over `method` and `rtol`: `error_median`, `error_worst`, `seconds`; shares of cells `ok`, `remarked`,
+        `inaccurate`, `unsolved`, `silent`; texts `worst_cell`, `unsolved_as`, `silent_at`, `methods_used`; and means of
+        the outputs asked for that count work. Attributes `reference`, `reference_error` (the largest error of the truth
+        itself), `cells` (in which methods can be told right or wrong), `open_cells` (in which they cannot), and
+        `omissions` (which methods cannot do the study, and what fails where).
 
     Raises
     ------
@@ -145,7 +142,7 @@ def work_precision(
     against = _given(part, truth) if truth is not None else _best(part, [reference] if reference else able)
     found = _chart(part, names, tolerances, against)
     missing = [] if methods is not None else _missing(part, able)
-    return found.assign_attrs(missing="; ".join(missing), omissions="; ".join([*missing, *_omissions(found)]))
+    return found.assign_attrs(omissions="; ".join([*missing, *_omissions(found)]))
 
 
 def _chart(study: Study, names: Sequence[str], tolerances: Sequence[float], against: _Reference) -> xr.Dataset:
@@ -336,13 +333,8 @@ def _measured(study: Study, name: str, rtol: float, against: _Reference) -> dict
         "unsolved": unsolved,
         "silent": wrong,
     }
-    # NaN where there are none; no number between two cells, for errors may be infinite
-    errors = error[valued] if valued.any() else np.array([math.nan])
-    low, high = np.quantile(errors, (0.1, 0.9), method="inverted_cdf")
     return {
-        "error_median": np.median(errors),
-        "error_low": low,
-        "error_high": high,
+        "error_median": np.median(error[valued]) if valued.any() else math.nan,
         "error_worst": error[worst] if sure.any() else math.nan,
         **{key: cells.sum() / against.judged for key, cells in shares.items()},
         **{key: outputs[key][valued].mean() if valued.any() else math.nan for key in WORK if key in outputs},

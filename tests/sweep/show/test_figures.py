@@ -152,8 +152,6 @@ def precision(**changes):
         "seconds": [[1e-6, 2e-6], [3e-6, 4e-6], [5e-6, 6e-6], [1e-6, 1e-6]],
         "error_median": [[1e-5, 1e-9], [0.0, 1e-3], [1e-2, 50.0], [np.nan, np.nan]],
         "error_worst": [[1e-4, 1e-8], [1e-3, 1e-2], [1e-1, 90.0], [np.nan, np.nan]],
-        "error_low": [[1e-6, 0.0], [1e-6, 1e-6], [1e-6, 1e-6], [np.nan, np.nan]],
-        "error_high": [[1e-4, 1e-8], [1e-2, 9.0], [1e-1, 80.0], [np.nan, np.nan]],
         "unsolved": [[0, 0], [0.2, 0], [0, 0], [1, 1]],
         "inaccurate": [[0, 0], [0, 0], [0, 0.3], [0, 0]],
         "silent": [[0, 0], [0, 0], [0.1, 0], [0, 0]],
