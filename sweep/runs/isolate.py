@@ -15,12 +15,11 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable
 from multiprocessing import forkserver
 from multiprocessing.connection import wait
 from pathlib import Path
 from types import ModuleType
-from typing import Any, TypeVar
+from typing import Any
 
 from sweep.cells.block import Unsolved, sampled_by, told
 from sweep.cells.compiling import work_clock
@@ -43,7 +42,8 @@ TRIALS = 3
 LOOK_SECONDS = 0.2
 """How often it is looked whether time goes by, or the machine slept."""
 
-R = TypeVar("R")
+Answer = tuple[list[Any], float, int]
+"""Columns of cells, the seconds that they took, and most bytes that their process ever had."""
 
 
 class Died(Unsolved):
@@ -109,11 +109,11 @@ class Isolated:
         One cell alone is tried again, for a process may die of what it did before, or with others; and then no other
         cell is tried so meanwhile, lest each be blamed for the other.
         """
-        crew, limit = self._all, self._all.seconds(cells.number)
+        crew = self._all
         for trial in range(1, TRIALS + 1):
             try:
                 with crew.alone if trial > 1 else contextlib.nullcontext():
-                    columns, seconds, most = self.call(limit, _solve, start, cells.number, wanted)
+                    columns, seconds, most = self._solved(start, cells.number, wanted)
                 break
             except Died:
                 if cells.number > 1 or trial == TRIALS:
@@ -126,11 +126,11 @@ class Isolated:
         for column, values in zip(cells.columns, columns, strict=False):  # errors come last, and may not be wanted
             column[...] = values
 
-    def call(self, limit: float, function: Callable[..., R], *words: Any) -> R:
-        """What a function gives in the process, within so many seconds. Raises Unsolved, Died, SweepError."""
-        process, late = self._process or self._begin(), False
+    def _solved(self, *words: Any) -> Answer:
+        """What the process answers. Raises Unsolved, Died, SweepError."""
+        process, limit, late = self._process or self._begin(), self._all.seconds(words[1]), False
         try:
-            return _asked(process, limit, function, *words)
+            return _answer(process, limit, *words)
         except Died:
             self.end()
             raise
@@ -151,8 +151,9 @@ class Isolated:
                 with self._lock:
                     if self._all.over:
                         raise SweepError("the run is being stopped")
-                    process = self._process = _started()
-                _asked(process, LOAD_SECONDS, _load, self._all.text, self._all.good)
+                    process = self._process = _started(self._all.text)
+                good = self._all.good
+                _answer(process, LOAD_SECONDS, good or 0, int(good is not None), None)
                 return process
             except SweepError:
                 raise
@@ -177,12 +178,12 @@ class Isolated:
         return process.exitcode  # type: ignore[no-any-return]
 
 
-def _asked(process: Any, limit: float, function: Callable[..., R], *words: Any) -> R:
-    """What a function gives in a process. Raises TimeoutError, EOFError or OSError where it died, Unsolved, Died.
+def _answer(process: Any, limit: float, *words: Any) -> Answer:
+    """What a process answers. Raises TimeoutError, EOFError or OSError where it died, Unsolved, Died.
 
     No seconds count while the machine sleeps or the process compiles; compiling has a limit of its own.
     """
-    process.pipe.send((function, words))
+    process.pipe.send(words)
     left = {False: limit, True: LOAD_SECONDS}
     while min(left.values()) > 0.0:
         begun = time.monotonic()
@@ -198,8 +199,8 @@ def _asked(process: Any, limit: float, function: Callable[..., R], *words: Any) 
 _starting = threading.Lock()
 
 
-def _started() -> Any:
-    """A process that serves, with its `pipe` and whether it is `compiling`.
+def _started(text: str) -> Any:
+    """A process that solves cells of a study, with its `pipe` and whether it is `compiling`.
 
     It is made by a clean process, for one with threads cannot be copied. It does not run the program again that asks
     for it: kernels are looked up by name, so nothing of `__main__` is needed there. Workers of dask are daemons, which
@@ -213,7 +214,9 @@ def _started() -> Any:
         ours, theirs = context.Pipe()
         try:
             sys.modules["__main__"], flags["daemon"] = ModuleType("__main__"), False
-            process: Any = context.Process(target=_serve, args=(theirs, flag := context.RawValue("i")), daemon=True)
+            process: Any = context.Process(
+                target=_serve, args=(theirs, flag := context.RawValue("i"), text), daemon=True
+            )
             process.start()
         finally:
             sys.modules["__main__"], flags["daemon"] = main, daemon
@@ -222,13 +225,8 @@ def _started() -> Any:
     return process
 
 
-# what follows is done in the process
-
-_here: dict[str, Any] = {}
-
-
-def _serve(pipe: Any, flag: Any) -> None:
-    """Does what it is asked for, until nobody asks any more.
+def _serve(pipe: Any, flag: Any, text: str) -> None:
+    """In the process: loads the kernel, and solves cells, until nobody asks any more.
 
     It ends with the run, and before the run where the memory is short. Linux kills it with its fork server, also in a
     kernel that never lets Python run; that one ends with who asks it, if nobody else holds the pipe that tells.
@@ -248,28 +246,17 @@ def _serve(pipe: Any, flag: Any) -> None:
         ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
     run: Any = multiprocessing.parent_process()
     threading.Thread(target=lambda: (run.join(), os._exit(0)), daemon=True).start()
+    solver = None
     with contextlib.suppress(EOFError, OSError):
         while True:
-            function, words = pipe.recv()
+            start, count, wanted = pipe.recv()
             try:
-                answer = function(*words), ""
+                solver = solver or Solver(Study.from_json(text, allow_import=True))
+                cells = cells_of({column.name: column.empty(count) for column in columns(solver.study)})
+                begun = work_clock()
+                solver.solve(start, cells, wanted)
+                most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
+                found, reason = (cells.columns, work_clock() - begun, most), ""
             except BaseException as fault:
-                answer = None, told(fault)
-            pipe.send(answer)
-
-
-def _load(text: str, good: int | None) -> None:
-    study = Study.from_json(text, allow_import=True)
-    _here["study"], _here["solver"] = study, Solver(study)
-    work_clock.watch()
-    if good is not None:
-        _solve(good, 1, None)
-
-
-def _solve(start: int, count: int, wanted: Any) -> tuple[list[Any], float, float]:
-    """Columns of cells, the seconds that they took, and most bytes that the process ever had."""
-    cells = cells_of({column.name: column.empty(count) for column in columns(_here["study"])})
-    begun = work_clock()
-    _here["solver"].solve(start, cells, wanted)
-    seconds, unit = work_clock() - begun, 1 if sys.platform == "darwin" else 1024
-    return cells.columns, seconds, unit * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+                found, reason = None, told(fault)
+            pipe.send((found, reason))
