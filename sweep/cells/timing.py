@@ -47,15 +47,15 @@ Clock = Callable[[], float]
 class Sample:
     """Timed probes: cell each starts at (ascending), its seconds per cell, and how many cells each has.
 
-    `lanes`: whether one cell takes as long as 32; None where that was not asked. `call`: what a call costs beside the
-    share of its cells, in seconds: what one cell alone takes beyond it. Where cells are solved in lanes, that is also
-    about what the last ones of a call wait for each other.
+    `lanes`: whether one cell takes as long as 32, where cells are so dear that it matters. `call`: what a call costs
+    beside the share of its cells, in seconds: what one cell alone takes beyond it. Where cells are solved in lanes,
+    that is also about what the last ones of a call wait for each other.
     """
 
     positions: Any
     costs: Any
     cells: int
-    lanes: bool | None = None
+    lanes: bool = False
     call: float = 0.0
 
     @property
@@ -102,11 +102,11 @@ def take_sample(solver: SolveCells, columns: Sequence[Column], size: int, clock:
         starts = (*_places(size, 1, cells), *_places(size, PLACES, cells))
         return next((taken for start in starts if (taken := probe(start, cells)) is not None), math.inf)
 
-    cells, lanes, alone = 1, None, anywhere(1)
+    cells, lanes, alone = 1, False, anywhere(1)
     if alone < 2 * PROBE_SECONDS:  # what is met for the first time matters in it
         alone = min(alone, anywhere(1))
-    if size > 1 and alone > PROBE_SECONDS and (alone > max(BUDGET) / 4 or size <= 50 * LANES):
-        # cells are dear, or dear and few: where two take as long as one, 32 will
+    if size > 1 and alone > PROBE_SECONDS:
+        # where two cells take as long as one, 32 will
         lanes = anywhere(2) < 1.5 * alone
         cells = max(1, min(LANES, size // 4)) if lanes else 1
     else:
@@ -128,7 +128,6 @@ def take_sample(solver: SolveCells, columns: Sequence[Column], size: int, clock:
             probes |= {} if seconds is None else {start: seconds}
         if probes:
             costs = np.array([probes[start] / count for start in sorted(probes)])
-            lanes = lanes if count == cells else None
             return Sample(np.array(sorted(probes)), costs, count, lanes, max(0.0, alone - float(np.min(costs))))
     raise faults[-1]
 
@@ -150,8 +149,6 @@ def partition(sample: Sample, size: int, cell_bytes: float, workers: int, least:
     cells = min(max(seconds / cost, min(worth_a_call, share)), longest / cost, BLOCK_BYTES / cell_bytes, size)
     if sample.lanes:
         cells = max(cells, min(LANES, math.ceil(size / workers)))
-    elif sample.cells < LANES and sample.lanes is None:
-        cells = max(cells, min(LANES, size / (4 * workers)))
     cells = max(1, math.floor(cells), -(-size // MOST_BLOCKS))
     return Partition(size, min(cells if cells < LANES else -(-cells // LANES) * LANES, size))
 
