@@ -40,8 +40,8 @@ DRAWN = 64
 """Cells beside the ends of axes that are solved to see their methods and statuses,"""
 LOOK_SECONDS, SHARE = 1.0, 0.25
 """or as many as can be in this time, or this share of the run. So long may looking for superfluous axes take, too."""
-ADVICE_CELLS, ADVICE_SECONDS = 500, 0.1
-"""Cells that are solved for it, about; and what it may always take."""
+ADVICE_CELLS, ADVICE_SECONDS = 2_000, 0.1
+"""Cells that are solved for it, at most about; and what it may always take."""
 NO_ADVICE = "superfluous axes are not looked for, which may take as long as the run; sweep.scaling(study) does"
 RUN_SECONDS = 0.15
 """What any run to a file takes beside its cells: opening, a sample, the end."""

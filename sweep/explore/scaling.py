@@ -32,8 +32,8 @@ from sweep.words import require_dataset
 if TYPE_CHECKING:
     import xarray as xr
 
-CELLS = 24
-"""On which scalings are tried."""
+CELLS, FEW = 24, 4
+"""On which scalings are tried; and before, since most of them do not hold, and may make cells dear."""
 RTOL, AGREEMENT = 1e-9, 30.0
 """Cells are solved to that at least, for a loose tolerance lets pass what does not hold; outputs may differ by that
 multiple of it."""
@@ -148,7 +148,7 @@ class Scaling:
 def scaling(study: Given) -> Scaling:
     """Groups of a study's parameters, and how many of its axes are superfluous.
 
-    Scalings are tried on 24 cells, which are solved some ten to some hundred times.
+    Scalings are tried on four cells, and those that hold there on 24.
 
     Parameters
     ----------
@@ -214,8 +214,8 @@ def _held(study: Study) -> tuple[dict[str, Weights], int]:
     # fields of the simplest unit lead; numbers without one, and what is no number of a cell, come last
     fields.sort(key=lambda f: (f in along, bool(f.dims), not units[f.name], sum(map(abs, units[f.name].values()))))
     names = [field.name for field in fields]
-    cells = drawn(study, CELLS, np.random.default_rng(2))
-    old = solved(cells)
+    few, cells = (drawn(study, number, np.random.default_rng(2)) for number in (FEW, CELLS))
+    old_few, old = solved(few), solved(cells)
 
     # a coordinate may be a share of something, whatever its unit
     changes: list[Weights] = [{}, *({field.name: 0 * ONE} for field in along)]
@@ -224,10 +224,14 @@ def _held(study: Study) -> tuple[dict[str, Weights], int]:
     def first(unit: Weights) -> Weights | None:
         """Of the scalings by a unit, as declared or with a change, one that holds."""
         declared = {name: sum((k * units[name].get(base, 0) for base, k in unit.items()), 0 * ONE) for name in names}
-        tried = (_tried(cells, old, {**declared, **change}) for change in changes)
-        return next((row for row in tried if row is not None), None)
+        for change in changes:
+            weights = {**declared, **change}
+            if _tried(few, old_few, weights) and (row := _tried(cells, old, weights)):
+                return row
+        return None
 
-    by_unit = {base: first({base: ONE}) for base in sorted({base for powers in units.values() for base in powers})}
+    bases = sorted({base for powers in units.values() for base in powers}) if _valued(old).any() else []
+    by_unit = {base: first({base: ONE}) for base in bases}
     failed = [base for base, row in by_unit.items() if row is None]
     pairs = [first({one: ONE, other: k}) for one, other in itertools.combinations(failed, 2) for k in (ONE, -ONE)]
     rows = [row for row in (*by_unit.values(), *pairs) if row is not None]
@@ -261,8 +265,6 @@ def _is_scalable(study: Study, field: Field) -> bool:
 def _tried(study: Study, old: Cells, weights: Weights) -> Weights | None:
     """Weights of fields, and of outputs as they come out, if these scale; statuses may change as rounding decides."""
     fine, found = _valued(old), dict.fromkeys(old.outputs, 0 * ONE)
-    if not fine.any():
-        return None
     for factor in FACTORS:
         new = solved(multiplied(study, {name: factor ** float(weight) for name, weight in weights.items() if weight}))
         was, now = (np.where(c.status == Status.INACCURATE, Status.OK, c.status) for c in (old, new))
