@@ -40,8 +40,8 @@ DRAWN = 64
 """Cells beside the ends of axes that are solved to see their methods and statuses,"""
 LOOK_SECONDS, SHARE = 1.0, 0.25
 """or as many as can be in this time, or this share of the run. So long may looking for superfluous axes take, too."""
-ADVICE_CELLS, ADVICE_SECONDS = 2_000, 0.1
-"""Cells that are solved for it, at most about; and what it may always take."""
+ADVICE_CELLS, ADVICE_SECONDS = 300, 0.1
+"""Cells that are solved for it at least, about; and what it may always take."""
 NO_ADVICE = "superfluous axes are not looked for, which may take as long as the run; sweep.scaling(study) does"
 RUN_SECONDS = 0.15
 """What any run to a file takes beside its cells: opening, a sample, the end."""
@@ -189,10 +189,10 @@ def plan(
     before = work_clock.compiled
     sample = sampled_study(study, note or (lambda text: None))
     found = _forecast(study, sample, crew, folder, Guard(Solver(study), lambda cell: None))
-    advice = NO_ADVICE
-    if ADVICE_CELLS * found.cell_seconds < max(SHARE * found.seconds, ADVICE_SECONDS):
+    allowed, advice = max(SHARE * found.seconds, ADVICE_SECONDS), NO_ADVICE
+    if ADVICE_CELLS * found.cell_seconds < allowed:
         with faults_reported(f"{study.kernel_name}: the kernel failed"):
-            advice = scaling(study).advice
+            advice = scaling(study, allowed).advice
     took = work_clock.compiled - before
     compiled = took if took > SILENT_SECONDS else 0.0
     again = 0.0 if _is_kept(study.kernel_name) else compiled

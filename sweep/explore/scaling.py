@@ -12,6 +12,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
+import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -34,6 +35,8 @@ if TYPE_CHECKING:
 
 CELLS, FEW = 24, 4
 """On which scalings are tried; and before, since most of them do not hold, and may make cells dear."""
+SECONDS = 10.0
+"""That trying may take."""
 RTOL, AGREEMENT = 1e-9, 30.0
 """Cells are solved to that at least, for a loose tolerance lets pass what does not hold; outputs may differ by that
 multiple of it."""
@@ -145,7 +148,7 @@ class Scaling:
         return dataset
 
 
-def scaling(study: Given) -> Scaling:
+def scaling(study: Given, seconds: float = SECONDS) -> Scaling:
     """Groups of a study's parameters, and how many of its axes are superfluous.
 
     Scalings are tried on four cells, and those that hold there on 24.
@@ -153,6 +156,8 @@ def scaling(study: Given) -> Scaling:
     Parameters
     ----------
     study : Study, path, mapping of its keys, or Dataset that came from it
+    seconds : float
+        Time to try what the declared units do not tell; these are tried always.
 
     Raises
     ------
@@ -168,7 +173,7 @@ def scaling(study: Given) -> Scaling:
     one-dimensional in mu, a: only mu/(phi0 a^2) matters; 1 of these axes can be left out; tried on ... cells at random
     """
     study = as_study(study)
-    held, tried = _held(study)
+    held, tried = _held(study, seconds)
     fields = [f.name for f in (*study.kernel.parameters, *study.kernel.along)]
     weights = {f: [row[f] for row in held.values()] for f in fields if any(row.get(f) for row in held.values())}
     arrays = any(field.dims for field in study.kernel.parameters)
@@ -204,7 +209,7 @@ def scaling(study: Given) -> Scaling:
     )
 
 
-def _held(study: Study) -> tuple[dict[str, Weights], int]:
+def _held(study: Study, seconds: float) -> tuple[dict[str, Weights], int]:
     """Scalings that hold on random cells, weights of fields and outputs, by the field that leads each: its weight is 1,
     and 0 in the others. And the number of cells."""
     study = dataclasses.replace(study, rtol=min(study.rtol, RTOL))
@@ -217,6 +222,7 @@ def _held(study: Study) -> tuple[dict[str, Weights], int]:
     few, cells = (drawn(study, number, np.random.default_rng(2)) for number in (FEW, CELLS))
     old_few, old = solved(few), solved(cells)
 
+    until = time.monotonic() + seconds
     # a coordinate may be a share of something, whatever its unit
     changes: list[Weights] = [{}, *({field.name: 0 * ONE} for field in along)]
     changes += [{name: power} for name in names if not units[name] for power in POWERS]
@@ -225,6 +231,8 @@ def _held(study: Study) -> tuple[dict[str, Weights], int]:
         """Of the scalings by a unit, as declared or with a change, one that holds."""
         declared = {name: sum((k * units[name].get(base, 0) for base, k in unit.items()), 0 * ONE) for name in names}
         for change in changes:
+            if change and time.monotonic() > until:
+                break
             weights = {**declared, **change}
             if _tried(few, old_few, weights) and (row := _tried(cells, old, weights)):
                 return row
