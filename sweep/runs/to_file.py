@@ -29,18 +29,31 @@ Ending = Literal["done before", "complete", "unfinished", "not begun"]
 def run_to_file(task: Task, precomputed: Precomputed | None = None) -> Ending:
     """Continues, begins or leaves alone what is there. Raises SweepError, KeyboardInterrupt, Terminated."""
     left = unfinished_of(task.output).exists() or lock_of(task.output).exists()
-    if not left and _is_complete(task):
+    if not left and _standing(task) == "complete":
         return "done before"
     with opened(task.output) as store:
         # looked at again, for another run may have ended before this one had the lock
-        if _is_complete(task):
-            found = _found(store, task)
-            if found is not None and found.fingerprint == dict(task.fingerprint):
+        standing, found = _standing(task), _found(store, task)
+        is_ours = found is not None and found.fingerprint == dict(task.fingerprint)
+        if standing == "complete":
+            if is_ours:
                 store.discard()
             return "done before"
-        _take_up(store, task)
+        if found is not None and is_ours:
+            store.resume(found)
+        elif found is None and standing == "damaged":
+            store.reopen(verify(task.output).blocks or ())
+        else:
+            if found is not None:
+                found.close()
+                if not task.force:
+                    raise SweepError(
+                        f"{store.path}: the unfinished result of another study or version; finish that one first, "
+                        f"choose another name, or give it up with --force\n{_changes(found.fingerprint, task)}"
+                    )
+            store.discard()
         try:
-            _computed(store, task, precomputed)
+            _computed(store, task, precomputed, standing == "reused")
             return "complete"
         except (KeyboardInterrupt, Terminated, TimeUp) as reason:
             kept = "before the first block"
@@ -54,21 +67,22 @@ def run_to_file(task: Task, precomputed: Precomputed | None = None) -> Ending:
             raise
 
 
-def _is_complete(task: Task) -> bool:
-    """Whether the output is complete for this study. Raises SweepError where it is something else."""
+def _standing(task: Task) -> Literal["nothing", "complete", "damaged", "reused"]:
+    """What the output is to this study: its cells may be "reused". Raises SweepError where it is something else."""
     if not task.output.exists():
-        return False
+        return "nothing"
     stored = stored_fingerprint(task.output)
     if task.force:
-        return False
+        return "nothing"
     if stored == dict(task.fingerprint):
         if task.repair and verify(task.output).blocks is not None:
-            return False
+            return "damaged"
         check_whole(task.output)
-        return not (task.retry_failed and has_failed(task.output))
+        return "reused" if task.retry_failed and has_failed(task.output) else "complete"
     hindrance = obstacle(stored, task.fingerprint)
     if task.extend and not hindrance:
-        return False
+        check_whole(task.output)
+        return "reused"
     what = f"cannot be extended, for {hindrance}" if task.extend else "holds the result of another study or version"
     extendable = (
         "; where its axes have only got more values, --extend computes the new cells alone; those of another version "
@@ -92,31 +106,11 @@ def _found(store: Store, task: Task) -> StoredFile | None:
         return None
 
 
-def _take_up(store: Store, task: Task) -> None:
-    """Continues what an earlier run left. Raises SweepError where that was another study, unless forced."""
-    left = _found(store, task)
-    if left is None and task.repair and not task.force and task.output.exists():
-        store.reopen(verify(task.output).blocks or ())
-    elif left is not None and left.fingerprint == dict(task.fingerprint):
-        store.resume(left)
-    elif left is None or task.force:
-        if left is not None:
-            left.close()
-        store.discard()
-    else:
-        left.close()
-        raise SweepError(
-            f"{store.path}: the unfinished result of another study or version; finish that one first, choose another "
-            f"name, or give it up with --force\n{_changes(left.fingerprint, task)}"
-        )
-
-
-def _computed(store: Store, task: Task, known: Reused | Precomputed | None) -> None:
+def _computed(store: Store, task: Task, known: Reused | Precomputed | None, reused: bool) -> None:
     """Computes what is missing, and puts the result in its place."""
     with contextlib.ExitStack() as stack:
         to_do, sampled = store.file is None or bool(store.missing()), known is None
-        if to_do and known is None and (task.extend or task.retry_failed) and not task.force and task.output.exists():
-            check_whole(task.output)
+        if to_do and reused:
             known = stack.enter_context(contextlib.closing(Reused(task.output, task.study, task.retry_failed)))
             if task.extend and is_of_another_version(stored_fingerprint(task.output), task.fingerprint):
                 task.note("another version has computed it; a sample of its cells is computed again")
