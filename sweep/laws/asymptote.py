@@ -158,7 +158,7 @@ def _fading(fade: float) -> Law:
     def parts(q: Array, s: Array, span: float) -> Any:
         return CORRECTION.parts(np.stack([q[0], np.full_like(q[0], fade)]), s, span)
 
-    return CORRECTION._replace(name=str(fade), parts=parts, starts=CORRECTION.starts[:1], limits=CORRECTION.limits[:1])
+    return CORRECTION._replace(name=str(fade), parts=parts, q=CORRECTION.q[:1])
 
 
 def _mixture(t: Array, z: Array, tried: dict[str, Found], word: str, confidence: float) -> tuple[float, float]:

@@ -28,8 +28,19 @@ class Found(NamedTuple):
     off: Array
     sigma: Array | None
     """Standard errors of the points, where they are known."""
-    aicc: float
-    bic: float
+    deviance: float
+    more: int = 0
+    """Numbers of the noise that are fitted too."""
+
+    @property
+    def aicc(self) -> float:
+        """Akaike's criterion, corrected for few points."""
+        return float(corrected(self.deviance, self.off.size, self.law.numbers + self.more))
+
+    @property
+    def bic(self) -> float:
+        """Bayes' criterion."""
+        return self.deviance + (self.law.numbers + self.more) * math.log(self.off.size)
 
     @property
     def square(self) -> float:
@@ -50,7 +61,7 @@ class Found(NamedTuple):
     def interval(self, t: Array, which: list[int], noise: str, confidence: float) -> tuple[Array, float]:
         """Ends of the intervals of some numbers (2, k), infinite where they are not determined; `aicc` with the noise
         of the word that suits best, where it is not known."""
-        known, aicc = np.flatnonzero(np.isfinite(self.errors())).tolist(), self.aicc
+        known, best = np.flatnonzero(np.isfinite(self.errors())).tolist(), self
         ends = np.array([[-np.inf] * len(which), [np.inf] * len(which)])
         if known:
             line = regress(t, self.jacobian[:, known], self.off[None], noise, sigma=self.sigma)
@@ -58,8 +69,8 @@ class Found(NamedTuple):
                 if number in known:
                     ends[:, place] = line.interval(known.index(number), confidence)[:, 0]
             if self.sigma is None and noise != "even":
-                aicc = float(corrected(float(line.deviance[0]), t.size, self.law.numbers + 2))
-        return self.numbers[which] + np.clip(ends, [[-np.inf], [0.0]], [[0.0], [np.inf]]), aicc
+                best = self._replace(deviance=float(line.deviance[0]), more=2)
+        return self.numbers[which] + np.clip(ends, [[-np.inf], [0.0]], [[0.0], [np.inf]]), best.aicc
 
     def denied(self, t: Array, noise: str) -> bool:
         """Whether the points are not the law and noise; unless that is independent, by polynomials beside the law."""
@@ -93,20 +104,17 @@ def fitted(laws: Sequence[Law], t: Array, z: Array, errors: Array | None = None)
         for k, one in enumerate(_nearest(laws, t, part, None if errors is None else errors[first])):
             found[first + k % len(part)][one.law.name] = one
     if ONE in laws and errors is None:
-        k = ONE.numbers + 2
         for line, row in zip(found, z, strict=True):
-            deviance = line_deviance(t, row)
-            aicc, bic = float(corrected(deviance, t.size, k)), deviance + k * math.log(t.size)
-            if aicc < line[ONE.name].aicc:
-                line[ONE.name] = line[ONE.name]._replace(aicc=aicc, bic=bic)
+            one = line[ONE.name]
+            line[ONE.name] = min(one, one._replace(deviance=line_deviance(t, row), more=2), key=lambda fit: fit.aicc)
     return found
 
 
 def _start(law: Law, t: Array, z: Array, root: Array) -> Array:
     """The q (m, q) of a grid that are nearest to lines z (m, n)."""
-    if not law.starts:
+    if not law.q:
         return np.zeros((len(z), 0))
-    tries = np.array(list(itertools.product(*law.starts)), dtype=np.float64)
+    tries = np.array(list(itertools.product(*(number.starts for number in law.q))), dtype=np.float64)
     parts = _parts([law], [tries], t)
     exist = np.asarray(np.isfinite(parts).all(axis=(0, 2)))
     basis = np.linalg.qr((np.where(exist[:, None], parts[1:], 0.0) * root).transpose(1, 2, 0))[0]
@@ -119,12 +127,12 @@ def _start(law: Law, t: Array, z: Array, root: Array) -> Array:
 def _nearest(laws: Sequence[Law], t: Array, z: Array, errors: Array | None) -> list[Found]:
     """Each law fitted to each line z (m, n); law by law."""
     root, lines = np.ones_like(t) if errors is None else 1 / errors, len(z)
-    most = max(1, *(len(law.starts) for law in laws))
+    most = max(1, *(len(law.q) for law in laws))
     # rows are laws times lines; q that a law does not have are 0 and stay so
     q, limits = np.zeros((len(laws) * lines, most)), np.zeros((len(laws), most, 2))
     for k, law in enumerate(laws):
-        q[k * lines : (k + 1) * lines, : len(law.starts)] = _start(law, t, z, root)
-        limits[k, : len(law.starts)] = np.reshape(law.limits, (-1, 2))
+        q[k * lines : (k + 1) * lines, : len(law.q)] = _start(law, t, z, root)
+        limits[k, : len(law.q)] = np.reshape([(number.least, number.most) for number in law.q], (-1, 2))
     low, high = np.repeat(limits, lines, axis=0)[:, None].transpose(3, 0, 1, 2)
     steps = STEP * np.concatenate([np.eye(most), -np.eye(most)])
 
@@ -185,13 +193,12 @@ def _nearest(laws: Sequence[Law], t: Array, z: Array, errors: Array | None) -> l
     by_q, columns, n = derivatives(rows)[0], parts(rows, q[:, None])[1:, :, 0], t.size
     found = []
     for row, law in enumerate(law for law in laws for _ in z):
-        numbers = np.concatenate([q[row, : len(law.starts)], b[row, : law.columns]])
-        jacobian = np.concatenate([by_q[row, : len(law.starts)], columns[: law.columns, row]]).T
+        numbers = np.concatenate([q[row, : len(law.q)], b[row, : law.columns]])
+        jacobian = np.concatenate([by_q[row, : len(law.q)], columns[: law.columns, row]]).T
         floor = (ROUNDING * (1 + abs(z[row % lines]).max())) ** 2  # what rounding leaves
-        square, k = float(off[row] @ off[row]), law.numbers + (errors is None)
+        square = float(off[row] @ off[row])
         deviance = n * math.log(square / n + floor) if errors is None else square
-        aicc, bic = float(corrected(deviance, n, k)), deviance + k * math.log(n)
-        found.append(Found(law, numbers, np.array(jacobian), off[row] / root, errors, aicc, bic))
+        found.append(Found(law, numbers, np.array(jacobian), off[row] / root, errors, deviance, int(errors is None)))
     return found
 
 
@@ -201,6 +208,6 @@ def _parts(laws: Sequence[Law], q: Sequence[Array], t: Array) -> Array:
     found, s = np.zeros((1 + max(law.columns for law in laws), starts[-1], t.size)), (t - t[0]) / span
     for law, own, start in zip(laws, q, starts, strict=False):
         if len(own):
-            for k, part in enumerate(law.parts(own[:, : len(law.starts)].T[:, :, None], s, span)):
+            for k, part in enumerate(law.parts(own[:, : len(law.q)].T[:, :, None], s, span)):
                 found[k, start : start + len(own)] = part
     return found

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,6 +21,14 @@ Parts = Callable[[Array, Array, float], tuple[Array | float, ...]]
 same for all q, or at all points, may be less."""
 
 
+class Number(NamedTuple):
+    """One of the q: the least and largest that it may have, and values to start from."""
+
+    least: float
+    most: float
+    starts: Any
+
+
 class Law(NamedTuple):
     """One of the curves."""
 
@@ -28,10 +36,7 @@ class Law(NamedTuple):
     formula: str
     parts: Parts
     columns: int
-    starts: Sequence[Any] = ()
-    """Values of each q to start from,"""
-    limits: Sequence[tuple[float, float]] = ()
-    """and the least and largest that it may have."""
+    q: tuple[Number, ...] = ()
     exponents: tuple[str, ...] = ()
     """Names of the exponents, which are the last numbers b."""
     power: bool = True
@@ -40,7 +45,7 @@ class Law(NamedTuple):
     @property
     def numbers(self) -> int:
         """That are fitted."""
-        return len(self.starts) + self.columns
+        return len(self.q) + self.columns
 
 
 def _offset(q: Array, s: Array, span: float) -> Any:
@@ -51,6 +56,26 @@ def _offset(q: Array, s: Array, span: float) -> Any:
 def _correction(q: Array, s: Array, span: float) -> Any:
     """q: logarithm of 1 + the correction where it is largest, and how fast it fades from there."""
     return np.log(1 + np.expm1(q[0]) * np.exp(-q[1] * (s - (q[1] < 0)))), 1.0, s
+
+
+def _log_correction(q: Array, s: Array, span: float) -> Any:
+    """q: logarithm of B per window."""
+    return 0.0, 1.0, np.log1p(np.exp(q[0]) * s), s
+
+
+def _logarithm(q: Array, s: Array, span: float) -> Any:
+    """q: B per window, over what the brackets are at its middle."""
+    return np.log(1 + q[0] * (s - 0.5)), 1.0, s
+
+
+def _stretched_exponential(q: Array, s: Array, span: float) -> Any:
+    """q: b per window; the exponent is of size 1 at its large end."""
+    return 0.0, 1.0, np.exp(q[0] * (s - (q[0] > 0)))
+
+
+def _two_exponentials(q: Array, s: Array, span: float) -> Any:
+    """Two laws over x instead of ln x; among them 1/cosh(x/X)."""
+    return TWO.parts(q, np.exp(span * (s - 1)), span)
 
 
 def _three(q: Array, s: Array, span: float) -> Any:
@@ -87,15 +112,15 @@ GRID = np.sinh(np.linspace(-9.0, 9.0, 361))
 """Where slopes of bends without a closed form are integrated, in widths."""
 
 
-def _integrated(slope: Bend, least: float, most: float) -> Bend:
-    """The bend of a slope that rises from 0 to 1, as k between two values says."""
+def _integrated(slope: Bend, k_of: Number) -> Bend:
+    """The bend of a slope that rises from 0 to 1, as k says."""
 
     @functools.cache
     def surface() -> Any:
         """b - ln(1 + e^v) over asinh v and k, by trapezia of the slope, moved so that b tends to v."""
         from scipy.interpolate import CubicHermiteSpline, RectBivariateSpline
 
-        shapes, rows = np.linspace(least, most, 41), []
+        shapes, rows = np.linspace(k_of.least, k_of.most, 41), []
         for k in shapes:
             steep = slope(GRID, k)
             rise = np.append(0.0, np.cumsum(0.5 * (steep[1:] + steep[:-1]) * np.diff(GRID)))
@@ -117,15 +142,15 @@ def _stretched(v: Any, k: Any) -> Any:
     return np.exp(-np.logaddexp(0, -np.sign(v) * abs(v) ** np.exp(k)))
 
 
-PLACE, WIDTH, AT, WIDE = np.linspace(0.1, 0.9, 7), np.log((0.01, 0.04, 0.12, 0.3)), (-1.0, 2.0), (-7.0, 1.0)
-FADES, POWER = (-12.0, -6.0, -2.5, 2.5, 6.0, 12.0), (-60.0, 60.0)
-SKEW, FADING = (-2.5, 2.5), (-1.2, 0.8)
+PLACE = Number(-1.0, 2.0, np.linspace(0.1, 0.9, 7))
+WIDTH = Number(-7.0, 1.0, np.log((0.01, 0.04, 0.12, 0.3)))
+POWER = Number(-60.0, 60.0, (-12.0, -6.0, -2.5, 2.5, 6.0, 12.0))
+SKEW, WIDTHS, FADING = Number(-2.5, 2.5, [0.0]), Number(-2.0, 2.0, [0.0]), Number(-1.2, 0.8, [0.0])
 
 
-def _two(name: str, formula: str, bend: Bend, *shape: tuple[float, float]) -> Law:
-    """Two power laws with a bend, whose shape has these limits."""
-    starts = (PLACE, WIDTH, (0.0,))
-    return Law(name, formula, _bent(bend), 3, starts[: 2 + len(shape)], (AT, WIDE, *shape), ("p low", "p high"))
+def _two(name: str, formula: str, bend: Bend, *shape: Number) -> Law:
+    """Two power laws with a bend."""
+    return Law(name, formula, _bent(bend), 3, (PLACE, WIDTH, *shape), ("p low", "p high"))
 
 
 ONE = Law("one law", "A x^p", lambda q, s, span: (0.0, 1.0, s), 2, exponents=("p",))
@@ -133,75 +158,25 @@ TWO = _two("two laws", "bend fading exponentially", lambda v, k: np.logaddexp(0,
 BENDS = (
     TWO,
     _two("two laws, hyperbola", "bend fading as 1/ln x", lambda v, k: 0.5 * (v + np.hypot(v, 1))),
-    _two("two laws, asymmetric bend", "fading faster on one side", _integrated(_powered, *SKEW), SKEW),
-    _two("two laws, two widths", "one width below, another above", _uneven, (-2.0, 2.0)),
-    _two("two laws, stretched bend", "fading as exp(-(ln x)^b)", _integrated(_stretched, *FADING), FADING),
+    _two("two laws, asymmetric bend", "fading faster on one side", _integrated(_powered, SKEW), SKEW),
+    _two("two laws, two widths", "one width below, another above", _uneven, WIDTHS),
+    _two("two laws, stretched bend", "fading as exp(-(ln x)^b)", _integrated(_stretched, FADING), FADING),
 )
-THREE = Law(
-    "three laws",
-    "two bends of one width",
-    _three,
-    columns=4,
-    starts=((0.15, 0.3, 0.45, 0.6), np.log((0.2, 0.35, 0.5)), WIDTH[:3]),
-    limits=((0.02, 0.9), (-2.5, 0.0), WIDE),
-    exponents=("p low", "p middle", "p high"),
+SECOND = Number(0.02, 0.9, (0.15, 0.3, 0.45, 0.6)), Number(-2.5, 0.0, np.log((0.2, 0.35, 0.5)))
+THREE_Q = (*SECOND, WIDTH._replace(starts=WIDTH.starts[:3]))
+THREE = Law("three laws", "two bends of one width", _three, 4, THREE_Q, ("p low", "p middle", "p high"))
+OFFSET = Law("offset", "A x^p + C", _offset, 1, (POWER, Number(-1.57, 1.57, (-1.2, -0.3, 0.1, 0.8, 1.4))))
+CORRECTION_Q = Number(-30.0, 60.0, (-2.5, -0.7, -0.1, 0.1, 0.7, 2.5, 6.0)), POWER._replace(least=-80.0, most=80.0)
+CORRECTION = Law("correction to scaling", "A x^p (1 + B x^-D)", _correction, 2, CORRECTION_Q, ("p",))
+LOG_Q = (Number(-3.0, 8.0, (-1.0, 1.0, 3.0, 5.0)),)
+LOG_CORRECTION = Law("logarithmic correction", "A x^p (1 + B ln(x/x0))^c", _log_correction, 3, LOG_Q, ("p",))
+LOGARITHM = Number(-2 + 1e-9, 2 - 1e-9, (-1.9, -1.5, -0.5, 0.5, 1.5, 1.9))
+OTHER_FUNCTIONS = (
+    Law("logarithm", "A x^p (1 + B ln x)", _logarithm, 2, (LOGARITHM,), ("p",), power=False),
+    Law("exponential", "A exp(-x/X)", lambda q, s, span: (0.0, 1.0, np.exp(span * (s - 1))), 2, power=False),
+    Law("stretched exponential", "A exp(-(x/X)^b)", _stretched_exponential, 2, (POWER,), power=False),
+    Law("cut-off", "A exp(-x/X) x^p", lambda q, s, span: (0.0, 1.0, np.exp(span * (s - 1)), s), 3, (), ("p",), False),
+    Law("lognormal", "A exp(-B ln(x/X)^2)", lambda q, s, span: (0.0, 1.0, s, s**2), 3, power=False),
+    Law("two exponentials", "A exp(-x/X), with a bend to exp(-x/Y)", _two_exponentials, 3, TWO.q, power=False),
 )
-OFFSET = Law("offset", "A x^p + C", _offset, 1, (FADES, (-1.2, -0.3, 0.1, 0.8, 1.4)), (POWER, (-1.57, 1.57)))
-CORRECTION = Law(
-    "correction to scaling",
-    "A x^p (1 + B x^-D)",
-    _correction,
-    columns=2,
-    starts=((-2.5, -0.7, -0.1, 0.1, 0.7, 2.5, 6.0), FADES),
-    limits=((-30.0, 60.0), (-80.0, 80.0)),
-    exponents=("p",),
-)
-LOG_CORRECTION = Law(  # q: logarithm of B per window
-    "logarithmic correction",
-    "A x^p (1 + B ln(x/x0))^c",
-    lambda q, s, span: (0.0, 1.0, np.log1p(np.exp(q[0]) * s), s),
-    columns=3,
-    starts=((-1.0, 1.0, 3.0, 5.0),),
-    limits=((-3.0, 8.0),),
-    exponents=("p",),
-)
-LOGARITHM = Law(
-    "logarithm",
-    "A x^p (1 + B ln x)",
-    lambda q, s, span: (np.log(1 + q[0] * (s - 0.5)), 1.0, s),
-    columns=2,
-    starts=((-1.9, -1.5, -0.5, 0.5, 1.5, 1.9),),
-    limits=((-2 + 1e-9, 2 - 1e-9),),
-    exponents=("p",),
-    power=False,
-)
-STRETCHED = Law(  # q: power per window; the exponent is of size 1 at its large end
-    "stretched exponential",
-    "A exp(-(x/X)^b)",
-    lambda q, s, span: (0.0, 1.0, np.exp(q[0] * (s - (q[0] > 0)))),
-    columns=2,
-    starts=(FADES,),
-    limits=(POWER,),
-    power=False,
-)
-EXPONENTIAL = Law("exponential", "A exp(-x/X)", lambda q, s, span: (0.0, 1.0, np.exp(span * (s - 1))), 2, power=False)
-CUT_OFF = Law(
-    "cut-off",
-    "A exp(-x/X) x^p",
-    lambda q, s, span: (0.0, 1.0, np.exp(span * (s - 1)), s),
-    columns=3,
-    exponents=("p",),
-    power=False,
-)
-LOGNORMAL = Law("lognormal", "A exp(-B ln(x/X)^2)", lambda q, s, span: (0.0, 1.0, s, s**2), 3, power=False)
-TWO_EXPONENTIALS = Law(  # (1) of two laws over x instead of ln x; among them 1/cosh(x/X)
-    "two exponentials",
-    "A exp(-x/X), with a bend to exp(-x/Y)",
-    lambda q, s, span: TWO.parts(q, np.exp(span * (s - 1)), span),
-    columns=3,
-    starts=TWO.starts,
-    limits=TWO.limits,
-    power=False,
-)
-OTHER_FUNCTIONS = (LOGARITHM, EXPONENTIAL, STRETCHED, CUT_OFF, LOGNORMAL, TWO_EXPONENTIALS)
 LAWS = (ONE, *OTHER_FUNCTIONS, OFFSET, CORRECTION, *BENDS, THREE)

@@ -146,7 +146,7 @@ def _one(t: Array, z: Array, tried: dict[str, Found], confidence: float, noise: 
 
     def ends(found: Found) -> tuple[Array, float]:
         """Of the intervals of both exponents and of ln of where they meet, (2, 3); AICc."""
-        q = len(found.law.starts)
+        q = len(found.law.q)
         of, aicc = found.interval(t, [q + 1, q + 2, 0], word, confidence)
         return of * [1 / span, 1 / span, span] + [0.0, 0.0, t[0]], aicc
 
