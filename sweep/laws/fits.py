@@ -81,7 +81,7 @@ class Found(NamedTuple):
         return bool(columns.size and regress(t, every, self.off[None], noise, columns.shape[1], self.sigma).denied[0])
 
 
-DAMPINGS = 10.0 ** np.array([-7.0, -4.0, -3.0, -2.0, -1.5, -1.0, -0.5, 0.0, 1.0, 3.0])
+DAMPINGS = 10.0 ** np.array([-7.0, -3.0, -2.0, -1.0, 0.0, 1.0, 3.0])
 """Of a Gauss-Newton step, all of which are tried at once; the best is taken."""
 STEP, STEPS = 1e-6, 30
 """Of numerical derivatives by q; Gauss-Newton steps at most."""

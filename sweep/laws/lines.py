@@ -83,8 +83,7 @@ def fit_exponent(
     Parameters
     ----------
     y : DataArray
-        Any shape; missing points, and those whose sigma is NaN, are left out. A line with a value that is not positive
-        has no exponent; its `kind` says so.
+        Any shape; missing points are left out. The `kind` of a line with a value that is not positive says so.
     dim : str
         Dimension of `y`, or 1-D coordinate along one; positive and monotone. Equal values are repeated measurements.
     window : (low, high), optional
