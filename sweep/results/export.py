@@ -82,7 +82,7 @@ def export(
     try:
         with disk.replacing(target) as part:
             history = [text for text in str(dataset.attrs.get("history", "")).splitlines() if text != EXPORTED]
-            whole = _in_float32(dataset) if float32 else dataset
+            whole = _in_float32(dataset) if float32 else dataset if kind in PACKED else flat(dataset)
             whole = whole.assign_attrs(history="\n".join([*history, EXPORTED]))
             WRITERS[kind](whole, part, **({"compress": True} if compress else {}))
     except ImportError as error:
@@ -113,14 +113,13 @@ def _in_float32(dataset: xr.Dataset) -> xr.Dataset:
 def _write_csv(dataset: xr.Dataset, path: Path) -> None:
     with path.open("w", newline="", encoding="utf-8") as file:
         file.write(f"# {EXPORTED}\n")
-        whole = flat(dataset)
-        for name, variable in (*whole.coords.items(), *whole.data_vars.items()):
+        for name, variable in (*dataset.coords.items(), *dataset.data_vars.items()):
             unit = f" [{variable.attrs['units']}]" if "units" in variable.attrs else ""
             # a quotation mark could open a quoted field that swallows the lines below
             about = " ".join(str(variable.attrs.get("long_name", "")).replace('"', "'").split())
             file.write(f"# {' '.join(f'{name}{unit}'.split())}{': ' + about if about else ''}\n")
         writer = csv.writer(file, lineterminator="\n")  # faster than that of pandas
-        writer.writerow(map(cell, (*whole.coords, *whole.data_vars)))
+        writer.writerow(map(cell, (*dataset.coords, *dataset.data_vars)))
         for table in _tables(dataset):
             columns = [c.tolist() if c.dtype.kind in "fiu" else map(cell, c) for _, c in table.items()]
             writer.writerows(zip(*columns, strict=True))
@@ -134,12 +133,12 @@ def _write_parquet(dataset: xr.Dataset, path: Path) -> None:
         """As parquet wants attributes; flags are words in a table."""
         return {str(name): str(value) for name, value in attrs.items() if name not in ("flag_values", "flag_meanings")}
 
-    variables, schema = flat(dataset).variables, None
+    schema = None
     with contextlib.ExitStack() as stack:
         for table in _tables(dataset):
             arrays = {str(name): pa.array(column.to_numpy()) for name, column in table.items()}
             if schema is None:
-                fields = [pa.field(name, a.type, metadata=text(variables[name].attrs)) for name, a in arrays.items()]
+                fields = [pa.field(name, a.type, metadata=text(dataset[name].attrs)) for name, a in arrays.items()]
                 schema = pa.schema(fields, metadata=text(dataset.attrs))
                 writer = stack.enter_context(pq.ParquetWriter(path, schema))
             writer.write_table(pa.table(list(arrays.values()), schema=schema))
@@ -147,7 +146,6 @@ def _write_parquet(dataset: xr.Dataset, path: Path) -> None:
 
 def _tables(dataset: xr.Dataset) -> Iterator[Any]:
     """pandas tables of at most about `ROWS` rows: one for each cell, and place of a trace; flags as words."""
-    dataset = flat(dataset)
     dims = list(dict.fromkeys((*(dataset["status"].dims if "status" in dataset else ()), *dataset.sizes)))
     for block in pieces(dataset, dims, ROWS * len(dataset.variables)):
         # a dataset of no dimension has one row
@@ -182,26 +180,24 @@ def flat(dataset: xr.Dataset) -> xr.Dataset:
     """
     if not is_summary(dataset):
         return dataset
-    found = {name: column for name, variable in dataset.data_vars.items() for name, column in _flat_columns(variable)}
+    found = dict[str, xr.DataArray]()
+    for name, variable in dataset.data_vars.items():
+        last = str(variable.dims[-1]) if variable.dims else ""
+        if name in (BY_STATUS, BY_METHOD):
+            for word in variable[last].values:
+                if (column := variable.sel({last: word})).any():
+                    found[f"cells_{word}"] = column.assign_attrs(long_name=f"cells: {word}")
+        elif f"{last}_lower" in variable.coords:
+            for place in range(variable.sizes[last]):
+                column = variable.isel({last: place})
+                ends = " to ".join(f"{column[f'{last}_{end}'].item():g}" for end in ("lower", "upper"))
+                text = f"{ends}: {variable.attrs['long_name']}"
+                found[f"{name}_{place + 1}"] = column.assign_attrs(long_name=text)
+        else:
+            found[str(name)] = variable
     dims = {dim for column in found.values() for dim in column.dims}
     kept = {name: c for name, c in dataset.coords.items() if set(c.dims) <= dims}
     return xr.Dataset({name: column.drop_vars(column.coords) for name, column in found.items()}, kept, dataset.attrs)
-
-
-def _flat_columns(variable: xr.DataArray) -> Iterator[tuple[str, xr.DataArray]]:
-    name, last = str(variable.name), str(variable.dims[-1]) if variable.dims else ""
-    if name in (BY_STATUS, BY_METHOD):
-        for word in variable[last].values:
-            column = variable.sel({last: word})
-            if column.any():
-                yield f"cells_{word}", column.assign_attrs(long_name=f"cells: {word}")
-    elif f"{last}_lower" in variable.coords:
-        for place in range(variable.sizes[last]):
-            column = variable.isel({last: place})
-            ends = " to ".join(f"{column[f'{last}_{end}'].item():g}" for end in ("lower", "upper"))
-            yield f"{name}_{place + 1}", column.assign_attrs(long_name=f"{ends}: {variable.attrs['long_name']}")
-    else:
-        yield name, variable
 
 
 def _write_netcdf(dataset: xr.Dataset, path: Path, compress: bool = False) -> None:
