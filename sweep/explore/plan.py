@@ -42,7 +42,7 @@ LOOK_SECONDS, SHARE = 1.0, 0.25
 """or as many as can be in this time, or this share of the run. So long may looking for superfluous axes take, too."""
 ADVICE_CELLS, ADVICE_SECONDS = 300, 0.1
 """Cells that are solved for it at least, about; and what it may always take."""
-NO_ADVICE = "superfluous axes are not looked for, which may take as long as the run, or crash; sweep.scaling(study) does"
+NO_ADVICE = "superfluous axes are not looked for, which may take as long or fail; sweep.scaling(study) does"
 RUN_SECONDS = 0.15
 """What any run to a file takes beside its cells: opening, a sample, the end."""
 

@@ -141,8 +141,7 @@ def work_precision(
         part = _without_failing(part, ["auto", *able], cell_timeout, note)
     against = _given(part, truth) if truth is not None else _best(part, [reference] if reference else able)
     found = _chart(part, names, tolerances, against)
-    missing = [] if methods is not None else _missing(part, able)
-    return found.assign_attrs(omissions="; ".join([*missing, *_omissions(found)]))
+    return found.assign_attrs(omissions="; ".join(_omissions(found, part, able if methods is None else None)))
 
 
 def _chart(study: Study, names: Sequence[str], tolerances: Sequence[float], against: _Reference) -> xr.Dataset:
@@ -175,17 +174,6 @@ def _require(names: Sequence[str], reference: str | None, able: Sequence[str]) -
         if name not in able and (name != "auto" or name == reference):
             hint = did_you_mean(name, able) or f"; there are auto, {', '.join(able)}"
             raise SweepError(f"no method {name} that can do this study{hint}")
-
-
-def _missing(study: Study, able: Sequence[str]) -> list[str]:
-    """Which methods cannot do a study, and why."""
-    found = []
-    for method in study.kernel.methods:
-        if method.name not in able:
-            terms = [name for name in method.excludes if name in study.terms]
-            lacks = [name for name in method.lacks if name in study.outputs]
-            found.append(f"{method.name} {'cannot do' if terms else 'does not give'} {', '.join(terms or lacks)}")
-    return found
 
 
 def _without_failing(
@@ -232,9 +220,14 @@ def precision_text(found: xr.Dataset, complete: bool = False) -> str:
     return page(Table(rows, columns).text(wide=complete), paragraph(basis), paragraph(left_out))
 
 
-def _omissions(found: xr.Dataset) -> list[str]:
-    """What fails where, in words."""
+def _omissions(found: xr.Dataset, study: Study, able: Sequence[str] | None) -> list[str]:
+    """What fails where, in words; and first, if those that are `able` were charted, why others cannot do the study."""
     lines, faults = [], (("unsolved", "does not solve", "unsolved_as"), ("silent", "is silently wrong in", "silent_at"))
+    for method in study.kernel.methods:
+        if able is not None and method.name not in able:
+            terms = [name for name in method.excludes if name in study.terms]
+            lacks = [name for name in method.lacks if name in study.outputs]
+            lines.append(f"{method.name} {'cannot do' if terms else 'does not give'} {', '.join(terms or lacks)}")
     for name, (key, verb, where) in itertools.product(found["method"].values, faults):
         row = found.sel({"method": name})
         if row[key].any():
