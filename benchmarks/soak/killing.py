@@ -26,7 +26,7 @@ import sweep
 from sweep.file import disk
 from sweep.file.open import open_result
 from sweep.file.reading import StoredFile
-from sweep.file.store import Store, unfinished_of
+from sweep.file.store import Store, lock_of, unfinished_of
 from sweep.file.verify import verify
 from sweep.runs.run import run
 
@@ -55,7 +55,10 @@ def base_of(output):
 def perform(kind, output, workers, cells, cluster=None):
     """A run of some kind to its end."""
     keys = {"workers": workers, "progress": False, "block_cells": cells}
-    if kind == "refine":
+    if kind == "refine" and output.exists():  # killed at its very end; a second call would be told that it is there
+        shutil.rmtree(output.with_name(f"{output.name}.rounds"), ignore_errors=True)
+        lock_of(output).unlink(missing_ok=True)
+    elif kind == "refine":
         with open_result(base_of(output)) as found:
             sweep.refine(found, "fall_time", 1e-2, path=output, study=few(), workers=workers)
     elif kind == "summary":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,13 @@ import xarray as xr
 from xarray.backends import BackendArray, BackendEntrypoint
 from xarray.core import indexing
 
+from sweep.cells.partition import row_blocks
+from sweep.cells.reduce import gathered, output_schema, pending
+from sweep.errors import SweepError
+from sweep.file.open import in_memory
 from sweep.file.reading import Numbers, StoredFile
+from sweep.file.store import unfinished_of
+from sweep.study.model import Study
 
 
 class Column(BackendArray):
@@ -25,12 +32,21 @@ class Column(BackendArray):
 
 
 class Result(BackendEntrypoint):
-    """A result as xarray opens it."""
+    """A result as xarray opens it, finished or not, the latter unless it is to be `strict`."""
 
-    def open_dataset(self, filename_or_obj: Any, *, drop_variables: Any = None) -> xr.Dataset:
-        """Raises SweepError when damaged numbers are read; OSError, ValueError and their like at once."""
+    def open_dataset(self, filename_or_obj: Any, *, drop_variables: Any = None, strict: bool = False) -> xr.Dataset:
+        """Raises SweepError when damaged numbers are read, one of DAMAGE at once."""
         path = Path(filename_or_obj)
         file, columns = StoredFile(path), {}
+        if not file.ending:
+            if path.suffix != unfinished_of(path).suffix:
+                raise OSError("what was written at its end is damaged")
+            if strict:
+                done = file.tables[file.work].done
+                left = f"{int((~done).sum())} of {done.size} blocks are missing"
+                raise SweepError(f"{path}: unfinished, {left}; run its sweep again to continue")
+            if file.work == "rows":
+                return _of_rows(file)
         for name, numbers in file.columns().items():
             chunks = dict(zip(numbers.dims, (*numbers.table.box, *numbers.own), strict=True))
             lazy = indexing.LazilyIndexedArray(Column(numbers))
@@ -39,3 +55,15 @@ class Result(BackendEntrypoint):
         found.encoding["source"] = str(path)
         found.set_close(file.close)
         return found
+
+
+def _of_rows(file: StoredFile) -> xr.Dataset:
+    """The Dataset of an unfinished summary: of the rows that are there."""
+    study = Study.from_json(file.attrs["study_json"], declared=True)
+    rows, table = pending(study, 0, row_blocks(study).count), file.tables["rows"]
+    for block in filter(table.is_sound, range(table.blocks.count)):
+        cells = slice(*table.blocks.bounds(block))
+        for column in table.columns:
+            rows[column.name][cells] = column[cells]
+    plan = output_schema(study, file.fingerprint)
+    return in_memory(replace(plan, attrs={**plan.attrs, **file.attrs}), gathered(study, rows))

@@ -41,13 +41,10 @@ COMPACT = 1 << 15
 """Attributes up to which HDF5 keeps them in an object header."""
 LONG = 1 << 12
 """Bytes of a coordinate to which the study in the file refers, so that its text fits into an object header."""
+PIECE = 1 << 20
+"""Bytes of short chunks that are written at a time."""
 WRONG = b"\xff" * 4
 """A checksum that zeros have not."""
-LONG_NAMES = {
-    "key": "xxh3_128 of all that stands before it in the file",
-    "ending": "when the run ended, and how fast it was: JSON, and its xxh3_128 digest",
-    "digests": "xxh3_128 of each chunk of each column, zeros where it is not computed yet",
-}
 
 
 @dataclass(frozen=True)
@@ -100,7 +97,7 @@ def _attrs(schema: Schema) -> dict[str, Any]:
     return {**schema.attrs, "study_json": study}
 
 
-def create(path: Path, schema: Schema, cuts: Mapping[str, Cut], shared: bool = False) -> None:
+def create(path: Path, schema: Schema, cuts: Mapping[str, Cut], shared: bool = False) -> StoredFile:
     """Makes a result of which nothing is computed yet, with room on the disk for all of it.
 
     Parameters
@@ -123,18 +120,26 @@ def create(path: Path, schema: Schema, cuts: Mapping[str, Cut], shared: bool = F
         disk.reserve(fd, image.size)
         for at, page in image.pages.items():
             disk.write_all(fd, (page[: image.size - at],), at)
-        with StoredFile(path) as file:
-            for column in (column for table in file.tables.values() for column in table.columns if column.check):
-                pending = WRONG
-                if column.name == STATUS:
-                    pending = bytes([Status.PENDING]) * column.size
-                    pending += checksum(pending, column.size)
-                for at in column.at.tolist():
-                    disk.write_all(fd, (pending,), at + column.size + column.check - len(pending))
-            disk.write_all(fd, (digest_before(fd, file.key_at),), file.key_at)
+        file = StoredFile(path)
+        for column in (column for table in file.tables.values() for column in table.columns if column.check):
+            size, pending = column.size + column.check, WRONG
+            if column.name == STATUS:
+                pending = bytes([Status.PENDING]) * column.size
+                pending += checksum(pending, column.size)
+            elif size < PAGE:
+                pending = bytes(column.size) + WRONG
+            # short chunks behind each other at once
+            some = max(1, PIECE // size) if len(pending) == size else 1
+            for chunks in np.split(column.at, np.flatnonzero(np.diff(column.at) != size) + 1):
+                for at in chunks[::some].tolist():
+                    count = min(some, (int(chunks[-1]) - at) // size + 1)
+                    disk.write_all(fd, (pending * count,), at + size - len(pending))
+        file.key = digest_before(fd, file.key_at)
+        disk.write_all(fd, (file.key,), file.key_at)
         disk.fsync(fd)
     finally:
         os.close(fd)
+    return file
 
 
 class _Image(disk.Raw):
@@ -159,7 +164,7 @@ class _Image(disk.Raw):
 
     def write(self, piece: Any) -> int:
         # HDF5 writes nothing else of a chunk's length that begins with zeros: its tables begin with addresses
-        if len(piece) == self.chunk and not any(piece[:BYTES]):
+        if len(piece) == self.chunk and bytes(piece[:BYTES]) == bytes(BYTES):
             self.at += len(piece)
         else:
             for page, here, there in self._pieces(len(piece)):
@@ -218,12 +223,10 @@ def _lay_out(image: _Image, schema: Schema, cuts: Mapping[str, Cut], aligned: in
         _say(integrity, {"format": FORMAT, "contents": json.dumps({"tables": tables, "dims": dims})})
         shapes: dict[str, tuple[int, ...]] = {"key": (BYTES,), "ending": (ENDING_BYTES,)}
         shapes |= {f"{name}_digests": (cut.blocks.count, len(cut.columns), BYTES) for name, cut in cuts.items()}
-        made_of = {name: integrity.create_dataset(name, shape, "u1", dcpl=_how(None)) for name, shape in shapes.items()}
-        for name, data in made_of.items():
-            _say(data, {"long_name": LONG_NAMES.get(name, LONG_NAMES["digests"])})
+        pieces = [integrity.create_dataset(name, shape, "u1") for name, shape in shapes.items()]
         # from here on nothing is made, and places alone are found, that of the key first
         plain.flush()
-        for data in made_of.values():
+        for data in pieces:
             data[...] = np.zeros(data.shape, "u1")
         for path in (path for table in tables.values() for path in table["paths"]):
             data = plain[path]
@@ -256,23 +259,22 @@ def _write_coordinate(file: Any, plain: Any, coordinate: Any) -> None:
     _say(single, attrs)
 
 
-def _how(chunk: tuple[int, ...] | None) -> Any:
-    """How HDF5 makes a dataset: in chunks with a checksum; (): in its object header; None: in one piece, without.
+def _how(chunk: tuple[int, ...]) -> Any:
+    """How HDF5 makes a dataset: in chunks with a checksum; (): in its object header.
 
-    An output that is a single number is in one piece in any case: h5py gives it no properties.
+    An output that is a single number is in one piece: h5py gives it no properties.
     """
     from h5py import h5d, h5p
 
     how = h5p.create(h5p.DATASET_CREATE)
     how.set_attr_phase_change(COMPACT, 0)
-    how.set_fill_time(h5d.FILL_TIME_NEVER)
-    if chunk == ():
-        how.set_layout(h5d.COMPACT)
-        return how
-    how.set_alloc_time(h5d.ALLOC_TIME_LATE)
     if chunk:
         how.set_chunk(chunk)
         how.set_fletcher32()
+        how.set_fill_time(h5d.FILL_TIME_NEVER)
+        how.set_alloc_time(h5d.ALLOC_TIME_LATE)
+    else:
+        how.set_layout(h5d.COMPACT)
     return how
 
 

@@ -6,17 +6,13 @@ import contextlib
 import errno
 import os
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sweep.cells.partition import row_blocks
-from sweep.cells.reduce import gathered, output_schema, pending
 from sweep.cells.schema import Schema
 from sweep.errors import SweepError
 from sweep.file.reading import DAMAGE, StoredFile
 from sweep.file.store import unfinished_of
-from sweep.study.model import Study
 from sweep.words import as_path
 
 if TYPE_CHECKING:
@@ -76,36 +72,13 @@ def _open(place: Path, strict: bool = False, chunks: Any = None) -> xr.Dataset:
     from sweep.file.columns import Result
 
     try:
-        large = place.stat().st_size > MEMORY_SHARE * memory()
-        with StoredFile(place) as file:
-            if not file.ending:
-                if place.suffix != unfinished_of(place).suffix:
-                    raise OSError("what was written at its end is damaged")
-                done = file.tables[file.work].done
-                left = int((~done).sum())
-                missing = f"{left} of {done.size} blocks are missing" if left else "all is computed but not checked yet"
-                if strict:
-                    raise SweepError(f"{place}: unfinished, {missing}; run its sweep again to continue")
-                if file.work == "rows":
-                    rows = _of_rows(file)
-                    return rows if chunks is None else rows.chunk(chunks)
-        return xr.open_dataset(os.fspath(place), engine=Result, chunks="auto" if large and chunks is None else chunks)
+        if chunks is None and place.stat().st_size > MEMORY_SHARE * memory():
+            chunks = "auto"
+        return xr.open_dataset(os.fspath(place), engine=Result, chunks=chunks, strict=strict)
     except (FileNotFoundError, NotADirectoryError):
         raise
     except DAMAGE as fault:
         raise unreadable(place, fault) from None
-
-
-def _of_rows(file: StoredFile) -> xr.Dataset:
-    """The Dataset of an unfinished summary: of the rows that are there."""
-    study = Study.from_json(file.attrs["study_json"], declared=True)
-    rows, table = pending(study, 0, row_blocks(study).count), file.tables["rows"]
-    for block in filter(table.is_sound, range(table.blocks.count)):
-        cells = slice(*table.blocks.bounds(block))
-        for column in table.columns:
-            rows[column.name][cells] = column[cells]
-    plan = output_schema(study, file.fingerprint)
-    return in_memory(replace(plan, attrs={**plan.attrs, **file.attrs}), gathered(study, rows))
 
 
 def in_memory(plan: Schema, arrays: Mapping[str, Any]) -> xr.Dataset:

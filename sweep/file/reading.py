@@ -160,8 +160,8 @@ class StoredFile:
 class Table:
     """Columns that are cut alike, and the digests of their chunks.
 
-    The cells of a `grid` are cut into `blocks`; when the file was opened the `digests`, shape (blocks, columns, 16),
-    stood at `digests_at`, and `done` were those blocks that had some.
+    The cells of a `grid` are cut into `blocks`; the `digests`, shape (blocks, columns, 16), stand at `digests_at`: as
+    they were when the file was opened, and as they are written by this table.
     """
 
     def __init__(self, file: StoredFile, h5: Any, name: str, grid: list[int], blocks: list[int], paths: list[str]):
@@ -170,14 +170,18 @@ class Table:
         self.columns = tuple(Numbers(self, number, _own(h5, path)) for number, path in enumerate(paths))
         self.digests_at = _own(h5, f"integrity/{name}_digests").id.get_offset()
         self.row_bytes, shape = BYTES * len(paths), (self.blocks.count, len(paths), BYTES)
-        found = read_bytes(file.fd, self.digests_at, math.prod(shape))
-        self.digests: Any = np.frombuffer(found, "u1").reshape(shape)
-        self.done: Any = np.any(self.digests, axis=2).all(axis=1)
-        self._sound = np.zeros_like(self.done)
+        self.digests = np.empty(shape, "u1")
+        disk.read_all(file.fd, (self.digests,), self.digests_at)
+        self._sound = np.zeros(self.blocks.count, bool)
+
+    @property
+    def done(self) -> Any:
+        """Which blocks have digests: ndarray of bool."""
+        return np.any(self.digests, axis=2).all(axis=1)
 
     def is_sound(self, block: int) -> bool:
         """Whether all columns of a block are there and as they were written; looked at once."""
-        if not self._sound[block] and self.done[block]:
+        if not self._sound[block] and self.digests[block].any():
             self._sound[block] = not self.damaged([block])
         return bool(self._sound[block])
 
@@ -200,8 +204,9 @@ class Table:
         """Writes those of some blocks, neighbouring ones at once. Raises OSError."""
         for _, some in itertools.groupby(enumerate(sorted(digests)), lambda pair: pair[1] - pair[0]):
             blocks = [block for _, block in some]
-            rows = b"".join(digests[block] for block in blocks)
+            rows = np.frombuffer(b"".join(digests[block] for block in blocks), "u1")
             disk.write_all(fd, (rows,), self.digests_at + blocks[0] * self.row_bytes)
+            self.digests[blocks] = rows.reshape(len(blocks), -1, BYTES)
 
 
 class Numbers:

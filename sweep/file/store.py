@@ -89,7 +89,7 @@ class Store:
         self.output, self.path = output, unfinished_of(output)
         self.temporary = self.path.with_name(self.path.name + ".tmp")
         self.file: StoredFile | None = None
-        self._fd, self._size, self._done = -1, 0, np.zeros(0, bool)
+        self._fd, self._size = -1, 0
         self._waiting: deque[tuple[int, bytes]] = deque()
         self._synced, self._committing = time.monotonic(), threading.Lock()
         self._checked: Future[list[int]] | None = None
@@ -120,19 +120,20 @@ class Store:
         """Makes the file, with room on the disk for all of it. Raises SweepError."""
         with disk.refusing(self.path):
             try:
-                create(self.temporary, schema, cuts, shared)
+                file = create(self.temporary, schema, cuts, shared)
                 disk.rename(self.temporary, self.path)
                 disk.sync_folder(self.path.parent)
             except OSError:
                 with contextlib.suppress(OSError):
                     disk.remove(self.temporary)
                 raise
-            self._open(StoredFile(self.path))
+            file.path = self.path
+            self._open(file)
 
     def resume(self, file: StoredFile) -> None:
         """Takes up what an earlier run left, which is compared with its digests meanwhile. Raises SweepError."""
         self._open(file)
-        done = np.flatnonzero(self._done).tolist()
+        done = np.flatnonzero(self.table.done).tolist()
 
         def check() -> list[int]:
             left = itertools.takewhile(lambda block: not self._closing.is_set(), done)
@@ -143,41 +144,30 @@ class Store:
     def _open(self, file: StoredFile) -> None:
         with disk.refusing(self.path):
             self._fd = disk.open_file(self.path, os.O_RDWR)
-        self.file, self._done = file, file.tables[file.work].done.copy()
-        self._size = os.fstat(self._fd).st_size
+        self.file, self._size = file, os.fstat(self._fd).st_size
 
     def _check(self) -> None:
         """Raises Incomplete where the file is not what it was, or not where it was: not a byte of ours goes there."""
         assert self.file is not None
-        ours = os.fstat(self._fd)
-        at = self.file.key_at
-        if ours.st_size < self._size or read_bytes(self._fd, at, BYTES) != self.file.key:
-            raise Incomplete(
-                f"{self.path}: was cut or overwritten by another program while the run wrote to it, and cannot be "
-                "continued; remove it and run the same command again"
-            )
+        ours, at = os.fstat(self._fd), self.file.key_at
         try:
-            if os.path.samestat(self.path.stat(), ours):
-                return
-        except (FileNotFoundError, NotADirectoryError):
-            pass
-        except OSError:
-            return  # a network may be slow to answer
-        if not ours.st_nlink:
-            raise Incomplete(f"{self.path}: was removed while the run wrote to it; what was computed is lost")
-        raise Incomplete(
-            f"{self.path}: was moved while the run wrote to it; all blocks that were computed are kept there; move it "
-            "back, and the same command continues"
-        )
+            there = os.path.samestat(self.path.stat(), ours)
+        except OSError as fault:
+            there = not isinstance(fault, FileNotFoundError | NotADirectoryError)  # a network may be slow to answer
+        if not there or ours.st_size < self._size or read_bytes(self._fd, at, BYTES) != self.file.key:
+            raise Incomplete(
+                f"{self.path}: was moved, removed, cut or overwritten while the run wrote to it; if it was moved, move "
+                "it back, and the same command continues; else remove what is left, and begin anew"
+            )
 
     @property
     def count(self) -> int:
         """Blocks that are acknowledged."""
-        return int(self._done.sum())
+        return int(self.table.done.sum())
 
     def missing(self) -> list[int]:
         """Numbers of the blocks that are not done, ascending."""
-        return np.flatnonzero(~self._done).tolist()
+        return np.flatnonzero(~self.table.done).tolist()
 
     def put(self, index: int, arrays: Mapping[str, Any]) -> None:
         """Writes a block; it is acknowledged by `tick`, with others. Raises SweepError."""
@@ -211,13 +201,11 @@ class Store:
             if waiting:
                 disk.sync_numbers(self._fd)
                 self.table.write_digests(self._fd, waiting)
-        self._done[list(waiting)] = True
 
     def _undo(self, blocks: Iterable[int]) -> None:
         """Takes blocks out of those that are done. Raises SweepError."""
         with disk.refusing(self.path):
             self.table.write_digests(self._fd, dict.fromkeys(blocks, bytes(self.table.row_bytes)))
-        self._done[list(blocks)] = False
 
     def finish(self, texts: Mapping[str, str], gather: Gather | None) -> list[int]:
         """Puts the result in its place, if it is what was written.
@@ -238,33 +226,26 @@ class Store:
             checked, self._checked = self._checked, None
             self._undo(checked.result() if checked is not None else [])
             found = self.missing()
+            cells = self.file.tables["cells"]
             if not found and gather is not None:
-                found = self._gathered(gather)
+                found = self.table.damaged(range(self.table.blocks.count))
                 self._undo(found)
+                if not found:
+                    blocks = range(cells.blocks.count)
+                    digests = {block: cells.write(self._fd, block, gather(self.file, block)) for block in blocks}
+                    disk.sync_numbers(self._fd)
+                    cells.write_digests(self._fd, digests)
             if found:
                 return found
             disk.write_all(self._fd, (ending_text(texts),), self.file.ending_at)
             disk.fsync(self._fd)
-            with StoredFile(self.path) as file:
-                table, last = file.tables["cells"], file.tables["cells"].blocks.count - 1
-                if not file.ending or table.damaged({0, last // 2, last}):
-                    raise SweepError(
-                        f"{self.output}: differs when read back from what was written; the disk may be failing"
-                    )
+            last = cells.blocks.count - 1
+            if cells.damaged({0, last // 2, last}):
+                raise SweepError(
+                    f"{self.output}: differs when read back from what was written; the disk may be failing"
+                )
             disk.rename(self.path, self.output)
             disk.sync_folder(self.output.parent)
-        return []
-
-    def _gathered(self, gather: Gather) -> list[int]:
-        """Writes the columns of a summary; gives the blocks of rows that turned out to be damaged, where some did."""
-        with StoredFile(self.path) as file:
-            found = file.tables["rows"].damaged(range(self.table.blocks.count))
-            if found:
-                return found
-            table = file.tables["cells"]
-            digests = {block: table.write(self._fd, block, gather(file, block)) for block in range(table.blocks.count)}
-            disk.sync_numbers(self._fd)
-            table.write_digests(self._fd, digests)
         return []
 
     def reopen(self, damaged: Iterable[int]) -> None:
@@ -275,6 +256,7 @@ class Store:
             file = self.found()
             assert file is not None
             self._open(file)
+            file.ending = {}
             disk.write_all(self._fd, (ending_text({}),), file.ending_at)
             self._undo(damaged)
 
