@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +10,8 @@ from xarray.backends import BackendArray, BackendEntrypoint
 from xarray.core import indexing
 
 from sweep.cells.partition import row_blocks
-from sweep.cells.reduce import gathered, output_schema, pending
+from sweep.cells.reduce import gathered, pending
 from sweep.errors import SweepError
-from sweep.file.open import in_memory
 from sweep.file.reading import Numbers, StoredFile
 from sweep.file.store import unfinished_of
 from sweep.study.model import Study
@@ -45,25 +43,26 @@ class Result(BackendEntrypoint):
                 done = file.tables[file.work].done
                 left = f"{int((~done).sum())} of {done.size} blocks are missing"
                 raise SweepError(f"{path}: unfinished, {left}; run its sweep again to continue")
-            if file.work == "rows":
-                return _of_rows(file)
-        for name, numbers in file.columns().items():
+        for name, numbers in file.columns().items() if file.ending or file.work == "cells" else ():
             chunks = dict(zip(numbers.dims, (*numbers.table.box, *numbers.own), strict=True))
             lazy = indexing.LazilyIndexedArray(Column(numbers))
             columns[name] = xr.Variable(numbers.dims, lazy, dict(numbers.attrs), {"preferred_chunks": chunks})
+        columns = columns or _of_rows(file)
         found = xr.Dataset(columns, {name: (c.dims, c.values, c.attrs) for name, c in file.coords.items()}, file.attrs)
         found.encoding["source"] = str(path)
         found.set_close(file.close)
         return found
 
 
-def _of_rows(file: StoredFile) -> xr.Dataset:
-    """The Dataset of an unfinished summary: of the rows that are there."""
+def _of_rows(file: StoredFile) -> dict[str, xr.Variable]:
+    """The columns of an unfinished summary: of the rows that are there."""
     study = Study.from_json(file.attrs["study_json"], declared=True)
     rows, table = pending(study, 0, row_blocks(study).count), file.tables["rows"]
     for block in filter(table.is_sound, range(table.blocks.count)):
         cells = slice(*table.blocks.bounds(block))
         for column in table.columns:
             rows[column.name][cells] = column[cells]
-    plan = output_schema(study, file.fingerprint)
-    return in_memory(replace(plan, attrs={**plan.attrs, **file.attrs}), gathered(study, rows))
+    arrays = gathered(study, rows)
+    return {
+        c.name: xr.Variable(c.dims, arrays[c.name].reshape(c.shape), dict(c.attrs)) for c in file.columns().values()
+    }
