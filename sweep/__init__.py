@@ -55,7 +55,7 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module 'sweep' has no attribute {name!r}")
     if name not in _WITHOUT_DATASETS:
         import_module("sweep.show.accessor")
-    # what a notebook shows of a study needs to know what a run takes, which is above the study
+    # what a notebook shows of a study needs to know its cells, which is above the study
     import_module("sweep.study.model").Study._repr_html_ = lambda study: import_module(
         "sweep.show.notebook"
     ).study_html(study)
