@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Callable
 from typing import Any
@@ -14,7 +13,7 @@ from numpy.typing import NDArray
 from sweep.errors import SweepError
 from sweep.laws.loglog import EPSILON, FEWEST, Array, alike
 from sweep.laws.noise import NOISES
-from sweep.words import kind
+from sweep.words import did_you_mean, kind
 
 Window = tuple[float | None, float | None]
 
@@ -63,11 +62,10 @@ def positive_axis(y: xr.DataArray, dim: str, repeated: bool = False) -> tuple[st
     check_output(y)
     known = [str(name) for name, coordinate in y.coords.items() if coordinate.ndim == 1]
     if dim not in known:
-        there = f"{title(y)} runs along {', '.join(known)}" if known else f"{title(y)} runs along no axis with values"
+        there = f"; {title(y)} runs along {', '.join(known) or 'no axis with values'}"
         if dim in y.coords:
-            raise SweepError(f"{dim} has one value here, so nothing can be fitted along it; {there}")
-        close = difflib.get_close_matches(str(dim), known, 1)
-        raise SweepError(f"{title(y)} has no axis {dim!r}; " + (f"did you mean {close[0]}?" if close else there))
+            raise SweepError(f"{dim} has one value here, so nothing can be fitted along it{there}")
+        raise SweepError(f"{title(y)} has no axis {dim!r}" + (did_you_mean(dim, known) or there))
     values = y.coords[dim].values
     if values.dtype.kind in "mM":
         times = f"{dim} - {dim}[0]" if values.dtype.kind == "M" else dim
@@ -187,13 +185,10 @@ def like(given: Any, y: xr.DataArray, what: str) -> xr.DataArray:
     """A number or DataArray as one of the shape of y. Raises SweepError where it is negative or does not fit."""
     try:
         found: xr.DataArray = xr.zeros_like(y, dtype=np.float64) + given
-        fits = found.dims == y.dims and found.shape == y.shape
     except (TypeError, ValueError):
-        fits = False
-    if not fits:
-        raise SweepError(
-            f"{what}: expected a number, or an array along axes of {title(y)}; found {type(given).__name__}"
-        )
+        found = xr.DataArray(math.nan)
+    if found.dims != y.dims or found.shape != y.shape:
+        raise SweepError(f"{what}: expected a number, or an array along axes of {title(y)}; found {kind(given)}")
     if bool((found < 0).any()):
         raise SweepError(f"{what}: errors are not negative; found {float(found.min()):g}")
     return found

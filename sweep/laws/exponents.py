@@ -227,24 +227,16 @@ def contours(field: xr.DataArray, levels: Sequence[float]) -> xr.Dataset:
         import contourpy
     except ImportError:
         raise missing("lines on maps need contourpy", "plot") from None
-    down, across = map(str, field.dims)
-    values = [field[name].values for name in (across, down)]
-    logarithmic = [is_logarithmic(grid) for grid in values]
-    x, y = (np.log(g) if take else g.astype(np.float64) for g, take in zip(values, logarithmic, strict=True))
+    names = [str(field.dims[1]), str(field.dims[0])]  # across, down
+    logarithmic = [is_logarithmic(field[name].values) for name in names]
+    x, y = (np.log(field[n].values) if take else field[n].values for n, take in zip(names, logarithmic, strict=True))
     generator = contourpy.contour_generator(x, y, np.ma.masked_invalid(field.values.astype(np.float64)))
     lines = [(level, np.array(line)) for level in levels for line in generator.lines(float(level))]
-    points = np.concatenate([line for _, line in lines]) if lines else np.empty((0, 2))
+    points = np.concatenate([np.empty((0, 2)), *(line for _, line in lines)])
     points[:, logarithmic] = np.exp(points[:, logarithmic])
-    count = [len(line) for _, line in lines]
-    columns = {
-        across: points[:, 0],
-        down: points[:, 1],
-        "level": np.repeat(np.array([level for level, _ in lines], np.float64), count),
-        "line": np.repeat(np.arange(len(lines)), count),
-    }
-    found = xr.Dataset({name: ("point", values) for name, values in columns.items()})
-    for name in (across, down):
-        found[name].attrs = dict(field[name].attrs)
-    found.level.attrs = {"units": str(field.attrs.get("units", "1")), "long_name": f"{title(field)} on the line"}
-    found.line.attrs = {"units": "1", "long_name": "number of the line"}
-    return found
+    count, units = [len(line) for _, line in lines], str(field.attrs.get("units", "1"))
+    columns = {name: (points[:, k], dict(field[name].attrs)) for k, name in enumerate(names)}
+    level = np.repeat(np.array([level for level, _ in lines], np.float64), count)
+    columns["level"] = level, {"units": units, "long_name": f"{title(field)} on the line"}
+    columns["line"] = np.repeat(np.arange(len(lines)), count), {"units": "1", "long_name": "number of the line"}
+    return xr.Dataset({name: ("point", *column) for name, column in columns.items()})

@@ -147,12 +147,10 @@ def _by_window(y: xr.DataArray, dim: str, window: Window | None, end: str, **key
     if x.size < FEWEST_IN_WINDOW:
         raise SweepError(f"an exponent against the window needs at least {FEWEST_IN_WINDOW} points, found {x.size}")
     low, high, fits = float(x.min()), float(x.max()), []
-    for share in 1.5 ** -np.arange(float(MOST_WINDOWS)):
-        reach = (high / low) ** share
+    for reach in (high / low) ** 1.5 ** -np.arange(float(MOST_WINDOWS)):
         smaller = (high / reach, high) if end == "high" else (low, low * reach)
-        if ((x >= smaller[0]) & (x <= smaller[1])).sum() < FEWEST_IN_WINDOW:
-            break
-        fits.append(fit_exponent(y, dim, smaller, **keys))
+        if ((x >= smaller[0]) & (x <= smaller[1])).sum() >= FEWEST_IN_WINDOW:
+            fits.append(fit_exponent(y, dim, smaller, **keys))
     found = xr.concat(fits, dim="window", combine_attrs="override")
     p, below, above = (found[name].values for name in ("exponent", "exponent_low", "exponent_high"))
     for first in range(p.size - 2):

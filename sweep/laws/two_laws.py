@@ -262,15 +262,17 @@ def crossover(low_fit: xr.Dataset, high_fit: xr.Dataset) -> xr.Dataset:
     """
     if bool(((low_fit.low < high_fit.high) & (high_fit.low < low_fit.high)).any()):
         raise SweepError("the windows of the two fits overlap, so their errors are not independent; take them apart")
-    fits, ends = (low_fit, high_fit), [("limit_low", "start", "low"), ("limit_high", "stop", "high")]
-    centres = [np.log(fit.centre) for fit in fits]
-    if bool((centres[0] > centres[1]).all()):
-        ends.reverse()
+    if bool((low_fit.centre > high_fit.centre).all()):
+        low_fit, high_fit = high_fit, low_fit
+    centres = [np.log(low_fit.centre), np.log(high_fit.centre)]
     middle = (centres[0] + centres[1]) / 2  # logarithms counted from here keep their digits
     lines, outer, wide = [], [], []  # outer: through the outer ends, towards where the exponents tend
-    for fit, centre, (limit, value, end) in zip(fits, centres, ends, strict=True):
+    for fit, centre, ends in zip(
+        (low_fit, high_fit), centres, (("limit_low", "start", "low"), ("limit_high", "stop", "high")), strict=True
+    ):
+        limit, value, end = (fit[name] for name in ends)
         lines.append((fit.exponent, np.log(fit.level), centre - middle))
-        outer.append((fit[limit], np.log(fit[value]), np.log(fit[end]) - middle))
+        outer.append((limit, np.log(value), np.log(end) - middle))
         reach = ((fit.exponent_high - fit.exponent_low) / 2).where(fit.noisy == 1, fit.exponent_error)
         factor = (reach / fit.exponent_error).where(fit.exponent_error > 0, 1.0)
         wide.append((reach, fit.level_error * factor, centre - middle))
