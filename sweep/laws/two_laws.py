@@ -200,7 +200,7 @@ def _widened(t: Array, z: Array, best: Array, low: Array, high: Array) -> tuple[
     t, z = t[first], z[first]
     local, near = slopes(t, z, 5), np.eye(min(5, t.size))
     half = np.flatnonzero(np.diff(np.sign(local - (best[0] + best[1]) / 2)))
-    places = [t[half[np.argmin(abs(t[half] - best[2]))]]] if half.size else []
+    places = [t[half[np.argmin(abs(t[half] - best[2]))]] if half.size else best[2]]
     low, high, steep = low.copy(), high.copy(), []
     for law, (at, of) in enumerate(((t, local), (-t[::-1], local[::-1]))):
         # what noise there is moves the local exponent at the end

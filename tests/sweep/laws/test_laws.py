@@ -40,7 +40,7 @@ def test_the_law_it_is_made_of_is_found_to_rounding(low, high, decades):
 
 @pytest.mark.parametrize("power", [0.0, -0.5])
 def test_where_one_law_holds_to_rounding_nothing_meets_anywhere(power):
-    found = sweep.fit_two_laws(line(power * T + 2.0), "x")
+    found = sweep.fit_two_laws(line(power * T - 4.0 * power), "x")  # ones, too
     assert int(found.regimes) == 1
     assert all(np.isnan(float(found[name])) for name in ("crossover", "width", "level"))
     assert (float(found.crossover_low), float(found.crossover_high)) == (0.0, np.inf)
