@@ -93,20 +93,22 @@ def join(
         values = whole[name].transpose(*grid.dims, ...).values
         arrays[name] = np.ascontiguousarray(values.reshape(grid.size, *values.shape[len(grid.dims) :]))
         digest.update(arrays[name])
-    # of other cells or labels it is another result, and no run continues it
-    mark = {**fingerprint(study), "joined": f"of two results (digest {digest.hexdigest()})"}
+    # of other cells or labels it is another result; no run continues it, nor is it of the program that joins
+    mark = {**_said(study), "joined": f"of two results (digest {digest.hexdigest()})"}
     if path is None:
         return in_memory(cell_schema(study, mark), arrays)
     return store_cells(study, path, arrays, force, mark, versions)
 
 
+def _said(study: Study) -> dict[str, str]:
+    """The entries of a fingerprint that tell of the study, not of the program."""
+    return {name: text for name, text in fingerprint(study).items() if not is_of_program(name)}
+
+
 def _apart(first: Study, second: Study) -> list[str]:
     """What two studies differ in: "axes.mu", "fixed.a", "rtol"; of axes that run together "points"."""
-    old, new = (
-        {name: text for name, text in fingerprint(study).items() if name != "study" and not is_of_program(name)}
-        for study in (first, second)
-    )
-    apart = sorted(name for name in {*old, *new} if old.get(name) != new.get(name))
+    old, new = _said(first), _said(second)
+    apart = sorted(name for name in {*old, *new} - {"study"} if old.get(name) != new.get(name))
     if first.dims == second.dims and len(first.dims) == 1 and first.design != "product":
         return list(dict.fromkeys("points" if name.startswith("axes.") else name for name in apart))
     return apart
