@@ -197,11 +197,11 @@ def draw_lines(axes: Any, ds: xr.Dataset) -> None:
         axes.plot(line.a, theory(line), color=COLOURS[k], linewidth=0.9)
         look = {"linestyle": "", "color": COLOURS[k], "markerfacecolor": "white", "markersize": 3.6}
         axes.plot(line.a[::4], line.loss[::4], MARKS[k], **look)
-        text = f"{1e3 * at:+.0f} mrad" if at else "centre"
+        text = f"${1e3 * at:+.3g}$ mrad" if at else "centre"
         direct_label(axes, 1.15 * float(line.a.max()), float(theory(line)[int(line.a.argmax("w"))]), text, COLOURS[k],
                      fontsize=6.5, ha="left", va="top" if at == -0.0125 else "center")  # fmt: skip
-    axes.plot([], [], "o", color="0.3", markerfacecolor="white", markersize=3.6, label="impulse at, scene")
-    axes.plot([], [], color="0.3", linewidth=0.9, label="theory (1)")
+    axes.plot([], [], "o", color="0.3", markerfacecolor="white", markersize=3.6, label="computed")
+    axes.plot([], [], color="0.3", linewidth=0.9, label="theory, light losses")
     axes.set_yscale("symlog", linthresh=1.0, linscale=0.6)
     axes.set_yticks([-1000, -100, -10, -1, 0, 1, 10, 100, 1000])
     axes.set_yticks([], minor=True)
@@ -251,7 +251,8 @@ def draw_positions(axes: Any, ds: xr.Dataset) -> None:
         axes.plot(wide, drop, color=COLOURS[k], linewidth=0.9)
         axes.plot(line.a, line.loss, MARKS[k], color=COLOURS[k], markerfacecolor="white", markersize=3.6,
                   linestyle="", label=f"{math.degrees(hang):.0f} degree")  # fmt: skip
-    axes.axvline(3.8317, ymax=0.6, color="0.5", linestyle=(0, (4, 2)), linewidth=0.9, label="220 degree")
+    axes.axvline(3.8317, ymax=0.6, color="0.5", linestyle=(0, (4, 2)), linewidth=0.9)
+    direct_label(axes, 3.8317, 5.0, "220 degree", "0.35", fontsize=7)
     axes.plot([], [], color="black", linewidth=0.9, label=r"$\propto J_1(a)/a$")
     axes.set(xlabel="amplitude, $a$ [rad]", ylabel="loss [s/day]", xlim=(1.0, 6.5), ylim=(-8, 16))
     axes.legend(title="heavy point from the top", fontsize=7, title_fontsize=7, loc="upper right", ncols=2)
