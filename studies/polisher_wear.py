@@ -200,8 +200,10 @@ def draw_map(axes: Any, tool: xr.Dataset, k: int) -> Any:
     uneven = tool.uneven.transpose("e", "w_x")
     x, y = MM * (tool.w_x - tool.L).values, MM * tool.e.values
     mesh = axes.pcolormesh(x, y, uneven, vmin=0, vmax=1.2, cmap="cividis_r", shading="gouraud", rasterized=True)
-    axes.clabel(axes.contour(x, y, uneven, levels=[0.3, 0.5], colors="white", linewidths=0.7), fmt="%g", fontsize=7)
     hatch(axes, x, y, (tool.least < KEPT).transpose("e", "w_x").values, "////", "white")
+    lines = axes.contour(x, y, uneven, levels=[0.3, 0.5], colors="white", linewidths=0.7)
+    for text in axes.clabel(lines, fmt="%g", fontsize=7):
+        text.set_bbox({"facecolor": "0.35", "edgecolor": "none", "pad": 0.5})
     best = least_uneven(without_hole(tool), ("e", "w_x"))
     axes.plot(MM * float(best.w_x - tool.L), MM * float(best.e), "*", color="white", markeredgecolor="black",
               markersize=8, label="(d-f) most even without a hole, on the grid")  # fmt: skip
