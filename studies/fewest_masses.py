@@ -11,8 +11,8 @@ fewest_masses.png here. What comes out:
 - Rivin's chain needs 2.7 more, and nine of the ten where the band holds seven: that is the price of staying a chain;
 - with frequencies held to 1 %, Rivin's and Guyan's receptance of the spindle is still 3 to 4 % off, that of the others
   0.02 to 0.15 %: with about 1 % of damping a resonance that moves by 0.4 % is felt;
-- no method is cheap or dear: a model of five, compared with the full chain, takes 0.2 ms by each, three times as long
-  as the full chain of ten alone with its poles; to find the fewest takes 0.2 to 0.3 ms.
+- no method is cheap or dear: a model of five, compared with the full chain, takes 0.1 to 0.2 ms by each, three to five
+  times as long as the full chain of ten alone with its poles; to find the fewest takes 0.2 to 0.3 ms.
 """
 
 from __future__ import annotations
