@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, page_of, read_result, report
+from _common import Groups, Statement, direct_label, page_of, read_result, report
 from scipy.integrate import DOP853, RK45
 
 import sweep
@@ -252,7 +252,9 @@ def draw_steps(axes: Any, ds: xr.Dataset) -> None:
         across = margin(ds[swept(ds)].values)
         axes.plot(across, np.where(right.any("step"), longest, np.nan), **method_look(method), markersize=4,
                   linewidth=0.9, markevery=max(1, across.size // 10))  # fmt: skip
-    axes.set(xscale="log", yscale="log", xlabel=label, ylabel="longest step for 10 %, $h$ [s]", ylim=(0.015, 30))
+    axes.set(xscale="log", yscale="log", xlabel=label, ylabel="longest step for 10 %, $h$ [s]", ylim=(0.015, 80))
+    axes.axhline(float(ds.step.max()), color="0.7", linewidth=4.0, zorder=0)
+    direct_label(axes, 0.03, 0.93, "longest step tried", "0.35", fontsize=7, ha="left", transform=axes.transAxes)
 
 
 def conclude(path: str, oscillator: str, *paths: str) -> tuple[Groups, list[str], Any]:
