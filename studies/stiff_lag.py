@@ -133,13 +133,13 @@ def figure(lag: xr.Dataset, bounce: xr.Dataset, found: dict[str, xr.Dataset]) ->
         draw_lags(share, error, lag)
         draw_bounces(ball, bounce)
         places = {
-            "rodas5p": (2.2, 4.0),
-            "scipy Radau": (0.6, 6.0),
+            "rodas5p": (2.5, 4.0),
+            "scipy Radau": (55.0, 3e-7),
             "scipy BDF": (3.0, 4.0),
             "diffrax Kvaerno5": (3.0, 6.0),
         }
         draw_costs(cost, found, places)
-        cost.set(xlim=(1e-5, 1.0), ylim=(1e-15, 1))
+        cost.set(xlim=(2e-6, 1.0), ylim=(1e-15, 1))
     return page
 
 
@@ -166,8 +166,8 @@ def draw_bounces(axes: Any, ds: xr.Dataset) -> None:
         for d, dashes, name in zip(ds.d.values, ("-", ":"), ("without drag", "with drag"), strict=True):
             line = left.sel(d=d).where(left.sel(d=d) > 1e-12)
             axes.plot(1 - ds.e, line, color=COLOURS[i], linestyle=dashes, label=f"{flips:.0f} bounces, {name}")
-    axes.set(xscale="log", yscale="log", xlabel="1 - restitution, $1 - e$ [1]", ylim=(1e-12, 30))
-    axes.set_ylabel("share of the time until rest still to come [1]", fontsize=8)
+    axes.set(xscale="log", yscale="log", xlabel="one less restitution, $1 - e$ [1]", ylim=(1e-12, 30))
+    axes.set_ylabel("part of the time to rest left [1]")
     axes.legend(loc="lower left", fontsize=7)
 
 
