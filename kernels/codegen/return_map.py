@@ -163,8 +163,9 @@ def returning(scene):
 
     def start(**given):
         before = {name: given[place] for name, place in zip(scene.states, places, strict=True)}
+        graph = given[FRESH].graph
         values = {**given, "side": -1.0, ".way": 1.0}
-        before[scene.states[seen]] = -_again(offset, values) / _again(factor, values)
+        before[scene.states[seen]] = -_again(graph, offset, values) / _again(graph, factor, values)
         behind = tuple(before.values())
         if scene.switch is not None:
             behind = asked(scene.switch, values | before)
@@ -176,15 +177,11 @@ def returning(scene):
     return replace(scene, name=f"{scene.name}_return", parameters=parameters, start=start, exact_start=True)
 
 
-def _again(x, values):
-    """A recorded expression of other values."""
-    if x.kind == NUMBER:
-        return x.args[0]
-    if x.kind == INPUT:
-        return values[x.args[0]]
-    args = [_again(a, values) for a in x.args]
-    graph = next((a.graph for a in args if isinstance(a, Expression)), x.graph)
-    return made(graph, x.kind, args)
+def _again(graph, x, values):
+    """A recorded expression of other values, in a graph of theirs."""
+    if x.kind in (NUMBER, INPUT):
+        return graph.of(x.args[0] if x.kind == NUMBER else values[x.args[0]])
+    return made(graph, x.kind, [_again(graph, a, values) for a in x.args])
 
 
 def paired(scene):

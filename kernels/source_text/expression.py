@@ -179,6 +179,8 @@ class Graph:
     def of(self, value):
         """The value as an expression. Raises SceneError for what is none."""
         if isinstance(value, Expression):
+            if value.graph is not self:
+                raise SceneError(f"{value!r} is of another call of the scene's functions")
             return value
         if getattr(value, "shape", None) == ():
             value = value.item()  # a number of numpy's

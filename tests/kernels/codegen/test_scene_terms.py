@@ -134,6 +134,17 @@ def test_a_function_that_cannot_be_recorded_is_named_in_a_line_with_what_is_wron
     assert len(str(refusal.value).splitlines()) == 1
 
 
+def test_what_a_function_keeps_of_an_earlier_call_is_refused():
+    kept = []
+
+    def rates(x, v):
+        kept.append(x)
+        return v, -kept[0]
+
+    with pytest.raises(SceneError, match="another call"):
+        scene(rates=rates)
+
+
 @pytest.mark.parametrize(
     "changed",
     [
