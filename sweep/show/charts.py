@@ -94,8 +94,8 @@ def result_figure(dataset: xr.Dataset, y: str | None = None, x: str | None = Non
     with style():
         figure = new_figure(120.0, 82.0)
         axes = figure.subplots()
-        (_draw_map if shown.mapped else _draw_lines)(axes, shown)
-        if shown.mapped or not shown.joined:  # what is drawn lies everywhere
+        (_draw_passages if shown.passed else _draw_map if shown.mapped else _draw_lines)(axes, shown)
+        if shown.passed or shown.mapped or not shown.joined:  # what is drawn lies everywhere
             handles, names = axes.get_legend_handles_labels()
             figure.legend(handles, names, loc="outside lower center", ncols=3) if names else None
         elif shown.across or shown.codes():
@@ -275,6 +275,19 @@ def _draw_lines(axes: Any, shown: View) -> None:
             axes.plot(x[valued], y[valued], **look)
             axes.plot(x[empty], np.zeros(empty.sum()), transform=axes.get_xaxis_transform(), **look)
         axes.plot([], [], mark, color=colour, markerfacecolor="none", label=shown.meanings.get(code, str(code)))
+
+
+def _draw_passages(axes: Any, shown: View) -> None:
+    """A point for each passage at each value of a parameter: a diagram of bifurcations."""
+    axes.set(xlabel=label(coordinate(shown.y, shown.x), 80), ylabel=label(shown.y))
+    axes.set_xscale("log" if is_logarithmic(shown.values(shown.x)) else "linear")
+    x = np.broadcast_to(shown.values(shown.x), shown.y.shape)
+    names = dict.fromkeys(shown.codes(), "") | shown.meanings | {0: "OK"}
+    for code, colour in zip([0, *shown.codes()], ("black", *FLAGGED), strict=False):
+        here = (shown.status == code) & np.isfinite(shown.y.values)
+        axes.plot(x[here], shown.y.values[here], ".", markersize=1.5, markeredgewidth=0.0, color=colour)
+        if here.any() and shown.codes():
+            axes.plot([], [], ".", color=colour, label=names[code])
 
 
 def _draw_map(axes: Any, shown: View) -> None:

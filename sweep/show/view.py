@@ -29,6 +29,8 @@ FAMILY = 8
 """Most lines in one picture; more values of a number axis make a map."""
 POINTS, PIXELS = 20_000, 2_000
 """Points along a line and cells along the side of a map that are drawn; beyond, every second, third ... one."""
+PASSAGE = "passage"
+"""What a section runs along: its values are points beside each other, which are drawn over a parameter."""
 HARD_SPACE = "\u00a0"
 """Where no line is broken."""
 SIDE = 201
@@ -57,6 +59,11 @@ class View:
     def mapped(self) -> bool:
         """Whether it is a map, and no line or family of lines."""
         return self.across is not None and self.y.sizes[self.across] > FAMILY and is_number_axis(self.y, self.across)
+
+    @property
+    def passed(self) -> bool:
+        """Whether it is a section over a parameter: many points at each of its values."""
+        return self.across == PASSAGE
 
     @property
     def joined(self) -> bool:
@@ -90,8 +97,9 @@ def view(dataset: xr.Dataset, y: str | None = None, x: str | None = None) -> Vie
     output, cells = dataset[name], dataset["status"].dims if "status" in dataset else ()
     known = [str(name) for name, c in output.coords.items() if c.ndim == 1 and c.dtype.kind in "fiu"]
     if x is None:
-        traces = [str(dim) for dim in output.dims if cells and dim not in cells and dim in known]
-        axes = traces or [str(dim) for dim in output.dims if dim in known] or known
+        along_it = [str(dim) for dim in output.dims if dim in known]
+        traces = [dim for dim in along_it if cells and dim not in cells and dim != PASSAGE]
+        axes = traces or [dim for dim in along_it if dim != PASSAGE] or known
         if not axes:
             raise SweepError(f"{name} has no number axis to draw it along")
         x = max(axes, key=lambda axis: output[axis].size)

@@ -65,6 +65,17 @@ def test_two_long_axes_make_a_map_with_a_logarithmic_colour_scale():
     assert bar.get_ylabel() == "period of the cycle [s]"
 
 
+def test_a_section_is_points_over_a_parameter_by_their_status():
+    ds = dataset(mu=log(11)).expand_dims(passage=np.arange(101.0, 133.0))
+    ds = ds.assign(status=ds.status.isel(passage=0).copy(data=[0] * 7 + [1] * 4))
+    (axes,) = plot(ds).axes
+    fine, unsure = drawn(axes)
+    np.testing.assert_array_equal(np.unique(fine.get_xdata()), ds.mu[:7])
+    assert len(fine.get_ydata()) == 7 * 32
+    assert len(unsure.get_ydata()) == 4 * 32
+    assert axes.get_ylabel() == "period of the cycle [s]"
+
+
 def test_further_axes_are_held_at_their_middle_and_the_title_says_so():
     ds = dataset(mu=log(), a=np.linspace(1, 2, 11), R=[0.0, 10.0, 20.0])
     figure = plot(ds)
