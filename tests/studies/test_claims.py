@@ -52,6 +52,7 @@ TABLE = {
     "balance_ringdown": Claims({
         "balance_ringdown": {"zeta": np.geomspace(1e-4, 2, 31), "r": np.geomspace(1e-4, 0.9, 37)},
     }, "margin status stop_time", 5),
+    "bouncing_ball": Claims({"bouncing_ball": {"push": [1.05, 1.2, 1.4, 1.53, 1.5375, 1.545, 1.6, 1.69]}}, ""),
     "chatter_lobes": Claims({"chatter_lobes": {}}, "damping frequency frequency_error", 2),
     "cross_beat": Claims({"cross_beat": {}}, ""),
     "foliot_scaling": Claims({
@@ -96,6 +97,9 @@ TABLE = {
     "polisher_zone": Claims({"polisher_zone": {}}, "wear_error", 3),
     "rate_parameters": Claims({"rate_parameters": {}}, "", 4),
     "self_starting": Claims({"self_starting": {}}, "flip_speed status", 6),
+    "shapiro": Claims({"shapiro": {
+        "order": [0, 1], "ac": [0.0, 1.0, 2.5], "detuning": [-0.5, -0.25, 0.0, 0.25, 0.5],
+    }}, "status"),
     "stability_maps": Claims({
         "stability_maps": {"mu": 16, "step": 12}, "stability_maps_oscillator": {"a": 8, "w": 8},
         "stability_maps_sticking": {"R": [0.9, 0.999], "step": 12},
@@ -103,6 +107,7 @@ TABLE = {
     }, "amplitude crossing_speed rate_calls steps time status stability_maps_oscillator.clock "
         "stability_maps_oscillator.error stability_maps_oscillator.interval stability_maps_oscillator.pace", 1),
     "relaxation": Claims({"relaxation": {"mu": [0.01, 1.0, 1e3, 10**3.5, 1e4]}}, "", 1),
+    "stribeck": Claims({"stribeck": {"belt": [0.05, 0.5, 1.0, 1.8, 1.85, 2.2]}, "stribeck_unstable": {}}, "stribeck.multiplier", 2),
     "stick_slip": Claims({
         "stick_slip": {"method": ["taylor", "dop853"], "belt": [0.02, 0.3], "fall": [0.02, 0.3]},
     }, "interval place speed", 2, tell=False),

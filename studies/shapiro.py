@@ -1,0 +1,98 @@
+"""On which steps of voltage does a driven Josephson junction lock, and how wide are they?
+
+    sweep run studies/shapiro.toml --allow-import
+    python studies/shapiro.py shapiro.h5
+
+draws shapiro.png. On step n the phase turns n times in a period of the drive, so that the voltage is n w whatever the
+current. Of a fast drive the phase follows the alternating current and turns slowly besides, by
+
+    psi' = detuning - J_n(ac) sin(psi),                                                                  (1)
+
+J_n being Bessel's function: it is locked where abs(detuning) < abs(J_n(ac)), and a disturbance decays in a period of
+the drive by exp(-2 pi/w sqrt(J_n^2 - detuning^2)). Without the drive (ac = 0, n = 0) both are exact.
+"""
+
+from __future__ import annotations
+
+import sys
+from functools import partial
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from _common import Groups, Statement, differing, direct_label, page_of, read_result, report
+from matplotlib.colors import ListedColormap
+from scipy.special import jv
+
+from kernels.interface import Status
+from sweep.show.charts import COLOURS
+
+BORDER = 0.5
+"""Times 1/w, within which borders are not those of (1): a constant current sqrt(1 + (n w)^2) gives the voltage n w."""
+NOTES = "decay: ln(multiplier) w/2 pi, squared; by (1) it is J_n^2 - detuning^2"
+
+
+def read(path: str) -> xr.Dataset:
+    """The sweep with Bessel's function, and the square of how fast disturbances decay."""
+    ds = read_result(path, "junction_scene:KERNEL", ["w", "order", "ac", "detuning"], "shapiro.toml")
+    bessel = xr.apply_ufunc(jv, ds.order, ds.ac)
+    rate = -ds.w / (2.0 * np.pi) * np.log(ds.multiplier)
+    return ds.assign(bessel=bessel, decay=rate**2, locked=ds.status == Status.OK)
+
+
+def statements(ds: xr.Dataset) -> list[Statement]:
+    """Voltage, widths and decay."""
+    inside, clear = abs(ds.bessel) - abs(ds.detuning), BORDER / ds.w
+    own = ds.locked & (ds.phase_turns == ds.order)
+    right = [bool((own == (inside > 0)).where(abs(inside) > clear, True).sel(w=w).all()) for w in ds.w]
+    periods = float(abs(ds.period * ds.w / (2.0 * np.pi) - 1.0).max())
+    free = ds.sel(order=0, ac=0.0)
+    exact = float(abs(free.decay - (1.0 - free.detuning**2)).where(free.locked).max())
+    middle = abs(ds.decay - ds.bessel**2).where(own).sel(detuning=0.0).max(("order", "ac"))
+    falls = float(np.log(middle[1] / middle[0]) / np.log(ds.w[1] / ds.w[0]))
+    lines = [
+        Statement("period of the cycle", "2 pi/w", "", periods, periods <= 1e-6),
+        Statement("decay without a drive", "1 - detuning^2", "", exact, exact <= 1e-5),
+        *(
+            Statement(f"w = {w:g}: n turns a period by (1), but for {BORDER / w:.2f}", "all cells", "", None, here)
+            for w, here in zip(ds.w.values, right, strict=True)
+        ),
+        Statement("decay in the middle beside (1)", "", ", ".join(f"{off:.4f}" for off in middle.values)),
+        differing("its deviation goes as w to the power", "-2", falls, -2.0, 0.2, 3),
+    ]  # fmt: skip
+    return lines
+
+
+def figure(ds: xr.Dataset) -> Any:
+    """The steps over both currents, their borders by (1), and the decay on one of them."""
+    with page_of(80.0, 1, 2, width_ratios=(1.35, 1.0)) as (page, (plane, decay)):
+        slow, fast = ds.sel(w=2.0), ds.sel(w=8.0)
+        fine = np.linspace(0.0, 6.0, 200)
+        for n in map(int, ds.order.values):
+            colour, here = COLOURS[n], slow.sel(order=n).transpose("ac", "detuning")
+            plane.pcolormesh(2.0 * n + here.detuning, here.ac, np.where(here.locked, 1.0, np.nan),
+                             cmap=ListedColormap([colour]), alpha=0.45, rasterized=True)  # fmt: skip
+            for sign in (1.0, -1.0):
+                plane.plot(2.0 * n + sign * abs(jv(n, fine)), fine, color=colour, linewidth=0.8)
+            direct_label(plane, 2.0 * n, 6.25, f"$n={n}$", colour)
+            line = fast.sel(order=n, detuning=0.0)
+            decay.plot(line.ac, np.sqrt(line.decay), "os^D"[n], color=colour, markersize=3, markerfacecolor="white")
+            decay.plot(fine, abs(jv(n, fine)), color=colour, linewidth=0.8, label=f"$n={n}$")
+        plane.set(xlabel="constant current over the critical one [1]", ylabel="alternating current over $w$ [1]",
+                  xlim=(-1, 7), ylim=(0, 6.5))  # fmt: skip
+        decay.set(xlabel="alternating current over $w$ [1]", ylabel="rate of decay in the middle [1]", ylim=(0, 1.05))
+        decay.legend(loc="upper right")
+    return page
+
+
+def conclude(path: str) -> tuple[Groups, list[str], Any]:
+    """Statements and the figure."""
+    ds = read(path)
+    return {"Shapiro steps": statements(ds)}, [NOTES], lambda: figure(ds)
+
+
+main = partial(report, __file__, ["shapiro.h5"], conclude=conclude)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
