@@ -107,7 +107,9 @@ TABLE = {
     }, "amplitude crossing_speed rate_calls steps time status stability_maps_oscillator.clock "
         "stability_maps_oscillator.error stability_maps_oscillator.interval stability_maps_oscillator.pace", 1),
     "relaxation": Claims({"relaxation": {"mu": [0.01, 1.0, 1e3, 10**3.5, 1e4]}}, "", 1),
-    "stribeck": Claims({"stribeck": {"belt": [0.05, 0.5, 1.0, 1.8, 1.85, 2.2]}, "stribeck_unstable": {}}, "stribeck.multiplier", 2),
+    "stribeck": Claims({
+        "stribeck": {"belt": [0.05, 0.5, 1.0, 1.8, 1.85, 2.2]}, "stribeck_unstable": {},
+    }, "stribeck.multiplier", 2),
     "stick_slip": Claims({
         "stick_slip": {"method": ["taylor", "dop853"], "belt": [0.02, 0.3], "fall": [0.02, 0.3]},
     }, "interval place speed", 2, tell=False),
