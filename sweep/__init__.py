@@ -34,8 +34,8 @@ if TYPE_CHECKING:
     from sweep.results.listing import list_results as list_results
     from sweep.results.units import in_units as in_units
     from sweep.runs.run import run as run
+    from sweep.show.charts import plot as plot
     from sweep.show.kernels import kernels as kernels
-    from sweep.show.plot import plot as plot
     from sweep.study.toml import to_toml as to_toml
 
 _HOMES = {"study": "sweep.study"} | {

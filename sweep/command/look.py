@@ -52,8 +52,7 @@ def studies(arguments: argparse.Namespace) -> None:
 )
 def show(arguments: argparse.Namespace) -> None:
     """Contents of a result, how much is computed, and a count of statuses."""
-    from sweep.show.follow import follow
-    from sweep.show.text import result_text
+    from sweep.show.text import follow, result_text
 
     with opened(arguments) as dataset:
         say(result_text(arguments.result, dataset))

@@ -21,7 +21,7 @@ from sweep.file.store import unfinished_of
 from sweep.results.statuses import account
 from sweep.runs.log import LOG, log, log_path, logging_to, read_lines
 from sweep.runs.pool import deadline, passed
-from sweep.show.follow import reasons
+from sweep.show.text import reasons
 
 SECONDS = 10.0
 """What a run may take to end: two seconds, and eight for a machine with much to do to notice."""

@@ -10,9 +10,8 @@ from toy_studies import build
 import sweep
 from kernels.interface import Status
 from sweep.errors import SweepError
-from sweep.show.follow import follow
 from sweep.show.laws import comparison, comparison_text, laws, laws_text, pick, write_comparison, write_laws
-from sweep.show.text import result_text
+from sweep.show.text import follow, result_text
 
 X = np.geomspace(1e-4, 1e4, 33)
 BENT = X**-1 + X**-0.25
