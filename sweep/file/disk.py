@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import errno
 import fcntl
-import io
 import os
 import shutil
 from collections.abc import Iterator, Sequence
@@ -92,30 +91,6 @@ def as_bytes(piece: Any) -> memoryview:
     return view.cast("B") if view.nbytes else memoryview(b"")
 
 
-class Raw(io.RawIOBase):
-    """An open file as HDF5 reads it, whatever has its name by now."""
-
-    def __init__(self, fd: int) -> None:
-        self.fd, self.at, self.size = fd, 0, os.fstat(fd).st_size
-
-    def seek(self, offset: int, whence: int = 0) -> int:
-        self.at = offset + (self.size if whence == os.SEEK_END else 0)
-        return self.at
-
-    def tell(self) -> int:
-        return self.at
-
-    def truncate(self, size: int | None = None) -> int:
-        self.size = self.at if size is None else size
-        return self.size
-
-    def readinto(self, buffer: Any) -> int:
-        found = os.pread(self.fd, len(buffer), self.at)
-        buffer[:] = found.ljust(len(buffer), b"\0")
-        self.at += len(buffer)
-        return len(buffer)
-
-
 def sync_folder(path: Path) -> None:
     """Returns when the names in a folder, or the bytes of a file, are on the disk. Raises OSError."""
     fd = open_file(path, os.O_RDONLY)
@@ -140,20 +115,18 @@ def replacing(target: Path) -> Iterator[Path]:
     """
     part, lock = (target.with_name(f".{target.name}.{end}") for end in ("tmp", "lock"))
     try:
-        with locked(lock) as ours:
+        with locked(lock) as ours, contextlib.ExitStack() as stack:
             if not ours:
                 raise SweepError(f"{target}: is being written by another process")
             _discard(part)  # what one has left that was killed
-            try:
-                part.touch()  # says in plain words that there is no such folder, or no permission
-                yield part
-                sync_tree(part)
-                if target.is_dir() or part.is_dir():
-                    _discard(target)  # a folder cannot be replaced in one step
-                rename(part, target)
-                sync_folder(target.parent)
-            finally:
-                _discard(part)
+            stack.callback(_discard, part)
+            part.touch()  # says in plain words that there is no such folder, or no permission
+            yield part
+            sync_tree(part)
+            if target.is_dir() or part.is_dir():
+                _discard(target)  # a folder cannot be replaced in one step
+            rename(part, target)
+            sync_folder(target.parent)
     except OSError as fault:
         raise SweepError(f"{target} cannot be written: {fault.strerror or fault}") from None
 

@@ -8,6 +8,7 @@ chunk stands a checksum that is wrong, so that nobody takes what is not computed
 
 from __future__ import annotations
 
+import io
 import json
 import math
 import os
@@ -24,7 +25,7 @@ from sweep.cells.reduce import part_columns
 from sweep.cells.schema import STATUS, Column, Schema
 from sweep.file import disk
 from sweep.file.fletcher import checksum
-from sweep.file.reading import BYTES, ENDING_BYTES, FORMAT, StoredFile, digest_before
+from sweep.file.reading import BYTES, ENDING_BYTES, FORMAT, Numbers, StoredFile, digest_before
 from sweep.study.model import ARRAY
 
 if TYPE_CHECKING:
@@ -122,18 +123,7 @@ def create(path: Path, schema: Schema, cuts: Mapping[str, Cut], shared: bool = F
             disk.write_all(fd, (page[: image.size - at],), at)
         file = StoredFile(path)
         for column in (column for table in file.tables.values() for column in table.columns if column.check):
-            size, pending = column.size + column.check, WRONG
-            if column.name == STATUS:
-                pending = bytes([Status.PENDING]) * column.size
-                pending += checksum(pending, column.size)
-            elif size < PAGE:
-                pending = bytes(column.size) + WRONG
-            # short chunks behind each other at once
-            some = max(1, PIECE // size) if len(pending) == size else 1
-            for chunks in np.split(column.at, np.flatnonzero(np.diff(column.at) != size) + 1):
-                for at in chunks[::some].tolist():
-                    count = min(some, (int(chunks[-1]) - at) // size + 1)
-                    disk.write_all(fd, (pending * count,), at + size - len(pending))
+            _write_pending(fd, column)
         file.key = digest_before(fd, file.key_at)
         disk.write_all(fd, (file.key,), file.key_at)
         disk.fsync(fd)
@@ -142,7 +132,22 @@ def create(path: Path, schema: Schema, cuts: Mapping[str, Cut], shared: bool = F
     return file
 
 
-class _Image(disk.Raw):
+def _write_pending(fd: int, column: Numbers) -> None:
+    """Says of each chunk of a column that it is not computed yet; of short ones behind each other at once."""
+    size, pending = column.size + column.check, WRONG
+    if column.name == STATUS:
+        pending = bytes([Status.PENDING]) * column.size
+        pending += checksum(pending, column.size)
+    elif size < PAGE:
+        pending = bytes(column.size) + WRONG
+    some = max(1, PIECE // size) if len(pending) == size else 1
+    for run in np.split(column.at, np.flatnonzero(np.diff(column.at) != size) + 1):
+        for first in range(0, len(run), some):
+            chunks = run[first : first + some]
+            disk.write_all(fd, (pending * len(chunks),), int(chunks[0]) + size - len(pending))
+
+
+class _Image(io.RawIOBase):
     """The file as HDF5 writes it, in memory, but for chunks of zeros.
 
     Attributes
@@ -156,6 +161,14 @@ class _Image(disk.Raw):
     def __init__(self) -> None:
         self.pages: dict[int, bytearray] = {}
         self.at = self.size = self.chunk = 0
+
+    def seek(self, offset: int, whence: int = 0) -> int:
+        self.at = offset + (0, self.at, self.size)[whence]
+        return self.at
+
+    def truncate(self, size: int | None = None) -> int:
+        self.size = self.at if size is None else size
+        return self.size
 
     def readinto(self, buffer: Any) -> int:
         for page, here, there in self._pieces(len(buffer)):

@@ -115,4 +115,7 @@ def unreadable(output: Path, fault: Exception) -> SweepError:
         return SweepError(f"{output}: is a folder, not the result of a sweep")
     if isinstance(fault, OSError) and fault.errno and fault.errno not in OF_DAMAGE:
         return SweepError(f"{output}: cannot be read ({os.strerror(fault.errno)})")
-    return SweepError(f"{output}: not the result of a sweep, or damaged; move it away or choose another name")
+    return SweepError(
+        f"{output}: not the result of a sweep (exports are for xarray and other programs), or damaged; move it away or "
+        "choose another name"
+    )

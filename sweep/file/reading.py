@@ -76,10 +76,11 @@ class StoredFile:
                         "alone; open it with the version that wrote it, or compute it again under another name"
                     )
                 contents = json.loads(attrs["contents"])
+                self._dims = {name: tuple(dims) for name, dims in contents["dims"].items()}
                 self.key_at, self.ending_at = (_own(file, f"integrity/{k}").id.get_offset() for k in ("key", "ending"))
                 self.key, ending = read_bytes(self.fd, self.key_at, BYTES), read_bytes(self.fd, self.ending_at, 256)
                 self.tables = {name: Table(self, file, name, **keys) for name, keys in contents["tables"].items()}
-            self.ending, self._dims = ending_of(ending), contents["dims"]
+            self.ending = ending_of(ending)
         except BaseException:
             self.close()
             raise
@@ -92,7 +93,7 @@ class StoredFile:
 
         if not stat.S_ISREG(os.fstat(self.fd).st_mode) or read_bytes(self.fd, 0, len(SIGNATURE)) != SIGNATURE:
             raise ValueError("it is no file of HDF5")
-        with h5py.File(disk.Raw(self.fd), "r") as file:
+        with os.fdopen(os.dup(self.fd), "rb", 0) as raw, h5py.File(raw, "r") as file:
             yield file
 
     def __enter__(self) -> StoredFile:
@@ -127,7 +128,7 @@ class StoredFile:
                     values = data[()]
                     if attrs.pop("_Encoding", None):
                         values = np.char.decode(values.view(f"S{values.shape[-1]}")[..., 0], "utf-8")
-                    coords[name] = Coordinate(name, tuple(dims), values, attrs)
+                    coords[name] = Coordinate(name, dims, values, attrs)
             attrs = _attrs(file)
         return {**attrs, "study_json": study_together(attrs["study_json"], coords), **self.ending}, about, coords
 
@@ -220,6 +221,7 @@ class Numbers:
         self.table, self.number, self.path = table, number, data.name
         self.name, self.shape, self.dtype, grid = data.name.split("/")[-1], data.shape, data.dtype, table.grid
         self.own, self.check = data.shape[len(grid) :], 4 * data.fletcher32
+        self.dims = table.file._dims.get(self.name, ())
         self.size = self.dtype.itemsize * math.prod((*table.box, *self.own))
         if data.shape[: len(grid)] != grid or (data.chunks or ()) != (*table.box, *self.own):
             raise ValueError(f"{self.path} has another shape than it was made with")
@@ -239,11 +241,6 @@ class Numbers:
         if len(chunks) != self.table.blocks.count or {(0, self.size + 4)} != {(c.filter_mask, c.size) for c in chunks}:
             raise ValueError(f"{self.path} has other chunks than it was made with")
         return np.array([chunk.byte_offset for chunk in chunks])
-
-    @property
-    def dims(self) -> tuple[str, ...]:
-        """Its dimensions, of a column of the output."""
-        return tuple(self.table.file._dims[self.name])
 
     @property
     def attrs(self) -> Mapping[str, Any]:
