@@ -22,16 +22,20 @@ from pathlib import Path
 import numpy as np
 import rich_scene
 import sliding_scene
-import stiff_scene
 
 from kernels import catalogue
 from kernels.interface import FIRST_REFUSAL, Status
 from kernels.lanes.jit import COMPILED
 
+sys.path.append(str(Path(__file__).parents[2] / "studies"))
+import lag_scene
+
 FILE = Path(__file__).parents[1] / "golden" / "digests.json"
 RTOLS = (1e-3, 1e-6, 1e-9, 1e-12, 1e-15)
-SCENES = {"rich": rich_scene.RICH, "lag": stiff_scene.LAG, "sliding": sliding_scene.SLIDING}
+SCENES = {"rich": rich_scene.RICH, "lag": lag_scene.KERNEL, "sliding": sliding_scene.SLIDING}
 """Scenes of one's own: with every kind of term, stiff, and sliding along a kink."""
+OF_SCENE = {"lag": ("taylor", "rodas5p")}
+"""Methods of a scene whose bits are kept, where the others' are kept of its neighbours."""
 NEAR, USUAL, WILD = 0, 4, 60
 MANY, FEW = {NEAR: 43, USUAL: 43, WILD: 44}, {NEAR: 33, USUAL: 8, WILD: 6}
 """{powers of two that a parameter is spread over: cells}, of kernels and of scenes of one's own, which take longer."""
@@ -291,7 +295,7 @@ def computed(name, kernel, columns, rtol, few=1):
     status = check_of(kernel, columns)
     yield "check", status, None
     sound = np.flatnonzero(status == Status.OK)
-    for method in kernel.methods:
+    for method in map(kernel.method, OF_SCENE.get(name, [m.name for m in kernel.methods])):
         cells = chosen(name, sound.size)[: None if COMPILED else ONCE.get(method.name)]
         cells = cells[:: few if method.name in THOUSANDS else 1]
         own = sound[cells]

@@ -1,20 +1,11 @@
-"""Foliots whose drive lags behind its switch, or follows a wave: stiff where the lag is short; balls that bounce."""
+"""Motions that follow a wave or relax, stiff where their time is short; a ball that bounces on a raised floor."""
+
+import bounce_scene
 
 from kernels.scene import Field, cos, scene_kernel, sin
 
-ANGLE, SPEED = Field("angle", "rad", "angle at the switch"), Field("speed", "rad/s", "speed at the switch")
+SPEED = Field("speed", "rad/s", "speed at the switch")
 FORCE, EPS = Field("force", "rad/s^2", "lagging drive"), Field("eps", "s", "lag", lower=0.0, open_lower=True)
-
-LAG = scene_kernel(
-    name="lag",
-    doc="foliot whose drive follows its switch with a lag",
-    states=(ANGLE, SPEED, FORCE),
-    parameters=(Field("mu", "rad/s^2", "drive"), Field("a", "1/s", "viscous friction"), EPS),
-    rates=lambda angle, speed, force, side, mu, a, eps: (speed, force - a * speed, (side * mu - force) / eps),
-    surface=lambda angle, side: 1.0 - side * angle,
-    start=lambda: (0.0, 0.0, 0.0),
-    example={"mu": 1.0, "a": 0.5, "eps": 1e-3},
-)
 
 
 def followed_wave(speed, force, clock, side, eps):
@@ -45,24 +36,14 @@ PASSED = scene_kernel(
 )
 
 
-def ball(floor):
-    """A ball that bounces on a floor at that height."""
-    return scene_kernel(
-        name=f"ball_{floor}",
-        doc="a ball that bounces, with drag by the square of its speed",
-        states=(Field("height", "m", "height"), Field("speed", "m/s", "speed")),
-        parameters=(
-            Field("g", "m/s^2", "gravity"),
-            Field("e", "1", "restitution"),
-            Field("above", "m", "height over the floor at the start", default=1.0),
-            Field("d", "1/m", "drag", default=0.0),
-        ),
-        rates=lambda speed, g, d: (speed, -g - d * speed * abs(speed)),
-        surface=lambda height: height - floor,
-        switch=lambda height, speed, e: (height, -e * speed),
-        start=lambda above: (floor + above, 0.0),
-        example={"g": 9.81, "e": 0.5},
-    )
-
-
-BALL, RAISED = ball(0), ball(1)
+RAISED = scene_kernel(
+    name="raised",
+    doc="the ball of `bounce_scene` on a floor at the height 1",
+    states=bounce_scene.KERNEL.outputs[2:],
+    parameters=bounce_scene.KERNEL.parameters[:-1],
+    rates=bounce_scene.rates,
+    surface=lambda height: height - 1.0,
+    switch=bounce_scene.switch,
+    start=lambda above: (1.0 + above, 0.0),
+    example={"g": 9.81, "e": 0.5},
+)

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from bounce_scene import KERNEL as BALL
 from columns import relative_error, solve
 from mpmath import mp, mpf
-from stiff_scene import BALL, RAISED
+from stiff_scene import RAISED
 
 from kernels.interface import Status
 from kernels.lanes.jit import COMPILED

@@ -9,7 +9,8 @@ from kernels.interface import Status
 from kernels.lanes.jit import COMPILED
 from kernels.scene import Field, power, scene_kernel, sign
 
-TOLERANCES = [1e-6, 1e-9, 1e-12] if COMPILED else [1e-9]
+TOLERANCES = [1e-10, 1e-12] if COMPILED else [1e-10]
+"""By one series; `slide` is followed by both."""
 
 
 def fields(*names):
@@ -34,7 +35,7 @@ def swing():
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("rtol", [1e-6, 1e-10, 1e-13] if COMPILED else [1e-10])
+@pytest.mark.parametrize("rtol", [1e-6, 1e-13] if COMPILED else [1e-10])
 @pytest.mark.parametrize("a", [0.0, 1.0])
 def test_what_a_power_below_1_brings_to_rest_sticks(slide, rtol, a):
     n = np.array([0.5, 0.3, 0.05, 0.8] if COMPILED else [0.5, 0.3])

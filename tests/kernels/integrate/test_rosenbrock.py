@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 import stiff_oracles
 from columns import relative_error, solve
+from lag_scene import KERNEL as LAG
 from mpmath import mp, mpf
-from stiff_scene import LAG, PASSED, WAVE
+from stiff_scene import PASSED, WAVE
 
 import sweep
 from kernels.codegen.stepped import stepped
@@ -42,8 +43,8 @@ def off(outputs, truths, names=("time", "angle", "speed", "force")):
 
 @pytest.mark.parametrize("rtol", [1e-3, 1e-6, 1e-9, 1e-11] if COMPILED else [1e-6])
 def test_a_lag_of_nine_decades_is_right_to_the_tolerance(rtol):
-    (*cells, flips), truths = lags()
-    outputs, status = solve(LAG, "rodas5p", *cells, flips=flips, rtol=rtol)
+    (mu, a, eps, flips), truths = lags()
+    outputs, status = solve(LAG, "rodas5p", mu=mu, a=a, b=0.0, eps=eps, flips=flips, rtol=rtol)
     assert not status.any()
     assert (off(outputs, truths) < rtol).all()
 
@@ -51,11 +52,10 @@ def test_a_lag_of_nine_decades_is_right_to_the_tolerance(rtol):
 @many
 def test_the_series_gives_up_where_stability_limits_its_steps_and_auto_goes_on():
     eps = [1e-1, 1e-6, 1e-9]
-    _, status = solve(LAG, "taylor", 1.0, 0.5, eps, flips=1.0)
+    _, status = solve(LAG, "taylor", mu=1.0, a=0.5, b=0.0, eps=eps, flips=1.0)
     assert status.tolist() == [Status.OK, Status.STEP_LIMIT, Status.STEP_LIMIT]
-    study = sweep.study(
-        kernel="stiff_scene:LAG", axes={"eps": eps}, fixed={"mu": 1.0, "a": 0.5, "flips": 1}, allow_import=True
-    )
+    fixed = {"mu": 1.0, "a": 0.5, "b": 0.0, "flips": 1}
+    study = sweep.study(kernel="lag_scene:KERNEL", axes={"eps": eps}, fixed=fixed, allow_import=True)
     found = sweep.run(study, progress=False)
     names = [method.name for method in LAG.methods]
     assert [names[k] for k in found.method_used.values] == ["taylor", "rodas5p", "rodas5p"]
