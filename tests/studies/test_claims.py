@@ -75,7 +75,7 @@ TABLE = {
         "impact_map.contact_share impact_map.offset impact_map.status impact_map_lever.period "
         "impact_map_lever.swing", 4),
     "law_any_swing": Claims({"law_any_swing": {}}, "status", 1),
-    "law_map": Claims({"law_map": {"e": [1, 0.99, 0.5], "R": [0, 1, 100], "c": [0, 1e-6, 1]}}, "status"),
+    "law_map": Claims({"law_map": {"e": [1, 0.99, 0.5], "R": [0, 1, 100], "c": [0, 1e-6, 1], "mu": 2}}, "status"),
     "law_map_overnight": Claims({
         "law_map_overnight": {"n": [0.25, 1.5, 3.0], "e": [1, 0.99, 0.97, 0.5], "R": 3, "c": 10},
         "law_map_borders": {},
@@ -258,30 +258,33 @@ def off(ds, names, how):
     return ds.assign({name: how(ds[name]).assign_attrs(ds[name].attrs) for name in names})
 
 
-def noticed(told):
-    """Statements that fail where an output is false, by "study.output"; "inner" are the sweeps of the script itself."""
-    found = {}
-    for name in sorted({name for ds in told.inner.values() for name in numbers(ds)}):
-        for how in OFF[:2]:
-            false = partial(lambda ds, name, how: off(ds, {name} & set(ds.data_vars), how), name=name, how=how)
-            found["inner"] = found.get("inner", set()) | told.failing(inner=false)
+def lies(told, how):
+    """("study.output", what is to be believed) for every output that is off so; "inner": the sweeps of the script."""
+    for name in sorted({name for ds in told.inner.values() for name in numbers(ds)}) if how is not OFF[2] else ():
+        yield "inner", {"inner": lambda ds, name=name: off(ds, {name} & set(ds.data_vars), how)}
     for path, ds in told.results.items():
         study = Path(path).stem
         silent = {name.removeprefix(f"{study}.") for name in told.claims.silent.split()}
         for name in sorted(set(numbers(ds)) - silent):
-            found[f"{study}.{name}"] = set().union(*(told.failing(**{path: off(ds, [name], how)}) for how in OFF))
-        if "status" in ds and bool((ds.status != 0).any()) and "status" not in silent:
-            found[f"{study}.status"] = told.failing(**{path: ds.assign(status=xr.zeros_like(ds.status))})
-    return found
+            yield f"{study}.{name}", {path: off(ds, [name], how)}
+        if "status" in ds and bool((ds.status != 0).any()) and "status" not in silent and how is OFF[0]:
+            yield f"{study}.status", {path: ds.assign(status=xr.zeros_like(ds.status))}
 
 
 def test_false_numbers_are_noticed_in_each_output_and_move_the_statements(told, monkeypatch):
+    """A second and a third kind of falsehood are tried where the first goes unnoticed, or leaves statements unmoved."""
     monkeypatch.setattr(sweep, "open_result", told.open)
     checked = [s.what for lines in told.conclude()[0].values() for s in lines if s.holds is not None]
-    found = noticed(told)
+    found, still = {}, checked
+    for how in OFF:
+        for output, lie in lies(told, how):
+            found[output] = found.get(output, set()) | told.failing(**lie)
+        still = [what for number, what in enumerate(checked) if number not in set().union(*found.values())]
+        unnoticed = [name for name, failed in found.items() if not failed and name != "inner"]
+        if not unnoticed and len(still) <= told.claims.still:
+            break
     assert any(found.values())
-    assert [name for name, failed in found.items() if not failed and name != "inner"] == []
-    still = [what for number, what in enumerate(checked) if number not in set().union(*found.values())]
+    assert unnoticed == []
     assert len(still) <= told.claims.still, still
 
 
