@@ -121,9 +121,8 @@ def _one(
         low, high = _mixture(t, z, tried, word, confidence) if fits else (math.nan, math.nan)
     ends = sorted(sign * one for one in (low, high, exponent))[::2] if fits else (math.nan, math.nan)
     verdict = VERDICTS[1 if not fits else 0 if abs(left) < 1 else 2]
-    residual = math.expm1(min(float(abs(found.off).max()), 700.0))
     of = {"exponent": sign * exponent, "exponent_low": ends[0], "exponent_high": ends[1], "verdict": verdict}
-    of |= {"correction_exponent": sign * fade, "correction": left, "residual": residual, "noisy": noisy}
+    of |= {"correction_exponent": sign * fade, "correction": left, "residual": found.residual, "noisy": noisy}
     return of | {"fits": verdict == VERDICTS[0]}
 
 

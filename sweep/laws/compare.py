@@ -93,7 +93,7 @@ def _table(t: Array, z: Array, tried: list[Found]) -> xr.Dataset:
         "worse": [f.aicc - least for f in tried],
         "numbers": [f.law.numbers for f in tried],
         "scatter": [math.sqrt(float(np.mean(f.off**2))) for f in tried],
-        "residual": [math.expm1(min(float(abs(f.off).max()), 700.0)) for f in tried],
+        "residual": [f.residual for f in tried],
         "runs": [float(runs_chance(f.off)) for f in tried],
         "chi_squared": [chi_squared(f) for f in tried],
         "formula": [f.law.formula for f in tried],

@@ -47,6 +47,11 @@ class Found(NamedTuple):
         """Sum of squares, of what is known of the noise."""
         return float(((self.off if self.sigma is None else self.off / self.sigma) ** 2).sum())
 
+    @property
+    def residual(self) -> float:
+        """Largest relative distance of a point."""
+        return math.expm1(min(float(abs(self.off).max()), 700.0))
+
     def errors(self) -> Array:
         """Standard errors of the numbers beside independent noise; inf of what the points do not determine."""
         columns = self.jacobian if self.sigma is None else self.jacobian / self.sigma[:, None]

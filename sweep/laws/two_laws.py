@@ -166,7 +166,7 @@ def _one(t: Array, z: Array, tried: dict[str, Found], confidence: float, noise: 
     verdict, evidence = _verdict(t, tried, noisy)
     of_laws = zip(EXPONENTS, (best, low, high), strict=True)
     found = {f"{name} {law}": of[k] for name, of in of_laws for k, law in enumerate(LAW.values)}
-    found |= {"crossover": math.exp(best[2]), "crossover_low": np.exp(low[2]), "crossover_high": np.exp(high[2])}
+    found |= {"crossover": np.exp(best[2]), "crossover_low": np.exp(low[2]), "crossover_high": np.exp(high[2])}
     found |= {"level": np.exp(two.numbers[2]), "width": math.exp(two.numbers[1]) * span / math.log(10)}
     if evidence <= 0 and not noisy:  # straight to rounding: nothing meets anywhere
         found |= {"crossover": math.nan, "crossover_low": 0.0, "crossover_high": np.inf, "width": math.nan}
@@ -175,9 +175,8 @@ def _one(t: Array, z: Array, tried: dict[str, Found], confidence: float, noise: 
         found = dict.fromkeys(found, math.nan)
     if verdict == "no meeting in the window":
         found["crossover"] = math.nan
-    residual = math.expm1(min(float(abs(two.off).max()), 700.0))
     found |= {"verdict": verdict, "regimes": VERDICTS[verdict], "evidence": evidence}
-    return found | {"residual": residual, "noisy": noisy}
+    return found | {"residual": two.residual, "noisy": noisy}
 
 
 def _is_noise(t: Array, z: Array, off: Array, size: float) -> bool:

@@ -188,7 +188,10 @@ def test_three_laws_are_told_and_a_meeting_outside_the_window_is_none(noise):
     scatter = noise * np.random.default_rng(3).standard_normal(X.size)
     assert str(sweep.fit_two_laws(line(TRUTHS["three laws"] + scatter), "x").verdict.values) == "three laws"
     tail = sweep.fit_two_laws(line(two(T, 0.0, -1.0, -1 / 3, T[0] - 1.5, 0.3)), "x")
-    assert (str(tail.verdict.values), bool(np.isnan(tail.crossover))) == ("no meeting in the window", True)
+    t = np.linspace(400, 700, 30)  # a meeting beyond the largest number
+    beyond = sweep.fit_two_laws(line(-0.1 * t + 90 * np.logaddexp(0, (t - 1000) / 100), np.exp(t)), "x")
+    for found in (tail, beyond):
+        assert (str(found.verdict.values), bool(np.isnan(found.crossover))) == ("no meeting in the window", True)
 
 
 def test_a_correction_that_the_points_deny_has_no_interval():
