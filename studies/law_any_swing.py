@@ -24,10 +24,11 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, read_result, report
+from _common import Groups, Statement, page_of, read_result, report
 from _losses import any_swing, shares
 
 import sweep
+from sweep.show.charts import COLOURS
 
 BANDS = ((1.0, 1.1, 0.25), (1.1, 2.0, 0.20), (2.0, 10.0, 0.09), (10.0, np.inf, 0.005))
 """Swings over phi0, and the most that (1) may be off there, as a share of s."""
@@ -109,20 +110,14 @@ def by_periods(ds: xr.Dataset) -> list[Statement]:
 
 def figure(ds: xr.Dataset) -> Any:
     """One loss alone over the swing, (1) against every clock, and how far it is off; for two columns of print."""
-    from sweep.show import charts
-
-    with charts.style():
-        page = charts.new_figure(charts.PAGE, 62.0)
-        for axes, draw, text in zip(page.subplots(1, 3), (draw_alone, draw_all, draw_off), "abc", strict=True):
+    with page_of(62.0, 1, 3) as (page, panels):
+        for axes, draw in zip(panels, (draw_alone, draw_all, draw_off), strict=True):
             draw(axes, ds)
-            charts.letter(axes, text)
     return page
 
 
 def draw_alone(axes: Any, _: xr.Dataset) -> None:
     """s of one loss over its swing beyond the switch."""
-    from sweep.show.charts import COLOURS
-
     for colour, name in zip(COLOURS, list(LOSSES)[:3], strict=False):
         line = alone(name)
         axes.loglog(line.swing - 1, line.law, color=colour, label=name)
@@ -135,8 +130,6 @@ def draw_alone(axes: Any, _: xr.Dataset) -> None:
 
 def draw_all(axes: Any, ds: xr.Dataset) -> None:
     """The exponent of every clock against (1), and against the law of large swings."""
-    from sweep.show.charts import COLOURS
-
     s = ds.sensitivity.values.ravel()
     for name, colour, text in (("large", "0.75", "large swings alone"), ("law", COLOURS[0], "(1)")):
         axes.loglog(ds[name].values.ravel(), s, ".", color=colour, markersize=1, label=text, rasterized=True)
@@ -147,8 +140,6 @@ def draw_all(axes: Any, ds: xr.Dataset) -> None:
 
 def draw_off(axes: Any, ds: xr.Dataset) -> None:
     """Deviations of (1) over the swing, with what half and 95 % of the clocks keep."""
-    from sweep.show.charts import COLOURS
-
     swing, off = ds.swing.values.ravel() - 1, 100 * abs(ds.law / ds.sensitivity - 1).values.ravel()
     axes.loglog(swing, off, ".", color="0.75", markersize=1, rasterized=True)
     edges = np.geomspace(1e-3, 20, 10)

@@ -20,10 +20,11 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, plain_ticks, read_result, report
+from _common import Groups, Statement, page_of, plain_ticks, read_result, report
 from clock_losses import SHARES, SUM, THRESHOLD, Measured, forecast
 
 import sweep
+from sweep.show.charts import COLOURS
 
 CLOCKS = ("equal shares", "mostly dry", "mostly viscous", "mostly drag", "mostly impacts")
 NOISE = 0.01
@@ -148,22 +149,14 @@ def chosen(ds: xr.Dataset) -> list[Statement]:
 
 def figure(ds: xr.Dataset, clocks: int) -> Any:
     """What can be known by the spread of the torques, and intervals of known clocks; for two columns of print."""
-    from sweep.show import charts
-
-    with charts.style():
-        page = charts.new_figure(charts.PAGE, 72.0)
-        left, right = page.subplots(1, 2)
+    with page_of(72.0, 1, 2) as (page, (left, right)):
         draw_spread(left, ds)
         draw_intervals(right, ds, clocks)
-        charts.letter(left, "a")
-        charts.letter(right, "b")
     return page
 
 
 def draw_spread(axes: Any, ds: xr.Dataset) -> None:
     """Forecast errors over the spread of the torques, by periods alone and with amplitudes."""
-    from sweep.show.charts import COLOURS
-
     spreads = np.geomspace(2.0, 60.0, 12)
     for dashes, amplitude in (("--", False), ("-", True)):
         errors = np.array([forecast(*matrices(ds, 0, over, amplitude)[1:])[0] for over in spreads])
@@ -179,8 +172,6 @@ def draw_spread(axes: Any, ds: xr.Dataset) -> None:
 
 def draw_intervals(axes: Any, ds: xr.Dataset, clocks: int) -> None:
     """Intervals of 95 % of each clock, beside the true shares."""
-    from sweep.show.charts import COLOURS
-
     for clock in range(clocks):
         noisy = measured(ds, clock, True, NOISE)
         true = SUM @ noisy.predicted(losses(ds, clock, noisy)[None])[1][0]

@@ -20,8 +20,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, compared, read_result, report
+from _common import Groups, Statement, compared, page_of, read_result, report
 from _polishing import KEPT, POINTS, area, disc, least, unevenness
+
+from sweep.show.charts import COLOURS
 
 DWELL = 0.05
 """delta: what a hand at a switch keeps."""
@@ -160,13 +162,8 @@ def few(p: Profiles, sets: dict[int, list[int]]) -> list[Statement]:
 
 def figure(p: Profiles, sets: dict[int, list[int]]) -> Any:
     """Unevenness by the number of settings, by the errors of dwell, and profiles; for two columns of print."""
-    from sweep.show import charts
-    from sweep.show.charts import COLOURS
-
     everything = range(len(p.rows))
-    with charts.style():
-        page = charts.new_figure(charts.PAGE, 62.0)
-        number, errors, mixed = page.subplots(1, 3)
+    with page_of(62.0, 1, 3) as (page, (number, errors, mixed)):
         number.plot(list(sets), [100 * p.best(s) for s in sets.values()], "o-", color=COLOURS[0], label="expected")
         exact = [100 * unevenness(p.times(s, DWELL) @ p.rows[s], p.weight) for s in sets.values()]
         number.plot(list(sets), exact, "s--", color=COLOURS[1], markersize=3, label="with exact times")
@@ -174,32 +171,15 @@ def figure(p: Profiles, sets: dict[int, list[int]]) -> Any:
         number.set(xlabel="settings [1]", ylabel="unevenness [%]", ylim=(0, 3.5))
         number.legend(fontsize=6.5)
         delta = np.linspace(0.0, 0.15, 31)
-        for k, (name, times) in enumerate(
-            (("exact times", p.times(everything, 0.0)), ("errors of 5 %", p.times(everything, DWELL)))
-        ):
-            errors.plot(
-                100 * delta,
-                [100 * p.expected(everything, times, d) for d in delta],
-                color=COLOURS[k],
-                label=f"best for {name}",
-            )
+        made = {"exact times": p.times(everything, 0.0), "errors of 5 %": p.times(everything, DWELL)}
+        for colour, (name, times) in zip(COLOURS, made.items(), strict=False):
+            expected = [100 * p.expected(everything, times, d) for d in delta]
+            errors.plot(100 * delta, expected, color=colour, label=f"best for {name}")
             for d in (0.0, 0.05, 0.1):
-                errors.plot(
-                    100 * d,
-                    100 * np.sqrt(np.mean(p.drawn(everything, times, d) ** 2)),
-                    "o",
-                    color=COLOURS[k],
-                    markerfacecolor="white",
-                    markersize=3.5,
-                )
-        errors.plot(
-            100 * delta,
-            [100 * p.best(everything, d) for d in delta],
-            "--",
-            color="black",
-            linewidth=0.8,
-            label="best for each error",
-        )
+                drawn = 100 * np.sqrt(np.mean(p.drawn(everything, times, d) ** 2))
+                errors.plot(100 * d, drawn, "o", color=colour, markerfacecolor="white", markersize=3.5)
+        best = [100 * p.best(everything, d) for d in delta]
+        errors.plot(100 * delta, best, "k--", linewidth=0.8, label="best for each error")
         errors.set(xlabel="error of a time of dwell [%]", ylabel="expected unevenness [%]", ylim=(0, 3.5))
         errors.legend(fontsize=6.5)
         for k, n in enumerate((3, 8)):
@@ -208,8 +188,6 @@ def figure(p: Profiles, sets: dict[int, list[int]]) -> Any:
         mixed.plot(1e3 * p.radius, p.times(everything, DWELL) @ p.rows, color=COLOURS[2], label="all settings")
         mixed.set(xlabel="radius [mm]", ylabel="wear over its mean [1]", ylim=(0.8, 1.12), xlim=(0, 1e3 * p.radius[-1]))
         mixed.legend(fontsize=6.5)
-        for axes, text in zip((number, errors, mixed), "abc", strict=True):
-            charts.letter(axes, text)
     return page
 
 

@@ -19,10 +19,9 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, compared, hatch, quality_bar, read_result, report
+from _common import Groups, Statement, compared, hatch, page_of, quality_bar, read_result, report
 from _polishing import KEPT, area, least, one_setting, unevenness
 
-from sweep.show import charts
 from sweep.show.charts import COLOURS
 
 UM_PER_HOUR = 3.6e9
@@ -164,15 +163,11 @@ def figure(ds: xr.Dataset, load: xr.Dataset) -> Any:
     """Profiles of three tools, and how uneven they are over offset and eccentricity; for two columns of print."""
     from matplotlib.patches import Patch
 
-    with charts.style():
-        page = charts.new_figure(charts.PAGE, 116.0)
-        upper, lower = page.subplots(2, 3)
+    with page_of(116.0, 2, 3) as (page, (upper, lower)):
         for k, (name, n, b) in enumerate(SHAPES[:3]):
             tool = ds.sel(tool_n=n).sel(tool_b=b, method="nearest")
             draw_profiles(upper[k], tool, name, k, load if k == 0 else None)
             mesh = draw_map(lower[k], tool, k)
-            charts.letter(upper[k], "abc"[k])
-            charts.letter(lower[k], "def"[k])
         quality_bar(page, mesh, list(lower), "unevenness of the wear [1]", pad=0.01)
         hole = Patch(facecolor="0.4", edgecolor="white", hatch="////", linewidth=0, label="(d-f) a hole in the middle")
         star = lower[0].get_legend_handles_labels()[0]

@@ -16,9 +16,10 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, compared, differing, direct_label, read_result, report
+from _common import Groups, Statement, compared, differing, direct_label, page_of, read_result, report
 
 from kernels.interface import Status
+from sweep.show.charts import COLOURS
 
 SLOW = 3.0 - 2.0 * math.log(2.0)
 """Period over mu of strong friction."""
@@ -61,29 +62,22 @@ def strong(ds: xr.Dataset) -> list[Statement]:
 
 def figure(ds: xr.Dataset) -> Any:
     """Period with its limits; what is left of it beyond the strong one; largest x and multiplier."""
-    from sweep.show import charts
-
-    with charts.style():
-        page = charts.new_figure(charts.PAGE, 62.0)
-        panels = page.subplots(1, 3)
-        a, b, c = panels
-        a.plot(ds.mu, ds.period, color=charts.COLOURS[0])
+    with page_of(62.0, 1, 3) as (page, (a, b, c)):
+        a.plot(ds.mu, ds.period, color=COLOURS[0])
         a.plot(ds.mu, SLOW * ds.mu, color="0.5", linestyle="--", linewidth=0.8)
         a.axhline(2.0 * math.pi, color="0.5", linestyle=":", linewidth=0.8)
         a.set(xscale="log", yscale="log", xlabel=r"friction $\mu$", ylabel="period $T$", ylim=(3.0, 3e4))
         direct_label(a, 1500.0, 200.0, r"$(3-2\,\ln 2)\,\mu$", "0.4")
         direct_label(a, 0.1, 4.4, r"$2\pi$", "0.4")
-        b.plot(ds.mu, ds.period - SLOW * ds.mu, color=charts.COLOURS[0])
+        b.plot(ds.mu, ds.period - SLOW * ds.mu, color=COLOURS[0])
         b.plot(ds.mu, NEXT * ds.mu ** (-1 / 3), color="0.5", linestyle="--", linewidth=0.8)
         b.set(xscale="log", yscale="log", xlabel=r"friction $\mu$", ylabel=r"$T-(3-2\,\ln 2)\,\mu$")
         direct_label(b, 400.0, 4.0, r"$7.0143\,\mu^{-1/3}$", "0.4")
-        c.plot(ds.mu, ds.x_size, color=charts.COLOURS[0], label="largest $x$")
-        c.plot(ds.mu, ds.multiplier.clip(0.0), color=charts.COLOURS[1], linestyle="--", label="multiplier")
-        c.plot(ds.mu, ds.period_by_mu, color=charts.COLOURS[2], linestyle="-.", label=r"d ln $T$/d ln $\mu$")
+        c.plot(ds.mu, ds.x_size, color=COLOURS[0], label="largest $x$")
+        c.plot(ds.mu, ds.multiplier.clip(0.0), color=COLOURS[1], linestyle="--", label="multiplier")
+        c.plot(ds.mu, ds.period_by_mu, color=COLOURS[2], linestyle="-.", label=r"d ln $T$/d ln $\mu$")
         c.set(xscale="log", xlabel=r"friction $\mu$", ylim=(-0.05, 2.2))
         c.legend(loc="center right", fontsize=6, bbox_to_anchor=(1.0, 0.68))
-        for axes, letter in zip(panels, "abc", strict=True):
-            charts.letter(axes, letter)
     return page
 
 

@@ -19,10 +19,9 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, read_result, report
+from _common import Groups, Statement, page_of, read_result, report
 
 import sweep
-from sweep.show import charts
 from sweep.show.charts import COLOURS
 
 NOTES = """\
@@ -80,10 +79,8 @@ def figure(ds: xr.Dataset) -> Any:
     from matplotlib.patches import Patch
 
     palette = ("0.85", COLOURS[5], COLOURS[0])
-    with charts.style():
-        page = charts.new_figure(charts.PAGE, 78.0)
-        panels = page.subplots(1, 3, sharey=True)
-        for axes, k, letter in zip(panels, ds.k.values, "abc", strict=True):
+    with page_of(78.0, 1, 3, sharey=True) as (page, panels):
+        for axes, k in zip(panels, ds.k.values, strict=True):
             part = ds.sel(k=k, R_s=0.6)
             kind = started(part).sel(a=0).astype(int) + started(part).sel(a=1)
             axes.pcolormesh(ds.phi_start, ds.mu, kind.transpose("mu", "phi_start"), cmap=ListedColormap(list(palette)),
@@ -94,7 +91,6 @@ def figure(ds: xr.Dataset) -> Any:
             axes.set(
                 xlabel=r"released at $\varphi_\mathrm{s}/\varphi_0$ [1]", ylim=(0, 2.5), title=f"$k={k:g}$ s$^{{-2}}$"
             )
-            charts.letter(axes, letter)
         panels[0].set_ylabel(r"torque, $\mu/\varphi_0$ [s$^{-2}$]")
         keys = [
             Patch(color=c, label=t) for c, t in zip(palette, ("rests", "starts if $a=0$ only", "starts"), strict=True)

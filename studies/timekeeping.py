@@ -33,10 +33,9 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, columns, compared, differing, read_result, report
+from _common import Groups, Statement, columns, compared, differing, page_of, read_result, report
 
 import sweep
-from sweep.show import charts
 from sweep.show.charts import COLOURS
 
 DAY = 86400.0
@@ -207,13 +206,10 @@ noise, a share of sigma^2; what differs from day to day stays.\
 
 def figure(clocks: dict[str, xr.Dataset]) -> Any:
     """Scatter against noise, against correlation, and loss against noise."""
-    with charts.style():
-        page = charts.new_figure(charts.PAGE, 76.0)
-        panels = page.subplots(1, 3)
-        for draw, axes, letter in zip((draw_scatter, draw_correlation, draw_losses), panels, "abc", strict=True):
+    with page_of(76.0, 1, 3) as (page, panels):
+        for draw, axes in zip((draw_scatter, draw_correlation, draw_losses), panels, strict=True):
             for i, (name, ds) in enumerate(clocks.items()):
                 draw(axes, ds, name, COLOURS[i], "os^"[i])
-            charts.letter(axes, letter)
         page.legend(*panels[1].get_legend_handles_labels(), loc="outside upper center", ncols=3)
         frame(panels[0])
     return page
