@@ -55,6 +55,9 @@ class Shared:
     path: str
     key: bytes
 
+    def __reduce__(self) -> Any:
+        return Shared, (self.path, self.key)  # what is open here is of no use elsewhere
+
     def opened(self) -> int | None:
         """A file descriptor; None where this process does not see the file, or may not write to it."""
         try:
@@ -107,14 +110,12 @@ class Store:
             return None
         try:
             file = StoredFile(self.path)
-            if file.attrs and all(column.at.size for column in file.tables[file.work].columns):
+            if file.is_as_made() and all(column.at.size for column in file.tables[file.work].columns):
                 return file
         except DAMAGE as fault:
             if isinstance(fault, OSError) and fault.errno:
                 raise SweepError(f"{self.path}: cannot be read ({fault.strerror})") from fault
-        raise SweepError(
-            f"{self.path}: damaged beside its numbers, or not of this version; remove it, or give it up with --force"
-        )
+        raise SweepError(f"{self.path}: damaged beside its numbers; remove it, or give it up with --force")
 
     def begin(self, schema: Schema, cuts: Mapping[str, Cut], shared: bool = False) -> None:
         """Makes the file, with room on the disk for all of it. Raises SweepError."""

@@ -224,6 +224,17 @@ def test_what_is_there_of_an_unfinished_result_is_told_with_what_is_missing(tmp_
     assert f"{len(kept(tmp_path / 'out.h5'))} of 5 blocks" in found.checked
 
 
+def test_an_unfinished_result_that_is_damaged_beside_its_numbers_is_not_continued(tmp_path):
+    output = tmp_path / "out.h5"
+    interrupted(study(), output)
+    with StoredFile(unfinished_of(output)) as file:
+        flip(file.path, file.key_at)
+    with pytest.raises(sweep.SweepError, match="--force"):
+        quiet(study(), output)
+    quiet(study(), output, force=True).close()
+    assert sweep.verify(output).whole
+
+
 # what mends it
 
 
