@@ -8,6 +8,7 @@ import re
 import socket
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,9 +16,9 @@ from typing import TYPE_CHECKING, Any
 from kernels.interface import Status
 from sweep.errors import SweepError, missing
 from sweep.file.open import open_result
-from sweep.show.view import coordinate, evened, preferred, setting
+from sweep.show.view import coordinate, evened, preferred
 from sweep.view import region
-from sweep.view.region import Choice, along, nearest, number_axes, other_axes, outputs, row, shown
+from sweep.view.region import Choice, number_axes, other_axes, outputs, row, shown
 from sweep.words import Table
 
 try:
@@ -39,13 +40,10 @@ ADDRESS = "127.0.0.1"
 OTHER_HOSTS = rf"(?!({re.escape(ADDRESS)}|localhost|\[::1\])$).*"
 """Names of this server that no browser of its user knows: a page from elsewhere asks for it by one of its own."""
 ONE_LINE = "(one line)"
+MOST_ROWS = 1_000_000
+"""Cells that are sent to a browser as a table."""
 SCALED = {"x": "scale across", "y": "scale up", "values": "values"}
 WIDE = {"sizing_mode": "stretch_width"}
-FRAME = """
-{% extends base %}
-{% block preamble %}<meta name="viewport" content="width=device-width, initial-scale=1">{% endblock %}
-{% block contents %}{{ embed(roots.page) }}{% endblock %}
-"""
 STYLE = """
 table { border-collapse: collapse; font-size: 13px; }
 td { padding: 2px 12px 2px 0; border-bottom: 1px solid #ddd; vertical-align: top; }
@@ -99,61 +97,49 @@ class Page:
     """
 
     def __init__(self, dataset: xr.Dataset, name: str, location: Any = None) -> None:
-        self.name, self.location, values, even = name, location, ["value", "local exponent"], evened(dataset)
+        self.location, values, even = location, ["value", "local exponent"], evened(dataset)
         if even is not dataset:
             title = f"{dataset.attrs.get('title') or name}: straight lines between its {dataset['status'].size:,} cells"
             even, values = even.assign_attrs(title=title), ["value"]  # straight lines have no exponent
-        self.dataset = dataset = even
-        names = outputs(dataset)
+        self.dataset, names, select = even, outputs(even), pn.widgets.Select
         if not names:
             raise SweepError(f"{name}: there is nothing to look at: no output runs along an axis of numbers")
-        select = pn.widgets.Select
         self.output = select(label="output", options=names, value=preferred(names), **WIDE)
         self.shows = pn.widgets.RadioButtonGroup(options=values, **WIDE)
-        self.x = select(label="across the page", options=number_axes(dataset, self.output.value), **WIDE)
+        self.x = select(label="across the page", options=number_axes(even, self.output.value), **WIDE)
         self.up = select(label="up the page", **WIDE)
-        self.scales = {
-            key: select(label=text, options=["auto", "linear", "log"], min_width=70, **WIDE)
-            for key, text in SCALED.items()
-        }
+        scales = ["auto", "linear", "log"]
+        self.scales = {key: select(label=text, options=scales, min_width=70, **WIDE) for key, text in SCALED.items()}
         self.statuses = pn.widgets.Checkbox(label="mark cells that are not OK", value=True)
         self.sliders: dict[str, Any] = {}
-        self.saves = {suffix: self._save(suffix, make) for suffix, make in FILES.items()}
         self.slider_box = pn.Column(**WIDE)
         self.pane, self.note, self.legend, self.table = pn.pane.Bokeh(**WIDE), _html(), _html(), _html()
+        stem = name.rpartition(".")[0] or name
+        self.saves = {
+            suffix: pn.widgets.FileDownload(
+                callback=partial(lambda make: make(self.dataset, self.choice), make),
+                filename=f"{stem}_shown.{suffix}", label=suffix.upper(), min_width=70, **WIDE,
+            ) for suffix, make in FILES.items()
+        }  # fmt: skip
         self.found: View | None = None
         self.picture: Picture | None = None
         self.key: tuple[Any, ...] = ()
-        self._choose_output()
-        self.output.param.watch(lambda _: self._choose_output(), "value")
-        self.x.param.watch(lambda _: self._choose_x(), "value")
-        self.up.param.watch(lambda _: self._make_sliders(), "value")
+        self._offer()
+        for control in (self.output, self.x, self.up):
+            control.param.watch(lambda _: self._offer(), "value")
         for control in (self.shows, self.statuses, *self.scales.values()):
             control.param.watch(lambda _: self._redraw(), "value")
         self._link({"output": self.output, "x": self.x, "up": self.up, "shows": self.shows, "marks": self.statuses})
         self._link({f"scale_{key}": widget for key, widget in self.scales.items()})
-        self.layout = self._layout()
-
-    def _layout(self) -> Any:
-        scales, saves = (pn.Row(*widgets.values(), **WIDE) for widgets in (self.scales, self.saves))
-        controls = pn.Column(
-            self.output, self.shows, self.x, self.up, self.slider_box, scales, self.statuses, saves,
-            styles={"flex": "1 1 280px", "min-width": "min(100%, 280px)"},
-        )  # fmt: skip
-        styles = {"flex": "3 1 340px", "min-width": "min(100%, 340px)"}
-        seen = pn.Column(self.note, self.pane, self.legend, self.table, styles=styles)
-        title = html.escape(str(self.dataset.attrs.get("title") or self.name))
-        head = _html(f"<h2 style='margin:4px 0'>{title}</h2>{html.escape(self.name)}")
-        box = pn.FlexBox(controls, seen, styles={"max-width": "calc(100vw - 16px)"}, **WIDE)
-        frame = pn.Template(FRAME)
-        frame.add_panel("page", pn.Column(head, box, stylesheets=[STYLE], **WIDE))
-        return frame
-
-    def _save(self, suffix: str, make: Any) -> Any:
-        return pn.widgets.FileDownload(
-            callback=lambda: make(self.dataset, self.choice), label=suffix.upper(), min_width=70,
-            filename=f"{self.name.rpartition('.')[0] or self.name}_shown.{suffix}", **WIDE,
-        )  # fmt: skip
+        scales_row, saves = (pn.Row(*widgets.values(), **WIDE) for widgets in (self.scales, self.saves))
+        controls = (self.output, self.shows, self.x, self.up, self.slider_box, scales_row, self.statuses, saves)
+        left = pn.Column(*controls, styles={"flex": "1 1 280px", "min-width": "min(100%, 280px)"})
+        seen = (self.note, self.pane, self.legend, self.table)
+        right = pn.Column(*seen, styles={"flex": "3 1 340px", "min-width": "min(100%, 340px)"})
+        title = html.escape(str(even.attrs.get("title") or name))
+        head = _html(f"<h2 style='margin:4px 0'>{title}</h2>{html.escape(name)}")
+        box = pn.FlexBox(left, right, styles={"max-width": "calc(100vw - 16px)"}, **WIDE)
+        self.layout = pn.Column(head, box, stylesheets=[STYLE], **WIDE)
 
     def _link(self, widgets: Mapping[str, Any]) -> None:
         """Controls that the address of the window keeps; what it says that they cannot show is left aside."""
@@ -172,31 +158,22 @@ class Page:
         ranges = self.picture.ranges if self.picture else (None, None)
         return Choice(self.output.value, self.x.value, up, held, self.shows.value != "value", *ranges)
 
-    def _choose_output(self) -> None:
-        """Another output may have other axes; those that are chosen stay if it has them."""
+    def _offer(self) -> None:
+        """The axes of the output, and sliders for those that are not in the picture; what is chosen stays if it can."""
         axes = number_axes(self.dataset, self.output.value)
-        before, self.x.options = self.x.value, axes
-        if before not in axes:
-            self.x.value = axes[0]
-        self._choose_x()
-
-    def _choose_x(self) -> None:
-        others = other_axes(self.dataset, Choice(self.output.value, self.x.value))
-        before, self.up.options = self.up.value, [*others, ONE_LINE]
-        self.up.value = before if before in self.up.options else self.up.options[0]
-        self._make_sliders()
-
-    def _make_sliders(self) -> None:
+        self.x.param.update(options=axes, value=self.x.value if self.x.value in axes else axes[0])
+        axes = [*other_axes(self.dataset, self.choice), ONE_LINE]
+        self.up.param.update(options=axes, value=self.up.value if self.up.value in axes else axes[0])
         choice, before = self.choice, self.sliders
         self.sliders = {}
         for dim in (dim for dim in other_axes(self.dataset, choice) if dim != choice.across):
-            column, size = coordinate(self.dataset[choice.output], dim), self.dataset.sizes[dim]
-            # one value without its name; signs of formulas are for print
-            texts = [setting(value).partition(" = ")[2] for value in column]
-            texts = [text.replace("$", "").replace("^{", "^").replace("}", "") for text in texts]
-            options = {f"{i + 1}: {text}" if size > 1 else text: i for i, text in enumerate(texts)}
-            place = int(before[dim].value) if dim in before else size // 2
-            kind = pn.widgets.DiscreteSlider if size > 1 else pn.widgets.Select
+            column = coordinate(self.dataset[choice.output], dim)
+            unit = str(column.attrs.get("units", "1"))
+            texts = [f"{value:.4g}" if column.dtype.kind in "fiu" else str(value) for value in column.values]
+            texts = [text if unit == "1" else f"{text} {unit}" for text in texts]
+            options = {f"{i}: {text}" if column.size > 1 else text: i - 1 for i, text in enumerate(texts, 1)}
+            place = int(before[dim].value) if dim in before else column.size // 2
+            kind = pn.widgets.DiscreteSlider if column.size > 1 else pn.widgets.Select
             self.sliders[dim] = slider = kind(label=dim, options=options, value=place, **WIDE)
             slider.param.watch(lambda _: self._redraw(), "value")
         if self.location is not None:
@@ -224,27 +201,22 @@ class Page:
         self.picture.show(found, self.statuses.value)
         self.legend.object = _legend(found) if self.statuses.value else ""
         # what cannot be saved of this slice is grey
-        self.saves["csv"].disabled = region.rows(self.dataset, self.choice) > region.MOST_ROWS
+        choice = self.choice
+        self.saves["csv"].disabled = region.part(self.dataset, choice)[choice.output].size > MOST_ROWS
         try:
-            region.study_text(self.dataset, self.choice)
+            region.study_text(self.dataset, choice)
             self.saves["toml"].disabled = False
         except SweepError:
             self.saves["toml"].disabled = True
 
     def _click(self, x: float | None, y: float | None) -> None:
         """Shows the row of a cell that was clicked, and a cross on it."""
-        choice, found, picture = self.choice, self.found, self.picture
-        places = None if x is None or y is None or not found or not picture else nearest(found, x, y, picture.log)
-        if places is None or y is None or picture is None:
-            return
-        dataset, at = self.dataset, {**choice.held, **places}
-        if picture.mapped:
-            up = coordinate(dataset[choice.output], str(choice.across))[places[str(choice.across)]]
-        else:
-            up = dataset[choice.output].isel(at)
-        height = y if choice.exponent and not picture.mapped else float(up)
-        picture.mark(float(dataset[choice.x][places[along(dataset, choice.x)]]), height)
-        self.table.object = Table(row(dataset, at)).html()
+        cell = None if x is None or y is None or self.picture is None else self.picture.choose(x, y)
+        if cell and (found := self.found):
+            column = found.y.coords
+            dims = zip((found.across, found.along), cell, strict=True)
+            places = {dim: int(column[region.PLACE + dim][i]) for dim, i in dims if dim is not None}
+            self.table.object = Table(row(self.dataset, {**self.choice.held, **places})).html()
 
 
 FILES: dict[str, Callable[[xr.Dataset, Choice], BytesIO]] = {

@@ -5,7 +5,6 @@ No more than that is read.
 
 from __future__ import annotations
 
-import math
 import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -15,7 +14,6 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from sweep.cells.schema import STATUS
 from sweep.errors import SweepError
@@ -23,14 +21,12 @@ from sweep.laws.exponents import local_exponent
 from sweep.laws.loglog import is_logarithmic
 from sweep.results.export import export
 from sweep.results.statuses import flag_words
-from sweep.show.view import ANCILLARY, View, coordinate, edges, is_number_axis, view
+from sweep.show.view import ANCILLARY, View, coordinate, is_number_axis, view
 from sweep.study.model import SETTINGS, Axis, Study
 from sweep.study.toml import to_toml
 
 PLACE = "place along "
 """Coordinates of a slice that say where its cells are in the result."""
-MOST_ROWS = 1_000_000
-"""Cells that are sent to a browser as a table."""
 POINTS = 101
 """Points of an axis of the refined study, at least."""
 
@@ -83,13 +79,11 @@ def part(dataset: xr.Dataset, choice: Choice) -> xr.Dataset:
 
     Two more cells on both sides show the spacing. An axis that is not in order is not cut.
     """
-    wanted = {along(dataset, choice.x): None, **({choice.across: choice.y_range} if choice.across else {})}
-    if choice.x in wanted:
-        wanted[choice.x] = choice.x_range
-    held = {dim: choice.held.get(dim, 0) for dim in other_axes(dataset, choice) if dim != choice.across}
-    places = {PLACE + dim: (dim, np.arange(dataset.sizes[dim])) for dim in wanted}
-    found = dataset.assign_coords(places).isel(held)
-    for dim, ends in wanted.items():
+    ranges = {along(dataset, choice.x): choice.x_range if choice.x in dataset.dims else None}
+    if choice.across:
+        ranges[choice.across] = choice.y_range
+    found = dataset.isel({dim: choice.held.get(dim, 0) for dim in other_axes(dataset, choice) if dim not in ranges})
+    for dim, ends in ranges.items():
         grid = coordinate(found[choice.output], dim).values
         if ends is not None and grid.dtype.kind in "fiu" and (np.diff(grid) > 0).all():
             first, last = np.searchsorted(grid, sorted(ends))
@@ -105,8 +99,9 @@ def shown(dataset: xr.Dataset, choice: Choice) -> View:
     SweepError
         The exponent is asked for along what is no positive axis.
     """
-    names = [choice.output, *([STATUS] if STATUS in dataset else [])]
-    found = view(part(dataset[names], choice), choice.output, choice.x)
+    columns = dataset[[choice.output, *([STATUS] if STATUS in dataset else [])]]
+    places = {PLACE + str(dim): (dim, np.arange(size)) for dim, size in columns.sizes.items()}
+    found = view(part(columns.assign_coords(places), choice), choice.output, choice.x)
     if not choice.exponent:
         return found
     if not found.joined:
@@ -114,57 +109,12 @@ def shown(dataset: xr.Dataset, choice: Choice) -> View:
     return replace(found, y=local_exponent(found.y, choice.x))
 
 
-def cell_numbers(grid: NDArray[Any], at: NDArray[np.float64]) -> NDArray[np.intp]:
-    """Which cell of a rising axis each of some points is in; -1 beside all of them."""
-    borders = edges(grid.astype(np.float64))
-    found = np.searchsorted(borders, at, side="right") - 1
-    return np.where((at < borders[0]) | (at > borders[-1]), -1, np.minimum(found, grid.size - 1))
-
-
-def nearest(found: View, x: float, y: float, logarithmic: tuple[bool, bool]) -> dict[str, int] | None:
-    """Where in the result the cell is that a point of the picture belongs to; None beside the map.
-
-    Parameters
-    ----------
-    logarithmic : two bool
-        How the axes of the picture are drawn; of lines the nearest point is taken as the eye sees it.
-    """
-    if found.mapped:
-        grids = (str(found.across), y), (found.x, x)
-        row, column = (int(cell_numbers(found.values(name), np.array([at]))[0]) for name, at in grids)
-        if min(row, column) < 0:
-            return None
-    else:
-        heights = np.atleast_2d(found.y.values)
-        beside = np.broadcast_to(_distance(found.values(found.x), x, logarithmic[0]), heights.shape)
-        if found.joined:  # above or below its point, a click means the nearest line
-            column = int(np.nanargmin(beside[0]))
-            off = np.full(heights.shape, np.nan)
-            off[:, column] = _distance(heights[:, column], y, logarithmic[1])
-        else:
-            off, column = np.hypot(beside, _distance(heights, y, logarithmic[1])), 0
-        best = int(np.nanargmin(off)) if np.isfinite(off).any() else column
-        row, column = divmod(best, heights.shape[1])
-    dims = {found.along: column, **({found.across: row} if found.across else {})}
-    return {dim: int(found.y[PLACE + dim].values[i]) for dim, i in dims.items()}
-
-
-def _distance(values: NDArray[Any], at: float, logarithmic: bool) -> NDArray[np.float64]:
-    """Distances as a picture shows them: shares of its width."""
-    with np.errstate(invalid="ignore", divide="ignore"):
-        numbers, place = (np.log(np.asarray(v, np.float64)) if logarithmic else np.asarray(v) for v in (values, at))
-    numbers = np.where(np.isfinite(numbers), numbers, np.nan)
-    width = np.nanmax(numbers) - np.nanmin(numbers) if np.isfinite(numbers).any() else 1.0
-    away: NDArray[np.float64] = abs(numbers - place) / (width or 1.0)
-    return away
-
-
 def row(dataset: xr.Dataset, places: Mapping[str, int]) -> list[tuple[str, ...]]:
     """All about one cell, of a trace at one place: name, value, unit, meaning; outputs first, then parameters."""
     cell = dataset.isel(places)
     single = cell[[name for name, column in cell.variables.items() if not column.dims]].load()
     rows: list[tuple[str, ...]] = []
-    for name in (name for name in (*single.data_vars, *single.coords) if not str(name).startswith(PLACE)):
+    for name in (*single.data_vars, *single.coords):
         column, value = single[name], single[name].item()
         text = flag_words(column).get(value) or (f"{value:.6g}" if column.dtype.kind == "f" else str(value))
         unit = str(column.attrs.get("units", ""))
@@ -185,20 +135,10 @@ def picture(dataset: xr.Dataset, choice: Choice) -> BytesIO:
 
 
 def table(dataset: xr.Dataset, choice: Choice) -> BytesIO:
-    """All outputs of the shown cells, every one of them, as csv. Raises SweepError where they are too many."""
-    count, cells = rows(dataset, choice), part(dataset, choice)
-    if count > MOST_ROWS:
-        raise SweepError(f"{count:,} cells are too many for a page; zoom in, or take sweep export, which has no limit")
-    dims = {along(dataset, choice.x), choice.across}
+    """All outputs of the shown cells, every one of them, as csv."""
+    cells, dims = part(dataset, choice), {along(dataset, choice.x), choice.across}
     cells = cells[[name for name, column in cells.data_vars.items() if set(column.dims) <= dims]]
-    cells = cells.drop_vars([name for name in cells.coords if str(name).startswith(PLACE)])
     return _bytes(".csv", lambda path: export(cells, path))
-
-
-def rows(dataset: xr.Dataset, choice: Choice) -> int:
-    """Lines that the table has."""
-    sizes = part(dataset, choice).sizes
-    return math.prod(sizes[dim] for dim in {along(dataset, choice.x), choice.across} if dim)
 
 
 def _bytes(suffix: str, write: Callable[[Path], Any]) -> BytesIO:
@@ -224,28 +164,28 @@ def study_text(dataset: xr.Dataset, choice: Choice) -> str:
     if study.design != "product":
         raise SweepError("only a product of axes has regions; this study is a list of cells")
     ranges = {choice.x: choice.x_range, choice.across: choice.y_range}
-    axes = {name: _narrowed(study, axis, ranges[name]) for name, axis in study.axes.items() if name in ranges}
-    held: dict[str, Any] = {}
+    axes: dict[str, Axis] = {}
+    fixed: dict[str, Any] = dict(study.fixed)
     for name, axis in study.axes.items():
-        if name not in axes:  # of methods the word, of parameters the number
-            place = choice.held.get(name, 0)
-            held[name] = axis.words[place] if axis.words and name in SETTINGS else axis.values[place]
-    settings = {name: held.pop(name) for name in SETTINGS if name in held}
+        if name in ranges:
+            axes[name] = _narrowed(study, axis, ranges[name])
+        else:  # of methods the word, of parameters the number
+            values = axis.words if axis.words and name in SETTINGS else axis.values
+            fixed[name] = values[choice.held.get(name, 0)]
+    settings: dict[str, Any] = {name: fixed.pop(name) for name in SETTINGS if name in fixed}
     question = f"{study.question or study.title}, in the region shown by sweep view"
-    fixed = {**study.fixed, **held}
     return to_toml(replace(study, question=question, axes=axes, fixed=fixed, summary=None, **settings))
 
 
 def _narrowed(study: Study, axis: Axis, wanted: Range | None) -> Axis:
     """The part of an axis within a range, with more points; words, whole numbers and lists of lists as they are."""
-    fields = {parameter.name: parameter for parameter in study.kernel.parameters}
     if axis.words is not None or axis.values.ndim > 1:
         return replace(axis, entry=None)
     low, high = float(axis.values.min()), float(axis.values.max())
     first, last = sorted(wanted) if wanted else (low, high)
     if first < high and last > low:  # what is shown beyond the last cell is nothing
         low, high = max(low, float(first)), min(high, float(last))
-    spec = fields.get(axis.name)
+    spec = next((parameter for parameter in study.kernel.parameters if parameter.name == axis.name), None)
     if low == high or (spec is not None and spec.integer):
         return replace(axis, entry=None, values=axis.values[(axis.values >= low) & (axis.values <= high)])
     spacing = "log" if is_logarithmic(axis.values) else "linear"
