@@ -9,7 +9,7 @@ import xarray as xr
 
 from sweep.errors import SweepError
 from sweep.laws.loglog import is_logarithmic
-from sweep.study import samples
+from sweep.study.designs import LEVELS, problem, require_salib
 from sweep.study.model import Study
 
 SEED = 1
@@ -71,12 +71,12 @@ def sensitivity(dataset: xr.Dataset, y: str | xr.DataArray) -> xr.Dataset:
     if lost:
         raise SweepError(f"{lost} of {values.size} cells have no value; make the ranges of the axes narrower")
 
-    samples.require_salib()
+    require_salib()
     from SALib.analyze import morris, sobol
 
-    problem = samples.problem(tuple(study.axes))
+    given = problem(tuple(study.axes))
     if study.design == "saltelli":
-        words, told = SOBOL, sobol.analyze(problem, values, calc_second_order=False, seed=SEED)
+        words, told = SOBOL, sobol.analyze(given, values, calc_second_order=False, seed=SEED)
     else:
         # where cells lie along each axis, from 0 to 1; only the order of neighbours counts
         columns = [dataset[name].values for name in study.axes]
@@ -84,6 +84,6 @@ def sensitivity(dataset: xr.Dataset, y: str | xr.DataArray) -> xr.Dataset:
         shares = np.stack([(column - column.min()) / (np.ptp(column) or 1.0) for column in columns], axis=1)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            words, told = MORRIS, morris.analyze(problem, shares, values, num_levels=samples.LEVELS, seed=SEED)
+            words, told = MORRIS, morris.analyze(given, shares, values, num_levels=LEVELS, seed=SEED)
     indices = {name: ("parameter", np.asarray(told[key], float), {"long_name": t}) for key, (name, t) in words.items()}
-    return xr.Dataset(indices, {"parameter": problem["names"]}, {"design": study.design})
+    return xr.Dataset(indices, {"parameter": given["names"]}, {"design": study.design})

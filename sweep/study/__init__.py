@@ -9,9 +9,9 @@ Others may use
     `units`          scale, exponents
     `toml`           to_toml: a study as the text of its file
     `condition`      Condition, cells_where, names_in: read by Python's grammar, never run by it
-    `samples`        what a sampled design is called, and its axes for SALib
+    `designs`        a sampled design's axes for SALib
 
-`entries` (what stands under a key), `designs`, `summary` and `spacing` are behind `read`.
+`values` (what stands under a key) and `summary` are behind `read`.
 The room itself may be called: `sweep.study(...)` is `sweep.study.read.study`.
 """
 

@@ -2,7 +2,7 @@
 
 design = "zip"
 
-design = { kind = "sobol", n = 1024, seed = 7 }           # or latin, random, saltelli, morris; axes without num
+design = { kind = "sobol", n = 1024, seed = 7 }           # axes without num
 
 [[blocks]]                                                # the grid is the product of all blocks
 design = "zip"
@@ -11,6 +11,16 @@ axes.R = [0.1, 0.3]
 
 [[blocks]]
 axes.seed = [1, 2, 3]
+
+Points of a sampled design are those of scipy.stats.qmc and SALib:
+
+| kind | points | what for |
+|---|---|---|
+| `sobol` | n, a power of 2 | Sobol' sequence: evenly spread in all dimensions together |
+| `latin` | n | Latin hypercube: evenly spread along each axis |
+| `random` | n | independent |
+| `saltelli` | n (d + 2), n a power of 2 | for Sobol' indices of d axes |
+| `morris` | n (d + 1) | n one-at-a-time trajectories, for Morris' elementary effects |
 """
 
 from __future__ import annotations
@@ -23,17 +33,19 @@ from typing import Any
 import numpy as np
 
 from kernels.interface import Field, Kernel
-from sweep.study import samples
-from sweep.study.entries import EXAMPLE, NONE, SAMPLED_EXAMPLE, axis
+from sweep.errors import missing
 from sweep.study.mistakes import Entry, one_of, show, whole
 from sweep.study.model import SETTINGS, SMALLEST_RTOL, Axis, Block, setting
-from sweep.study.spacing import LARGEST_AXIS
+from sweep.study.values import EXAMPLE, LARGEST_AXIS, NONE, SAMPLED_EXAMPLE, Floats, axis
 from sweep.words import listed, nearest
 
 PLAIN = ("product", "zip")
-DESIGNS = (*PLAIN, *samples.GENERATORS)
+GENERATORS = ("sobol", "latin", "random", "saltelli", "morris")
+DESIGNS = (*PLAIN, *GENERATORS)
+SCRAMBLED = ("sobol", "latin", "saltelli")
 LARGEST_GRID = 10**12
-LARGEST_SEED = 2**32 - 1
+LEVELS = 4
+"""Values that a Morris trajectory may take along each axis."""
 
 
 def read_designs(keys: Entry, kernel: Kernel) -> tuple[str, dict[str, Axis], tuple[Block, ...]]:
@@ -84,9 +96,9 @@ def _block(keys: Entry, kernel: Kernel) -> tuple[dict[str, Axis], Block]:
     if not given.value and given.good():
         given.wrong(f"missing; give at least one, e.g. axes.mu = {EXAMPLE}")
     design, options = _design(keys["design"], len(given.value)) if "design" in keys else ("product", {})
-    sampled, shares = design in samples.GENERATORS, np.full((len(given.value), 1), 0.5)
+    sampled, shares = design in GENERATORS, np.full((len(given.value), 1), 0.5)
     if options and given.value:  # else anywhere: the design has a mistake
-        shares = keys["design"].read(shares, lambda _: samples.unit_points(design, len(given.value), **options).T)
+        shares = keys["design"].read(shares, lambda _: _unit_points(design, len(given.value), **options).T)
     axes: dict[str, Axis] = {}
     for name, own in zip(given.value, shares, strict=True):
         entry = given[name]
@@ -118,26 +130,60 @@ def _design(entry: Entry, axes: int) -> tuple[str, dict[str, Any]]:
     """Name and options of a design; no options of one that has a mistake."""
     if not isinstance(entry.value, Mapping):
         design = entry.read("", one_of, DESIGNS)
-        if design in samples.GENERATORS:
+        if design in GENERATORS:
             entry.wrong(f'how many points? Write design = {{ kind = "{design}", n = 1024, seed = 0 }}')
         return design, {}
-    kind, before = entry["kind"], len(entry.mistakes)
-    known = kind.value if isinstance(kind.value, str) and kind.value in DESIGNS else ""
-    # scramble is no mistake where the kind is
-    scrambled = known in samples.SCRAMBLED or not known
-    entry = entry.keys("kind", *["n", "seed"] * (known not in PLAIN), *["scramble"] * scrambled)
+    before, kind = len(entry.mistakes), str(entry["kind"].value)
+    design = kind if kind in DESIGNS else ""
+    # an option is no mistake where the kind is
+    scrambled = design in SCRAMBLED or not design
+    entry = entry.keys("kind", *["n", "seed"] * (design not in PLAIN), *["scramble"] * scrambled)
     design = entry["kind"].read("", one_of, DESIGNS)
     if design in PLAIN or not design:
         return design, {}
     n = entry["n"].read(2, whole, 2, LARGEST_AXIS)
-    options = {"n": n, "seed": entry["seed"].read(0, whole, 0, LARGEST_SEED) if "seed" in entry else 0}
-    if design in samples.POWERS_OF_TWO and n & (n - 1):
+    options = {"n": n, "seed": entry["seed"].read(0, whole, 0, 2**32 - 1) if "seed" in entry else 0}
+    if design in ("sobol", "saltelli") and n & (n - 1):
         lower = 1 << (n.bit_length() - 1)
         entry["n"].wrong(f"a Sobol' sequence needs a power of 2; write {lower} or {2 * lower}")
-    if (points := samples.count(design, axes, n)) > LARGEST_AXIS:
+    if (points := n * {"saltelli": axes + 2, "morris": axes + 1}.get(design, 1)) > LARGEST_AXIS:
         entry["n"].wrong(f"makes {points:,} points; expected at most {LARGEST_AXIS:,}")
     if scrambled:
         options["scramble"] = entry["scramble"].value if "scramble" in entry else True
         if not isinstance(options["scramble"], bool):
             entry["scramble"].wrong(f"expected true or false, found {show(options['scramble'])}")
     return design, options if len(entry.mistakes) == before else {}
+
+
+def _unit_points(design: str, axes: int, n: int, seed: int, scramble: bool = True) -> Floats:
+    """The points of a design, shape (points, axes), from 0 to 1. Raises SweepError where a package is missing."""
+    if design == "random":
+        return np.random.default_rng(seed).random((n, axes))
+    if design in ("sobol", "latin"):
+        from scipy.stats import qmc
+
+        generator = qmc.Sobol if design == "sobol" else qmc.LatinHypercube
+        points = generator(axes, scramble=scramble, rng=np.random.default_rng(seed)).random(n)
+    else:
+        require_salib()
+        from SALib.sample import morris, sobol
+
+        given = problem(tuple(map(str, range(axes))))
+        if design == "saltelli":
+            points = sobol.sample(given, n, calc_second_order=False, scramble=scramble, seed=seed)
+        else:
+            points = morris.sample(given, n, num_levels=LEVELS, seed=seed)
+    return np.ascontiguousarray(points, np.float64)
+
+
+def problem(names: tuple[str, ...]) -> dict[str, Any]:
+    """Axes from 0 to 1, as SALib wants them."""
+    return {"num_vars": len(names), "names": list(names), "bounds": [[0.0, 1.0]] * len(names)}
+
+
+def require_salib() -> None:
+    """Raises SweepError where SALib is missing."""
+    try:
+        import SALib  # noqa: F401
+    except ImportError:
+        raise missing("needs the package SALib", "sensitivity") from None

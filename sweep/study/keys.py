@@ -15,12 +15,11 @@ from kernels.interface import Field, Kernel
 from sweep.errors import StudyError
 from sweep.study.condition import cells_where
 from sweep.study.designs import field_of, read_designs
-from sweep.study.entries import axis, quantity
 from sweep.study.kernel_lookup import load_kernel
 from sweep.study.mistakes import Entry, Mistakes, exact_float, limits, one_of, text
 from sweep.study.model import SETTINGS, SMALLEST_RTOL, Axis, Block, Study, differs, frozen, setting
-from sweep.study.spacing import Floats
 from sweep.study.summary import read_summary
+from sweep.study.values import Floats, axis, quantity
 from sweep.words import listed, nearest
 
 KEYS = (

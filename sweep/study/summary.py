@@ -18,10 +18,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from kernels.interface import Field
-from sweep.study.entries import axis
 from sweep.study.mistakes import Entry
 from sweep.study.model import Axis, Summary
-from sweep.study.spacing import Floats
+from sweep.study.values import Floats, axis
 from sweep.words import did_you_mean, listed, nearest
 
 REDUCTIONS = ("min", "max", "mean", "argmin", "argmax", "histogram")

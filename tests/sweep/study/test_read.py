@@ -13,8 +13,8 @@ from toy_studies import build, build_rich, message_of
 import sweep
 from kernels import catalogue
 from kernels.interface import FIRST_REFUSAL, Field
+from sweep.study.designs import GENERATORS
 from sweep.study.kernel_lookup import load_kernel
-from sweep.study.samples import GENERATORS
 
 MASS = [0.1, 0.2, 0.7]
 

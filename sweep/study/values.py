@@ -1,32 +1,42 @@
-"""One entry of a study: a quantity, or the values of an axis or coordinate, brought to the unit of its field.
+"""Numbers of a study in the unit of their field: a quantity, or the values of an axis or coordinate.
 
-What is wrong goes to the entry's mistakes, and NaN or no values come back.
+Spacing and units are computed in decimals of 50 digits and rounded once, so that a value is the float64 nearest to
+what the study says (0.3, 0.001, the endpoints), on every machine. What is wrong goes to the entry's mistakes, and NaN
+or no values come back.
 """
 
 from __future__ import annotations
 
+import csv
+import itertools
 import math
-from collections.abc import Callable, Mapping, Sequence
+import operator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from decimal import Decimal
+from decimal import Context, Decimal, localcontext
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kernels.interface import Field
 from sweep.errors import Mistake
 from sweep.study.mistakes import Entry, exact_float, finite, limits, one_of, show, text, whole
 from sweep.study.model import Axis, frozen
-from sweep.study.spacing import LARGEST_AXIS, MOST_BAD_VALUES, SPACINGS, Floats, read_columns, scaled, spaced
 from sweep.study.units import scale
 from sweep.words import listed, quoted
 
+LARGEST_AXIS = 10_000_000
+DIGITS = Context(prec=50)
+MOST_BAD_VALUES = 3
+"""Bad values reported of one list or file."""
 KEPT: dict[str, Callable[[Any], Any]] = {"spacing": str, "unit": str, "num": int, "start": float, "stop": float}
 """What a study keeps of an axis that it does not list: words as they are, numbers as float64."""
 ENDS = ("start", "stop", "num")
 SAMPLED_EXAMPLE = '{ spacing = "log", start = 0.1, stop = 10 }'
 EXAMPLE = '{ spacing = "log", start = 0.1, stop = 10, num = 21 }'
+Floats = NDArray[np.float64]
 NONE: Floats = np.empty(0)
 """Values of an axis that has a mistake."""
 
@@ -38,18 +48,18 @@ def quantity(entry: Entry, field: Field) -> float | Floats:
     """
     array, given, factor = bool(field.dims), entry, None
     if isinstance(entry.value, Mapping):
-        entry = entry.keys("value", "file", "unit") if array else entry.keys("value", "unit")
+        entry = entry.keys("value", "unit", *["file"] * array)
         given, factor = entry["value"], _factor(entry, field)
         if array and "file" in entry:
             if "value" in entry:
                 entry.wrong("value and file exclude each other; keep one")
-            return frozen(scaled(_columns(entry["file"], field, numbered=False), factor))
-    if array and isinstance(given.value, list | tuple | np.ndarray):
-        return frozen(scaled(_list(given, field), factor))
-    if isinstance(given.value, list | tuple):
+            return frozen(_scaled(entry["file"].read(NONE, _columns, entry.folder, field, False), factor))
+    if isinstance(given.value, list | tuple | np.ndarray):
+        if array:
+            return frozen(_scaled(_list(given, field), factor))
         given.wrong(f"expected a number, found a list; to sweep it, write it under [axes.{field.name}]")
         return math.nan
-    return float(scaled(np.array([given.read(math.nan, _number, field)]), factor)[0])
+    return float(_scaled(np.array([given.read(math.nan, _number, field)]), factor)[0])
 
 
 def axis(entry: Entry, field: Field, shares: Floats | None = None) -> Axis:
@@ -80,9 +90,9 @@ def axis(entry: Entry, field: Field, shares: Floats | None = None) -> Axis:
     elif form == "spacing":
         values = _spaced(entry, field, factor, shares)
     elif form == "values":
-        values = scaled((_rows if array else _list)(listing, field), factor)
+        values = _scaled((_rows if array else _list)(listing, field), factor)
     elif form == "file":
-        values = scaled(_columns(entry["file"], field, numbered=array), factor)
+        values = _scaled(entry["file"].read(NONE, _columns, entry.folder, field, array), factor)
     for key in (key for key in ends if key in entry and form in ("values", "file")):
         entry[key].wrong(f"does not go with {form}; leave it out")
     if form == "spacing" and len(values):
@@ -93,7 +103,7 @@ def axis(entry: Entry, field: Field, shares: Floats | None = None) -> Axis:
 
 
 def _factor(entry: Entry, field: Field) -> Decimal | None:
-    """What the numbers of an entry are multiplied by, to be in the field's unit."""
+    """What the numbers of an entry are multiplied by, to be in the field's unit; None: they are in it."""
 
     def factor(value: Any) -> Decimal | None:
         unit = text(value)
@@ -104,13 +114,26 @@ def _factor(entry: Entry, field: Field) -> Decimal | None:
     return entry["unit"].read(None, factor) if "unit" in entry else None
 
 
+def _scaled(values: Floats, factor: Decimal | None) -> Floats:
+    """`values` times `factor`, each rounded once."""
+    if factor is None:
+        return values
+    with localcontext(DIGITS):
+        return np.array([float(_decimal(v) * factor) for v in values.ravel().tolist()]).reshape(values.shape)
+
+
+def _decimal(value: float) -> Decimal:
+    """The shortest decimal that is this float64: what the user wrote."""
+    return Decimal(repr(value))
+
+
 def _spaced(entry: Entry, field: Field, factor: Decimal | None, shares: Floats | None) -> Floats:
-    """Values between start and stop: `num` of them, or at the shares of a sampled design."""
+    """Values between start and stop, with equal differences or ratios: `num`, or at the shares of a sampled design."""
     before, spacing, found = len(entry.mistakes), None, {"start": 1.0, "stop": 2.0, "num": math.inf}
     if field.choices:
         entry.wrong(f"{field.name} takes words; write e.g. values = [{quoted(field.choices)}]")
     elif "spacing" in entry:
-        spacing = entry["spacing"].read(None, one_of, SPACINGS)
+        spacing = entry["spacing"].read(None, one_of, ("linear", "log"))
     else:
         entry["spacing"].wrong('missing; write spacing = "linear" or "log"')
     for key in ENDS if shares is None else ENDS[:2]:
@@ -128,7 +151,21 @@ def _spaced(entry: Entry, field: Field, factor: Decimal | None, shares: Floats |
         entry["stop"].wrong(f"equals start; for a single value write values = [{start:g}]")
     if spacing is None or len(entry.mistakes) > before:
         return NONE
-    values = spaced(spacing, start, stop, int(num) if shares is None else shares, factor)
+    decimals: Iterable[Decimal]
+    with localcontext(DIGITS):
+        first, last = (_decimal(end) * (factor or 1) for end in (start, stop))
+        steps = 0 if shares is not None else int(num) - 1
+        if shares is not None and spacing == "linear":
+            decimals = (first + (last - first) * Decimal(share) for share in shares.tolist())
+        elif shares is not None:
+            logarithm = (last / first).ln()
+            decimals = (first * (Decimal(share) * logarithm).exp() for share in shares.tolist())
+        elif spacing == "linear":
+            decimals = ((first * (steps - i) + last * i) / steps for i in range(steps + 1))
+        else:
+            ratios = itertools.repeat((last / first) ** (1 / Decimal(steps)), steps - 1)
+            decimals = itertools.chain(itertools.accumulate(ratios, operator.mul, initial=first), [last])
+        values = np.fromiter(map(float, decimals), np.float64)
     if np.isfinite(values).all() and (spacing == "linear" or values.all()):
         return values
     entry.wrong(f"{start:g} to {stop:g} leaves the range of float64 once converted to the kernel's unit")
@@ -173,36 +210,65 @@ def _rows(entry: Entry, field: Field) -> Floats:
 def _allowed_length(entry: Entry) -> bool:
     length = len(entry.value)
     if not 0 < length <= LARGEST_AXIS:
-        entry.wrong(
-            f"expected at most {LARGEST_AXIS} values, found {length}" if length else "has no values; give at least one"
-        )
+        many = f"expected at most {LARGEST_AXIS} values, found {length}"
+        entry.wrong(many if length else "has no values; give at least one")
     return 0 < length <= LARGEST_AXIS
 
 
-def _columns(entry: Entry, field: Field, numbered: bool) -> Floats:
-    """A column of a csv file, or those that are `numbered`: a row for each value of the axis.
+def _columns(file: Any, folder: Path, field: Field, numbered: bool) -> Floats:
+    """Numbers of a csv file: of the column of the field's name, or the only one; `numbered`: of name_1, name_2, ...
 
-    A text names a file in the study's folder or below; a `Path`, which a study file cannot hold, any.
+    A text names a file in the study's folder or below; a `Path`, which a study file cannot hold, any. Empty lines and
+    lines that start with "#" are left out. Raises ValueError with the text for the user.
     """
+    if not isinstance(file, str | Path):
+        raise ValueError(f'expected the name of a csv file, found {show(file)}; write e.g. "points.csv"')
+    path, name, values, bad = folder / file, field.name, list[list[float]](), list[str]()
+    try:
+        if isinstance(file, str) and not path.resolve().is_relative_to(folder.resolve()):
+            raise OSError(None, "it is outside of the study's folder; put a copy beside it")
+        if path.exists() and not path.is_file():
+            raise OSError(None, "it is no regular file")
+        with path.open(newline="", encoding="utf-8-sig") as lines:
+            # a comment becomes an empty line before csv sees it, since a quotation mark in it would open a field
+            reader = csv.reader(("\n" if line.startswith("#") else line for line in lines), skipinitialspace=True)
+            stripped = ([cell.strip() for cell in row] for row in reader)
+            rows: Iterator[list[str]] = (row for row in stripped if any(row))
+            headings = next(rows, [])
+            names = [f"{name}_{i + 1}" for i in range(len(headings))] if numbered else [name]
+            places = [headings.index(n) for n in itertools.takewhile(headings.__contains__, names)]
+            if not places and (numbered or len(headings) > 1):
+                columns = f"columns {name}_1, {name}_2, ..." if numbered else f'column "{name}"'
+                raise ValueError(f"{path} has no {columns}; its first line is {','.join(headings)[:60]}")
+            if headings and not places:  # a column of numbers alone
+                rows, places = itertools.chain([headings], rows), [0]
+            # one value too many suffices to know that there are too many
+            for row in itertools.islice(rows, LARGEST_AXIS + 1):
+                line = f"line {reader.line_num}: "
+                if len(row) != len(headings):
+                    raise ValueError(f"{path}, {line}expected {len(headings)} columns, found {len(row)}")
+                try:
+                    values.append([_written(row[place], field) for place in places])
+                except ValueError as error:
+                    bad.append(f"{line}{error}")
+    except (OSError, RuntimeError) as error:  # a link to itself is a RuntimeError
+        raise ValueError(f"{path} cannot be read: {getattr(error, 'strerror', error)}") from None
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise ValueError(f"{path} is not a csv file: {error}") from None
+    if bad:
+        more = "; and more like these" * (len(bad) > MOST_BAD_VALUES)
+        raise ValueError(f"{path}, {'; '.join(bad[:MOST_BAD_VALUES])}{more}")
+    if not 0 < len(values) <= LARGEST_AXIS:
+        raise ValueError(f"expected at most {LARGEST_AXIS} values, found more" if values else f"{path} holds no values")
+    return np.array(values) if numbered else np.array(values)[:, 0]
 
-    def number(text: str) -> float:
-        try:
-            return _number(text, field) if field.choices else float("" if "_" in text else text)  # 1_0 is Python's
-        except ValueError:
-            raise ValueError(f"expected {limits(field) if field.choices else 'a number'}, found {show(text)}") from None
 
-    def columns(name: Any) -> Floats:
-        if not isinstance(name, str | Path):
-            raise ValueError(f'expected the name of a csv file, found {show(name)}; write e.g. "points.csv"')
-        try:
-            inside = (entry.folder / name).resolve().is_relative_to(entry.folder.resolve())
-        except (OSError, RuntimeError, ValueError) as error:
-            raise ValueError(f"{show(name)} cannot be read: {getattr(error, 'strerror', None) or error}") from None
-        if isinstance(name, str) and not inside:
-            raise ValueError(f"{show(name)} cannot be read: it is outside of the study's folder; put a copy beside it")
-        return read_columns(entry.folder / name, field.name, numbered, number)
-
-    return entry.read(NONE, columns)
+def _written(found: str, field: Field) -> float:
+    """The number of a text in a csv file."""
+    try:
+        return _number(found, field) if field.choices else float("" if "_" in found else found)  # 1_0 is Python's
+    except ValueError:
+        raise ValueError(f"expected {limits(field) if field.choices else 'a number'}, found {show(found)}") from None
 
 
 def _number(found: Any, field: Field) -> float:
