@@ -1,57 +1,49 @@
 """The sweep engine: a study in, an xarray Dataset in an HDF5 file out."""
 
-from __future__ import annotations
-
-import re
 from importlib import import_module
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from sweep.errors import StudyError as StudyError
-    from sweep.errors import SweepError as SweepError
-    from sweep.explore.join import join as join
-    from sweep.explore.plan import plan as plan
-    from sweep.explore.refine import refine as refine
-    from sweep.explore.scaling import scaling as scaling
-    from sweep.explore.scattered import interpolated as interpolated
-    from sweep.explore.sensitivity import sensitivity as sensitivity
-    from sweep.explore.solver import solver as solver
-    from sweep.explore.work_precision import work_precision as work_precision
-    from sweep.file.open import open_result as open_result
-    from sweep.file.verify import verify as verify
-    from sweep.laws.asymptote import fit_correction as fit_correction
-    from sweep.laws.collapse import fit_collapse as fit_collapse
-    from sweep.laws.compare import compare_laws as compare_laws
-    from sweep.laws.exponents import exponent_map as exponent_map
-    from sweep.laws.exponents import local_exponent as local_exponent
-    from sweep.laws.exponents import where_exponent as where_exponent
-    from sweep.laws.lines import fit_exponent as fit_exponent
-    from sweep.laws.two_laws import fit_two_laws as fit_two_laws
-    from sweep.results.diff import diff as diff
-    from sweep.results.export import export as export
-    from sweep.results.filter import where as where
-    from sweep.results.listing import list_results as list_results
-    from sweep.results.units import in_units as in_units
-    from sweep.runs.run import run as run
-    from sweep.show.charts import plot as plot
-    from sweep.show.kernels import kernels as kernels
-    from sweep.study.toml import to_toml as to_toml
-
-_HOMES = {"study": "sweep.study"} | {
-    name: home
-    for home, name in re.findall(r"^    from ([\w.]+) import (\w+) as", Path(__file__).read_text(), re.MULTILINE)
+_MODULES = {
+    "study": "study",
+    "StudyError": "errors",
+    "SweepError": "errors",
+    "join": "explore.join",
+    "plan": "explore.plan",
+    "refine": "explore.refine",
+    "scaling": "explore.scaling",
+    "interpolated": "explore.scattered",
+    "sensitivity": "explore.sensitivity",
+    "solver": "explore.solver",
+    "work_precision": "explore.work_precision",
+    "open_result": "file.open",
+    "verify": "file.verify",
+    "fit_correction": "laws.asymptote",
+    "fit_collapse": "laws.collapse",
+    "compare_laws": "laws.compare",
+    "exponent_map": "laws.exponents",
+    "local_exponent": "laws.exponents",
+    "where_exponent": "laws.exponents",
+    "fit_exponent": "laws.lines",
+    "fit_two_laws": "laws.two_laws",
+    "diff": "results.diff",
+    "export": "results.export",
+    "where": "results.filter",
+    "list_results": "results.listing",
+    "in_units": "results.units",
+    "run": "runs.run",
+    "plot": "show.charts",
+    "kernels": "show.kernels",
+    "to_toml": "study.toml",
 }
-"""Public names and the modules they live in: the lines above, which only type checkers run; a module is imported when
-one of its names is first used."""
+"""Public names and the modules they live in, each imported when one of its names is first used."""
 _WITHOUT_DATASETS = {"study", "to_toml", "plan", "kernels", "solver", "StudyError", "SweepError"}
 """Names that take and give no Dataset; with any other one xarray is needed, and Datasets get `ds.sweep`."""
 
-__all__ = list(_HOMES)
+__all__ = [*_MODULES]
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
+    if name not in _MODULES:
         raise AttributeError(f"module 'sweep' has no attribute {name!r}")
     if name not in _WITHOUT_DATASETS:
         import_module("sweep.show.accessor")
@@ -59,9 +51,10 @@ def __getattr__(name: str) -> Any:
     import_module("sweep.study.model").Study._repr_html_ = lambda study: import_module(
         "sweep.show.notebook"
     ).study_html(study)
+    module = import_module(f"sweep.{_MODULES[name]}")
     # the room of that name is the function as well, and stays what `sweep.study.read` and its like begin with
-    return import_module("sweep.study") if name == "study" else getattr(import_module(_HOMES[name]), name)
+    return module if name == "study" else getattr(module, name)
 
 
 def __dir__() -> list[str]:
-    return sorted(_HOMES)
+    return sorted(_MODULES)

@@ -13,8 +13,7 @@ from collections.abc import Sequence
 
 from sweep.command import look, solve
 from sweep.command.options import command, option
-from sweep.command.outcome import Outcome, explained
-from sweep.command.reading import say
+from sweep.command.reading import Outcome, explained, say
 from sweep.errors import COMPLETE, EXIT_CODES, missing
 
 

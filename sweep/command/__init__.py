@@ -2,8 +2,8 @@
 
 Others may use
     `options`         Command: how a command is declared; none overwrites a file without --force
-    `outcome`         Outcome, explained: how it ended
+    `reading`         what commands open and check; Outcome, explained: how one ended
     `solve`, `look`   the commands themselves: those that solve cells, and those that do not
 
-`reading` opens and checks what commands read. A further command is a function that `sweep.cli` names.
+A further command is a function that `sweep.cli` names.
 """

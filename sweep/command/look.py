@@ -13,8 +13,7 @@ from pathlib import Path
 import sweep
 from sweep.command import options as o
 from sweep.command.options import command, option, switch
-from sweep.command.outcome import DIFFERENT, Outcome
-from sweep.command.reading import opened, say, tell
+from sweep.command.reading import DIFFERENT, Outcome, opened, say, tell
 from sweep.errors import COMPLETE, SweepError
 
 

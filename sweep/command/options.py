@@ -8,8 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from sweep.command.outcome import Outcome
-from sweep.command.reading import say
+from sweep.command.reading import Outcome, say
 
 Function = Callable[[argparse.Namespace], Outcome | None]
 

@@ -1,4 +1,4 @@
-"""What commands read, opened and checked; and what they say, to people or with --json to programs."""
+"""What commands read, opened and checked; what they say, to people or with --json to programs; how they end."""
 
 from __future__ import annotations
 
@@ -11,15 +11,42 @@ import math
 import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, Any, NamedTuple, TextIO
 
 import sweep
-from sweep.errors import SweepError
+from sweep.errors import FAULT, INCOMPLETE, INTERRUPTED, MISTAKE, Incomplete, SweepError
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from sweep.study.model import Study
+
+DIFFERENT = 1
+"""Exit status of commands that compare, as `diff` of files says it."""
+
+
+class Outcome(NamedTuple):
+    """How a command ended: its exit status, and what is said of it."""
+
+    code: int
+    text: str
+
+
+def explained(error: BaseException) -> Outcome:
+    """The exit status and the message of a fault."""
+    match error:
+        case SweepError():
+            return Outcome(INCOMPLETE if isinstance(error, Incomplete) else MISTAKE, str(error))
+        case KeyboardInterrupt():
+            return Outcome(INTERRUPTED, "stopped")
+        case SystemExit(code=code):
+            return Outcome(code if isinstance(code, int) else FAULT, "stopped")
+        case MemoryError():
+            return Outcome(MISTAKE, "out of memory; choose fewer cells, fewer outputs or fewer workers")
+        case OSError():
+            return Outcome(MISTAKE, f"{error.filename or 'the system'}: {error.strerror or error}")
+    said = "Please report it; with SWEEP_TRACEBACK=1 in the environment the same command says where."
+    return Outcome(FAULT, f"a fault in foliot: {type(error).__name__}: {error}\n{said}")
 
 
 def study_from(arguments: argparse.Namespace, given: Any = None) -> Study:
@@ -39,25 +66,26 @@ def solving(arguments: argparse.Namespace, study: Study) -> dict[str, Any]:
 @contextlib.contextmanager
 def opened(arguments: argparse.Namespace, name: str = "result") -> Iterator[xr.Dataset]:
     """A result that is named, with --at, --where and --unit; one that is not complete where the command takes it."""
-    path: Path = getattr(arguments, name)
+    options = vars(arguments)
+    path: Path = options[name]
     if path.suffix == ".toml":
         raise SweepError(f"{path} is a study, not a result; compute it with: sweep run {path}")
     if not path.exists() and path.with_name(path.name + ".unfinished").exists():
         say(f"{path}: unfinished; cells that are not computed yet are NaN and PENDING", file=sys.stderr)
     with sweep.open_result(path) as found:
-        if "end" not in found.attrs and not getattr(arguments, "unfinished", True):
+        if "end" not in found.attrs and not options.get("unfinished", True):
             raise SweepError(f"{path}: unfinished; continue it with sweep run, or take what there is with --unfinished")
-        if getattr(arguments, "at", None):
+        if options.get("at"):
             from sweep.show.laws import pick
 
             found = pick(found, arguments.at)
-        if getattr(arguments, "where", None):
+        if options.get("where"):
             found = sweep.where(found, arguments.where)
-        pairs = [text.partition("=") for text in getattr(arguments, "unit", ())]
-        for pair in pairs:
+        units = {text: text.partition("=") for text in options.get("unit", ())}
+        for text, pair in units.items():
             if not all(pair):
-                raise SweepError(f'--unit: expected NAME=UNIT, found "{"".join(pair)}"; write e.g. --unit A0=degree')
-        yield sweep.in_units(found, {name: unit for name, _, unit in pairs}) if pairs else found
+                raise SweepError(f'--unit: expected NAME=UNIT, found "{text}"; write e.g. --unit A0=degree')
+        yield sweep.in_units(found, {name: unit for name, _, unit in units.values()}) if units else found
 
 
 def say(text: object, file: TextIO | None = None) -> None:
@@ -79,18 +107,15 @@ def plain(value: Any) -> Any:
     """A finding as JSON has it: records and Datasets are objects, statuses words, and what is not finite null."""
     if isinstance(value, enum.Enum):
         return value.name
-    if value is None or isinstance(value, str | bool | int):
-        return value
     if isinstance(value, float):
         return value if math.isfinite(value) else None
-    if hasattr(value, "to_dict"):
-        return plain(value.to_dict())
-    if hasattr(value, "tolist"):
-        return plain(value.tolist())
+    if value is None or isinstance(value, str | bool | int):
+        return value
+    for method in ("to_dict", "tolist", "_asdict"):
+        if hasattr(value, method):
+            return plain(getattr(value, method)())
     if dataclasses.is_dataclass(value):
-        return {field.name: plain(getattr(value, field.name)) for field in dataclasses.fields(value)}
-    if hasattr(value, "_asdict"):
-        return plain(value._asdict())
+        value = {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
     if isinstance(value, Mapping):
         return {str(name): plain(one) for name, one in value.items()}
     return [plain(one) for one in value] if isinstance(value, list | tuple | set) else str(value)

@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING
 import sweep
 from sweep.command import options as o
 from sweep.command.options import command, option, switch
-from sweep.command.outcome import DIFFERENT, Outcome, explained
-from sweep.command.reading import opened, say, solving, study_from, tell
+from sweep.command.reading import DIFFERENT, Outcome, explained, opened, say, solving, study_from, tell
 from sweep.errors import CELLS_FAILED, COMPLETE, EXIT_CODES, INCOMPLETE, SweepError
 
 if TYPE_CHECKING:

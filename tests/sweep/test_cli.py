@@ -16,7 +16,7 @@ import xarray as xr
 
 import sweep
 from sweep import cli
-from sweep.command.outcome import explained
+from sweep.command.reading import explained
 from sweep.errors import SweepError
 
 STUDY = """# How fast does a stone fall?

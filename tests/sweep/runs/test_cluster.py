@@ -14,7 +14,7 @@ from running import kept, quiet, same, tall
 
 import sweep
 from sweep.cli import main
-from sweep.command.outcome import explained
+from sweep.command.reading import explained
 from sweep.errors import INCOMPLETE, SweepError
 from sweep.results.statuses import account
 
