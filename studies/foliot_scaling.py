@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -54,16 +53,6 @@ DAY = 24 * 60.0
 """Minutes in a day."""
 
 
-@dataclass(frozen=True)
-class HalfPoint:
-    """The drive at which the exponent of the period is -1/2."""
-
-    alpha: float
-    error: float
-    aP: float
-    A: float
-
-
 def scaled(ds: xr.Dataset) -> xr.Dataset:
     """`ds` with its dimensionless groups: coordinate `alpha`, variables `aP`, `A` and `s`."""
     ds = ds.assign_coords(alpha=ds.mu / (ds.a**2 * ds.phi0))
@@ -82,13 +71,12 @@ def sweep_of_alpha(ds: xr.Dataset, alpha: Iterable[float], method: str = "closed
     return scaled(sweep.run(study))
 
 
-def half_point(ds: xr.Dataset) -> HalfPoint:
+def half_point(ds: xr.Dataset) -> xr.Dataset:
     """Where s = 1/2, bracketed on the sweep and refined by a sweep of its neighbourhood."""
     near = float(sweep.where_exponent(ds.s, "alpha", 0.5, values=True).abscissa)
     close = sweep_of_alpha(ds, near * np.geomspace(0.99, 1.01, 21))
     found = sweep.where_exponent(close.s, "alpha", 0.5, values=True)
-    there = sweep_of_alpha(ds, [float(found.abscissa)]).isel(mu=0)
-    return HalfPoint(float(there.alpha), float(found.abscissa_error), float(there.aP), float(there.A))
+    return sweep_of_alpha(ds, [float(found.abscissa)]).isel(mu=0)
 
 
 def limits(ds: xr.Dataset) -> list[Statement]:
@@ -96,24 +84,13 @@ def limits(ds: xr.Dataset) -> list[Statement]:
     first, last = ds.isel(mu=0), ds.isel(mu=-1)
     weak, strong = float(first.alpha), float(last.alpha)
     b2 = (3 / strong) ** (2 / 3)  # square of the strong drive's small parameter
-    ends = f"alpha = {weak:.2g}", f"alpha = {strong:.2g}"
+    at_weak, at_strong = f"alpha = {weak:.2g}", f"alpha = {strong:.2g}"
+    third, period, swing = strong ** (1 / 3), f"4 3^(1/3) = {STRONG_P:.5f} *", f"3^(2/3)/2 = {STRONG_A:.5f} *"
     return [
-        compared(f"weak drive: a P alpha at {ends[0]}", "4 *", float(first.aP) * weak, 4.0, 1.01 * weak),
-        compared(f"weak drive: A at {ends[0]}", "1 *", float(first.A), 1.0, 0.31 * weak),
-        compared(
-            f"strong drive: a P alpha^(1/3) at {ends[1]}",
-            f"4 3^(1/3) = {STRONG_P:.5f} *",
-            float(last.aP) * strong ** (1 / 3),
-            STRONG_P,
-            0.14 * b2,
-        ),
-        compared(
-            f"strong drive: A alpha^(-1/3) at {ends[1]}",
-            f"3^(2/3)/2 = {STRONG_A:.5f} *",
-            float(last.A) / strong ** (1 / 3),
-            STRONG_A,
-            0.11 * b2,
-        ),
+        compared(f"weak drive: a P alpha at {at_weak}", "4 *", float(first.aP) * weak, 4.0, 1.01 * weak),
+        compared(f"weak drive: A at {at_weak}", "1 *", float(first.A), 1.0, 0.31 * weak),
+        compared(f"strong drive: a P alpha^(1/3) at {at_strong}", period, float(last.aP) * third, STRONG_P, 0.14 * b2),
+        compared(f"strong drive: A alpha^(-1/3) at {at_strong}", swing, float(last.A) / third, STRONG_A, 0.11 * b2),
     ]
 
 
@@ -141,7 +118,7 @@ def _curvature(fit: xr.Dataset, limit: float) -> float:
     return float(fit.high) if limit in (-1.0, 0.0) else 4 / 45 * (3 / float(fit.low)) ** (2 / 3)
 
 
-def sliding(ds: xr.Dataset, half: HalfPoint) -> list[Statement]:
+def sliding(ds: xr.Dataset, half: xr.Dataset) -> list[Statement]:
     """What becomes of the exponent in between."""
     slope = sweep.local_exponent(ds.aP, "alpha")
     rough = float(np.diff(np.log(ds.alpha)).max() ** 4)  # differences are of fourth order
@@ -150,7 +127,7 @@ def sliding(ds: xr.Dataset, half: HalfPoint) -> list[Statement]:
     by_period = sweep.where_exponent(ds.aP, "alpha", -0.5)
     place, error = float(by_period.abscissa), float(by_period.abscissa_error)
     apart, near = float(abs(slope + ds.s).max()), float((abs(slope + 0.5) < 0.01).mean())
-    off, found = place / HALF[0] - 1, (half.alpha, half.aP, half.A)
+    off, found = place / HALF[0] - 1, (float(half.alpha), float(half.aP), float(half.A))
     names = "at alpha, from the exact s", "a P there", "A there"
     read, roup = "read off a figure", "exponent -1/2 (Roup et al. and Denny: at all torques)"
     return [
@@ -166,13 +143,19 @@ def sliding(ds: xr.Dataset, half: HalfPoint) -> list[Statement]:
     ]  # fmt: skip
 
 
-def general(ds: xr.Dataset, half: HalfPoint) -> list[Statement]:
+def general(ds: xr.Dataset, half: xr.Dataset) -> list[Statement]:
     """Statements about all drives."""
     from_rest, cycle = (sweep_of_alpha(ds, SHOWN.values(), method) for method in ("map", "closed"))
     reached = float(abs(from_rest.aP / cycle.aP - 1).max())
     other = sweep_of_alpha(ds.assign_coords(a=3 * ds.a, phi0=ds.phi0 / 7), ds.alpha.values)
     apart = max(float(abs(other[y].values / ds[y].values - 1).max()) for y in ("aP", "A"))
-    least, blind = float(ds.A.min() - 1), friction_exponent(ds, half)
+    least = float(ds.A.min() - 1)
+    near = sweep.run(
+        kernel="foliot", method="closed", outputs=["period"],
+        axes={"a": float(ds.a) * np.exp(np.linspace(-0.02, 0.02, 9))},
+        fixed={"mu": float(half.alpha * ds.a**2 * ds.phi0), "phi0": float(ds.phi0)},
+    )  # fmt: skip
+    blind = float(sweep.local_exponent(near.period, "a")[4])
     return [
         weakest(ds),
         Statement("self-starting", "yes", "from rest to the cycle", reached, reached < 1e-8),
@@ -193,16 +176,6 @@ def weakest(ds: xr.Dataset) -> Statement:
     off = float(2 * sweep.run(study).interval[0] / weak.period) - 1
     what = f"from rest to 4 switches at alpha = {float(weak.alpha):.1e}: P"
     return Statement("no least torque", "yes", what, off, abs(off) < 1e-8)
-
-
-def friction_exponent(ds: xr.Dataset, half: HalfPoint) -> float:
-    """dlnP/dlna at the drive of exponent -1/2, by differences over a sweep of the friction alone."""
-    a = float(ds.a) * np.exp(np.linspace(-0.02, 0.02, 9))
-    study = sweep.study(
-        kernel="foliot", method="closed", outputs=["period"], axes={"a": a},
-        fixed={"mu": half.alpha * float(ds.a**2 * ds.phi0), "phi0": float(ds.phi0)},
-    )  # fmt: skip
-    return float(sweep.local_exponent(sweep.run(study).period, "a")[4])
 
 
 def torque(ds: xr.Dataset) -> list[Statement]:
@@ -240,29 +213,9 @@ def inverse_design(ds: xr.Dataset) -> list[tuple[str, ...]]:
     rows = [("wanted P [s]", "phi_max [degree]", "a [1/s]", "mu [rad/s^2]", "P back, off by", "phi_max back, off by")]
     for i, (p, degree) in enumerate(WANTED):
         off = float(back.period[i]) / p - 1, float(back.amplitude[i]) / math.radians(degree) - 1
-        rows.append(
-            (
-                f"{p:g}",
-                f"{degree:g}",
-                f"{float(found.a[i]):.10g}",
-                f"{float(found.mu[i]):.10g}",
-                *(f"{x:.0e}" for x in off),
-            )
-        )
+        made = f"{float(found.a[i]):.10g}", f"{float(found.mu[i]):.10g}"
+        rows.append((f"{p:g}", f"{degree:g}", *made, *(f"{x:.0e}" for x in off)))
     return rows
-
-
-def statements(ds: xr.Dataset) -> Groups:
-    """Every line of the table, by heading."""
-    half = half_point(ds)
-    return {
-        "Limits": limits(ds) + straight_lines(ds),
-        "In between": sliding(ds, half),
-        "At every drive": general(ds, half),
-        "Torque": torque(ds),
-        "Shape of the swing": shape(ds),
-        "Energy": energy(ds),
-    }
 
 
 def shape(ds: xr.Dataset) -> list[Statement]:
@@ -278,19 +231,15 @@ def shape(ds: xr.Dataset) -> list[Statement]:
         high = float((abs(angle) > 0.5 * abs(angle).max()).mean())
         speed = motion.speed.isel(mu=i).values
         leaves, returns = speed[0], float(np.interp(-1.0, -angle[top:401], -speed[top:401]))
-        lines.append(
+        sooner = f"{out:.3f} P there, {home:.3f} P back"
+        lines += [
             Statement(f"{name} drive: faster at A than at C", "yes", f"{leaves / returns:.4f} times", None,
-                      bool(leaves > returns))
-        )  # fmt: skip
-        text = f"{out:.3f} P there, {home:.3f} P back"
-        lines.append(
-            Statement(f"{name} drive: from the switch to the peak sooner", "yes", text, None, bool(out < home))
-        )
+                      bool(leaves > returns)),
+            Statement(f"{name} drive: from the switch to the peak sooner", "yes", sooner, None, bool(out < home)),
+        ]  # fmt: skip
         if alpha > 50:
-            lines.append(
-                Statement(f"{name} drive: rounder than a sine, time over A/2", "yes", f"{high:.3f} P, sine 0.667", None,
-                          high > 2 / 3 + 0.01)
-            )  # fmt: skip
+            rounder = f"{name} drive: rounder than a sine, time over A/2"
+            lines.append(Statement(rounder, "yes", f"{high:.3f} P, sine 0.667", None, high > 2 / 3 + 0.01))
     return lines
 
 
@@ -306,28 +255,20 @@ def energy(ds: xr.Dataset) -> list[Statement]:
     cycle = sweep_of_alpha(ds, alpha)
     squares = (sweep.run(study).speed ** 2).integrate("phase").values * cycle.period.values
     off = float(abs(a * squares / (2 * cycle.mu.values * phi0) - 1).max())
-    whole = sweep_of_alpha(ds, alpha)
-    kept = float(np.max(whole.multiplier.values[:1]))
+    kept = float(cycle.multiplier[0])
     lines = [
         Statement("friction takes 2 mu phi0 in half a period", "yes *", "largest deviation", off, off < 1e-5),
         Statement("a swing forgets the one before it at weak drive", "", f"kept: {kept:.0e}", None, kept < 1e-8),
         *taken_out(ds, cycle),
         *estimates(ds),
     ]
-    for value, s in zip(alpha, whole.s.values, strict=True):
-        heavy = math.exp(0.01)  # moment of inertia: torque and friction over it fall
-        moved = [
-            float(sweep.run(sweep.study(
-                kernel="foliot", axes={"mu": [unit * value / inertia]}, fixed={"a": a / inertia, "phi0": phi0},
-                outputs=["period"],
-            )).period[0]) for inertia in (1 / heavy, heavy)
-        ]  # fmt: skip
-        rise = math.log(moved[1] / moved[0]) / 0.02
-        lines.append(
-            differing(
-                f"weights moved out, alpha = {value:g}: dlnP/dlnI", f"(1 - s = {1 - s:.5f})", rise, 1 - s, 1e-4, 5
-            )
-        )
+    for value, s in zip(alpha, cycle.s.values, strict=True):
+        moved = []
+        for inertia in (math.exp(-0.01), math.exp(0.01)):  # torque and friction over it fall
+            fixed, mu = {"a": a / inertia, "phi0": phi0}, [unit * value / inertia]
+            moved.append(float(sweep.run(kernel="foliot", axes={"mu": mu}, fixed=fixed, outputs=["period"]).period[0]))
+        rise, what = math.log(moved[1] / moved[0]) / 0.02, f"weights moved out, alpha = {value:g}: dlnP/dlnI"
+        lines.append(differing(what, f"(1 - s = {1 - s:.5f})", rise, 1 - s, 1e-4, 5))
     return lines
 
 
@@ -343,9 +284,8 @@ def taken_out(ds: xr.Dataset, cycle: xr.Dataset) -> list[Statement]:
         drive = float(one.mu * (one.amplitude - ds.phi0)) / had
         friction = float(ds.a * (way**2).integrate("phase") * one.period) / had
         text, off = f"drive {drive:.1%}, friction {friction:.1%}", drive + friction - 1
-        lines.append(
-            Statement(f"all energy is taken out and fed anew, {name} drive", "yes", text, off, abs(off) < 0.02)
-        )
+        what = f"all energy is taken out and fed anew, {name} drive"
+        lines.append(Statement(what, "yes", text, off, abs(off) < 0.02))
     return lines
 
 
@@ -372,13 +312,12 @@ def trajectories(ds: xr.Dataset) -> xr.Dataset:
     return sweep.run(study).assign(aP=("mu", sweep_of_alpha(ds, SHOWN.values()).aP.values))
 
 
-def figure(ds: xr.Dataset) -> Any:
+def figure(ds: xr.Dataset, half: xr.Dataset) -> Any:
     """Period and amplitude, the sliding exponent, and trajectories, in one figure for two columns of print."""
     with charts.style():
         page = charts.new_figure(charts.PAGE, 118.0)
         left, right = page.subfigures(1, 2, width_ratios=(1.12, 1))
         upper, lower = left.subplots(2, 1, sharex=True, height_ratios=(1.15, 1))
-        half = half_point(ds)
         draw_scaling(upper, ds, half)
         draw_exponent(lower, ds, half)
         draw_trajectories(right.subplots(3, 1, sharex=True), trajectories(ds), float(ds.phi0))
@@ -387,7 +326,7 @@ def figure(ds: xr.Dataset) -> Any:
     return page
 
 
-def draw_scaling(axes: Any, ds: xr.Dataset, half: HalfPoint) -> None:
+def draw_scaling(axes: Any, ds: xr.Dataset, half: xr.Dataset) -> None:
     """a P and A against alpha, with the asymptotes of both."""
     alpha = ds.alpha.values
     axes.loglog(alpha, ds.aP, color=COLOURS[0], label=r"period, $aP$")
@@ -407,29 +346,19 @@ def draw_scaling(axes: Any, ds: xr.Dataset, half: HalfPoint) -> None:
     axes.legend(loc="upper right")
 
 
-def draw_exponent(axes: Any, ds: xr.Dataset, half: HalfPoint) -> None:
+def draw_exponent(axes: Any, ds: xr.Dataset, half: xr.Dataset) -> None:
     """Local exponent by differences of ln P, the exact -s, and the drive at which it is -1/2."""
     slope = sweep.local_exponent(ds.aP, "alpha")
     few = slice(None, None, max(1, slope.size // 56))
     for value in (-1, -1 / 2, -1 / 3):
         axes.axhline(value, color="0.6", linewidth=0.6, linestyle=(0, (4, 2)))
     axes.semilogx(ds.alpha, -ds.s, color=COLOURS[0], label=r"exact, $-s$")
-    axes.plot(
-        ds.alpha[few],
-        slope[few],
-        "o",
-        markersize=3,
-        color=COLOURS[1],
-        markerfacecolor="white",
-        label=r"differences of $\ln P$",
-    )
+    look = {"color": COLOURS[1], "markersize": 3, "markerfacecolor": "white", "label": r"differences of $\ln P$"}
+    axes.plot(ds.alpha[few], slope[few], "o", **look)
     axes.plot(half.alpha, -0.5, "o", color="black")
-    axes.annotate(rf"$\alpha = {half.alpha:.6f}$", (half.alpha, -0.5), (8, -12), textcoords="offset points")
-    axes.set(
-        xlabel=r"drive torque, $\alpha = \mu/(a^2\varphi_0)$ [1]",
-        ylabel=r"exponent, $\mathrm{d}\ln P/\mathrm{d}\ln\mu$ [1]",
-        ylim=(-1.06, -0.27),
-    )
+    axes.annotate(rf"$\alpha = {float(half.alpha):.6f}$", (half.alpha, -0.5), (8, -12), textcoords="offset points")
+    axes.set(xlabel=r"drive torque, $\alpha = \mu/(a^2\varphi_0)$ [1]", ylim=(-1.06, -0.27))
+    axes.set_ylabel(r"exponent, $\mathrm{d}\ln P/\mathrm{d}\ln\mu$ [1]")
     axes.set_yticks([-1, -1 / 2, -1 / 3], labels=["$-1$", r"$-\frac{1}{2}$", r"$-\frac{1}{3}$"])
     axes.set_yticks([-0.9, -0.8, -0.7, -0.6, -0.4], minor=True)
     axes.legend(loc="center right", bbox_to_anchor=(1, 0.35))
@@ -454,16 +383,20 @@ def draw_trajectories(panels: Sequence[Any], motion: xr.Dataset, phi0: float) ->
     panels[-1].set_xlabel(r"time, $t/P$ [1]")
 
 
-def read(path: str) -> xr.Dataset:
-    """The sweep with its dimensionless groups. Raises SweepError where it is none of this study."""
-    return scaled(read_result(path, "foliot", ["mu"], "foliot_scaling.toml"))
-
-
 def conclude(path: str) -> tuple[Groups, list[str], Any]:
     """Statements of the paper, inverse design, and the figure."""
-    ds = read(path)
+    ds = scaled(read_result(path, "foliot", ["mu"], "foliot_scaling.toml"))
+    half = half_point(ds)
+    groups = {
+        "Limits": limits(ds) + straight_lines(ds),
+        "In between": sliding(ds, half),
+        "At every drive": general(ds, half),
+        "Torque": torque(ds),
+        "Shape of the swing": shape(ds),
+        "Energy": energy(ds),
+    }
     heading = f"INVERSE DESIGN, phi0 = {math.degrees(float(ds.phi0)):g} degree (not in the paper)"
-    return statements(ds), [NOTES, "", heading, *columns(inverse_design(ds), "   ")], lambda: figure(ds)
+    return groups, [NOTES, "", heading, *columns(inverse_design(ds), "   ")], lambda: figure(ds, half)
 
 
 main = partial(report, __file__, ["foliot_scaling.h5"], conclude=conclude, source="paper")
