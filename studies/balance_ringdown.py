@@ -90,11 +90,10 @@ def followed() -> list[Statement]:
         half = max(half, float(abs(np.diff(times) / swing - 1).max()))
         formula = [float(motion(zeta, r, 1.0, k * swing, k)) for k in (1, 2, 3)]
         reach = max(reach, float(abs(angles[1:] - formula).max()))
-    rs = " to ".join(f"{x:g}" for x in (min(r for _, r in CELLS), max(r for _, r in CELLS)))
+    radii = [r for _, r in CELLS]
+    free = f"free half swing, r = {min(radii):g} to {max(radii):g} rad, DOP853"
     return [
-        Statement(
-            f"free half swing, r = {rs} rad, DOP853", "pi/omega_d at any r", "largest deviation", half, half < 1e-8
-        ),
+        Statement(free, "pi/omega_d at any r", "largest deviation", half, half < 1e-8),
         Statement("turning points by (10) and DOP853", "the same", "largest difference", reach, reach < 1e-8),
     ]
 
@@ -131,16 +130,14 @@ def counts(ds: xr.Dataset) -> list[Statement]:
     light = ds.where((ds.zeta <= LIGHT) & (ds.N > 0))
     allowed = 1 + light.law * (0.5 * light.zeta**2 + light.r / abs(ds.theta0))
     worst = float((abs(light.N - light.law) / allowed).max())
-    off = float(abs(light.N - light.law).max())
+    most = f"off by {float(abs(light.N - light.law).max()):.2f} at most"
     solid, viscous = ds.isel(zeta=0), ds.isel(r=0)
     few = sweep.fit_exponent(solid.N.where(solid.x < 0.1, drop=True), "r")
     many = viscous.where((viscous.zeta < 0.1) & (viscous.x > 100), drop=True)
     steep = sweep.fit_exponent(many.N, "zeta")
     slope = float((1 / np.log1p(many.x) - 1).mean())  # dln(ln(1 + x)/zeta)/dlnzeta for x >> 1
     return [
-        Statement(
-            f"N = ln(1 + x)/(pi zeta), zeta <= {LIGHT:g}", "all cells", f"off by {off:.2f} at most", None, worst < 1
-        ),
+        Statement(f"N = ln(1 + x)/(pi zeta), zeta <= {LIGHT:g}", "all cells", most, None, worst < 1),
         differing("exponent of N in r, x < 0.1", "-1", float(few.exponent), -1.0, 0.1, 5),
         differing("exponent of N in zeta, x > 100", f"{slope:.3f}", float(steep.exponent), slope, 0.05, 5),
     ]
@@ -151,19 +148,11 @@ def rest(ds: xr.Dataset) -> list[Statement]:
     far = float((abs(ds.stop_angle) / ds.r).max())
     creeping = ds.where(~ds.swings, drop=True)
     creeps = bool((creeping.stop_angle == np.sign(creeping.theta0) * creeping.r).all())
-    near = int((ds.status == Status.GRAZING).sum())
+    near, cells = int((ds.status == Status.GRAZING).sum()), ds.status.size
     return [
         Statement("it rests within r of the spring's zero", "yes", f"largest abs(theta)/r {far:.6f}", None, far <= 1),
-        Statement(
-            "zeta >= 1: creeps to r, never to 0", "yes", f"{creeping.r.size * creeping.zeta.size} cells", None, creeps
-        ),
-        Statement(
-            "counts that the last digits decide",
-            "few",
-            f"{near} of {ds.status.size} cells",
-            None,
-            near < 1e-3 * ds.status.size,
-        ),
+        Statement("zeta >= 1: creeps to r, never to 0", "yes", f"{creeping.status.size} cells", None, creeps),
+        Statement("counts that the last digits decide", "few", f"{near} of {cells} cells", None, near < 1e-3 * cells),
         *page_rule(ds),
     ]
 
@@ -171,24 +160,20 @@ def rest(ds: xr.Dataset) -> list[Statement]:
 def isochronism(ds: xr.Dataset) -> list[Statement]:
     """What friction does to the period of the free balance."""
     swinging = ds.period.where(ds.swings, drop=True)
-    zeta = swinging.zeta
-    exact = 2 * math.pi / ds.omega_n / np.sqrt((1 - zeta) * (1 + zeta))
+    exact = 2 * math.pi / ds.omega_n / np.sqrt((1 - swinging.zeta) * (1 + swinging.zeta))
     off = float(abs(swinging / exact - 1).max())
-    first = ds.isel(zeta=0, r=0)
-    light = ds.sel(zeta=LIGHT, method="nearest")
-    lost = 86400 * float(light.slow[0])
+    first, light = ds.isel(zeta=0, r=0), ds.sel(zeta=LIGHT, method="nearest")
+    zeta, damped, lost = float(first.zeta), float(light.zeta), 86400 * float(light.slow[0])
+    slower, loses = (
+        f"period omega_n/(2 pi) - 1 at zeta = {zeta:g}",
+        f"viscous damping loses, zeta = {damped:.3g} [s/day]",
+    )
     return [
         *followed(),
         Statement("period = 2 pi/(omega_n sqrt(1 - zeta^2))", "yes", "largest deviation", off, off < 1e-13),
-        compared(
-            f"period omega_n/(2 pi) - 1 at zeta = {float(first.zeta):g}", "zeta^2/2", float(first.slow),
-            float(first.zeta) ** 2 / 2, 1e-6, 4,
-        ),
-        compared(
-            f"viscous damping loses, zeta = {float(light.zeta):.3g} [s/day]", "86400 zeta^2/2", lost,
-            43200 * float(light.zeta) ** 2, 1e-3, 4,
-        ),
-    ]  # fmt: skip
+        compared(slower, "zeta^2/2", float(first.slow), zeta**2 / 2, 1e-6, 4),
+        compared(loses, "86400 zeta^2/2", lost, 43200 * damped**2, 1e-3, 4),
+    ]
 
 
 def figure(ds: xr.Dataset) -> Any:
@@ -210,7 +195,9 @@ def figure(ds: xr.Dataset) -> Any:
 def draw_motion(axes: Any) -> None:
     """theta(t) of one ring-down, with the centre of each half swing, which solid friction shifts; marks by DOP853."""
     zeta, r = SHOWN
-    count = int(np.ceil(_swings(zeta, r)))
+    E = math.exp(-math.pi * zeta / math.sqrt(1 - zeta**2))
+    C = (1 + E) / (1 - E)
+    count = math.ceil(math.log((1 + r * C) / (r + r * C)) / -math.log(E))  # half swings from 1 rad until rest
     half = math.pi / math.sqrt(1 - zeta**2)
     t = np.linspace(0.0, (count + 0.8) * half, 1200)
     axes.axhspan(-r, r, color="0.9", linewidth=0, label=r"$|\theta|\leq r$: it rests")
@@ -219,18 +206,9 @@ def draw_motion(axes: Any) -> None:
     axes.plot(steps, r * (-1.0) ** np.repeat(np.arange(count), 2), color=COLOURS[1], linewidth=1.0, label="centre")
     times, angles = turning_points(zeta, r, 1.0, count)
     axes.plot(times / half, angles, "o", color=COLOURS[0], markerfacecolor="white", markersize=4, label="turns, DOP853")
-    axes.set(
-        xlabel=r"half swings, $\omega_\mathrm{d}t/\pi$ [1]", ylabel=r"$\theta/\theta_0$ [1]", xlim=(0, t[-1] / half)
-    )
-    axes.set(ylim=(-1.05, 1.75), yticks=(-1, 0, 1))
+    axes.set(xlim=(0, t[-1] / half), ylim=(-1.05, 1.75), yticks=(-1, 0, 1))
+    axes.set(xlabel=r"half swings, $\omega_\mathrm{d}t/\pi$ [1]", ylabel=r"$\theta/\theta_0$ [1]")
     axes.legend(loc="upper right", ncols=2, fontsize=7, borderaxespad=0.3)
-
-
-def _swings(zeta: float, r: float) -> float:
-    """Half swings from 1 rad until rest."""
-    E = math.exp(-math.pi * zeta / math.sqrt(1 - zeta**2))
-    C = (1 + E) / (1 - E)
-    return math.log((1 + r * C) / (r + r * C)) / -math.log(E)
 
 
 def draw_map(page: Any, axes: Any, ds: xr.Dataset) -> None:
@@ -260,14 +238,10 @@ def draw_law(axes: Any, ds: xr.Dataset) -> None:
         row = ds.sel(zeta=zeta, method="nearest")
         row = row.where(row.N > 0, drop=True).isel(r=slice(None, None, 8))
         style = {"markerfacecolor": "white", "markersize": 3.4, "linestyle": "", "markeredgewidth": 0.8}
-        axes.plot(
-            row.x, math.pi * row.zeta * row.N, MARKS[k], color=COLOURS[k], label=rf"$\zeta={_power(zeta)}$", **style
-        )
-    axes.set(
-        xlabel=r"viscous over solid friction, $x=\pi\zeta\theta_0/(2r)$ [1]",
-        ylabel=r"$\pi\zeta N$ [1]",
-        xlim=(1e-4, 1e4),
-    )
+        name = rf"$\zeta={_power(zeta)}$"
+        axes.plot(row.x, math.pi * row.zeta * row.N, MARKS[k], color=COLOURS[k], label=name, **style)
+    axes.set(xlim=(1e-4, 1e4), ylabel=r"$\pi\zeta N$ [1]")
+    axes.set_xlabel(r"viscous over solid friction, $x=\pi\zeta\theta_0/(2r)$ [1]")
     axes.legend(loc="lower right", ncols=1, borderaxespad=0.3, labelspacing=0.25)
 
 
@@ -288,14 +262,9 @@ def draw_period(axes: Any, ds: xr.Dataset) -> None:
     axes.legend(loc="upper left", borderaxespad=0.3, labelspacing=0.25)
 
 
-def read(path: str) -> xr.Dataset:
-    """The sweep with its groups. Raises SweepError where it is none of this study."""
-    return scaled(read_result(path, "balance", ["zeta", "r"], "balance_ringdown.toml"))
-
-
 def conclude(path: str) -> tuple[Groups, list[str], Any]:
     """Statements and the figure."""
-    ds = read(path)
+    ds = scaled(read_result(path, "balance", ["zeta", "r"], "balance_ringdown.toml"))
     groups = {"Half swings": counts(ds), "Rest": rest(ds), "Isochronism of the free balance": isochronism(ds)}
     return groups, [NOTES], lambda: figure(ds)
 
