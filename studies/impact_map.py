@@ -45,16 +45,6 @@ def prepared(ds: xr.Dataset) -> xr.Dataset:
     return ds.assign_coords(kappa=kappa).assign(pitch=pitch, Y=ds.swing / pitch)
 
 
-def half_period(ds: xr.Dataset) -> xr.DataArray:
-    """T of the symmetric cycle [s]."""
-    acceleration = ds.torque * ds.r_c / ds.I_c
-    return np.sqrt(ds.pitch * (1 + ds.e) / (acceleration * (1 - ds.e) * (1 + ds.kappa)))
-
-
-def worst(here: xr.DataArray, theory: xr.DataArray) -> float:
-    return float(abs(here / theory - 1).max())
-
-
 def count(condition: xr.DataArray) -> int:
     return int(condition.sum())
 
@@ -75,22 +65,18 @@ def plastic(closed: xr.Dataset) -> list[Statement]:
     """e = 0, the tooth on the pallet until it escapes: the kernel beside the scene `verge_scene` in SI units."""
     stuck = closed.isel(e=0).isel(I_c=slice(None, None, max(1, closed.sizes["I_c"] // 8)))
     n = float(stuck.r_v / stuck.r_c)
-    axes = {"I_c": stuck.I_c.values}
     phi0 = float(stuck.h / stuck.r_v)
     fixed = {"tau": float(stuck.torque), "I_v": float(stuck.I_v), "n": n, "phi0": phi0}
     fixed["drop"] = math.pi / float(stuck.teeth) - 2 * n * phi0
     periods = []
     for flips in (3000, 3002):  # an even number: the last event is a landing
-        study = sweep.study(
-            kernel="verge_scene:KERNEL", axes=axes, fixed=fixed | {"flips": flips}, rtol=1e-10, allow_import=True
-        )
-        periods.append(2 * sweep.run(study).clock.values)
+        scene = {"kernel": "verge_scene:KERNEL", "axes": {"I_c": stuck.I_c.values}, "fixed": fixed | {"flips": flips}}
+        periods.append(2 * sweep.run(rtol=1e-10, allow_import=True, **scene).clock.values)
     off = float(abs(stuck.period.values / periods[0] - 1).max())
+    cells = f"{stuck.I_c.size} cells"
     wander = float(abs(periods[1] / periods[0] - 1).max())
     return [
-        Statement(
-            "e = 0: period of the kernel and in SI units", "the same", f"{stuck.I_c.size} cells", off, off < 1e-8
-        ),
+        Statement("e = 0: period of the kernel and in SI units", "the same", cells, off, off < 1e-8),
         Statement("e = 0: from rest to a steady beat at every kappa", "yes", "last change", wander, wander < 1e-10),
     ]
 
@@ -142,11 +128,13 @@ def motions(closed: xr.Dataset, motion: xr.Dataset) -> list[Statement]:
     both = (closed.status == Status.OK) & (motion.status == Status.OK) & (motion.impacts == 1)
     same = motion.where(both & (closed.e > 0))
     lost = (closed.status == Status.OK) & (motion.status != Status.OK)
-    twice = 2 * half_period(closed)
+    force = closed.torque * closed.r_c / closed.I_c
+    twice = 2 * np.sqrt(closed.pitch * (1 + closed.e) / (force * (1 - closed.e) * (1 + closed.kappa)))
     way = same.kappa * (1 + same.e) / (4 * (1 - same.e) * (1 + same.kappa))
+    slow, wide = (float(abs(here / theory - 1).max()) for here, theory in ((same.period, twice), (same.Y, way)))
     return [
-        Statement("period by events = 2T", "1e-9", f"{count(both)} cells", *_near(same.period, twice)),
-        Statement("swing by events = Y, whatever the torque", "1e-9", f"{count(both)} cells", *_near(same.Y, way)),
+        Statement("period by events = 2T", "1e-9", f"{count(both)} cells", slow, slow < 1e-9),
+        Statement("swing by events = Y, whatever the torque", "1e-9", f"{count(both)} cells", wide, wide < 1e-9),
         Statement("stable cycles that events does not settle on", "1 %", f"{count(lost)} cells", None,
                   count(lost) < 0.01 * lost.size),
     ]  # fmt: skip
@@ -159,16 +147,6 @@ def census(motion: xr.Dataset) -> str:
     return textwrap.fill(f"The clock's motion, in cells: {told}.", 120)
 
 
-def _near(here: xr.DataArray, theory: xr.DataArray) -> tuple[float, bool]:
-    off = worst(here, theory)
-    return off, off < 1e-9
-
-
-def lever_borders(kappa: Any, e: float) -> tuple[Any, Any]:
-    """nu between which the cycle is stable, for kappa < 1."""
-    return -4 * (1 + kappa) / (kappa * (1 - kappa)), flip_border(kappa, e)
-
-
 def flip_border(kappa: Any, e: float) -> Any:
     """nu at which a multiplier is -1, for any kappa; so it is at kappa = 1 for any nu."""
     return -4 * (1 + e) ** 2 / ((1 - e) ** 2 * kappa + 2 * (1 + e * e))
@@ -177,25 +155,20 @@ def flip_border(kappa: Any, e: float) -> Any:
 def lever(bent: xr.Dataset) -> list[Statement]:
     """A curved lever can steady a heavy foliot."""
     exists = bent.status.isin((Status.OK, Status.UNSTABLE))
-    low, high = lever_borders(bent.kappa, LEVER_E)
-    steady = xr.where(bent.kappa < 1, (bent.nu > low) & (bent.nu < high), _steady_light(bent))
+    k, flip = bent.kappa, flip_border(bent.kappa, LEVER_E)
+    # of light foliots p(1) > 0 and p(-1) < 0, p the characteristic polynomial of the half map
+    light = (bent.nu < 4 * (1 + k) / (k * (k - 1))) & (bent.nu > flip)
+    steady = xr.where(k < 1, (bent.nu > -4 * (1 + k) / (k * (1 - k))) & (bent.nu < flip), light)
     wrong = count(exists & (steady != (bent.multiplier < 1)))
     heavy = exists & (bent.kappa < 1)
     held = count(heavy & (bent.multiplier < 1))
+    some = f"{held} of {count(heavy)} cells"
     flat = count(heavy & (abs(bent.nu) < 1e-9) & (bent.multiplier < 1))
     return [
         Statement("stability between the two borders in nu", "no exception", f"{wrong} exceptions", None, not wrong),
-        Statement(
-            "heavy foliots steadied by a lever that yields", "some", f"{held} of {count(heavy)} cells", None, held > 0
-        ),
+        Statement("heavy foliots steadied by a lever that yields", "some", some, None, held > 0),
         Statement("heavy foliots steady with a flat lever", "none", f"{flat} cells", None, not flat),
     ]
-
-
-def _steady_light(bent: xr.Dataset) -> xr.DataArray:
-    """For kappa > 1: p(1) > 0 and p(-1) < 0, p the characteristic polynomial of the half map."""
-    k = bent.kappa
-    return (bent.nu < 4 * (1 + k) / (k * (k - 1))) & (bent.nu > flip_border(k, LEVER_E))
 
 
 def figure(closed: xr.Dataset, motion: xr.Dataset, bent: xr.Dataset) -> Any:
@@ -283,10 +256,9 @@ def draw_lever(page: Any, axes: Any, bent: xr.Dataset) -> list[Any]:
     axes.set(xlabel=r"wheel over foliot, $\kappa$ [1]", ylabel=r"curvature of the lever, $\nu$ [1]")
     direct_label(axes, 0.3, -7, "stable")
     direct_label(axes, 0.22, 3, "unstable")
+    dashed = {"color": "black", "linewidth": 0.8, "linestyle": (0, (4, 2))}
     return [
-        Line2D(
-            [], [], color="black", linewidth=0.8, linestyle=(0, (4, 2)), label=r"(a) $\kappa=1$, (b) $\kappa=2e/(1-e)$"
-        ),
+        Line2D([], [], **dashed, label=r"(a) $\kappa=1$, (b) $\kappa=2e/(1-e)$"),
         Line2D([], [], color="black", linewidth=0.9, label="(d) multiplier 1 by theory"),
         Patch(facecolor="white", edgecolor="0.45", hatch="////", linewidth=0.5, label="no cycle with one impact"),
     ]
