@@ -52,9 +52,8 @@ def scaled(ds: xr.Dataset) -> xr.Dataset:
 def at(alpha: Any, kappa: Any, design: str = "product") -> xr.Dataset:
     """The same foliot at other alpha and kappa, by one method: near the last spring with a cycle it is INACCURATE."""
     axes = {"a": np.atleast_1d(alpha) ** -0.5, "k": np.atleast_1d(kappa)}
-    keys = {"kernel": "foliot", "method": "segments", "rtol": 1e-7, "design": design}
-    study = sweep.study(**keys, axes=axes, fixed={"mu": 1.0, "phi0": 1.0})
-    return scaled(sweep.run(study))
+    fixed = {"mu": 1.0, "phi0": 1.0}
+    return scaled(sweep.run(kernel="foliot", method="segments", rtol=1e-7, design=design, axes=axes, fixed=fixed))
 
 
 def lines(ds: xr.Dataset, alpha: float) -> xr.Dataset:
@@ -78,13 +77,10 @@ def laws(ds: xr.Dataset) -> list[Statement]:
     middle = strong.sel(k=100.0, method="nearest")
     theory = float(first_order(alpha, middle.kappa.item()))
     slack = (math.pi / 16) * math.sqrt(window[1] / alpha) + 1 / window[0] ** 1.75  # of (1), and of the next order
+    weak, steep = f"s at kappa = {ds.kappa[0]:.0e}: still", f"exponent of s in kappa, 10 to 1000, alpha = {alpha:.0e}"
     return [
-        compared(
-            f"s at kappa = {ds.kappa[0]:.0e}: still the foliot's", f"{bare:.6f}", float(strong.s[0]), bare, 1e-2, 6
-        ),
-        differing(
-            f"exponent of s in kappa, 10 to 1000, alpha = {alpha:.0e}", "-3/4", fall.exponent.item(), -0.75, slack
-        ),
+        compared(f"{weak} the foliot's", f"{bare:.6f}", float(strong.s[0]), bare, 1e-2, 6),
+        differing(steep, "-3/4", fall.exponent.item(), -0.75, slack),
         differing("exponent of s in alpha at kappa = 100", "-1/4", by_drive.exponent.item(), -0.25, 0.02),
         compared(f"s at kappa = {middle.kappa:.4g}", f"(1) = {theory:.6g}", middle.s.item(), theory, 1e-3, 6),
         agreement(ds),
@@ -121,28 +117,14 @@ def optimum(ds: xr.Dataset, springs: xr.Dataset) -> list[Statement]:
     found = []
     for alpha in (1e6, 1e4, 1e2):
         cell = lines(springs, alpha)
-        next_order = 1e-4 + 1 / alpha + float(cell.blur)
+        place, steadied = float(cell.kappa / cell.alpha), float(cell.s * cell.alpha)
+        next_order, last = 1e-4 + 1 / alpha + float(cell.blur), 1e-3 + 4 / alpha
+        best, most = f"alpha = {alpha:.0e}: best spring, kappa/alpha", "  strongest with a cycle"
         found += [
-            compared(
-                f"alpha = {alpha:.0e}: best spring, kappa/alpha",
-                "9/pi^2 = 0.91189",
-                float(cell.kappa / cell.alpha),
-                9 / math.pi**2,
-                next_order,
-                6,
-            ),
-            compared(
-                "  s alpha there", "pi/27^(1/2) = 0.60460", float(cell.s * cell.alpha), math.pi / 27**0.5, next_order, 6
-            ),
+            compared(best, "9/pi^2 = 0.91189", place, 9 / math.pi**2, next_order, 6),
+            compared("  s alpha there", "pi/27^(1/2) = 0.60460", steadied, math.pi / 27**0.5, next_order, 6),
             compared("  A/phi0 there", "2/3^(1/2) = 1.15470", float(cell.A), 2 / 3**0.5, next_order, 6),
-            compared(
-                "  strongest with a cycle",
-                "16/pi^2 = 1.6211",
-                end(ds, alpha) / alpha,
-                16 / math.pi**2,
-                1e-3 + 4 / alpha,
-                5,
-            ),
+            compared(most, "16/pi^2 = 1.6211", end(ds, alpha) / alpha, 16 / math.pi**2, last, 5),
         ]
     return [*found, envelope(1000.0), from_rest(ds)]
 
@@ -153,9 +135,8 @@ def envelope(Q: float) -> Statement:
     ds = at(Q**2 / kappa, kappa, "zip")
     place = sweep.where_exponent(ds.s, "kappa", 0.0).abscissa.item()
     cell = at(Q**2 / place, place).isel(a=0, k=0)
-    return compared(
-        f"least s Q at Q = {Q:g}, there kappa/Q = {place / Q:.4f}", "1/2", float(cell.s * cell.Q), 0.5, 3 / Q, 6
-    )
+    what = f"least s Q at Q = {Q:g}, there kappa/Q = {place / Q:.4f}"
+    return compared(what, "1/2", float(cell.s * cell.Q), 0.5, 3 / Q, 6)
 
 
 def from_rest(ds: xr.Dataset) -> Statement:
