@@ -62,13 +62,7 @@ class Cut:
 
 
 def cuts_of(study: Study, schema: Schema, blocks: Partition) -> dict[str, Cut]:
-    """The tables of a study's result.
-
-    Parameters
-    ----------
-    schema : of the output
-    blocks : of what is computed
-    """
+    """The tables of a study's result, whose output has a schema, and in which blocks are computed."""
     if study.summary is None:
         return {"cells": Cut(schema.columns, schema.grid.shape, blocks)}
     rows, columns = row_blocks(study), part_columns(study)
@@ -99,20 +93,9 @@ def _attrs(schema: Schema) -> dict[str, Any]:
 
 
 def create(path: Path, schema: Schema, cuts: Mapping[str, Cut], shared: bool = False) -> StoredFile:
-    """Makes a result of which nothing is computed yet, with room on the disk for all of it.
+    """Makes a result of which nothing is computed yet, with room on the disk for all of it. Raises OSError.
 
-    Parameters
-    ----------
-    schema : Schema
-        Of the output.
-    cuts : mapping of str to Cut
-        "cells": the output's columns; of a summary also "rows".
-    shared : bool
-        Whether several machines may write.
-
-    Raises
-    ------
-    OSError
+    Of the output's `schema`, with tables as `cuts_of` gives them; `shared`, where several machines may write.
     """
     image = _Image()
     _lay_out(image, schema, cuts, SHARED_WORTH_A_PAGE if shared else WORTH_A_PAGE)
@@ -148,15 +131,7 @@ def _write_pending(fd: int, column: Numbers) -> None:
 
 
 class _Image(io.RawIOBase):
-    """The file as HDF5 writes it, in memory, but for chunks of zeros.
-
-    Attributes
-    ----------
-    pages : dict of int to bytearray
-        What was written, by where it begins.
-    chunk : int
-        Bytes of the chunks that are left out.
-    """
+    """The file as HDF5 writes it, in `pages` by where they begin, but for zeros of the length of a `chunk`."""
 
     def __init__(self) -> None:
         self.pages: dict[int, bytearray] = {}

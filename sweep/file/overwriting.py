@@ -9,15 +9,7 @@ from sweep.errors import SweepError
 
 
 def check_target(target: Path, *, force: bool = False, read: Sequence[Path] = ()) -> None:
-    """Raise SweepError where a file or a folder is not to be written to `target`.
-
-    Parameters
-    ----------
-    force : bool
-        Overwrite what is there,
-    read : paths
-        but for these.
-    """
+    """Raise SweepError where something is at `target`, unless by `force`, or where it is what is `read`."""
     if target.exists() and any(one.exists() and target.samefile(one) for one in read):
         raise SweepError(f"{target} is what is read; name another file")
     if target.exists() and not force:

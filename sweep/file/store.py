@@ -80,12 +80,7 @@ class Shared:
 class Store:
     """The result of one sweep while it is written, locked for this process. Made by `opened`.
 
-    Attributes
-    ----------
-    output, path : Path
-        Where the result will be, and where it is.
-    file : StoredFile or None
-        As it was when this run began to write to it; None until `begin` or `resume`.
+    It is at `path`, and will be at `output`; `file` is None until `begin`, `resume` or `reopen`.
     """
 
     def __init__(self, output: Path) -> None:
@@ -209,17 +204,10 @@ class Store:
             self.table.write_digests(self._fd, dict.fromkeys(blocks, bytes(self.table.row_bytes)))
 
     def finish(self, texts: Mapping[str, str], gather: Gather | None) -> list[int]:
-        """Puts the result in its place, if it is what was written.
+        """Puts the result in its place, with what is known at the end; of a summary, its rows are gathered first.
 
-        Parameters
-        ----------
-        texts : what is known at the end
-        gather : of a summary
-
-        Returns
-        -------
-        list of int
-            Blocks that turned out to be damaged, or are not acknowledged, which have to be computed again first.
+        Returns the blocks that turned out to be damaged, or are not acknowledged: there are none, or the result stays
+        where it is, and they have to be computed again. Raises SweepError.
         """
         assert self.file is not None
         with disk.refusing(self.output):
