@@ -69,7 +69,7 @@ def compare(cells, truths, rtol):
 
 def test_every_term_and_their_mixtures_are_right_to_half_of_rtol():
     cells = TERMS if COMPILED else [TERMS[i] for i in (5, 10, 12, 14)]
-    truths = [foliot_oracles.cycle(**UNIT | cell, digits=18) for cell in cells]
+    truths = [foliot_oracles.cycle(**UNIT | cell, digits=13) for cell in cells]
     for rtol in (1e-3, 1e-6, 1e-9) if COMPILED else (1e-3,):
         compare(cells, truths, rtol)
 
