@@ -90,17 +90,23 @@ class Condition:
             case ast.UnaryOp(op=ast.Not(), operand=part):
                 return ~self._part(part, "b", "condition")[0], None
             case ast.BoolOp(op=op, values=parts):
-                return functools.reduce(
-                    OPERATORS[type(op)], (self._part(part, "b", "condition")[0] for part in parts)
-                ), None
-            case ast.BinOp(op=op) if type(op) in OPERATORS:
-                return self._computed(node)
-            case ast.Compare(left=left, ops=ops, comparators=others) if all(type(op) in OPERATORS for op in ops):
-                parts = [left, *others]
-                links = (
-                    self._compared(a, OPERATORS[type(op)], b) for a, op, b in zip(parts, ops, others, strict=False)
-                )
-                return functools.reduce(np.logical_and, links), None
+                truths = (self._part(part, "b", "condition")[0] for part in parts)
+                return functools.reduce(OPERATORS[type(op)], truths), None
+            case ast.Compare(left=first, ops=ops, comparators=others) if all(type(op) in OPERATORS for op in ops):
+                links = zip([first, *others], ops, others, strict=False)
+                return functools.reduce(np.logical_and, (self._compared(a, op, b) for a, op, b in links)), None
+            case ast.BinOp(left=left, op=op, right=right) if type(op) in OPERATORS:
+                compute = OPERATORS[type(op)]
+                (value, unit), (other, its) = (self._part(part, "fiu", "number") for part in (left, right))
+                if isinstance(op, ast.Add | ast.Sub):
+                    return compute(value, other), self._agreed(left, unit, right, its)
+                if isinstance(op, ast.Pow) and self.units is not None:
+                    if not isinstance(other, int) or not 1 <= other <= 9:
+                        raise self.refusal("is not allowed; a power is a whole number from 1 to 9", node)
+                    return functools.reduce(operator.mul, [value] * other), None if unit is None else unit**other
+                if unit is not None or its is not None:  # a number alone is of no unit in a product
+                    unit = compute(*(parsed("1") if one is None else one for one in (unit, its)))
+                return compute(value, other), unit
         raise self.refusal(f"is not allowed; it may hold {GRAMMAR}", node)
 
     def _part(self, node: ast.expr, kinds: str, what: str) -> Valued:
@@ -110,22 +116,7 @@ class Condition:
             raise self.refusal(f"is no {what}", node)
         return found, unit
 
-    def _computed(self, node: ast.BinOp) -> Valued:
-        """A sum, product or power."""
-        (left, unit), (right, other) = (self._part(part, "fiu", "number") for part in (node.left, node.right))
-        compute = OPERATORS[type(node.op)]
-        if isinstance(node.op, ast.Add | ast.Sub):
-            return compute(left, right), self._agreed(node.left, unit, node.right, other)
-        if isinstance(node.op, ast.Pow) and self.units is not None:
-            if not isinstance(right, int) or not 1 <= right <= 9:
-                raise self.refusal("is not allowed; a power is a whole number from 1 to 9", node)
-            return functools.reduce(operator.mul, [left] * right), None if unit is None else unit**right
-        if unit is None and other is None:
-            return compute(left, right), None
-        # a number alone is of no unit in a product
-        return compute(left, right), compute(other**0 if unit is None else unit, unit**0 if other is None else other)
-
-    def _compared(self, left: ast.expr, compare: Callable[[Any, Any], Any], right: ast.expr) -> Any:
+    def _compared(self, left: ast.expr, sign: ast.cmpop, right: ast.expr) -> Any:
         """One link of a chain of comparisons."""
         (value, unit), (other, other_unit) = self._beside(left, right), self._beside(right, left)
         if (_kind(value) == "U") != (_kind(other) == "U"):
@@ -134,12 +125,12 @@ class Condition:
             raise self.refusal("compares two constants")
         for node, word in ((left, other), (right, value)):
             # a misspelt status would choose nothing, or everything, without a sign
-            words = list(self.words(node.id)) if isinstance(node, ast.Name) and isinstance(word, str) else [word]
+            words = list(self.words(node.id)) if isinstance(node, ast.Name) else [word]
             if isinstance(word, str) and word not in words:
                 hint = did_you_mean(word, words) or f"; it has {listed(words)}"
                 raise self.refusal(f'{ast.unparse(node)} is never "{word}"{hint}')
         self._agreed(left, unit, right, other_unit)
-        return compare(value, other)
+        return OPERATORS[type(sign)](value, other)
 
     def _beside(self, node: ast.expr, other: ast.expr) -> Valued:
         """One side of a comparison; '3 cm' is a number in the unit of the name on the other side."""

@@ -34,8 +34,8 @@ import numpy as np
 
 from kernels.interface import Field, Kernel
 from sweep.errors import missing
-from sweep.study.mistakes import Entry, one_of, show, whole
-from sweep.study.model import SETTINGS, SMALLEST_RTOL, Axis, Block, setting
+from sweep.study.mistakes import Entry, check_limits, one_of, show, whole
+from sweep.study.model import SETTINGS, Axis, Block, setting
 from sweep.study.values import EXAMPLE, LARGEST_AXIS, NONE, SAMPLED_EXAMPLE, Floats, axis
 from sweep.words import listed, nearest
 
@@ -110,8 +110,8 @@ def _block(keys: Entry, kernel: Kernel) -> tuple[dict[str, Axis], Block]:
             # where the design cannot be read, an axis may be meant for a sampled one
             between = sampled or (not design and without and not {"start", "stop"}.isdisjoint(entry.value))
             axes[name] = found = axis(entry, field, own if between else None)
-            if name == "rtol" and not all(SMALLEST_RTOL <= value < 1 for value in found.values):
-                entry.wrong(f"expected {SMALLEST_RTOL:g} <= rtol < 1 everywhere")
+            if name == "rtol":
+                check_limits(entry, found.values, field)
             if design == "product" and found.values.ndim > 1:
                 entry.wrong(f'{name} is an array; as an axis it needs design = "zip"')
             elif design == "product":
@@ -142,7 +142,7 @@ def _design(entry: Entry, axes: int) -> tuple[str, dict[str, Any]]:
     if design in PLAIN or not design:
         return design, {}
     n = entry["n"].read(2, whole, 2, LARGEST_AXIS)
-    options = {"n": n, "seed": entry["seed"].read(0, whole, 0, 2**32 - 1) if "seed" in entry else 0}
+    options = {"n": n, "seed": entry.get("seed", 0, whole, 0, 2**32 - 1)}
     if design in ("sobol", "saltelli") and n & (n - 1):
         lower = 1 << (n.bit_length() - 1)
         entry["n"].wrong(f"a Sobol' sequence needs a power of 2; write {lower} or {2 * lower}")

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 
 from kernels import catalogue
-from kernels.interface import Field, Kernel
+from kernels.interface import Kernel
 from sweep.errors import StudyError
 from sweep.study.condition import cells_where
 from sweep.study.designs import field_of, read_designs
 from sweep.study.kernel_lookup import load_kernel
-from sweep.study.mistakes import Entry, Mistakes, exact_float, limits, one_of, text
-from sweep.study.model import SETTINGS, SMALLEST_RTOL, Axis, Block, Study, differs, frozen, setting
+from sweep.study.mistakes import Entry, Mistakes, check_limits, exact_float, one_of, text
+from sweep.study.model import SETTINGS, Axis, Block, Study, differs, frozen, setting
 from sweep.study.summary import read_summary
 from sweep.study.values import Floats, axis, quantity
 from sweep.words import listed, nearest
@@ -27,7 +27,6 @@ KEYS = (
     "summary",
 )  # fmt: skip
 
-DEFAULT_RTOL = 1e-9
 Fixed = dict[str, float | Floats]
 
 
@@ -36,14 +35,10 @@ def read_keys(said: Mapping[str, Any], source_text: str, source: str, folder: Pa
     mistakes = Mistakes()
     keys = Entry(said, "", mistakes, folder).keys(*KEYS)
     kernel = _kernel(keys, source, allow_import)
-    title, question, where = (keys[k].read("", text) if k in keys else "" for k in ("title", "question", "where"))
-    method, rtol = "auto", DEFAULT_RTOL
-    if "method" in keys:
-        method = keys["method"].read(method, one_of, setting("method", kernel).choices)
-    if "rtol" in keys:
-        rtol = keys["rtol"].read(rtol, exact_float)
-        if not SMALLEST_RTOL <= rtol < 1:
-            keys["rtol"].wrong(f"expected {SMALLEST_RTOL:g} <= rtol < 1, found {rtol:g}")
+    title, question, where = (keys.get(key, "", text) for key in ("title", "question", "where"))
+    method = keys.get("method", "auto", one_of, setting("method", kernel).choices)
+    rtol = keys.get("rtol", 1e-9, exact_float)
+    check_limits(keys["rtol"], rtol, setting("rtol", kernel))
     outputs = _outputs(keys, kernel)
     design, axes, blocks = read_designs(keys, kernel)
     for name in (name for name in SETTINGS if name in keys and name in axes):
@@ -118,7 +113,7 @@ def _fixed(keys: Entry, kernel: Kernel, axes: Mapping[str, Axis]) -> Fixed:
             before = len(keys.mistakes)
             given[name] = quantity(entry, field)
             if len(keys.mistakes) == before:
-                _check_limits(entry, given[name], field)
+                check_limits(entry, given[name], field)
         if name in axes:
             entry.wrong(f"{name} is an axis as well; keep one of the two")
     return given
@@ -144,23 +139,11 @@ def _along(keys: Entry, kernel: Kernel, outputs: Sequence[str]) -> dict[str, Flo
                 entry = replace(entry, value={"spacing": "linear", "start": field.lower, "stop": last, **said})
             before, values = len(mistakes), axis(entry, field).values
             if len(mistakes) == before:
-                _check_limits(entry, values, field, finite=True)
+                check_limits(entry, values, field, finite=True)
         elif field.name in needed and field.name not in mistakes.meant and not mistakes.unread:
             entry.wrong(f"missing; output {needed[field.name]} needs it, e.g. num = 200")
         along[field.name] = values if field.name in needed else frozen([])
     return along
-
-
-def _check_limits(entry: Entry, found: float | Floats, field: Field, finite: bool = False) -> None:
-    """A mistake where some values are outside of the limits of their field, or not whole where they should be."""
-    values = np.atleast_1d(found)
-    inside = (values > field.lower if field.open_lower else values >= field.lower) & (values <= field.upper)
-    inside &= ((np.round(values) == values) | (not field.integer)) & (np.isfinite(values) | (not finite))
-    bad = values[~inside & (values != field.default)]
-    if len(bad):
-        unit = f" {field.unit}" if field.unit != "1" else ""
-        wanted = f"{'a whole number ' * field.integer}{limits(field) or 'a number'}{unit}"
-        entry.wrong(f"expected {wanted}, found {bad[0]:.6g}{unit}")
 
 
 def _complete(keys: Entry, kernel: Kernel, axes: Mapping[str, Axis], given: Fixed) -> tuple[Fixed, dict[str, str]]:

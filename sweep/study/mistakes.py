@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kernels.interface import Field
 from sweep.errors import Mistake, StudyError, SweepError
@@ -89,6 +90,10 @@ class Entry:
         except (ValueError, SweepError) as error:
             self.wrong(str(error))
             return otherwise
+
+    def get(self, key: str, otherwise: U, reader: Callable[..., T], *given: Any) -> T | U:
+        """What a reader makes of the value under a key that may be left out; `otherwise` without it."""
+        return self[key].read(otherwise, reader, *given) if key in self else otherwise
 
     def table(self, key: str | int, example: str) -> Entry:
         """The table that stands there; an empty one where there is none, or something else, which is a mistake."""
@@ -202,3 +207,15 @@ def limits(field: Field) -> str:
     below = float(f"{field.upper:g}") > field.upper
     high = f"{'<' if below else '<='} {field.upper:g}" if field.upper < math.inf else ""
     return ", ".join(filter(None, [low, high]))
+
+
+def check_limits(entry: Entry, found: float | NDArray[np.float64], field: Field, finite: bool = False) -> None:
+    """A mistake where some values are outside of the limits of their field, or not whole where they should be."""
+    values = np.atleast_1d(found)
+    inside = (values > field.lower if field.open_lower else values >= field.lower) & (values <= field.upper)
+    inside &= ((np.round(values) == values) | (not field.integer)) & (np.isfinite(values) | (not finite))
+    bad = values[~inside & (values != field.default)]
+    if len(bad):
+        unit = f" {field.unit}" if field.unit != "1" else ""
+        wanted = f"{'a whole number ' * field.integer}{limits(field) or 'a number'}{unit}"
+        entry.wrong(f"expected {wanted}, found {bad[0]:.6g}{unit}")

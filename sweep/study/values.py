@@ -111,7 +111,7 @@ def _factor(entry: Entry, field: Field) -> Decimal | None:
             raise ValueError(f"{field.name} takes words, which have no unit; leave it out")
         return scale(unit, field.unit, field.name)
 
-    return entry["unit"].read(None, factor) if "unit" in entry else None
+    return entry.get("unit", None, factor)
 
 
 def _scaled(values: Floats, factor: Decimal | None) -> Floats:
