@@ -206,11 +206,11 @@ def _folder_of_rounds(path: str | os.PathLike[str] | None, dataset: xr.Dataset, 
     if path is None:
         return None
     target, source = as_path(path), dataset.encoding.get("source")
-    check_target(target, force=force, read=[Path(source)] if source else [])
     rounds = target.with_name(f"{target.name}.rounds")
     with disk.refusing(target):
-        if force:
+        if force or target.exists():  # of a call that was killed when it had ended, they are still there
             shutil.rmtree(rounds, ignore_errors=True)
+        check_target(target, force=force, read=[Path(source)] if source else [])
         rounds.mkdir(exist_ok=True)
     return rounds
 
