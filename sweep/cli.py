@@ -25,8 +25,20 @@ def main(argv: Sequence[str] | None = None) -> int:
     int
         One of `EXIT_CODES`.
     """
-    arguments = parser().parse_args(argv)
-    ended = _ended(arguments)
+    arguments, ended = parser().parse_args(argv), Outcome(COMPLETE, "")
+    try:
+        ended = arguments.command.run(arguments) or ended
+        if sys.stdout is not None:  # closed by whoever has started us
+            sys.stdout.flush()
+    except BrokenPipeError:
+        # whoever read our output has had enough; Python would complain again when it closes stdout
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except (Exception, KeyboardInterrupt, SystemExit) as error:
+        if os.environ.get("SWEEP_TRACEBACK"):
+            raise
+        ended = explained(error)
+        with contextlib.suppress(OSError):  # the exit status tells of it where there is no room for words
+            say(ended.text, sys.stderr)
     if getattr(arguments, "notify", None):
         solve.notify(arguments, ended)
     pool = sys.modules.get("sweep.runs.pool")
@@ -37,26 +49,6 @@ def main(argv: Sequence[str] | None = None) -> int:
                 stream.flush()
         os._exit(ended.code)
     return ended.code
-
-
-def _ended(arguments: argparse.Namespace) -> Outcome:
-    """Does what is asked, and says what became of it."""
-    try:
-        outcome: Outcome = arguments.command.run(arguments) or Outcome(COMPLETE, "")
-        if sys.stdout is not None:  # closed by whoever has started us
-            sys.stdout.flush()
-        return outcome
-    except BrokenPipeError:
-        # whoever read our output has had enough; Python would complain again when it closes stdout
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return Outcome(COMPLETE, "")
-    except (Exception, KeyboardInterrupt, SystemExit) as error:
-        if os.environ.get("SWEEP_TRACEBACK"):
-            raise
-        outcome = explained(error)
-        with contextlib.suppress(OSError):  # the exit status tells of it where there is no room for words
-            say(outcome.text, sys.stderr)
-        return outcome
 
 
 @command('eval "$(sweep completion bash)"', option("shell", choices=("bash", "zsh", "tcsh")))
@@ -108,7 +100,3 @@ def _version() -> str:
         return f"foliot {metadata.version('foliot')}"
     except metadata.PackageNotFoundError:
         return "foliot (not installed)"
-
-
-if __name__ == "__main__":
-    sys.exit(main())

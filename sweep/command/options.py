@@ -64,11 +64,6 @@ def switch(name: str, text: str) -> Option:
     return option(name, text, action="store_true")
 
 
-def several(name: str, text: str, metavar: str) -> Option:
-    """An option with values, which may be given again."""
-    return option(name, text, metavar=metavar, nargs="+", action="extend", default=[])
-
-
 def output(metavar: str, text: str | None = None, ending: str = "", checked: bool = True, **keys: Any) -> Option:
     """Where a command writes: by default here, under the name of what it reads and an ending, if there is one.
 
@@ -86,8 +81,10 @@ FORCE = switch("--force", "overwrite what is there")
 UNFINISHED = switch("--unfinished", "take what there is of a result that is not complete yet")
 ALL = switch("--all", "all columns of the table")
 JSON = switch("--json", "as JSON, for programs; a number that is none is null")
-AT = several("--at", "pick one value of another axis", "AXIS=VALUE")
-UNITS = several("--unit", "give a variable in another unit, e.g. A0=degree e=mm wear=mm/hour", "NAME=UNIT")
+SEVERAL: dict[str, Any] = {"nargs": "+", "action": "extend", "default": []}
+AT = option("--at", "pick one value of another axis", metavar="AXIS=VALUE", **SEVERAL)
+UNIT_TEXT = "give a variable in another unit, e.g. A0=degree e=mm wear=mm/hour"
+UNITS = option("--unit", UNIT_TEXT, metavar="NAME=UNIT", **SEVERAL)
 SOLVING = (
     option("--workers", "cores to use; default: all", metavar="N", type=int),
     ALLOW_IMPORT,

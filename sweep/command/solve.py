@@ -72,10 +72,10 @@ def run(arguments: argparse.Namespace) -> Outcome:
         try:
             outcome = _computed(arguments, study, target)
         except BaseException as error:
-            told = explained(error)
-            log(f"ended with {told.code}: {told.text}", "end", exit=told.code)
+            outcome = explained(error)
             raise
-        log(f"ended with {outcome.code}: {outcome.text}", "end", exit=outcome.code)
+        finally:
+            log(f"ended with {outcome.code}: {outcome.text}", "end", exit=outcome.code)
     return outcome
 
 

@@ -168,9 +168,9 @@ class Page:
         self.sliders = {}
         for dim in (dim for dim in other_axes(self.dataset, choice) if dim != choice.across):
             column = coordinate(self.dataset[choice.output], dim)
-            unit = str(column.attrs.get("units", "1"))
+            unit = str(column.attrs.get("units", ""))
             texts = [f"{value:.4g}" if column.dtype.kind in "fiu" else str(value) for value in column.values]
-            texts = [text if unit == "1" else f"{text} {unit}" for text in texts]
+            texts = [text if unit in ("", "1") else f"{text} {unit}" for text in texts]
             options = {f"{i}: {text}" if column.size > 1 else text: i - 1 for i, text in enumerate(texts, 1)}
             place = int(before[dim].value) if dim in before else column.size // 2
             kind = pn.widgets.DiscreteSlider if column.size > 1 else pn.widgets.Select

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import cycle
 from typing import Any
 
 import numpy as np
@@ -28,8 +29,7 @@ TOOLS = "pan,box_zoom,wheel_zoom,reset,tap"
 def status_colour(found: View, code: int) -> str:
     """The colour of a status."""
     rest = sorted(number for number, name in found.meanings.items() if name not in OWN)
-    name = found.meanings.get(code, "")
-    return OWN[name] if name in OWN else OTHERS[(rest.index(code) if code in rest else code) % len(OTHERS)]
+    return OWN.get(found.meanings.get(code, "")) or dict(zip(rest, cycle(OTHERS), strict=False)).get(code, OTHERS[0])
 
 
 def plain_label(found: View, name: str) -> str:
