@@ -103,7 +103,7 @@ class Condition:
                 if isinstance(op, ast.Pow) and self.units is not None:
                     if not isinstance(other, int) or not 1 <= other <= 9:
                         raise self.refusal("is not allowed; a power is a whole number from 1 to 9", node)
-                    return functools.reduce(operator.mul, [value] * other), None if unit is None else unit**other
+                    return functools.reduce(operator.mul, [value * 1.0] * other), None if unit is None else unit**other
                 if unit is not None or its is not None:  # a number alone is of no unit in a product
                     unit = compute(*(parsed("1") if one is None else one for one in (unit, its)))
                 return compute(value, other), unit

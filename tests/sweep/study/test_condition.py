@@ -23,6 +23,7 @@ G = 9.80665
         ("height > 2 or v0 > 2 and height < 1", (H > 2) | (V > 2) & (H < 1)),
         ("'1.5e1 cm' < height <= '.3 m'", (H > 0.15) & (H <= 0.3)), ("'300 mm' >= height", H <= 0.3),
         ("method == 'exact'", H > 0), ("method != 'exact' or v0 > 2", V > 2),
+        ("(" * 8 + "9" + "**9)" * 8 + " > height", H > 0),
     ],
 )  # fmt: skip
 def test_cells_are_those_that_plain_numpy_chooses(text, mask):
