@@ -221,7 +221,7 @@ def _columns(file: Any, folder: Path, field: Field, numbered: bool) -> Floats:
     A text names a file in the study's folder or below; a `Path`, which a study file cannot hold, any. Empty lines and
     lines that start with "#" are left out. Raises ValueError with the text for the user.
     """
-    if not isinstance(file, str | Path):
+    if not isinstance(file, str | Path) or "\0" in str(file):
         raise ValueError(f'expected the name of a csv file, found {show(file)}; write e.g. "points.csv"')
     path, name, values, bad = folder / file, field.name, list[list[float]](), list[str]()
     try:
