@@ -200,6 +200,14 @@ def held_by(m, state, side, signs, parameters, unit, surfaces, on):
     return joined(tuple(where(x, 1.0, sign) for x, sign in zip(held, signs[:-1], strict=True)), signs[-1:])
 
 
+@jit_call
+@over_tuples
+def sinking(m, state, mode, unit):
+    """1 where the value of the surface falls, else 0."""
+    _, factor, u = m.jet(state, mode, unit, ()).events[0]
+    return where(factor * u[1] < 0.0, 1.0, 0.0)
+
+
 @jit
 @over_tuples
 def advance(m, leg, memory, i, tells, slides, surfaces):
@@ -265,9 +273,8 @@ def advance(m, leg, memory, i, tells, slides, surfaces):
         state = tuple(where(shaken, fma(off, rate, u), u) for rate, u in zip(rates, state, strict=True))
         time = where(moving, fma(found.t, unit, time), time)
         since = where(moving, fma(found.t, unit, since), since)
-        switches = moving & (on[0] > 0.5) & (signs[-1] > 0.0)
+        first = switches = moving & (on[0] > 0.5) & (signs[-1] > 0.0)
         if surfaces is not None:
-            first = switches
             met = tuple(
                 moving & (o > 0.5) & (s > 0.5) & (sign > 0.0)
                 for o, s, sign in zip(on[1:], surfaces, signs[:-1], strict=True)
@@ -309,10 +316,9 @@ def advance(m, leg, memory, i, tells, slides, surfaces):
             mode = Mode(side, signs, parameters, False)
             after, extent = m.surface(state, mode), m.made(state, mode)[0][0]
             still = magnitude(after) <= fma(1e-12, extent, 2.0 * magnitude(before_it))
+            through = first & still & (sinking(m, state, mode, unit) > 0.5)
+            signs = joined(signs[:-1], (where(through, -1.0, signs[-1]),))
             if surfaces is not None:
-                _, factor, u = m.jet(state, mode, unit, ()).events[0]
-                sinks = switches & first & still & (factor * u[1] < 0.0)
-                signs = joined(signs[:-1], (where(sinks, -1.0, signs[-1]),))
                 still = still & first
             on = choose(switches, joined((where(still, 1.0, 0.0),), kinks_on), on)
             way = where(switches & (after < 0.0) & not_(still), -1.0, signs[-1])

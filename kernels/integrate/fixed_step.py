@@ -353,9 +353,12 @@ def switched(m, motion, behind, switches):
     side = where(switches, -motion.side, motion.side)
     state = choose(switches, m.switched(motion.state, mode), motion.state)
     signs, kinks_on = settled(m, state, side, motion.parameters, 0.0 * side + 1.0, times(0.0, motion.signs[:-1]))
-    after_it = events(m, state, Mode(side, signs, motion.parameters, False))[0][0]
-    still = magnitude(after_it) <= 2.0 * magnitude(left)
-    signs = joined(signs[:-1], (where((after_it < 0.0) & not_(still), -1.0, signs[-1]),))
+    mode = Mode(side, signs, motion.parameters, False)
+    values, rates = events(m, state, mode)
+    still = magnitude(values[0]) <= 2.0 * magnitude(left)
+    through = (values[0] <= left) & (values[0] >= left) & (rates[0] < 0.0)
+    below = (still & through) | (not_(still) & (values[0] < 0.0))
+    signs = joined(signs[:-1], (where(below, -1.0, signs[-1]),))
     on = joined((where(still, 1.0, 0.0),), kinks_on)
     return refused(jumped(motion, state, side, signs, on, behind, switches), switches & faint, OUT_OF_RANGE)
 

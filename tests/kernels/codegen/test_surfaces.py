@@ -1,5 +1,7 @@
 """Several surfaces, each with its jump: walls, a section beside an impact, and a mode of more than two values."""
 
+import math
+
 import pytest
 from columns import solve
 
@@ -84,6 +86,23 @@ def test_a_section_beside_an_impact_is_passed_and_counts_behind_it_too(method):
         assert status == Status.OK
         assert [outputs[name] for name in ("time", "x", "v")] == pytest.approx([time, x, v], abs=1e-8)
     assert found(kernel, method, 0.0, flips=5)[1] != Status.OK
+
+
+SECTION = {
+    "name": "section", "doc": "an oscillator, at each passage of its place of rest",
+    "states": fields("x", "v"), "parameters": fields("w"), "rates": lambda x, v, w: (v, -w * w * x),
+    "surface": lambda x: x, "start": lambda: (1.0, 0.0),
+}  # fmt: skip
+
+
+@plain
+@pytest.mark.parametrize("method", ["taylor", "dop853", "rodas5p", "rk4"])
+def test_a_surface_without_a_side_and_without_a_jump_is_passed_once_a_period(method):
+    step = {"step": 0.03} if method == "rk4" else {}
+    kernel = stepped_kernel(**SECTION) if step else scene_kernel(**SECTION)
+    outputs, status = solve(kernel, method, [2.0], flips=3.0, **step)
+    assert status[0] <= (Status.GRAZING if step else Status.OK)
+    assert [outputs[name][0] for name in ("time", "x", "v")] == pytest.approx([2.25 * math.pi, 0, -2], abs=1e-6)
 
 
 @plain

@@ -1,0 +1,32 @@
+"""Types of the public names, for editors and type checkers."""
+
+from sweep.errors import StudyError as StudyError
+from sweep.errors import SweepError as SweepError
+from sweep.explore.join import join as join
+from sweep.explore.plan import plan as plan
+from sweep.explore.refine import refine as refine
+from sweep.explore.scaling import scaling as scaling
+from sweep.explore.scattered import interpolated as interpolated
+from sweep.explore.sensitivity import sensitivity as sensitivity
+from sweep.explore.solver import solver as solver
+from sweep.explore.work_precision import work_precision as work_precision
+from sweep.file.open import open_result as open_result
+from sweep.file.verify import verify as verify
+from sweep.laws.asymptote import fit_correction as fit_correction
+from sweep.laws.collapse import fit_collapse as fit_collapse
+from sweep.laws.compare import compare_laws as compare_laws
+from sweep.laws.exponents import exponent_map as exponent_map
+from sweep.laws.exponents import local_exponent as local_exponent
+from sweep.laws.exponents import where_exponent as where_exponent
+from sweep.laws.lines import fit_exponent as fit_exponent
+from sweep.laws.two_laws import fit_two_laws as fit_two_laws
+from sweep.results.diff import diff as diff
+from sweep.results.export import export as export
+from sweep.results.filter import where as where
+from sweep.results.listing import list_results as list_results
+from sweep.results.units import in_units as in_units
+from sweep.runs.run import run as run
+from sweep.show.charts import plot as plot
+from sweep.show.kernels import kernels as kernels
+from sweep.study.read import study as study
+from sweep.study.toml import to_toml as to_toml
