@@ -41,6 +41,7 @@ class Claims(NamedTuple):
 
 # fmt: off
 TABLE = {
+    "anchor": Claims({"anchor": {"mu": 2}}, "", 1),
     "balance_isochronism": Claims({
         "balance_isochronism": {"at": 8, "w": 4}, "balance_isochronism_lift": {"m": 2},
         "balance_isochronism_positions": {"w": 2},
