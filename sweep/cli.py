@@ -41,12 +41,14 @@ def main(argv: Sequence[str] | None = None) -> int:
             say(ended.text, sys.stderr)
     if getattr(arguments, "notify", None):
         solve.notify(arguments, ended)
+    for stream in filter(None, (sys.stdout, sys.stderr)):
+        try:
+            stream.flush()
+        except OSError:  # Python would try again, and end with a status of its own
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
     pool = sys.modules.get("sweep.runs.pool")
     if argv is None and pool is not None and pool.endless.is_set():
         # a kernel that never ends would keep Python from ending; a program that calls this is not ours to end
-        for stream in (sys.stdout, sys.stderr):
-            with contextlib.suppress(OSError, AttributeError):
-                stream.flush()
         os._exit(ended.code)
     return ended.code
 

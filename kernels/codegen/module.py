@@ -90,7 +90,7 @@ def {name}(state, mode, unit, cores):
 SCENE = """
 M = Written(
     rates, surface, kinks, switched, started, natural_signs, underflows, jet, lost, hidden, bounds, made,
-    {numbers}, {alternating}, {most_kinks}, cell_of({cell}), {slides}, {hiding}, None, None,
+    {numbers}, {alternating}, {most_kinks}, cell_of({cell}), {slides}, {hiding}, {passable}, None, None,
 )
 """
 
@@ -422,6 +422,10 @@ class Writer:
                 SCENE,
                 numbers=tuple(map(float, range(1 + self.kinks))),
                 hiding=tuple(tuple(map(float, h)) for h in hides),
+                passable=tuple(
+                    float(not any(x.kind == INPUT and x.args[0] == "side" for x in needed(event)))
+                    for event in (recorded.surface, *recorded.graph.kinks)
+                ),
                 alternating=tuple((-1.0) ** j for j in range(len(self.states))),
                 most_kinks=KINK_LIMIT if scene.most_kinks is None else float(scene.most_kinks),
                 cell=f"{len(self.states)}, {len(self.parameters)}, {self.kinks}",

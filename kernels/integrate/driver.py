@@ -23,6 +23,8 @@ EVENTS = 1_000_000
 """Of lanes none of which finishes, before what they keep is put down."""
 BLUR = 16.0
 """Tolerances of the surface's value at the start that rounding may take from it: rtol/2 in the finer run."""
+BACK = 1e-9
+"""Of an event's rate before a switch, that of one which rounding may be all of behind it."""
 ONE_ULP = 2.0**-52
 SHAKEN, GOLDEN = 2.0, 0.6180339887498949
 """Roundings that an event is missed by at most; and what the share of it goes on by from one event to the next, so that
@@ -190,22 +192,24 @@ def which_met(signs, surfaces, first, met):
 
 
 @symbolic
-def held_by(m, state, side, signs, parameters, unit, surfaces, on):
-    """The signs behind a switch: 1 for a surface that the motion is on and has no rate from, which holds it."""
-    events = m.jet(state, Mode(side, signs, parameters, False), unit, ()).events[1:]
+def held_by(m, state, side, signs, parameters, unit, surfaces, on, falls):
+    """The signs behind a switch: 1 for a surface that the motion is on and does not leave, which holds it.
+
+    `falls` : the rates of the events before the switch
+    """
+    rates = rates_of_events(m, state, Mode(side, signs, parameters, False), unit)
     held = tuple(
-        (s > 0.5) & (o > 0.5) & (u[1] <= 0.0) & (u[1] >= 0.0)
-        for s, o, (offset, factor, u) in zip(surfaces, on, events, strict=True)
+        (s > 0.5) & (o > 0.5) & ((magnitude(rate) <= BACK * magnitude(fall)) | ((1.0 - passable) * rate < 0.0))
+        for s, o, rate, fall, passable in zip(surfaces, on, rates[1:], falls[1:], m.passable[1:], strict=True)
     )
     return joined(tuple(where(x, 1.0, sign) for x, sign in zip(held, signs[:-1], strict=True)), signs[-1:])
 
 
 @jit_call
 @over_tuples
-def sinking(m, state, mode, unit):
-    """1 where the value of the surface falls, else 0."""
-    _, factor, u = m.jet(state, mode, unit, ()).events[0]
-    return where(factor * u[1] < 0.0, 1.0, 0.0)
+def rates_of_events(m, state, mode, unit):
+    """Of each event's value, per unit of time."""
+    return tuple(factor * u[1] for offset, factor, u in m.jet(state, mode, unit, ()).events)
 
 
 @jit
@@ -300,7 +304,7 @@ def advance(m, leg, memory, i, tells, slides, surfaces):
             if surfaces is not None:
                 mode = Mode(side, which_met(signs, surfaces, first, met), parameters, False)
             errors, rates = carried.behind(tells, errors, state, mode, rates, switches)
-            before_it = m.surface(state, mode)
+            before_it, old, old_mode = m.surface(state, mode), state, mode
             gaps = m.kinks(state, mode)
             jumped = m.switched(state, mode)
             mode, side = Mode(side, signs, parameters, False), where(switches, -side, side)
@@ -311,13 +315,16 @@ def advance(m, leg, memory, i, tells, slides, surfaces):
             )
             new_signs, kinks_on = settled(m, jumped, side, parameters, unit, near)
             if surfaces is not None:
-                new_signs = held_by(m, jumped, side, new_signs, parameters, unit, surfaces, kinks_on)
+                falls = rates_of_events(m, old, old_mode, unit)
+                new_signs = held_by(m, jumped, side, new_signs, parameters, unit, surfaces, kinks_on, falls)
             state, signs = choose(switches, jumped, state), choose(switches, new_signs, signs)
             mode = Mode(side, signs, parameters, False)
             after, extent = m.surface(state, mode), m.made(state, mode)[0][0]
             still = magnitude(after) <= fma(1e-12, extent, 2.0 * magnitude(before_it))
-            through = first & still & (sinking(m, state, mode, unit) > 0.5)
-            signs = joined(signs[:-1], (where(through, -1.0, signs[-1]),))
+            if m.passable[0] > 0.5:
+                fall, rate = rates_of_events(m, old, old_mode, unit)[0], rates_of_events(m, state, mode, unit)[0]
+                through = first & still & (rate < -BACK * magnitude(fall))
+                signs = joined(signs[:-1], (where(through, -1.0, signs[-1]),))
             if surfaces is not None:
                 still = still & first
             on = choose(switches, joined((where(still, 1.0, 0.0),), kinks_on), on)

@@ -10,7 +10,7 @@ import math
 from typing import NamedTuple
 
 from kernels.integrate import events as E
-from kernels.integrate.driver import begun, settled
+from kernels.integrate.driver import BACK, begun, settled
 from kernels.integrate.events import cubic_root, leap, lowest, of_event, shortened, swapped
 from kernels.integrate.records import Mode, Step
 from kernels.integrate.steps import ONE, events, rate
@@ -348,15 +348,15 @@ def _chosen(switches, x, y):
 def switched(m, motion, behind, switches):
     """The motion behind the switch, of the lanes that are on it."""
     mode = Mode(motion.side, motion.signs, motion.parameters, False)
-    left = events(m, motion.state, mode)[0][0]
+    before, falls = events(m, motion.state, mode)
     faint = m.underflows(motion.state, mode, motion.step)
     side = where(switches, -motion.side, motion.side)
     state = choose(switches, m.switched(motion.state, mode), motion.state)
     signs, kinks_on = settled(m, state, side, motion.parameters, 0.0 * side + 1.0, times(0.0, motion.signs[:-1]))
     mode = Mode(side, signs, motion.parameters, False)
     values, rates = events(m, state, mode)
-    still = magnitude(values[0]) <= 2.0 * magnitude(left)
-    through = (values[0] <= left) & (values[0] >= left) & (rates[0] < 0.0)
+    still = magnitude(values[0]) <= 2.0 * magnitude(before[0])
+    through = m.passable[0] * rates[0] < -BACK * magnitude(falls[0])
     below = (still & through) | (not_(still) & (values[0] < 0.0))
     signs = joined(signs[:-1], (where(below, -1.0, signs[-1]),))
     on = joined((where(still, 1.0, 0.0),), kinks_on)

@@ -208,11 +208,16 @@ def _folder_of_rounds(path: str | os.PathLike[str] | None, dataset: xr.Dataset, 
     target, source = as_path(path), dataset.encoding.get("source")
     rounds = target.with_name(f"{target.name}.rounds")
     with disk.refusing(target):
-        if force or target.exists():  # of a call that was killed when it had ended, they are still there
+        if force or (target.exists() and not _are_newer(rounds, target)):
             shutil.rmtree(rounds, ignore_errors=True)
         check_target(target, force=force, read=[Path(source)] if source else [])
         rounds.mkdir(exist_ok=True)
     return rounds
+
+
+def _are_newer(rounds: Path, target: Path) -> bool:
+    """Whether there are rounds on the way to another result than that which is there."""
+    return any(file.stat().st_mtime > target.stat().st_mtime for file in rounds.glob("*.h5"))
 
 
 def report(cells: Refiner, dataset: xr.Dataset) -> Refinement:

@@ -123,17 +123,31 @@ def replacing(target: Path) -> Iterator[Path]:
             part.touch()  # says in plain words that there is no such folder, or no permission
             yield part
             sync_tree(part)
-            if target.is_dir() or part.is_dir():
-                _discard(target)  # a folder cannot be replaced in one step
-            rename(part, target)
+            _renamed(part, target)
             sync_folder(target.parent)
     except OSError as fault:
         raise SweepError(f"{target} cannot be written: {fault.strerror or fault}") from None
 
 
+def _renamed(part: Path, target: Path) -> None:
+    """Puts `part` at the place of `target`; a folder, which cannot be replaced in one step, stands aside meanwhile."""
+    old = target.with_name(f".{target.name}.old")
+    aside = target.exists() and (target.is_dir() or part.is_dir())
+    if aside:
+        _discard(old)
+        rename(target, old)
+    try:
+        rename(part, target)
+    except OSError:
+        if aside:
+            rename(old, target)
+        raise
+    _discard(old)
+
+
 def _discard(path: Path) -> None:
     """Removes a file or a folder, if it is there."""
-    if path.is_dir():
+    if path.is_dir() and not path.is_symlink():
         shutil.rmtree(path, ignore_errors=True)
     else:
         path.unlink(missing_ok=True)

@@ -78,7 +78,10 @@ class StoredFile:
                 contents = json.loads(attrs["contents"])
                 self._dims = {name: tuple(dims) for name, dims in contents["dims"].items()}
                 self.key_at, self.ending_at = (_own(file, f"integrity/{k}").id.get_offset() for k in ("key", "ending"))
-                self.key, ending = read_bytes(self.fd, self.key_at, BYTES), read_bytes(self.fd, self.ending_at, 256)
+                self.key, ending = (
+                    read_bytes(self.fd, self.key_at, BYTES),
+                    read_bytes(self.fd, self.ending_at, ENDING_BYTES),
+                )
                 self.tables = {name: Table(self, file, name, **keys) for name, keys in contents["tables"].items()}
             self.ending = ending_of(ending)
         except BaseException:
@@ -104,6 +107,9 @@ class StoredFile:
 
     def __del__(self) -> None:
         self.close()
+
+    def __reduce__(self) -> Any:
+        return _again, (self.path, self.key)
 
     def close(self) -> None:
         """Gives the file back; nothing can be read from then on."""
@@ -227,7 +233,7 @@ class Numbers:
             raise ValueError(f"{self.path} has another shape than it was made with")
 
     def __reduce__(self) -> Any:
-        return _column, (self.table.file.path, self.table.name, self.number)
+        return _column, (self.table.file, self.table.name, self.number)
 
     @cached_property
     def at(self) -> Any:
@@ -278,7 +284,9 @@ class Numbers:
     def __getitem__(self, key: Any) -> Any:
         """By what is given for each dimension, or for the first ones. Raises SweepError where damaged."""
         key = key if isinstance(key, tuple) else (key,)
-        key = (*(k for k in key if k is not Ellipsis), *[slice(None)] * len(self.shape))[: len(self.shape)]
+        key = key if Ellipsis in key else (*key, Ellipsis)
+        place, left = key.index(Ellipsis), len(self.shape) - len(key) + 1
+        key = (*key[:place], *[slice(None)] * left, *key[place + 1 :])
         grid, box = self.table.grid, self.table.box
         counts = [-(-n // m) for n, m in zip(grid, box, strict=True)]
         slices = [k if isinstance(k, slice) else slice(k, k + 1 or None) for k in key[: len(grid)]]
@@ -315,7 +323,7 @@ class Numbers:
             raise SweepError(f"{file.path}: is closed; open it again to read {self.name}")
         if (file.ending or self.table.is_sound(block)) and self.read(block, out) is not None:
             return
-        if file.ending:
+        if file.ending or self.table.name == "rows":  # what is missing of these is not asked for
             start, stop = self.table.blocks.bounds(block)
             raise SweepError(
                 f"{file.path}: {self.name} is damaged between its cells {start:,} and {stop:,}, or was changed by "
@@ -325,8 +333,16 @@ class Numbers:
         out[...] = {STATUS: int(Status.PENDING), METHOD_USED: -1}.get(self.name, math.nan)
 
 
-def _column(path: Path, table: str, number: int) -> Numbers:
-    return StoredFile(path).tables[table].columns[number]
+def _again(path: Path, key: bytes) -> StoredFile:
+    """A file once more, in another process or from a pickle. Raises SweepError where another has its name by now."""
+    file = StoredFile(path)
+    if file.key != key:
+        raise SweepError(f"{path}: was replaced since it was opened; open it again")
+    return file
+
+
+def _column(file: StoredFile, table: str, number: int) -> Numbers:
+    return file.tables[table].columns[number]
 
 
 def _own(file: Any, path: str) -> Any:

@@ -140,10 +140,13 @@ class Store:
     def _open(self, file: StoredFile) -> None:
         with disk.refusing(self.path):
             self._fd = disk.open_file(self.path, os.O_RDWR)
+            if file.ending:  # it was killed just before it was renamed, or is taken up again
+                file.ending = {}
+                disk.write_all(self._fd, (ending_text({}),), file.ending_at)
         self.file, self._size = file, os.fstat(self._fd).st_size
 
     def _check(self) -> None:
-        """Raises Incomplete where the file is not what it was, or not where it was: not a byte of ours goes there."""
+        """Raises Incomplete where the file is not what it was, or not where it was: no block of ours counts there."""
         assert self.file is not None
         ours, at = os.fstat(self._fd), self.file.key_at
         try:
@@ -245,8 +248,6 @@ class Store:
             file = self.found()
             assert file is not None
             self._open(file)
-            file.ending = {}
-            disk.write_all(self._fd, (ending_text({}),), file.ending_at)
             self._undo(damaged)
 
     def shared(self) -> Shared | None:

@@ -27,7 +27,7 @@ from typing import Any
 
 import distributed
 
-from sweep.cells.block import Blocks, warm
+from sweep.cells.block import Blocks, faults_reported, warm
 from sweep.cells.fingerprint import difference, fingerprint
 from sweep.cells.solve import Solver
 from sweep.errors import Incomplete, SweepError
@@ -220,6 +220,6 @@ class _Sink:
 
 def compute(remote: Remote, job: int, wanted: Any) -> Done:
     """Computes a block on a worker. Raises SweepError."""
-    with remote.turn:
+    with remote.turn, faults_reported(f"worker on {socket.gethostname()}"):
         bench = remote.bench
     return bench.block(job, wanted)

@@ -83,7 +83,7 @@ class Processes:
 
     def solver(self) -> Isolated:
         """A solver with a process of its own, for one thread at a time; one that is idle, if there is any."""
-        if self._idle:
+        with contextlib.suppress(IndexError):  # another thread may take the last one
             return self._idle.pop()
         self._solvers.append(Isolated(self))
         return self._solvers[-1]
@@ -153,7 +153,7 @@ class Isolated:
                         raise SweepError("the run is being stopped")
                     process = self._process = _started(self._all.text)
                 good = self._all.good
-                _answer(process, LOAD_SECONDS, good or 0, int(good is not None), None)
+                _answer(process, LOAD_SECONDS + self._all.dearest * DEARER, good or 0, int(good is not None), None)
                 return process
             except SweepError:
                 raise

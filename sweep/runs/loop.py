@@ -266,6 +266,7 @@ class Loop:
         if self._cluster is not None:
             self._cluster.cancel()
         self._threads.shutdown(wait=False, cancel_futures=True)
+        computing = [future for future in computing if not future.cancelled()]
         if wait(computing, 1.3 if self._cluster is None else 0.0).not_done and self._processes is not None:
             self._processes.end()
         if wait(computing, 0.3).not_done and self._cluster is None:

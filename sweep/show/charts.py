@@ -370,7 +370,7 @@ def _draw_passages(axes: Any, shown: View) -> None:
     axes.set_xscale("log" if is_logarithmic(shown.values(shown.x)) else "linear")
     x = np.broadcast_to(shown.values(shown.x), shown.y.shape)
     names = dict.fromkeys(shown.codes(), "") | shown.meanings | {0: "OK"}
-    for code, colour in zip([0, *shown.codes()], ("black", *FLAGGED), strict=False):
+    for code, colour in zip([0, *shown.codes()], itertools.chain(["black"], itertools.cycle(FLAGGED)), strict=False):
         here = (shown.status == code) & np.isfinite(shown.y.values)
         axes.plot(x[here], shown.y.values[here], ".", markersize=1.5, markeredgewidth=0.0, color=colour)
         if here.any() and shown.codes():

@@ -125,7 +125,7 @@ class Condition:
             raise self.refusal("compares two constants")
         for node, word in ((left, other), (right, value)):
             # a misspelt status would choose nothing, or everything, without a sign
-            words = list(self.words(node.id)) if isinstance(node, ast.Name) else [word]
+            words = list(self.words(node.id)) if isinstance(node, ast.Name) and isinstance(word, str) else [word]
             if isinstance(word, str) and word not in words:
                 hint = did_you_mean(word, words) or f"; it has {listed(words)}"
                 raise self.refusal(f'{ast.unparse(node)} is never "{word}"{hint}')

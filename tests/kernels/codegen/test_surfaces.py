@@ -8,7 +8,7 @@ from columns import solve
 from kernels.cycle import cycle_kernel
 from kernels.interface import Status
 from kernels.lanes.jit import COMPILED
-from kernels.scene import Field, SceneError, scene_kernel, where
+from kernels.scene import Field, SceneError, cos, scene_kernel, sin, where
 from kernels.stepping import stepped_kernel
 from kernels.trajectory import motion_kernel
 
@@ -40,8 +40,8 @@ SHIFTED = {
 plain = pytest.mark.skipif(COMPILED, reason="compiled in test_functions; run with NUMBA_DISABLE_JIT=1")
 
 
-def found(kernel, method, *cell, flips, rtol=1e-9):
-    outputs, status = solve(kernel, method, [cell[0]], *cell[1:], flips=float(flips), rtol=rtol)
+def found(kernel, method, *cell, flips, rtol=1e-9, **more):
+    outputs, status = solve(kernel, method, [cell[0]], *cell[1:], flips=float(flips), rtol=rtol, **more)
     return {name: values[0] for name, values in outputs.items()}, status[0]
 
 
@@ -86,6 +86,37 @@ def test_a_section_beside_an_impact_is_passed_and_counts_behind_it_too(method):
         assert status == Status.OK
         assert [outputs[name] for name in ("time", "x", "v")] == pytest.approx([time, x, v], abs=1e-8)
     assert found(kernel, method, 0.0, flips=5)[1] != Status.OK
+
+
+@plain
+@pytest.mark.parametrize("method", ["taylor", "dop853", "rk4"])
+def test_what_both_sides_press_onto_a_surface_does_not_pass_through_it(method):
+    """An oscillator whose dry friction is written by `side`: it turns twice, and is held where the spring is weaker."""
+    scene = {
+        "name": "dry", "doc": "", "states": fields("x", "v"), "parameters": fields("c"),
+        "rates": lambda x, v, side, c: (v, -x - side * c), "start": lambda: (-1.0, 0.0),
+    }  # fmt: skip
+    step, turn = {"step": 0.03} if method == "rk4" else {}, lambda v, side: side * v
+    kernel = (stepped_kernel if step else scene_kernel)(**scene, surface=turn)
+    assert found(kernel, method, 0.3, flips=2, **step)[1] <= Status.GRAZING
+    assert found(kernel, method, 0.3, flips=8, **step)[1] == Status.STICKS
+    if not step:
+        assert (
+            found(scene_kernel(**scene, surface={"turn": turn, "far": lambda x: x + 9.0}), method, 0.3, flips=8)[1] > 63
+        )
+
+
+@plain
+def test_what_an_impact_leaves_at_rest_on_a_moving_wall_sticks_and_goes_where_the_wall_recedes():
+    """Behind the impact the relative speed is 0 but for rounding."""
+    wall = scene_kernel(
+        name="wall", doc="", states=fields("x", "v"), parameters=fields("A", "w"), rates=lambda x, v: (v, -x),
+        surface=lambda x, t, A, w: x - 0.1 - A * sin(w * t), switch=lambda x, t, A, w: (x, A * w * cos(w * t)),
+        start=lambda: (1.0, 0.0),
+    )  # fmt: skip
+    for A, w in ((0.31, 0.7), (0.1234, 0.7), (0.77, 0.7)):
+        assert found(wall, "taylor_once", A, w, flips=2)[1] == Status.STICKS
+    assert found(wall, "taylor_once", 0.77, 1.3, flips=2)[1] == Status.OK
 
 
 SECTION = {

@@ -1,5 +1,6 @@
 """What is overwritten by force, and what never."""
 
+import errno
 import os
 from pathlib import Path
 
@@ -78,12 +79,30 @@ def test_a_result_is_no_earlier_export_of_itself(here):
     assert sweep.verify("other.nc").whole
 
 
+def full_once(rename):
+    """As `rename`, but the second one finds no room."""
+    calls = iter([rename, None, rename])
+
+    def renamed(*paths):
+        do = next(calls)
+        if do is None:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        do(*paths)
+
+    return renamed
+
+
 def test_a_folder_that_is_no_zarr_is_left_alone(here):
     Path("a.zarr").mkdir()
     Path("a.zarr/thesis.txt").write_text("all of it")
     with sweep.open_result("r.h5") as ds:
         with pytest.raises(SweepError, match="is there already"):
             sweep.export(ds, "a.zarr")
+        assert Path("a.zarr/thesis.txt").read_text() == "all of it"
+        with pytest.MonkeyPatch.context() as patched:
+            patched.setattr(disk, "rename", full_once(disk.rename))
+            with pytest.raises(sweep.SweepError, match="cannot be written"):
+                sweep.export(ds, "a.zarr", force=True)
         assert Path("a.zarr/thesis.txt").read_text() == "all of it"
         sweep.export(ds, "a.zarr", force=True)
         assert not Path("a.zarr/thesis.txt").exists()

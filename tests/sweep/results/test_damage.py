@@ -216,6 +216,16 @@ def test_a_dataset_that_was_sent_to_another_process_is_checked_there(copy):
             fall_time.load()
 
 
+def test_a_result_from_a_pickle_has_a_file_of_its_own_and_refuses_another_result(copy):
+    with sweep.open_result(copy) as found:
+        sent = pickle.dumps(found)
+        pickle.loads(sent).close()
+        assert found.equals(pickle.loads(sent))
+    quiet(tall(7), copy, force=True).close()
+    with pytest.raises(sweep.SweepError, match="replaced"):
+        pickle.loads(sent)
+
+
 def test_what_is_there_of_an_unfinished_result_is_told_with_what_is_missing(tmp_path):
     interrupted(tall(23), tmp_path / "out.h5")
     found = sweep.verify(tmp_path / "out.h5")
