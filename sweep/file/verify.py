@@ -1,4 +1,6 @@
-"""Whether a result, finished or not, is what was written: every byte is read, and compared with its digest."""
+"""Whether a result, finished or not, is what was written: all numbers, and all that stands before its key, are read and
+compared with their digests. Tables of places behind it have checksums of HDF5's; where nothing stands is not compared.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +28,7 @@ class Verdict:
     Attributes
     ----------
     whole : bool
-        Finished, and every byte is as it was written.
+        Finished, and all that it says is as it was written.
     findings : tuple of str
         What is wrong or missing, a line each; none where it is whole.
     blocks : tuple of int or None
