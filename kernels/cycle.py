@@ -73,14 +73,14 @@ def cycle_kernel(
     ------
     SceneError
         As `scene_kernel`; where the surface watches more than one state, or one that turns; and where a motion passes
-        through it: neither it nor the rates hang on `side`, and there is no switch.
+        through it: neither it nor the rates depend on `side`, and there is no switch.
     """
     scene = bare(scene_of(name, doc, states, parameters, rates, surface, start, switch))
     turning = {scene.states.index(state): float(turn) for state, turn in (turns or {}).items()}
     if watched(scene) in turning:
         raise SceneError(f"{name}: the state that the surface watches cannot turn; let the switch put it back")
     if scene.switch is None and not has_sides(scene):
-        raise SceneError(f"{name}: the surface must hang on `side`, or a switch turn the motion back from it: side * x")
+        raise SceneError(f"{name}: the motion passes through the surface; let it depend on `side`, as side * x does")
     fields = (*parameters, *SEARCH)
     swept = [k for k, field in enumerate(parameters) if not field.integer]
     outputs = (

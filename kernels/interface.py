@@ -214,9 +214,3 @@ def load(entry: str) -> Any:
 def machine_code_folder() -> Path | None:
     """Where machine code of kernels is kept; None: nowhere, or none has been loaded."""
     return getattr(sys.modules.get("kernels.lanes.cache"), "FOLDER", None)
-
-
-def is_kept(function: Callable[..., None]) -> bool:
-    """Whether a function's machine code is kept, so that its first call loads it and compiles nothing."""
-    cache = sys.modules.get("kernels.lanes.cache")
-    return cache is not None and bool(cache.kept(function))

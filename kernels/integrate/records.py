@@ -36,7 +36,7 @@ class Written(NamedTuple):
     cell : a `Cell` of zeros
     slides : None, or the functions of a scene that slides (`driver.Slides`)
     hiding : 1 for each rate, and for each event, that can hide something
-    passable : 1 for the surface, and for each kink, that does not hang on the side: a motion may pass through it
+    passable : 1 for the surface, and for each kink, that does not depend on the side: a motion may pass through it
     factored, solved : None, or of a scene that may be stiff (`source_text.stiff`)
     """
 

@@ -207,9 +207,3 @@ def is_ours(function):
     """Whether a function, compiled or not, is of this package, or written by it."""
     file = Path(getattr(function, "py_func", function).__code__.co_filename)
     return PACKAGE in file.parents or file.parent == FOLDER
-
-
-def kept(function):
-    """Whether machine code of an entry function is on the disk, to be loaded and not compiled."""
-    cache = getattr(getattr(function, "compiled", function), "_cache", None)
-    return isinstance(cache, _Cache) and Path(cache._cache_file._index_path).exists()

@@ -73,11 +73,6 @@ class Partition:
         """Flat range of a block, or of the blocks from `start` to `stop`."""
         return self.first(start), self.first(start + 1 if stop is None else stop)
 
-    def index(self, cell: Any) -> Any:
-        """The block that a cell is in, or each of an array of cells."""
-        row = self.row or self.size
-        return cell // row * self.per_row + cell % row // self.cells
-
     def strips(self, start: int, stop: int, capacity: int) -> Iterator[Strip]:
         """Cut the blocks `start` to `stop`, which are rows, into strips of at most `capacity` cells, or one row.
 

@@ -216,7 +216,7 @@ def root(t: Array, c: Array, bracket: int, value: float, points: int) -> float:
     start, stop = next((a, b) for a, b in runs(np.isfinite(c)) if a <= bracket < b)
     first = min(max(bracket - points // 2 + 1, start), max(stop - points, start))
     near, ends = slice(first, min(first + points, stop)), t[bracket : bracket + 2]
-    polynomial = BarycentricInterpolator(t[near], c[near] - value)
+    polynomial = BarycentricInterpolator(t[near], c[near] - value, rng=0)  # it takes the points in a random order
     return float(brentq(lambda at: float(polynomial(at)), *ends, xtol=4 * EPSILON * np.ptp(ends), rtol=4 * EPSILON))
 
 

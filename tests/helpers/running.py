@@ -77,8 +77,9 @@ def place(output, name, cell, table="cells"):
     """Where a cell of a column stands in a file."""
     with StoredFile(output) as file:
         column = file.columns(table)[name]
-        block = column.table.blocks.index(cell)
-        start = column.table.blocks.bounds(block)[0]
+        blocks = column.table.blocks
+        block = next(number for number in range(blocks.count) if cell < blocks.bounds(number)[1])
+        start = blocks.bounds(block)[0]
         return int(column.at[block]) + (cell - start) * column.empty(1).nbytes
 
 
