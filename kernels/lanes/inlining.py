@@ -13,7 +13,6 @@ This rests on the inside of numba's compiler, so other versions of numba than th
 
 import contextlib
 import gc
-import operator
 
 import numba
 from llvmlite.binding import Linkage
@@ -31,7 +30,6 @@ TRIED = ("0.68",)
 """Versions of numba whose compiler is known to work so."""
 LINE = 64
 """Bytes of a cache line, and of the widest register."""
-_OPERATORS = frozenset(getattr(operator, name) for name in operator.__all__)
 
 
 class _Flags(Flags):
@@ -214,24 +212,21 @@ class _Entry(CPUDispatcher):
                 gc.enable()
 
 
-def _is_plain(kind):
-    """Whether it is a number, or as many as there are lanes (`vectors`), or what tells of such."""
-    return isinstance(kind, types.Number | types.Boolean) or getattr(kind, "wide", False)
-
-
 def _remember(context):
-    """Has numba ask once what an operator makes of numbers: it looks at lists, sets, text and arrays first."""
+    """Has numba ask once what comes out of a function for arguments of these types."""
     if "resolve_function_type" in vars(context):
         return
     known, ask = {}, context.resolve_function_type
 
     def resolve(function, args, kws):
-        if function not in _OPERATORS or not all(map(_is_plain, args)):
-            return ask(function, args, kws)
         key = function, tuple(args)
-        if key not in known:
+        try:
+            return ask(function, args, kws) if kws else known[key]
+        except KeyError:
             known[key] = ask(function, args, kws)
-        return known[key]
+            return known[key]
+        except TypeError:  # the type of a constant slice has no hash
+            return ask(function, args, kws)
 
     context.resolve_function_type = resolve
 
