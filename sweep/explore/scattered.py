@@ -18,6 +18,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay
+from threadpoolctl import threadpool_limits
 
 from kernels.interface import FIRST_REFUSAL, Status
 from sweep.errors import SweepError
@@ -184,7 +185,8 @@ def located(points: Array, at: Array) -> tuple[Indices, Array, Indices, Indices]
     and the corners of all simplices."""
     found = Delaunay(tilted(points))
     mesh, places = np.sort(found.simplices.astype(np.intp), axis=1), tilted(at)
-    where = found.find_simplex(places, tol=OUTSIDE).astype(np.intp)
+    with threadpool_limits(1, "blas"):  # on busy cores its threads wait some milliseconds for each other, each time
+        where = found.find_simplex(places, tol=OUTSIDE).astype(np.intp)
     inverse = found.transform[where]
     shares = np.einsum("nij,nj->ni", inverse[:, :-1], places - inverse[:, -1])
     shares = np.column_stack([shares, 1 - shares.sum(axis=1)])
