@@ -28,6 +28,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from _common import Groups, Statement, compared, differing, direct_label, page_of, paragraph, plain_ticks, report
+from scipy.optimize.elementwise import find_root
 
 import sweep
 from sweep.show.charts import COLOURS, DASHES, MARKS
@@ -56,26 +57,24 @@ def thinned(ds: xr.Dataset) -> xr.Dataset:
 def balanced(clocks: xr.Dataset, mu: xr.DataArray) -> xr.Dataset:
     """By (1), for each clock: the least `s`, its torque `mu`, and the way beyond the switch over phi0 there."""
     a, phi0 = float(clocks.a), float(clocks.phi0)
-    n, e, R, c = (clocks[name] for name in ("n", "e", "R", "c"))
 
-    def losses(v: Any) -> tuple[Any, ...]:
+    def losses(v: Any, n: Any, e: Any, R: Any, c: Any, mu: Any) -> tuple[Any, ...]:
         drag = 2 * c * v ** (n + 2) / ((n + 2) * mu)
         return R * v**2 / mu, 2 * a * v**3 / (3 * mu), drag, 0.5 * (1 - e**2) * v**2
 
-    low = np.log(1e-6) + xr.zeros_like(clocks.sensitivity_min + mu)
-    high = low + np.log(1e16)
-    for _ in range(45):
-        middle = 0.5 * (low + high)
-        above = sum(losses(np.exp(middle))) > 2 * mu * phi0
-        low, high = xr.where(above, low, middle), xr.where(above, middle, high)
-    v = np.exp(low)
-    dry, viscous, drag, struck = (x / (2 * mu * phi0) for x in losses(v))
+    def unpaid(log_v: Any, *terms: Any) -> Any:
+        return sum(losses(np.exp(log_v), *terms)) - 2 * terms[-1] * phi0
+
+    terms = xr.broadcast(*(clocks[name] for name in ("n", "e", "R", "c")), mu)
+    found = find_root(unpaid, (math.log(1e-6), math.log(1e10)), args=tuple(x.values for x in terms))
+    v = terms[0].copy(data=np.exp(found.x))
+    n, _, R, _, mu = terms
+    dry, viscous, drag, struck = (x / (2 * mu * phi0) for x in losses(v, *terms))
     N = viscous + n * drag
     s = ((N + struck) / (N + 2) + dry / ((mu / R) ** 2 - 1)).where(mu > R, math.inf)
     best = s.argmin("mu")
-    return xr.Dataset(
-        {"s": s.min("mu"), "mu": mu[best].drop_vars("mu"), "beyond": (v**2 / (2 * mu * phi0)).isel(mu=best)}
-    )
+    beyond = v**2 / (2 * mu * phi0)
+    return xr.Dataset({"s": s, "mu": mu.drop_vars("mu"), "beyond": beyond}).isel(mu=best)
 
 
 def best_torques(ds: xr.Dataset) -> list[Statement]:

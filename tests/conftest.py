@@ -13,6 +13,9 @@ settings.register_profile("local", **AT_ANY_LOAD)
 settings.register_profile("ci", derandomize=True, print_blob=True, **AT_ANY_LOAD)
 settings.load_profile("ci" if os.environ.get("CI") else "local")
 
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+"""One thread a worker: where all cores are busy, those of OpenBLAS wait for each other."""
+
 TESTS = Path(__file__).parent
 PLACES = ("tests/oracles", "tests/helpers", "benchmarks/soak", "studies", "docs")
 sys.path += [str(TESTS.parent / place) for place in PLACES]

@@ -13,7 +13,7 @@ from kernels.interface import FIRST_REFUSAL, Status
 from kernels.lanes.jit import COMPILED
 
 NAMES = sorted(KERNELS)
-CELLS = 1500
+CELLS = 1000
 DEAR = {"foliot_ripple": 100, "foliot_steps": 60, "foliot_noise": 200, "polisher_wear": 60, "polisher_wear_point": 60}
 """Cells of all of float64 where each takes long."""
 

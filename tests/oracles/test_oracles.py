@@ -35,9 +35,7 @@ def test_the_viscous_law_is_that_of_flows():
         assert digits(foliot_oracles.cycle(1.0, 1.0, a=a), oracles.foliot(1.0, 1.0, a)) >= 40
 
 
-@pytest.mark.parametrize(
-    "cell", [{"R": 0.2, "k": 1.4, "e": -0.7}, {"R": 0.1, "e": 0.6}, {"c": 0.5, "n": 2}, {"c": 4.0, "n": 2, "R": 0.3}]
-)
+@pytest.mark.parametrize("cell", [{"R": 0.2, "k": 1.4, "e": -0.7}, {"R": 0.1, "e": 0.6}, {"c": 0.5, "n": 2, "R": 0.3}])
 def test_flows_and_integrals_agree_with_a_taylor_series(cell):
     """The series takes its slopes from differences over 1e-8."""
     truth = ripple_oracles.by_taylor(1.0, 0.8, a=0.3, **{name: v for name, v in cell.items() if name != "n"})

@@ -102,7 +102,7 @@ TABLE = {
         "order": [0, 1], "ac": [0.0, 1.0, 2.5], "detuning": [-0.5, -0.25, 0.0, 0.25, 0.5],
     }}, "status"),
     "stability_maps": Claims({
-        "stability_maps": {"mu": 16, "step": 12}, "stability_maps_oscillator": {"a": 8, "w": 8},
+        "stability_maps": {"mu": 24, "step": 12}, "stability_maps_oscillator": {"a": 8, "w": 8},
         "stability_maps_sticking": {"R": [0.9, 0.999], "step": 12},
         "stability_maps_spring": {"k": [1.5, 1.999], "step": 12},
     }, "amplitude crossing_speed rate_calls steps time status stability_maps_oscillator.clock "

@@ -180,7 +180,7 @@ def test_taylor_hands_what_slides_to_dop853_and_what_that_cannot_end_to_rodas5p(
 
 
 @many
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", ["taylor", "dop853"])
 def test_stick_and_slip_that_never_comes_to_its_surface_meets_the_limit(method):
     cell = {"press": 1.0, "belt": 0.2, "speed0": 0.2, "drag": -0.1, "stiffness": 1.0, "mid": 9.0, "wall": [-1e9]}
     assert solve(SLIDING, method, **cell, flips=1.0)[1][0] == Status.STEP_LIMIT

@@ -136,7 +136,7 @@ def test_what_is_called_ok_is_right_to_rtol_against_50_digits(kind):
 
 @pytest.mark.skipif(not COMPILED, reason="many clocks")
 def test_random_clocks_go_where_a_plain_simulation_goes():
-    scenes = random_clocks(60, seed=11, high=0.6)
+    scenes = random_clocks(30, seed=11, high=0.6)
     outputs, status = events(*scenes)
     compared = 0
     for i, scene in enumerate(zip(*map(np.ndarray.tolist, scenes), strict=True)):
@@ -150,7 +150,7 @@ def test_random_clocks_go_where_a_plain_simulation_goes():
         if status[i] in (Status.OK, Status.PERIOD_2):
             compared += 1
             assert outputs["period"][i] == pytest.approx(clock.time / clock.way, rel=1e-6)
-    assert compared >= 30
+    assert compared >= 15
 
 
 @pytest.mark.skipif(not COMPILED, reason="two thousand half swings")
