@@ -12,6 +12,7 @@ KERNELS = {
     "foliot_noise": "kernels.foliot.noise:FOLIOT_NOISE",
     "foliot_design": "kernels.foliot.design:FOLIOT_DESIGN",
     "foliot_steps": "kernels.foliot.steps:FOLIOT_STEPS",
+    "verge": "kernels.foliot.verge:VERGE",
     "balance": "kernels.balance.release:BALANCE",
     "balance_trace": "kernels.balance.trace:BALANCE_TRACE",
     "balance_driven": "kernels.balance.driven:BALANCE_DRIVEN",

@@ -51,6 +51,7 @@ class Status(IntEnum):
     NO_CYCLE = 72, "a cycle of this kind does not exist here"
     NEVER_MEETS = 73, "the pallets never meet a tooth"
     NO_ASSEMBLY = 74, "the links are too short or too long to be joined"
+    UNMESHES = 75, "the recoil throws the crown wheel out of mesh, and the clock stops"
     NOT_ASKED = 125, "the study's condition leaves the cell out"
     FAILED = 126, "the kernel gave no number and no reason"
     PENDING = 127, "not computed yet"

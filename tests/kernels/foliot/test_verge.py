@@ -1,0 +1,85 @@
+"""Two bodies with friction and restitution, against scipy's integration and the kernels that they turn into."""
+
+import numpy as np
+from columns import solve
+from verge_oracles import cycle
+
+from kernels.foliot.cycle import FOLIOT
+from kernels.foliot.verge import VERGE
+from kernels.impact.clock import IMPACT
+from kernels.interface import Status
+
+PHI0 = np.deg2rad(20.0)
+NAMES = [field.name for field in VERGE.parameters]
+
+
+def clock(alpha, kappa, e, dry=0.0, drop=0.01):
+    """A clock by its drive over viscous friction, inertias, restitution, and R_v/(n tau); `drop` over n phi0."""
+    I_v, n, c_v = 1e-4, 0.2, 1e-4
+    tau = alpha * c_v**2 * PHI0 / (I_v * n)
+    values = tau, I_v, kappa * I_v / n**2, n, PHI0, drop * n * PHI0, e, c_v, dry * n * tau
+    return dict(zip(NAMES, values, strict=True))
+
+
+def found(clocks, rtol=1e-10):
+    columns = [[c[name] for c in clocks] for name in NAMES]
+    return solve(VERGE, "return_map", *columns, rtol=rtol)
+
+
+CLOCKS = [
+    (clock(2.0, 0.2, 0.4, 0.1), 14),
+    (clock(8.0, 0.3, 0.0, drop=0.2), 16),
+    (clock(0.5, 2.0, 0.2, 0.7), 12),
+    (clock(10.0, 0.3, 0.3), 18),
+]
+
+
+def test_the_cycle_is_that_of_an_integration_in_si():
+    outputs, status = found([c for c, _ in CLOCKS])
+    truth = np.array([cycle(c, k) for c, k in CLOCKS]).T
+    assert (status == Status.OK).all()
+    for values, true in zip(outputs.values(), truth, strict=True):
+        assert np.allclose(values, true, rtol=1e-10, atol=1e-12)
+
+
+def test_beyond_half_a_pitch_the_clock_unmeshes_on_its_way_from_rest():
+    """Just inside the cycle is there, its recoil below half a pitch; just beyond, scipy comes to the same end."""
+    clocks = [clock(alpha, 0.1, 0.3) for alpha in np.geomspace(5.0, 300.0, 41)]
+    outputs, status = found(clocks)
+    pitch = 2 * (2 * 0.2 * PHI0 + clocks[0]["drop"])
+    inside = status == Status.OK
+    last = np.flatnonzero(inside)[-1]
+    assert (status[last + 1 :] == Status.UNMESHES).all()
+    assert inside[: last + 1].all()
+    assert 0.45 < outputs["recoil"][last] / pitch < 0.5
+    assert cycle(clocks[last], 60) is not None
+    assert cycle(clocks[last + 1], 60) is None
+
+
+def test_without_friction_it_is_the_plastic_impact_clock():
+    teeth, I_v, n, kappa = 31.0, 1e-4, 0.2, np.array([0.02, 0.3, 1.0, 4.0])
+    drop = 0.05 * np.pi / teeth
+    phi0 = 0.5 * (np.pi / teeth - drop) / n
+    two, status = solve(VERGE, "return_map", 1e-3, I_v, kappa * I_v / n**2, n, phi0, drop)
+    one, other = solve(IMPACT, "closed", 1e-3, kappa * I_v / n**2, I_v, 0.05, 0.01, teeth, 0.01 * phi0, 0.0)
+    there = status == Status.OK
+    assert there[1:].all()
+    assert status[0] == Status.UNMESHES
+    assert one["recoil"][0] > np.pi / teeth
+    assert (other == Status.OK).all()
+    assert np.allclose(two["period"][there], one["period"][there], rtol=1e-11)
+    assert np.allclose(two["amplitude"][there], one["swing"][there] / 0.01, rtol=1e-11)
+    assert np.allclose(two["recoil"][there], one["recoil"][there], rtol=1e-9, atol=1e-14)
+    assert np.allclose(two["impact_share"][there], 1.0, rtol=1e-11)
+
+
+def test_without_inertia_of_the_wheel_it_is_the_foliot():
+    """To the wheel's inertia and its drop, both a millionth."""
+    clocks = [clock(alpha, 1e-9, e, dry, 1e-9) for alpha in (0.3, 1.5, 4.0) for e in (0.0, 0.6) for dry in (0.0, 0.2)]
+    outputs, status = found(clocks, 1e-8)
+    mu = np.array([c["n"] * c["tau"] / c["I_v"] for c in clocks])
+    R = np.array([c["R_v"] / c["I_v"] for c in clocks])
+    foliot, _ = solve(FOLIOT, "segments", mu=mu, phi0=PHI0, a=1.0, R=R)
+    assert (status == Status.OK).all()
+    for name in ("period", "amplitude"):
+        assert np.allclose(outputs[name], foliot[name], rtol=1e-7)
