@@ -18,8 +18,8 @@ from sweep.laws.curves import Window, check_end, check_options, described, fit_l
 from sweep.laws.fits import Found, fitted
 from sweep.laws.lines import rounding
 from sweep.laws.loglog import Array, slope_bounds, slopes
-from sweep.laws.noise import regress, roughness
-from sweep.laws.shapes import CORRECTION, LOG_CORRECTION, Law
+from sweep.laws.noise import BEYOND_DOUBT, regress, roughness
+from sweep.laws.shapes import CORRECTION, LOG_CORRECTION, ONE, Law
 
 SCATTERS = 0.3
 """Share of the distances from (1) that is noise between neighbours, from which on they are noise."""
@@ -34,7 +34,7 @@ VERDICTS = ("a power law with a correction", "no power law with a correction", "
 NAMES = {
     "exponent": "exponent far out",
     "verdict": "whether the points are a power law with a correction that fades",
-    "correction_exponent": "D: how fast the correction fades",
+    "correction_exponent": "D: how fast the correction fades; NaN where there is none",
     "correction": "B x^-D at the outer end of the window",
     "residual": "largest relative distance of a point from the curve",
     "noisy": "1 where the interval is of noise, 0 where of what a smaller window says otherwise",
@@ -55,8 +55,8 @@ def fit_correction(
     """Asymptotic exponent by a correction to scaling, equation (1), and whether the points follow it.
 
     Where there is noise, the interval is that of a mixture over all D and over the noises of `fit_exponent`, and
-    reaches over that of a logarithmic correction (1 + B ln x)^c where the points do not tell it from (1). Where
-    there is none, it is three times as far as the fit to the outer half of the window moves the exponent. There is no
+    reaches over those of a logarithmic correction (1 + B ln x)^c and of one law where the points do not tell them from
+    (1). Where there is no noise, it is three times as far as the fit to the outer half of the window moves the exponent. There is no
     interval where the points deny (1): by polynomials beside it that describe them far better, by too few runs of
     signs where `noise="even"` or `sigma` is given, by chi-squared where `sigma` is.
 
@@ -95,7 +95,7 @@ def fit_correction(
     def each(t: Array, z: Array, errors: Array | None, bounds: Array | None) -> dict[str, Any]:
         if end == "low":
             t, z, errors = -t[::-1], z[:, ::-1], None if errors is None else errors[:, ::-1]
-        tried = fitted((CORRECTION, LOG_CORRECTION), t, z, errors)
+        tried = fitted((ONE, CORRECTION, LOG_CORRECTION), t, z, errors)
         every = [_one(t, row, laws, sign, confidence, noise) for row, laws in zip(z, tried, strict=True)]
         return {name: [one[name] for one in every] for name in every[0]}
 
@@ -110,6 +110,8 @@ def _one(
     """Numbers of one line; t runs towards the end where (1) is a power law, and exponents take `sign`."""
     found, fits = tried[CORRECTION.name], True
     exponent, fade, left = _outer(found, t)
+    if abs(left) >= 1 and tried[ONE.name].aicc <= found.aicc + BEYOND_DOUBT:  # a correction that is none
+        exponent, fade, left = float(tried[ONE.name].numbers[1] / (t[-1] - t[0])), math.nan, 0.0
     size = float(np.sqrt(np.mean(found.off**2)))
     scatters = bool(roughness(t, found.off)[0] > SCATTERS * size if noise is None else noise)
     noisy = found.sigma is not None or (scatters and size > float(8 * rounding(t, z)))
@@ -162,7 +164,7 @@ def _fading(fade: float) -> Law:
 
 def _mixture(t: Array, z: Array, tried: dict[str, Found], word: str, confidence: float) -> tuple[float, float]:
     """Ends of the interval of the exponent, over all D and noises."""
-    found, slow, span = tried[CORRECTION.name], tried[LOG_CORRECTION.name], float(t[-1] - t[0])
+    found, span = tried[CORRECTION.name], float(t[-1] - t[0])
     steps, least, most = FADES
     best = float(np.clip(abs(found.numbers[1]), least, most))
     doubt = float(np.nan_to_num(found.errors()[1], posinf=best)) / best
@@ -182,6 +184,7 @@ def _mixture(t: Array, z: Array, tried: dict[str, Found], word: str, confidence:
         share=CAUTION * np.concatenate([one.share for one in parts]),
     )
     ends = both.interval(2, confidence)[:, 0].tolist()
-    if slow.aicc < found.aicc + AS_WELL and np.isfinite(slow.errors()).all():
-        ends += slow.interval(t, [3], word, confidence)[0][:, 0].tolist()
+    for law, as_well in ((ONE, BEYOND_DOUBT), (LOG_CORRECTION, AS_WELL)):
+        if (one := tried[law.name]).aicc < found.aicc + as_well and np.isfinite(one.errors()).all():
+            ends += one.interval(t, [law.numbers - 1], word, confidence)[0][:, 0].tolist()
     return min(ends) / span, max(ends) / span

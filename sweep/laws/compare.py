@@ -11,6 +11,7 @@ from scipy.special import gammaincc
 
 from sweep.laws.curves import Window, fit_lines, one_line, title
 from sweep.laws.fits import Found, fitted
+from sweep.laws.lines import rounding
 from sweep.laws.loglog import Array
 from sweep.laws.noise import BEYOND_DOUBT, runs_chance
 from sweep.laws.shapes import CORRECTION, LAWS, OFFSET
@@ -19,7 +20,7 @@ from sweep.words import Table
 NAMES = {
     "aicc": "Akaike's criterion, corrected for few points; of one law with the noise that suits it best",
     "bic": "Bayes' criterion, likewise",
-    "worse": "AICc above that of the best law; beyond 10 a law is ruled out",
+    "worse": "AICc above the least, or BIC, whichever is less; beyond 10 a law is ruled out",
     "numbers": "numbers that are fitted",
     "scatter": "relative distance of the points from the law, root mean square",
     "residual": "largest relative distance of a point from the law",
@@ -31,9 +32,10 @@ NAMES = {
 def compare_laws(y: xr.DataArray, dim: str, window: Window | None = None, *, sigma: Any = None) -> xr.Dataset:
     """What laws say of one line, which of them are ruled out, and the simplest that is not.
 
-    A law with more numbers is believed only where AICc prefers it by more than 10 to every law with fewer: so many
-    times e^5 more likely, and a margin that correlated, uneven or outlying noise does not bridge, which one law is
-    tried with. The laws are one, two (with bends of five shapes) and three power laws, an offset, a correction to
+    A law with more numbers is believed only where AICc and BIC prefer it by more than 10 to every law with fewer: so
+    many times e^5 more likely, and a margin that correlated, uneven or outlying noise does not bridge, which one law is
+    tried with. Beside a function that is no power law, a power law with as few numbers is taken where it is not ruled
+    out. The laws are one, two (with bends of five shapes) and three power laws, an offset, a correction to
     scaling; and functions that are none: logarithm, exponential, stretched exponential, cut-off, lognormal, two
     exponentials.
 
@@ -45,8 +47,8 @@ def compare_laws(y: xr.DataArray, dim: str, window: Window | None = None, *, sig
     Returns
     -------
     Dataset
-        Along `law`, the best first: `aicc`, `bic`, `worse` (AICc above the best), `numbers`, `scatter`, `residual`,
-        `runs`, `chi_squared`, `formula`, `exponents`; `fitted` (law, point), the law at the points, whose places are
+        Along `law`, the best first: `aicc`, `bic`, `worse` (AICc or BIC above the least), `numbers`, `scatter`,
+        `residual`, `runs`, `chi_squared`, `formula`, `exponents`; `fitted` (law, point), the law at the points, whose places are
         `x` and values `y`. Attributes `chosen`, `margin` (AICc to the next law; negative where a law with more
         numbers is nearer), `verdict`, a sentence, and `summary`, a table for printing.
 
@@ -81,7 +83,8 @@ def compare_laws(y: xr.DataArray, dim: str, window: Window | None = None, *, sig
 
 def _table(t: Array, z: Array, tried: list[Found]) -> xr.Dataset:
     """All that `compare_laws` says of laws, the best first."""
-    least, span = tried[0].aicc, float(t[-1] - t[0])
+    span, least, least_bic = float(t[-1] - t[0]), tried[0].aicc, min(f.bic for f in tried)
+    worse = {f.law.name: min(f.aicc - least, f.bic - least_bic) for f in tried}
 
     def chi_squared(f: Found) -> float:
         """Chance of so large a one; NaN where the noise is not known."""
@@ -90,7 +93,7 @@ def _table(t: Array, z: Array, tried: list[Found]) -> xr.Dataset:
     columns: dict[str, list[Any]] = {
         "aicc": [f.aicc for f in tried],
         "bic": [f.bic for f in tried],
-        "worse": [f.aicc - least for f in tried],
+        "worse": list(worse.values()),
         "numbers": [f.law.numbers for f in tried],
         "scatter": [math.sqrt(float(np.mean(f.off**2))) for f in tried],
         "residual": [f.residual for f in tried],
@@ -99,20 +102,20 @@ def _table(t: Array, z: Array, tried: list[Found]) -> xr.Dataset:
         "formula": [f.law.formula for f in tried],
         "exponents": [_exponents(f, span) for f in tried],
     }
-    alive = [f for f in tried if f.aicc <= least + BEYOND_DOUBT]
-    chosen = min(alive, key=lambda f: (f.law.numbers, f.aicc))
+    alive = [f for f in tried if worse[f.law.name] <= BEYOND_DOUBT]
+    chosen = min(alive, key=lambda f: (f.law.numbers, not f.law.power, f.aicc))
     margin = min((f.aicc for f in tried if f is not chosen), default=math.inf) - chosen.aicc
-    text = f"{chosen.law.name} ({chosen.law.formula}): " + "no power law; " * (not chosen.law.power)
+    text = f"{chosen.law.name} ({chosen.law.formula}): " + "no power law; " * (not any(f.law.power for f in alive))
     if rivals := [f.law.name for f in alive if f is not chosen]:
         text += f"not ruled out beside it: {', '.join(rivals)}"
     else:
-        text += f"all others are worse by {margin:.3g} and more in AICc"
-    if chosen.denied(t, "even"):
+        text += f"all others are ruled out, the next by {margin:.3g} in AICc"
+    if chosen.residual > 8 * rounding(t, z) and chosen.denied(t, "even"):
         text += "; but what it leaves has a shape, so that none of them is the law"
     rows = zip(
         [f.law.name for f in tried], (f"{one:.3g}" for one in columns["worse"]), columns["exponents"], strict=True
     )
-    summary = Table(list(rows), ("law", "worse in AICc", "exponents")).text(indent="", wide=True)
+    summary = Table(list(rows), ("law", "worse", "exponents")).text(indent="", wide=True)
     about = {name: {"units": "1", "long_name": words} for name, words in NAMES.items()}
     variables: dict[str, Any] = {name: ("law", column, about.get(name)) for name, column in columns.items()}
     variables |= {"fitted": (("law", "point"), np.exp([z - f.off for f in tried]))}

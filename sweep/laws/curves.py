@@ -17,8 +17,8 @@ from sweep.words import did_you_mean, kind
 
 Window = tuple[float | None, float | None]
 
-FEWEST_OF_LINE = 8
-"""Points from which on laws with more numbers than a line are fitted."""
+FEWEST_OF_LAW, PLACES_OF_LAW = 8, 6
+"""Points, and different places among them, from which on laws with more numbers than a line are fitted."""
 MOST_SIGMA = 1e6
 """Relative standard error beyond which a logarithm says nothing."""
 MOST_ROWS = 20
@@ -79,8 +79,11 @@ def positive_axis(y: xr.DataArray, dim: str, repeated: bool = False) -> tuple[st
     if x.size < FEWEST:
         raise SweepError(f"{dim} has {x.size} of the at least {FEWEST} points that an exponent needs")
     steps = np.diff(x)
-    if not (((steps >= 0).all() or (steps <= 0).all()) and (repeated or steps.all())):
+    if not ((steps >= 0).all() or (steps <= 0).all()):
         raise SweepError(f"{dim} neither rises nor falls throughout; sort first, e.g. ds.sortby({dim!r})")
+    if not (repeated or steps.all()):
+        twice = f"{dim} = {x[:-1][steps == 0][0]:g} stands there more than once"
+        raise SweepError(f"{twice}; take means first, e.g. ds.groupby({dim!r}).mean()")
     return str(y.coords[dim].dims[0]), x
 
 
@@ -125,7 +128,7 @@ def fit_lines(
     window: Window | None,
     sigma: Any,
     bounds: xr.DataArray | None = None,
-    fewest: int = FEWEST_OF_LINE,
+    fewest: int = FEWEST_OF_LAW,
 ) -> xr.Dataset:
     """What a function finds of each line of y in a window, and `points`, how many of its values are there.
 
@@ -152,10 +155,11 @@ def fit_lines(
     )
     present = np.isfinite(z) if errors is None else np.isfinite(z) & np.isfinite(errors)
     columns: dict[str, Any] = {}
+    places = PLACES_OF_LAW if fewest == FEWEST_OF_LAW else 2
     for pattern, which in alike(present):
         at = np.flatnonzero(pattern)
         at = at[np.argsort(t[at], kind="stable")]
-        if at.size >= fewest and t[at[0]] < t[at[-1]]:
+        if at.size >= fewest and np.unique(t[at]).size >= places:
             grid = np.ix_(which, at)
             given = (None if one is None else one[grid] for one in (errors, bound))
             with np.errstate(all="ignore"):  # what overflows is infinite
@@ -169,7 +173,8 @@ def fit_lines(
         low, high = ends(window, dim)
         raise SweepError(
             f"a fit needs at least {fewest} points, found {count.max()} of {title(y)} in the window {low:g} to "
-            f"{high:g} of {dim}; choose a wider one"
+            f"{high:g} of {dim}, at {np.unique(t[present.any(axis=0)]).size} places ({places} are needed); choose a "
+            "wider one"
         )
     missing = np.where(bad, "not positive", "too few points").reshape(-1)
     for name, column in columns.items():

@@ -97,11 +97,12 @@ MOST_LINES = 16
 @np.errstate(all="ignore")  # what overflows is infinite, and no curve
 def fitted(laws: Sequence[Law], t: Array, z: Array, errors: Array | None = None) -> list[dict[str, Found]]:
     """For each line of z (m, n) the laws, by name, that are nearest to it, t rising; not those that have not two more
-    points than numbers. `errors` (m, n) are standard errors, where they are known.
+    points than numbers, at more places than numbers. `errors` (m, n) are standard errors, where they are known.
 
     The law ONE is of the noise that suits it best, where that is not known.
     """
-    laws = [law for law in laws if t.size >= law.numbers + 2]
+    places = np.unique(t).size
+    laws = [law for law in laws if t.size >= law.numbers + 2 and places > law.numbers]
     found: list[dict[str, Found]] = [{} for _ in z]
     most = MOST_LINES if errors is None else 1
     for first in range(0, len(z) if laws else 0, most):

@@ -128,7 +128,7 @@ def fit_exponent(
     if towards is not None:
         return _by_window(y, dim, window, towards, confidence=confidence, noise=noise, sigma=sigma, bound=bound)
     check_options(confidence, noise, sigma)
-    each = functools.partial(_fit, confidence=confidence, noise=noise)
+    each = functools.partial(fit_line, confidence=confidence, noise=noise)
     fit = fit_lines(each, y, dim, window, sigma, stated_bound(y, bound), FEWEST)
     units, place = str(y.attrs.get("units", "1")), str(y.coords[dim].attrs.get("units", "1"))
     of = dict.fromkeys(("prefactor", "prefactor_error", "level", "start", "stop"), units)
@@ -171,8 +171,8 @@ def rounding(t: Array, z: Array) -> Array:
     return found
 
 
-def _fit(
-    t: Array, z: Array, sigma: Array | None, bound: Any, *, confidence: float, noise: bool | str | None
+def fit_line(
+    t: Array, z: Array, sigma: Array | None, bound: Any, *, confidence: float = 0.95, noise: bool | str | None = None
 ) -> dict[str, Any]:
     """Of lines z (m, n) without gaps, t rising: least squares, and then by what the distances are."""
     share = np.ones_like(z) if sigma is None else sigma**-2.0

@@ -17,7 +17,7 @@ import xarray as xr
 from sweep.errors import SweepError
 from sweep.laws.curves import Window, check_options, described, fit_lines, title
 from sweep.laws.fits import Found, fitted
-from sweep.laws.lines import fit_exponent, rounding
+from sweep.laws.lines import fit_exponent, fit_line, rounding
 from sweep.laws.loglog import Array, slopes, tends
 from sweep.laws.noise import BEYOND_DOUBT, roughness
 from sweep.laws.shapes import BENDS, ONE, OTHER_FUNCTIONS, THREE, TWO
@@ -39,7 +39,8 @@ may be between the shapes that are tried."""
 BEYOND_SHAPES = 0.5
 """Share of what other shapes add to where the laws meet, added again: the true one may be none of them."""
 
-VERDICTS = {"one law": 1, "two laws": 2, "three laws": 3, "no power law": 0, "no meeting in the window": 0}
+VERDICTS = {"one law": 1, "two laws": 2, "three laws": 3}
+VERDICTS |= {"no power law": 0, "no meeting in the window": 0, "undecided": 0}
 """Numbers of laws, by verdict."""
 LAW = xr.DataArray(["low", "high"], dims="law", name="law")
 EXPONENTS = ("exponent", "exponent_low", "exponent_high")
@@ -48,7 +49,7 @@ NAMES = {
     "exponent": "exponent of the power law",
     "crossover": "where the two laws meet",
     "verdict": "how many laws are beyond doubt, or what speaks against it",
-    "regimes": "2 where two laws are beyond doubt: evidence above 10, meeting in the window; 0 where none is a law",
+    "regimes": "2 where two laws are beyond doubt: evidence above 10, meeting in the window; 0 where none is told",
     "evidence": "by how much AICc and BIC prefer two laws to one, whatever its noise, and to functions that are none",
     "width": "width of the bend, in decades",
     "level": "y where the two laws meet",
@@ -92,8 +93,9 @@ def fit_two_laws(
     -------
     Dataset
         `exponent`, `exponent_low`, `exponent_high` along `law` ("low", "high"); `crossover` with its interval, in
-        the unit of `dim`; `verdict`: "two laws" where they are beyond doubt, "one law" where one does as well, "three
-        laws", "no power law" where another function does as well and one law does not, "no meeting in the window";
+        the unit of `dim`; `verdict`: "two laws" where they are beyond doubt, "one law" where one does as well and is
+        not denied as in `fit_exponent`, "three laws", "no power law" where AICc and BIC prefer another function to one
+        law by more than 10, and two laws to it by less, "no meeting in the window", "undecided";
         `regimes`, how many laws; `evidence` (difference of AICc or BIC); `width` [decades], `level` (y where the laws
         meet), `residual`, `points`, `noisy`. NaN where the verdict is "three laws" or "no power law", and of fewer than
         eight points.
@@ -163,7 +165,7 @@ def _one(t: Array, z: Array, tried: dict[str, Found], confidence: float, noise: 
         low, high = np.where(np.isnan(low), -np.inf, low), np.where(np.isnan(high), np.inf, high)  # not determined
     if not noisy:
         low, high = _widened(t, z, best, low, high)
-    verdict, evidence = _verdict(t, tried, noisy)
+    verdict, evidence = _verdict(t, z, tried, noisy)
     of_laws = zip(EXPONENTS, (best, low, high), strict=True)
     found = {f"{name} {law}": of[k] for name, of in of_laws for k, law in enumerate(LAW.values)}
     found |= {"crossover": np.exp(best[2]), "crossover_low": np.exp(low[2]), "crossover_high": np.exp(high[2])}
@@ -213,7 +215,7 @@ def _widened(t: Array, z: Array, best: Array, low: Array, high: Array) -> tuple[
     return low, high
 
 
-def _verdict(t: Array, tried: dict[str, Found], noisy: bool) -> tuple[str, float]:
+def _verdict(t: Array, z: Array, tried: dict[str, Found], noisy: bool) -> tuple[str, float]:
     """One of VERDICTS, and by how much two laws are better than a line and than other functions.
 
     By AICc, and BIC for many points. The noise of the line may be of any kind, that of all others is even.
@@ -235,7 +237,12 @@ def _verdict(t: Array, tried: dict[str, Found], noisy: bool) -> tuple[str, float
             return "three laws", evidence
     if evidence > BEYOND_DOUBT:
         return "two laws" if 0 <= two.numbers[0] <= 1 else "no meeting in the window", evidence
-    return "no power law" if max(gain(line, one) for one in others) > BEYOND_DOUBT else "one law", evidence
+    if any(gain(line, one) > BEYOND_DOUBT and min(gain(law, one) for law in bends) > -BEYOND_DOUBT for one in others):
+        return "no power law", evidence
+    known = None if line.sigma is None else line.sigma[None]
+    straight = fit_line(t, z[None], known, np.zeros((1, t.size)))["fits"][0]
+    bends_more = max(gain(line, one) for one in (*bends, *others)) > BEYOND_DOUBT
+    return "one law" if straight and not bends_more else "undecided", evidence
 
 
 def _in_windows(y: xr.DataArray, dim: str, windows: tuple[Window, Window], **keys: Any) -> xr.Dataset:

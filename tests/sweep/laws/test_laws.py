@@ -194,6 +194,29 @@ def test_three_laws_are_told_and_a_meeting_outside_the_window_is_none(noise):
         assert (str(found.verdict.values), bool(np.isnan(found.crossover))) == ("no meeting in the window", True)
 
 
+def test_few_points_leave_open_what_they_do_not_tell():
+    x = np.geomspace(0.01, 100.0, 8)
+    noise = 0.01 * np.random.default_rng(3).standard_normal(8)
+    for z in (np.log(x / (1 + x)), np.log(-np.expm1(-x))):
+        found = sweep.fit_two_laws(line(z + noise, x), "x")
+        assert (str(found.verdict.values), int(found.regimes)) == ("undecided", 0)
+        compared = sweep.compare_laws(line(z + noise, x), "x")
+        assert float(compared.worse[compared.law.str.startswith("two laws")].min()) <= 10
+        assert "no power law" not in compared.verdict
+
+
+@pytest.mark.parametrize("power", [0.0, -0.5])
+def test_one_law_is_one_law_with_a_correction_of_zero(power):
+    for noise in (0.0, 0.02):
+        y = line(1.1 + power * T + noise * np.random.default_rng(5).standard_normal(X.size))
+        found = sweep.fit_correction(y, "x")
+        assert (int(found.fits), float(found.exponent)) == (1, pytest.approx(power, abs=0.1 * noise + 1e-4))
+        assert float(found.exponent_low) <= power <= float(found.exponent_high)
+        compared = sweep.compare_laws(y, "x")
+        assert compared.chosen == "one law"
+        assert "none of them" not in compared.verdict
+
+
 def test_a_correction_that_the_points_deny_has_no_interval():
     """Twelve sets, one or two of which may be described by chance."""
     x = np.geomspace(0.8, 1e4, 41)
@@ -262,6 +285,8 @@ def test_eight_points_are_enough_and_may_fall_or_have_gaps():
         (lambda y: sweep.compare_laws(y[:7], "x"), "at least 8 points, found 7 of y"),
         (lambda y: sweep.compare_laws(y.expand_dims(a=[1.0, 2.0]), "x"), "one line"),
         (lambda y: sweep.compare_laws(-y, "x"), "positive values"),
+        (lambda y: sweep.fit_correction(y.assign_coords(x=np.repeat([1.0, 9.0], 31)[:61]), "x"), "2 places"),
+        (lambda y: sweep.local_exponent(y.assign_coords(x=np.maximum(X, 3.0)), "x"), "3 stands there more than once"),
         (lambda y: sweep.fit_two_laws(y, "nu"), "no axis 'nu'"),
         (lambda y: sweep.fit_two_laws(y, "x", (1.0, 5.0)), "at least 8 points"),
         (lambda y: sweep.fit_two_laws(-y, "x"), "positive values"),
