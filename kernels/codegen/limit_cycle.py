@@ -252,7 +252,8 @@ class Search:
             scale[j] = np.minimum(scale[j], turn)
         z, off, J = newton(self.map, some, z, scale, shift)
         multiplier = largest(J)
-        good = (off <= NEAR) & self._moves(some, z, scale) & (abs(multiplier) < math.inf)
+        moved = self._moved(some, z, scale)
+        good = (moved > NEAR) & (off <= NEAR * moved) & (abs(multiplier) < math.inf)
         stable = abs(multiplier) <= 1.0
         keep = good & (stable | ~np.isin(self.status[left], FOUND))
         if doubled:
@@ -263,13 +264,12 @@ class Search:
         self.status[those] = np.where(stable[keep], Status.OK, Status.UNSTABLE)
         return those
 
-    def _moves(self, some, z, scale):
-        """Whether a cycle is more than a point that the surface goes through."""
+    def _moved(self, some, z, scale):
+        """How far apart states of a cycle are, over their sizes; 1 at most, and 0 of a point that the surface holds."""
         half = np.maximum(np.floor(0.5 * some.flips), 1.0)
         T, middle, _ = self.map.passed(list(some.parameters), z, half, np.full(len(half), self.map.rough))
-        whole = half == some.flips
-        apart = np.maximum.reduce(abs(middle - z) / scale)
-        return np.where(whole, T > 0.0, apart > NEAR)
+        apart = np.minimum(np.maximum.reduce(abs(middle - z) / scale), 1.0)
+        return np.where(half == some.flips, T > 0.0, apart)
 
     def _two(self, some, z, scale, shift):
         """Whether half of so many switches do not close the cycle."""
