@@ -56,9 +56,9 @@ def fit_correction(
 
     Where there is noise, the interval is that of a mixture over all D and over the noises of `fit_exponent`, and
     reaches over those of a logarithmic correction (1 + B ln x)^c and of one law where the points do not tell them from
-    (1). Where there is no noise, it is three times as far as the fit to the outer half of the window moves the exponent. There is no
-    interval where the points deny (1): by polynomials beside it that describe them far better, by too few runs of
-    signs where `noise="even"` or `sigma` is given, by chi-squared where `sigma` is.
+    (1). Where there is no noise, it is three times as far as the fit to the outer half of the window moves the
+    exponent. There is no interval where the points deny (1): by polynomials beside it that describe them far better, by
+    too few runs of signs where `noise="even"` or `sigma` is given, by chi-squared where `sigma` is.
 
     Parameters
     ----------

@@ -48,9 +48,9 @@ def compare_laws(y: xr.DataArray, dim: str, window: Window | None = None, *, sig
     -------
     Dataset
         Along `law`, the best first: `aicc`, `bic`, `worse` (AICc or BIC above the least), `numbers`, `scatter`,
-        `residual`, `runs`, `chi_squared`, `formula`, `exponents`; `fitted` (law, point), the law at the points, whose places are
-        `x` and values `y`. Attributes `chosen`, `margin` (AICc to the next law; negative where a law with more
-        numbers is nearer), `verdict`, a sentence, and `summary`, a table for printing.
+        `residual`, `runs`, `chi_squared`, `formula`, `exponents`; `fitted` (law, point), the law at the points, whose
+        places are `x` and values `y`. Attributes `chosen`, `margin` (AICc to the next law; negative where a law with
+        more numbers is nearer), `verdict`, a sentence, and `summary`, a table for printing.
 
     Raises
     ------
