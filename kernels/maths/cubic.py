@@ -6,9 +6,9 @@ follow from the quadratic that is left.
 Source: W. Kahan, "To solve a real cubic equation", Berkeley PAM-352 (1986).
 """
 
-from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.jit import jit_call
 from kernels.lanes.vectors import any_lane, choose, fma, magnitude, not_, sqrt, where
-from kernels.maths import pairs
+from kernels.maths import complex, pairs
 from kernels.maths.elementary import cbrt, exponent, larger, scale
 
 _START = 1.324718
@@ -19,104 +19,71 @@ _PAIR_ERROR = 1e-30
 _NOTHING = 1e-290
 
 
-@jit
-def _size(a2, a1, a0):
-    """The power of two near the largest root."""
+@jit_call
+def largest_modulus(a2, a1, a0):
+    """The largest modulus of the three roots, and the relative error that the 32 digits of the coefficients leave."""
+    # coefficients of the cubic in x/2^e, 2^e near the largest root
     third = magnitude(a0[0])
     size = (
         magnitude(a2[0])
         + sqrt(magnitude(a1[0]))
         + where(third > _NOTHING, cbrt(where(third > _NOTHING, third, 1.0)), 0.0)
     )
-    return where(size > _NOTHING, exponent(where(size > _NOTHING, size, 1.0)), 0.0)
+    e = where(size > _NOTHING, exponent(where(size > _NOTHING, size, 1.0)), 0.0)
+    a2, a1, a0 = complex.scaled(a2, -e), complex.scaled(a1, -2.0 * e), complex.scaled(a0, -3.0 * e)
+    b2, b1, b0 = a2[0], a1[0], a0[0]
 
-
-@jit
-def _scaled(x, n):
-    return scale(x[0], n), scale(x[1], n)
-
-
-@jit
-def _start(a2, a1, a0):
-    """A place outside the root that lies alone on its side of the point of inflection, and that side."""
-    middle = a2 * (-1.0 / 3.0)
-    value = fma(fma(middle + a2, middle, a1), middle, a0)
-    slope = fma(fma(3.0, middle, 2.0 * a2), middle, a1)
-    side = where(value > 0.0, 1.0, -1.0)
-    height = magnitude(value)
+    # a place outside the root that lies alone on its side of the point of inflection
+    middle = b2 * (-1.0 / 3.0)
+    value = fma(fma(middle + b2, middle, b1), middle, b0)
+    slope = fma(fma(3.0, middle, 2.0 * b2), middle, b1)
+    side, height = where(value > 0.0, 1.0, -1.0), magnitude(value)
     reach = where(height > _NOTHING, cbrt(where(height > _NOTHING, height, 1.0)), 0.0)
     bend = where(slope < 0.0, sqrt(where(slope < 0.0, -slope, 0.0)), 0.0)
     reach = where(slope < 0.0, _START * larger(reach, bend), reach)
-    return middle - side * reach, side
+    x = middle - side * reach
 
-
-@jit
-def _descended(a2, a1, a0):
-    """The lonely root, to float64 digits: Newton from outside until a step would turn back."""
-    x, side = _start(a2, a1, a0)
+    # that root to float64 digits: Newton until a step would turn back
     active = not_(magnitude(x) < 0.0)
     for _ in range(_FLOAT_STEPS):
-        value = fma(fma(x + a2, x, a1), x, a0)
-        slope = fma(fma(3.0, x, 2.0 * a2), x, a1)
+        value = fma(fma(x + b2, x, b1), x, b0)
+        slope = fma(fma(3.0, x, 2.0 * b2), x, b1)
         new = x - value / where(slope > 0.0, slope, 1.0)
         active = active & (slope > 0.0) & (side * new > side * x)
         if not any_lane(active):
             break
         x = where(active, new, x)
-    return x
 
-
-@jit
-def _polished(x, a2, a1, a0):
-    """The lonely root as a pair, and what its last digits are worth."""
+    # as a pair, and what its last digits are worth
     root, step, slope = (x, 0.0 * x), 0.0 * x, 0.0 * x
     for _ in range(_PAIR_STEPS):
-        slope = fma(fma(3.0, root[0], 2.0 * a2[0]), root[0], a1[0])
-        slope = larger(slope, _PAIR_ERROR)
-        value = pairs.add(pairs.times(pairs.add(root, a2), root), a1)
-        step = -pairs.add(pairs.times(value, root), a0)[0] / slope
+        slope = larger(fma(fma(3.0, root[0], 2.0 * b2), root[0], b1), _PAIR_ERROR)
+        rest = pairs.add(pairs.times(pairs.add(root, a2), root), a1)
+        step = -pairs.add(pairs.times(rest, root), a0)[0] / slope
         root = pairs.shifted(root, step)
-    size = magnitude(x)
-    sum_ = fma(fma(size + magnitude(a2[0]), size, magnitude(a1[0])), size, magnitude(a0[0]))
-    return root, fma(_PAIR_ERROR, sum_ / slope, magnitude(step))
+    alone, size = magnitude(root[0]), magnitude(x)
+    terms = fma(fma(size + magnitude(b2), size, magnitude(b1)), size, magnitude(b0))
+    error = fma(_PAIR_ERROR, terms / slope, magnitude(step))
 
-
-@jit
-def _deflated(root, a2, a1, a0):
-    """b and c of the factor x^2 + b x + c that is left, from that end of the cubic where nothing cancels."""
-    x = root[0]
-    far = magnitude(x * x * x) > magnitude(a0[0])
+    # the factor x^2 + b x + c that is left, from that end of the cubic where nothing cancels
+    far = magnitude(root[0] * root[0] * root[0]) > magnitude(b0)
     divisor = choose(far, root, (1.0, 0.0))
     c_far = pairs.over(pairs.negative(a0), divisor)
     b_far = pairs.over(pairs.add(c_far, pairs.negative(a1)), divisor)
     b_near = pairs.add(a2, root)
     c_near = pairs.add(a1, pairs.times(root, b_near))
-    return choose(far, b_far, b_near), choose(far, c_far, c_near)
+    b, c = choose(far, b_far, b_near), choose(far, c_far, c_near)
 
-
-@jit
-def _of_two(b, c, error):
-    """The larger modulus of the roots of x^2 + b x + c, and its error, for an error of the root split off."""
+    # the larger modulus of its roots, and what the error of the first leaves of it
     half = (0.5 * b[0], 0.5 * b[1])
     inside = pairs.add(pairs.times(half, half), pairs.negative(c))
     real = inside[0] > 0.0
     width = sqrt(where(real, inside[0] + inside[1], 0.0))
     modulus = where(real, magnitude(half[0]) + width, sqrt(where(c[0] > 0.0, c[0], 0.0)))
     spread = fma(error, 2.0 * magnitude(half[0]) + modulus, _PAIR_ERROR * fma(half[0], half[0], magnitude(c[0])))
-    open_ = where(inside[0] > -spread, width, modulus)
-    closest = sqrt(spread)
-    return modulus, error + spread / where(open_ > closest, open_, where(closest > 0.0, closest, 1.0))
+    apart, closest = where(inside[0] > -spread, width, modulus), sqrt(spread)
+    blur = error + spread / where(apart > closest, apart, where(closest > 0.0, closest, 1.0))
 
-
-@jit_call
-def largest_modulus(a2, a1, a0):
-    """The largest modulus of the three roots, and the relative error that the 32 digits of the coefficients leave."""
-    e = _size(a2, a1, a0)
-    a2, a1, a0 = _scaled(a2, -e), _scaled(a1, -2.0 * e), _scaled(a0, -3.0 * e)
-    root, error = _polished(_descended(a2[0], a1[0], a0[0]), a2, a1, a0)
-    b, c = _deflated(root, a2, a1, a0)
-    modulus, blur = _of_two(b, c, error)
-    alone = magnitude(root[0])
     doubt = where(alone > modulus, error, blur)
     modulus = larger(alone, modulus)
     return scale(modulus, e), where(modulus > 0.0, doubt / where(modulus > 0.0, modulus, 1.0), 0.0)

@@ -17,11 +17,9 @@ count more than once: INACCURATE.
 import math
 from collections import namedtuple
 
-import numpy as np
-
 from kernels.interface import Field
 from kernels.lanes.codes import BAD_INPUT, CHANGE_POINT, INACCURATE, LOCK_UP
-from kernels.lanes.groups import GROUP, cells_at, write_row
+from kernels.lanes.groups import cells_at, one_row, write_row
 from kernels.lanes.jit import jit
 from kernels.lanes.ranges import or_none, partly
 from kernels.lanes.records import read
@@ -96,11 +94,6 @@ def _follow(first, columns, row):
     columns.status[i] = where(within, partly(held, code), BAD_INPUT)
 
 
-@jit
-def _row():
-    return (np.empty(GROUP),)
-
-
 POLISHER_MOTION = kernel(
     "polisher_motion",
     doc="motion of a polishing machine's arm and tool along the crank's angle",
@@ -120,6 +113,6 @@ POLISHER_MOTION = kernel(
     ),
     record=Machine,
     # over the largest value of the trace, of x and y over L; close to a lock the status says more
-    methods=(tracing("closed", "closed forms of sums without error", _follow, ROUNDING, buffers=_row),),
+    methods=(tracing("closed", "closed forms of sums without error", _follow, ROUNDING, buffers=one_row),),
     example=EXAMPLE | {"omega": 6.0},
 )
