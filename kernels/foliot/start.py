@@ -112,9 +112,16 @@ def _next(scene, flip):
 
 
 @jit
-def _follow(first, columns, row):
-    """One group of cells from flip to flip; flips asked for in falling order are followed from the release again."""
+def segments(first, columns, row):
+    """Exact pieces from flip to flip of a group of cells, and how far their rounding may have added up.
+
+    INACCURATE where that is beyond rtol. Flips asked for in falling order are followed from the release again.
+    """
     i, flip = cells_at(first), columns.flip
+    for number in flip:  # whole numbers from 1 on; NaN fails
+        if not (1.0 <= number <= FLIP_LIMIT and number == math.floor(number)):
+            columns.status[i] = BAD_INPUT
+            return
     scene, units = _units.without_dimensions(_units.without_drag(read(LinearFoliot, columns, i)))
     phi0, phi_start = columns.phi0[i], columns.phi_start[i]
     before = phi_start < phi0
@@ -144,18 +151,6 @@ def _follow(first, columns, row):
     verdict = where(starts, verdict, where(held, NEVER_STARTS, STICKS))
     verdict = partly(whole, where(unsure, GRAZING, verdict))
     columns.status[i] = where(fine & given, verdict, OUT_OF_RANGE)
-
-
-@jit
-def segments(first, columns, row):
-    """Exact pieces from switch to switch, and how far their rounding may have added up: INACCURATE beyond rtol."""
-    counts = True
-    for flip in columns.flip:  # whole numbers from 1 on; NaN fails
-        counts = counts and 1.0 <= flip <= FLIP_LIMIT and flip == math.floor(flip)
-    if counts:
-        _follow(first, columns, row)
-    else:
-        columns.status[cells_at(first)] = BAD_INPUT
 
 
 @jit
