@@ -27,7 +27,8 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, columns, compared, differing, direct_label, page_of, read_result, report
+from _common import Groups, Statement, compared, differing, direct_label, page_of, read_result, report
+from scipy.optimize import brentq
 
 from sweep.show.charts import COLOURS, DASHES
 
@@ -49,12 +50,8 @@ so a ripple without work still shifts the period. The paper's supposition
 
 
 def switch_time(alpha: float) -> float:
-    """Root q of q - tanh q = 1/alpha by bisection."""
-    low, high = 1e-6, 1e6
-    while high / low > 1 + 1e-15:
-        middle = math.sqrt(low * high)
-        low, high = (middle, high) if middle - math.tanh(middle) < 1 / alpha else (low, middle)
-    return low
+    """Root q of q - tanh q = 1/alpha."""
+    return float(brentq(lambda q: q - math.tanh(q) - 1 / alpha, 1e-3, 1e6, xtol=1e-15))
 
 
 def first_order(alpha: float, harmonics: Any, pieces: int = 1000) -> Any:
@@ -181,30 +178,6 @@ def weak(ds: xr.Dataset) -> list[Statement]:
     ]
 
 
-def allowed(line: xr.DataArray, limit: float) -> float:
-    """Depth up to which |P/P0 - 1| stays within `limit`; NaN if no deeper ripple of the grid is known to pass it."""
-    known = line[line.notnull().values]
-    outside = np.flatnonzero(abs(known.values) > limit)
-    if not len(outside):
-        return math.nan
-    j = outside[0]
-    (d0, d1), (y0, y1) = known.depth.values[j - 1 : j + 1], known.values[j - 1 : j + 1]
-    return float(d0 + (d1 - d0) * (math.copysign(limit, y1) - y0) / (y1 - y0))
-
-
-def permitted(ds: xr.Dataset) -> list[str]:
-    """Table: how deep a ripple may be, and what a tenth of the torque does to period and sensitivity."""
-    rows = [("drive", "harmonic", *(f"{x} of P allows" for x in LIMITS), "P/P0 - 1 at 0.1", "s at 0", "s at 0.1")]
-    for i, name in enumerate(DRIVES):
-        for h in (1, 2, 4, 8, 16, 32, 64):
-            line = ds.isel(a=i).sel(harmonic=h)
-            tenth = line.sel(depth=0.1)
-            depths = (f"{allowed(line.change, x):.2g}" for x in LIMITS.values())
-            s = (f"{x:.3f}" for x in (line.sensitivity.sel(depth=0).item(), tenth.sensitivity.item()))
-            rows.append((name, str(h), *depths, f"{100 * tenth.change.item():+.3f} %", *s))
-    return ["HOW DEEP A RIPPLE MAY BE (depth = amplitude over mean torque; nan: not reached)", *columns(rows, " | ")]
-
-
 def in_words(ds: xr.Dataset) -> list[str]:
     """The answer, from the numbers."""
     text = ["A RIPPLE OF A TENTH OF THE TORQUE, all harmonics"]
@@ -274,10 +247,10 @@ def draw_harmonics(axes: Any, ds: xr.Dataset, found: xr.DataArray, theory: Any, 
 
 
 def conclude(path: str) -> tuple[Groups, list[str], Any]:
-    """Statements, tables and the figure."""
+    """Statements, the answer in words, and the figure."""
     ds = scaled(read_result(path, "foliot_ripple", ["a", "harmonic", "depth"], "torque_ripple.toml"))
     groups = {"First order in the depth": linear(ds), "High harmonics": falls(ds), "Weak drive": weak(ds)}
-    return groups, [*permitted(ds), "", *in_words(ds)], lambda: figure(ds)
+    return groups, in_words(ds), lambda: figure(ds)
 
 
 main = partial(report, __file__, ["torque_ripple.h5"], conclude=conclude)

@@ -58,7 +58,7 @@ TABLE = {
     "cross_beat": Claims({"cross_beat": {}}, ""),
     "foliot_scaling": Claims({
         "foliot_scaling": {"mu": np.geomspace(1e-7, 1e7, 169), "a": 1.3, "phi0": 0.4},
-    }, "multiplier", 13),
+    }, "multiplier", 8),
     "friction_laws": Claims({
         "friction_laws": {"mu": np.geomspace(1e-24, 1e24, 385)},
         "friction_laws_map": {"R": np.geomspace(1e-3, 1e9, 61), "mu": np.geomspace(1e-3, 1e11, 141)},
