@@ -100,12 +100,14 @@ def _parts(z, rho, slack):
     return u, x, m3, log_remainder3(x)
 
 
-@jit
-def _viscous_and_coulomb(d, rho, slack):
-    """The cycle by Halley's steps on (7), and where they have not settled.
+@jit_call
+def coulomb(scene, rtol):
+    """The cycle by Halley's steps on (7), and its verdict; without viscous friction that of dry friction alone.
 
     They start within a factor of 2: (7) is A z^2 + B z^3 for small z, slack (z - 3/2) + ... for large z.
     """
+    rho, slack, dry = scene.rho, scene.slack, scene.d < _FAINT
+    d = where(dry, 1.0, scene.d)
     double_k = 2.0 * d * d
     square, share = slack * rho / (1.0 + rho), slack / (1.0 + rho)
     cube = slack * fma(share, share, 1.0) * (1.0 / 3.0)
@@ -132,17 +134,9 @@ def _viscous_and_coulomb(d, rho, slack):
     top = 1.0 + 2.0 * (1.0 + rho) * log_remainder(x) / double_k
     share = rho / (slack * (1.0 + rho))
     s = (2.0 * rho * (share * u) * (share * u) + m3 + l3) / ((rho + u) * u * tau)
-    return Cycle(tau / d, top, u / d, s, exp(-tau) * slack / (1.0 + rho)), active
-
-
-@jit_call
-def coulomb(scene, rtol):
-    """The cycle, and its verdict; without viscous friction that of dry friction alone."""
-    d, rho, slack = scene.d, scene.rho, scene.slack
-    dry = d < _FAINT
-    cycle, unsettled = _viscous_and_coulomb(where(dry, 1.0, d), rho, slack)
+    cycle = Cycle(tau / d, top, u / d, s, exp(-tau) * slack / (1.0 + rho))
     alone = _dry(where(rho > _FAINT_COULOMB, rho, 0.5), slack)
-    verdict = where(unsettled, NOT_CONVERGED, OK)
+    verdict = where(active, NOT_CONVERGED, OK)
     verdict = where(dry, where(rho > _FAINT_COULOMB, OK, OUT_OF_RANGE), verdict)
     return choose(dry, alone, cycle), verdict
 

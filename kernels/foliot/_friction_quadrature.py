@@ -169,27 +169,6 @@ def _defect(z, rule, e, far, near):
 
 
 @jit_call
-def _excess(scene, terminal, y):
-    """ln of the right side of (2) over its left, and its slope in y."""
-    n, e = scene.n, scene.e
-    _, log_v1, z, far, near, F1, slope, a, b, _, _ = _speeds(scene, terminal, y)
-    lost, m0, m1, m2 = _leg(scene, a, b)
-    total, rule = 0.0 * y, 0.0 * y
-    for j in range(_NODES):
-        q = -expm1(n * _LOG_S[j])
-        F = fma(a, _REST[j], fma(b, q, F1))
-        M = fma(m1, _S[j], fma(m2, 1.0 - q, m0))
-        total = fma(_WEIGHT[j] * _S[j], fma(lost, F, M) / (F * (F + M)), total)
-        rule = fma(_WEIGHT[j], _pole(e, far, near, _REST[j], _S[j]), rule)
-    K = fma(n, terminal.G, terminal.D)
-    total = total + _defect(z, rule, e, far, near) / (where(z > _NEAR, far, 1.0) * K)
-    M1 = m0 + m1 + m2
-    rate = fma(lost, F1, M1) / (slope * (F1 + M1))
-    stretch = where(z > 1e-300, z / where(z > 1e-300, far, 1.0), 1.0)
-    return fma(2.0, log_v1, log(0.5 * total)), stretch * rate / total
-
-
-@jit_call
 def _solve(scene, terminal):
     """y of the cycle, and where it has not settled.
 
@@ -197,7 +176,7 @@ def _solve(scene, terminal):
     bracket that every evaluation narrows; it begins with all float64 and is halved where a step leaves it. The start is
     from the strong limit of each friction term alone and from the weak limit V z = 2 V f'(V)/V.
     """
-    d, gamma, n, slack, (log_V, D, G) = scene.d, scene.gamma, scene.n, scene.slack, terminal
+    d, gamma, n, e, slack, (log_V, D, G) = scene.d, scene.gamma, scene.n, scene.e, scene.slack, terminal
     lost, m0, m1, m2 = _leg(scene, d, gamma)
     product = slack * (slack + m0)
     steady = 0.5 * log(4.0 * product / fma(lost, slack, m0))
@@ -212,7 +191,24 @@ def _solve(scene, terminal):
     for _ in range(NEWTON_LIMIT):
         if not any_lane(active):
             break
-        excess, slope = _excess(scene, terminal, y)
+
+        # ln of the right side of (2) over its left, and its slope in y
+        _, log_v1, z, far, near, F1, v_slope, a, b, _, _ = _speeds(scene, terminal, y)
+        lost, m0, m1, m2 = _leg(scene, a, b)
+        total, rule = 0.0 * y, 0.0 * y
+        for j in range(_NODES):
+            q = -expm1(n * _LOG_S[j])
+            F = fma(a, _REST[j], fma(b, q, F1))
+            M = fma(m1, _S[j], fma(m2, 1.0 - q, m0))
+            total = fma(_WEIGHT[j] * _S[j], fma(lost, F, M) / (F * (F + M)), total)
+            rule = fma(_WEIGHT[j], _pole(e, far, near, _REST[j], _S[j]), rule)
+        total = total + _defect(z, rule, e, far, near) / (where(z > _NEAR, far, 1.0) * fma(n, G, D))
+        M1 = m0 + m1 + m2
+        rate = fma(lost, F1, M1) / (v_slope * (F1 + M1))
+        stretch = where(z > 1e-300, z / where(z > 1e-300, far, 1.0), 1.0)
+        excess, slope = fma(2.0, log_v1, log(0.5 * total)), stretch * rate / total
+
+        # Newton's step, or where it leaves the bracket a bisection
         low, high = where(excess < 0.0, y, low), where(excess < 0.0, high, y)
         step = -excess / slope
         settled = magnitude(step) <= SETTLED
