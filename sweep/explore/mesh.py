@@ -19,6 +19,7 @@ dimensionless group stays as it is, shrinks. Source: A. Loseille, F. Alauzet, SI
 from __future__ import annotations
 
 import itertools
+import math
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,6 +69,14 @@ def tilted(points: Array) -> Array:
     """Points as they are joined."""
     axes = points.shape[1]
     found: Array = points @ (np.eye(axes) + SHEAR * np.tril(1.0 + 0.3 * np.arange(axes), -1))
+    return found
+
+
+def rounded(values: Array) -> Array:
+    """Values to six digits of the largest, so that what is decided by them is alike on every machine: the last digits
+    of what LAPACK gives are not, and cells differ ever more once one edge was cut or joined otherwise."""
+    size = 10.0 ** math.floor(math.log10(float(abs(values).max(initial=0.0)) or 1.0) - 6)
+    found: Array = np.round(values / size) * size
     return found
 
 
@@ -204,5 +213,5 @@ def stretch(points: Array, heights: Array) -> Array:
         sizes, directions = np.linalg.eigh(found @ np.average(bends, axis=0, weights=volumes) @ found.T)
         if sizes.max() <= STRAIGHT:
             return np.eye(axes)
-        found = (directions * np.sqrt(np.maximum(sizes / sizes.max(), FLATTEST))) @ directions.T
+        found = rounded((directions * np.sqrt(np.maximum(sizes / sizes.max(), FLATTEST))) @ directions.T)
     return found

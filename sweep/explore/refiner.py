@@ -107,7 +107,7 @@ class Refiner:
             # worst first, as many as are allowed; none shares an end with one before: a cut changes what is known there
             used, cuts = np.zeros(len(self.points), dtype=bool), []
             todo = np.flatnonzero(found.wanted & ~found.finest)
-            for ends in found.ends[todo[np.argsort(-found.size[todo], kind="stable")]]:
+            for ends in found.ends[todo[np.argsort(np.round(-np.log(found.size[todo]), 6), kind="stable")]]:
                 if not used[ends].any():
                     used[ends] = True
                     cuts.append(ends)

@@ -29,7 +29,7 @@ POINTS = 12
 WORST_MISFIT = 0.1
 """Relative distance of a point beyond which a report does not speak of two laws."""
 RULED_OUT = 10.0
-"""AICc above that of the best law from which a law is ruled out."""
+"""AICc or BIC above the least, from which on a law is ruled out."""
 REST = "Points, drift, residual, prefactor, and what the columns mean: --all; other laws: --compare."
 EXPLANATION = (
     "If the values scatter, the interval contains the exponent with {confidence:g} % confidence, and is never "
@@ -39,10 +39,10 @@ EXPLANATION = (
     "across the window; residual is the largest relative distance of a point from the law."
 )
 COMPARED = (
-    "The smaller AICc, the better a law describes the points for the numbers that it fits. A law whose AICc is more "
-    "than 10 above the best is ruled out; of the others, the one that fits the fewest numbers is chosen. Errors of "
-    "exponents hold for independent scatter. A chance of runs below 0.001 says that a law misses the points "
-    "systematically."
+    "The smaller AICc and BIC, the better a law describes the points for the numbers that it fits. A law whose AICc "
+    "and BIC are more than 10 above the least is ruled out; of the others, the one that fits the fewest numbers is "
+    "chosen. Errors of exponents hold for independent scatter. A chance of runs below 0.001 says that a law misses the "
+    "points systematically."
 )
 
 
@@ -256,7 +256,7 @@ def _interval(low: float, high: float) -> str:
 
 def _bend_cells(bend: xr.Dataset) -> tuple[str, ...]:
     if bend.regimes.item() != 2:
-        return *("-",) * 4, "one law does as well", "-", "-"
+        return *("-",) * 4, bend.verdict.item(), "-", "-"
     cells = []
     for one, name in ((bend.sel(law="low"), "exponent"), (bend.sel(law="high"), "exponent"), (bend, "crossover")):
         cells += [f"{one[name].item():.6g}", _interval(one[f"{name}_low"].item(), one[f"{name}_high"].item())]
@@ -292,7 +292,7 @@ def comparison_text(found: xr.Dataset, complete: bool = False) -> str:
         runs = "-" if np.isnan(one["runs"]) else f"{one['runs']:.2g}" if one["runs"] >= 1e-4 else "< 1e-4"
         more = (f"{one['bic'] - float(found.bic.min()):.4g}", str(one["numbers"]), runs) if complete else ()
         rows.append((one["law"], f"{one['worse']:.4g}", *more, f"{one['residual']:.1e}", told))
-    heading = ("law", "AICc worse by", *(("BIC", "numbers", "chance of runs") if complete else ()), "residual")
+    heading = ("law", "worse by", *(("BIC", "numbers", "chance of runs") if complete else ()), "residual")
     title = f"{found.attrs['y']} over {found.attrs['x']}, {found.sizes['point']} points"
     notes = (f"Chosen: {found.attrs['verdict']}.", COMPARED if complete else "BIC and more, and what it means: --all.")
     return page(Table(rows, (*heading, "exponents"), title).text(), *map(paragraph, notes))

@@ -33,10 +33,10 @@ def error_between(dataset, **fixed):
     return float(abs(guess / truth - 1).max())
 
 
-def own(solve, heights):
+def own(solve, heights, **axes):
     """A study of the toy that is solved in another way."""
     kernel = dataclasses.replace(TOY, methods=(dataclasses.replace(TOY.methods[1], solve=solve),))
-    return dataclasses.replace(build(axes={"height": heights}), kernel=kernel)
+    return dataclasses.replace(build(axes={"height": heights, **axes}), kernel=kernel)
 
 
 def test_a_curve_is_interpolated_to_the_accuracy_asked_for_and_is_a_sweep_like_any_other():
@@ -153,6 +153,22 @@ def test_beside_a_pole_cells_are_few_and_elsewhere_the_tolerance_is_met(pole):
     scale = np.log if (values > 0).all() else lambda y: y / abs(values).max()
     off = np.interp(height, found.dataset.height, scale(found.dataset.fall_time.values)) - scale(pole(height - 1.3719))
     assert abs(off[far]).max() < 1e-2
+
+
+def test_cells_do_not_depend_on_the_unit_of_the_output():
+    """In another unit, 3 of the other, other digits are rounded, in all that is decided."""
+    found = []
+    for unit in (1.0, 3.0):
+
+        def solve(height, v0, g, rtol, phase, fall_time, impact_speed, drop, said, unit=unit):
+            with np.errstate(invalid="ignore"):
+                fall_time[...] = unit * height / np.sqrt(height - v0)
+            said[...] = np.where(height > v0, Status.OK, Status.NEVER_STARTS)
+
+        study = own(solve, np.geomspace(0.1, 100.0, 7), v0=np.geomspace(0.01, 10.0, 7))
+        ds = sweep.refine(sweep.run(study), "fall_time", 5e-2, study=study, most_cells=300).dataset
+        found.append(list(zip(ds.height.values.tolist(), ds.v0.values.tolist(), strict=True)))
+    assert found[0] == found[1]
 
 
 def test_cells_that_are_inaccurate_are_on_no_border():
