@@ -95,6 +95,7 @@ PLAIN = {
     "foliot_ripple": 2,
     "foliot_steps": 1,
     "foliot_noise": 4,
+    "verge": 2,
 }
 """Cells of each method that are computed in plain Python; 8 of other kernels, one of scenes of one's own."""
 ONCE = {"sdirk4": 1, "map": 5, "dopri5": 4}
