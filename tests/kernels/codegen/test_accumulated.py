@@ -26,10 +26,10 @@ def rest(g, e, above):
 @pytest.mark.parametrize("rtol", [1e-4, 1e-9])
 def test_a_ball_is_at_rest_when_its_bounces_accumulate(kernel, rtol):
     random = np.random.default_rng(3)
-    g, e = 10.0 ** random.uniform(-2, 2, 12), 1.0 - 10.0 ** random.uniform(-1.5, -0.3, 12)
-    above = 10.0 ** random.uniform(-3, 3, 12) if kernel is BALL else np.ones(12)
+    g, e = 10.0 ** random.uniform(-2, 2, 40), 1.0 - 10.0 ** random.uniform(-1.5, -0.3, 40)
+    above = 10.0 ** random.uniform(-3, 3, 40) if kernel is BALL else np.ones(40)
     outputs, status = solve(kernel, "taylor", g, e, above, flips=MANY, rtol=rtol)
-    assert not (status == Status.OK).any()
+    assert np.isin(status, [Status.COMES_TO_REST, Status.INACCURATE]).all()
     assert (status == Status.COMES_TO_REST).mean() > 0.9
     rests = status == Status.COMES_TO_REST
     truths = [rest(*cell) for cell in zip(g, e, above, strict=True)]
