@@ -55,6 +55,7 @@ class Cluster:
             raise SweepError("cluster: the client is asynchronous; pass one that is not")
         self.threads, self._looked, self._gone = -1, -math.inf, False
         self._asked: Any = weakref.WeakSet()
+        self._suspects = asyncio.Lock()
 
     def __enter__(self) -> Cluster:
         self.look()
@@ -88,17 +89,27 @@ class Cluster:
         """A future of a block that a worker computes. Raises SweepError, now or when it is asked for its result.
 
         That of `client.get_executor()` trips over a task that fails with its worker and is answered at that moment.
+        dask blames a worker's death on every block that waited there, so those given up are tried again one by one.
         """
         found = Future[Done]()
-        try:
+
+        def ask() -> Any:
             asked = self._client.submit(compute, self._remote, job, wanted, pure=False)
+            self._asked.add(asked)
+            return asked
+
+        try:
+            asked = ask()
         except Exception as fault:
             raise self._lost(fault) from fault
-        self._asked.add(asked)
 
         async def settle() -> None:
             try:
-                found.set_result(await asked)
+                try:
+                    found.set_result(await asked)
+                except distributed.KilledWorker:
+                    async with self._suspects:
+                        found.set_result(await ask())
             except SweepError as fault:
                 found.set_exception(fault)
             except (CancelledError, asyncio.CancelledError, OSError) as fault:
