@@ -116,6 +116,8 @@ class Isolated:
                     columns, seconds, most = self._solved(start, cells.number, wanted)
                 break
             except Died:
+                if crew.over:  # it was killed with the run, so the cell is not to blame, and stays PENDING
+                    raise SweepError("the run is being stopped") from None
                 if cells.number > 1 or trial == TRIALS:
                     raise
         if most > crew.most_bytes:

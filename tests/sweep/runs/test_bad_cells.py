@@ -5,6 +5,7 @@ import resource
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import bad
 import numpy as np
@@ -84,6 +85,21 @@ def test_a_process_that_died_by_itself_was_not_late(monkeypatch):
         "its process died of SIGSEGV",
         "its process ended with 7",
     ]
+
+
+def test_a_cell_that_is_stopped_in_its_last_trial_is_not_blamed(monkeypatch):
+    monkeypatch.setattr(isolate, "TRIALS", 1)
+    processes, seen = Processes(tall(50, "bad:STUCK"), None, 1), []
+    solver = Guard(processes.solver(), seen.append)
+    cell = Cells({"fall_time": np.empty(1)}, np.empty(1, np.int8), np.empty(1, np.int8))
+    solver.solve(0, cell)  # its process is there from now on
+    with ThreadPoolExecutor(1) as thread:
+        stuck = thread.submit(solver.solve, int(bad.HANGS) - 1, cell)
+        time.sleep(0.5)
+        processes.end()
+        with pytest.raises(SweepError, match="stopped"):
+            stuck.result(30)
+    assert not seen
 
 
 def test_a_kernel_that_kills_its_parent_costs_the_cell_and_none_of_those_that_other_processes_are_at():
