@@ -46,14 +46,6 @@ class Turn(NamedTuple):
     openings: np.ndarray
 
 
-class Even(NamedTuple):
-    """psi_1, the mean of psi, and the sum of the sizes of what makes psi_1."""
-
-    first: float
-    mean: float
-    gross: float
-
-
 class Pace(NamedTuple):
     """(arg p)' and psi', of which alpha' is the sum (type A) or difference (B), then psi_xx, and psi."""
 
@@ -121,9 +113,13 @@ def pace(lengths, margin, s, c):
 
 
 @jit_inline
-def scan(lengths, margin, turn):
-    """Fills a `Turn`; returns its `Even`."""
-    zero = 0.0 * lengths.b
+def distortion(lengths, margin, turn):
+    """Fills a `Turn`; thd of (2), and its relative error."""
+    b, d, f, e = lengths
+    m1, m2, m3 = margin
+    zero, ratio, far = 0.0 * b, e / b, 2.0 * FAR * b * e
+
+    # psi_1 by (3), the mean of psi, and the sum of the sizes of what makes psi_1
     first, mean, gross = zero, zero, zero
     for j in range(NODES):
         s, c = SINE[j] + zero, COSINE[j] + zero
@@ -134,57 +130,34 @@ def scan(lengths, margin, turn):
         part = 2.0 * share * (s * c) * here.opened
         first, mean = first - part, fma(0.5 * share, here.psi, mean)
         gross = gross + magnitude(part)
-    return Even(first, mean, gross)
 
-
-@jit_inline
-def few_harmonics(ratio, bends):
-    """sum (a_k^2 + psi_k^2) over k from 2 to HARMONICS, and the sum of terms that make psi_2."""
-    zero = 0.0 * ratio
-    total, gross, power = zero, zero, ratio
-    for k in range(2, HARMONICS + 1):
-        power = power * ratio
-        psi = zero
-        for j in range(NODES):
-            part = KERNELS[k - 2, j] * bends[cells_at(j * GROUP)]
-            psi = psi + part
-            gross = where(k < 3, gross + magnitude(part), gross)
-        sine = power * (1.0 / k)
-        total = fma(psi, psi, fma(sine, sine, total))
-    return total, gross
-
-
-@jit_inline
-def all_harmonics(lengths, ratio, even_part, openings):
-    """The same sum over all k, as twice the mean square of what the first harmonic leaves."""
-    zero = 0.0 * ratio
-    total = zero
-    for j in range(NODES):
-        s, c = SINE[j] + zero, COSINE[j] + zero
-        even = openings[cells_at(j * GROUP)] - even_part.mean - even_part.first * ((c - s) * (c + s))
-        odd = direction(lengths, Crank(2.0 * zero, s, c)) - ratio * (2.0 * s * c)
-        total = fma((2.0 / math.pi) * WEIGHT[j], fma(even, even, odd * odd), total)
-    return total
-
-
-@jit_inline
-def distortion(lengths, margin, even, turn):
-    """thd of (2), and its relative error; `even` is what `scan` returns."""
-    b, d, f, e = lengths
-    m1, m2, m3 = margin
-    moves, ratio, far = e > 0.0, e / b, 2.0 * FAR * b * e
-    few = (m1 * ((b + d) + (f + e)) > far) & (m2 * m3 > far) & (b > 5.3 * e)  # all that counts is in (3)
-    rest, lost = 0.0 * b, 0.0 * b
+    # the sum of (2) over k > 1, by (3) where all that counts is in it, and the sizes of what makes psi_2
+    few = (m1 * ((b + d) + (f + e)) > far) & (m2 * m3 > far) & (b > 5.3 * e)
+    rest, lost = zero, zero
     if any_lane(few):
-        of_few, terms = few_harmonics(ratio, turn.bends)
-        root = sqrt(of_few)
-        rest, lost = where(few, root, rest), where(few, terms, lost)
-    if any_lane(not_(few)):
-        root = sqrt(all_harmonics(lengths, ratio, even, turn.openings))
-        rest, lost = where(few, rest, root), where(few, lost, 2.0 + even.mean)
-    fundamental = sqrt(fma(even.first, even.first, ratio * ratio))
-    doubt = ROUNDING * 0.1 * (lost / rest + even.gross / fundamental) + ROUNDING
-    return where(moves, rest / fundamental, 0.0), where(moves, doubt, ROUNDING)
+        total, terms, power = zero, zero, ratio
+        for k in range(2, HARMONICS + 1):
+            power = power * ratio
+            psi = zero
+            for j in range(NODES):
+                part = KERNELS[k - 2, j] * turn.bends[cells_at(j * GROUP)]
+                psi = psi + part
+                terms = where(k < 3, terms + magnitude(part), terms)
+            sine = power * (1.0 / k)
+            total = fma(psi, psi, fma(sine, sine, total))
+        rest, lost = where(few, sqrt(total), rest), where(few, terms, lost)
+    if any_lane(not_(few)):  # else twice the mean square of what the first harmonic leaves
+        total = zero
+        for j in range(NODES):
+            s, c = SINE[j] + zero, COSINE[j] + zero
+            even = turn.openings[cells_at(j * GROUP)] - mean - first * ((c - s) * (c + s))
+            odd = direction(lengths, Crank(2.0 * zero, s, c)) - ratio * (2.0 * s * c)
+            total = fma((2.0 / math.pi) * WEIGHT[j], fma(even, even, odd * odd), total)
+        rest, lost = where(few, rest, sqrt(total)), where(few, lost, 2.0 + mean)
+
+    fundamental = sqrt(fma(first, first, ratio * ratio))
+    doubt = ROUNDING * 0.1 * (lost / rest + gross / fundamental) + ROUNDING
+    return where(e > 0.0, rest / fundamental, 0.0), where(e > 0.0, doubt, ROUNDING)
 
 
 @jit_inline

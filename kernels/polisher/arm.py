@@ -17,39 +17,49 @@ rates, no derivatives). A crank e = 0 swings nothing; crank angles are those for
 
 import math
 from collections import namedtuple
-from typing import NamedTuple
 
 from kernels.interface import FIRST_REFUSAL, Field
 from kernels.lanes.codes import CHANGE_POINT, DOUBLE_CRANK, INACCURATE, LOCK_UP, OK
 from kernels.lanes.groups import cells_at
 from kernels.lanes.jit import jit
 from kernels.lanes.ranges import or_none
-from kernels.lanes.records import read, write
+from kernels.lanes.records import named, read, write
+from kernels.lanes.tuples import times
 from kernels.lanes.vectors import any_lane, choose, magnitude, not_, pow2, where
 from kernels.lanes.wiring import kernel, method, tracing
 from kernels.polisher import _motor_waveform, extremes
-from kernels.polisher._cell import ROUNDING, UNIT_LIMIT, judged, said
-from kernels.polisher.extremes import Angles, Locks, Slopes
+from kernels.polisher.extremes import ROUNDING, UNIT_LIMIT, judged, said
 from kernels.polisher.linkage import EXAMPLE, PARAMETERS, side_of
 
 Linkage = namedtuple("Linkage", [field.name for field in PARAMETERS])
 
+OUTPUTS = (
+    Field("A0", "rad", "middle between the arm's extremes, from b; negative for type B"),
+    Field("A1", "rad", "half amplitude of the arm"),
+    Field("eta_plus", "rad", "angle of the arm where crank and coupler are stretched; negative for type B"),
+    Field("eta_minus", "rad", "angle of the arm where crank and coupler are folded; negative for type B"),
+    Field("theta_plus", "rad", "crank angle from b at eta_plus"),
+    Field("theta_minus", "rad", "crank angle from b at eta_minus"),
+    Field("theta_lock", "rad", "crank angle from b, to either side, where it locks: the one nearest to 0", gaps=True),
+    Field("theta_lock_outer", "rad", "the other one, of a crank that locks at both ends of its way", gaps=True),
+    Field("transmission_angle", "rad", "least angle between coupler and arm over the turn"),
+    Field("thd", "1", "root of the sum of squares of the harmonics from the second on, over the first"),
+    Field("rate_max", "1", "largest angular rate of the arm per rate of the crank"),
+    Field("rate_min", "1", "least, that is fastest backward, rate of the arm per rate of the crank"),
+    Field("A0_b", "rad/m", "derivative of A0 by b"),
+    Field("A0_d", "rad/m", "derivative of A0 by d"),
+    Field("A0_f", "rad/m", "derivative of A0 by f"),
+    Field("A0_e", "rad/m", "derivative of A0 by e"),
+    Field("A1_b", "rad/m", "derivative of A1 by b"),
+    Field("A1_d", "rad/m", "derivative of A1 by d"),
+    Field("A1_f", "rad/m", "derivative of A1 by f"),
+    Field("A1_e", "rad/m", "derivative of A1 by e"),
+)
 
-class Swing(NamedTuple):
-    """Outputs of the closed forms."""
+RATES = ("thd", "rate_max", "rate_min")
+"""Outputs of the motion over a turn."""
 
-    angles: Angles
-    locks: Locks
-    transmission_angle: float
-    slopes: Slopes
-
-
-class Rates(NamedTuple):
-    """Outputs of the motion over a turn."""
-
-    thd: float
-    rate_max: float
-    rate_min: float
+Swing = namedtuple("Swing", [field.name for field in OUTPUTS if field.name not in RATES])
 
 
 @jit
@@ -58,36 +68,21 @@ def _swing(p, cell):
     lengths, unit, margin, code = cell
     swings, bent = said(code, OK), said(code, CHANGE_POINT)
     rocks, locked = swings | (bent & (lengths.e <= lengths.b)), said(code, LOCK_UP)
-    side = side_of(p.type)
-    flat = extremes.flattened(margin)
-    root = extremes.roots(lengths, flat)
-
-    a = extremes.extremes(lengths, flat, root)
-    sign = or_none(side, rocks)
-    angles = Angles(
-        sign * a.A0,
-        or_none(a.A1, rocks),
-        sign * a.eta_plus,
-        sign * a.eta_minus,
-        sign * a.theta_plus,
-        sign * a.theta_minus,
-    )
+    angles, mean_by, swing_by = extremes.extremes(lengths, extremes.flattened(lengths, margin))
+    sign = or_none(side_of(p.type), rocks)
 
     none = 0.0 * code + math.nan
-    locks = Locks(none, none)
+    locks = none, none
     if any_lane(locked):
         locks = choose(locked, extremes.locks(lengths, margin), locks)
     moves = swings | said(code, DOUBLE_CRANK) | bent
     transmission = where(moves, extremes.transmission(lengths, margin), or_none(0.0, locked))
 
-    s = extremes.tolerances(lengths, root)
-    swing = or_none(pow2(-where(magnitude(unit) <= UNIT_LIMIT, unit, 0.0)), swings)
-    mean = side * swing
-    slopes = Slopes(
-        mean * s.A0_b, mean * s.A0_d, mean * s.A0_f, mean * s.A0_e,
-        swing * s.A1_b, swing * s.A1_d, swing * s.A1_f, swing * s.A1_e,
-    )  # fmt: skip
-    return Swing(angles, locks, transmission, slopes)
+    per_unit = or_none(pow2(-where(magnitude(unit) <= UNIT_LIMIT, unit, 0.0)), swings)
+    slopes = times(side_of(p.type) * per_unit, mean_by) + times(per_unit, swing_by)
+    mirrored = times(sign, angles)
+    outputs = mirrored[0], or_none(angles[1], rocks), *mirrored[2:], *locks, transmission, *slopes
+    return named(Swing, outputs)
 
 
 @jit
@@ -104,12 +99,12 @@ def _waveform(first, columns, turn):
     p, rtol = read(Linkage, columns, i), columns.rtol[i]
     cell = judged(p)
     write(columns, i, _swing(p, cell))
-    even = _motor_waveform.scan(cell.lengths, cell.margin, turn)
-    thd, doubt = _motor_waveform.distortion(cell.lengths, cell.margin, even, turn)
+    thd, doubt = _motor_waveform.distortion(cell.lengths, cell.margin, turn)
     most, least, rate_doubt = _motor_waveform.rates(cell.lengths, cell.margin, turn)
     swings = said(cell.code, OK)
     turns = swings | said(cell.code, DOUBLE_CRANK)
-    write(columns, i, Rates(or_none(thd, swings), or_none(most, turns), or_none(least, turns)))
+    columns.thd[i] = or_none(thd, swings)
+    columns.rate_max[i], columns.rate_min[i] = or_none(most, turns), or_none(least, turns)
     wide = (turns & not_(rate_doubt <= rtol)) | (swings & not_(doubt <= rtol)) | not_(rtol >= ROUNDING)
     columns.status[i] = where(wide & (cell.code < FIRST_REFUSAL), INACCURATE, cell.code)
 
@@ -119,33 +114,10 @@ POLISHER = kernel(
     doc="how far a polishing machine's crank swings its arm, and how well",
     source="Cordero-Davila et al., Opticheskii Zhurnal 78(3):55 (2011), (37)-(40); stable forms and verdict are ours",
     parameters=PARAMETERS,
-    outputs=(
-        Field("A0", "rad", "middle between the arm's extremes, from b; negative for type B"),
-        Field("A1", "rad", "half amplitude of the arm"),
-        Field("eta_plus", "rad", "angle of the arm where crank and coupler are stretched; negative for type B"),
-        Field("eta_minus", "rad", "angle of the arm where crank and coupler are folded; negative for type B"),
-        Field("theta_plus", "rad", "crank angle from b at eta_plus"),
-        Field("theta_minus", "rad", "crank angle from b at eta_minus"),
-        Field(
-            "theta_lock", "rad", "crank angle from b, to either side, where it locks: the one nearest to 0", gaps=True
-        ),
-        Field("theta_lock_outer", "rad", "the other one, of a crank that locks at both ends of its way", gaps=True),
-        Field("transmission_angle", "rad", "least angle between coupler and arm over the turn"),
-        Field("thd", "1", "root of the sum of squares of the harmonics from the second on, over the first"),
-        Field("rate_max", "1", "largest angular rate of the arm per rate of the crank"),
-        Field("rate_min", "1", "least, that is fastest backward, rate of the arm per rate of the crank"),
-        Field("A0_b", "rad/m", "derivative of A0 by b"),
-        Field("A0_d", "rad/m", "derivative of A0 by d"),
-        Field("A0_f", "rad/m", "derivative of A0 by f"),
-        Field("A0_e", "rad/m", "derivative of A0 by e"),
-        Field("A1_b", "rad/m", "derivative of A1 by b"),
-        Field("A1_d", "rad/m", "derivative of A1 by d"),
-        Field("A1_f", "rad/m", "derivative of A1 by f"),
-        Field("A1_e", "rad/m", "derivative of A1 by e"),
-    ),
+    outputs=OUTPUTS,
     record=Linkage,
     methods=(
-        method("stable", "half-angle forms of sums without error", stable, ROUNDING, lacks=Rates._fields),
+        method("stable", "half-angle forms of sums without error", stable, ROUNDING, lacks=RATES),
         tracing(
             "waveform",
             "stable, and integrals and extremes of the rate over a turn",

@@ -21,14 +21,18 @@ f = 5, e = 10 has two angles by the arccos, and locks).
 import math
 from typing import NamedTuple
 
-from kernels.lanes.codes import CHANGE_POINT, DOUBLE_CRANK, LOCK_UP, NO_ASSEMBLY, OK
+from kernels.lanes.codes import CHANGE_POINT, DOUBLE_CRANK, LOCK_UP, NO_ASSEMBLY, OK, OUT_OF_RANGE
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.vectors import any_lane, choose, fma, horner, magnitude, not_, sqrt, where
 from kernels.maths.elementary import larger, smaller
 from kernels.maths.pairs import two_product, two_sum
-from kernels.polisher.linkage import Margins, sum4
+from kernels.polisher.linkage import Lengths, Margins, in_units, margins, sum4
 
-ROUNDING = 2.0**-53
+ROUNDING = 3e-15
+"""What closed forms are right to."""
+UNIT_LIMIT = 720.0
+"""Power of two of the longest length, beyond which derivatives would leave float64."""
+HAIR = 2.0**-53
 """Share of b+d+f+e that rounding the four lengths may add to a margin: closer to 0 it is a change point."""
 NARROW = 2.0**-40
 """Share of b^2+d^2+f^2+e^2 down to which 32 digits of a sum of squares suffice."""
@@ -43,51 +47,19 @@ _ARCTAN = (
 )  # fmt: skip
 
 
-class Roots(NamedTuple):
-    """k, l, m, n of (2)."""
+class Cell(NamedTuple):
+    """Lengths without units, their unit and margins, and the verdict on the linkage."""
 
-    k: float
-    low: float
-    m: float
-    n: float
-
-
-class Angles(NamedTuple):
-    """Those of (2), the arm's extremes, and the crank's angles there."""
-
-    A0: float
-    A1: float
-    eta_plus: float
-    eta_minus: float
-    theta_plus: float
-    theta_minus: float
+    lengths: Lengths
+    unit: float
+    margin: Margins
+    code: float
 
 
-class Locks(NamedTuple):
-    """Crank angles from b, to either side, where it locks, the nearest to 0 first; NaN for what there is not."""
-
-    theta_lock: float
-    theta_lock_outer: float
-
-
-class Slopes(NamedTuple):
-    """Derivatives of A0 and A1 by the lengths."""
-
-    A0_b: float
-    A0_d: float
-    A0_f: float
-    A0_e: float
-    A1_b: float
-    A1_d: float
-    A1_f: float
-    A1_e: float
-
-
-@jit_call
-def _spare(b, d, f, e):
-    """By how much the other three links together exceed the longest one: below 0 they cannot be joined."""
-    crank_or_frame = smaller(sum4(d, f, e, -b), sum4(b, d, f, -e))
-    return smaller(crank_or_frame, smaller(sum4(b, e, f, -d), sum4(b, d, e, -f)))
+@jit
+def said(code, status):
+    """Whether the code of a cell is that status."""
+    return magnitude(code - status) < 0.5
 
 
 @jit
@@ -95,31 +67,34 @@ def verdict(lengths, margin):
     """OK for a crank that turns and an arm that swings, else LOCK_UP, CHANGE_POINT, DOUBLE_CRANK or NO_ASSEMBLY."""
     b, d, f, e = lengths
     m1, m2, m3 = margin
-    hair = ROUNDING * ((b + d) + (f + e))
+    hair = HAIR * ((b + d) + (f + e))
     sense = where(e > b, -1.0, 1.0)  # a crank longer than the frame: abs(b-e) = e-b
     least = smaller(m1, smaller(sense * m2, sense * m3))
     turning = where(least > hair, where(e < b, OK, DOUBLE_CRANK), CHANGE_POINT)
     locked = least < -hair
-    if any_lane(locked):
-        return where(locked, where(_spare(b, d, f, e) < 0.0, NO_ASSEMBLY, LOCK_UP), turning)
+    if any_lane(locked):  # where the longest link is longer than the other three, they cannot be joined
+        crank_or_frame = smaller(sum4(d, f, e, -b), sum4(b, d, f, -e))
+        spare = smaller(crank_or_frame, smaller(sum4(b, e, f, -d), sum4(b, d, e, -f)))
+        return where(locked, where(spare < 0.0, NO_ASSEMBLY, LOCK_UP), turning)
     return turning
 
 
 @jit
-def flattened(margin):
-    """The margins of a linkage that turns, without what rounding has taken them below 0 by."""
-    m1, m2, m3 = margin
-    return Margins(larger(m1, 0.0), larger(m2, 0.0), larger(m3, 0.0))
+def judged(p):
+    """The `Cell` of a record with b, d, f, e."""
+    lengths, unit, fine = in_units(p)
+    margin = margins(lengths)
+    code = verdict(lengths, margin)
+    return Cell(lengths, unit, margin, where(fine & (magnitude(unit) <= UNIT_LIMIT), code, OUT_OF_RANGE))
 
 
 @jit
-def roots(lengths, margin):
-    """`Roots`."""
-    b, d, f, e = lengths
+def flattened(lengths, margin):
+    """The margins of a linkage that turns, without what rounding has taken them past 0 by."""
     m1, m2, m3 = margin
-    k = sqrt(fma(2.0, e, m1) * fma(2.0, e, m2))
-    n = sqrt(fma(2.0, b, m1) * fma(2.0, e, m3))
-    return Roots(k, sqrt(m1 * m2), sqrt(((b + d) + (f + e)) * m3), n)
+    turns = lengths.e > lengths.b
+    back = where(turns, smaller(m2, 0.0), larger(m2, 0.0))
+    return Margins(larger(m1, 0.0), back, where(turns, smaller(m3, 0.0), larger(m3, 0.0)))
 
 
 @jit_call
@@ -133,19 +108,6 @@ def angle(y, x):
     value = fma(tangent * v, horner(v, _ARCTAN), tangent)
     value = where(middle, _QUARTER + (value + _QUARTER_LOW), value)
     return where(y > x, 2.0 * _QUARTER - (value - 2.0 * _QUARTER_LOW), value)
-
-
-@jit
-def extremes(lengths, margin, root):
-    """`Angles` for type A: of the arm by (1) and (2), sums of positive angles; of the crank in the same triangles."""
-    b, d, f, e = lengths
-    k, low, m, n = root
-    across = fma(k, n, low * m) * fma(m, n, k * low)
-    swing = angle(16.0 * (e * f) * (b * d), where(e > 0.0, across, 1.0))
-    minus = 2.0 * angle(low, n)
-    crank_plus = angle(((b + d) + (f + e)) * fma(2.0, e, margin.back), k * m)
-    crank_minus = angle(margin.stretched * fma(2.0, e, margin.front), low * n)
-    return Angles(minus + swing, swing, fma(2.0, swing, minus), minus, 2.0 * crank_plus, -2.0 * crank_minus)
 
 
 @jit
@@ -164,7 +126,7 @@ def transmission(lengths, margin):
 
 @jit
 def locks(lengths, margin):
-    """`Locks`: abs(theta).
+    """Crank angles from b, to either side, where it locks, the nearest to 0 first; NaN for what there is not.
 
     d and f stretched stop it towards 0 where b + e > d + f, d and f folded stop it towards pi where
     abs(b-e) < abs(d-f).
@@ -178,7 +140,7 @@ def locks(lengths, margin):
     opposite = (m2 < 0.0) & (m3 > 0.0) | (m2 > 0.0) & (m3 < 0.0)
     folded = 2.0 * angle(sqrt(over_d * over_f), sqrt(where(opposite, -m2 * m3, 0.0)))
     inner, outer = where(m1 < 0.0, stretched, math.nan), where(opposite, folded, math.nan)
-    return Locks(where(m1 < 0.0, inner, outer), where(m1 < 0.0, outer, math.nan))
+    return where(m1 < 0.0, inner, outer), where(m1 < 0.0, outer, math.nan)
 
 
 @jit
@@ -227,22 +189,33 @@ def square_sums(lengths):
 
 
 @jit
-def tolerances(lengths, root):
-    """(3) for type A, in units of one over the unit of lengths.
+def extremes(lengths, margin):
+    """For type A: A0, A1, eta_plus, eta_minus, theta_plus, theta_minus; (3) of A0 by b, d, f, e; and of A1.
 
-    W cancels for the longer of b and d only: there it is taken from Z1 Z2, and the other one is -`apart`.
+    Angles of the arm are (1) and (2), sums of positive angles; those of the crank are in the same triangles.
+    Derivatives are in units of one over the unit of lengths. W cancels for the longer of b and d only: there it is
+    taken from Z1 Z2, and the other one is -`apart`.
     """
     b, d, f, e = lengths
-    k, low, m, n = root
+    m1, m2, m3 = margin
+    k, low = sqrt(fma(2.0, e, m1) * fma(2.0, e, m2)), sqrt(m1 * m2)
+    m, n = sqrt(((b + d) + (f + e)) * m3), sqrt(fma(2.0, b, m1) * fma(2.0, e, m3))
+    width = fma(k, n, low * m)
+
+    across = width * fma(m, n, k * low)
+    swing = angle(16.0 * (e * f) * (b * d), where(e > 0.0, across, 1.0))
+    minus = 2.0 * angle(low, n)
+    crank_plus = angle(((b + d) + (f + e)) * fma(2.0, e, m2), k * m)
+    crank_minus = angle(m1 * fma(2.0, e, m3), low * n)
+    angles = minus + swing, swing, fma(2.0, swing, minus), minus, 2.0 * crank_plus, -2.0 * crank_minus
+
     z1, z2 = square_sums(lengths)
     plus, minus = k * m, low * n
     per_area = 1.0 / (plus * minus)
     apart = fma(magnitude(b - d), m * n, (b + d) * (k * low))
     leaning, opposed = -4.0 * (b * d) * (z1 * z2) / apart * per_area, -apart * per_area
     frame, arm = where(b > d, leaning, opposed), where(b > d, opposed, leaning)
-    width = fma(k, n, low * m)
-    mean, swing = width / (4.0 * b * d), 4.0 * (e * f) / width
+    of_mean, of_swing = width / (4.0 * b * d), 4.0 * (e * f) / width
     leverage = fma(f + e, minus, (f - e) * plus)
-    coupler = 4.0 * (e * f) * (z1 * z2) / leverage * per_area
-    crank = leverage * per_area
-    return Slopes(mean * arm, mean * frame, crank, coupler, swing * frame, swing * arm, coupler, crank)
+    coupler, crank = 4.0 * (e * f) * (z1 * z2) / leverage * per_area, leverage * per_area
+    return angles, (of_mean * arm, of_mean * frame, crank, coupler), (of_swing * frame, of_swing * arm, coupler, crank)

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 from kernels.interface import Field
 from kernels.lanes.jit import jit, jit_call
-from kernels.lanes.vectors import fma, magnitude, nearest, not_, pow2, sqrt, where
+from kernels.lanes.vectors import fma, nearest, not_, pow2, sqrt, where
 from kernels.maths.elementary import arctan, larger, mantissa_exponent, sincos
 from kernels.maths.pairs import two_sum
 
@@ -184,14 +184,6 @@ def opening(lengths, squared, rz):
 
 
 @jit
-def rate(lengths, squared, rz, side, s, c):
-    """(3): alpha'."""
-    b, e = lengths.b, lengths.e
-    turn = e * fma(2.0 * b * c, c, e - b)  # e (e + b cos theta)
-    return fma(side * (2.0 * b * e), (s * c) * squared.q / rz, turn) / squared.p2
-
-
-@jit
 def acceleration(lengths, margin, squared, rz, side, s, c):
     """alpha'' at a constant rate of the crank, (3) once more by theta.
 
@@ -228,17 +220,7 @@ def motion(lengths, margin, side, crank):
     rz = sqrt(where(free, outer * inner, math.nan))
     squared = squares(lengths, c)
     alpha = direction(lengths, crank) + side * opening(lengths, squared, rz)
-    return (
-        alpha,
-        rate(lengths, squared, rz, side, s, c),
-        acceleration(lengths, margin, squared, rz, side, s, c),
-    )
-
-
-@jit
-def lock_doubt(lengths, margin, crank):
-    """What rounding may come to in rz^2, relatively: large only close to where a linkage that locks does so."""
-    s, c = crank.s, crank.c
-    outer, inner = dead_gaps(lengths, margin, s, c)
-    bow = 4.0 * lengths.b * lengths.e
-    return 1e-15 * larger(bow * (s * s) / magnitude(outer), bow * (c * c) / magnitude(inner))
+    b, e = lengths.b, lengths.e
+    turn = e * fma(2.0 * b * c, c, e - b)  # e (e + b cos theta)
+    rate = fma(side * (2.0 * b * e), (s * c) * squared.q / rz, turn) / squared.p2
+    return alpha, rate, acceleration(lengths, margin, squared, rz, side, s, c)

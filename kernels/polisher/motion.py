@@ -23,12 +23,12 @@ from kernels.lanes.groups import cells_at, one_row, write_row
 from kernels.lanes.jit import jit
 from kernels.lanes.ranges import or_none, partly
 from kernels.lanes.records import read
-from kernels.lanes.vectors import magnitude, not_, where
+from kernels.lanes.vectors import choose, magnitude, not_, where
 from kernels.lanes.wiring import kernel, tracing
-from kernels.maths.elementary import arctan, larger, sincos, smaller
+from kernels.maths.elementary import arctan, larger, sincos
 from kernels.polisher import linkage
-from kernels.polisher._cell import ROUNDING, judged, said
-from kernels.polisher.linkage import EXAMPLE, Crank, Margins, crank_at, lock_doubt, motion, side_of
+from kernels.polisher.extremes import ROUNDING, flattened, judged, said
+from kernels.polisher.linkage import EXAMPLE, Crank, crank_at, dead_gaps, motion, side_of
 
 FARTHEST = 1e6
 """Crank angle, beyond which a radian has lost its digits."""
@@ -40,12 +40,7 @@ PARAMETERS = (
     *linkage.PARAMETERS,
     Field("omega", "rad/s", "angular rate of the crank, either way"),
     Field(
-        "b_angle",
-        "rad",
-        "direction of b, from the pivot to the motor",
-        default=0.0,
-        lower=-math.tau,
-        upper=math.tau,
+        "b_angle", "rad", "direction of b, from the pivot to the motor", default=0.0, lower=-math.tau, upper=math.tau
     ),
     Field("L", "m", "distance of the tool's centre from the pivot", default="d", lower=0.0),
     Field("beta", "rad", "angle of the tool's centre ahead of the arm", default=0.0, lower=-math.tau, upper=math.tau),
@@ -67,12 +62,9 @@ def _follow(first, columns, row):
     i = cells_at(first)
     p = read(Machine, columns, i)
     cell, side, w = judged(p), side_of(p.type), p.omega
-    lengths, (m1, m2, m3) = cell.lengths, cell.margin
-    # a change point goes on smoothly: its margins without what rounding has taken them past 0 by
-    flat, long_crank = said(cell.code, CHANGE_POINT), lengths.e > lengths.b
-    back = where(long_crank, smaller(m2, 0.0), larger(m2, 0.0))
-    front = where(long_crank, smaller(m3, 0.0), larger(m3, 0.0))
-    margin = Margins(where(flat, larger(m1, 0.0), m1), where(flat, back, m2), where(flat, front, m3))
+    lengths, bow = cell.lengths, 4.0 * cell.lengths.b * cell.lengths.e
+    # a change point goes on smoothly
+    margin = choose(said(cell.code, CHANGE_POINT), flattened(lengths, cell.margin), cell.margin)
 
     worst, within = 0.0 * cell.code, True
     rated, held = _held(magnitude(w), RATE_LIMIT * RATE_LIMIT), _held(magnitude(w), RATE_LIMIT)
@@ -81,9 +73,11 @@ def _follow(first, columns, row):
         crank = crank_at(0.0 * cell.code + columns.crank_angle[j], p.b_angle)
         theta = 2.0 * arctan(crank.s / crank.c)  # in [-pi, pi]
         alpha, rate, acceleration = motion(lengths, margin, side, Crank(theta, crank.s, crank.c))
-        turns = where(long_crank, crank.theta - theta, 0.0)
-        doubt = where(rate - rate >= 0.0, 2.0 * lock_doubt(lengths, margin, crank), 0.0)
-        worst = larger(worst, doubt)
+        turns = where(lengths.e > lengths.b, crank.theta - theta, 0.0)
+        # of rz^2, relatively: large only close to where a linkage that locks does so
+        outer, inner = dead_gaps(lengths, margin, crank.s, crank.c)
+        doubt = larger(bow * (crank.s * crank.s) / magnitude(outer), bow * (crank.c * crank.c) / magnitude(inner))
+        worst = larger(worst, where(rate - rate >= 0.0, 2e-15 * doubt, 0.0))
         write_row(first, j, p.b_angle + (alpha + turns), row, columns.alpha)
         write_row(first, j, or_none(w * rate, rated), row, columns.alpha_rate)
         write_row(first, j, or_none(w * w * acceleration, held), row, columns.alpha_acceleration)
