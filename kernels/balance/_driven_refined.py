@@ -66,25 +66,19 @@ def _series(y, shares):
 
 
 @jit_call
-def _waves(square):
-    """1 - cos x and sin x/x for x^2, a pair, which is negative beyond critical damping: cosh and sinh.
+def _swing(zeta, t):
+    """The swing until the time t, a pair.
 
-    Series for x/512, and 1 - cos 2x = 2 (1 - cos x)(1 + cos x), sin 2x = 2 sin x cos x nine times.
+    Of its phase x, 1 - cos x and sin x/x are series for x/512, and 1 - cos 2x = 2 (1 - cos x)(1 + cos x),
+    sin 2x = 2 sin x cos x nine times; beyond critical damping x^2 is negative, and they are of cosh and sinh.
     """
+    high, low = two_product(zeta, zeta)
+    square = times(shifted((-high, -low), 1.0), times(t, t))
     y = scaled(square, 4.0**-_DOUBLINGS)
     gap, sine = times(y, _series(y, _COSINES)), _series(y, _SINES)
     for _ in range(_DOUBLINGS):
         sine = times(sine, shifted(negative(gap), 1.0))
         gap = scaled(times(gap, shifted(negative(gap), 2.0)), 2.0)
-    return gap, sine
-
-
-@jit_call
-def _swing(zeta, t):
-    """The swing until the time t, a pair."""
-    high, low = two_product(zeta, zeta)
-    square = times(shifted((-high, -low), 1.0), times(t, t))
-    gap, sine = _waves(square)
     sine, cosine = times(t, sine), shifted(negative(gap), 1.0)
     decay = whole(*exponential(scaled(t, -zeta)))
     lag = scaled(sine, zeta)

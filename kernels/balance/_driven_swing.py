@@ -84,7 +84,7 @@ class HalfSwing(NamedTuple):
 
 @jit
 def in_units(p):
-    """The scene, the exponent of its unit, and whether friction and torque are normal numbers in it."""
+    """The scene; and omega_n, the exponent of the unit, and whether friction and torque are normal numbers in it."""
     lifts = p.beta > 0.0
     m_w, e_w = mantissa_exponent(where(lifts, 1.0, p.w))
     _, e_beta = mantissa_exponent(where(lifts, p.beta, 1.0))
@@ -93,7 +93,7 @@ def in_units(p):
     energy = where(lifts, 0.0, m_w * where(e_w - 2.0 * half > 0.5, 2.0, 1.0))
     friction, torque = in_unit(p.r, e), in_unit(p.m, e)
     fine = (not_(p.r > 0.0) | (friction > 1e-300)) & (friction < 1e300) & (not_(lifts) | (torque > 1e-300))
-    return Scene(p.zeta, friction, torque, in_unit(p.beta, e), energy), e, fine & (torque < 1e300)
+    return Scene(p.zeta, friction, torque, in_unit(p.beta, e), energy), (p.omega_n, e, fine & (torque < 1e300))
 
 
 @jit
@@ -215,8 +215,7 @@ def newton(scene, rtol):
         new, found = _driven_refined.refined(scene, near, (t1, rise.t2, rise.t3), wanted)
         a, time, kept = choose(found, new, (a, time, kept))
         verdict = where(found, where(rtol >= ROUNDING, OK, INACCURATE), verdict)
-    verdict = where(swings, verdict, STICKS)
-    return Cycle(a, time, kept), where(tame, verdict, OUT_OF_RANGE)
+    return Cycle(a, time, kept), where(tame, where(swings, verdict, STICKS), OUT_OF_RANGE)
 
 
 @jit_call

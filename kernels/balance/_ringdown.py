@@ -37,7 +37,7 @@ _UNIT_LIMIT = 2.0**900
 
 
 class Scene(NamedTuple):
-    """A balance in units of angle; zeta < 1 where its half swings are counted."""
+    """A balance in units of angle, zeta < 1."""
 
     zeta: float
     r: float
@@ -70,11 +70,14 @@ class Rest(NamedTuple):
 
 
 @jit
-def in_units(zeta, r, r_s, theta0):
-    """The scene in units of 2^e, e, and whether it is not too large there; powers of two are exact."""
-    angle = magnitude(theta0)
-    _, e = mantissa_exponent(where(r > 0.0, r, where(r_s > 0.0, r_s, where(angle > 0.0, angle, 1.0))))
-    scene = Scene(zeta, in_unit(r, e), in_unit(r_s, e), in_unit(angle, e))
+def in_units(p):
+    """The scene in units of 2^e, e, and whether it is not too large there; powers of two are exact.
+
+    Its damping is a tame one where it is overdamped and nothing is counted.
+    """
+    angle = magnitude(p.theta0)
+    _, e = mantissa_exponent(where(p.r > 0.0, p.r, where(p.r_s > 0.0, p.r_s, where(angle > 0.0, angle, 1.0))))
+    scene = Scene(where(p.zeta < 1.0, p.zeta, 0.5), in_unit(p.r, e), in_unit(p.r_s, e), in_unit(angle, e))
     return scene, e, (scene.start < _UNIT_LIMIT) & (scene.r_s < _UNIT_LIMIT)
 
 
@@ -110,29 +113,12 @@ def turning_point(scene, decay, k):
 
 
 @jit
-def count_by_formula(scene, decay):
-    """(4) without its ceil, within 4e-15; a number above 0 where a_0 > r_s."""
-    delta, lost = decay.delta[0], decay.lost[0]
-    coth = where(delta > FAINT, delta * (2.0 - lost) / where(delta > FAINT, lost, 1.0), 2.0)  # delta coth(delta/2)
-    below = fma(scene.r, coth, delta * scene.r_s)
-    high = where(delta > 1.0, delta, 1.0)
-    x = (delta / high) * (scene.start - scene.r_s) / (below / high)
-    small = x < 1e-17
-    return where(small, (scene.start - scene.r_s) / below, log1p(x) / where(small, 1.0, delta))
-
-
-@jit
 def _whole(x):
     """The least integer from x on, for x >= 0; above 2^50 a nearest one."""
     big = x >= COUNT_LIMIT
     n = nearest(where(big, 0.0, x))
     n = where(n < x, n + 1.0, n)
     return where(big, where(x < 2.0**52, (x + 2.0**52) - 2.0**52, x), n)
-
-
-@jit
-def _exceeds(pair, number):
-    return pairs.shifted(pair, -number)[0] > 0.0
 
 
 @jit_call
@@ -143,7 +129,15 @@ def closed(scene):
     search began.
     """
     r_s, moves, decay = scene.r_s, scene.start > scene.r_s, decay_of(scene.zeta)
-    guess = where(moves, count_by_formula(scene, decay), 0.0)
+    delta, lost, felt = decay.delta[0], decay.lost[0], scene.zeta > FAINT
+
+    # (4) without its ceil, within 4e-15
+    coth = where(delta > FAINT, delta * (2.0 - lost) / where(delta > FAINT, lost, 1.0), 2.0)  # delta coth(delta/2)
+    under, high = fma(scene.r, coth, delta * r_s), where(delta > 1.0, delta, 1.0)
+    x = (delta / high) * (scene.start - r_s) / (under / high)
+    small = x < 1e-17
+    guess = where(small, (scene.start - r_s) / under, log1p(x) / where(small, 1.0, delta))
+    guess = where(moves, guess, 0.0)
     countless = not_(guess < COUNT_LIMIT)
     k = _whole(where(countless, 0.0, guess * (1.0 - 4e-15) - 1e-6)) - 1.0
     k, counted = where(k > 0.0, k, 0.0), moves & not_(countless)
@@ -151,22 +145,32 @@ def closed(scene):
     # from below the count on, by (2), to the first turning point that does not exceed r_s
     above, kept = turning_point(scene, decay, k)
     sure = above[0] - r_s + above[1] > 0.0
-    lost = pairs.negative(pairs.scaled(pairs.shifted(decay.kept, 1.0), scene.r))
-    below = pairs.add(pairs.times(decay.kept, above), lost)
-    active, k = counted & _exceeds(below, r_s), k + 1.0
+    friction = pairs.negative(pairs.scaled(pairs.shifted(decay.kept, 1.0), scene.r))
+    below = pairs.add(pairs.times(decay.kept, above), friction)
+    active, k = counted & (pairs.shifted(below, -r_s)[0] > 0.0), k + 1.0
     for _ in range(_CONFIRM_LIMIT):
         if not any_lane(active):
             break
         above = choose(active, below, above)
-        below = choose(active, pairs.add(pairs.times(decay.kept, above), lost), below)
+        below = choose(active, pairs.add(pairs.times(decay.kept, above), friction), below)
         k = where(active, k + 1.0, k)
-        active = active & _exceeds(below, r_s)
+        active = active & (pairs.shifted(below, -r_s)[0] > 0.0)
     unsure = counted & (active | not_(sure))
+
+    # what two units in the last place of a_0, r and zeta are worth in both: da/dln a_0 = a_0 E^k, da/dln r =
+    # -r (1 + E)(1 - E^k)/(1 - E), and ln zeta counts through ln delta, `steep` times: k delta-fold in the first, at
+    # most `drift`-fold in the second
+    steep = 1.0 / (decay.root[0] * decay.root[0])
+    drift = 2.0 * decay.kept[0] * where(felt, delta / where(felt, lost, 1.0), 1.0)
+    first, second = fma(k * delta, steep, 1.0), fma(drift, steep, 1.0)
+    blur_above = _TWO_ULP * (kept * first + magnitude(kept - above[0]) * second)
+    blur_above = where(k > 1.0, blur_above, _TWO_ULP * scene.start)
+    kept = decay.kept[0] * kept
+    blur = _TWO_ULP * (kept * first + magnitude(kept - below[0]) * second)
 
     # how far both lie from r_s, and whether that is no more than its error or 1e-9
     over = pairs.shifted(above, -r_s)[0]
     under = where(moves, -pairs.shifted(below, -r_s)[0], r_s - scene.start)
-    blur_above, blur = _blurs(scene, decay, k, above[0], below[0], kept)
     held = _TWO_ULP * r_s
     over_error, under_error = where(moves, blur_above + held, 0.0), where(moves, blur + held, 0.0)
     grazes = not_(under > GRAZING * r_s) | not_(under > under_error)
@@ -175,7 +179,7 @@ def closed(scene):
 
     count = where(moves, where(countless, _whole(guess), k), 0.0)
     last = where(moves, where(countless, math.nan, below[0]), scene.start)
-    doubt = where(moves & (scene.zeta > FAINT), fma(_PAIR_ERROR / _TWO_ULP, blur, _LOST), 0.0)
+    doubt = where(moves & felt, fma(_PAIR_ERROR / _TWO_ULP, blur, _LOST), 0.0)
     return Rest(count, last, where(countless, 0.0, margin), grazes | countless, doubt, unsure)
 
 
@@ -183,21 +187,3 @@ def closed(scene):
 def unit(r_s):
     """What margins are relative to; without solid friction there is nothing to divide by."""
     return where(r_s > 0.0, r_s, 1.0)
-
-
-@jit
-def _blurs(scene, decay, k, above, below, kept):
-    """What two units in the last place of a_0, r and zeta are worth in the turning points k - 1 and k.
-
-    da/dln a_0 = a_0 E^k, da/dln r = -r (1 + E)(1 - E^k)/(1 - E), and ln zeta counts through ln delta, `steep` times:
-    k delta-fold in the first, at most `drift`-fold in the second.
-    """
-    delta = decay.delta[0]
-    steep = 1.0 / (decay.root[0] * decay.root[0])
-    felt = scene.zeta > FAINT
-    drift = 2.0 * decay.kept[0] * where(felt, delta / where(felt, decay.lost[0], 1.0), 1.0)
-    first, second = fma(k * delta, steep, 1.0), fma(drift, steep, 1.0)
-    of_above = _TWO_ULP * (kept * first + magnitude(kept - above) * second)
-    kept = decay.kept[0] * kept
-    of_below = _TWO_ULP * (kept * first + magnitude(kept - below) * second)
-    return where(k > 1.0, of_above, _TWO_ULP * scene.start), of_below

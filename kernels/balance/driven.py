@@ -22,13 +22,6 @@ from kernels.maths.elementary import measured
 
 
 @jit
-def _taken(p):
-    """The scene in units of angle and of 1/omega_n, and these."""
-    scene, e, fine = _driven_swing.in_units(p)
-    return scene, (p.omega_n, e, fine)
-
-
-@jit
 def _put_back(units, cycle, verdict):
     """Amplitude, period and multiplier, and the status."""
     omega_n, e, fine = units
@@ -37,7 +30,7 @@ def _put_back(units, cycle, verdict):
     return (amplitude, period, cycle.multiplier), where(fine, partly(whole, verdict), OUT_OF_RANGE)
 
 
-UNITS = _taken, _put_back
+UNITS = _driven_swing.in_units, _put_back
 
 
 @jit

@@ -46,20 +46,14 @@ def side(theta0, swings):
 
 
 @jit
-def swinging(scene):
-    """The scene with a tame damping where it is overdamped and nothing is counted."""
-    return _ringdown.Scene(where(scene.zeta < 1.0, scene.zeta, 0.5), scene.r, scene.r_s, scene.start)
-
-
-@jit
 def closed(p, rtol):
     """The count by formula, confirmed by the turning points on both sides of it in 32 digits, in SI units.
 
     Overdamped and endless motions get what exists of them.
     """
-    scene, e, fine = _ringdown.in_units(p.zeta, p.r, p.r_s, p.theta0)
-    rest = _ringdown.closed(swinging(scene))
-    creeps, moves = scene.zeta >= 1.0, scene.start > scene.r_s
+    scene, e, fine = _ringdown.in_units(p)
+    rest = _ringdown.closed(scene)
+    creeps, moves = p.zeta >= 1.0, scene.start > scene.r_s
     endless = moves & not_(creeps) & not_((scene.r > 0.0) | (scene.r_s > 0.0))
     lasts = not_((creeps & moves) | endless)  # the motion has an end, be it the release
 

@@ -9,7 +9,7 @@ a balance without solid friction never ends.
 import math
 
 from kernels.balance import _ringdown
-from kernels.balance.release import EXAMPLE, PARAMETERS, Balance, side, swinging
+from kernels.balance.release import EXAMPLE, PARAMETERS, Balance, side
 from kernels.interface import Field
 from kernels.lanes.codes import BAD_INPUT, GRAZING, NOT_CONVERGED, OK, OUT_OF_RANGE, OVERDAMPED
 from kernels.lanes.groups import cells_at, one_row, write_row
@@ -24,36 +24,26 @@ ROUNDING = 1e-15
 
 
 @jit
-def _farthest(half_swing):
-    """The largest number asked for; NaN where the coordinate does not count whole half swings."""
-    farthest = 0.0
-    for k in half_swing:
-        counts = k >= 0.0 and k < _ringdown.COUNT_LIMIT and k == math.floor(k)
-        farthest = max(farthest, k) if counts else math.nan
-        if not counts:
-            break
-    return farthest
-
-
-@jit
 def _follow(first, columns, row):
     """One group of cells; each turning point by formula, so the order in which they are asked for does not matter."""
     i = cells_at(first)
     p = read(Balance, columns, i)
-    scene, e, fine = _ringdown.in_units(p.zeta, p.r, p.r_s, p.theta0)
-    creeps, scene = scene.zeta >= 1.0, swinging(scene)
-    rest = _ringdown.closed(scene)
+    scene, e, fine = _ringdown.in_units(p)
+    creeps, rest = p.zeta >= 1.0, _ringdown.closed(scene)
     last = where(creeps, 0.0, rest.count)  # NaN where there is none
     decay = _ringdown.decay_of(scene.zeta)
+    farthest, counts = 0.0, True  # of the half swings asked for, and whether they are whole numbers
     for j in range(columns.half_swing.size):
-        k = 0.0 * scene.start + columns.half_swing[j]
+        number = columns.half_swing[j]
+        farthest = max(farthest, number)
+        counts = counts and 0.0 <= number < _ringdown.COUNT_LIMIT and number == math.floor(number)
+        k = 0.0 * scene.start + number
         a, _ = _ringdown.turning_point(scene, decay, k)
         angle = where(k > 0.0, scale(side(p.theta0, k) * a[0], e), p.theta0)
         write_row(first, j, where(k > last, math.nan, angle), row, columns.turning_point)
-    farthest = _farthest(columns.half_swing)
     verdict = where(rest.unsure, NOT_CONVERGED, where(rest.grazes & (last <= farthest), GRAZING, OK))
     verdict = where(fine, where(creeps, OVERDAMPED, verdict), OUT_OF_RANGE)
-    columns.status[i] = where(farthest >= 0.0, verdict, BAD_INPUT)
+    columns.status[i] = where(counts, verdict, BAD_INPUT)
 
 
 @jit
