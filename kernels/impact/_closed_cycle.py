@@ -25,7 +25,7 @@ and both start with V = w = wheel R - c, thrown back by V^2/(2 wheel) where V < 
 map of c^2 is linear with the factor d^2. Derived here.
 """
 
-from kernels.impact._units import Answer, Cycle
+from kernels.impact._units import Cycle
 from kernels.lanes.codes import GRAZING, INACCURATE, NO_CYCLE, NO_METHOD, OK, UNSTABLE
 from kernels.lanes.jit import jit
 from kernels.lanes.vectors import choose, fma, magnitude, not_, sqrt, where
@@ -42,35 +42,17 @@ _MOST_BENT = 24.0
 
 
 @jit
-def behind(u, G, size, t):
-    """The share by which u s - G s^2/2 stays above 0 for 0 < s <= t; `size` is that of the terms of G."""
-    return (2.0 * u - G * t) / fma(size, t, 2.0 * u)
-
-
-@jit
-def within(u, G, size, t, pitch):
-    """The share by which u s - G s^2/2 stays below the pitch for 0 < s <= t."""
-    turns = G * t > u
-    peak = where(turns, 0.5 * u * u / where(turns, G, 1.0), t * fma(-0.5 * G, t, u))
-    return (pitch - peak) / fma(t, fma(0.5 * size, t, u), pitch)
-
-
-@jit
-def bent(scene):
-    """nu, or 0 where the lever is so bent that no cycle exists, and whether it is not."""
-    tame = magnitude(scene.nu) * scene.kappa[0] * scene.wheel[0] <= _MOST_BENT
-    return where(tame, scene.nu, 0.0), tame
-
-
-@jit
 def existence(scene, nu):
     """The least share by which the conditions (3) hold; negative where the impact cycle does not exist."""
     e, wheel, pallet = scene.e, scene.wheel[0], scene.pallet[0]
     reach = 4.0 * scene.eta[0] * (1.0 - e) / (wheel * (1.0 + e))  # eta/Y
     a = 0.5 * (1.0 + reach)
     n = 0.25 * nu * scene.kappa[0] * wheel
-    q, size = (1.0 + e) * (pallet - n), (1.0 + e) * (pallet + magnitude(n))
-    return smaller(behind(e, q, size, a), within(1.0, q, size, a, 1.0 - e))
+    q, size = (1.0 + e) * (pallet - n), (1.0 + e) * (pallet + magnitude(n))  # of the terms of q
+    behind = (2.0 * e - q * a) / fma(size, a, 2.0 * e)
+    turns = q * a > 1.0
+    peak = where(turns, 0.5 / where(turns, q, 1.0), a * fma(-0.5 * q, a, 1.0))
+    return smaller(behind, ((1.0 - e) - peak) / fma(a, fma(0.5 * size, a, 1.0), 1.0 - e))
 
 
 @jit
@@ -96,16 +78,10 @@ def stability(scene, nu):
 
 
 @jit
-def _number(x, like):
-    """A float64 as a pair."""
-    return x + 0.0 * like, 0.0 * like
-
-
-@jit
 def _polynomial(scene, nu):
     """The coefficients of p, as pairs: p(1) + p(-1) = 2 (a2 + a0), p(1) - p(-1) = 2 (1 + a1), a0 = -e^2."""
     pallet, e = scene.pallet, scene.e
-    one = _number(1.0, e)
+    one = 1.0 + 0.0 * e, 0.0 * e
     more, less, square = pairs.shifted(one, e), pairs.shifted(one, -e), pairs.two_product(e, e)
     excess = pairs.times(scene.wheel, _excess(scene))
     bend = pairs.scaled(excess, nu)
@@ -134,12 +110,12 @@ def impact_cycle(scene, nu):
     back = where(rim < 0.0, 0.125 * rim * rim / lossy, 0.0)
     rim = 0.5 * rim / sqrt(lossy)
     speed = 0.5 * scene.kappa[0] * half_period
-    return Cycle(half_period, 0.25 * wheel[0] / loss, rim, speed, multiplier, back), doubt
+    return Cycle(half_period, 0.25 * wheel[0] / loss, rim, speed, multiplier, back, 0.0, 1.0, 0.0), doubt
 
 
 @jit
 def plastic_cycle(scene):
-    """The cycle (6), and the share of time in contact."""
+    """The cycle (6)."""
     wheel, kappa, eta = scene.wheel, scene.kappa, scene.eta
     twice = sqrt(fma(4.0, eta[0], kappa[0]))  # 2 c
     stop = sqrt(1.0 / scene.pallet[0])
@@ -150,26 +126,19 @@ def plastic_cycle(scene):
     back = where(start < 0.0, 0.5 * start * start / wheel[0], 0.0)
     d = _excess(scene)[0]
     travel = fma(0.5 * twice, fall, eta[0]) + back
-    return Cycle(half_period, travel, start, start, d * d, back), 1.0 - fall / half_period
-
-
-@jit
-def verdict(exists, stable, doubt, rtol):
-    """The status by the margins of existence and stability and the error of the multiplier."""
-    status = where(stable < -GRAZE, UNSTABLE, where((exists <= GRAZE) | (stable <= GRAZE), GRAZING, OK))
-    status = where((rtol >= ROUNDING) & (doubt <= 0.2 * rtol), status, INACCURATE)
-    return where(exists >= -GRAZE, status, NO_CYCLE)
+    return Cycle(half_period, travel, start, start, d * d, back, 1.0 - fall / half_period, 1.0, 0.0)
 
 
 @jit
 def closed(scene, rtol):
     """The symmetric cycle by formula, with its existence and its multipliers, and the status."""
-    plastic = not_(scene.e > 0.0)
-    nu, tame = bent(scene)
+    plastic, straight = not_(scene.e > 0.0), not_(magnitude(scene.nu) > 0.0)
+    tame = magnitude(scene.nu) * scene.kappa[0] * scene.wheel[0] <= _MOST_BENT
+    nu = where(tame, scene.nu, 0.0)
     cycle, doubt = impact_cycle(scene, nu)
-    pushed, held = plastic_cycle(scene)
-    status = where(tame, verdict(existence(scene, nu), stability(scene, nu), doubt, rtol), NO_CYCLE)
-    straight = not_(magnitude(scene.nu) > 0.0)
+    exists, stable = existence(scene, nu), stability(scene, nu)
+    status = where(stable < -GRAZE, UNSTABLE, where((exists <= GRAZE) | (stable <= GRAZE), GRAZING, OK))
+    status = where((rtol >= ROUNDING) & (doubt <= 0.2 * rtol), status, INACCURATE)
+    status = where(tame & (exists >= -GRAZE), status, NO_CYCLE)
     status = where(plastic, where(straight, OK, NO_METHOD), status)
-    share = where(plastic, held, 0.0)
-    return Answer(choose(plastic, pushed, cycle), 0.0 * held, share, 0.0 * held + 1.0), status
+    return choose(plastic, plastic_cycle(scene), cycle), status

@@ -71,34 +71,17 @@ def meets_either(gap, rate, bend):
 
 @jit
 def impact(scene, motion, lever):
-    """The motion after an impact, by (2), and the speed of closing before it."""
-    closing = motion.V - lever * motion.w
-    push = (1.0 + scene.e) * closing / (scene.pallet + scene.wheel * lever * lever)
-    return Motion(motion.y, motion.V - scene.pallet * push, motion.w + lever * scene.wheel * push), closing
-
-
-@jit
-def impact_loss(scene, closing, lever):
-    """Energy lost in an impact, for a wheel of mass 1."""
-    inertia = scene.pallet + scene.wheel * lever * lever
-    return 0.5 * (1.0 - scene.e) * (1.0 + scene.e) * closing * closing * scene.pallet / inertia
+    """The motion after an impact, by (2), the speed of closing before it, and the energy lost for a wheel of mass 1."""
+    closing, inertia = motion.V - lever * motion.w, scene.pallet + scene.wheel * lever * lever
+    push = (1.0 + scene.e) * closing / inertia
+    loss = 0.5 * (1.0 - scene.e) * (1.0 + scene.e) * closing * closing * scene.pallet / inertia
+    return Motion(motion.y, motion.V - scene.pallet * push, motion.w + lever * scene.wheel * push), closing, loss
 
 
 @jit
 def centre(scene, motion, side):
     """Way and speed of the common centre along `side` (1: the holding pallet pushes y up, -1: the other one, down)."""
     return side * motion.y, scene.wheel * motion.V + scene.pallet * side * motion.w
-
-
-@jit
-def train(scene, motion, side):
-    """Duration (3) of the bounces that follow an impact, the motion after them, and the widest gap on the way."""
-    away, W = centre(scene, motion, side)
-    bounce = side * motion.w - motion.V
-    bounce = bounce if bounce > 0.0 else 0.0
-    t = 2.0 * bounce / (1.0 - scene.e)
-    speed = W + scene.wheel * t
-    return t, Motion(side * (away + 0.5 * (W + speed) * t), speed, side * speed), 0.5 * bounce * bounce
 
 
 @jit
@@ -112,22 +95,27 @@ def lowest(wheel, away, W, t):
 
 
 @jit
-def train_ends(scene, motion, side, t, after, gap):
-    """Whether nothing comes between the bounces: no tip of a pallet is reached, and no tooth meets the other pallet.
+def train(scene, motion, side):
+    """Bounces that follow an impact: their duration (3), the motion after them, the widest gap on the way, and `ends`.
 
-    On the holding side that tooth is met where y is in [-1/4, -1/4 + gap/2] and above -eta, on the other mirrored. Nor
-    may y or the rim's way have an extreme between them: that of the centre is another.
+    `ends`: whether nothing comes between them. No tip of a pallet is reached, and no tooth meets the other pallet: on
+    the holding side it is met where y is in [-1/4, -1/4 + gap/2] and above -eta, on the other mirrored. Nor may y or
+    the rim's way have an extreme between them: that of the centre is another.
     """
     eta = scene.eta
     away, W = centre(scene, motion, side)
+    bounce = side * motion.w - motion.V
+    bounce = bounce if bounce > 0.0 else 0.0
+    t, gap = 2.0 * bounce / (1.0 - scene.e), 0.5 * bounce * bounce
+    speed = W + scene.wheel * t
+    after = Motion(side * (away + 0.5 * (W + speed) * t), speed, side * speed)
     low, high = lowest(scene.wheel, away, W, t), side * after.y
     high = (high if high > away else away) + scene.wheel * gap
     clear = gap <= 0.5 - 2.0 * eta or low > -0.25 + 0.5 * gap or high < -eta
-    if not (high < eta and clear and (side > 0.0 or low > -eta)):
-        return False
+    ends = high < eta and clear and (side > 0.0 or low > -eta)
     if W >= 0.0:
-        return motion.V >= 0.0
-    return after.V <= 0.0 and 2.0 * scene.wheel * scene.pallet * gap <= after.V * after.V
+        return t, after, gap, ends and motion.V >= 0.0
+    return t, after, gap, ends and after.V <= 0.0 and 2.0 * scene.wheel * scene.pallet * gap <= after.V * after.V
 
 
 @jit

@@ -14,7 +14,7 @@ from kernels.impact import _half_swing as swing
 from kernels.impact._contacts import PlainScene
 from kernels.impact._half_swing import Start, half_swing
 from kernels.impact._periodic import Work, chain, difference, distance, errors, invert, multiplier, newton
-from kernels.impact._units import Answer, Cycle, bend
+from kernels.impact._units import Cycle
 from kernels.lanes.codes import (
     GRAZING,
     INACCURATE,
@@ -52,13 +52,6 @@ _KICK, _KICKS = 0.01, 8
 _ROUNDING = 2.3e-16
 _CHAINED = 5.0
 """Errors of the changes after many contacts over those of one: 3.5 at most in 1055 clocks."""
-
-
-@jit
-def plain_scene(scene):
-    """The scene that half swings are followed in."""
-    c, y_i = bend(scene)
-    return PlainScene(scene.wheel[0], scene.pallet[0], min(scene.eta[0], 0.25), scene.e, c, y_i)
 
 
 @jit
@@ -101,27 +94,27 @@ def _past(history, i):
 
 
 @jit
-def _answer(tally, half_way, middle, halves, pace, e):
-    """The cycle as in `_units`, the middle of the swing, the share of time in contact, and impacts, from the
-    tally of half swings that are so many half periods; the swing's half way and middle may be means."""
+def _cycle(tally, half_way, middle, halves, pace, e):
+    """The cycle as in `_units`, from the tally of half swings that are so many half periods; the swing's half way and
+    middle may be means."""
     beats = tally[swing.BEATS]
     rim, pallet = (tally[swing.RIM] / beats, tally[swing.PALLET] / beats) if beats > 0.0 else (math.nan, math.nan)
     endless = e > 0.0 and tally[swing.TRAINS] > 0.0
     impacts = math.inf if endless else tally[swing.IMPACTS] / halves
-    cycle = Cycle(tally[swing.TIME] / halves, half_way, rim, pallet, pace, tally[swing.RECOIL])
-    return Answer(cycle, middle, tally[swing.HELD] / tally[swing.TIME], impacts)
+    half_period, held = tally[swing.TIME] / halves, tally[swing.HELD] / tally[swing.TIME]
+    return Cycle(half_period, half_way, rim, pallet, pace, tally[swing.RECOIL], held, impacts, middle)
 
 
 @jit
 def _none():
-    """No answer."""
+    """No cycle."""
     nan = math.nan
-    return Answer(Cycle(nan, nan, nan, nan, nan, nan), nan, nan, nan)
+    return Cycle(nan, nan, nan, nan, nan, nan, nan, nan, nan)
 
 
 @jit_call
 def _judged(scene, start, k, work, rtol):
-    """The answer for a motion that repeats after k half swings, and its status; UNSTABLE where it leaves that."""
+    """The cycle of a motion that repeats after k half swings, and its status; UNSTABLE where it leaves that."""
     tally = work.tally
     swing.clear(tally)
     image, _ = chain(scene, start, k, work)
@@ -143,10 +136,10 @@ def _judged(scene, start, k, work, rtol):
     else:
         half_swings, cycles = 2.0 * k, min(teeth, 1.0 * k)
         half_way, middle = max(low, high), 0.0
-    answer = _answer(tally, half_way, middle, 2.0 * cycles * k / half_swings, per_half_swing, scene.e)
+    cycle = _cycle(tally, half_way, middle, 2.0 * cycles * k / half_swings, per_half_swing, scene.e)
 
     # the largest relative error of an output, by those of the start; thrown back is V^2/2, V perhaps that of both
-    cycle, share, back = answer.cycle, answer.held, answer.cycle.back
+    share, back = cycle.held, cycle.back
     rounding = _ROUNDING * (2.0 + tally[swing.EVENTS] / k) * (1.0 + cycle.travel)
     gap, V, w, late = errors(start, difference(image, start), work, rounding, tally[swing.TIME])
     worst = max(max(late, gap / cycle.travel), max(V / magnitude(cycle.rim), w / magnitude(cycle.pallet)))
@@ -157,27 +150,35 @@ def _judged(scene, start, k, work, rtol):
 
     fading = (1.0 - modulus) / max(noise, _ROUNDING)  # in units of its error
     if fading < -1.0:
-        return answer, UNSTABLE
+        return cycle, UNSTABLE
     if not (worst <= rtol):
-        return answer, INACCURATE
+        return cycle, INACCURATE
     if fading < 1.0 or tally[swing.MARGIN] <= 4.0 * gap + rounding:
-        return answer, GRAZING
+        return cycle, GRAZING
     if teeth > cycles:
-        return answer, TOOTH_JUMPED
-    return answer, OK if teeth == 1.0 else PERIOD_2
+        return cycle, TOOTH_JUMPED
+    return cycle, OK if teeth == 1.0 else PERIOD_2
 
 
 @jit_call
-def attractor(scene, rtol, total, work, history):
-    """The cycle, the middle of the swing, the share of time in contact, impacts in half a period, and the status."""
-    start, kicks = beginning(scene, DISTURBANCE), 0
+def events(scene, rtol, total, work, history):
+    """The cycle of a scene of `_units`, contact by contact, and the status.
+
+    No two clocks have the same contacts to be followed in lanes.
+    """
+    if not (1.0 / KAPPA_LIMIT <= scene.kappa[0] <= KAPPA_LIMIT):
+        return _none(), NO_METHOD
+    wheel, pallet, loss = scene.wheel[0], scene.pallet[0], (1.0 - scene.e) / (1.0 + scene.e)
+    c, y_i = scene.nu * loss / pallet, -0.25 * wheel / loss  # (5); c is 0 where nu is
+    clock = PlainScene(wheel, pallet, min(scene.eta[0], 0.25), scene.e, c, y_i)
+    start, kicks = beginning(clock, DISTURBANCE), 0
     swing.clear(total)
     k = 0
     blocks = HALF_SWINGS // BLOCK
     for block in range(blocks):
         if 2 * block == blocks:
             swing.clear(total)
-        start, verdict = follow(scene, start, BLOCK, history, total, work.slopes)
+        start, verdict = follow(clock, start, BLOCK, history, total, work.slopes)
         if verdict != swing.DONE or total[swing.EVENTS] > EVENT_LIMIT:
             return _none(), NO_METHOD if verdict == swing.BENT_CONTACT else STEP_LIMIT
         k = 0
@@ -186,41 +187,33 @@ def attractor(scene, rtol, total, work, history):
                 k = back
         if k == 0:
             continue
-        cycle, found = newton(scene, start, k, work)
-        if not (found and distance(start, cycle) < _NEAR):
+        again, found = newton(clock, start, k, work)
+        if not (found and distance(start, again) < _NEAR):
             continue
-        follow(scene, cycle, k, history, work.tally, work.slopes)
+        follow(clock, again, k, history, work.tally, work.slopes)
         whole = k
         for shorter in range(whole - 1, 0, -1):
-            if whole % shorter == 0 and distance(_past(history, shorter), cycle) < _SAME:
+            if whole % shorter == 0 and distance(_past(history, shorter), again) < _SAME:
                 k = shorter
-        answer, status = _judged(scene, cycle, k, work, rtol)
+        cycle, status = _judged(clock, again, k, work, rtol)
         if status != UNSTABLE:
-            return answer, status
+            return cycle, status
         if 2 * block < blocks and kicks < _KICKS:  # go on further from the unstable cycle, the way the motion leaves it
             kicks += 1
-            away, way = distance(start, cycle), difference(start, cycle)
+            away, way = distance(start, again), difference(start, again)
             more = _KICK / max(away, 1e-12) if away < _KICK else 1.0
-            w = cycle.w + more * way.w
+            w = again.w + more * way.w
             if w < 0.0:
-                start = Start(swing.reduced(cycle.gap + more * way.gap), cycle.V + more * way.V, w)
+                start = Start(swing.reduced(again.gap + more * way.gap), again.V + more * way.V, w)
     half_swings = HALF_SWINGS // 2
     cycles = max(min(total[swing.WAY], 0.5 * half_swings), 1.0)
     status = NOT_CONVERGED if k > 0 else NOT_PERIODIC
     half_way, middle = total[swing.DIPS] / half_swings, magnitude(total[swing.LEAN]) / half_swings
-    return _answer(total, half_way, middle, 2.0 * cycles, math.nan, scene.e), status
+    return _cycle(total, half_way, middle, 2.0 * cycles, math.nan, scene.e), status
 
 
 @jit
 def workspace():
-    """Arrays that `settled` uses for one clock after the other."""
+    """Arrays that `events` uses for one clock after the other."""
     work = Work(np.empty(swing.TALLIES), np.empty((5, 3)), np.empty((4, 3)), np.empty((3, 3)))
     return np.empty(swing.TALLIES), work, np.empty((BLOCK + 1, 3))
-
-
-@jit
-def events(scene, rtol, total, work, history):
-    """`attractor` of a scene of `_units`, contact by contact: no two clocks have the same to be followed in lanes."""
-    if not (1.0 / KAPPA_LIMIT <= scene.kappa[0] <= KAPPA_LIMIT):
-        return _none(), NO_METHOD
-    return attractor(plain_scene(scene), rtol, total, work, history)

@@ -27,11 +27,9 @@ from kernels.impact._contacts import (
     carry_train,
     centre,
     impact,
-    impact_loss,
     meets_either,
     slide,
     train,
-    train_ends,
 )
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.vectors import magnitude
@@ -105,14 +103,6 @@ def _count_margin(tally, gap):
 
 
 @jit
-def _line(eta, y, w, near):
-    """Time to the next tip that y passes; inf if it passes none."""
-    if w > 0.0:
-        return max(((eta if near else -eta) - y) / w, 0.0)
-    return max((-eta - y) / w, 0.0) if near and w < 0.0 else math.inf
-
-
-@jit
 def _flight(scene, gap, far, motion, near, tally, slopes, follows):
     """Free flight until a tooth meets the holding pallet, or the one across while that is `near`, or y passes a tip.
 
@@ -130,7 +120,9 @@ def _flight(scene, gap, far, motion, near, tally, slopes, follows):
         other, other_behind = meets_either(far, rate_across, bend)
         if other < t:
             t, behind, across = other, other_behind, True
-    line = _line(scene.eta, y, w, near)
+    line = math.inf  # the time to the next tip that y passes
+    if w > 0.0 or (near and w < 0.0):
+        line = max(((scene.eta if near and w > 0.0 else -scene.eta) - y) / w, 0.0)
     contact, t = t < line, min(t, line)
     if t < math.inf:
         way = (V + 0.5 * t) * t
@@ -150,8 +142,8 @@ def _flight(scene, gap, far, motion, near, tally, slopes, follows):
 @jit_call
 def _held(scene, motion, side, tally, slopes, follows):
     """Bounces that end in contact, and that until a tip: whether they do, the motion then, whether all ends there."""
-    t, after, widest = train(scene, motion, side)
-    if not train_ends(scene, motion, side, t, after, widest):
+    t, after, widest, alone = train(scene, motion, side)
+    if not alone:
         return False, motion, False
     if follows:
         carry_train(scene, slopes, motion, side, t)
@@ -201,8 +193,8 @@ def half_swing(scene, start, tally, slopes, follows):
         lever = -_lever(scene, -motion.y) if across else _lever(scene, motion.y)
         if follows:
             carry_impact(scene, slopes, motion, lever)
-        motion, closing = impact(scene, motion, lever)
-        tally[LOSS] += impact_loss(scene, closing, lever)
+        motion, closing, loss = impact(scene, motion, lever)
+        tally[LOSS] += loss
         tally[IMPACTS] += 1.0
         tally[DIP] = min(tally[DIP], motion.y)
         touching = -1.0 if behind else 0.0

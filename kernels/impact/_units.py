@@ -50,17 +50,12 @@ class Scene(NamedTuple):
     nu: float
 
 
-class Answer(NamedTuple):
-    """A cycle, how far the middle of its swing is off, the share of time in contact, and impacts in half a period."""
-
-    cycle: tuple
-    offset: float
-    held: float
-    impacts: float
-
-
 class Cycle(NamedTuple):
-    """A cycle without dimensions: speeds are those just after impact, `back` is the way the rim is thrown back."""
+    """A cycle without dimensions: speeds are those just after impact, `back` is the way the rim is thrown back.
+
+    `held` is the share of time in contact, `impacts` are those in half a period, `offset` is how far the middle of the
+    swing is off.
+    """
 
     half_period: float
     travel: float
@@ -68,6 +63,9 @@ class Cycle(NamedTuple):
     pallet: float
     multiplier: float
     back: float
+    held: float
+    impacts: float
+    offset: float
 
 
 class Units(NamedTuple):
@@ -124,21 +122,18 @@ def without_dimensions(p):
 
 
 @jit
-def given(units, answer, verdict):
+def given(units, cycle, verdict):
     """The outputs, each size NaN where it is no normal number nor 0, and the status."""
-    cycle, offset, held, impacts = answer
     rate = units.step / units.time
-    period, swing = (
-        measured(2.0 * units.time * cycle.half_period, units.e_time),
-        measured(units.pitch * cycle.travel, units.e_pitch),
-    )
+    period = measured(2.0 * units.time * cycle.half_period, units.e_time)
+    swing = measured(units.pitch * cycle.travel, units.e_pitch)
     wheel_speed = scale(rate * cycle.rim, -units.e_time)
     pallet_speed = scale(rate * units.arm * cycle.pallet, units.e_arm - units.e_time)
     rolls, beats = _normal_or_none(cycle.rim, wheel_speed), _normal_or_none(cycle.pallet, pallet_speed)
     whole = (period > 0.0) & (swing > 0.0) & rolls & beats
     speeds, recoil = (or_none(wheel_speed, rolls), or_none(pallet_speed, beats)), units.step * cycle.back
-    middle = scale(units.pitch * offset, units.e_pitch)
-    outputs = (period, swing, speeds[0], speeds[1], cycle.multiplier, recoil, held, impacts, middle)
+    middle = scale(units.pitch * cycle.offset, units.e_pitch)
+    outputs = period, swing, *speeds, cycle.multiplier, recoil, cycle.held, cycle.impacts, middle
     return outputs, judged(units.fine, whole, verdict)
 
 
@@ -149,10 +144,3 @@ def _normal_or_none(x, result):
 
 
 UNITS = without_dimensions, given
-
-
-@jit
-def bend(scene):
-    """c of (5) and y_i, for one float64 each; c is 0 where nu is."""
-    loss = (1.0 - scene.e) / (1.0 + scene.e)
-    return scene.nu * loss / scene.pallet[0], -0.25 * scene.wheel[0] / loss
