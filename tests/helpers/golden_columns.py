@@ -95,9 +95,10 @@ PLAIN = {
     "foliot_ripple": 2,
     "foliot_steps": 1,
     "foliot_noise": 4,
-    "verge": 2,
+    "verge": (30, 55, 65),
 }
-"""Cells of each method that are computed in plain Python; 8 of other kernels, one of scenes of one's own."""
+"""Cells of each method that are computed in plain Python: how many, or which ones, where others take a minute; 8 of
+other kernels, one of scenes of one's own."""
 ONCE = {"sdirk4": 1, "map": 5, "dopri5": 4}
 """The same of methods that take thousands of steps in some of their cells."""
 THOUSANDS = {"sdirk4"}
@@ -285,7 +286,9 @@ def difference(found, kept):
 def chosen(name, count):
     """Numbers of the cells that are computed: all, or in plain Python as many as that does in a moment."""
     few = PLAIN.get(name, 1 if name in SCENES else 8)
-    return np.arange(count) if COMPILED else np.unique(np.linspace(0, count - 1, few).astype(int))[:count]
+    if COMPILED:
+        return np.arange(count)
+    return np.array(few) if isinstance(few, tuple) else np.unique(np.linspace(0, count - 1, few).astype(int))[:count]
 
 
 def computed(name, kernel, columns, rtol, few=1):
