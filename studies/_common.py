@@ -1,4 +1,4 @@
-"""What the scripts of the studies share: opening a result, the table of statements, and the look of their figures.
+"""What the scripts of the studies share: opening a result, and the table of statements; `_figures` has their figures.
 
 A script `<question>.py` stands beside its `<question>.toml`, reads the dataset that `sweep run` made of it, prints what
 theory says beside what comes out, and draws `<question>.png` beside the dataset.
@@ -9,22 +9,23 @@ from __future__ import annotations
 import sys
 import textwrap
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
+from _figures import charts
+from _figures import direct_label as direct_label
+from _figures import draw_costs as draw_costs
+from _figures import hatch as hatch
+from _figures import page_of as page_of
+from _figures import plain_ticks as plain_ticks
+from _figures import quality_bar as quality_bar
 
 import sweep
 from sweep.file.overwriting import check_target
-
-try:
-    from sweep.show import charts
-except sweep.SweepError as error:  # no matplotlib
-    sys.exit(str(error))
 
 
 @dataclass(frozen=True)
@@ -61,18 +62,52 @@ class Statement:
 
 Groups = dict[str, list[Statement]]
 """Statements by heading."""
+Conclusion = tuple[Groups, list[str], Callable[[], Any]]
+"""What a script concludes: statements, further lines of text, and what draws the figure."""
 
 
-def compared(what: str, theory: str, here: float, value: float, allowed: float, digits: int = 8) -> Statement:
+def compared(what: str, theory: str, here: Any, value: float, allowed: float, digits: int = 8) -> Statement:
     """A number beside what theory says; it holds if the relative deviation is at most `allowed`."""
-    off = here / value - 1
-    return Statement(what, theory, f"{here:.{digits}g}", off, bool(abs(off) <= allowed))
+    off = float(here) / value - 1
+    return Statement(what, theory, f"{float(here):.{digits}g}", off, bool(abs(off) <= allowed))
 
 
-def differing(what: str, theory: str, here: float, value: float, allowed: float, digits: int = 8) -> Statement:
+def differing(what: str, theory: str, here: Any, value: float, allowed: float, digits: int = 8) -> Statement:
     """As `compared`, of exponents and what else may be 0: the deviation is the difference."""
-    off = here - value
-    return Statement(what, theory, f"{here:.{digits}g}", off, bool(abs(off) <= allowed))
+    off = float(here) - value
+    return Statement(what, theory, f"{float(here):.{digits}g}", off, bool(abs(off) <= allowed))
+
+
+def said(what: str, holds: Any, here: str = "", theory: str = "", refuted: bool = False) -> Statement:
+    """What holds or does not, without a number that it deviates by."""
+    return Statement(what, theory, here, None, bool(holds), refuted)
+
+
+def most(what: str, theory: str, off: Any, allowed: float, here: str = "largest deviation") -> Statement:
+    """A deviation, or the largest of many, missing cells left out; it holds if that is at most `allowed`."""
+    worst = float(off) if np.ndim(off) == 0 else float(abs(off).max())
+    return Statement(what, theory, here, worst, abs(worst) <= allowed)
+
+
+def count(there: Any, what: str = "cells") -> str:
+    """How many are true, or have a value: "12 cells"."""
+    return f"{int((there if there.dtype == bool else there.notnull()).sum())} {what}"
+
+
+KEYS = ("method", "rtol", "outputs", "design", "along")
+
+
+def solved(kernel: str, **given: Any) -> xr.Dataset:
+    """A sweep in memory, by keys of a study and parameters: those that are sequences are axes, numbers are fixed."""
+    keys = {name: given.pop(name) for name in KEYS if name in given}
+    axes = {name: np.asarray(values) for name, values in given.items() if np.ndim(values)}
+    fixed = {name: float(value) for name, value in given.items() if not np.ndim(value)}
+    return sweep.run(sweep.study(kernel=kernel, axes=axes, fixed=fixed, allow_import=":" in kernel, **keys))
+
+
+def power(y: xr.DataArray) -> float:
+    """The exponent of a line over its one dimension, by least squares."""
+    return float(np.polyfit(np.log(y[y.dims[0]]), np.log(abs(y)), 1)[0])
 
 
 def cheapest(found: dict[str, xr.Dataset]) -> list[Statement]:
@@ -143,7 +178,7 @@ def report(
     script: str,
     inputs: Sequence[str],
     arguments: Sequence[str],
-    conclude: Callable[..., tuple[Groups, Sequence[str], Callable[[], Any]]],
+    conclude: Callable[..., Conclusion],
     source: str = "theory",
 ) -> int:
     """Prints what a study concludes from the results named, and saves its figure beside the first of them.
@@ -177,61 +212,6 @@ def report(
         print(error, file=sys.stderr)
         return 2
     return int(any(s.failed for lines in groups.values() for s in lines))
-
-
-@contextmanager
-def page_of(height: float, *shape: int, width: float = charts.PAGE, **how: Any) -> Iterator[tuple[Any, Any]]:
-    """A figure for print of so many mm, and its panels as `subplots` gives them, lettered in the end if several."""
-    with charts.style():
-        page = charts.new_figure(width, height)
-        panels = page.subplots(*shape, **how)
-        yield page, panels
-        for axes, text in zip(np.ravel(panels), "abcdefghi", strict=False) if np.size(panels) > 1 else ():
-            charts.letter(axes, text)
-
-
-def hatch(axes: Any, x: Any, y: Any, where: Any, pattern: str, colour: str = "0.45") -> None:
-    """Hatches the cells of a map for which `where`, of shape (y, x), is true, and draws their edge."""
-    shown = where.astype(float)
-    with charts.matplotlib.rc_context({"hatch.color": colour, "hatch.linewidth": 0.4}):
-        axes.contourf(x, y, shown, levels=[0.5, 1.5], colors="none", hatches=[pattern])
-    axes.contour(x, y, shown, levels=[0.5], colors=[colour], linewidths=0.8)
-
-
-def direct_label(axes: Any, x: float, y: float, text: str, colour: str = "black", **how: Any) -> None:
-    """Text in the colour of the line it names, readable where it crosses others."""
-    box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.8}
-    axes.text(x, y, text, color=colour, bbox=box, **{"fontsize": 8, "ha": "center", "va": "center", **how})
-
-
-def draw_costs(axes: Any, found: dict[str, xr.Dataset], places: dict[str, tuple[float, float]]) -> None:
-    """`worst` error over `seconds` a cell of each method, in its colour, with its name beside it.
-
-    Parameters
-    ----------
-    places : by name, factors from the line's first point to where the name stands; those without are not drawn.
-    """
-    for name, row in found.items():
-        look, drawn = charts.method_look(name), row.worst.where(row.worst < 1.0).dropna("rtol")
-        if name in places and drawn.size:
-            axes.plot(row.seconds.sel(rtol=drawn.rtol), drawn.clip(1e-16), markersize=4, linewidth=0.9, **look)
-            right, up = places[name]
-            x, y = float(row.seconds.sel(rtol=drawn.rtol[0])), float(drawn[0])
-            direct_label(axes, right * x, up * y, name, look["color"], fontsize=7)
-    axes.set(xscale="log", yscale="log", xlabel="CPU time per cell [s]", ylabel="relative error, worst cell [1]")
-
-
-def quality_bar(page: Any, mesh: Any, axes: Any, label: str, **how: Any) -> Any:
-    """The bar of a map in "cividis_r" of what is better the less it is: the good end is bright, and on top."""
-    bar = page.colorbar(mesh, ax=axes, label=label, **how)
-    bar.ax.invert_yaxis()
-    return bar
-
-
-def plain_ticks(axis: Any, values: Sequence[float]) -> None:
-    """Ticks of a logarithmic axis at these values, written out, and no others."""
-    axis.set_ticks(list(values), labels=[f"{x:g}" for x in values])
-    axis.set_ticks([], minor=True)
 
 
 def paragraph(text: str) -> list[str]:

@@ -23,8 +23,10 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, compared, differing, direct_label, hatch, page_of, read_result, report
+from _common import Conclusion, Statement, compared, count, differing, most, read_result, report, solved
+from _figures import colour_map, direct_label, hatch, page_of
 from _losses import any_swing, shares
+from scipy.optimize import brentq
 
 import sweep
 from sweep.show.charts import COLOURS
@@ -33,8 +35,15 @@ LARGE, SMALL = 100.0, 1.0003
 """Amplitudes over phi0 from which, and up to which, losses are called light and heavy."""
 AT_ONCE = 4000
 """Cells whose losses are summed up together: 6 MB an array."""
-PURE = {"dry": (0.0, 0.0), "viscous": (1.0, 1 / 3), "impacts": (2.0, 1 / 2), "drag": (3.0, 3 / 5)}
-"""Degree and exponent, at large swings, of the losses of the map; drag of degree 3."""
+DEGREES = (0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0)
+"""Of one friction alone; some are not on the grid."""
+BEST = {10.0: (0.27318, 8.719), 100.0: (0.17768, 6.098)}
+"""Least s and its mu/R by R/(a^2 phi0) where viscous and dry friction act, once in 50 digits."""
+PLANE = {"a": 1.0, "e": 0.9, "n": 3.0, "c": 4e-6, "phi0": 1.0}
+"""The clock whose exponent is mapped over torque and dry friction."""
+SPEEDS = ["amplitude", "crossing_speed", "sensitivity"]
+"""Outputs that shares of the losses are made of."""
+LOSSES = ["viscous", "dry", "drag", "impacts"]
 
 NOTES = """\
 s = -dlnP/dlnmu; deviation: the difference of exponents, others relative. Shares by quadrature of the losses over the
@@ -56,75 +65,65 @@ def prepared(ds: xr.Dataset) -> xr.Dataset:
 
 def laws(ds: xr.Dataset) -> list[Statement]:
     """(1) and (2) against every cell of large and of small swings."""
-    large, small = ds.where(ds.swing > LARGE), ds.where(ds.swing < SMALL)
-    small = small.where(small.impacts < 0.01)
-    light, heavy = abs(large.sensitivity - large.light), abs(small.sensitivity / small.heavy - 1)
-    mixed = large.where(large[["viscous", "dry", "drag", "impacts"]].to_array().max("variable") < 0.7)
-    between_laws = float(abs(mixed.sensitivity - mixed.light).max())
+    large, small = ds.where(ds.swing > LARGE), ds.where((ds.swing < SMALL) & (ds.impacts < 0.01))
+    light, heavy = large.sensitivity - large.light, small.sensitivity / small.heavy - 1
+    mixed = light.where(large[LOSSES].to_array().max("variable") < 0.7)
     whole = abs(any_swing(ds).law / ds.sensitivity - 1)
-    usual, worst = float(whole.quantile(0.95)), float(whole.max())
-    gap = float(ds.deficit.where(ds.swing > 2).max())
+    usual = whole.quantile(0.95)
     return [
-        Statement("the shares are the work, swings over 2 phi0", "1", "largest deviation", gap, gap < 1e-6),
-        Statement(f"(1), swings over {LARGE:g} phi0", "s", f"{int(light.notnull().sum())} cells", float(light.max()),
-                  bool(light.max() < 1e-3)),
-        Statement("  of these no loss takes over 70 %", "s", f"{int(mixed.sensitivity.notnull().sum())} cells",
-                  between_laws, between_laws < 1e-3),
-        Statement(f"(2), swings under {SMALL:g} phi0", "s", f"{int(heavy.notnull().sum())} cells", float(heavy.max()),
-                  bool(heavy.max() < 0.05)),
-        Statement("any swing, (1) of law_any_swing.py: 95 % of all cells", "s to 5 %", f"within {usual:.2%}", usual,
-                  usual < 0.05),
-        Statement(f"  all {int(whole.notnull().sum())} cells that cycle", "s to 25 %", f"within {worst:.1%}", worst,
-                  worst < 0.25),
-    ]  # fmt: skip
+        most("the shares are the work, swings over 2 phi0", "1", ds.deficit.where(ds.swing > 2), 1e-6),
+        most(f"(1), swings over {LARGE:g} phi0", "s", light, 1e-3, count(light)),
+        most("  of these no loss takes over 70 %", "s", mixed, 1e-3, count(mixed)),
+        most(f"(2), swings under {SMALL:g} phi0", "s", heavy, 0.05, count(heavy)),
+        most("any swing, (1) of law_any_swing.py: 95 % of all cells", "s to 5 %", usual, 0.05, f"within {usual:.2%}"),
+        most(f"  all {count(whole)} that cycle", "s to 25 %", whole, 0.25, f"within {whole.max():.1%}"),
+    ]
 
 
-def pure_laws() -> list[Statement]:
-    """n/(n + 2) and 1/n of one friction alone, once more at degrees that are not on the grid."""
+def pure_laws(pure: xr.DataArray) -> list[Statement]:
+    """n/(n + 2) and 1/n of one friction alone."""
     lines = []
     for n in (0.25, 1.5, 2.0, 4.0):
-        axes = {"mu": np.geomspace(1e-30, 1e30, 3)}
-        study = sweep.study(kernel="foliot", axes=axes, fixed={"n": n, "c": 1.0, "phi0": 1.0}, outputs=["sensitivity"])
-        s = sweep.run(study).sensitivity.values
-        weak, strong = (s[0], s[-1]) if n < 2 else (s[-1], s[0])
-        off = max(abs(weak - 1 / n), abs(strong - n / (n + 2)))
-        lines.append(Statement(f"drag of degree {n:g} alone: 1/n, n/(n + 2)", f"{1 / n:.4f}, {n / (n + 2):.4f}",
-                               f"{weak:.4f}, {strong:.4f}", off, bool(off < 1e-6)))  # fmt: skip
+        weak, strong = pure.sel(n=n).values[:: 1 if n < 2 else -1]
+        off, theory = max(abs(weak - 1 / n), abs(strong - n / (n + 2))), f"{1 / n:.4f}, {n / (n + 2):.4f}"
+        here = f"{weak:.4f}, {strong:.4f}"
+        lines.append(most(f"drag of degree {n:g} alone: 1/n, n/(n + 2)", theory, off, 1e-6, here))
     return lines
 
 
 def best_torques() -> list[Statement]:
-    """The torque of least s where viscous and dry friction act: known to 50 digits for two."""
+    """The torque of least s where viscous and dry friction act."""
     lines = []
-    for R, least, place in ((10.0, 0.27318, 8.719), (100.0, 0.17768, 6.098)):
-        mu = R * np.geomspace(1.5, 60, 400)
-        study = sweep.study(kernel="foliot", axes={"mu": mu}, fixed={"a": 1.0, "R": R, "phi0": 1.0}, rtol=1e-12)
-        s = sweep.run(study).sensitivity.values
-        k = int(s.argmin())
-        fit = np.polyfit(np.log(mu[k - 2 : k + 3]), s[k - 2 : k + 3], 2)
-        top = math.exp(-fit[1] / (2 * fit[0])) / R
-        lines.append(differing(f"R = {R:g} a^2 phi0: least s", f"{least}", float(s.min()), least, 1e-4, 5))
+    for R, (least, place) in BEST.items():
+        s = solved("foliot", mu=R * np.geomspace(1.5, 60, 400), a=1, R=R, phi0=1, rtol=1e-12).sensitivity
+        top = sweep.where_exponent(s, "mu", 0.0).abscissa / R
+        lines.append(differing(f"R = {R:g} a^2 phi0: least s", f"{least}", s.min(), least, 1e-4, 5))
         lines.append(compared("  at mu/R", f"{place}", top, place, 1e-3, 4))
     return lines
 
 
 def widths(ds: xr.Dataset) -> list[Statement]:
     """How many decades of torque the exponent takes for the middle half of its way from law to law, a = 1/s."""
-    smooth = ds.sel(n=3, a=1, R=0)
+    smooth = ds.sensitivity.sel(n=3, a=1, R=0)
     known = (
-        ("1 to 1/3, viscous, small to large swings", smooth.sel(c=0, e=1), (1.0, 1 / 3), _by_q()),
-        ("1/3 to 1/2, viscous to impacts (e = .99)", smooth.sel(c=0, e=0.99), (1 / 3, 1 / 2), _by_shares(1, None)),
-        ("1/3 to 3/5, viscous to drag of degree 3", smooth.sel(c=1e-6, e=1), (1 / 3, 3 / 5), _by_shares(1, 3)),
+        ("1 to 1/3, viscous, small to large swings", smooth.sel(c=0, e=1), (1.0, 1 / 3), by_q()),
+        ("1/3 to 1/2, viscous to impacts (e = .99)", smooth.sel(c=0, e=0.99), (1 / 3, 1 / 2), by_shares(1, None)),
+        ("1/3 to 3/5, viscous to drag of degree 3", smooth.sel(c=1e-6, e=1), (1 / 3, 3 / 5), by_shares(1, 3)),
     )
-    return [
-        compared(f"{what}: decades", f"{theory:.3f}", width(line, *ends), theory, 0.03, 4)
-        for what, line, ends, theory in known
-    ]
+    lines = []
+    for what, s, (start, end), theory in known:
+        behind = s if end < start else s.where(s.mu > s.mu[int(s.argmin("mu"))])
+        places = [
+            sweep.where_exponent(behind, "mu", start + part * (end - start), values=True).abscissa
+            for part in (0.25, 0.75)
+        ]
+        width = abs(np.log10(places[1] / places[0]))
+        lines.append(compared(f"{what}: decades", f"{theory:.3f}", width, theory, 0.03, 4))
+    return lines
 
 
-def _by_q() -> float:
+def by_q() -> float:
     """Of one viscous loss, from s = 5/6 to 1/2, by s and alpha as functions of q = a P/4."""
-    from scipy.optimize import brentq
 
     def place(s: float) -> float:
         q = brentq(lambda q: (1 - math.tanh(q) / q) / math.tanh(q) ** 2 - s, 0.1, 500.0)
@@ -133,7 +132,7 @@ def _by_q() -> float:
     return abs(place(5 / 6) - place(1 / 2))
 
 
-def _by_shares(n: float, other: float | None) -> float:
+def by_shares(n: float, other: float | None) -> float:
     """(3) from a friction of degree n to one of degree `other`, None: to impacts."""
     r = np.geomspace(1e-6, 1e6, 200001)  # ratio of the shares
     share = r / (1 + r)
@@ -145,34 +144,6 @@ def _by_shares(n: float, other: float | None) -> float:
     return float(np.interp(high, s, log_mu) - np.interp(low, s, log_mu))
 
 
-def width(line: xr.Dataset, start: float, end: float) -> float:
-    """Decades of mu between the last passages of 25 % and 75 % of the way from s = start to end; NaN if not there."""
-    s, x = line.sensitivity.values, np.log10(line.mu.values)
-    places = []
-    for share in (0.25, 0.75):
-        value = start + share * (end - start)
-        way = (s[:-1] - value) * (s[1:] - value) < 0
-        if not way.any():
-            return math.nan
-        i = np.flatnonzero(way)[-1]
-        places.append(x[i] + (value - s[i]) / (s[i + 1] - s[i]) * (x[i + 1] - x[i]))
-    return float(abs(places[1] - places[0]))
-
-
-PLANE = {"a": 1.0, "e": 0.9, "n": 3.0, "c": 4e-6, "phi0": 1.0}
-"""The clock whose exponent is mapped over torque and dry friction."""
-
-
-def plane() -> xr.Dataset:
-    """s over torque and dry friction of a clock with all four losses, with the shares."""
-    axes = {
-        "R": {"spacing": "log", "start": 1e-3, "stop": 1e4, "num": 421},
-        "mu": {"spacing": "log", "start": 1e-3, "stop": 1e8, "num": 661},
-    }
-    outputs = ["amplitude", "crossing_speed", "sensitivity"]
-    return prepared(sweep.run(sweep.study(kernel="foliot", axes=axes, fixed=PLANE, rtol=1e-7, outputs=outputs)))
-
-
 def all_over() -> xr.Dataset:
     """Clocks all over the triangle of viscous, dry and impact losses, at swings of about 200 phi0, with their shares.
 
@@ -182,44 +153,54 @@ def all_over() -> xr.Dataset:
     wanted = [(i / 6, j / 6) for i in range(7) for j in range(7 - i) if (i, j) not in ((0, 0), (6, 0), (0, 6))]
     viscous, struck = np.array(wanted).T
     mu, speed = 1e4, math.sqrt(400e4)
-    axes = {
+    losses = {
         "a": 3.0 * viscous * mu**2 / speed**3,
         "R": np.maximum(1.0 - viscous - struck, 0.0) * 2.0 * mu**2 / speed**2,
         "e": np.sqrt(1.0 - struck * 4.0 * mu / speed**2),
     }
-    outputs = ["amplitude", "crossing_speed", "sensitivity"]
-    fixed = {"mu": mu, "c": 0.0, "n": 3.0, "phi0": 1.0}
-    study = sweep.study(kernel="foliot", design="zip", axes=axes, fixed=fixed, rtol=1e-9, outputs=outputs)
-    return shares(sweep.run(study))
+    return shares(solved("foliot", design="zip", **losses, mu=mu, c=0, n=3, phi0=1, rtol=1e-9, outputs=SPEEDS))
 
 
-def figure(ds: xr.Dataset, whole: xr.Dataset) -> Any:
+def figure(ds: xr.Dataset, pure: xr.DataArray) -> Any:
     """The law over shares, over torque and friction, over the degree, and against every cell; for two columns."""
     with page_of(140.0, 2, 2) as (page, ((triangle, region), (degree, check))):
         draw_triangle(page, triangle)
-        draw_region(page, region, whole)
-        draw_degrees(degree)
-        draw_check(check, ds)
+        draw_region(region)
+        n = np.linspace(0.02, 4, 200)
+        degree.plot(n, n / (n + 2), color=COLOURS[0], label="large swings, $n/(n+2)$")
+        degree.plot(n, 1 / n, color=COLOURS[1], linestyle="--", label="small swings, $1/n$")
+        degree.axhline(0.5, color=COLOURS[2], linewidth=0.8, linestyle=":", label="impacts, 1/2")
+        for k, label in enumerate(("kernel, $\\mu=10^{\\mp30}$", None)):
+            degree.plot(pure.n, pure[:, k], "o", color="black", markerfacecolor="white", markersize=4, label=label)
+        degree.set(xlabel="degree of the friction, $n$ [1]", ylabel="exponent, $s$ [1]", xlim=(0, 4.2), ylim=(0, 2.2))
+        degree.legend(loc="upper right", fontsize=7)
+        bands = ((1.5, 3, "0.8"), (3, 10, COLOURS[5]), (10, 100, COLOURS[1]), (100, math.inf, COLOURS[0]))
+        for low, high, colour in bands:
+            part = ds.where((ds.swing > low) & (ds.swing <= high))
+            look = {"color": colour, "markersize": 1.6, "rasterized": True}
+            look["label"] = f"{low:g} to {high:g}" if math.isfinite(high) else f"over {low:g}"
+            check.plot(part.light.values.ravel(), part.sensitivity.values.ravel(), ".", **look)
+        check.plot([0, 0.6], [0, 0.6], color="black", linewidth=0.8, label="theory (1)")
+        check.set(xlabel=r"$(N+\lambda_e)/(N+2)$ [1]", ylabel="exponent, $s$ [1]", xlim=(0, 0.62), ylim=(0, 1.0))
+        check.legend(title=r"swing, $A/\varphi_0$", loc="upper left", markerscale=5, fontsize=7)
     return page
 
 
 def draw_triangle(page: Any, axes: Any) -> None:
     """(1) over the shares of viscous, dry and impact losses; rings are clocks, filled with their own s."""
-    import matplotlib.tri as tri
-
     steps = 60
     corner = np.array([(i / steps, j / steps) for i in range(steps + 1) for j in range(steps + 1 - i)])
     viscous, struck = corner.T
     s = (viscous + struck) / (viscous + 2)
+    look = {"vmin": 0, "vmax": 1, "cmap": "cividis"}
     x, y = struck + 0.5 * viscous, viscous * math.sqrt(3) / 2
-    mesh = tri.Triangulation(x, y)
-    filled = axes.tripcolor(mesh, s, vmin=0, vmax=1, cmap="cividis", shading="gouraud", rasterized=True)
-    lines = axes.tricontour(mesh, s, levels=[0.1, 0.2, 0.3, 0.4], colors="white", linewidths=0.7)
+    filled = axes.tripcolor(x, y, s, shading="gouraud", rasterized=True, **look)
+    lines = axes.tricontour(x, y, s, levels=[0.1, 0.2, 0.3, 0.4], colors="white", linewidths=0.7)
     axes.clabel(lines, fmt="%.1f", fontsize=7, manual=[(0.17, 0.1), (0.36, 0.1), (0.56, 0.1), (0.76, 0.1)])
     clocks = all_over()
-    look = {"vmin": 0, "vmax": 1, "cmap": "cividis", "edgecolors": "black", "linewidths": 0.5, "s": 12}
     place = clocks.impacts + 0.5 * clocks.viscous, clocks.viscous * math.sqrt(3) / 2
-    axes.scatter(*place, c=clocks.sensitivity, label="clocks of the kernel", **look)
+    ring = {"edgecolors": "black", "linewidths": 0.5, "s": 12, "label": "clocks of the kernel"}
+    axes.scatter(*place, c=clocks.sensitivity, **look, **ring)
     page.colorbar(filled, ax=axes, label="exponent, $s$ [1]", pad=0.02, shrink=0.85, extend="max")
     for where, text in (((0, -0.02), "dry, 0"), ((1, -0.02), "impacts, 1/2"), ((0.5, 0.89), "viscous, 1/3")):
         axes.text(*where, text, ha="center", va="bottom" if where[1] > 0 else "top", fontsize=8)
@@ -228,73 +209,41 @@ def draw_triangle(page: Any, axes: Any) -> None:
     axes.legend(loc="lower center", fontsize=7, borderaxespad=0)
 
 
-def draw_region(page: Any, axes: Any, whole: xr.Dataset) -> None:
+def draw_region(axes: Any) -> None:
     """s over torque and dry friction; lines where another loss comes to be the largest, dots where s is least."""
-    mu, R, s = whole.mu.values, whole.R.values, whole.sensitivity.transpose("R", "mu").values
-    mesh = axes.pcolormesh(mu, R, s, vmin=0, vmax=1, cmap="cividis", shading="nearest", rasterized=True)
-    page.colorbar(mesh, ax=axes, label="exponent, $s$ [1]", pad=0.02, extend="max")
-    names = ("viscous", "dry", "drag", "impacts")
-    parts = np.stack([whole[name].transpose("R", "mu").values for name in names])
-    largest = np.where(np.isfinite(s), np.argmax(np.nan_to_num(parts), axis=0), np.nan)
-    for k in range(len(names)):
+    R, mu = np.geomspace(1e-3, 1e4, 421), np.geomspace(1e-3, 1e8, 661)
+    whole = prepared(solved("foliot", R=R, mu=mu, **PLANE, rtol=1e-7, outputs=SPEEDS)).transpose("R", "mu")
+    s = whole.sensitivity.values
+    colour_map(axes, mu, R, s, "exponent, $s$ [1]", {"extend": "max"}, vmin=0, vmax=1)
+    parts = np.nan_to_num([whole[name].values for name in LOSSES])
+    largest = np.where(np.isfinite(s), np.argmax(parts, axis=0), np.nan)
+    for k in range(len(LOSSES)):
         axes.contour(mu, R, np.where(largest == k, 1.0, 0.0), levels=[0.5], colors="white", linewidths=0.7)
     hatch(axes, mu, R, np.isnan(s), "////")
-    least = [int(np.nanargmin(row)) for row in s]
-    axes.plot(mu[least], R, color="#D55E00", label="least $s$")
+    axes.plot(mu[np.nanargmin(s, axis=1)], R, color="#D55E00", label="least $s$")
     axes.plot([], [], color="0.6", linewidth=0.7, label="largest loss (white)")
-    direct_label(axes, 3e-2, 2e-3, "viscous, 1", fontsize=7)
-    direct_label(axes, 6e1, 8e-2, "viscous, 1/3", fontsize=7)
-    direct_label(axes, 1e5, 8e-2, "impacts, 1/2", fontsize=7)
-    direct_label(axes, 2e7, 8e-2, "drag, 3/5", fontsize=7)
-    direct_label(axes, 1.3e4, 1.5e3, "dry, 0", fontsize=7)
-    direct_label(axes, 3e-2, 1e2, "never starts", fontsize=7)
+    for x, y, text in (
+        (3e-2, 2e-3, "viscous, 1"), (6e1, 8e-2, "viscous, 1/3"), (1e5, 8e-2, "impacts, 1/2"),
+        (2e7, 8e-2, "drag, 3/5"), (1.3e4, 1.5e3, "dry, 0"), (3e-2, 1e2, "never starts"),
+    ):  # fmt: skip
+        direct_label(axes, x, y, text, fontsize=7)
     axes.set(xscale="log", yscale="log", xlabel=r"torque, $\mu/(a^2\varphi_0)$ [1]")
-    axes.set(ylabel=r"dry friction, $R/(a^2\varphi_0)$ [1]", xlim=(mu[0], mu[-1]), ylim=(R[0], R[-1]))
+    axes.set(ylabel=r"dry friction, $R/(a^2\varphi_0)$ [1]")
     axes.legend(loc="lower right", fontsize=6.5, frameon=True, framealpha=0.85)
 
 
-def draw_degrees(axes: Any) -> None:
-    """The two exponents of one friction over its degree."""
-    n = np.linspace(0.02, 4, 200)
-    axes.plot(n, n / (n + 2), color=COLOURS[0], label="large swings, $n/(n+2)$")
-    axes.plot(n, 1 / n, color=COLOURS[1], linestyle="--", label="small swings, $1/n$")
-    axes.axhline(0.5, color=COLOURS[2], linewidth=0.8, linestyle=":", label="impacts, 1/2")
-    for degree in (0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0):
-        axes_mu = {"mu": np.geomspace(1e-30, 1e30, 3)}
-        study = sweep.study(
-            kernel="foliot", axes=axes_mu, fixed={"n": degree, "c": 1.0, "phi0": 1.0}, outputs=["sensitivity"]
-        )
-        ends = sweep.run(study).sensitivity.values[[0, -1]]
-        axes.plot([degree] * 2, ends, "o", color="black", markerfacecolor="white", markersize=4)
-    axes.plot([], [], "o", color="black", markerfacecolor="white", markersize=4, label="kernel, $\\mu=10^{\\mp30}$")
-    axes.set(xlabel="degree of the friction, $n$ [1]", ylabel="exponent, $s$ [1]", xlim=(0, 4.2), ylim=(0, 2.2))
-    axes.legend(loc="upper right", fontsize=7)
-
-
-def draw_check(axes: Any, ds: xr.Dataset) -> None:
-    """The exponent of every cell against (1), by the swing."""
-    bands = ((1.5, 3, "0.8"), (3, 10, COLOURS[5]), (10, 100, COLOURS[1]), (100, math.inf, COLOURS[0]))
-    for low, high, colour in bands:
-        part = ds.where((ds.swing > low) & (ds.swing <= high))
-        name = f"{low:g} to {high:g}" if math.isfinite(high) else f"over {low:g}"
-        axes.plot(part.light.values.ravel(), part.sensitivity.values.ravel(), ".", color=colour, markersize=1.6,
-                  label=name, rasterized=True)  # fmt: skip
-    axes.plot([0, 0.6], [0, 0.6], color="black", linewidth=0.8, label="theory (1)")
-    axes.set(xlabel=r"$(N+\lambda_e)/(N+2)$ [1]", ylabel="exponent, $s$ [1]", xlim=(0, 0.62), ylim=(0, 1.0))
-    axes.legend(title=r"swing, $A/\varphi_0$", loc="upper left", markerscale=5, fontsize=7)
-
-
-def conclude(path: str) -> tuple[Groups, list[str], Any]:
+def conclude(path: str) -> Conclusion:
     """Statements and the figure."""
     ds = prepared(read_result(path, "foliot", ["n", "e", "a", "R", "c", "mu"], "law_map.toml"))
+    pure = solved("foliot", n=DEGREES, mu=[1e-30, 1e30], c=1, phi0=1, outputs=["sensitivity"]).sensitivity
     law = "the law: s = (N + lambda_e)/(N + 2) at large swings, 1/N at small, N = sum of n lambda_n over the frictions"
     groups = {
         "The general law": laws(ds),
-        "One loss alone": pure_laws(),
+        "One loss alone": pure_laws(pure),
         "Best torque, viscous and dry": best_torques(),
         "Width of the crossovers (25 to 75 %)": widths(ds),
     }
-    return groups, [law, "", NOTES], lambda: figure(ds, plane())
+    return groups, [law, "", NOTES], lambda: figure(ds, pure)
 
 
 main = partial(report, __file__, ["law_map.h5"], conclude=conclude)

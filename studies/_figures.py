@@ -1,0 +1,81 @@
+"""What the figures of the studies share: the page, maps and their bars, labels, ticks."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+import sweep
+
+try:
+    from sweep.show import charts
+except sweep.SweepError as error:  # no matplotlib
+    sys.exit(str(error))
+
+
+@contextmanager
+def page_of(height: float, *shape: int, width: float = charts.PAGE, **how: Any) -> Iterator[tuple[Any, Any]]:
+    """A figure for print of so many mm, and its panels as `subplots` gives them, lettered in the end if several."""
+    with charts.style():
+        page = charts.new_figure(width, height)
+        panels = page.subplots(*shape, **how)
+        yield page, panels
+        for axes, text in zip(np.ravel(panels), "abcdefghi", strict=False) if np.size(panels) > 1 else ():
+            charts.letter(axes, text)
+
+
+def colour_map(axes: Any, x: Any, y: Any, values: Any, label: str, bar: Any = None, **how: Any) -> Any:
+    """A map of values, of shape (y, x), to the edges of its grid; gives its bar, whose options are `bar`."""
+    how = {"cmap": "cividis", "shading": "nearest", "rasterized": True, **how}
+    mesh = axes.pcolormesh(x, y, values, **how)
+    axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
+    return axes.figure.colorbar(mesh, ax=axes, label=label, pad=0.02, **(bar or {}))
+
+
+def hatch(axes: Any, x: Any, y: Any, where: Any, pattern: str, colour: str = "0.45") -> None:
+    """Hatches the cells of a map for which `where`, of shape (y, x), is true, and draws their edge."""
+    shown = where.astype(float)
+    with charts.matplotlib.rc_context({"hatch.color": colour, "hatch.linewidth": 0.4}):
+        axes.contourf(x, y, shown, levels=[0.5, 1.5], colors="none", hatches=[pattern])
+    axes.contour(x, y, shown, levels=[0.5], colors=[colour], linewidths=0.8)
+
+
+def direct_label(axes: Any, x: float, y: float, text: str, colour: str = "black", **how: Any) -> None:
+    """Text in the colour of the line it names, readable where it crosses others."""
+    box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.8}
+    axes.text(x, y, text, color=colour, bbox=box, **{"fontsize": 8, "ha": "center", "va": "center", **how})
+
+
+def draw_costs(axes: Any, found: dict[str, xr.Dataset], places: dict[str, tuple[float, float]]) -> None:
+    """`worst` error over `seconds` a cell of each method, in its colour, with its name beside it.
+
+    Parameters
+    ----------
+    places : by name, factors from the line's first point to where the name stands; those without are not drawn.
+    """
+    for name, row in found.items():
+        look, drawn = charts.method_look(name), row.worst.where(row.worst < 1.0).dropna("rtol")
+        if name in places and drawn.size:
+            axes.plot(row.seconds.sel(rtol=drawn.rtol), drawn.clip(1e-16), markersize=4, linewidth=0.9, **look)
+            right, up = places[name]
+            x, y = float(row.seconds.sel(rtol=drawn.rtol[0])), float(drawn[0])
+            direct_label(axes, right * x, up * y, name, look["color"], fontsize=7)
+    axes.set(xscale="log", yscale="log", xlabel="CPU time per cell [s]", ylabel="relative error, worst cell [1]")
+
+
+def quality_bar(page: Any, mesh: Any, axes: Any, label: str, **how: Any) -> Any:
+    """The bar of a map in "cividis_r" of what is better the less it is: the good end is bright, and on top."""
+    bar = page.colorbar(mesh, ax=axes, label=label, **how)
+    bar.ax.invert_yaxis()
+    return bar
+
+
+def plain_ticks(axis: Any, values: Sequence[float]) -> None:
+    """Ticks of a logarithmic axis at these values, written out, and no others."""
+    axis.set_ticks(list(values), labels=[f"{x:g}" for x in values])
+    axis.set_ticks([], minor=True)
