@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.optimize import brentq, least_squares
 
 import sweep
 
@@ -87,11 +88,8 @@ class Measured:
 
     def fit(self, tied: int | None = None, at: float = 0.0, start: Any = (0.25, 0.25, 0.25, 0.25)) -> tuple[Any, float]:
         """The best losses and their sum of squares; with the share (of `SHARES`) numbered `tied` at a value."""
-        from scipy.optimize import least_squares
-
         exact = {"ftol": 1e-7, "xtol": 1e-7, "gtol": 1e-7, "max_nfev": 60}
-        seen = [self.period] if self.amplitude is None else [self.period, self.amplitude]
-        seen = np.log(np.concatenate(seen))
+        seen = np.log(np.concatenate([x for x in (self.period, self.amplitude) if x is not None]))
 
         def off(u: Any) -> Any:
             shown, share = self.predicted(u[None])
@@ -108,8 +106,6 @@ class Measured:
 
     def interval(self, share: int, best: tuple[Any, float] | None = None) -> tuple[float, float, float]:
         """The least, best and largest value of a share (of `SHARES`); `best`: what `fit` gave, if it is at hand."""
-        from scipy.optimize import brentq
-
         u, least = self.fit() if best is None else best
         place = float(SUM[share] @ self.predicted(u[None])[1][0])
 

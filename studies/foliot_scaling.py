@@ -11,13 +11,12 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Iterable, Sequence
 from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, compared, read_result, report
+from _common import Conclusion, Statement, compared, most, read_result, report, said, solved
 
 import sweep
 from sweep.show import charts
@@ -56,16 +55,10 @@ def scaled(ds: xr.Dataset) -> xr.Dataset:
     return ds.assign(aP=ds.a * ds.period, A=ds.amplitude / ds.phi0, s=ds.sensitivity)
 
 
-def sweep_of_alpha(ds: xr.Dataset, alpha: Iterable[float], method: str = "closed") -> xr.Dataset:
+def sweep_of_alpha(ds: xr.Dataset, alpha: Any, method: str = "closed") -> xr.Dataset:
     """`foliot` at other alpha, with the friction and the switching angle of `ds`."""
-    unit = float(ds.a**2 * ds.phi0)
-    study = sweep.study(
-        kernel="foliot",
-        method=method,
-        axes={"mu": unit * np.asarray(list(alpha))},
-        fixed={"a": float(ds.a), "phi0": float(ds.phi0)},
-    )
-    return scaled(sweep.run(study))
+    mu = float(ds.a**2 * ds.phi0) * np.array([*alpha], float)
+    return scaled(solved("foliot", method=method, mu=mu, a=ds.a, phi0=ds.phi0))
 
 
 def half_point(ds: xr.Dataset) -> xr.Dataset:
@@ -84,95 +77,80 @@ def limits(ds: xr.Dataset) -> list[Statement]:
     at_weak, at_strong = f"alpha = {weak:.2g}", f"alpha = {strong:.2g}"
     third, period, swing = strong ** (1 / 3), f"4 3^(1/3) = {STRONG_P:.5f} *", f"3^(2/3)/2 = {STRONG_A:.5f} *"
     return [
-        compared(f"weak drive: a P alpha at {at_weak}", "4 *", float(first.aP) * weak, 4.0, 1.01 * weak),
-        compared(f"weak drive: A at {at_weak}", "1 *", float(first.A), 1.0, 0.31 * weak),
-        compared(f"strong drive: a P alpha^(1/3) at {at_strong}", period, float(last.aP) * third, STRONG_P, 0.14 * b2),
-        compared(f"strong drive: A alpha^(-1/3) at {at_strong}", swing, float(last.A) / third, STRONG_A, 0.11 * b2),
+        compared(f"weak drive: a P alpha at {at_weak}", "4 *", first.aP * weak, 4.0, 1.01 * weak),
+        compared(f"weak drive: A at {at_weak}", "1 *", first.A, 1.0, 0.31 * weak),
+        compared(f"strong drive: a P alpha^(1/3) at {at_strong}", period, last.aP * third, STRONG_P, 0.14 * b2),
+        compared(f"strong drive: A alpha^(-1/3) at {at_strong}", swing, last.A / third, STRONG_A, 0.11 * b2),
     ]
 
 
 def straight_lines(ds: xr.Dataset) -> list[Statement]:
-    """Exponents over the two windows, and where the two laws of the period meet."""
-    laws = [("a P", ds.aP, WEAK, "-1 *", -1.0), ("a P", ds.aP, STRONG, "-1/3 *", -1 / 3)]
-    laws += [("A", ds.A, WEAK, "0 *", 0.0), ("A", ds.A, STRONG, "1/3 *", 1 / 3)]
+    """Exponents over the two windows, and where the two laws of the period meet.
+
+    A limit is allowed the distance of the local exponent at the inner end of its window, by the series' next term.
+    """
     lines = []
-    for name, y, window, paper, limit in laws:
+    for name, y, window, paper, limit in (
+        ("a P", ds.aP, WEAK, "-1 *", -1.0),
+        ("a P", ds.aP, STRONG, "-1/3 *", -1 / 3),
+        ("A", ds.A, WEAK, "0 *", 0.0),
+        ("A", ds.A, STRONG, "1/3 *", 1 / 3),
+    ):
         fit = sweep.fit_exponent(y, "alpha", window)
-        off = float(fit.exponent) - limit
-        span = f"{float(fit.low):.1e} to {float(fit.high):.1e}"
-        here = f"{float(fit.exponent):.7f} ± {float(fit.exponent_error):.1g}, prefactor {float(fit.prefactor):.5f}"
-        what = f"exponent of {name}, alpha = {span} ({int(fit.points)} points)"
-        lines.append(Statement(what, paper, here, off, abs(off) <= _curvature(fit, limit)))
+        off, next_term = fit.exponent - limit, fit.high if window == WEAK else 4 / 45 * (3 / fit.low) ** (2 / 3)
+        here = f"{fit.exponent:.7f} ± {fit.exponent_error:.1g}, prefactor {fit.prefactor:.5f}"
+        what = f"exponent of {name}, alpha = {fit.low:.1e} to {fit.high:.1e} ({fit.points:d} points)"
+        lines.append(most(what, paper, off, next_term, here))
     meet = sweep.fit_two_laws(ds.aP, "alpha", windows=(WEAK, STRONG))
-    here = f"alpha = {float(meet.crossover):.5f} ± {float(meet.crossover_error):.1g}, a P = {float(meet.level):.4f}"
-    exact, off = "(3^(-1/2) = 0.57735, 6.9282)", float(meet.crossover) * math.sqrt(3) - 1
-    lines.append(Statement("the two laws of a P meet at", exact, here, off, abs(off) < 0.01))
-    return lines
-
-
-def _curvature(fit: xr.Dataset, limit: float) -> float:
-    """Distance of the local exponent from its limit at the inner end of a window, by the next term of the series."""
-    return float(fit.high) if limit in (-1.0, 0.0) else 4 / 45 * (3 / float(fit.low)) ** (2 / 3)
+    here = f"alpha = {meet.crossover:.5f} ± {meet.crossover_error:.1g}, a P = {meet.level:.4f}"
+    off, exact = meet.crossover * math.sqrt(3) - 1, "(3^(-1/2) = 0.57735, 6.9282)"
+    return [*lines, most("the two laws of a P meet at", exact, off, 0.01, here)]
 
 
 def sliding(ds: xr.Dataset, half: xr.Dataset) -> list[Statement]:
     """What becomes of the exponent in between."""
     slope = sweep.local_exponent(ds.aP, "alpha")
     rough = float(np.diff(np.log(ds.alpha)).max() ** 4)  # differences are of fourth order
-    ends = float(slope.min()), float(slope.max())
-    slides = bool((slope.diff("mu") > -rough).all()) and abs(ends[0] + 1) < 0.01 and abs(ends[1] + 1 / 3) < 0.01
+    low, high = float(slope.min()), float(slope.max())
+    slides = (slope.diff("mu") > -rough).all() and abs(low + 1) < 0.01 and abs(high + 1 / 3) < 0.01
+    near = (abs(slope + 0.5) < 0.01).mean()
     by_period = sweep.where_exponent(ds.aP, "alpha", -0.5)
     place, error = float(by_period.abscissa), float(by_period.abscissa_error)
-    apart, near = float(abs(slope + ds.s).max()), float((abs(slope + 0.5) < 0.01).mean())
-    off, found = place / HALF[0] - 1, (float(half.alpha), float(half.aP), float(half.A))
-    names = "at alpha, from the exact s", "a P there", "A there"
     read, roup = "read off a figure", "exponent -1/2 (Roup et al. and Denny: at all torques)"
-    return [
-        Statement("exponent of P changes gradually", "-1 to -1/3 *", f"{ends[0]:.7f} to {ends[1]:.7f}", None, slides),
-        Statement("  differences of ln P against the exact -s", "(0)", "largest distance", apart, apart < rough),
-        Statement(roup, "at one alpha", f"{near:.1%} of alpha within 0.01", None, near < 0.02),
-        Statement("  at alpha, from differences of ln P", read, f"{place:.10f} ± {error:.0e}", off,
-                  abs(off) * HALF[0] <= error),
-        *[
-            Statement(f"  {name}", read, f"{here:.13f}", here / true - 1, abs(here / true - 1) < 1e-12)
-            for name, here, true in zip(names, found, HALF, strict=True)
-        ],
-    ]  # fmt: skip
+    far, differences = "largest distance", "  at alpha, from differences of ln P"
+    lines = [
+        said("exponent of P changes gradually", slides, f"{low:.7f} to {high:.7f}", "-1 to -1/3 *"),
+        most("  differences of ln P against the exact -s", "(0)", slope + ds.s, rough, far),
+        said(roup, near < 0.02, f"{near:.1%} of alpha within 0.01", "at one alpha"),
+        most(differences, read, place / HALF[0] - 1, error / HALF[0], f"{place:.10f} ± {error:.0e}"),
+    ]
+    names = ("at alpha, from the exact s", "a P there", "A there")
+    for name, here, true in zip(names, (half.alpha, half.aP, half.A), HALF, strict=True):
+        lines.append(compared(f"  {name}", read, here, true, 1e-12, 14))
+    return lines
 
 
 def general(ds: xr.Dataset, half: xr.Dataset) -> list[Statement]:
-    """Statements about all drives."""
+    """Statements about all drives: a weak one is followed from rest in SI units, swing by swing.
+
+    Weaker ones take steps in proportion to 1/alpha.
+    """
+    weak = ds.isel(mu=int(np.argmin(abs(np.log(ds.alpha.values / 1e-3)))))
+    rest = solved("foliot_scene:KERNEL", mu=[float(weak.mu)], a=ds.a, phi0=ds.phi0, flips=4, rtol=1e-10)
     from_rest, cycle = (sweep_of_alpha(ds, SHOWN.values(), method) for method in ("map", "closed"))
-    reached = float(abs(from_rest.aP / cycle.aP - 1).max())
     other = sweep_of_alpha(ds.assign_coords(a=3 * ds.a, phi0=ds.phi0 / 7), ds.alpha.values)
     apart = max(float(abs(other[y].values / ds[y].values - 1).max()) for y in ("aP", "A"))
-    least = float(ds.A.min() - 1)
-    near = sweep.run(
-        kernel="foliot", method="closed", outputs=["period"],
-        axes={"a": float(ds.a) * np.exp(np.linspace(-0.02, 0.02, 9))},
-        fixed={"mu": float(half.alpha * ds.a**2 * ds.phi0), "phi0": float(ds.phi0)},
-    )  # fmt: skip
-    blind = float(sweep.local_exponent(near.period, "a")[4])
+    friction, mu = float(ds.a) * np.exp(np.linspace(-0.02, 0.02, 9)), half.alpha * ds.a**2 * ds.phi0
+    near = solved("foliot", method="closed", outputs=["period"], a=friction, mu=mu, phi0=ds.phi0)
+    blind, least = sweep.local_exponent(near.period, "a")[4], ds.A.min() - 1
+    followed = f"from rest to 4 switches at alpha = {weak.alpha:.1e}: P"
     return [
-        weakest(ds),
-        Statement("self-starting", "yes", "from rest to the cycle", reached, reached < 1e-8),
-        Statement("A is always larger than 1", "yes", f"smallest A - 1 = {least:.2g}", None, least > 0),
-        Statement("a P and A depend on alpha alone", "yes *", "same with other a, phi0", apart, apart < 1e-12),
-        Statement("at exponent -1/2 friction does not count", "yes *", "dlnP/dlna = 0", blind, abs(blind) < 1e-8),
+        most("no least torque", "yes", 2 * rest.interval[0] / weak.period - 1, 1e-8, followed),
+        most("self-starting", "yes", from_rest.aP / cycle.aP - 1, 1e-8, "from rest to the cycle"),
+        said("A is always larger than 1", least > 0, f"smallest A - 1 = {least:.2g}", "yes"),
+        most("a P and A depend on alpha alone", "yes *", apart, 1e-12, "same with other a, phi0"),
+        most("at exponent -1/2 friction does not count", "yes *", blind, 1e-8, "dlnP/dlna = 0"),
     ]
-
-
-def weakest(ds: xr.Dataset) -> Statement:
-    """A weak drive followed from rest in SI units, swing by swing; weaker ones take steps in proportion to 1/alpha."""
-    weak = ds.isel(mu=int(np.argmin(abs(np.log(ds.alpha.values / 1e-3)))))
-    mu, a, phi0 = float(weak.mu), float(ds.a), float(ds.phi0)
-    study = sweep.study(
-        kernel="foliot_scene:KERNEL", axes={"mu": [mu]}, fixed={"a": a, "phi0": phi0, "flips": 4}, rtol=1e-10,
-        allow_import=True,
-    )  # fmt: skip
-    off = float(2 * sweep.run(study).interval[0] / weak.period) - 1
-    what = f"from rest to 4 switches at alpha = {float(weak.alpha):.1e}: P"
-    return Statement("no least torque", "yes", what, off, abs(off) < 1e-8)
 
 
 def torque(ds: xr.Dataset) -> list[Statement]:
@@ -182,8 +160,8 @@ def torque(ds: xr.Dataset) -> list[Statement]:
     factor, allowed = 10 ** (1 / 3), 0.14 * (30 / last) ** (2 / 3)
     cube, strong = f"10^(1/3) = {factor:.5f} *", "tenfold torque at strong drive:"
     rows = [
-        compared(f"{strong} P falls by", cube, float(once.period / tenfold.period), factor, allowed),
-        compared(f"{strong} phi_max grows by", cube, float(tenfold.amplitude / once.amplitude), factor, allowed),
+        compared(f"{strong} P falls by", cube, once.period / tenfold.period, factor, allowed),
+        compared(f"{strong} phi_max grows by", cube, tenfold.amplitude / once.amplitude, factor, allowed),
     ]
     for drive, alpha, percent in (("weak", float(ds.alpha[0]), 1), ("strong", last, 3)):
         part = 15 / DAY / float(sweep_of_alpha(ds, [alpha]).s[0])
@@ -206,29 +184,33 @@ def shape(motion: xr.Dataset) -> list[Statement]:
         out.append(phase[top])
         back.append(float(np.interp(-1.0, -angle[falling], phase[falling])) - phase[top])
     strong = abs(motion.turned.isel(mu=-1))
-    high = float((strong > 0.5 * strong.max()).mean())
-    drives = ", ".join(SHOWN)
+    high = (strong > 0.5 * strong.max()).mean()
+    times = ", ".join(f"{x:.4f}" for x in faster) + " times"
     sooner = ", ".join(f"{x:.3f} and {y:.3f} P" for x, y in zip(out, back, strict=True))
+    rounder = "strong drive: rounder than a sine, time over A/2"
     return [
-        Statement(f"faster at A than at C, {drives}", "yes", ", ".join(f"{x:.4f}" for x in faster) + " times", None,
-                  min(faster) > 1),
-        Statement("time from the switch to the peak, shorter than back", "yes", sooner, None,
-                  bool(np.all(np.less(out, back)))),
-        Statement("strong drive: rounder than a sine, time over A/2", "yes", f"{high:.3f} P, sine 0.667", None,
-                  high > 2 / 3 + 0.01),
-    ]  # fmt: skip
+        said(f"faster at A than at C, {', '.join(SHOWN)}", min(faster) > 1, times, "yes"),
+        said("time from the switch to the peak, shorter than back", np.all(np.less(out, back)), sooner, "yes"),
+        said(rounder, high > 2 / 3 + 0.01, f"{high:.3f} P, sine 0.667", "yes"),
+    ]
 
 
 def energy(ds: xr.Dataset, motion: xr.Dataset) -> list[Statement]:
-    """The drive's work 2 mu phi0 a half swing is what friction takes, a integral v^2 dt; and what moved weights do."""
+    """The drive's work 2 mu phi0 a half swing is what friction takes, a integral v^2 dt; why -1 and why -1/3.
+
+    The speed at the switch is the final one at weak drive, and follows from the work and the loss at strong.
+    """
     squares = (motion.speed**2).integrate("phase") * motion.period
-    off = float(abs(ds.a * squares / (4 * motion.mu * ds.phi0) - 1).max())
-    kept = float(motion.multiplier[0])
+    kept, weak, strong = motion.multiplier[0], ds.isel(mu=0), ds.isel(mu=-1)
+    cube = strong.crossing_speed**3 * strong.a / (strong.mu**2 * strong.phi0)
+    b2, final = (3 / float(strong.alpha)) ** (2 / 3), weak.crossing_speed * weak.a / weak.mu
+    taken = ds.a * squares / (4 * motion.mu * ds.phi0) - 1
     return [
-        Statement("friction takes 2 mu phi0 in half a period", "yes *", "largest deviation", off, off < 1e-5),
-        Statement("a swing forgets the one before it at weak drive", "", f"kept: {kept:.0e}", None, kept < 1e-8),
+        most("friction takes 2 mu phi0 in half a period", "yes *", taken, 1e-5),
+        said("a swing forgets the one before it at weak drive", kept < 1e-8, f"kept: {kept:.0e}"),
         taken_out(ds, motion),
-        *estimates(ds),
+        compared("why -1: v a/mu, v at the switch, weak drive", "1 *", final, 1.0, 1e-6),
+        compared("why -1/3: v^3 a/(mu^2 phi0), strong drive", "(3) order 1", cube, 3.0, b2),
         moved_weights(ds, motion),
         wanted(),
     ]
@@ -246,7 +228,7 @@ def taken_out(ds: xr.Dataset, motion: xr.Dataset) -> Statement:
         shares.append(f"{drive:.1%}")
         off = max(off, abs(drive + friction - 1))
     text = f"the drive takes {', '.join(shares)}, friction the rest"
-    return Statement("all energy is taken out and fed anew", "yes", text, off, off < 0.01)
+    return most("all energy is taken out and fed anew", "yes", off, 0.01, text)
 
 
 def moved_weights(ds: xr.Dataset, motion: xr.Dataset) -> Statement:
@@ -254,47 +236,28 @@ def moved_weights(ds: xr.Dataset, motion: xr.Dataset) -> Statement:
     inertia = np.exp([-0.01, 0.01])
     mu, a = motion.mu.values[:, None] / inertia, float(ds.a) / inertia
     axes = {"mu": mu.ravel(), "a": np.tile(a, len(mu))}
-    study = sweep.study(
-        kernel="foliot", design="zip", axes=axes, fixed={"phi0": float(ds.phi0)}, outputs=["period"]
-    )  # fmt: skip
-    rise = np.diff(np.log(sweep.run(study).period.values.reshape(mu.shape)))[:, 0] / 0.02
-    off, text = float(abs(rise - (1 - motion.s.values)).max()), ", ".join(f"{x:.5f}" for x in rise)
-    return Statement("weights moved out: dlnP/dlnI", "(1 - s)", text, off, off < 1e-4)
+    period = solved("foliot", design="zip", **axes, phi0=ds.phi0, outputs=["period"]).period.values
+    rise = np.diff(np.log(period.reshape(mu.shape)))[:, 0] / 0.02
+    text = ", ".join(f"{x:.5f}" for x in rise)
+    return most("weights moved out: dlnP/dlnI", "(1 - s)", rise - (1 - motion.s.values), 1e-4, text)
 
 
 def wanted() -> Statement:
     """Friction and torque that give a wanted clock, and the period and amplitude which they do give."""
     clocks = {"period": [2.0, 4.0, 4.0], "amplitude": np.radians([32.0, 45.0, 100.0])}
-    phi0 = {"phi0": math.radians(30.0)}
-    found = sweep.run(sweep.study(kernel="foliot_design", design="zip", axes=clocks, fixed=phi0, rtol=1e-13))
-    axes = {name: found[name].values for name in ("mu", "a")}
-    back = sweep.run(sweep.study(kernel="foliot", method="closed", design="zip", axes=axes, fixed=phi0))
+    phi0 = math.radians(30.0)
+    found = solved("foliot_design", design="zip", **clocks, phi0=phi0, rtol=1e-13)
+    back = solved("foliot", method="closed", design="zip", mu=found.mu, a=found.a, phi0=phi0)
     off = max(float(abs(back[name] / clocks[name] - 1).max()) for name in clocks)
-    return Statement(
-        "clocks designed for a period and an amplitude have them", "", "largest deviation", off, off < 1e-12
-    )
-
-
-def estimates(ds: xr.Dataset) -> list[Statement]:
-    """Why -1 and why -1/3: the speed at the switch is the final one, or follows from the work and the loss."""
-    weak, strong = ds.isel(mu=0), ds.isel(mu=-1)
-    final = float(weak.crossing_speed * weak.a / weak.mu)
-    cube = float(strong.crossing_speed**3 * strong.a / (strong.mu**2 * strong.phi0))
-    b2 = (3 / float(strong.alpha)) ** (2 / 3)
-    return [
-        compared("why -1: v a/mu, v at the switch, weak drive", "1 *", final, 1.0, 1e-6),
-        compared("why -1/3: v^3 a/(mu^2 phi0), strong drive", "(3) order 1", cube, 3.0, b2),
-    ]
+    what = "clocks designed for a period and an amplitude have them"
+    return most(what, "", off, 1e-12, "largest deviation")
 
 
 def trajectories(ds: xr.Dataset) -> xr.Dataset:
     """The cycles at the drives of `SHOWN`, and the motion over one period; `turned` is the angle over phi0."""
-    cycle = sweep_of_alpha(ds, SHOWN.values())
-    study = sweep.study(
-        kernel="foliot_motion", method="closed", outputs=["angle", "speed"], axes={"mu": cycle.mu.values},
-        along={"phase": np.linspace(0, 1, 8001)}, fixed={"a": float(ds.a), "phi0": float(ds.phi0)},
-    )  # fmt: skip
-    motion = sweep.run(study)
+    cycle, how = sweep_of_alpha(ds, SHOWN.values()), {"method": "closed", "outputs": ["angle", "speed"]}
+    along = {"phase": np.linspace(0, 1, 8001)}
+    motion = solved("foliot_motion", **how, along=along, mu=cycle.mu, a=ds.a, phi0=ds.phi0)
     return cycle.assign(speed=motion.speed, turned=motion.angle / ds.phi0)
 
 
@@ -303,11 +266,11 @@ def figure(ds: xr.Dataset, half: xr.Dataset, motion: xr.Dataset) -> Any:
     with charts.style():
         page = charts.new_figure(charts.PAGE, 118.0)
         left, right = page.subfigures(1, 2, width_ratios=(1.12, 1))
-        upper, lower = left.subplots(2, 1, sharex=True, height_ratios=(1.15, 1))
-        draw_scaling(upper, ds, half)
-        draw_exponent(lower, ds, half)
+        scaling, exponent = left.subplots(2, 1, sharex=True, height_ratios=(1.15, 1))
+        draw_scaling(scaling, ds, half)
+        draw_exponent(exponent, ds, half)
         draw_trajectories(right.subplots(3, 1, sharex=True), motion)
-        for axes, text in ((upper, "a"), (lower, "b"), (right.axes[0], "c")):
+        for axes, text in ((scaling, "a"), (exponent, "b"), (right.axes[0], "c")):
             charts.letter(axes, text)
     return page
 
@@ -350,7 +313,7 @@ def draw_exponent(axes: Any, ds: xr.Dataset, half: xr.Dataset) -> None:
     axes.legend(loc="center right", bbox_to_anchor=(1, 0.35))
 
 
-def draw_trajectories(panels: Sequence[Any], motion: xr.Dataset) -> None:
+def draw_trajectories(panels: Any, motion: xr.Dataset) -> None:
     """Two periods of phi(t)/phi0 at each drive; shaded while the torque is positive."""
     phase = np.concatenate([motion.phase.values, 1 + motion.phase.values[1:]])
     for i, (axes, (name, alpha)) in enumerate(zip(panels, SHOWN.items(), strict=True)):
@@ -369,7 +332,7 @@ def draw_trajectories(panels: Sequence[Any], motion: xr.Dataset) -> None:
     panels[-1].set_xlabel(r"time, $t/P$ [1]")
 
 
-def conclude(path: str) -> tuple[Groups, list[str], Any]:
+def conclude(path: str) -> Conclusion:
     """Statements of the paper, and the figure."""
     ds = scaled(read_result(path, "foliot", ["mu"], "foliot_scaling.toml"))
     half, motion = half_point(ds), trajectories(ds)

@@ -19,12 +19,13 @@ from __future__ import annotations
 
 import itertools
 import sys
-from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, page_of, read_result, report
+from _common import Conclusion, Statement, count, most, read_result, report, said, solved
+from _figures import page_of
 from _losses import any_swing, shares
 
 import sweep
@@ -40,28 +41,6 @@ NOTES = """\
 deviation: of s, as a share of it, or the difference where an exponent is beside a number. Allowed: of (1)
 what the line says, of (2) the error of differences. Clocks: 1280 drawn over a, R, c and n, with e = 1, .99, .9, .5, 0
 """
-
-
-def everywhere(ds: xr.Dataset) -> list[Statement]:
-    """(1) against every clock, by its swing."""
-    off = abs(ds.law / ds.sensitivity - 1.0)
-    usual = off.quantile([0.5, 0.95]).values
-    lines = [
-        Statement("all clocks: half of them, 95 % of them within", "", f"{usual[0]:.2%}, {usual[1]:.1%}", usual[1],
-                  bool(usual[0] < 0.012 and usual[1] < 0.1)),
-    ]  # fmt: skip
-    for low, high, allowed in BANDS:
-        part = off.where((ds.swing >= low) & (ds.swing < high))
-        text = f"{int(part.notnull().sum())} clocks within {float(part.max()):.2%}"
-        what = f"swings from {low:g} phi0" + (f" to {high:g}" if np.isfinite(high) else "")
-        lines.append(Statement(what, f"(1) to {allowed:.1%}", text, float(part.max()), bool(part.max() < allowed)))
-    near = [float((abs(ds[name] / ds.sensitivity - 1.0) < 0.1).mean()) for name in ("law", "large", "small")]
-    text = ", ".join(f"{share:.0%}" for share in near)
-    there = bool(near[0] > 0.9 > 0.75 > max(near[1:]))
-    lines.append(Statement("within 10 %: by (1), by large swings, by small", "", text, None, there))
-    return lines
-
-
 LOSSES: dict[str, tuple[dict[str, float], float]] = {
     "dry": ({"R": 1.0}, 1e-8), "viscous": ({"a": 1.0}, 0.05), "degree 3": ({"c": 1.0, "n": 3.0}, 0.05),
     "degree 2": ({"c": 1e-2, "n": 2.0}, 1e-8), "impacts": ({"e": 0.7}, 1e-8),
@@ -69,24 +48,37 @@ LOSSES: dict[str, tuple[dict[str, float], float]] = {
 """Clocks of one loss, and the most that (1) may be off."""
 
 
+def everywhere(ds: xr.Dataset) -> list[Statement]:
+    """(1) against every clock, by its swing."""
+    off = abs(ds.law / ds.sensitivity - 1.0)
+    half, nearly = off.quantile([0.5, 0.95]).values
+    usual, text = bool(half < 0.012 and nearly < 0.1), f"{half:.2%}, {nearly:.1%}"
+    lines = [Statement("all clocks: half of them, 95 % of them within", "", text, nearly, usual)]
+    for low, high, allowed in BANDS:
+        part = off.where((ds.swing >= low) & (ds.swing < high))
+        text = f"{count(part, 'clocks')} within {part.max():.2%}"
+        what = f"swings from {low:g} phi0" + (f" to {high:g}" if np.isfinite(high) else "")
+        lines.append(most(what, f"(1) to {allowed:.1%}", part, allowed, text))
+    near = [float((abs(ds[name] / ds.sensitivity - 1.0) < 0.1).mean()) for name in ("law", "large", "small")]
+    text, better = ", ".join(f"{share:.0%}" for share in near), near[0] > 0.9 > 0.75 > max(near[1:])
+    return [*lines, said("within 10 %: by (1), by large swings, by small", better, text)]
+
+
 def alone(name: str) -> xr.Dataset:
     """One loss at many torques, with its laws."""
-    fixed, _ = LOSSES[name]
-    mu = 1.0 + np.geomspace(1e-3, 1e3, 40) if "R" in fixed else np.geomspace(1e-8, 1e8, 50)
+    clock = {"a": 0.0, "c": 0.0, "phi0": 1.0, **LOSSES[name][0]}
+    mu = 1.0 + np.geomspace(1e-3, 1e3, 40) if "R" in clock else np.geomspace(1e-8, 1e8, 50)
     outputs = ["amplitude", "crossing_speed", "sensitivity"]
-    fixed = {"a": 0.0, "c": 0.0, "phi0": 1.0, **fixed}
-    study = sweep.study(kernel="foliot", axes={"mu": mu}, fixed=fixed, outputs=outputs, rtol=1e-10)
-    return any_swing(shares(sweep.run(study)))
+    return any_swing(shares(solved("foliot", mu=mu, **clock, outputs=outputs, rtol=1e-10)))
 
 
-def one_loss() -> list[Statement]:
+def one_loss(single: dict[str, xr.Dataset]) -> list[Statement]:
     """(1) where it is exact, and of two losses where it is not."""
     lines = []
-    for name, (_, allowed) in LOSSES.items():
-        ds = alone(name)
-        off = float(abs(ds.law / ds.sensitivity - 1).max())
-        text = f"s from {float(ds.sensitivity.max()):.4g} to {float(ds.sensitivity.min()):.4g}"
-        lines.append(Statement(f"{name} alone", f"(1) to {allowed:g}", text, off, off < allowed))
+    for name, ds in single.items():
+        allowed = LOSSES[name][1]
+        text = f"s from {ds.sensitivity.max():.4g} to {ds.sensitivity.min():.4g}"
+        lines.append(most(f"{name} alone", f"(1) to {allowed:g}", ds.law / ds.sensitivity - 1, allowed, text))
     return lines
 
 
@@ -103,69 +95,53 @@ def by_periods(ds: xr.Dataset) -> list[Statement]:
 
     with np.errstate(divide="ignore", invalid="ignore"):
         s = 0.5 + 0.5 * (slope("a") + 2.0 * slope("R") + (2.0 - clock["n"]) * slope("c"))
-    off = float(np.nanmax(abs(s / few.sensitivity.values - 1)))
     text = "s by the kernel's tangent, p_n by its periods"
-    return [Statement(f"(2), {SAMPLE * 4} clocks", "1e-4", text, off, off < 1e-4)]
+    return [most(f"(2), {SAMPLE * 4} clocks", "1e-4", s / few.sensitivity - 1, 1e-4, text)]
 
 
-def figure(ds: xr.Dataset) -> Any:
+def figure(ds: xr.Dataset, single: dict[str, xr.Dataset]) -> Any:
     """One loss alone over the swing, (1) against every clock, and how far it is off; for two columns of print."""
-    with page_of(62.0, 1, 3) as (page, panels):
-        for axes, draw in zip(panels, (draw_alone, draw_all, draw_off), strict=True):
-            draw(axes, ds)
+    beyond, s = r"swing beyond the switch, $A-1$ [1]", ds.sensitivity.values.ravel()
+    with page_of(62.0, 1, 3) as (page, (one, law, off)):
+        for colour, (name, line) in zip(COLOURS, list(single.items())[:3], strict=False):
+            one.loglog(line.swing - 1, line.law, color=colour, label=name)
+            one.loglog(line.swing - 1, line.sensitivity, "o", color=colour, markersize=2.5, markerfacecolor="white")
+        one.plot([], [], "ko", markersize=2.5, markerfacecolor="white", label="kernel")
+        one.set(xlabel=beyond, ylabel="exponent, $s$ [1]", xlim=(1e-3, 1e2), ylim=(0.02, 30))
+        one.legend(fontsize=6.5, loc="upper right")
+
+        dots = {"markersize": 1, "rasterized": True}
+        for name, colour, text in (("large", "0.75", "large swings alone"), ("law", COLOURS[0], "(1)")):
+            law.loglog(ds[name].values.ravel(), s, ".", color=colour, label=text, **dots)
+        law.plot([0.02, 30], [0.02, 30], color="black", linewidth=0.6)
+        law.set(xlabel="exponent by the law [1]", ylabel="exponent, $s$ [1]", xlim=(0.02, 30), ylim=(0.02, 30))
+        law.legend(fontsize=6.5, loc="upper left", markerscale=6)
+
+        swing, far = ds.swing.values.ravel() - 1, 100 * abs(ds.law.values.ravel() / s - 1)
+        off.loglog(swing, far, ".", color="0.75", **dots)
+        edges = np.geomspace(1e-3, 20, 10)
+        bins = [far[(swing >= low) & (swing < high)] for low, high in itertools.pairwise(edges)]
+        for share, dashes in ((95, "-"), (50, "--")):
+            kept, look = [np.percentile(b, share) for b in bins], {"color": COLOURS[0], "label": f"{share} % of them"}
+            off.plot(np.sqrt(edges[1:] * edges[:-1]), kept, dashes, **look)
+        off.set(xlabel=beyond, ylabel="deviation of (1) [% of $s$]", xlim=(1e-3, 100), ylim=(1e-3, 100))
+        off.legend(fontsize=6.5, loc="lower left")
     return page
 
 
-def draw_alone(axes: Any, _: xr.Dataset) -> None:
-    """s of one loss over its swing beyond the switch."""
-    for colour, name in zip(COLOURS, list(LOSSES)[:3], strict=False):
-        line = alone(name)
-        axes.loglog(line.swing - 1, line.law, color=colour, label=name)
-        axes.loglog(line.swing - 1, line.sensitivity, "o", color=colour, markersize=2.5, markerfacecolor="white")
-    axes.plot([], [], "ko", markersize=2.5, markerfacecolor="white", label="kernel")
-    axes.set(xlabel=r"swing beyond the switch, $A-1$ [1]", ylabel="exponent, $s$ [1]", xlim=(1e-3, 1e2))
-    axes.set(ylim=(0.02, 30))
-    axes.legend(fontsize=6.5, loc="upper right")
-
-
-def draw_all(axes: Any, ds: xr.Dataset) -> None:
-    """The exponent of every clock against (1), and against the law of large swings."""
-    s = ds.sensitivity.values.ravel()
-    for name, colour, text in (("large", "0.75", "large swings alone"), ("law", COLOURS[0], "(1)")):
-        axes.loglog(ds[name].values.ravel(), s, ".", color=colour, markersize=1, label=text, rasterized=True)
-    axes.plot([0.02, 30], [0.02, 30], color="black", linewidth=0.6)
-    axes.set(xlabel="exponent by the law [1]", ylabel="exponent, $s$ [1]", xlim=(0.02, 30), ylim=(0.02, 30))
-    axes.legend(fontsize=6.5, loc="upper left", markerscale=6)
-
-
-def draw_off(axes: Any, ds: xr.Dataset) -> None:
-    """Deviations of (1) over the swing, with what half and 95 % of the clocks keep."""
-    swing, off = ds.swing.values.ravel() - 1, 100 * abs(ds.law / ds.sensitivity - 1).values.ravel()
-    axes.loglog(swing, off, ".", color="0.75", markersize=1, rasterized=True)
-    edges = np.geomspace(1e-3, 20, 10)
-    bins = [off[(swing >= low) & (swing < high)] for low, high in itertools.pairwise(edges)]
-    middle = np.sqrt(edges[1:] * edges[:-1])
-    for share, dashes in ((95, "-"), (50, "--")):
-        axes.plot(middle, [np.percentile(b, share) for b in bins], dashes, color=COLOURS[0], label=f"{share} % of them")
-    axes.set(xlabel=r"swing beyond the switch, $A-1$ [1]", ylabel="deviation of (1) [% of $s$]", xlim=(1e-3, 100))
-    axes.set(ylim=(1e-3, 100))
-    axes.legend(fontsize=6.5, loc="lower left")
-
-
-def conclude(path: str) -> tuple[Groups, list[str], Any]:
+def conclude(path: str) -> Conclusion:
     """Statements and the figure."""
     ds = any_swing(shares(read_result(path, "foliot", ["point", "e"], "law_any_swing.toml")))
+    single = {name: alone(name) for name in LOSSES}
     groups = {
         "Any losses, any swing": everywhere(ds),
-        "One loss alone": one_loss(),
+        "One loss alone": one_loss(single),
         "By the period at other friction": by_periods(ds),
     }
-    return groups, [NOTES], lambda: figure(ds)
+    return groups, [NOTES], lambda: figure(ds, single)
 
 
-def main(arguments: Sequence[str]) -> int:
-    """Table and figure of the result that is named; 1 if a statement does not hold."""
-    return report(__file__, ["law_any_swing.h5"], arguments, conclude)
+main = partial(report, __file__, ["law_any_swing.h5"], conclude=conclude)
 
 
 if __name__ == "__main__":
