@@ -77,7 +77,8 @@ def refined(function, axes, tolerance):
     names = NAMES[:axes]
 
     def solved(values):
-        return dataset_of(function, list(values.values()), ("cell",))
+        found = dataset_of(function, list(values.values()), ("cell",))
+        return found.assign_coords({name: ("cell", column) for name, column in values.items()})
 
     study = SimpleNamespace(axes={n: Axis(n, g, "values") for n, g in zip(names, grid, strict=True)}, design="product")
     first = dataset_of(function, np.meshgrid(*grid, indexing="ij"), names)

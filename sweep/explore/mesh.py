@@ -72,14 +72,6 @@ def tilted(points: Array) -> Array:
     return found
 
 
-def rounded(values: Array) -> Array:
-    """Values to six digits of the largest, so that what is decided by them is alike on every machine: the last digits
-    of what LAPACK gives are not, and cells differ ever more once one edge was cut or joined otherwise."""
-    size = 10.0 ** math.floor(math.log10(float(abs(values).max(initial=0.0)) or 1.0) - 6)
-    found: Array = np.round(values / size) * size
-    return found
-
-
 def edges(axes: int) -> Indices:
     """Pairs of corners of a simplex."""
     return np.array(list(itertools.combinations(range(axes + 1), 2)), dtype=np.intp)
@@ -213,5 +205,9 @@ def stretch(points: Array, heights: Array) -> Array:
         sizes, directions = np.linalg.eigh(found @ np.average(bends, axis=0, weights=volumes) @ found.T)
         if sizes.max() <= STRAIGHT:
             return np.eye(axes)
-        found = rounded((directions * np.sqrt(np.maximum(sizes / sizes.max(), FLATTEST))) @ directions.T)
+        found = (directions * np.sqrt(np.maximum(sizes / sizes.max(), FLATTEST))) @ directions.T
+        # to six digits of the largest: the last ones of what LAPACK gives are not alike on every machine, and cells
+        # differ ever more once one edge was cut or joined otherwise
+        unit = 10.0 ** math.floor(math.log10(float(abs(found).max())) - 6)
+        found = np.round(found / unit) * unit
     return found

@@ -99,6 +99,8 @@ def check(dataset: xr.Dataset, study: Study, sample: int = 200, seed: int = 0) -
     SweepError
         The result is a summary or has no OK cell; `sample` is below 1.
     """
+    from scipy.stats import beta
+
     require_cells("check", dataset)
     if sample < 1:
         raise SweepError(f"sample: expected 1 or more, found {sample}")
@@ -131,7 +133,10 @@ def check(dataset: xr.Dataset, study: Study, sample: int = 200, seed: int = 0) -
             "off": float(off[:, i].max() / rtol[i]),
         }
     by_another = int((judged & (by != used)).sum())
-    return Checked(len(ok), len(drawn), number, by_another, beyond, _limit(beyond, number, len(ok)), worst)
+    # the largest share of which so few would be found in so many, by Clopper and Pearson; of all cells, their own
+    share = float(beta.ppf(CONFIDENCE, beyond + 1, number - beyond)) if beyond < number else 1.0
+    limit = beyond / number if number == len(ok) else share
+    return Checked(len(ok), len(drawn), number, by_another, beyond, limit, worst)
 
 
 def _second_opinions(cells: xr.Dataset, study: Study, rtol: Any) -> tuple[Any, Any, dict[str, Any]]:
@@ -160,12 +165,3 @@ def _second_opinions(cells: xr.Dataset, study: Study, rtol: Any) -> tuple[Any, A
         for name, column in again.outputs.items():
             values[name][todo[solves]] = column[solves]
     return by, errors, values
-
-
-def _limit(beyond: int, judged: int, cells: int) -> float:
-    """The largest share of which so few would be found in so many, by Clopper and Pearson; of all cells, their own."""
-    from scipy.stats import beta
-
-    if judged == cells:
-        return beyond / cells
-    return float(beta.ppf(CONFIDENCE, beyond + 1, judged - beyond)) if beyond < judged else 1.0

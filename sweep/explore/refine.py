@@ -208,16 +208,13 @@ def _folder_of_rounds(path: str | os.PathLike[str] | None, dataset: xr.Dataset, 
     target, source = as_path(path), dataset.encoding.get("source")
     rounds = target.with_name(f"{target.name}.rounds")
     with disk.refusing(target):
-        if force or (target.exists() and not _are_newer(rounds, target)):
+        # rounds that are newer than what is there lead to another result
+        latest = max((file.stat().st_mtime for file in rounds.glob("*.h5")), default=0.0)
+        if force or (target.exists() and latest <= target.stat().st_mtime):
             shutil.rmtree(rounds, ignore_errors=True)
         check_target(target, force=force, read=[Path(source)] if source else [])
         rounds.mkdir(exist_ok=True)
     return rounds
-
-
-def _are_newer(rounds: Path, target: Path) -> bool:
-    """Whether there are rounds on the way to another result than that which is there."""
-    return any(file.stat().st_mtime > target.stat().st_mtime for file in rounds.glob("*.h5"))
 
 
 def report(cells: Refiner, dataset: xr.Dataset) -> Refinement:

@@ -72,6 +72,7 @@ class Refiner:
         solve: Callable[[Mapping[str, Array]], xr.Dataset],
     ) -> None:
         self.tolerance, self.most, self._solve, self.axes = tolerance, most_cells, solve, list(study.axes)
+        even = study.design != "product"
         cells = dataset.load()
         if cells[STATUS].ndim > 1:
             # all along one dimension, which is the first one of traces too
@@ -81,10 +82,8 @@ class Refiner:
         self.first = len(self.points)
         # the two cells that each was put between; of the first ones, itself
         self.origins = np.stack([np.arange(self.first)] * 2, axis=1)
-        values = [cells[name].values for name in self.axes]
-        self._known = [dict(zip(_keys(t), v, strict=True)) for t, v in zip(self.points.T, values, strict=True)]
-        even = study.design != "product"
-        self._steps = np.array([self.first ** (1 / len(self.axes)) if even else len(k) - 1 for k in self._known])
+        lengths = (len(axis) - 1 for axis in study.axes.values())
+        self._steps = np.array([self.first ** (1 / len(self.axes)) if even else length for length in lengths])
         # how far values of an output scatter, which more cells do not lessen; 0 where they do
         self.noise = dict.fromkeys(names, 0.0)
         self._to_cut: dict[str, list[tuple[int, float]]] = {name: [] for name in names}
@@ -92,8 +91,8 @@ class Refiner:
     def refine(self) -> None:
         """Rounds of cuts, each of edges that share no end, until nothing is to be cut however outputs are judged."""
         # between two values nothing tells whether an output bends
-        for k, known in enumerate(self._known):
-            if len(known) == 2:
+        for k in range(len(self.axes)):
+            if np.isin(self.points[:, k], (0, 1)).all():
                 middle = self.points[self.points[:, k] == 0]
                 middle[:, k] = 0.5
                 self._add(middle)
@@ -119,15 +118,20 @@ class Refiner:
                 return
 
     def column(self, name: str) -> Any:
-        """An output, or what is said of it, of all cells."""
+        """An axis, an output, or what is said of it, of all cells."""
         return np.concatenate([part[name].values for part in self.parts])
 
     def _add(self, points: Array, ends: Indices | None = None) -> None:
-        """Solves further cells, maybe in the middles between two others; a value that an axis has is taken again."""
+        """Solves further cells, maybe in the middles between two others.
+
+        Of places along an axis that rounding alone tells apart, all get the value of the first.
+        """
         values = {}
-        for k, (name, known) in enumerate(zip(self.axes, self._known, strict=True)):
-            there = zip(_keys(points[:, k]), self.box.values(k, points[:, k]), strict=True)
-            values[name] = np.array([known.setdefault(place, value) for place, value in there])
+        for k, name in enumerate(self.axes):
+            places = np.round(np.concatenate([self.points[:, k], points[:, k]]) / SAME)
+            first, same = np.unique(places, return_index=True, return_inverse=True)[1:]
+            known = np.concatenate([self.column(name), self.box.values(k, points[:, k])])
+            values[name] = known[first[same[len(self.points) :]]]
         self.parts.append(self._solve(values))
         itself = len(self.points) + np.arange(len(points))
         self.points = np.concatenate([self.points, points])
@@ -213,9 +217,3 @@ class Refiner:
         if known.sum() <= 0.75 * LATEST or np.median((off[latest] - LESSENING * before)[known]) <= 0:
             return 0.0
         return float(np.median(off[latest][known]))
-
-
-def _keys(places: Array) -> list[float]:
-    """Places along an axis, alike where rounding alone tells them apart."""
-    found: list[float] = np.round(places / SAME).tolist()
-    return found

@@ -140,28 +140,16 @@ def work_precision(
     if isolate or cell_timeout is not None:
         part = _without_failing(part, ["auto", *able], cell_timeout, note)
     against = _given(part, truth) if truth is not None else _best(part, [reference] if reference else able)
-    found = _chart(part, names, tolerances, against)
-    return found.assign_attrs(omissions="; ".join(_omissions(found, part, able if methods is None else None)))
-
-
-def _chart(study: Study, names: Sequence[str], tolerances: Sequence[float], against: _Reference) -> xr.Dataset:
-    """What is measured of each method at each tolerance."""
-    rows = [_measured(study, name, rtol, against) for name in names for rtol in tolerances]
+    rows = [_measured(part, name, rtol, against) for name in names for rtol in tolerances]
     columns = {key: np.array([row[key] for row in rows]).reshape(len(names), -1) for key in rows[0]}
-    columns["seconds"] = _seconds(study, names, tolerances)
+    columns["seconds"] = _seconds(part, names, tolerances)
     about = {key: {"units": "s" if key == "seconds" else "1", "long_name": LONG_NAMES[key]} for key in columns}
-    return xr.Dataset(
+    found = xr.Dataset(
         {key: (("method", "rtol"), values, about[key]) for key, values in columns.items()},
-        {"method": list(names), "rtol": list(tolerances)},
-        {
-            "title": study.title,
-            "kernel": study.kernel_name,
-            "cells": against.judged,
-            "open_cells": len(against.floor) - against.judged,
-            "reference": against.source,
-            "reference_error": float(max(against.floor[against.sound], default=math.nan)),
-        },
+        {"method": names, "rtol": tolerances},
+        {"title": part.title, "kernel": part.kernel_name, **against.attrs},
     )
+    return found.assign_attrs(omissions="; ".join(_omissions(found, part, able if methods is None else None)))
 
 
 def _require(names: Sequence[str], reference: str | None, able: Sequence[str]) -> None:
@@ -171,9 +159,10 @@ def _require(names: Sequence[str], reference: str | None, able: Sequence[str]) -
     if not names:
         raise SweepError(f"methods: expected at least one of auto, {', '.join(able)}; found none")
     for name in names if reference is None else [*names, reference]:
-        if name not in able and (name != "auto" or name == reference):
-            hint = did_you_mean(name, able) or f"; there are auto, {', '.join(able)}"
-            raise SweepError(f"no method {name} that can do this study{hint}")
+        if name in able or (name == "auto" and name != reference):
+            continue
+        hint = did_you_mean(name, able) or f"; there are auto, {', '.join(able)}"
+        raise SweepError(f"no method {name} that can do this study{hint}")
 
 
 def _without_failing(
@@ -242,7 +231,7 @@ class _Reference(NamedTuple):
     it is known that there is nothing to give."""
 
     source: str
-    values: Mapping[str, Any]
+    values: dict[str, Any]
     floor: Any
     void: Any
 
@@ -255,6 +244,13 @@ class _Reference(NamedTuple):
     def judged(self) -> int:
         """Number of cells in which a method can be told right or wrong."""
         return int((self.sound | self.void).sum())
+
+    @property
+    def attrs(self) -> dict[str, Any]:
+        """What a chart says of it."""
+        accurate, cells = float(max(self.floor[self.sound], default=math.nan)), self.judged
+        opened = {"cells": cells, "open_cells": len(self.floor) - cells}
+        return {**opened, "reference": self.source, "reference_error": accurate}
 
 
 def _given(study: Study, values: Mapping[str, Any]) -> _Reference:
@@ -282,15 +278,14 @@ def _best(study: Study, names: Sequence[str]) -> _Reference:
     for name in sorted(names, key=lambda name: vague[name]):
         if vague[name] and any(one.judged == size for one in found):
             break  # those that state a bound suffice
-        values: dict[str, Any] = {}
-        one = _Reference(name, values, np.full(size, np.inf), np.zeros(size, bool))
+        one = _Reference(name, {}, np.full(size, np.inf), np.zeros(size, bool))
         for rtol in FINE:
             outputs, status, *_ = solved(with_method(study, name, rtol))
             refused = status >= FIRST_REFUSAL
             one.void[refused & ~among(status, GIVEN_UP)] = True
             now = ~refused & (status != Status.INACCURATE) & ~one.sound
             for output, column in outputs.items():
-                values.setdefault(output, column)[now] = column[now]
+                one.values.setdefault(output, column)[now] = column[now]
             one.floor[now] = rtol
             if one.judged == size:
                 break
@@ -311,29 +306,31 @@ def _measured(study: Study, name: str, rtol: float, against: _Reference) -> dict
     error = np.max([relative_error(outputs[name], true) for name, true in against.values.items()], axis=0)
     methods = [method.name for method in study.kernel.methods]
     # against itself the reference has no error; what can be said is what it is right to, also where auto took it
-    itself = used == methods.index(against.source) if against.source in methods else np.zeros(len(used), bool)
+    itself = against.source in methods and used == methods.index(against.source)
     error = np.where(itself, np.maximum(error, against.floor), error)
-    valued, inaccurate = against.sound & (status < FIRST_REFUSAL), status == Status.INACCURATE
-    sure = valued & ~np.isin(status, UNSURE)
-    unsolved = against.sound & ~valued
-    wrong = sure & ~(error <= rtol + against.floor) | against.void & (status == Status.OK)
-    first, worst = int(unsolved.argmax()), int(np.where(sure, error, -1.0).argmax())
-    counts = {method: int((used == i).sum()) for i, method in enumerate(methods)}
+    valued, ok, inaccurate = against.sound & (status < FIRST_REFUSAL), status == Status.OK, status == Status.INACCURATE
+    sure, unsolved = valued & ~np.isin(status, UNSURE), against.sound & ~valued
+    wrong, worst = sure & ~(error <= rtol + against.floor) | against.void & ok, error[sure].max(initial=0.0)
     shares = {
-        "ok": against.sound & (status == Status.OK),
-        "remarked": valued & (status != Status.OK) & ~inaccurate,
+        "ok": against.sound & ok,
+        "remarked": valued & ~ok & ~inaccurate,
         "inaccurate": valued & inaccurate,
         "unsolved": unsolved,
         "silent": wrong,
     }
+
+    def first(some: Any) -> str:
+        return _cell(study, int(some.argmax())) if some.any() else ""
+
+    counts = {method: int((used == i).sum()) for i, method in enumerate(methods)}
     return {
         "error_median": np.median(error[valued]) if valued.any() else math.nan,
-        "error_worst": error[worst] if sure.any() else math.nan,
+        "error_worst": worst if sure.any() else math.nan,
         **{key: cells.sum() / against.judged for key, cells in shares.items()},
         **{key: outputs[key][valued].mean() if valued.any() else math.nan for key in WORK if key in outputs},
-        "worst_cell": _cell(study, worst) if sure.any() else "",
-        "unsolved_as": f"{NAMES[int(status[first])]} at {_cell(study, first)}" if unsolved.any() else "",
-        "silent_at": _cell(study, int(wrong.argmax())) if wrong.any() else "",
+        "worst_cell": first(sure & (error == worst)),
+        "unsolved_as": f"{NAMES[int(status[unsolved][0])]} at {first(unsolved)}" if unsolved.any() else "",
+        "silent_at": first(wrong),
         "methods_used": ", ".join(f"{m} {100 * n / max((used >= 0).sum(), 1):.3g} %" for m, n in counts.items() if n),
     }
 
