@@ -31,7 +31,7 @@ _MODULES = {
     "list_results": "results.listing",
     "in_units": "results.units",
     "run": "runs.run",
-    "plot": "show.charts",
+    "plot": "show.figures",
     "kernels": "show.kernels",
     "to_toml": "study.toml",
 }

@@ -1,7 +1,8 @@
 """Results for people: pictures, pages and words. Runs nothing; the only room that imports matplotlib.
 
 Others may use
-    `charts`   plot, of whatever it is given; for figures of one's own: style, new_figure, save and what draws panels
+    `figures`  plot, of whatever it is given
+    `charts`   for figures of one's own: style, new_figure, save, and the line of a method
     `accessor` `ds.sweep`: what a Dataset of a sweep can do by itself
     `page`     write_page: a result as one page of HTML
     `text`     result_text; a sweep watched from its log
@@ -10,5 +11,5 @@ Others may use
     `kernels`  what can be swept, as text and HTML, and a study to begin with
     `notebook` study_html: what a notebook shows of a study
 
-`view` chooses and letters what `charts` draws.
+`view` chooses and letters what `figures` draws.
 """

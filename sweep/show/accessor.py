@@ -47,7 +47,7 @@ class SweepAccessor:
 
     def plot(self, path: str | os.PathLike[str] | None = None, **keys: Any) -> Any:
         """The figure of one output: as `sweep.plot`, logarithmic along axes whose grid is."""
-        from sweep.show.charts import plot
+        from sweep.show.figures import plot
 
         return plot(self._dataset, path, **keys)
 

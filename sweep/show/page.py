@@ -110,7 +110,8 @@ def _wide(table: Table) -> str:
 
 def _figures(dataset: xr.Dataset) -> Iterator[str]:
     """A picture of each of the first outputs that can be drawn."""
-    from sweep.show.charts import plot, style
+    from sweep.show.charts import style
+    from sweep.show.figures import plot
 
     found = []
     for name in [name for name in outputs_of(dataset) if bool(dataset[name].notnull().any())][:MOST_FIGURES]:

@@ -70,9 +70,17 @@ class View:
         """Whether neighbours along x are neighbours in the study, so that a line may join them."""
         return self.x == self.along
 
+    def axis(self, name: str) -> xr.DataArray:
+        """The coordinate of that name."""
+        return coordinate(self.y, name)
+
     def values(self, name: str) -> NDArray[Any]:
         """Those of a coordinate."""
-        return coordinate(self.y, name).values
+        return self.axis(name).values
+
+    def name(self, code: int) -> str:
+        """What a status is called."""
+        return self.meanings.get(code, str(code))
 
     def codes(self) -> list[int]:
         """Statuses other than OK that occur."""

@@ -235,7 +235,7 @@ def _legend(found: View) -> str:
     """What the colours of statuses mean, with how many cells in view have each."""
     lines = []
     for code in found.codes():
-        name, count = found.meanings.get(code, str(code)), int((found.status == code).sum())
+        name, count = found.name(code), int((found.status == code).sum())
         doc = Status[name].doc if name in Status.__members__ else ""
         chip = f'<span class="chip" style="background:{status_colour(found, code)}"></span>'
         lines.append(f"<div>{chip}{html.escape(name)}, {count:,} shown: {html.escape(doc)}</div>")

@@ -124,7 +124,7 @@ def row(dataset: xr.Dataset, places: Mapping[str, int]) -> list[tuple[str, ...]]
 
 def picture(dataset: xr.Dataset, choice: Choice) -> BytesIO:
     """The shown slice as a PNG fit for print. Raises SweepError, also where matplotlib is missing."""
-    from sweep.show.charts import plot
+    from sweep.show.figures import plot
 
     found = shown(dataset, choice)
     name = str(found.y.name or choice.output)

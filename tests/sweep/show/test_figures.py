@@ -8,7 +8,7 @@ import xarray as xr
 from matplotlib.colors import LogNorm
 
 from sweep.errors import SweepError
-from sweep.show.charts import plot
+from sweep.show.figures import plot
 from sweep.show.view import SIDE, evened
 
 FLAGS = {"flag_values": np.array([0, 1, 64, 127], np.int8), "flag_meanings": "OK INACCURATE BAD_INPUT PENDING"}
