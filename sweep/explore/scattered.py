@@ -21,6 +21,7 @@ from scipy.spatial import Delaunay
 from threadpoolctl import threadpool_limits
 
 from kernels.interface import FIRST_REFUSAL, Status
+from sweep.cells.schema import ERROR_BOUND, STATUS
 from sweep.errors import SweepError
 from sweep.explore.mesh import Array, Indices, are_solid, errors_inside, stretch, tilted
 from sweep.words import require_dataset
@@ -31,7 +32,6 @@ OUTSIDE = 1e-9
 """How far out of a simplex a point may be by rounding."""
 FEWEST_ON_A_LINE = 5
 MOST_AXES = 5
-STATUS, ERROR_BOUND = "status", "error_bound"
 REFINED_TO = "refined_to"
 """Attribute of a refined result: JSON, the tolerance of each output that was refined."""
 
@@ -141,22 +141,20 @@ def interpolated(dataset: xr.Dataset, at: Mapping[str, Sequence[float] | Array])
     nearest = np.take_along_axis(corners, shares.argmax(axis=1)[:, None], 1)[:, 0]  # with the largest share
     valued = status[nearest] < FIRST_REFUSAL
     found = xr.Dataset(coords={name: (name, values, dataset[name].attrs) for name, values in grids.items()})
-
-    def put(name: Any, values: Any) -> None:
-        found[name] = (tuple(grids), values.reshape(shape), dataset[name].attrs)
-
     refined, inaccurate = json.loads(dataset.attrs.get(REFINED_TO, "{}")), status[nearest] == Status.INACCURATE
-    error = np.zeros(len(places))
+    columns, error = dict[Any, Any](), np.zeros(len(places))
     for name, variable in dataset.data_vars.items():
         if variable.dims == dataset[STATUS].dims and variable.dtype.kind == "f" and name != ERROR_BOUND:
             between, off = _between(variable.values, points, places, status)
-            put(name, np.where(np.isnan(variable.values[nearest]), np.nan, between))
+            columns[name] = np.where(np.isnan(variable.values[nearest]), np.nan, between)
             if name in refined or not refined:
                 error = np.maximum(error, off)
                 inaccurate |= ~(off <= refined.get(name, sys.float_info.max))
-    put(STATUS, np.where(inaccurate & valued, np.int8(Status.INACCURATE), status[nearest]))
+    columns[STATUS] = np.where(inaccurate & valued, np.int8(Status.INACCURATE), status[nearest])
     if ERROR_BOUND in dataset:
-        put(ERROR_BOUND, np.where(valued, np.fmax(error, dataset[ERROR_BOUND].values[nearest]), np.nan))
+        columns[ERROR_BOUND] = np.where(valued, np.fmax(error, dataset[ERROR_BOUND].values[nearest]), np.nan)
+    for name, values in columns.items():
+        found[name] = (tuple(grids), values.reshape(shape), dataset[name].attrs)
     return found.assign_attrs(dataset.attrs)
 
 
@@ -219,9 +217,8 @@ def on_lines(dataset: xr.Dataset, x: str) -> xr.Dataset:
     places = np.stack([dataset[name].values for name in others], axis=1)
     lines, line, count = np.unique(places, axis=0, return_inverse=True, return_counts=True)
     line = line.ravel()
-    long = count >= FEWEST_ON_A_LINE
-    for end in (values.min(), values.max()):
-        long &= np.isin(np.arange(len(lines)), line[values == end])
+    ends = (np.isin(np.arange(len(lines)), line[values == end]) for end in (values.min(), values.max()))
+    long = np.logical_and.reduce([count >= FEWEST_ON_A_LINE, *ends])
     at = " ".join(f"--at {n}={float(v)!r}" for n, v in zip(others, lines[count.argmax()], strict=True))
     longest = f"e.g. {at} ({count.max()} cells)"
     if not long.any():

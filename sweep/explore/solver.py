@@ -5,7 +5,6 @@ from __future__ import annotations
 import inspect
 import warnings
 from collections import namedtuple
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -44,7 +43,6 @@ class PointSolver:
         self._solver = Guard(Solver(study, self._grid), _warn)
         self._solved: Any = namedtuple("solved", self.fields)  # type: ignore[misc]  # as many as the study asks for
         one = inspect.Parameter.POSITIONAL_OR_KEYWORD
-        self._keys = set(self.names)
         self._signature = inspect.Signature([inspect.Parameter(name, one) for name in self.names])
 
     def __call__(self, *values: Any, **named: Any) -> Any:
@@ -67,13 +65,10 @@ class PointSolver:
         SweepError
             A parameter is missing, unknown, given twice, or no number.
         """
-        given: Sequence[Any] = values
         try:
-            if named.keys() == self._keys and not values:  # as `bind` does, in less time
-                given = [named[name] for name in self.names]
-            elif named or len(values) != len(self.names):
-                given = self._signature.bind(*values, **named).args
-            points = np.array(np.broadcast_arrays(*given), np.float64)
+            if named or len(values) != len(self.names):
+                values = self._signature.bind(*values, **named).args
+            points = np.array(np.broadcast_arrays(*values), np.float64)
         except (TypeError, ValueError) as error:
             expected = listed(self.names, word="and")
             raise SweepError(f"expected numbers, or arrays of them, for {expected}: {error}") from None
@@ -81,8 +76,7 @@ class PointSolver:
         self._grid.given = points.reshape(len(self.names), -1)
         cells = empty_cells(self._study, self._grid.given.shape[1])
         self._solver.solve(0, cells)
-        outputs = (cells.outputs[name].reshape(shape + cells.outputs[name].shape[1:]) for name in self._study.outputs)
-        columns = (*outputs, cells.status.reshape(shape))
+        columns = (column.reshape(shape + column.shape[1:]) for column in (*cells.outputs.values(), cells.status))
         return self._solved(*(column if column.ndim else column.item() for column in columns))
 
 

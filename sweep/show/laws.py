@@ -148,10 +148,10 @@ def laws_text(found: Laws, complete: bool = False) -> str:
 
     def table(title: str, of: Sequence[xr.Dataset], heading: Sequence[str], cells: Any, keep: int | None) -> str:
         """A row for each line: its place on the other axes, and the first cells of what is fitted."""
-        rows = [(*labels, *cells(one)[:keep]) for fit in of for labels, one in _lines(fit)]
-        text = Table(rows[:MOST_ROWS], (*_dims(of[0]), *heading[:keep]), title).text()
-        more = len(rows) - MOST_ROWS
-        return text + (f"\n  and {more} more; choose with --at axis=value" if more > 0 else "")
+        rows = [(place, cells(one)[:keep]) for fit in of for place, one in _lines(fit)]
+        texts = [(*place.values(), *fitted) for place, fitted in rows[:MOST_ROWS]]
+        more = f"\n  and {len(rows) - MOST_ROWS} more; choose with --at axis=value" if len(rows) > MOST_ROWS else ""
+        return Table(texts, (*rows[0][0], *heading[:keep]), title).text() + more
 
     heading = ("window", "p", "interval", "points", "drift", "residual", f"{found.y} at {found.x} = 1")
     texts = [table(f"{found.y} ~ {found.x}^p", found.fits, heading, _fit_cells, None if complete else 3)]
@@ -165,26 +165,26 @@ def laws_text(found: Laws, complete: bool = False) -> str:
 
 def exponents_text(found: xr.Dataset, x: str, complete: bool = False) -> str:
     """Local exponents with their errors, a row a point: about `POINTS` of each line, by wish all."""
-    rows, along = [], str(found[x].dims[0])
-    for labels, line in _lines(found, along):
+    along, place, rows = str(found[x].dims[0]), dict[str, str](), list[Sequence[str]]()
+    for place, line in _lines(found, along):
         here = line.where(line.exponent.notnull(), drop=True)
         for point in range(0, here.sizes[along], 1 if complete else max(1, -(-here.sizes[along] // POINTS))):
             at, exponent, error = (float(here[name][point]) for name in (x, "exponent", "exponent_error"))
-            rows.append((*labels, f"{at:.6g}", f"{exponent:.6g}", f"{error:.1e}"))
-    return Table(rows, (*_dims(found, along), x, "exponent", "error"), str(found.exponent.attrs["long_name"])).text()
+            rows.append((*place.values(), f"{at:.6g}", f"{exponent:.6g}", f"{error:.1e}"))
+    return Table(rows, (*place, x, "exponent", "error"), str(found.exponent.attrs["long_name"])).text()
 
 
 def sensitivity_text(found: xr.Dataset) -> str:
     """Indices of `sensitivity`, a row a parameter."""
-    rows = [(*labels, *(f"{value:.4g}" for value in _numbers(one).values())) for labels, one in _lines(found)]
+    rows = [(name, *(f"{value:.4g}" for value in values)) for name, *values in found.to_dataframe().itertuples()]
     return Table(rows, ("parameter", *(str(name).replace("_", " ") for name in found.data_vars))).text()
 
 
 def law_rows(found: Laws) -> Iterator[tuple[str, ...]]:
     """Output, where, exponent, interval and largest distance: a row for one law, two rows for two with a bend."""
-    dims, bends = _dims(found.fits[0]), itertools.repeat(None) if found.bend is None else _lines(found.bend)
-    for (labels, fit), bend in zip(_lines(found.fits[0]), bends, strict=False):
-        where = ", ".join(f"{dim} = {label}" for dim, label in zip(dims, labels, strict=True))
+    bends = itertools.repeat(None) if found.bend is None else _lines(found.bend)
+    for (place, fit), bend in zip(_lines(found.fits[0]), bends, strict=False):
+        where = ", ".join(f"{dim} = {label}" for dim, label in place.items())
         name, both = f"{found.y} ({where})" if where else found.y, None if bend is None else bend[1]
         if both is None or both.regimes.item() != 2 or both.residual.item() > WORST_MISFIT:
             window, exponent, interval, _, _, residual, _ = _fit_cells(fit)
@@ -201,14 +201,8 @@ def write_laws(found: Laws, path: Path) -> None:
     parts += [] if found.bend is None else [(found.bend.sel(law=law), law) for law in ("low", "high")]
     parts += [] if found.meeting is None else [(found.meeting, "meeting")]
     start = {"y": found.y, "x": found.x}
-    _write(
-        [
-            start | {"law": law} | dict(zip(_dims(fit), labels, strict=True)) | _numbers(one)
-            for fit, law in parts
-            for labels, one in _lines(fit)
-        ],
-        path,
-    )
+    lines = ((law, *line) for fit, law in parts for line in _lines(fit))
+    _write([start | {"law": law} | place | _numbers(one) for law, place, one in lines], path)
 
 
 def _write(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
@@ -219,21 +213,17 @@ def _write(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
         writer.writerows([cell(row.get(name, "")) for name in names] for row in rows)
 
 
-def _dims(dataset: xr.Dataset, along: str = "law") -> list[str]:
-    return [str(dim) for dim in dataset.sizes if dim != along]
-
-
 def _numbers(one: xr.Dataset) -> dict[str, Any]:
     return {str(name): variable.item() for name, variable in one.data_vars.items()}
 
 
-def _lines(dataset: xr.Dataset, along: str = "law") -> Iterator[tuple[list[str], xr.Dataset]]:
+def _lines(dataset: xr.Dataset, along: str = "law") -> Iterator[tuple[dict[str, str], xr.Dataset]]:
     """Each line's place on the other axes, as people write it (a number where it has no name), and what is of it."""
-    dims = _dims(dataset, along)
+    dims = [str(dim) for dim in dataset.sizes if dim != along]
     for position in np.ndindex(*(dataset.sizes[dim] for dim in dims)):
         one = dataset.isel(dict(zip(dims, position, strict=True)))
-        places = [one[dim].item() if dim in one.coords else str(k) for dim, k in zip(dims, position, strict=True)]
-        yield [value if isinstance(value, str) else f"{value:.6g}" for value in places], one
+        places = {dim: one[dim].item() if dim in one.coords else str(k) for dim, k in zip(dims, position, strict=True)}
+        yield {dim: value if isinstance(value, str) else f"{value:.6g}" for dim, value in places.items()}, one
 
 
 def _fit_cells(fit: xr.Dataset) -> tuple[str, ...]:

@@ -218,17 +218,21 @@ def _failed(path: Path, dataset: xr.Dataset) -> Table:
 def follow(output: Path, sleep: Callable[[float], None] = time.sleep) -> Iterator[str]:
     """The last lines of the log of a run, and those to come until it ends. Raises SweepError."""
     path = log_path(output)
+    if path.is_fifo():
+        raise SweepError(f"{path} is a pipe, and no log of a run")
     silent, told, size = 0.0, 0, -1
-    while True:
-        if (now := _size(path)) != size:
+    while silent < SILENT_SECONDS:
+        try:
+            now = path.stat().st_size
+        except OSError:
+            raise SweepError(f"{path}: there is no log to follow; sweep run writes one beside its output") from None
+        if now != size:
             lines = list(read_lines(path.read_text("utf-8")))
             for line in lines[max(told, len(lines) - LAST) if told == 0 else told :]:
                 yield f"{line['time']}  {line['text']}"
             silent, told, size = 0.0, len(lines), now
             if lines and lines[-1]["text"].startswith(ENDED):
                 return
-        if silent >= SILENT_SECONDS:
-            break
         sleep(LOOK_SECONDS)
         silent += LOOK_SECONDS
     raise SweepError(f"{path}: nothing new for {SILENT_SECONDS:.0f} s; its run was killed, or the machine is away")
@@ -244,12 +248,3 @@ def reasons(output: Path) -> dict[int, str]:
         if failed and number.isdecimal():
             found[int(number)] = rest.partition(_REASON)[2]
     return found
-
-
-def _size(path: Path) -> int:
-    if path.is_fifo():
-        raise SweepError(f"{path} is a pipe, and no log of a run")
-    try:
-        return path.stat().st_size
-    except OSError:
-        raise SweepError(f"{path}: there is no log to follow; sweep run writes one beside its output") from None
