@@ -60,8 +60,7 @@ class Group:
     def __str__(self) -> str:
         def product(sign: int) -> list[str]:
             powers = [(name, sign * power) for name, power in self.powers if sign * power > 0]
-            texts = [(name, f"{p}" if p.denominator == 1 else f"({p})") for name, p in powers]
-            return [name if text == "1" else f"{name}^{text}" for name, text in texts]
+            return [name if p == 1 else f"{name}^{p}" if p.denominator == 1 else f"{name}^({p})" for name, p in powers]
 
         over, under = " ".join(product(1)), product(-1)
         below = f"({' '.join(under)})" if len(under) > 1 else "".join(under)

@@ -98,12 +98,11 @@ def view(dataset: xr.Dataset, y: str | None = None, x: str | None = None) -> Vie
     known = [str(n) for n, v in dataset.data_vars.items() if v.ndim and n not in ANCILLARY and v.dtype.kind in "fiu"]
     if not known:
         raise SweepError("there is nothing to draw: no output runs along an axis")
-    name = y or preferred(known)
-    one_of(name, known, f"there is no output {name!r} to draw")
+    name = one_of(y or preferred(known), known, f"there is no output {y!r} to draw")
     if x is None:
         dataset = evened(dataset, axes=2)
     output, cells = dataset[name], dataset["status"].dims if "status" in dataset else ()
-    known = [str(name) for name, c in output.coords.items() if c.ndim == 1 and c.dtype.kind in "fiu"]
+    known = lines_of(output)
     if x is None:
         along_it = [str(dim) for dim in output.dims if dim in known]
         traces = [dim for dim in along_it if cells and dim not in cells and dim != PASSAGE]
@@ -125,10 +124,15 @@ def view(dataset: xr.Dataset, y: str | None = None, x: str | None = None) -> Vie
         if dim is not None and is_number_axis(shown[name], dim) and dim in shown.coords:
             shown = shown.sortby(dim)
     values = shown[name].transpose(*([across] if across else []), along)
-    status = shown["status"].broadcast_like(values).transpose(*values.dims) if "status" in shown else None
-    codes = np.zeros(values.shape, int) if status is None else status.values.astype(int)
+    status = shown["status"] if "status" in shown else xr.zeros_like(values, int)
+    codes = status.broadcast_like(values).transpose(*values.dims).values.astype(int)
     words = ", ".join(setting(coordinate(output, dim)[index]) for dim, index in held.items())
-    return View(values, codes, {} if status is None else flag_words(shown["status"]), x, along, across, words)
+    return View(values, codes, flag_words(status), x, along, across, words)
+
+
+def lines_of(output: xr.DataArray) -> list[str]:
+    """Coordinates of numbers that an output can be drawn along."""
+    return [str(name) for name, c in output.coords.items() if c.ndim == 1 and c.dtype.kind in "fiu"]
 
 
 def one_of(name: str, known: Sequence[str], fault: str) -> str:

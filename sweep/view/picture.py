@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from sweep.laws.loglog import is_logarithmic, spans_decades
 from sweep.show.charts import COLOURS
-from sweep.show.view import View, coordinate, edges, meaning
+from sweep.show.view import View, edges, meaning
 from sweep.view.region import Range
 
 WIDTH, HEIGHT = 900, 560
@@ -34,7 +34,7 @@ def status_colour(found: View, code: int) -> str:
 
 def plain_label(found: View, name: str) -> str:
     """Text for an axis, without formulas."""
-    column = found.y if name == found.y.name else coordinate(found.y, name)
+    column = found.y if name == found.y.name else found.axis(name)
     words, unit = meaning(column), str(column.attrs.get("units", ""))
     text = f"{words}, {name}" if words and words != name else name
     return text + (f" [{unit}]" if unit not in ("", "1") else "")
@@ -84,8 +84,8 @@ class Picture:
         self.figure.add_layout(ColorBar(color_mapper=self.mapper, title=plain_label(found, str(found.y.name))), "above")
 
     def _prepare_lines(self, found: View) -> None:
-        self.lines, self.points = _source("xs", "ys", "colour", "name"), _source("x", "y", "colour")
-        self.marks = _source("x", "y", "colour")
+        self.lines = _source("xs", "ys", "colour", "name")
+        self.points, self.marks = (_source("x", "y", "colour") for _ in range(2))
         if found.joined:
             legend = {"legend_field": "name"} if found.across else {}
             self.figure.multi_line("xs", "ys", line_color="colour", line_width=2, source=self.lines, **legend)
@@ -128,7 +128,7 @@ class Picture:
         ys = np.where(ys > 0, ys, np.nan) if self.log_values else ys
         self.heights = np.where(np.isfinite(ys), ys, np.nanmin(ys) if np.isfinite(ys).any() else 1.0)
         colours = [COLOURS[i % len(COLOURS)] for i in range(len(ys))]
-        names = [f"{found.across} = {v}" for v in coordinate(found.y, found.across).values] if found.across else [""]
+        names = [f"{found.across} = {v}" for v in found.values(found.across)] if found.across else [""]
         self.lines.data = {"xs": [x] * len(ys), "ys": list(ys), "colour": colours, "name": names}
         self.points.data = {"x": np.tile(x, len(ys)), "y": ys.ravel(), "colour": np.repeat(colours, x.size)}
         status = np.atleast_2d(found.status) * statuses

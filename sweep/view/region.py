@@ -21,7 +21,7 @@ from sweep.laws.exponents import local_exponent
 from sweep.laws.loglog import is_logarithmic
 from sweep.results.export import export
 from sweep.results.statuses import flag_words
-from sweep.show.view import ANCILLARY, View, coordinate, is_number_axis, view
+from sweep.show.view import ANCILLARY, View, coordinate, is_number_axis, lines_of, view
 from sweep.study.model import SETTINGS, Axis, Study
 from sweep.study.toml import to_toml
 
@@ -52,14 +52,13 @@ class Choice:
 
 def number_axes(dataset: xr.Dataset, output: str) -> list[str]:
     """What a picture of the output can run along: axes first, the longest of them first."""
-    lines = [str(n) for n, c in dataset[output].coords.items() if c.ndim == 1 and c.dtype.kind in "fiu"]
-    return sorted(lines, key=lambda name: (name not in dataset.dims, -dataset[name].size))
+    return sorted(lines_of(dataset[output]), key=lambda name: (name not in dataset.dims, -dataset[name].size))
 
 
 def outputs(dataset: xr.Dataset) -> list[str]:
     """The outputs that run along an axis of numbers."""
     numbers = (str(n) for n, v in dataset.data_vars.items() if v.dtype.kind in "fiu" and n not in ANCILLARY)
-    return [name for name in numbers if number_axes(dataset, name)]
+    return [name for name in numbers if lines_of(dataset[name])]
 
 
 def along(dataset: xr.Dataset, x: str) -> str:
