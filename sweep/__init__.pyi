@@ -26,7 +26,7 @@ from sweep.results.filter import where as where
 from sweep.results.listing import list_results as list_results
 from sweep.results.units import in_units as in_units
 from sweep.runs.run import run as run
-from sweep.show.charts import plot as plot
+from sweep.show.figures import plot as plot
 from sweep.show.kernels import kernels as kernels
 from sweep.study.read import study as study
 from sweep.study.toml import to_toml as to_toml

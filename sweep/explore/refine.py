@@ -155,28 +155,39 @@ def refine(
     rounds, numbers = _folder_of_rounds(path, dataset, force), itertools.count(1)
     options: dict[str, Any] = {"workers": workers, "isolate": isolate, "cell_timeout": cell_timeout}
 
-    def of(values: Mapping[str, Array], design: str = "zip") -> Study:
-        axes = {name: Axis(name, frozen(column), "values") for name, column in values.items()}
-        return dataclasses.replace(study, design=design, blocks=(), axes=axes, title=f"{study.title}, refined")
-
     def solve(values: Mapping[str, Array]) -> xr.Dataset:
         """A round of cells; of one that an earlier call has computed, the file is there."""
         file = None if rounds is None else rounds / f"{next(numbers)}.h5"
-        with run(of(values), file, progress=file is not None, **options) as found:
+        with run(_study_of(study, values, "zip"), file, progress=file is not None, **options) as found:
             return found.load()
 
     cells = Refiner(dataset, study, names, tolerance, most_cells, solve)
     cells.refine()
+    attrs = {REFINED_TO: json.dumps(dict.fromkeys(names, tolerance))}
+    found = report(cells, _gathered(cells, study, path, force, attrs))
+    if rounds is not None:
+        shutil.rmtree(rounds, ignore_errors=True)
+    return found
+
+
+def _study_of(study: Study, values: Mapping[str, Array], design: str) -> Study:
+    """Cells at some values of the axes."""
+    axes = {name: Axis(name, frozen(column), "values") for name, column in values.items()}
+    return dataclasses.replace(study, design=design, blocks=(), axes=axes, title=f"{study.title}, refined")
+
+
+def _gathered(
+    cells: Refiner, study: Study, path: str | os.PathLike[str] | None, force: bool, attrs: Mapping[str, str]
+) -> xr.Dataset:
+    """All cells in rising order, in a file or in memory."""
     values = {name: cells.column(name) for name in cells.axes}
     order = np.lexsort(list(values.values())[::-1])
-    whole = of({name: column[order] for name, column in values.items()}, "product" if len(values) == 1 else "zip")
+    values = {name: column[order] for name, column in values.items()}
+    whole = _study_of(study, values, "product" if len(values) == 1 else "zip")
     arrays = {name: cells.column(name)[order] for name in (*study.outputs, *ANCILLARY)}
-    attrs = {REFINED_TO: json.dumps(dict.fromkeys(names, tolerance))}
-    if path is None or rounds is None:
-        return report(cells, in_memory(cell_schema(whole, {}), arrays).assign_attrs(attrs))
-    found = report(cells, store_cells(whole, path, arrays, force, attrs=attrs))
-    shutil.rmtree(rounds, ignore_errors=True)
-    return found
+    if path is None:
+        return in_memory(cell_schema(whole, {}), arrays).assign_attrs(attrs)
+    return store_cells(whole, path, arrays, force, attrs=attrs)
 
 
 def _require(dataset: xr.Dataset, study: Study, names: Sequence[str], tolerance: float) -> None:

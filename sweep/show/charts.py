@@ -121,7 +121,7 @@ def draw_precision(axes: Any, found: xr.Dataset, key: str) -> None:
     """A line for each method, with the look that `method_look` gives it.
 
     Filled marks where all cells are solved, open ones where some are unsolved or said to be inaccurate, crosses where
-    some are silently wrong; `precision_marks` says so in a legend. Errors below that of the reference mean nothing, and
+    some are silently wrong; the legend of `sweep.plot` says so. Errors below that of the reference mean nothing, and
     are drawn a little below it. A method that solves no cell is left out.
     """
     accurate = found.attrs.get("reference_error", np.nan)

@@ -195,29 +195,22 @@ def precision_figure(found: xr.Dataset) -> Figure:
         wide = np.sqrt(max(LEAST_SPAN * low / high, 1.0))
         panels[0].set(ylabel=f"relative error against {attrs['reference']} [1]", xlim=(low / wide, high * wide))
         lines = {line.get_label(): line for line in panels[0].get_lines()}
-        handles = {}
+        handles: dict[str, Any] = {}
         for name in names:
             silent = bool((found.silent.sel({"method": name}) > 0).any())
             text = name + " (solves no cell)" * (name not in lines) + " (silently wrong)" * silent
             handles[text] = lines.get(name, Line2D([], [], linestyle=""))
-        handles |= _precision_marks(found)
+        look: dict[str, Any] = {"linestyle": "", "marker": "o", "color": "0.3", "markersize": 4}
+        handles["all cells solved"] = Line2D([], [], **look)
+        if (found.unsolved + found.inaccurate > 0).any():
+            handles["some unsolved or inaccurate"] = Line2D([], [], **{**look, "markerfacecolor": "white"})
+        if (found.silent > 0).any():
+            handles["some silently wrong"] = Line2D([], [], linestyle="", marker="x", color="black", markersize=7)
+        if np.isfinite(accurate := attrs.get("reference_error", np.nan)):
+            handles[f"below the reference's own error, {accurate:.1g}"] = Patch(color="0.9", linewidth=0)
         figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=4, fontsize=7)
         figure.suptitle(_plain(attrs["title"]), fontsize=9)
     return figure
-
-
-def _precision_marks(found: xr.Dataset) -> dict[str, Any]:
-    """What the marks of `draw_precision` that occur mean."""
-    look: dict[str, Any] = {"linestyle": "", "marker": "o", "color": "0.3", "markersize": 4}
-    marks: dict[str, Any] = {"all cells solved": Line2D([], [], **look)}
-    if (found.unsolved + found.inaccurate > 0).any():
-        marks["some unsolved or inaccurate"] = Line2D([], [], **{**look, "markerfacecolor": "white"})
-    if (found.silent > 0).any():
-        marks["some silently wrong"] = Line2D([], [], linestyle="", marker="x", color="black", markersize=7)
-    accurate = found.attrs.get("reference_error", np.nan)
-    if np.isfinite(accurate):
-        marks[f"below the reference's own error, {accurate:.1g}"] = Patch(color="0.9", linewidth=0)
-    return marks
 
 
 def laws_figure(found: xr.Dataset) -> Figure:
