@@ -156,10 +156,10 @@ def _by_half(t: Array, z: Array, exponent: float) -> tuple[float, float]:
 def _fading(fade: float) -> Law:
     """(1) with a given D."""
 
-    def parts(q: Array, s: Array, span: float) -> Any:
-        return CORRECTION.parts(np.stack([q[0], np.full_like(q[0], fade)]), s, span)
+    def curve(q: Array, s: Array, span: float) -> Any:
+        return CORRECTION.curve(np.stack([q[0], np.full_like(q[0], fade)]), s, span)
 
-    return CORRECTION._replace(name=str(fade), parts=parts, q=CORRECTION.q[:1])
+    return CORRECTION._replace(name=str(fade), curve=curve, q=CORRECTION.q[:1])
 
 
 def _mixture(t: Array, z: Array, tried: dict[str, Found], word: str, confidence: float) -> tuple[float, float]:
@@ -167,12 +167,12 @@ def _mixture(t: Array, z: Array, tried: dict[str, Found], word: str, confidence:
     found, span = tried[CORRECTION.name], float(t[-1] - t[0])
     steps, least, most = FADES
     best = float(np.clip(abs(found.numbers[1]), least, most))
-    doubt = float(np.nan_to_num(found.errors()[1], posinf=best)) / best
+    doubt = float(np.nan_to_num(found.errors[1], posinf=best)) / best
     fades = best * steps ** np.clip(doubt, 0.01, 0.5)
     laws = [_fading(float(fade)) for fade in fades[(fades >= least) & (fades <= most)]]
     parts = []
     for one in fitted(laws, t, z[None], None if found.sigma is None else found.sigma[None])[0].values():
-        if np.isfinite(one.jacobian).all() and np.isfinite(one.errors()).all():
+        if np.isfinite(one.jacobian).all() and np.isfinite(one.errors).all():
             part = regress(t, one.jacobian, one.off[None], word, sigma=one.sigma)
             parts.append(part._replace(value=part.value + one.numbers[:, None]))
     evidence = np.array([float(part.evidence[0]) for part in parts])
@@ -185,6 +185,6 @@ def _mixture(t: Array, z: Array, tried: dict[str, Found], word: str, confidence:
     )
     ends = both.interval(2, confidence)[:, 0].tolist()
     for law, as_well in ((ONE, BEYOND_DOUBT), (LOG_CORRECTION, AS_WELL)):
-        if (one := tried[law.name]).aicc < found.aicc + as_well and np.isfinite(one.errors()).all():
+        if (one := tried[law.name]).aicc < found.aicc + as_well and np.isfinite(one.errors).all():
             ends += one.interval(t, [law.numbers - 1], word, confidence)[0][:, 0].tolist()
     return min(ends) / span, max(ends) / span

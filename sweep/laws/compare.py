@@ -126,7 +126,7 @@ def _table(t: Array, z: Array, tried: list[Found]) -> xr.Dataset:
 
 def _exponents(found: Found, span: float) -> str:
     """The exponents with their standard errors, as of independent noise."""
-    law, doubt = found.law, found.errors()
+    law, doubt = found.law, found.errors
     names = ("p",) if law is OFFSET else law.exponents
     first = 0 if law is OFFSET else found.numbers.size - len(names)
     parts = [f"{name} = {found.numbers[k] / span:.4g} +- {doubt[k] / span:.1g}" for k, name in enumerate(names, first)]

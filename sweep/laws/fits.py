@@ -28,6 +28,8 @@ class Found(NamedTuple):
     off: Array
     sigma: Array | None
     """Standard errors of the points, where they are known."""
+    errors: Array
+    """Standard errors of the numbers beside independent noise; inf of what the points do not determine."""
     deviance: float
     more: int = 0
     """Numbers of the noise that are fitted too."""
@@ -52,21 +54,10 @@ class Found(NamedTuple):
         """Largest relative distance of a point."""
         return math.expm1(min(float(abs(self.off).max()), 700.0))
 
-    def errors(self) -> Array:
-        """Standard errors of the numbers beside independent noise; inf of what the points do not determine."""
-        columns = self.jacobian if self.sigma is None else self.jacobian / self.sigma[:, None]
-        size = np.sqrt((columns**2).sum(axis=0)) + 1e-300
-        _, moved, directions = np.linalg.svd(columns / size, full_matrices=False)
-        seen = moved > 1e-8 * moved.max(initial=0.0)
-        change = directions.T / size[:, None] / np.where(seen, moved, np.nan)
-        lost = (directions[~seen] ** 2).sum(axis=0) > 1e-6
-        noise = 1.0 if self.sigma is not None else math.sqrt(self.square / (self.off.size - self.law.numbers))
-        return np.where(lost, np.inf, noise * np.sqrt(np.nansum(np.where(lost[:, None], 0.0, change) ** 2, axis=1)))
-
     def interval(self, t: Array, which: list[int], noise: str, confidence: float) -> tuple[Array, float]:
         """Ends of the intervals of some numbers (2, k), infinite where they are not determined; `aicc` with the noise
         of the word that suits best, where it is not known."""
-        known, best = np.flatnonzero(np.isfinite(self.errors())).tolist(), self
+        known, best = np.flatnonzero(np.isfinite(self.errors)).tolist(), self
         ends = np.array([[-np.inf] * len(which), [np.inf] * len(which)])
         if known:
             line = regress(t, self.jacobian[:, known], self.off[None], noise, sigma=self.sigma)
@@ -80,7 +71,7 @@ class Found(NamedTuple):
     def denied(self, t: Array, noise: str) -> bool:
         """Whether the points are not the law and noise; unless that is independent, by polynomials beside the law."""
         more = 0 if self.sigma is not None or noise == "even" else 3
-        columns = self.jacobian[:, np.isfinite(self.errors())]
+        columns = self.jacobian[:, np.isfinite(self.errors)]
         beside = np.polynomial.chebyshev.chebvander(2 * (t - t[0]) / (t[-1] - t[0]) - 1, 1 + more)[:, 2:]
         every = np.concatenate([columns, beside], axis=1)
         return bool(columns.size and regress(t, every, self.off[None], noise, columns.shape[1], self.sigma).denied[0])
@@ -88,8 +79,8 @@ class Found(NamedTuple):
 
 DAMPINGS = 10.0 ** np.array([-7.0, -3.0, -2.0, -1.0, 0.0, 1.0, 3.0])
 """Of a Gauss-Newton step, all of which are tried at once; the best is taken."""
-STEP, STEPS = 1e-6, 30
-"""Of numerical derivatives by q; Gauss-Newton steps at most."""
+STEPS = 30
+"""Gauss-Newton steps at most."""
 MOST_LINES = 16
 """That are fitted at once, so that what is held stays below some 50 MB."""
 
@@ -116,104 +107,123 @@ def fitted(laws: Sequence[Law], t: Array, z: Array, errors: Array | None = None)
     return found
 
 
-def _start(law: Law, t: Array, z: Array, root: Array) -> Array:
-    """The q (m, q) of a grid that are nearest to lines z (m, n)."""
-    if not law.q:
-        return np.zeros((len(z), 0))
-    tries = np.array(list(itertools.product(*(number.starts for number in law.q))), dtype=np.float64)
-    parts = _parts([law], [tries], t)
-    exist = np.asarray(np.isfinite(parts).all(axis=(0, 2)))
-    basis = np.linalg.qr((np.where(exist[:, None], parts[1:], 0.0) * root).transpose(1, 2, 0))[0]
-    wanted = (z[:, None] - np.where(exist[:, None], parts[0], np.nan)) * root
-    off = (wanted**2).sum(axis=2) - (np.einsum("gnk,mgn->mgk", basis, wanted) ** 2).sum(axis=2)
-    found: Array = tries[np.nanargmin(off, axis=1)]
-    return found
-
-
 def _nearest(laws: Sequence[Law], t: Array, z: Array, errors: Array | None) -> list[Found]:
     """Each law fitted to each line z (m, n); law by law."""
-    root, lines = np.ones_like(t) if errors is None else 1 / errors, len(z)
-    most = max(1, *(len(law.q) for law in laws))
+    root, lines, n = np.ones_like(t) if errors is None else 1 / errors, len(z), t.size
     # rows are laws times lines; q that a law does not have are 0 and stay so
-    q, limits = np.zeros((len(laws) * lines, most)), np.zeros((len(laws), most, 2))
-    for k, law in enumerate(laws):
-        q[k * lines : (k + 1) * lines, : len(law.q)] = _start(law, t, z, root)
-        limits[k, : len(law.q)] = np.reshape([(number.least, number.most) for number in law.q], (-1, 2))
-    low, high = np.repeat(limits, lines, axis=0)[:, None].transpose(3, 0, 1, 2)
-    steps = STEP * np.concatenate([np.eye(most), -np.eye(most)])
-
-    def parts(rows: NDArray[np.intp], at: Array) -> Array:
-        """Shifts and columns (1 + k, r, g, n) of rows at some q (r, g, most)."""
-        which = np.searchsorted(rows, lines * np.arange(len(laws) + 1))
-        found = _parts(laws, [at[a:b].reshape(-1, most) for a, b in itertools.pairwise(which)], t)
-        return found.reshape(len(found), *at.shape[:2], t.size)
+    law, wanted = np.repeat(np.arange(len(laws)), lines), np.tile(z, (len(laws), 1))
+    limits = np.zeros((2, len(laws), max(1, *(len(one.q) for one in laws))))
+    for k, one in enumerate(laws):
+        limits[:, k, : len(one.q)] = np.reshape([(number.least, number.most) for number in one.q], (-1, 2)).T
+    low, high = limits[:, law]
+    q = _starts(laws, t, z, root, limits.shape[2])
 
     def project(rows: NDArray[np.intp], at: Array) -> tuple[Array, Array, Array, Array]:
-        """Weighted distances (r, g, n), infinite where there is no curve, b (r, g, k), and Q, R of the columns."""
-        every = parts(rows, at)
-        exist = np.asarray(np.isfinite(every).all(axis=(0, 3)))[..., None]
-        columns, wanted = (np.where(exist, one, 0.0) * root for one in (every[1:], z[rows % lines, None] - every[0]))
-        basis, back = np.linalg.qr(np.moveaxis(columns, 0, -1))
-        size = abs(np.diagonal(back, axis1=-2, axis2=-1))
-        told = size > 1e-13 * size.max(axis=-1, keepdims=True)  # others add nothing
-        basis = np.where(told[..., None, :], basis, 0.0)
-        along = (wanted[..., None, :] @ basis)[..., 0, :]
-        back = np.where(told[..., :, None] & told[..., None, :], back, np.eye(len(columns)))
-        off = np.where(exist, wanted - (basis @ along[..., None])[..., 0], np.inf)
-        return off, np.linalg.solve(back, along[..., None])[..., 0], basis, back
+        """Weighted distances (r, n), infinite where there is no curve, b (r, k), and Q, R of the columns."""
+        shift, basis, back = _linear(laws, law[rows], at, t, root)
+        off = (wanted[rows] - shift) * root
+        along = (off[:, None] @ basis)[:, 0]
+        off = off - (basis @ along[..., None])[..., 0]
+        b: Array = np.linalg.solve(back, along[..., None])[..., 0].astype(np.float64)
+        return np.where(np.isnan(off), np.inf, off), b, basis, back
 
     def derivatives(rows: NDArray[np.intp]) -> tuple[Array, Array]:
-        """Of the curves at fixed b (r, most, n), and of the columns (k, r, most, n), by q."""
-        beside = np.clip(q[rows, None] + steps, low[rows], high[rows])
-        every, apart = parts(rows, beside), np.einsum("rqq->rq", beside[:, :most] - beside[:, most:])[..., None]
-        by_q = np.nan_to_num((every[:, :, :most] - every[:, :, most:]) / apart, posinf=0.0, neginf=0.0)
-        return by_q[0] + np.einsum("krqn,rk->rqn", by_q[1:], b[rows]), by_q[1:]
+        """Of the curves at fixed b (r, q, n) by q, and the columns with theirs (1 + q, k, r, n)."""
+        every = np.nan_to_num(_curves(laws, law[rows], q[rows], t, limits.shape[2]), posinf=0.0, neginf=0.0)
+        by_q = every[1:, 0] + np.einsum("qkrn,rk->qrn", every[1:, 1:], b[rows])
+        return by_q.transpose(1, 0, 2) * root, every[:, 1:] * root
 
     rows = np.arange(len(q))
-    off, b, basis, back = (part[:, 0] for part in project(rows, q[:, None]))
+    off, b, basis, back = project(rows, q)
+    square = (off**2).sum(axis=1)
     for _ in range(STEPS):
-        # of the distances (Golub and Pereyra, 1973)
-        by_q, columns = (part * root for part in derivatives(rows))
-        turned = np.linalg.solve(back[rows].transpose(0, 2, 1), np.einsum("krqn,rn->rkq", columns, off[rows]))
+        # of the distances, which b follows (Golub and Pereyra, 1973)
+        by_q, columns = derivatives(rows)
+        turned = np.linalg.solve(back[rows].transpose(0, 2, 1), np.einsum("qkrn,rn->rkq", columns[1:], off[rows]))
         by_q += (turned.transpose(0, 2, 1) - by_q @ basis[rows]) @ basis[rows].transpose(0, 2, 1)
-        normal, square = by_q @ by_q.transpose(0, 2, 1), (off[rows] ** 2).sum(axis=1)
+        normal = by_q @ by_q.transpose(0, 2, 1)
         trace = np.trace(normal, axis1=1, axis2=2)
-        moves = (trace > 1e-200) & (trace < np.inf) & (square < np.inf)  # else nothing moves the points
-        rows, square, by_q, normal, trace = (part[moves] for part in (rows, square, by_q, normal, trace))
+        moves = (trace > 1e-200) & (trace < np.inf) & (square[rows] < np.inf)  # else nothing moves the points
+        rows, by_q, normal, trace = (part[moves] for part in (rows, by_q, normal, trace))
         if not rows.size:
             break
-        scale = (np.einsum("rqq->rq", normal) + 1e-12 * trace[:, None])[:, None, None] * np.eye(most)
+        scale = (np.einsum("rqq->rq", normal) + 1e-12 * trace[:, None])[:, None, None] * np.eye(q.shape[1])
         right = (by_q @ off[rows, :, None])[:, None]
         change = np.linalg.solve(normal[:, None] + DAMPINGS[:, None, None] * scale, right)[..., 0]
-        there = np.clip(q[rows, None] + change, low[rows], high[rows])
-        tried = project(rows, there)
-        squares = (tried[0] ** 2).sum(axis=2)
-        best = np.argmin(squares, axis=1)
-        least = np.take_along_axis(squares, best[:, None], axis=1)[:, 0]
-        better = np.flatnonzero(least < square)
+        there = np.clip(q[rows, None] + change, low[rows, None], high[rows, None]).reshape(-1, q.shape[1])
+        tried = project(np.repeat(rows, DAMPINGS.size), there)
+        squares = (tried[0] ** 2).sum(axis=1)
+        best = squares.reshape(rows.size, -1).argmin(axis=1) + np.arange(rows.size) * DAMPINGS.size
+        least, before = squares[best], square[rows]
+        better = least < before
         taken, best = rows[better], best[better]
-        q[taken] = there[better, best]
-        off[taken], b[taken], basis[taken], back[taken] = (part[better, best] for part in tried)
-        rows = taken[(square - least >= 1e-6 * square)[better]]
-    rows = np.arange(len(q))
-    by_q, columns, n = derivatives(rows)[0], parts(rows, q[:, None])[1:, :, 0], t.size
+        q[taken], square[taken] = there[best], squares[best]
+        off[taken], b[taken], basis[taken], back[taken] = (part[best] for part in tried)
+        rows = rows[better & (before - least >= 1e-6 * before)]
+    by_q, columns = derivatives(np.arange(len(q)))
+    jacobian = np.concatenate([by_q.transpose(0, 2, 1), columns[0].transpose(1, 2, 0)], axis=2)
+    left = np.array([n - one.numbers for one in laws])[law]
+    doubt = np.sqrt(square / left if errors is None else np.ones_like(square))[:, None] * _doubts(jacobian)
+    deviance = square
+    if errors is None:  # what rounding leaves
+        deviance = n * np.log(square / n + (ROUNDING * (1 + abs(wanted).max(axis=1))) ** 2)
     found = []
-    for row, law in enumerate(law for law in laws for _ in z):
-        numbers = np.concatenate([q[row, : len(law.q)], b[row, : law.columns]])
-        jacobian = np.concatenate([by_q[row, : len(law.q)], columns[: law.columns, row]]).T
-        floor = (ROUNDING * (1 + abs(z[row % lines]).max())) ** 2  # what rounding leaves
-        square = float(off[row] @ off[row])
-        deviance = n * math.log(square / n + floor) if errors is None else square
-        found.append(Found(law, numbers, np.array(jacobian), off[row] / root, errors, deviance, int(errors is None)))
+    for row, one in enumerate(laws[k] for k in law.tolist()):
+        own = np.r_[: len(one.q), q.shape[1] : q.shape[1] + one.columns]
+        numbers = np.concatenate([q[row], b[row]])[own]
+        of_points = jacobian[row][:, own] / root[:, None], off[row] / root, errors, doubt[row, own]
+        found.append(Found(one, numbers, *of_points, float(deviance[row]), int(errors is None)))
     return found
 
 
-def _parts(laws: Sequence[Law], q: Sequence[Array], t: Array) -> Array:
-    """Shift and columns (1 + k, g, n) of (1) of shapes: laws behind one another, each with its q; the rest is 0."""
-    span, starts = float(t[-1] - t[0]), np.cumsum([0, *map(len, q)])
-    found, s = np.zeros((1 + max(law.columns for law in laws), starts[-1], t.size)), (t - t[0]) / span
-    for law, own, start in zip(laws, q, starts, strict=False):
-        if len(own):
-            for k, part in enumerate(law.parts(own[:, : len(law.q)].T[:, :, None], s, span)):
-                found[k, start : start + len(own)] = part
+def _starts(laws: Sequence[Law], t: Array, z: Array, root: Array, most: int) -> Array:
+    """The q (laws times m, most) of a grid that are nearest to lines z (m, n), law by law."""
+    own = [one for one in laws if not one.starts_as]
+    tries = [np.array(list(itertools.product(*(number.starts for number in one.q)))) for one in own]
+    edges = np.cumsum([0, *map(len, tries)])
+    q = np.zeros((edges[-1], most))
+    for start, some in zip(edges, tries, strict=False):
+        q[start : start + len(some), : some.shape[1]] = some
+    shift, basis, _ = _linear(own, np.repeat(np.arange(len(own)), np.diff(edges)), q, t, root)
+    wanted = (z[:, None] - shift) * root
+    square = (wanted**2).sum(axis=2) - (np.einsum("gnk,mgn->mgk", basis, wanted) ** 2).sum(axis=2)
+    best = {}
+    for one, a, b in zip(own, edges, edges[1:], strict=False):
+        best[one.name] = q[a + np.nanargmin(square[:, a:b], axis=1)]
+    return np.concatenate([best[one.starts_as or one.name] for one in laws])
+
+
+def _linear(laws: Sequence[Law], law: NDArray[np.intp], q: Array, t: Array, root: Array) -> tuple[Array, Array, Array]:
+    """Of (1) at some q: the shift (r, n), NaN where there is no curve, and Q (r, n, k), R of the weighted columns; of
+    those that add nothing to the ones before, 0 and 1."""
+    shift, *columns = _curves(laws, law, q, t)[0]
+    exist = np.isfinite(shift + sum(columns)).all(axis=1, keepdims=True)
+    basis, back = np.linalg.qr(np.moveaxis(np.where(exist, columns, 0.0) * root, 0, -1))
+    size = abs(np.diagonal(back, axis1=-2, axis2=-1))
+    told = size > 1e-13 * size.max(axis=-1, keepdims=True)
+    back = np.where(told[..., :, None] & told[..., None, :], back, np.eye(len(columns)))
+    return np.where(exist, shift, np.nan), np.where(told[..., None, :], basis, 0.0), back
+
+
+def _doubts(columns: Array) -> Array:
+    """Standard errors (r, k) of the numbers of columns (r, n, k) beside noise of 1; inf of what is not determined."""
+    size = np.sqrt((columns**2).sum(axis=1)) + 1e-300
+    _, moved, directions = np.linalg.svd(columns / size[:, None], full_matrices=False)
+    seen = (moved > 1e-8 * moved.max(axis=1, keepdims=True))[..., None]
+    lost = (np.where(seen, 0.0, directions) ** 2).sum(axis=1) > 1e-6
+    change = np.where(seen, directions / np.where(seen, moved[..., None], 1.0), 0.0) / size[:, None]
+    return np.where(lost, np.inf, np.sqrt((change**2).sum(axis=1)))
+
+
+def _curves(laws: Sequence[Law], law: NDArray[np.intp], q: Array, t: Array, derivatives: int = 0) -> Array:
+    """Shift and columns (1, 1 + k, r, n) of (1) of shapes: of rows, which rise, each of a law with its q; the rest
+    is 0. Behind them as many derivatives by q, likewise."""
+    span, edges = float(t[-1] - t[0]), np.searchsorted(law, np.arange(len(laws) + 1))
+    found, s = np.zeros((1 + derivatives, 1 + max(one.columns for one in laws), len(q), t.size)), (t - t[0]) / span
+    for one, a, b in zip(laws, edges, edges[1:], strict=False):
+        if b > a:
+            curve = one.curve(q[a:b, : len(one.q)].T[:, :, None], s, span)
+            for to, parts in zip(found, curve, strict=False):
+                for k, part in enumerate(parts):
+                    to[k, a:b] = part
     return found

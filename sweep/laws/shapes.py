@@ -9,16 +9,18 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.special import expit
 
 from sweep.laws.loglog import Array
 
-Parts = Callable[[Array, Array, float], tuple[Array | float, ...]]
-"""Of q, one behind the other (k, g, 1), s and the span: shift and columns of (1) for each q, (g, n) each; what is the
-same for all q, or at all points, may be less."""
+Parts = tuple[Array | float, ...]
+"""Shift and columns of (1), each at all points (g, n) of all q, or less where it is the same; what is left out is 0."""
+Curve = Callable[[Array, Array, float], Iterator[Parts]]
+"""Of q (k, g, 1), s and the span: the parts of (1), then their derivatives by each of the q."""
 
 
 class Number(NamedTuple):
@@ -34,13 +36,15 @@ class Law(NamedTuple):
 
     name: str
     formula: str
-    parts: Parts
+    curve: Curve
     columns: int
     q: tuple[Number, ...] = ()
     exponents: tuple[str, ...] = ()
     """Names of the exponents, which are the last numbers b."""
     power: bool = True
     """Whether it is a power law or several, and not another function."""
+    starts_as: str = ""
+    """Law that it is if its last q is 0, and starts from."""
 
     @property
     def numbers(self) -> int:
@@ -48,71 +52,125 @@ class Law(NamedTuple):
         return len(self.q) + self.columns
 
 
-def _offset(q: Array, s: Array, span: float) -> Any:
+def _offset(q: Array, s: Array, span: float) -> Iterator[Parts]:
     """q: exponent per window, and the arc tangent of offset over prefactor at the middle."""
-    return np.log(np.exp(q[0] * (s - 0.5)) + np.tan(q[1])), 1.0
+    power, level = np.exp(q[0] * (s - 0.5)), np.tan(q[1])
+    yield np.log(power + level), 1.0
+    yield ((s - 0.5) * power / (power + level),)
+    yield ((1 + level**2) / (power + level),)
 
 
-def _correction(q: Array, s: Array, span: float) -> Any:
+def _correction(q: Array, s: Array, span: float) -> Iterator[Parts]:
     """q: logarithm of 1 + the correction where it is largest, and how fast it fades from there."""
-    return np.log(1 + np.expm1(q[0]) * np.exp(-q[1] * (s - (q[1] < 0)))), 1.0, s
+    way = s - (q[1] < 0)
+    left = np.exp(-q[1] * way)
+    correction = np.expm1(q[0]) * left
+    yield np.log(1 + correction), 1.0, s
+    yield (np.exp(q[0]) * left / (1 + correction),)
+    yield (-way * correction / (1 + correction),)
 
 
-def _log_correction(q: Array, s: Array, span: float) -> Any:
+def _log_correction(q: Array, s: Array, span: float) -> Iterator[Parts]:
     """q: logarithm of B per window."""
-    return 0.0, 1.0, np.log1p(np.exp(q[0]) * s), s
+    rise = np.exp(q[0]) * s
+    yield 0.0, 1.0, np.log1p(rise), s
+    yield 0.0, 0.0, rise / (1 + rise)
 
 
-def _logarithm(q: Array, s: Array, span: float) -> Any:
+def _logarithm(q: Array, s: Array, span: float) -> Iterator[Parts]:
     """q: B per window, over what the brackets are at its middle."""
-    return np.log(1 + q[0] * (s - 0.5)), 1.0, s
+    brackets = 1 + q[0] * (s - 0.5)
+    yield np.log(brackets), 1.0, s
+    yield ((s - 0.5) / brackets,)
 
 
-def _stretched_exponential(q: Array, s: Array, span: float) -> Any:
+def _stretched_exponential(q: Array, s: Array, span: float) -> Iterator[Parts]:
     """q: b per window; the exponent is of size 1 at its large end."""
-    return 0.0, 1.0, np.exp(q[0] * (s - (q[0] > 0)))
+    way = s - (q[0] > 0)
+    yield 0.0, 1.0, np.exp(q[0] * way)
+    yield 0.0, 0.0, way * np.exp(q[0] * way)
 
 
-def _two_exponentials(q: Array, s: Array, span: float) -> Any:
+def _two_exponentials(q: Array, s: Array, span: float) -> Iterator[Parts]:
     """Two laws over x instead of ln x; among them 1/cosh(x/X)."""
-    return TWO.parts(q, np.exp(span * (s - 1)), span)
+    return TWO.curve(q, np.exp(span * (s - 1)), span)
 
 
-def _three(q: Array, s: Array, span: float) -> Any:
-    """q: where the first two laws meet, the logarithm of how much further the other two do, and of the width."""
-    width, place = np.exp(q[2]), q[0] + np.exp(q[1])
-    a, b = (width * np.logaddexp(0, (s - at) / width) for at in (q[0], place))
-    return 0.0, 1.0, s - a, a - b, b
+def _fixed(*columns: Callable[[Array, float], Array]) -> Curve:
+    """A constant and columns of s and the span alone."""
+    return lambda q, s, span: iter([(0.0, 1.0, *(column(s, span) for column in columns))])
 
 
-Bend = Callable[[Any, Any], Any]
-"""b(v; k), which tends to 0 far below and to v far above."""
+def _x(s: Array, span: float) -> Array:
+    """x over the last x."""
+    return np.asarray(np.exp(span * (s - 1)))
 
 
-def _bent(bend: Bend) -> Parts:
+def _s(s: Array, span: float) -> Array:
+    return s
+
+
+Bend = Callable[[Any, Any], Iterator[Any]]
+"""b(v; k), which tends to 0 far below and to v far above, then its derivatives by v and, where it has one, by k."""
+
+
+def _logistic(v: Any, k: Any) -> Iterator[Any]:
+    yield np.logaddexp(0, v)
+    yield expit(v)
+
+
+def _hyperbola(v: Any, k: Any) -> Iterator[Any]:
+    yield 0.5 * (v + np.hypot(v, 1))
+    yield 0.5 * (1 + v / np.hypot(v, 1))
+
+
+def _uneven(v: Any, k: Any) -> Iterator[Any]:
+    """Widths exp(k) below and exp(-k) above."""
+    moved = v + 2 * np.sinh(-k) * math.log(2)
+    above = moved >= 0
+    sign = np.where(above, -1.0, 1.0)
+    width = np.exp(sign * k)
+    b, slope = np.logaddexp(0, moved / width), expit(moved / width)
+    yield width * b + 2 * np.sinh(k) * math.log(2) * above
+    yield slope
+    yield sign * (width * b - moved * slope) + 2 * np.cosh(k) * math.log(2) * (above - slope)
+
+
+def _bent(bend: Bend) -> Curve:
     """Two laws that meet at q0 with a bend of width exp(q1), of shape q2 where it has one."""
 
-    def parts(q: Array, s: Array, span: float) -> Any:
+    def curve(q: Array, s: Array, span: float) -> Iterator[Parts]:
         u, width = s - q[0], np.exp(q[1])
-        b = width * bend(u / width, q[2] if len(q) > 2 else 0.0)
-        return 0.0, 1.0, u - b, b
+        of_shape = bend(u / width, q[2] if len(q) > 2 else 0.0)
+        b = width * next(of_shape)
+        yield 0.0, 1.0, u - b, b
+        slope = next(of_shape)
+        yield 0.0, 0.0, slope - 1, -slope
+        yield 0.0, 0.0, u * slope - b, b - u * slope
+        for by_k in of_shape:
+            yield 0.0, 0.0, -width * by_k, width * by_k
 
-    return parts
+    return curve
 
 
-def _uneven(v: Any, k: Any) -> Any:
-    """Widths exp(k) below and exp(-k) above."""
-    below, above = np.exp(k), np.exp(-k)
-    moved = v + (above - below) * math.log(2)
-    width = np.where(moved < 0, below, above)
-    return width * np.logaddexp(0, moved / width) + np.where(moved < 0, 0.0, (below - above) * math.log(2))
+def _three(q: Array, s: Array, span: float) -> Iterator[Parts]:
+    """q: where the first two laws meet, the logarithm of how much further the other two do, and of the width."""
+    further, width = np.exp(q[1]), np.exp(q[2])
+    u, v = s - q[0], s - q[0] - further
+    a, b = (width * np.logaddexp(0, one / width) for one in (u, v))
+    yield 0.0, 1.0, s - a, a - b, b
+    of_a, of_b = expit(u / width), expit(v / width)
+    yield 0.0, 0.0, of_a, of_b - of_a, -of_b
+    yield 0.0, 0.0, 0.0, further * of_b, -further * of_b
+    a, b = a - u * of_a, b - v * of_b
+    yield 0.0, 0.0, -a, a - b, b
 
 
 GRID = np.sinh(np.linspace(-9.0, 9.0, 361))
 """Where slopes of bends without a closed form are integrated, in widths."""
 
 
-def _integrated(slope: Bend, k_of: Number) -> Bend:
+def _integrated(slope: Callable[[Any, Any], Any], k_of: Number) -> Bend:
     """The bend of a slope that rises from 0 to 1, as k says."""
 
     @functools.cache
@@ -129,7 +187,13 @@ def _integrated(slope: Bend, k_of: Number) -> Bend:
             rows.append(CubicHermiteSpline(GRID, rise, steep)(inside) + moved - inside - np.logaddexp(0, GRID))
         return RectBivariateSpline(np.arcsinh(GRID), shapes, np.array(rows).T)
 
-    return lambda v, k: np.logaddexp(0, v) + surface().ev(np.arcsinh(np.clip(v, GRID[0], GRID[-1])), k)
+    def bend(v: Any, k: Any) -> Iterator[Any]:
+        at = np.arcsinh(np.clip(v, GRID[0], GRID[-1])), k
+        yield np.logaddexp(0, v) + surface().ev(*at)
+        yield expit(v) + surface().ev(*at, 1, 0) / np.hypot(v, 1)
+        yield surface().ev(*at, 0, 1)
+
+    return bend
 
 
 def _powered(v: Any, k: Any) -> Any:
@@ -145,19 +209,20 @@ def _stretched(v: Any, k: Any) -> Any:
 PLACE = Number(-1.0, 2.0, np.linspace(0.1, 0.9, 7))
 WIDTH = Number(-7.0, 1.0, np.log((0.01, 0.04, 0.12, 0.3)))
 POWER = Number(-60.0, 60.0, (-12.0, -6.0, -2.5, 2.5, 6.0, 12.0))
-SKEW, WIDTHS, FADING = Number(-2.5, 2.5, [0.0]), Number(-2.0, 2.0, [0.0]), Number(-1.2, 0.8, [0.0])
+SKEW, WIDTHS, FADING = Number(-2.5, 2.5, ()), Number(-2.0, 2.0, ()), Number(-1.2, 0.8, ())
 
 
 def _two(name: str, formula: str, bend: Bend, *shape: Number) -> Law:
     """Two power laws with a bend."""
-    return Law(name, formula, _bent(bend), 3, (PLACE, WIDTH, *shape), ("p low", "p high"))
+    q, starts_as = (PLACE, WIDTH, *shape), "two laws" if shape else ""
+    return Law(name, formula, _bent(bend), 3, q, ("p low", "p high"), starts_as=starts_as)
 
 
-ONE = Law("one law", "A x^p", lambda q, s, span: (0.0, 1.0, s), 2, exponents=("p",))
-TWO = _two("two laws", "bend fading exponentially", lambda v, k: np.logaddexp(0, v))
+ONE = Law("one law", "A x^p", _fixed(_s), 2, exponents=("p",))
+TWO = _two("two laws", "bend fading exponentially", _logistic)
 BENDS = (
     TWO,
-    _two("two laws, hyperbola", "bend fading as 1/ln x", lambda v, k: 0.5 * (v + np.hypot(v, 1))),
+    _two("two laws, hyperbola", "bend fading as 1/ln x", _hyperbola),
     _two("two laws, asymmetric bend", "fading faster on one side", _integrated(_powered, SKEW), SKEW),
     _two("two laws, two widths", "one width below, another above", _uneven, WIDTHS),
     _two("two laws, stretched bend", "fading as exp(-(ln x)^b)", _integrated(_stretched, FADING), FADING),
@@ -173,10 +238,10 @@ LOG_CORRECTION = Law("logarithmic correction", "A x^p (1 + B ln(x/x0))^c", _log_
 LOGARITHM = Number(-2 + 1e-9, 2 - 1e-9, (-1.9, -1.5, -0.5, 0.5, 1.5, 1.9))
 OTHER_FUNCTIONS = (
     Law("logarithm", "A x^p (1 + B ln x)", _logarithm, 2, (LOGARITHM,), ("p",), power=False),
-    Law("exponential", "A exp(-x/X)", lambda q, s, span: (0.0, 1.0, np.exp(span * (s - 1))), 2, power=False),
+    Law("exponential", "A exp(-x/X)", _fixed(_x), 2, power=False),
     Law("stretched exponential", "A exp(-(x/X)^b)", _stretched_exponential, 2, (POWER,), power=False),
-    Law("cut-off", "A exp(-x/X) x^p", lambda q, s, span: (0.0, 1.0, np.exp(span * (s - 1)), s), 3, (), ("p",), False),
-    Law("lognormal", "A exp(-B ln(x/X)^2)", lambda q, s, span: (0.0, 1.0, s, s**2), 3, power=False),
+    Law("cut-off", "A exp(-x/X) x^p", _fixed(_x, _s), 3, (), ("p",), False),
+    Law("lognormal", "A exp(-B ln(x/X)^2)", _fixed(_s, lambda s, span: s**2), 3, power=False),
     Law("two exponentials", "A exp(-x/X), with a bend to exp(-x/Y)", _two_exponentials, 3, TWO.q, power=False),
 )
 LAWS = (ONE, *OTHER_FUNCTIONS, OFFSET, CORRECTION, *BENDS, THREE)
