@@ -305,7 +305,7 @@ def _child(events, log, kind, output, workers, cells, cluster):
 
 
 def _note_phases(events, output):
-    opened, finish, rename, sync = Store._open, Store.finish, disk.rename, disk.sync_folder
+    opened, finish, rename, sync = Store._take_up, Store.finish, disk.rename, disk.sync_folder
 
     def at_work(self, file):
         opened(self, file)
@@ -325,7 +325,7 @@ def _note_phases(events, output):
         if events.found()[-1][0] == RENAME:
             events.note(AFTER if folder == output.parent else BETWEEN)
 
-    Store._open, Store.finish, disk.rename, disk.sync_folder = at_work, at_its_end, renamed, synced
+    Store._take_up, Store.finish, disk.rename, disk.sync_folder = at_work, at_its_end, renamed, synced
 
 
 def _note_acknowledged(told):

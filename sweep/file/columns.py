@@ -13,7 +13,6 @@ from sweep.cells.partition import row_blocks
 from sweep.cells.reduce import gathered, pending
 from sweep.errors import SweepError
 from sweep.file.reading import Numbers, StoredFile
-from sweep.file.store import unfinished_of
 from sweep.study.model import Study
 
 
@@ -33,16 +32,13 @@ class Result(BackendEntrypoint):
     """A result as xarray opens it, finished or not, the latter unless it is to be `strict`."""
 
     def open_dataset(self, filename_or_obj: Any, *, drop_variables: Any = None, strict: bool = False) -> xr.Dataset:
-        """Raises SweepError when damaged numbers are read, one of DAMAGE at once."""
+        """Raises as `StoredFile` does, and SweepError when damaged numbers are read."""
         path = Path(filename_or_obj)
         file, columns = StoredFile(path), {}
-        if not file.ending:
-            if path.suffix != unfinished_of(path).suffix:
-                raise OSError("what was written at its end is damaged")
-            if strict:
-                done = file.tables[file.work].done
-                left = f"{int((~done).sum())} of {done.size} blocks are missing"
-                raise SweepError(f"{path}: unfinished, {left}; run its sweep again to continue")
+        if strict and not file.ending:
+            done = file.tables[file.work].done
+            left = f"{int((~done).sum())} of {done.size} blocks are missing"
+            raise SweepError(f"{path}: unfinished, {left}; run its sweep again to continue")
         for name, numbers in file.columns().items() if file.ending or file.work == "cells" else ():
             chunks = dict(zip(numbers.dims, (*numbers.table.box, *numbers.own), strict=True))
             lazy = indexing.LazilyIndexedArray(Column(numbers))

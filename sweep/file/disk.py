@@ -41,6 +41,12 @@ def sync_numbers(fd: int) -> None:
     getattr(os, "fdatasync", os.fsync)(fd)
 
 
+def forget(fd: int) -> None:
+    """What another machine has written is read from the disk, not from what this one remembers of the file (NFS)."""
+    if hasattr(os, "posix_fadvise"):
+        os.posix_fadvise(fd, 0, 0, os.POSIX_FADV_DONTNEED)
+
+
 def reserve(fd: int, size: int) -> None:
     """Gives a file its length, and room on the disk for all of it where the system can. Raises OSError."""
     if hasattr(os, "posix_fallocate"):
@@ -171,6 +177,15 @@ def locked(path: Path) -> Iterator[bool]:
             with contextlib.suppress(OSError):
                 remove(path)
         os.close(fd)
+
+
+def mark(path: Path) -> tuple[int, ...]:
+    """What another file of this name has not, nor this one once it is changed; () where there is none, or cannot be."""
+    try:
+        found = path.stat()
+    except OSError:
+        return ()
+    return found.st_ino, found.st_size, found.st_mtime_ns
 
 
 def free(path: Path) -> int:

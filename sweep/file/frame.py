@@ -104,14 +104,18 @@ def create(path: Path, schema: Schema, cuts: Mapping[str, Cut], shared: bool = F
         disk.reserve(fd, image.size)
         for at, page in image.pages.items():
             disk.write_all(fd, (page[: image.size - at],), at)
-        file = StoredFile(path)
-        for column in (column for table in file.tables.values() for column in table.columns if column.check):
-            _write_pending(fd, column)
-        file.key = digest_before(fd, file.key_at)
-        disk.write_all(fd, (file.key,), file.key_at)
-        disk.fsync(fd)
     finally:
         os.close(fd)
+    file = StoredFile(path, os.O_RDWR)
+    try:
+        for column in (column for table in file.tables.values() for column in table.columns if column.check):
+            _write_pending(file.fd, column)
+        file.key = digest_before(file.fd, file.key_at)
+        disk.write_all(file.fd, (file.key,), file.key_at)
+        disk.fsync(file.fd)
+    except OSError:
+        file.close()
+        raise
     return file
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import errno
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -11,15 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 from sweep.cells.schema import Schema
 from sweep.errors import SweepError
-from sweep.file.reading import DAMAGE, StoredFile
+from sweep.file import disk
+from sweep.file.reading import StoredFile
 from sweep.file.store import unfinished_of
 from sweep.words import as_path
 
 if TYPE_CHECKING:
     import xarray as xr
 
-OF_DAMAGE = (errno.EINVAL, errno.EOVERFLOW)
-"""What the system says where a damaged file sends one to a place that cannot be."""
 MEMORY_SHARE = 0.25
 """Results larger than this share of the memory are opened in pieces (dask)."""
 
@@ -71,14 +69,10 @@ def _open(place: Path, strict: bool = False, chunks: Any = None) -> xr.Dataset:
 
     from sweep.file.columns import Result
 
-    try:
-        if chunks is None and place.stat().st_size > MEMORY_SHARE * memory():
-            chunks = "auto"
-        return xr.open_dataset(os.fspath(place), engine=Result, chunks=chunks, strict=strict)
-    except (FileNotFoundError, NotADirectoryError):
-        raise
-    except DAMAGE as fault:
-        raise unreadable(place, fault) from None
+    _, size, _ = disk.mark(place) or (0, 0, 0)
+    if chunks is None and size > MEMORY_SHARE * memory():
+        chunks = "auto"
+    return xr.open_dataset(os.fspath(place), engine=Result, chunks=chunks, strict=strict)
 
 
 def in_memory(plan: Schema, arrays: Mapping[str, Any]) -> xr.Dataset:
@@ -94,11 +88,8 @@ def in_memory(plan: Schema, arrays: Mapping[str, Any]) -> xr.Dataset:
 
 def stored_fingerprint(output: Path) -> dict[str, str]:
     """Fingerprint of a result. Raises SweepError where the file cannot be read, or is none of ours."""
-    try:
-        with StoredFile(output) as file:
-            return file.fingerprint
-    except DAMAGE as fault:
-        raise unreadable(output, fault) from None
+    with StoredFile(output) as file:
+        return file.fingerprint
 
 
 def memory() -> int:
@@ -107,15 +98,3 @@ def memory() -> int:
         return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     except (AttributeError, ValueError, OSError):
         return 8 << 30
-
-
-def unreadable(output: Path, fault: Exception) -> SweepError:
-    """What a user is told of a file that is no result."""
-    if output.is_dir():
-        return SweepError(f"{output}: is a folder, not the result of a sweep")
-    if isinstance(fault, OSError) and fault.errno and fault.errno not in OF_DAMAGE:
-        return SweepError(f"{output}: cannot be read ({os.strerror(fault.errno)})")
-    return SweepError(
-        f"{output}: not the result of a sweep (exports are for xarray and other programs), or damaged; move it away or "
-        "choose another name"
-    )

@@ -8,16 +8,16 @@ thread. A table in the file has a digest of each chunk, a row of them for each b
 
 from __future__ import annotations
 
-import contextlib
+import bisect
+import errno
 import itertools
 import json
 import math
 import os
 import stat
 import struct
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +33,8 @@ from sweep.file.fletcher import checksum
 from sweep.study.model import study_together
 
 FORMAT = 5
+UNFINISHED = ".unfinished"
+"""How the name of a result ends while its sweep runs."""
 BYTES, ENDING_BYTES = 16, 256
 """Of a digest; of what is written when all is done: JSON, and its digest."""
 READERS = 4
@@ -47,57 +49,77 @@ OF_NETCDF = {"CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_Netcdf4Coord
 """Attributes that say nothing to a user."""
 DAMAGE = (OSError, EOFError, LookupError, ValueError, TypeError, AttributeError, RuntimeError)
 """What comes of reading a damaged file."""
+OF_DAMAGE = (errno.EINVAL, errno.EOVERFLOW)
+"""What the system says where a damaged file sends one to a place that cannot be."""
+
+
+class Damaged(SweepError):
+    """What is read is no result of this program, or is damaged beside its numbers: `reason` says where."""
+
+    reason = ""
 
 
 class StoredFile:
-    """A result of this program, open for reading. To be used with `with`.
+    """A result of this program, open for reading, or for writing by other `flags`. To be used with `with`.
 
     Of a column or a coordinate `file[name]` gives `dims`, `attrs`, and its numbers as `values` or by indices. `tables`
     are "cells", the output's columns, and of a summary "rows", which they are made of; `work` names the one that is
-    computed. `ending` is what is known at the end, empty before: then what is missing or damaged is handed out as NaN
-    and PENDING. `key`, the digest of all that stands before it, tells this file from any other.
+    computed. `attrs` are those of the file, texts as str. `ending` is what is known at the end, empty before: then what
+    is missing or damaged is handed out as NaN and PENDING. `key`, the digest of all that stands before it, tells this
+    file from any other.
 
     Raises
     ------
-    OSError, ValueError and others of DAMAGE
-        It cannot be read, is none of ours, or is damaged beside the numbers.
+    Damaged
+        It is none of ours, or damaged beside the numbers.
+    FileNotFoundError, NotADirectoryError
+        There is none.
     SweepError
-        It is of another format.
+        It cannot be read, or is of another format.
     """
 
-    def __init__(self, path: Path) -> None:
-        self.path, self.fd = path, disk.open_file(path, os.O_RDONLY)
+    def __init__(self, path: Path, flags: int = os.O_RDONLY) -> None:
+        self.path, self.fd = Path(path), -1
         try:
-            with self.hdf5() as file:
-                attrs = _own(file, "integrity").attrs
-                if (number := attrs.get("format")) != FORMAT:
-                    raise SweepError(
-                        f"{path}: a result of another format ({number}); this version of foliot reads format {FORMAT} "
-                        "alone; open it with the version that wrote it, or compute it again under another name"
-                    )
-                contents = json.loads(attrs["contents"])
-                self._dims = {name: tuple(dims) for name, dims in contents["dims"].items()}
-                self.key_at, self.ending_at = (_own(file, f"integrity/{k}").id.get_offset() for k in ("key", "ending"))
-                self.key, ending = (
-                    read_bytes(self.fd, self.key_at, BYTES),
-                    read_bytes(self.fd, self.ending_at, ENDING_BYTES),
-                )
-                self.tables = {name: Table(self, file, name, **keys) for name, keys in contents["tables"].items()}
-            self.ending = ending_of(ending)
-        except BaseException:
+            self.fd = disk.open_file(path, flags)
+            self._read()
+            if not self.ending and flags == os.O_RDONLY and self.path.suffix != UNFINISHED:
+                raise ValueError("what was written at its end is damaged")
+        except BaseException as fault:
             self.close()
-            raise
-        self.work = "rows" if "rows" in self.tables else "cells"
+            if isinstance(fault, FileNotFoundError | NotADirectoryError) or not isinstance(fault, DAMAGE):
+                raise
+            raise _refusal(self.path, fault) from fault
 
-    @contextlib.contextmanager
-    def hdf5(self) -> Iterator[Any]:
-        """The file as HDF5 sees it, whatever has its name by now. Raises one of DAMAGE."""
+    def _read(self) -> None:
+        """All but numbers, by HDF5, which checks that, whatever has the file's name by now. Raises one of DAMAGE."""
         import h5py
 
         if not stat.S_ISREG(os.fstat(self.fd).st_mode) or read_bytes(self.fd, 0, len(SIGNATURE)) != SIGNATURE:
             raise ValueError("it is no file of HDF5")
         with os.fdopen(os.dup(self.fd), "rb", 0) as raw, h5py.File(raw, "r") as file:
-            yield file
+            integrity = _own(file, "integrity").attrs
+            if (number := integrity.get("format")) != FORMAT:
+                raise SweepError(
+                    f"{self.path}: a result of another format ({number}); this version of foliot reads format {FORMAT} "
+                    "alone; open it with the version that wrote it, or compute it again under another name"
+                )
+            contents = json.loads(integrity["contents"])
+            self.dims = {name: tuple(dims) for name, dims in contents["dims"].items()}
+            self.key_at, self.ending_at = (_own(file, f"integrity/{k}").id.get_offset() for k in ("key", "ending"))
+            self.key = read_bytes(self.fd, self.key_at, BYTES)
+            self.ending = ending_of(read_bytes(self.fd, self.ending_at, ENDING_BYTES))
+            self.tables = {name: Table(self, file, name, **keys) for name, keys in contents["tables"].items()}
+            self.coords = {}
+            for name in self.dims.keys() - self.columns():
+                data = _own(file, name)
+                attrs, values = _attrs(data), data[()]
+                if attrs.pop("_Encoding", None):
+                    values = np.char.decode(values.view(f"S{values.shape[-1]}")[..., 0], "utf-8")
+                self.coords[name] = Coordinate(name, self.dims[name], values, attrs)
+            attrs = _attrs(file)
+        self.work = "rows" if "rows" in self.tables else "cells"
+        self.attrs = {**attrs, "study_json": study_together(attrs["study_json"], self.coords), **self.ending}
 
     def __enter__(self) -> StoredFile:
         return self
@@ -109,11 +131,11 @@ class StoredFile:
         self.close()
 
     def __reduce__(self) -> Any:
-        return _again, (self.path, self.key)
+        return again, (self.path, self.key)
 
     def close(self) -> None:
         """Gives the file back; nothing can be read from then on."""
-        fd, self.fd = getattr(self, "fd", -1), -1
+        fd, self.fd = self.fd, -1
         if fd >= 0:
             os.close(fd)
 
@@ -121,32 +143,6 @@ class StoredFile:
         """Whether all but numbers is as it was made, and as long; HDF5 does not check all of it. Raises OSError."""
         size = int.from_bytes(read_bytes(self.fd, *FILE_END), "little")
         return os.fstat(self.fd).st_size == size and digest_before(self.fd, self.key_at) == self.key
-
-    @cached_property
-    def _described(self) -> tuple[dict[str, Any], dict[str, dict[str, Any]], dict[str, Coordinate]]:
-        """Attributes of the file; attributes of each variable; coordinates. Raises one of DAMAGE."""
-        about, coords = {}, {}
-        with self.hdf5() as file:
-            for name, dims in self._dims.items():
-                data = _own(file, name)
-                about[name] = attrs = _attrs(data)
-                if name not in self.columns():
-                    values = data[()]
-                    if attrs.pop("_Encoding", None):
-                        values = np.char.decode(values.view(f"S{values.shape[-1]}")[..., 0], "utf-8")
-                    coords[name] = Coordinate(name, dims, values, attrs)
-            attrs = _attrs(file)
-        return {**attrs, "study_json": study_together(attrs["study_json"], coords), **self.ending}, about, coords
-
-    @property
-    def attrs(self) -> dict[str, Any]:
-        """Attributes of the file, and what is known at the end; texts as str."""
-        return dict(self._described[0])
-
-    @property
-    def coords(self) -> dict[str, Coordinate]:
-        """Its coordinates."""
-        return dict(self._described[2])
 
     @property
     def fingerprint(self) -> dict[str, str]:
@@ -158,7 +154,7 @@ class StoredFile:
         return {column.name: column for column in self.tables[name].columns}
 
     def __contains__(self, name: str) -> bool:
-        return name in self._dims
+        return name in self.dims
 
     def __getitem__(self, name: str) -> Any:
         return self.coords[name] if name in self.coords else self.columns()[name]
@@ -196,62 +192,66 @@ class Table:
         """Which of some blocks are not what was written."""
         return [block for block in blocks if any(column.read(block) is None for column in self.columns)]
 
-    def write(self, fd: int, block: int, arrays: Mapping[str, Any]) -> bytes:
+    def write(self, block: int, arrays: Mapping[str, Any]) -> bytes:
         """Writes the chunks of a block, and gives their digests. Raises OSError."""
         row = b""
         for column in self.columns:
             array, behind = np.ascontiguousarray(arrays[column.name], column.dtype), b""
             if column.check:
                 behind = bytes(column.size - array.nbytes) + checksum(array, column.size)
-            disk.write_all(fd, (array, behind), int(column.at[block]))
+            disk.write_all(self.file.fd, (array, behind), int(column.at[block]))
             row += column.digest(block, array, behind)
         return row
 
-    def write_digests(self, fd: int, digests: Mapping[int, bytes]) -> None:
+    def write_digests(self, digests: Mapping[int, bytes]) -> None:
         """Writes those of some blocks, neighbouring ones at once. Raises OSError."""
         for _, some in itertools.groupby(enumerate(sorted(digests)), lambda pair: pair[1] - pair[0]):
             blocks = [block for _, block in some]
             rows = np.frombuffer(b"".join(digests[block] for block in blocks), "u1")
-            disk.write_all(fd, (rows,), self.digests_at + blocks[0] * self.row_bytes)
+            disk.write_all(self.file.fd, (rows,), self.digests_at + blocks[0] * self.row_bytes)
             self.digests[blocks] = rows.reshape(len(blocks), -1, BYTES)
 
 
 class Numbers:
     """A column over its grid: numbers by indices and slices with positive steps for each dimension, checked.
 
-    Each cell has the shape `own`, each chunk `size` bytes and a checksum of `check` bytes behind it, a single number
-    none. Raises ValueError where it has another shape than it was made with.
+    Each cell has the shape `own`, each chunk, which begins at one of `at`, `size` bytes and a checksum of `check` bytes
+    behind it, a single number none. Raises ValueError where it has another shape, or other chunks, than it was made
+    with.
     """
 
     def __init__(self, table: Table, number: int, data: Any) -> None:
-        self.table, self.number, self.path = table, number, data.name
-        self.name, self.shape, self.dtype, grid = data.name.split("/")[-1], data.shape, data.dtype, table.grid
+        self.table, self.number, path, grid, count = table, number, data.name, table.grid, table.blocks.count
+        self.name, self.shape, self.dtype, self.attrs = path.split("/")[-1], data.shape, data.dtype, _attrs(data)
         self.own, self.check = data.shape[len(grid) :], 4 * data.fletcher32
-        self.dims = table.file._dims.get(self.name, ())
+        self.dims = table.file.dims.get(self.name, ())
         self.size = self.dtype.itemsize * math.prod((*table.box, *self.own))
         if data.shape[: len(grid)] != grid or (data.chunks or ()) != (*table.box, *self.own):
-            raise ValueError(f"{self.path} has another shape than it was made with")
+            raise ValueError(f"{path} has another shape than it was made with")
+        if not self.check:
+            self.at = np.array([data.id.get_offset()])
+            return
+        # that HDF5 counts them has it compare the checksums of its tables
+        chunks = {block: self._chunk(data, block) for block in (0, count // 2, count - 1)}
+        if data.id.get_num_chunks() != count or any(chunk[1:] != (0, self.size + 4) for chunk in chunks.values()):
+            raise ValueError(f"{path} has other chunks than it was made with")
+        # HDF5 has put them at one distance, but maybe the first ones into a gap before; where that ends is halved for
+        last = chunks[count - 1][0]
+        step = last - self._chunk(data, max(0, count - 2))[0]
+        self.at = last - step * np.arange(count)[::-1]
+        gap = bisect.bisect_left(range(count), True, key=lambda block: self._chunk(data, block)[0] == self.at[block])
+        self.at[:gap] = chunks[0][0] + step * np.arange(gap)
+        if any(chunk[0] != self.at[block] for block, chunk in chunks.items()):
+            raise ValueError(f"{path} has its chunks in other places than it was made with")
+
+    def _chunk(self, data: Any, block: int) -> tuple[int, int, int]:
+        """Where HDF5 has a chunk, which filters it left out, and its bytes with checksum."""
+        corner = np.unravel_index(self.table.blocks.first(block), self.table.grid)
+        found = data.id.get_chunk_info_by_coord((*map(int, corner), *(0 for _ in self.own)))
+        return found.byte_offset, found.filter_mask, found.size
 
     def __reduce__(self) -> Any:
         return _column, (self.table.file, self.table.name, self.number)
-
-    @cached_property
-    def at(self) -> Any:
-        """Where each chunk begins: ndarray of int64. Raises ValueError where HDF5 has others, and OSError."""
-        with self.table.file.hdf5() as file:
-            data = _own(file, self.path)
-            if not self.check:
-                return np.array([data.id.get_offset()])
-            chunks: list[Any] = []
-            data.id.chunk_iter(chunks.append)
-        if len(chunks) != self.table.blocks.count or {(0, self.size + 4)} != {(c.filter_mask, c.size) for c in chunks}:
-            raise ValueError(f"{self.path} has other chunks than it was made with")
-        return np.array([chunk.byte_offset for chunk in chunks])
-
-    @property
-    def attrs(self) -> Mapping[str, Any]:
-        """Its attributes, of a column of the output."""
-        return self.table.file._described[1][self.name]
 
     @property
     def values(self) -> Any:
@@ -276,7 +276,7 @@ class Numbers:
         behind = bytearray(self.size + self.check - found.nbytes)
         try:
             disk.read_all(self.table.file.fd, (found, behind), int(self.at[block]))
-        except DAMAGE:
+        except (OSError, EOFError):
             return None
         digest = self.table.digests[block, self.number].tobytes()
         return found if self.digest(block, found, behind) == digest else None
@@ -288,33 +288,38 @@ class Numbers:
         place, left = key.index(Ellipsis), len(self.shape) - len(key) + 1
         key = (*key[:place], *[slice(None)] * left, *key[place + 1 :])
         grid, box = self.table.grid, self.table.box
+        runs = [
+            range(n)[k if isinstance(k, slice) else slice(k, k + 1 or None)] for n, k in zip(grid, key, strict=False)
+        ]
+        out = np.empty((*map(len, runs), *self.own), self.dtype)
         counts = [-(-n // m) for n, m in zip(grid, box, strict=True)]
-        slices = [k if isinstance(k, slice) else slice(k, k + 1 or None) for k in key[: len(grid)]]
-        runs = [range(n)[k] for n, k in zip(grid, slices, strict=True)]
-        starts, stops = [run[0] if run else 0 for run in runs], [run[-1] + 1 if run else 0 for run in runs]
-        out = np.empty((*np.subtract(stops, starts), *self.own), self.dtype)
 
         def fill(corner: tuple[int, ...]) -> None:
             """Reads what is wanted of one block, straight to its place where it can."""
-            spans = [(at * m, min((at + 1) * m, n)) for at, m, n in zip(corner, box, grid, strict=True)]
-            there: Any = [slice(max(a - start, 0), b - start) for (a, b), start in zip(spans, starts, strict=True)]
+            there: list[Any] = []
+            here: list[Any] = []
+            whole = []
+            for at, m, n, run in zip(corner, box, grid, runs, strict=True):
+                begin, end = at * m, min((at + 1) * m, n)
+                low, high = (min(max(0, -((run.start - x) // run.step)), len(run)) for x in (begin, end))
+                there.append(slice(low, high))
+                here.append(slice(run[low] - begin, run[high - 1] - begin + 1, run.step))
+                whole.append(end - begin)
             view = out[(*there, ...)]
-            whole = (*(b - a for a, b in spans), *self.own)
-            cells = view if view.shape == whole and view.flags.c_contiguous else np.empty(whole, self.dtype)
+            shape = (*whole, *self.own)
+            cells = view if view.shape == shape and view.flags.c_contiguous else np.empty(shape, self.dtype)
             self._checked(int(np.ravel_multi_index(corner, counts)) if grid else 0, cells)
             if cells is not view:
-                parts = zip(spans, starts, stops, strict=True)
-                view[...] = cells[tuple(slice(max(start - a, 0), stop - a) for (a, _), start, stop in parts)]
+                view[...] = cells[(*here, ...)]
 
-        corners = itertools.product(*(range(a // m, -(-b // m)) for a, b, m in zip(starts, stops, box, strict=True)))
+        corners = itertools.product(*(sorted({at // m for at in run}) for run, m in zip(runs, box, strict=True)))
         if out.nbytes < LARGE:
             for corner in corners:
                 fill(corner)
         else:
             with ThreadPoolExecutor(READERS) as pool:
                 list(pool.map(fill, corners))
-        steps = (slice(None, None, run.step) if isinstance(k, slice) else 0 for k, run in zip(key, runs, strict=False))
-        return out[(*steps, *key[len(grid) :])]
+        return out[(*(slice(None) if isinstance(k, slice) else 0 for k in key[: len(grid)]), *key[len(grid) :])]
 
     def _checked(self, block: int, out: Any) -> None:
         """Fills in the cells of a block. Raises SweepError where it is damaged, or the file is closed."""
@@ -333,12 +338,27 @@ class Numbers:
         out[...] = {STATUS: int(Status.PENDING), METHOD_USED: -1}.get(self.name, math.nan)
 
 
-def _again(path: Path, key: bytes) -> StoredFile:
+def again(path: Path, key: bytes, flags: int = os.O_RDONLY) -> StoredFile:
     """A file once more, in another process or from a pickle. Raises SweepError where another has its name by now."""
-    file = StoredFile(path)
+    file = StoredFile(path, flags)
     if file.key != key:
+        file.close()
         raise SweepError(f"{path}: was replaced since it was opened; open it again")
     return file
+
+
+def _refusal(path: Path, fault: BaseException) -> SweepError:
+    """What a user is told of a file that cannot be read, or is no result."""
+    if disk.mark(path) and not path.is_file():
+        return SweepError(f"{path}: is {'a folder' if path.is_dir() else 'no file'}, not the result of a sweep")
+    if isinstance(fault, OSError) and fault.errno and fault.errno not in OF_DAMAGE:
+        return SweepError(f"{path}: cannot be read ({os.strerror(fault.errno)})")
+    refused = Damaged(
+        f"{path}: not the result of a sweep (exports are for xarray and other programs), or damaged; move it away or "
+        "choose another name"
+    )
+    refused.reason = (str(fault).splitlines() or [type(fault).__name__])[0]
+    return refused
 
 
 def _column(file: StoredFile, table: str, number: int) -> Numbers:

@@ -18,8 +18,6 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +27,7 @@ from sweep.cells.schema import Schema
 from sweep.errors import Incomplete, SweepError
 from sweep.file import disk
 from sweep.file.frame import PAGE, Cut, create
-from sweep.file.reading import BYTES, DAMAGE, StoredFile, Table, ending_text, read_bytes
+from sweep.file.reading import BYTES, UNFINISHED, Damaged, StoredFile, Table, ending_text, read_bytes
 
 SYNC_SECONDS = 0.2
 """How often blocks are brought to the disk, and it is looked whether the file is still in its place."""
@@ -40,41 +38,12 @@ Gather = Callable[[StoredFile, int], Mapping[str, Any]]
 
 def unfinished_of(output: Path) -> Path:
     """Where a result is while its sweep runs."""
-    return output.with_name(output.name + ".unfinished")
+    return output.with_name(output.name + UNFINISHED)
 
 
 def lock_of(output: Path) -> Path:
     """What is locked while a sweep runs; a killed one leaves it behind."""
     return output.with_name(output.name + ".lock")
-
-
-@dataclass(frozen=True)
-class Shared:
-    """A file that other processes write blocks to, if they see it by the path at which the owner of its lock does."""
-
-    path: str
-    key: bytes
-
-    def __reduce__(self) -> Any:
-        return Shared, (self.path, self.key)  # what is open here is of no use elsewhere
-
-    def opened(self) -> int | None:
-        """A file descriptor; None where this process does not see the file, or may not write to it."""
-        try:
-            if self._file.key == self.key:
-                return disk.open_file(self.path, os.O_RDWR)
-        except (*DAMAGE, SweepError):
-            pass
-        return None
-
-    @cached_property
-    def _file(self) -> StoredFile:
-        return StoredFile(Path(self.path))
-
-    @property
-    def table(self) -> Table:
-        """What is computed."""
-        return self._file.tables[self._file.work]
 
 
 class Store:
@@ -87,9 +56,8 @@ class Store:
         self.output, self.path = output, unfinished_of(output)
         self.temporary = self.path.with_name(self.path.name + ".tmp")
         self.file: StoredFile | None = None
-        self._fd, self._size = -1, 0
         self._waiting: deque[tuple[int, bytes]] = deque()
-        self._synced, self._committing = time.monotonic(), threading.Lock()
+        self._synced, self._size, self._elsewhere = time.monotonic(), 0, False
         self._checked: Future[list[int]] | None = None
         self._closing = threading.Event()
 
@@ -104,12 +72,11 @@ class Store:
         if not self.path.exists():
             return None
         try:
-            file = StoredFile(self.path)
-            if file.is_as_made() and all(column.at.size for column in file.tables[file.work].columns):
+            file = StoredFile(self.path, os.O_RDWR)
+            if file.is_as_made():
                 return file
-        except DAMAGE as fault:
-            if isinstance(fault, OSError) and fault.errno:
-                raise SweepError(f"{self.path}: cannot be read ({fault.strerror})") from fault
+        except Damaged:
+            pass
         raise SweepError(f"{self.path}: damaged beside its numbers; remove it, or give it up with --force")
 
     def begin(self, schema: Schema, cuts: Mapping[str, Cut], shared: bool = False) -> None:
@@ -124,36 +91,31 @@ class Store:
                     disk.remove(self.temporary)
                 raise
             file.path = self.path
-            self._open(file)
+            self._take_up(file)
 
     def resume(self, file: StoredFile) -> None:
         """Takes up what an earlier run left, which is compared with its digests meanwhile. Raises SweepError."""
-        self._open(file)
+        self._take_up(file)
         done = np.flatnonzero(self.table.done).tolist()
+        left = itertools.takewhile(lambda block: not self._closing.is_set(), done)
+        self._checked = ThreadPoolExecutor(1).submit(self.table.damaged, left)
 
-        def check() -> list[int]:
-            left = itertools.takewhile(lambda block: not self._closing.is_set(), done)
-            return file.tables[file.work].damaged(left)
-
-        self._checked = ThreadPoolExecutor(1).submit(check)
-
-    def _open(self, file: StoredFile) -> None:
-        with disk.refusing(self.path):
-            self._fd = disk.open_file(self.path, os.O_RDWR)
-            if file.ending:  # it was killed just before it was renamed, or is taken up again
-                file.ending = {}
-                disk.write_all(self._fd, (ending_text({}),), file.ending_at)
-        self.file, self._size = file, os.fstat(self._fd).st_size
+    def _take_up(self, file: StoredFile) -> None:
+        if file.ending:  # it was killed just before it was renamed, or is taken up again
+            file.ending = {}
+            with disk.refusing(self.path):
+                disk.write_all(file.fd, (ending_text({}),), file.ending_at)
+        self.file, self._size = file, os.fstat(file.fd).st_size
 
     def _check(self) -> None:
         """Raises Incomplete where the file is not what it was, or not where it was: no block of ours counts there."""
         assert self.file is not None
-        ours, at = os.fstat(self._fd), self.file.key_at
+        ours = os.fstat(self.file.fd)
         try:
             there = os.path.samestat(self.path.stat(), ours)
         except OSError as fault:
             there = not isinstance(fault, FileNotFoundError | NotADirectoryError)  # a network may be slow to answer
-        if not there or ours.st_size < self._size or read_bytes(self._fd, at, BYTES) != self.file.key:
+        if not there or ours.st_size < self._size or read_bytes(self.file.fd, self.file.key_at, BYTES) != self.file.key:
             raise Incomplete(
                 f"{self.path}: was moved, removed, cut or overwritten while the run wrote to it; if it was moved, move "
                 "it back, and the same command continues; else remove what is left, and begin anew"
@@ -171,40 +133,38 @@ class Store:
     def put(self, index: int, arrays: Mapping[str, Any]) -> None:
         """Writes a block; it is acknowledged by `tick`, with others. Raises SweepError."""
         with disk.refusing(self.path):
-            self._waiting.append((index, self.table.write(self._fd, index, arrays)))
+            self._waiting.append((index, self.table.write(index, arrays)))
 
     def take(self, index: int, digests: bytes) -> None:
         """Acknowledges, by `tick`, a block that another process has written and synced."""
+        self._elsewhere = True
         self._waiting.append((index, digests))
 
     def tick(self) -> None:
         """Acknowledges what is written, if it is time to. Raises SweepError."""
-        if time.monotonic() - self._synced >= SYNC_SECONDS and self._committing.acquire(blocking=False):
-            try:
-                self._commit()
-            finally:
-                self._committing.release()
+        if time.monotonic() - self._synced >= SYNC_SECONDS:
+            self._commit()
 
     def commit(self) -> None:
         """Acknowledges all that is written, and brings that to the disk too. Raises SweepError."""
-        with self._committing:
-            self._commit()
-            with disk.refusing(self.path):
-                disk.sync_numbers(self._fd)
+        self._commit()
+        with disk.refusing(self.path):
+            disk.sync_numbers(self.table.file.fd)
 
     def _commit(self) -> None:
+        """By one thread at a time."""
         self._check()
         self._synced = time.monotonic()
         waiting = dict(self._waiting.popleft() for _ in range(len(self._waiting)))
         with disk.refusing(self.path):
             if waiting:
-                disk.sync_numbers(self._fd)
-                self.table.write_digests(self._fd, waiting)
+                disk.sync_numbers(self.table.file.fd)
+                self.table.write_digests(waiting)
 
     def _undo(self, blocks: Iterable[int]) -> None:
         """Takes blocks out of those that are done. Raises SweepError."""
         with disk.refusing(self.path):
-            self.table.write_digests(self._fd, dict.fromkeys(blocks, bytes(self.table.row_bytes)))
+            self.table.write_digests(dict.fromkeys(blocks, bytes(self.table.row_bytes)))
 
     def finish(self, texts: Mapping[str, str], gather: Gather | None) -> list[int]:
         """Puts the result in its place, with what is known at the end; of a summary, its rows are gathered first.
@@ -212,25 +172,25 @@ class Store:
         Returns the blocks that turned out to be damaged, or are not acknowledged: there are none, or the result stays
         where it is, and they have to be computed again. Raises SweepError.
         """
-        assert self.file is not None
+        file, cells = self.table.file, self.table.file.tables["cells"]
         with disk.refusing(self.output):
             self.commit()
+            if self._elsewhere:
+                disk.forget(file.fd)
             checked, self._checked = self._checked, None
             self._undo(checked.result() if checked is not None else [])
             found = self.missing()
-            cells = self.file.tables["cells"]
             if not found and gather is not None:
                 found = self.table.damaged(range(self.table.blocks.count))
                 self._undo(found)
                 if not found:
-                    blocks = range(cells.blocks.count)
-                    digests = {block: cells.write(self._fd, block, gather(self.file, block)) for block in blocks}
-                    disk.sync_numbers(self._fd)
-                    cells.write_digests(self._fd, digests)
+                    digests = {block: cells.write(block, gather(file, block)) for block in range(cells.blocks.count)}
+                    disk.sync_numbers(file.fd)
+                    cells.write_digests(digests)
             if found:
                 return found
-            disk.write_all(self._fd, (ending_text(texts),), self.file.ending_at)
-            disk.fsync(self._fd)
+            disk.write_all(file.fd, (ending_text(texts),), file.ending_at)
+            disk.fsync(file.fd)
             last = cells.blocks.count - 1
             if cells.damaged({0, last // 2, last}):
                 raise SweepError(
@@ -247,14 +207,13 @@ class Store:
             disk.sync_folder(self.output.parent)
             file = self.found()
             assert file is not None
-            self._open(file)
+            self._take_up(file)
             self._undo(damaged)
 
-    def shared(self) -> Shared | None:
-        """What another process needs to write blocks to the file; None where blocks of two would share a page."""
-        assert self.file is not None
+    def shared(self) -> tuple[Path, bytes] | None:
+        """By what another process opens the file to write blocks; None where blocks of two would share a page."""
         paged = not any((column.at % PAGE).any() for column in self.table.columns)
-        return Shared(str(self.path), self.file.key) if paged else None
+        return (self.path, self.table.file.key) if paged else None
 
     def discard(self) -> None:
         """Removes what is there. Raises SweepError."""
@@ -266,13 +225,10 @@ class Store:
         self._closing.set()
         if self._checked is not None:
             self._checked.result()
-        if self._fd >= 0:
+        if self.file is not None:
             with contextlib.suppress(SweepError):
                 if self._waiting:
                     self.commit()
-            os.close(self._fd)
-            self._fd = -1
-        if self.file is not None:
             self.file.close()
 
 

@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from sweep.errors import SweepError
-from sweep.file.open import OF_DAMAGE, unreadable
-from sweep.file.reading import DAMAGE, StoredFile, Table
+from sweep.file import disk
+from sweep.file.reading import UNFINISHED, Damaged, StoredFile, Table
 from sweep.file.store import unfinished_of
 from sweep.words import as_path
 
@@ -46,6 +46,14 @@ class Verdict:
             return f"{self.path}: whole; {self.checked}"
         return "\n".join([f"{self.path}: not whole; {self.checked}", *(f"  {text}" for text in self.findings)])
 
+    def require_whole(self) -> None:
+        """Raises SweepError where anything is wrong."""
+        if not self.whole:
+            cure = (
+                "" if self.blocks is None else "\n  sweep run --repair computes damaged cells again, and nothing else"
+            )
+            raise SweepError(f"{self}{cure}")
+
 
 def verify(path: str | os.PathLike[str]) -> Verdict:
     """Check all checksums of a result, finished or not.
@@ -64,27 +72,22 @@ def verify(path: str | os.PathLike[str]) -> Verdict:
     True
     """
     output = as_path(path)
-    place = output if output.exists() else unfinished_of(output)
-    if not place.exists():
-        raise SweepError(f"{output}: no such file, and no sweep that writes it")
+    place = output if disk.mark(output) else unfinished_of(output)
     try:
         with StoredFile(place) as file:
             return _verdict(output, file)
-    except DAMAGE as fault:
-        if not place.is_file() or (isinstance(fault, OSError) and fault.errno and fault.errno not in OF_DAMAGE):
-            raise unreadable(place, fault) from None
-        text = (str(fault).splitlines() or [type(fault).__name__])[0]
+    except (FileNotFoundError, NotADirectoryError):
+        raise SweepError(f"{output}: no such file, and no sweep that writes it") from None
+    except Damaged as fault:
         structure = "its structure is damaged, or it is not the result of a sweep"
-        return Verdict(output, False, "", (f"{structure} ({text})",))
+        return Verdict(output, False, "", (f"{structure} ({fault.reason})",))
 
 
 def _verdict(output: Path, file: StoredFile) -> Verdict:
-    """Compares all digests. Raises one of DAMAGE."""
+    """Compares all digests; HDF5 has checked texts and coordinates when it read them. Raises OSError."""
     findings: list[str] = []
-    if file.attrs and not file.is_as_made():  # HDF5 checks texts and coordinates as it reads them
+    if not file.is_as_made():
         findings.append("its structure is not as it was made: damaged, or changed by another program")
-    if file.path == output and not file.ending:
-        findings.append("what was written at its end is damaged")
     mendable, damaged = not findings, set[int]()
     # the columns of a summary are made at its end
     for name in file.tables if file.ending else (file.work,):
@@ -94,7 +97,7 @@ def _verdict(output: Path, file: StoredFile) -> Verdict:
             bad = [block for block in there if column.read(block) is None]
             damaged.update(bad if name == file.work else ())
             findings += _lines(f"{column.name}: damaged between its cells {{:,}} and {{:,}}", table, bad)
-    if file.path == output:
+    if file.path.suffix != UNFINISHED:
         blocks = tuple(sorted(damaged)) if findings and mendable else None
         return Verdict(output, not findings, f"{file.path.stat().st_size:,} bytes checked", tuple(findings), blocks)
     table = file.tables[file.work]
@@ -112,11 +115,3 @@ def _lines(text: str, table: Table, blocks: list[int]) -> Iterator[str]:
         yield text.format(table.blocks.bounds(int(run[0]))[0], table.blocks.bounds(int(run[-1]))[1])
     if len(runs) > MOST_TOLD:
         yield f"{text.partition(':')[0]}: {len(runs) - MOST_TOLD:,} more places"
-
-
-def check_whole(output: Path) -> None:
-    """Raises SweepError where a finished result is damaged."""
-    verdict = verify(output)
-    if not verdict.whole:
-        cure = "" if verdict.blocks is None else "\n  sweep run --repair computes damaged cells again, and nothing else"
-        raise SweepError(f"{verdict}{cure}")

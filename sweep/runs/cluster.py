@@ -32,7 +32,7 @@ from sweep.cells.fingerprint import difference, fingerprint
 from sweep.cells.solve import Solver
 from sweep.errors import Incomplete, SweepError
 from sweep.file import disk
-from sweep.file.store import Shared
+from sweep.file.reading import again
 from sweep.runs.bench import Bench, Done, Found
 from sweep.runs.isolate import Processes
 from sweep.runs.log import log
@@ -211,22 +211,25 @@ class Remote:
 class _Sink:
     """Where blocks of a worker go: the file, if it sees that; else their numbers are sent."""
 
-    def __init__(self, blocks: Blocks, shared: Shared | None) -> None:
-        self.room, self._shared = blocks.own, shared
-        self._fd = None if shared is None else shared.opened()
+    def __init__(self, blocks: Blocks, shared: tuple[Path, bytes] | None) -> None:
+        self.room, self._file = blocks.own, None
+        if shared is not None:
+            with contextlib.suppress(OSError, SweepError):  # it is not seen here, or may not be written
+                self._file = again(*shared, os.O_RDWR)
 
     def put(self, job: int, arrays: Mapping[str, Any]) -> Found:
         """The digests of what is written, and on the disk; or the numbers, which lie where nothing else will."""
-        if self._shared is None or self._fd is None:
+        file = self._file
+        if file is None:
             return {name: column.copy() for name, column in arrays.items()}
-        with disk.refusing(Path(self._shared.path)):
-            digests = self._shared.table.write(self._fd, job, arrays)
-            disk.fsync(self._fd)
+        with disk.refusing(file.path):
+            digests = file.tables[file.work].write(job, arrays)
+            disk.fsync(file.fd)
         return digests
 
     def close(self) -> None:
-        if self._fd is not None:
-            os.close(self._fd)
+        if self._file is not None:
+            self._file.close()
 
 
 def compute(remote: Remote, job: int, wanted: Any) -> Done:

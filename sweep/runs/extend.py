@@ -21,8 +21,7 @@ from sweep.cells.grid import Grid
 from sweep.cells.partition import box_slices
 from sweep.cells.schema import METHOD_USED, STATUS, columns
 from sweep.errors import SweepError
-from sweep.file.open import unreadable
-from sweep.file.reading import DAMAGE, StoredFile
+from sweep.file.reading import StoredFile
 from sweep.results.statuses import flat_pieces
 from sweep.study.model import Axis, Study
 
@@ -67,11 +66,8 @@ class Reused:
 
     def __init__(self, output: Path, study: Study, retry: bool = False) -> None:
         self._output, self._study, self._shape, self._retry = output, study, Grid(study).shape, retry
-        try:
-            self._stored = StoredFile(output)
-            old = Study.from_json(self._stored.attrs["study_json"], declared=True)
-        except DAMAGE as fault:
-            raise unreadable(output, fault) from None
+        self._stored = StoredFile(output)
+        old = Study.from_json(self._stored.attrs["study_json"], declared=True)
         self.attrs = {name: str(text) for name, text in self._stored.attrs.items() if name == TAKEN_OVER}
         self._numbers: Mapping[str, Any] = self._stored.columns()
         self._positions = [_positions(old.axes[name], axis) for name, axis in study.axes.items()]
@@ -93,21 +89,14 @@ class Reused:
         parts = [p[s] for p, s in zip(self._positions, box_slices(self._shape, start, stop), strict=True)]
         old = tuple(slice(int(part[part >= 0].min()), int(part.max()) + 1) for part in parts)
         for column in columns(self._study):
-            arrays[column.name][known] = self._values(column.name, old).reshape(-1, *column.shape)[known[shared]]
+            arrays[column.name][known] = self._numbers[column.name][old].reshape(-1, *column.shape)[known[shared]]
 
     def _known(self, start: int, stop: int) -> tuple[Any, Any]:
         """Which of some cells the result has; and which of these did not FAIL, where those are computed again."""
         box = box_slices(self._shape, start, stop)
         axes = [positions[s] >= 0 for positions, s in zip(self._positions, box, strict=True)]
         shared = reduce(np.logical_and.outer, axes).ravel()
-        return shared, shared & np.ravel(self._values(STATUS, box) != Status.FAILED) if self._retry else shared
-
-    def _values(self, name: str, slices: tuple[slice, ...]) -> Any:
-        """Those of a piece of the result. Raises SweepError where the file fails."""
-        try:
-            return self._numbers[name][slices]
-        except DAMAGE as fault:
-            raise unreadable(self._output, fault) from None
+        return shared, shared & np.ravel(self._numbers[STATUS][box] != Status.FAILED) if self._retry else shared
 
     def check_sample(self) -> None:
         """Computes some cells of every status and method again. Raises SweepError where one has other bits now."""

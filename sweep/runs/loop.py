@@ -27,7 +27,6 @@ from sweep.cells.sample import require_asked
 from sweep.cells.schema import Schema
 from sweep.cells.timing import UNSAMPLED, Sample
 from sweep.errors import SweepError, missing
-from sweep.file.store import Shared
 from sweep.runs.bench import Bench, Done, Sink
 from sweep.runs.extend import Precomputed, Reused
 from sweep.runs.isolate import Processes
@@ -207,7 +206,11 @@ class Loop:
         return {"created": end, "end": end, "cells_per_second": f"{self.progress.rate:.6e}"}
 
     def compute(
-        self, jobs: Sequence[int], sink: Sink, shared: Shared | None = None, tick: Callable[[], None] = lambda: None
+        self,
+        jobs: Sequence[int],
+        sink: Sink,
+        shared: tuple[Path, bytes] | None = None,
+        tick: Callable[[], None] = lambda: None,
     ) -> None:
         """Computes blocks into a sink; workers that see the file `shared` write them there. `tick` is called often.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, Literal
 
@@ -16,7 +16,7 @@ from sweep.file.frame import cuts_of, expected_size
 from sweep.file.open import stored_fingerprint
 from sweep.file.reading import StoredFile
 from sweep.file.store import Store, lock_of, opened, unfinished_of
-from sweep.file.verify import check_whole, verify
+from sweep.file.verify import verify
 from sweep.runs.extend import Precomputed, Reused, has_failed, is_of_another_version, obstacle
 from sweep.runs.loop import Loop, Task
 from sweep.runs.pool import Terminated, TimeUp
@@ -28,12 +28,14 @@ Ending = Literal["done before", "complete", "unfinished", "not begun"]
 
 def run_to_file(task: Task, precomputed: Precomputed | None = None) -> Ending:
     """Continues, begins or leaves alone what is there. Raises SweepError, KeyboardInterrupt, Terminated."""
-    left = unfinished_of(task.output).exists() or lock_of(task.output).exists()
-    if not left and _standing(task) == "complete":
+    left = any(map(disk.mark, (unfinished_of(task.output), lock_of(task.output))))
+    seen, (standing, damaged) = disk.mark(task.output), ("nothing", ()) if left else _standing(task)
+    if standing == "complete":
         return "done before"
     with opened(task.output) as store:
-        # looked at again, for another run may have ended before this one had the lock
-        standing, found = _standing(task), _found(store, task)
+        if left or seen != disk.mark(task.output):  # another run may have ended before this one had the lock
+            standing, damaged = _standing(task)
+        found = _found(store, task)
         is_ours = found is not None and found.fingerprint == dict(task.fingerprint)
         if standing == "complete":
             if is_ours:
@@ -42,7 +44,7 @@ def run_to_file(task: Task, precomputed: Precomputed | None = None) -> Ending:
         if found is not None and is_ours:
             store.resume(found)
         elif found is None and standing == "damaged":
-            store.reopen(verify(task.output).blocks or ())
+            store.reopen(damaged)
         else:
             if found is not None:
                 found.close()
@@ -67,22 +69,26 @@ def run_to_file(task: Task, precomputed: Precomputed | None = None) -> Ending:
             raise
 
 
-def _standing(task: Task) -> Literal["nothing", "complete", "damaged", "reused"]:
-    """What the output is to this study: its cells may be "reused". Raises SweepError where it is something else."""
-    if not task.output.exists():
-        return "nothing"
+def _standing(task: Task) -> tuple[Literal["nothing", "complete", "damaged", "reused"], Sequence[int]]:
+    """What the output is to this study, whose cells may be "reused"; blocks that are damaged and can be repaired.
+
+    All of it is read. Raises SweepError where it is something else.
+    """
+    if not disk.mark(task.output):
+        return "nothing", ()
     stored = stored_fingerprint(task.output)
     if task.force:
-        return "nothing"
+        return "nothing", ()
     if stored == dict(task.fingerprint):
-        if task.repair and verify(task.output).blocks is not None:
-            return "damaged"
-        check_whole(task.output)
-        return "reused" if task.retry_failed and has_failed(task.output) else "complete"
+        verdict = verify(task.output)
+        if task.repair and verdict.blocks is not None:
+            return "damaged", verdict.blocks
+        verdict.require_whole()
+        return "reused" if task.retry_failed and has_failed(task.output) else "complete", ()
     hindrance = obstacle(stored, task.fingerprint)
     if task.extend and not hindrance:
-        check_whole(task.output)
-        return "reused"
+        verify(task.output).require_whole()
+        return "reused", ()
     what = f"cannot be extended, for {hindrance}" if task.extend else "holds the result of another study or version"
     extendable = (
         "; where its axes have only got more values, --extend computes the new cells alone; those of another version "

@@ -1,5 +1,6 @@
 """Damage of every kind is found, told with its cells, and mended; no damaged number is handed out, all others are."""
 
+import os
 import pickle
 import random
 import shutil
@@ -234,6 +235,14 @@ def test_what_is_there_of_an_unfinished_result_is_told_with_what_is_missing(tmp_
     assert f"{len(kept(tmp_path / 'out.h5'))} of 5 blocks" in found.checked
 
 
+def test_an_unfinished_result_by_its_own_name_is_not_called_damaged(tmp_path):
+    interrupted(tall(23), tmp_path / "out.h5")
+    for name in ("out.h5", "out.h5.unfinished"):
+        found = sweep.verify(tmp_path / name)
+        assert "damaged" not in str(found)
+        assert "missing: cells 10 to" in str(found)
+
+
 def test_an_unfinished_result_that_is_damaged_beside_its_numbers_is_not_continued(tmp_path):
     output = tmp_path / "out.h5"
     interrupted(study(), output)
@@ -246,6 +255,18 @@ def test_an_unfinished_result_that_is_damaged_beside_its_numbers_is_not_continue
 
 
 # what mends it
+
+
+def test_a_damaged_result_is_read_once_before_it_is_repaired(tmp_path, monkeypatch):
+    path, real, places = tmp_path / "out.h5", os.preadv, []
+    quiet(study(), path, block_cells=3).close()
+    healthy = place(path, "fall_time", 6)
+    harm(path, "fall_time", 20)
+    monkeypatch.setattr(os, "preadv", lambda fd, buffers, at: (places.append(at), real(fd, buffers, at))[1])
+    quiet(study(), path, repair=True).close()
+    assert places.count(healthy) == 1
+    monkeypatch.undo()
+    assert sweep.verify(path).whole
 
 
 @pytest.mark.parametrize("kind", ["cells", "summary"])

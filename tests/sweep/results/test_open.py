@@ -148,6 +148,16 @@ def test_what_is_no_path_is_named(given):
             read(given)
 
 
+@pytest.mark.parametrize("letters", [246, 252, 300])
+def test_a_name_too_long_for_the_system_is_one_clear_line(tmp_path, letters):
+    path = tmp_path / ("a" * letters)
+    for action in (open_result, sweep.verify, lambda path: run(stone(), path, progress=False)):
+        with pytest.raises(SweepError, match=r"no such file|File name too long") as told:
+            action(path)
+        assert "\n" not in str(told.value)
+    assert not any(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize("content", [None, "folder", b"", b"words", b"\x89HDF\r\n\x1a\n" + bytes(100)])
 @pytest.mark.parametrize("name", ["open_result", "verify"])
 def test_what_is_no_result_is_one_clear_line(tmp_path, name, content, capsys):
