@@ -27,7 +27,8 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, compared, differing, direct_label, page_of, paragraph, plain_ticks, report
+from _common import Conclusion, Statement, compared, count, differing, most, paragraph, power, report, said, solved
+from _figures import colour_map, direct_label, page_of, plain_ticks
 from scipy.optimize.elementwise import find_root
 
 import sweep
@@ -39,19 +40,14 @@ CLOSE = 0.01
 STEPS = 2
 """Steps of the torque's axis to which the best torque is found: the least is flat."""
 POINTS = 2000
+SHOWN = (1.0, 0.99, 0.9, 0.5)
+"""Restitutions that are drawn."""
 
 NOTES = """\
 s = -dlnP/dlnmu; deviation: of exponents the difference; (1) is solved for every third friction R and fourth drag c
 allowed: 0.01 of s and two steps of 12 % of the torque where the foliot swings 5 phi0 beyond the switch; 8 % of (2), a
 limit; 0.06 of its power -1/3; 2 %, the tolerance of the refinement, between its cells\
 """
-
-
-def thinned(ds: xr.Dataset) -> xr.Dataset:
-    """Least exponents of some of the clocks, in memory."""
-    part = ds[["sensitivity_min", "sensitivity_argmin_mu"]]
-    many = {"R": slice(None, None, 3), "c": slice(None, None, 4)}
-    return part.isel({name: cut for name, cut in many.items() if ds.sizes[name] > 40}).load()
 
 
 def balanced(clocks: xr.Dataset, mu: xr.DataArray) -> xr.Dataset:
@@ -79,98 +75,93 @@ def balanced(clocks: xr.Dataset, mu: xr.DataArray) -> xr.Dataset:
 
 def best_torques(ds: xr.Dataset) -> list[Statement]:
     """Where s is least, against (1), (2) and what the paper says of strong drive."""
-    clocks = thinned(ds)
+    some = {name: slice(None, None, k) for name, k in (("R", 3), ("c", 4)) if ds.sizes[name] > 40}
+    clocks = ds[["sensitivity_min", "sensitivity_argmin_mu"]].isel(some).load()
     theory = balanced(clocks, ds.mu)
     far = theory.beyond > LARGE
-    off = abs(clocks.sensitivity_min - theory.s).where(far)
+    off = (clocks.sensitivity_min - theory.s).where(far)
     step = float(np.diff(np.log(ds.mu.values)).mean())
-    steps = abs(np.log(clocks.sensitivity_argmin_mu / theory.mu)).where(far) / step
-    least, at = ds.sensitivity_min.load(), ds.sensitivity_argmin_mu.load()
-    inside = float(((at > ds.mu[0]) & (at < ds.mu[-1])).mean())
+    steps = (abs(np.log(clocks.sensitivity_argmin_mu / theory.mu)).where(far) / step).max()
+    least = ds.sensitivity_min.load()
+    inside = float(within_decades(ds).mean())
     line = least.sel(e=1).isel(n=0, c=0)
     high = line.where(line.R > 1e3, drop=True)
-    power = np.polyfit(np.log(high.R.values), np.log(high.values), 1)[0].item()
-    limit = 3 * (18 * float(high.R[-1])) ** (-1 / 3)
+    limit, light = 3 * (18 * float(high.R[-1])) ** (-1 / 3), f"light viscous friction, R = {high.R[-1]:g}: least s"
+    beyond, missed = f"least s by (1), {LARGE:g} phi0 beyond the switch", f"{1 - inside:.0%} of {least.size}"
+    paper = "strong drive is best (paper, of viscous friction)"
     return [
-        Statement(f"least s by (1), {LARGE:g} phi0 beyond the switch", "s", f"{int(far.sum())} clocks",
-                  float(off.max()), bool(off.max() < CLOSE)),
-        Statement("  the torque where it is", "(1)", f"within {float(steps.max()):.0f} steps", None,
-                  bool(steps.max() < STEPS + 0.5)),
-        compared(f"light viscous friction, R = {float(high.R[-1]):g}: least s", f"(2) {limit:.4f}",
-                 float(high[-1]), limit, 0.08, 4),
-        differing("  its power of R, R > 1000", "-1/3", power, -1 / 3, 0.06, 4),
-        Statement("strong drive is best (paper, of viscous friction)", "every clock",
-                  f"{1 - inside:.0%} of {least.size}", None, inside < 0.01, True),
-    ]  # fmt: skip
+        most(beyond, "s", off, CLOSE, count(far, "clocks")),
+        said("  the torque where it is", steps < STEPS + 0.5, f"within {steps:.0f} steps", "(1)"),
+        compared(light, f"(2) {limit:.4f}", high[-1], limit, 0.08, 4),
+        differing("  its power of R, R > 1000", "-1/3", power(high), -1 / 3, 0.06, 4),
+        said(paper, inside < 0.01, missed, "every clock", True),
+    ]
+
+
+def within_decades(ds: xr.Dataset) -> xr.DataArray:
+    """Which clocks have their best torque within the grid, not at an end of it."""
+    at = ds.sensitivity_argmin_mu.load()
+    return (at > ds.mu[0]) & (at < ds.mu[-1])
 
 
 def borders(fine: xr.Dataset) -> list[Statement]:
-    """What refinement along the borders is worth: s between its cells, against the kernel there."""
-    random = np.random.default_rng(1)
-    ends = {name: (float(fine[name].min()), float(fine[name].max())) for name in ("c", "mu")}
-    at = {
-        name: np.exp(random.uniform(*np.log(span), POINTS // 50 if name == "c" else 50)) for name, span in ends.items()
-    }
-    here = sweep.interpolated(fine, at).sensitivity
-    fixed = {name: float(fine[name]) for name in ("a", "e", "n", "phi0")}
-    study = sweep.study(
-        kernel="foliot", axes={k: sorted(v) for k, v in at.items()}, fixed=fixed, rtol=1e-8, outputs=["sensitivity"]
-    )
-    true = sweep.run(study).sensitivity
-    off = float(abs(here.sortby(["c", "mu"]).transpose("c", "mu").values / true.transpose("c", "mu").values - 1).max())
-    cells = int(fine.sensitivity.size)
+    """What refinement along the borders is worth: s between its cells, against the kernel there.
+
+    Near a border s is farther than 0.01 from 1, 1/3, 1/2 and 3/5.
+    """
+    random, at = np.random.default_rng(1), {}
+    for name, number in (("c", POINTS // 50), ("mu", 50)):
+        ends = np.log([float(fine[name].min()), float(fine[name].max())])
+        at[name] = np.sort(np.exp(random.uniform(*ends, number)))
+    here = sweep.interpolated(fine, at).sensitivity.transpose("c", "mu").values
+    clock = {name: fine[name] for name in ("a", "e", "n", "phi0")}
+    true = solved("foliot", **at, **clock, rtol=1e-8, outputs=["sensitivity"]).sensitivity.transpose("c", "mu")
+    laws = np.array([1, 1 / 3, 1 / 2, 3 / 5])
+    near = float((abs(fine.sensitivity.values[..., None] - laws) > 0.01).all(axis=-1).mean())
+    what = f"s between {fine.sensitivity.size} cells, {here.size} places"
     return [
-        Statement(f"s between {cells} cells, {here.size} places", "2 %", "largest error", off, off < 0.02),
-        Statement("  of the cells near a border, s changing", "most", f"{near_borders(fine):.0%}", None,
-                  near_borders(fine) > 0.5),
-    ]  # fmt: skip
-
-
-def near_borders(fine: xr.Dataset) -> float:
-    """Share of the cells where s is farther than 0.01 from 1, 1/3, 1/2 and 3/5."""
-    s = fine.sensitivity.values
-    return float(np.mean(np.min([abs(s - x) for x in (1, 1 / 3, 1 / 2, 3 / 5)], axis=0) > 0.01))
+        most(what, "2 %", here / true.values - 1, 0.02, "largest error"),
+        said("  of the cells near a border, s changing", near > 0.5, f"{near:.0%}", "most"),
+    ]
 
 
 def answer(ds: xr.Dataset) -> list[str]:
     """The conclusion, with the numbers of the dataset."""
-    least, at = ds.sensitivity_min.load(), ds.sensitivity_argmin_mu.load()
-    inside = (at > ds.mu[0]) & (at < ds.mu[-1])
-    under = {x: float((least < x).mean()) for x in (1 / 3 - 1e-3, 0.2, 0.1)}
+    least, inside = ds.sensitivity_min.load(), float(within_decades(ds).mean())
+    third, fifth, tenth = (float((least < x).mean()) for x in (1 / 3 - 1e-3, 0.2, 0.1))
     k = np.unravel_index(int(np.nanargmin(least.values)), least.shape)
     cell = least[k]
-    ratio = float(at[k] / cell.R)
-    by_e = ", ".join(
-        f"{float(least.sel(e=e, method='nearest').min()):.3f} at e = {e:g}" for e in (1, 0.99, 0.9) if e in ds.e
-    )
-    return paragraph(f"""In a line: of {least.size} clocks {float(inside.mean()):.0%} have their best torque within
-        the twelve decades, and {under[1 / 3 - 1e-3]:.0%} of all come to be steadier than strong drive with viscous
-        friction, s = 1/3; {under[0.2]:.0%} come below s = 0.2 and {under[0.1]:.0%} below 0.1. The steadiest has
+    ratio = float(ds.sensitivity_argmin_mu[k] / cell.R)
+    lowest = {e: float(least.sel(e=e, method="nearest").min()) for e in (1, 0.99, 0.9) if e in ds.e}
+    by_e = ", ".join(f"{s:.3f} at e = {e:g}" for e, s in lowest.items())
+    return paragraph(f"""In a line: of {least.size} clocks {inside:.0%} have their best torque within
+        the twelve decades, and {third:.0%} of all come to be steadier than strong drive with viscous
+        friction, s = 1/3; {fifth:.0%} come below s = 0.2 and {tenth:.0%} below 0.1. The steadiest has
         s = {float(cell):.4f}, with R = {float(cell.R):g} a^2 phi0 and a torque of {ratio:.1f} R; the least is
         {by_e}.""")
 
 
 def figure(ds: xr.Dataset, fine: xr.Dataset) -> Any:
     """How many clocks come how low, the least s over dry friction, and the refined borders; for two columns."""
-    with page_of(68.0, 1, 3) as (page, panels):
-        draw_shares(panels[0], ds)
-        draw_least(panels[1], ds)
-        draw_borders(page, panels[2], fine)
+    with page_of(68.0, 1, 3) as (page, (shares, least, borders)):
+        for k, e in enumerate(SHOWN):
+            low = np.sort(ds.sensitivity_min.sel(e=e, method="nearest").values.ravel())
+            shares.plot(low, np.linspace(0, 100, low.size), color=COLOURS[k], linestyle=DASHES[k], label=f"{e:g}")
+        shares.axvline(1 / 3, color="0.5", linewidth=0.7)
+        shares.set(xlabel="least exponent, $s$ [1]", ylabel="clocks below it [%]", xlim=(0, 0.6), ylim=(0, 100))
+        shares.legend(title="restitution, $e$", loc="upper left", fontsize=7, title_fontsize=7)
+        draw_least(least, ds)
+
+        at = {name: np.geomspace(float(fine[name].min()), float(fine[name].max()), 120) for name in ("c", "mu")}
+        s = sweep.interpolated(fine, at).sensitivity.transpose("c", "mu")
+        colour_map(borders, s.mu, s.c, s, "exponent, $s$ [1]", vmin=1 / 3, vmax=1)
+        cells = fine.mu.values.ravel(), fine.c.values.ravel()
+        borders.plot(*cells, ".", color="white", markersize=1.2, label="cells")
+        for x, y, text in ((3e-2, 1e-6, "1"), (3e2, 1e-6, "1/3"), (1e6, 3e-6, "3/5"), (1e6, 1e-1, "1/3, drag")):
+            direct_label(borders, x, y, text, fontsize=7)
+        borders.set(xscale="log", xlabel=r"torque, $\mu/(a^2\varphi_0)$ [1]")
+        borders.set(yscale="log", ylabel=r"drag, $c\,a\varphi_0^2$ [1]")
     return page
-
-
-SHOWN = (1.0, 0.99, 0.9, 0.5)
-"""Restitutions that are drawn."""
-
-
-def draw_shares(axes: Any, ds: xr.Dataset) -> None:
-    """Share of the clocks whose least s is below a value."""
-    for k, e in enumerate(SHOWN):
-        least = np.sort(ds.sensitivity_min.sel(e=e, method="nearest").values.ravel())
-        axes.plot(least, np.linspace(0, 100, least.size), color=COLOURS[k], linestyle=DASHES[k], label=f"{e:g}")
-    axes.axvline(1 / 3, color="0.5", linewidth=0.7)
-    axes.set(xlabel="least exponent, $s$ [1]", ylabel="clocks below it [%]", xlim=(0, 0.6), ylim=(0, 100))
-    axes.legend(title="restitution, $e$", loc="upper left", fontsize=7, title_fontsize=7)
 
 
 def draw_least(axes: Any, ds: xr.Dataset) -> None:
@@ -182,8 +173,7 @@ def draw_least(axes: Any, ds: xr.Dataset) -> None:
         here, line = (x.sel(e=e, method="nearest").isel(n=0, c=0) for x in (part.sensitivity_min, theory))
         look = {"color": COLOURS[k], "linestyle": "", "markerfacecolor": "white", "markersize": 3}
         axes.loglog(here.R, here, MARKS[k], label=f"$e={e:g}$", **look)
-        far = line.beyond > LARGE
-        axes.plot(line.R, line.s.where(far), color=COLOURS[k])
+        axes.plot(line.R, line.s.where(line.beyond > LARGE), color=COLOURS[k])
     R = np.geomspace(10, 1e4, 20)
     axes.plot(R, 3 * (18 * R) ** (-1 / 3), color="black", linewidth=0.8, linestyle=":", label="(2)")
     axes.plot([], [], color="black", label="(1)")
@@ -192,26 +182,12 @@ def draw_least(axes: Any, ds: xr.Dataset) -> None:
     axes.legend(loc="lower left", fontsize=7)
 
 
-def draw_borders(page: Any, axes: Any, fine: xr.Dataset) -> None:
-    """s over torque and drag, with the cells of the refinement."""
-    at = {name: np.geomspace(float(fine[name].min()), float(fine[name].max()), 120) for name in ("c", "mu")}
-    s = sweep.interpolated(fine, at).sensitivity.transpose("c", "mu")
-    mesh = axes.pcolormesh(s.mu, s.c, s, vmin=1 / 3, vmax=1, cmap="cividis", shading="nearest", rasterized=True)
-    page.colorbar(mesh, ax=axes, label="exponent, $s$ [1]", pad=0.02)
-    axes.plot(fine.mu.values.ravel(), fine.c.values.ravel(), ".", color="white", markersize=1.2, label="cells")
-    for x, y, text in ((3e-2, 1e-6, "1"), (1e3, 1e-6, "1/3"), (1e7, 3e-7, "1/2"), (1e6, 1e-2, "3/5")):
-        direct_label(axes, x, y, text, fontsize=7)
-    axes.set(
-        xscale="log", yscale="log", xlabel=r"torque, $\mu/(a^2\varphi_0)$ [1]", ylabel=r"drag, $c\,a\varphi_0^2$ [1]"
-    )
-
-
-def conclude(path: str, borders_path: str) -> tuple[Groups, list[str], Any]:
+def conclude(path: str, borders_path: str) -> Conclusion:
     """Statements and the figure."""
-    ds = sweep.open_result(path, strict=True)
-    fine = sweep.open_result(borders_path, strict=True).load()
+    ds, fine = (sweep.open_result(one, strict=True) for one in (path, borders_path))
     if "sensitivity_argmin_mu" not in ds or set(ds.sensitivity_min.dims) != {"n", "e", "R", "c"}:
         raise sweep.SweepError(f"{path} is not of this study; make it from law_map_overnight.toml")
+    fine = fine.load()
     groups = {"The best torque": best_torques(ds), "Along the borders": borders(fine)}
     return groups, [NOTES, "", *answer(ds)], lambda: figure(ds, fine)
 

@@ -24,7 +24,8 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, compared, differing, direct_label, page_of, read_result, report
+from _common import Conclusion, Statement, compared, differing, most, read_result, report, solved
+from _figures import direct_label, page_of, plain_ticks
 
 import sweep
 from sweep.show.charts import COLOURS, DASHES
@@ -44,54 +45,52 @@ IN_SI = (1e-5, 1e-3, 0.1, 10.0)
 """Torques [N m] at which the models with impacts are followed in SI units."""
 SPRING, KEPT = 0.5, 0.8
 """Hairspring [1/s^2] and restitution of a foliot without friction whose swing grows with the torque."""
+HALF = 1.46299058758
+"""alpha where s = 1/2: q - tanh q = 1/alpha."""
+
+
+def two_bodies(impact: xr.Dataset) -> xr.Dataset:
+    """`impact` with its swing as an angle, kappa, the way to the switch phi0, the pitch, and the drive.
+
+    That is what a torque of 1 N m on the wheel does to foliot and wheel together [rad/s^2 of the foliot], and kappa the
+    mass of the wheel over that of the foliot, both at the pallet.
+    """
+    kappa = (impact.I_c / impact.r_c**2) / (impact.I_v / impact.r_v**2)
+    drive = impact.r_v / impact.r_c / (impact.I_v * (1 + kappa))
+    amplitude = (impact.swing / impact.r_v).assign_attrs(units="rad")
+    pitch = 2 * math.pi * impact.r_c / impact.teeth
+    return impact.assign(amplitude=amplitude, kappa=kappa, drive=drive, phi0=impact.h / impact.r_v, pitch=pitch)
 
 
 def together(impact: xr.Dataset, denny: xr.Dataset, viscous: xr.Dataset) -> xr.Dataset:
     """The three models over torque [N m]: `period`, `amplitude` [rad], `multiplier` and the local `exponent`."""
-    impact = impact.assign(amplitude=(impact.swing / impact.r_v).assign_attrs(units="rad"))
-    parts = [impact[["period", "amplitude", "multiplier"]].reset_coords(drop=True)]
-    for one in (denny, viscous):
-        torque = (one.mu / _drive(impact)).rename(mu="torque").assign_coords(torque=impact.torque.values)
+    drive, parts = float(impact.drive), []
+    for one in (impact, denny, viscous):
+        torque = impact.torque if one is impact else one.mu / drive
         if not np.allclose(torque, impact.torque, rtol=1e-12):
             raise sweep.SweepError("the three grids are not of the same torques; make them from the studies' files")
-        part = one[["period", "amplitude", "multiplier"]].reset_coords(drop=True).rename(mu="torque")
+        part = one[["period", "amplitude", "multiplier"]].reset_coords(drop=True)
+        part = part if one is impact else part.rename(mu="torque")
         parts.append(part.assign_coords(torque=impact.torque))
     ds = xr.concat(parts, xr.DataArray(list(MODELS), dims="model", name="model"), combine_attrs="drop_conflicts")
     ds = ds.assign(exponent=sweep.local_exponent(ds.period, "torque"))
     ds.attrs = {"title": "Period against torque in three models of a verge and foliot"}
-    unit = float(viscous.a**2 * viscous.phi0) / _drive(impact)
+    unit = float(viscous.a**2 * viscous.phi0) / drive
     return ds.assign(viscous_unit=xr.DataArray(unit, attrs={"units": "N m", "long_name": "torque of alpha = 1"}))
-
-
-def _drive(impact: xr.Dataset) -> float:
-    """What a torque of 1 N m on the wheel does to foliot and wheel together [rad/s^2 of the foliot]."""
-    return float(impact.r_v / impact.r_c / (impact.I_v * (1 + _kappa(impact))))
-
-
-def _kappa(impact: xr.Dataset) -> float:
-    """Mass of the wheel over that of the foliot, both at the pallet."""
-    return float((impact.I_c / impact.r_c**2) / (impact.I_v / impact.r_v**2))
 
 
 def in_si(impact: xr.Dataset, denny: xr.Dataset) -> dict[str, xr.Dataset]:
     """`period` [s] and `speed` at the switch [rad/s] of both models with impacts, followed from rest in SI units."""
-    torque = list(IN_SI)
     n = float(impact.r_v / impact.r_c)
-    phi0 = float(impact.h / impact.r_v)
-    verge = {"I_v": float(impact.I_v), "I_c": float(impact.I_c), "n": n, "phi0": phi0}
-    verge |= {"drop": math.pi / float(impact.teeth) - 2 * n * phi0, "flips": 402}
-    foliot = {"phi0": float(denny.phi0), "e": float(denny.e), "flips": 200}
-    two = _followed("verge_scene", {"tau": torque}, verge)
-    one = _followed("foliot_scene", {"mu": [_drive(impact) * x for x in torque]}, foliot)
+    verge = {"I_v": impact.I_v, "I_c": impact.I_c, "n": n, "phi0": impact.phi0, "flips": 402}
+    verge["drop"] = math.pi / impact.teeth - 2 * n * impact.phi0
+    mu = float(impact.drive) * np.array(IN_SI)
+    two = solved("verge_scene:KERNEL", tau=IN_SI, **verge, rtol=1e-10)
+    one = solved("foliot_scene:KERNEL", mu=mu, phi0=denny.phi0, e=denny.e, flips=200, rtol=1e-10)
     return {
         MODELS[0]: two.assign(period=2 * two.clock).rename(tau="torque"),
-        MODELS[1]: one.assign(period=2 * one.interval).rename(mu="torque").assign_coords(torque=torque),
+        MODELS[1]: one.assign(period=2 * one.interval).rename(mu="torque").assign_coords(torque=list(IN_SI)),
     }
-
-
-def _followed(scene: str, axes: dict[str, list[float]], fixed: dict[str, float]) -> xr.Dataset:
-    study = sweep.study(kernel=f"{scene}:KERNEL", rtol=1e-10, axes=axes, fixed=fixed, allow_import=True)
-    return sweep.run(study)
 
 
 def laws(ds: xr.Dataset, followed: dict[str, xr.Dataset]) -> list[Statement]:
@@ -99,119 +98,89 @@ def laws(ds: xr.Dataset, followed: dict[str, xr.Dataset]) -> list[Statement]:
     found = []
     for name, one in followed.items():
         fit = sweep.fit_exponent(one.period, "torque")
-        found.append(differing(f"exponent, {name}, in SI units", "-1/2", float(fit.exponent), -0.5, 1e-8))
         kernel = np.exp(np.interp(np.log(IN_SI), np.log(ds.torque), np.log(ds.period.sel(model=name))))
-        off = float(abs(one.period / kernel - 1).max())
-        found.append(Statement("  period of the kernel beside it", "the same", "largest", off, off < 1e-8))
-    weak, strong = (ds.exponent.sel(model="viscous").isel(torque=i) for i in (0, -1))
-    found += [
-        differing("exponent, viscous, weakest drive", "-1", float(weak), -1.0, 0.01, 5),
-        differing("exponent, viscous, strongest drive", "-1/3", float(strong), -1 / 3, 0.01, 5),
+        found.append(differing(f"exponent, {name}, in SI units", "-1/2", fit.exponent, -0.5, 1e-8))
+        found.append(most("  period of the kernel beside it", "the same", one.period / kernel - 1, 1e-8, "largest"))
+    viscous = ds.sel(model="viscous")
+    half = sweep.where_exponent(viscous.period, "torque", -0.5).abscissa
+    theory = HALF * float(ds.viscous_unit)
+    text = f"alpha = {HALF:.5f}: {theory:.5g}"
+    return [
+        *found,
+        differing("exponent, viscous, weakest drive", "-1", viscous.exponent[0], -1.0, 0.01, 5),
+        differing("exponent, viscous, strongest drive", "-1/3", viscous.exponent[-1], -1 / 3, 0.01, 5),
+        compared("torque of exponent -1/2, viscous [N m]", text, half, theory, 1e-3, 5),
     ]
-    half = sweep.where_exponent(ds.period.sel(model="viscous"), "torque", -0.5)
-    alpha = 1.46299058758  # q - tanh q = 1/alpha where s = 1/2
-    return [*found, compared("torque of exponent -1/2, viscous [N m]", *_half_torque(ds, half, alpha), 1e-3, 5)]
-
-
-def _half_torque(ds: xr.Dataset, half: xr.Dataset, alpha: float) -> tuple[str, float, float]:
-    theory = alpha * float(ds.viscous_unit)
-    return f"alpha = {alpha:.5f}: {theory:.5g}", float(half.abscissa), theory
 
 
 def swings(ds: xr.Dataset, followed: dict[str, xr.Dataset]) -> list[Statement]:
-    """Whether the swing depends on the torque."""
+    """Whether the swing depends on the torque; of restitution and a hairspring, no friction, by energy too."""
     found = []
     for name, one in followed.items():
-        reach = abs(one.speed) / np.sqrt(one.torque)  # the swing past the switch goes as speed^2/torque
-        off = float((reach.max() / reach.min()) ** 2 - 1)
-        found.append(Statement(f"spread of the swing, {name}, in SI units", "0", "", off, off < 1e-8))
+        reach = one.speed**2 / one.torque  # the swing past the switch goes with it
+        found.append(most(f"spread of the swing, {name}, in SI units", "0", reach.max() / reach.min() - 1, 1e-8, ""))
     viscous = ds.amplitude.sel(model="viscous")
-    grown = float(viscous[-1] / viscous[0])
-    alpha = float(ds.torque[-1] / ds.viscous_unit)
-    theory = 3 ** (2 / 3) / 2 * alpha ** (1 / 3)  # A at strong drive over A = 1 at weak drive
-    line = compared("growth of the swing, viscous", f"3^(2/3)/2 alpha^(1/3) = {theory:.4g}", grown, theory, 0.01, 4)
-    return [*found, line, *with_spring()]
-
-
-def with_spring() -> list[Statement]:
-    """Restitution and a hairspring, no friction: the swing by energy, and by the kernel."""
+    growth = 3 ** (2 / 3) / 2 * float(ds.torque[-1] / ds.viscous_unit) ** (1 / 3)  # A at strong drive, A = 1 at weak
+    text, grown = f"3^(2/3)/2 alpha^(1/3) = {growth:.4g}", viscous[-1] / viscous[0]
     mu = np.array([0.6, 6.0, 60.0])
-    study = sweep.study(kernel="foliot", rtol=1e-10, axes={"mu": mu}, fixed={"phi0": 1, "e": KEPT, "k": SPRING})
-    kernel = sweep.run(study).amplitude
+    kernel = solved("foliot", mu=mu, phi0=1, e=KEPT, k=SPRING, rtol=1e-10).amplitude
     kept = KEPT**2 * 4 * mu / (1 - KEPT**2)  # square of the speed behind the switch
-    theory = (-mu + np.sqrt(mu**2 + 2 * SPRING * (mu + SPRING / 2 + kept / 2))) / SPRING
-    off = float(abs(kernel / theory - 1).max())
-    grows = f"{float(kernel[0]):.4g} to {float(kernel[-1]):.4g} phi0"
+    energy = (-mu + np.sqrt(mu**2 + 2 * SPRING * (mu + SPRING / 2 + kept / 2))) / SPRING
+    off = float(abs(kernel / energy - 1).max())
+    grows, more = f"{kernel[0]:.4g} to {kernel[-1]:.4g} phi0", bool(kernel[-1] > 1.5 * kernel[0])
     what = f"no friction but a hairspring, k = {SPRING:g}/s^2: swing for mu = 0.6 to 60 rad/s^2"
-    return [Statement(what, "grows too, by energy", grows, off, off < 1e-9 and bool(kernel[-1] > 1.5 * kernel[0]))]
+    return [
+        *found,
+        compared("growth of the swing, viscous", text, grown, growth, 0.01, 4),
+        Statement(what, "grows too, by energy", grows, off, off < 1e-9 and more),
+    ]
 
 
 def identity(ds: xr.Dataset, impact: xr.Dataset) -> list[Statement]:
     """How near the two-body clock is to one body that keeps (m - M)/(m + M) of its speed."""
-    e = (1 - _kappa(impact)) / (1 + _kappa(impact))
-    pitch = float(2 * math.pi * impact.r_c / impact.teeth)
-    drop = 0.5 - 2 * float(impact.h) / pitch
+    e = float((1 - impact.kappa) / (1 + impact.kappa))
+    drop = 0.5 - 2 * float(impact.h / impact.pitch)
     two, one = (ds.sel(model=name).isel(torque=0) for name in MODELS[:2])
-    mu, phi0 = _drive(impact) * float(impact.torque[0]), float(impact.h / impact.r_v)
-    period = 4 * math.sqrt(phi0 / mu * (1 + e) / (1 - e))
+    period = 4 * math.sqrt(impact.phi0 / (impact.drive * impact.torque[0]) * (1 + e) / (1 - e))
+    ratio, bodies = f"period, two bodies over one, drop {drop:.4f} pitch", f"e = (m - M)/(m + M) = {e:.4g}"
     return [
-        compared("period of one body, formula", "4 sqrt(phi0 (1 + e)/(mu (1 - e)))", float(one.period), period, 1e-12),
-        compared(
-            f"period, two bodies over one, drop {drop:.4f} pitch",
-            "1 without drop",
-            float(two.period / one.period),
-            1.0,
-            2 * drop,
-            6,
-        ),
-        differing(f"multiplier, two bodies, e = (m - M)/(m + M) = {e:.4g}", "e^2", float(two.multiplier), e * e, 1e-12),
-        differing("multiplier, one body", "e^2", float(one.multiplier), e * e, 1e-12),
+        compared("period of one body, formula", "4 sqrt(phi0 (1 + e)/(mu (1 - e)))", one.period, period, 1e-12),
+        compared(ratio, "1 without drop", two.period / one.period, 1.0, 2 * drop, 6),
+        differing(f"multiplier, two bodies, {bodies}", "e^2", two.multiplier, e * e, 1e-12),
+        differing("multiplier, one body", "e^2", one.multiplier, e * e, 1e-12),
     ]
 
 
 def figure(ds: xr.Dataset) -> Any:
     """Period, exponent and swing over torque; for two columns of print."""
     with page_of(66.0, 1, 3) as (page, axes):
+        period, exponent, swing = axes
         for k, name in enumerate(MODELS):
-            look = {"color": COLOURS[k], "linestyle": DASHES[k]}
+            one, look = ds.sel(model=name), {"color": COLOURS[k], "linestyle": DASHES[k]}
             if k == 1:  # lies on the first: rings at every so many-th torque
+                one = one.isel(torque=slice(4, None, max(1, ds.torque.size // 9)))
                 look = {"color": COLOURS[k], "marker": "o", "linestyle": "", "markerfacecolor": "white"}
-            one = ds.sel(model=name).isel(torque=slice(4, None, max(1, ds.torque.size // 9)) if k == 1 else slice(None))
-            axes[0].loglog(one.torque, one.period, label=name, **look)
-            axes[1].semilogx(one.torque, -one.exponent, **look)
-            axes[2].loglog(one.torque, one.amplitude, **look)
-        _letter_axes(axes, ds)
+            period.loglog(one.torque, one.period, label=name, **look)
+            exponent.semilogx(one.torque, -one.exponent, **look)
+            swing.loglog(one.torque, one.amplitude, **look)
+        labels = ("period, $P$ [s]", r"$-\mathrm{d}\ln P/\mathrm{d}\ln\tau$", "swing [rad]")
+        for panel, label in zip(axes, labels, strict=True):
+            panel.set(xlabel=r"drive torque, $\tau$ [N m]", ylabel=label, xlim=(ds.torque[0], ds.torque[-1]))
+        period.legend(loc="upper right", handlelength=3)
+        exponent.set(ylim=(0.28, 1.05))
+        exponent.set_yticks((1 / 3, 0.5, 1), labels=("1/3", "1/2", "1"))
+        exponent.set_yticks([], minor=True)
+        plain_ticks(swing.yaxis, (0.25, 0.5, 1, 2))
+        direct_label(exponent, 3e-4, 0.55, "impacts alone", fontsize=7)
     return page
 
 
-def _letter_axes(axes: Any, ds: xr.Dataset) -> None:
-    for panel, label in zip(
-        axes, ("period, $P$ [s]", r"$-\mathrm{d}\ln P/\mathrm{d}\ln\tau$", "swing [rad]"), strict=True
-    ):
-        panel.set(xlabel=r"drive torque, $\tau$ [N m]", ylabel=label, xlim=(ds.torque[0], ds.torque[-1]))
-    axes[0].legend(loc="upper right", handlelength=3)
-    axes[1].set(ylim=(0.28, 1.05), yticks=(1 / 3, 0.5, 1), yticklabels=("1/3", "1/2", "1"))
-    axes[2].set(yticks=(0.25, 0.5, 1, 2), yticklabels=("0.25", "0.5", "1", "2"))
-    for panel in axes[1:]:
-        panel.yaxis.set_minor_locator(_no_ticks())
-    direct_label(axes[1], 3e-4, 0.55, "impacts alone", fontsize=7)
-
-
-def _no_ticks() -> Any:
-    from matplotlib.ticker import NullLocator
-
-    return NullLocator()
-
-
-def conclude(path: str, denny_path: str, viscous_path: str) -> tuple[Groups, list[str], Any]:
+def conclude(path: str, denny_path: str, viscous_path: str) -> Conclusion:
     """Statements and the figure; writes the three in one dataset beside the first."""
-    impact = read_result(path, "impact", ["torque"], "three_models.toml")
-    denny, viscous = (
-        read_result(p, "foliot", ["mu"], f"three_models_{name}.toml")
-        for p, name in ((denny_path, "denny"), (viscous_path, "viscous"))
-    )
-    ds = together(impact, denny, viscous)
-    followed = in_si(impact, denny)
+    impact = two_bodies(read_result(path, "impact", ["torque"], "three_models.toml"))
+    denny = read_result(denny_path, "foliot", ["mu"], "three_models_denny.toml")
+    viscous = read_result(viscous_path, "foliot", ["mu"], "three_models_viscous.toml")
+    ds, followed = together(impact, denny, viscous), in_si(impact, denny)
     target = sweep.export(ds, Path(path).with_name("three_models_all.nc"), force=True)
     groups = {
         "Period against torque": laws(ds, followed),
