@@ -28,20 +28,20 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, compared, differing, direct_label, hatch, page_of, read_result, report
+from _common import Conclusion, Statement, compared, differing, most, read_result, report, said, solved
+from _figures import colour_map, direct_label, hatch, page_of
 from scipy.optimize import brentq
 
-import sweep
 from kernels.interface import Status
 from sweep.show.charts import COLOURS, DASHES
 
 BORDER = 3 - 2 * math.sqrt(2)
-UNMESHES, NEVER_STARTS, FALLS_BACK = Status.UNMESHES, Status.NEVER_STARTS, Status.NO_METHOD
+FALLS_BACK = Status.NO_METHOD
 NEAR = 0.02
 """How near to 1/2 an exponent is called 1/2."""
 NOTES = """\
@@ -61,192 +61,150 @@ def prepared(ds: xr.Dataset) -> xr.Dataset:
     both = runs & runs.shift(tau=1, fill_value=False) & runs.shift(tau=-1, fill_value=False)
     pitches = ds.recoil / (2 * (2 * ds.n * ds.phi0 + ds["drop"]))
     ds = ds.assign_coords(kappa=ds.n**2 * ds.I_c / ds.I_v, alpha=("tau", alpha))
-    return ds.assign(s=slope.where(both), pitches=pitches, out=ds.status == UNMESHES)
+    return ds.assign(s=slope.where(both), pitches=pitches, out=ds.status == Status.UNMESHES)
 
 
 def one_body() -> tuple[float, float]:
     """alpha and s of (2)."""
-
-    def k(q: float) -> float:
-        return q - math.tanh(q)
-
-    q = brentq(lambda q: math.log(math.cosh(q)) / k(q) - 3, 0.1, 3.0)
-    return 1 / k(q), (1 - math.tanh(q) / q) / math.tanh(q) ** 2
+    q = brentq(lambda q: math.log(math.cosh(q)) / (q - math.tanh(q)) - 3, 0.1, 3.0)
+    return 1 / (q - math.tanh(q)), (1 - math.tanh(q) / q) / math.tanh(q) ** 2
 
 
-def border(axis: str, values: Any, **fixed: float) -> float:
+def border(axis: str, values: Any, **changed: float) -> float:
     """Between which of these values a clock without drop stays in mesh on one side alone: their middle, else NaN."""
-    fixed = {"tau": 1.0, "I_v": 1.0, "n": 1.0, "phi0": 0.3, "drop": 3e-10} | fixed
-    del fixed[axis]
-    stays = (
-        sweep.run(sweep.study(kernel="verge", axes={axis: values}, fixed=fixed, rtol=1e-6), progress=False).status == 0
-    )
-    turns = np.flatnonzero(np.diff(stays.values))
+    clock = {"tau": 1.0, "I_v": 1.0, "n": 1.0, "phi0": 0.3, "drop": 3e-10} | changed | {axis: values}
+    turns = np.flatnonzero(np.diff(solved("verge", **clock, rtol=1e-6).status == 0))
     return 0.5 * float(values[turns[0]] + values[turns[0] + 1]) if turns.size == 1 else math.nan
 
 
-def mesh(ds: xr.Dataset) -> list[Statement]:
+def mesh(ds: xr.Dataset, smooth: xr.Dataset) -> list[Statement]:
     """Which clocks stay in mesh, and the recoil of those that do."""
-    smooth = ds.isel(R_v=0, e=0)
-    leaves = smooth.out.any("tau")
-    light = smooth.isel(I_c=0)
-    last, first = float(light.alpha.where(~light.out).max()), float(light.alpha.where(light.out).min())
-    alpha, _ = one_body()
-    tau = 0.3 * np.arange(22.0, 22.4, 0.01)
-    leaves_at = border("tau", tau, I_c=1e-9, c_v=1.0) / 0.3
-    kappa = border("I_c", np.arange(0.165, 0.18, 1e-4), I_c=1.0)
+    light, leaves, (alpha, _) = smooth.isel(I_c=0), smooth.out.any("tau"), one_body()
+    last, first = light.alpha.where(~light.out).max(), light.alpha.where(light.out).min()
+    leaves_at = border("tau", 0.3 * np.arange(22.0, 22.4, 0.01), I_c=1e-9, c_v=1.0) / 0.3
+    kappa = border("I_c", np.arange(0.165, 0.18, 1e-4))
     heavy = smooth.where(~leaves & (smooth.kappa < 0.7), drop=True).isel(tau=-1)
-    theory = (1 - heavy.kappa) ** 2 / (8 * heavy.kappa)
-    off = float(abs(heavy.pitches / theory - 1).max())
-    most = float(ds.pitches.max())
-    below, above = float(smooth.kappa.where(leaves).max()), float(smooth.kappa.where(~leaves).min())
+    off = heavy.pitches / ((1 - heavy.kappa) ** 2 / (8 * heavy.kappa)) - 1
+    below, above, farthest = smooth.kappa.where(leaves).max(), smooth.kappa.where(~leaves).min(), ds.pitches.max()
+    free, last_first = "kappa from which on no drive unmeshes it, no friction", f"{last:.3g}, {first:.3g}"
+    bare, body = "alpha at which a wheel without inertia unmeshes, no drop", f"{alpha:.5g}, by one body"
+    near, recoil = last < 1.1 * alpha < first, "  their recoil at alpha = 1e5 [pitches]"
     return [
-        compared("kappa from which on no drive unmeshes it, no friction", "3 - 2 sqrt 2 = 0.17157", kappa, BORDER,
-                 1e-3, 5),
-        Statement("  with viscous friction, between", "the same",
-                  f"{below:.3f}, {above:.3f}", None, below < BORDER < above),
-        Statement("  their recoil at alpha = 1e5 [pitches]", "(1 - kappa)^2/(8 kappa)", f"{heavy.sizes['I_c']} wheels",
-                  off, off < 0.1),
-        compared("alpha at which a wheel without inertia unmeshes, no drop", f"{alpha:.5g}, by one body", leaves_at,
-                 alpha, 1e-3, 5),
-        Statement("  kappa = .001, with the drop, between", "the same and 10 %", f"{last:.3g}, {first:.3g}", None,
-                  last < 1.1 * alpha < first),
-        Statement("largest recoil of a clock that runs [pitches]", "at most 1/2", f"{most:.3f}", None,
-                  0.45 < most <= 0.5),
-    ]  # fmt: skip
+        compared(free, "3 - 2 sqrt 2 = 0.17157", kappa, BORDER, 1e-3, 5),
+        said("  with viscous friction, between", below < BORDER < above, f"{below:.3f}, {above:.3f}", "the same"),
+        most(recoil, "(1 - kappa)^2/(8 kappa)", off, 0.1, f"{heavy.sizes['I_c']} wheels"),
+        compared(bare, body, leaves_at, alpha, 1e-3, 5),
+        said("  kappa = .001, with the drop, between", near, last_first, "the same and 10 %"),
+        said("largest recoil of a clock that runs [pitches]", 0.45 < farthest <= 0.5, f"{farthest:.3f}", "at most 1/2"),
+    ]
 
 
-def exponents(ds: xr.Dataset) -> list[Statement]:
-    """The exponent in mesh."""
-    smooth = ds.isel(R_v=0, e=0)
-    _, s = one_body()
-    off = 0.0
+def exponents(smooth: xr.Dataset) -> list[Statement]:
+    """The exponent in mesh, beside that of one body that keeps (1 - kappa)/(1 + kappa) of its speed."""
+    off = []
     for i in np.flatnonzero(smooth.kappa.values < 0.7):
         line = smooth.isel(I_c=int(i))
-        kappa = float(line.kappa)
-        mu = (line.n * line.tau / (line.I_v * (1 + kappa))).values
-        fixed = {
-            "a": float(line.c_v / line.I_v) / (1 + kappa),
-            "phi0": float(line.phi0),
-            "e": (1 - kappa) / (1 + kappa),
-        }
-        one = sweep.run(
-            sweep.study(kernel="foliot", axes={"mu": mu}, fixed=fixed, outputs=["sensitivity"]), progress=False
-        )
-        off = max(off, float(np.nanmax(abs(line.s.values[1:-1] - one.sensitivity.values[1:-1]))))
-    heavy = smooth.s.where(smooth.kappa > BORDER, drop=True).isel(tau=-2)
+        share, mu = float(line.kappa), line.n * line.tau / (line.I_v * (1 + line.kappa))
+        foliot = {"a": line.c_v / line.I_v / (1 + share), "phi0": line.phi0, "e": (1 - share) / (1 + share)}
+        one = solved("foliot", mu=mu, **foliot, outputs=["sensitivity"])
+        off.append(line.s.values[1:-1] - one.sensitivity.values[1:-1])
+    heavy, (_, s) = smooth.s.where(smooth.kappa > BORDER, drop=True).isel(tau=-2), one_body()
+    body = "s, kappa < .7: one body keeping (1 - kappa)/(1 + kappa)"
     return [
-        differing("least s in mesh, kappa = .001", f"{s:.4f} or more", float(smooth.s.isel(I_c=0).min()), s, 0.01, 4),
-        Statement("s, kappa < .7: one body keeping (1 - kappa)/(1 + kappa)", "foliot", "largest difference", off,
-                  off < 0.01),
-        differing("strongest drive, kappa > .17: least s", "1/2", float(heavy.min()), 0.5, 0.01, 4),
-        differing("  and largest", "1/2", float(heavy.max()), 0.5, 0.01, 4),
-    ]  # fmt: skip
+        differing("least s in mesh, kappa = .001", f"{s:.4f} or more", smooth.s.isel(I_c=0).min(), s, 0.01, 4),
+        most(body, "foliot", xr.DataArray(off), 0.01, "largest difference"),
+        differing("strongest drive, kappa > .17: least s", "1/2", heavy.min(), 0.5, 0.01, 4),
+        differing("  and largest", "1/2", heavy.max(), 0.5, 0.01, 4),
+    ]
 
 
-def halves(ds: xr.Dataset) -> list[Statement]:
+def halves(ds: xr.Dataset, smooth: xr.Dataset) -> list[Statement]:
     """Over which torques the exponent is 1/2."""
-    smooth = ds.isel(R_v=0, e=0)
     decades = (abs(smooth.s - 0.5) < NEAR).sum("tau") / 8
-    light, heavy = (float(decades.sel(I_c=kappa * 2.5e-3, method="nearest")) for kappa in (0.01, 1.0))
+    light, heavy = (decades.sel(I_c=kappa * 2.5e-3, method="nearest") for kappa in (0.01, 1.0))
     dry = ds.isel(R_v=1, e=0).s.sel(I_c=2.5e-5, method="nearest")
+    near, friction = f"within {NEAR} of 1/2, kappa = .01", "kappa = .01, dry friction of I_v a^2 phi0: s in mesh"
     return [
-        Statement(f"decades of torque with s within {NEAR} of 1/2, kappa = .01", "< 1/2", f"{light:.2g}", None,
-                  0.0 < light < 0.5),
-        Statement("  kappa = 1", "> 3", f"{heavy:.2g}", None, heavy > 3),
-        Statement("kappa = .01, dry friction of I_v a^2 phi0: s in mesh", "below 1/2 at its end",
-                  f"{float(dry.max()):.3f} to {float(dry.min()):.3f}", None, bool(dry.min() < 0.4)),
-    ]  # fmt: skip
+        said(f"decades of torque with s {near}", 0.0 < light < 0.5, f"{light:.2g}", "< 1/2"),
+        said("  kappa = 1", heavy > 3, f"{heavy:.2g}", "> 3"),
+        said(friction, dry.min() < 0.4, f"{dry.max():.3f} to {dry.min():.3f}", "below 1/2 at its end"),
+    ]
 
 
 def restitution(ds: xr.Dataset) -> list[Statement]:
     """What e changes."""
     bounce, plastic = ds.e * ds.kappa / (1 - ds.e), ds.isel(e=0)
-    off = abs(ds.period / plastic.period - 1)
-    short, longer = float(off.where(bounce < 0.005).max()), float(off.where(bounce < 0.1).max())
+    short, longer = ((ds.period / plastic.period - 1).where(bounce < x) for x in (0.005, 0.1))
     light = (bounce < 0.25) & (ds.kappa < BORDER)
     other, leave = int(((ds.out != plastic.out) & light).sum()), int((ds.out & light).sum())
-    unknown = int((light & ~(np.isfinite(ds.period) | ds.out | (ds.status == NEVER_STARTS))).sum())
-    lost = int((ds.status == FALLS_BACK).sum())
+    unknown = int((light & ~(np.isfinite(ds.period) | ds.out | (ds.status == Status.NEVER_STARTS))).sum())
+    lost = f"{int((ds.status == FALLS_BACK).sum())} of {ds.status.size}"
+    alike = "  < .25, kappa < .17: cells that unmesh otherwise than with e = 0"
     return [
-        Statement("e kappa/(1 - e) < .005: period against e = 0", "no difference", "largest", short, short < 1e-4),
-        Statement("  < .1", "small", "largest", longer, longer < 0.05),
-        Statement("  < .25, kappa < .17: cells that unmesh otherwise than with e = 0", "0", f"{other} of {leave}", None,
-                  other == 0 < leave),
-        Statement("  and that do not run, unmesh, or stick", "0", f"{unknown}", None, unknown == 0),
-        Statement("beyond, an old tooth is met again: cells not followed", "", f"{lost} of {ds.status.size}"),
-    ]  # fmt: skip
+        most("e kappa/(1 - e) < .005: period against e = 0", "no difference", short, 1e-4, "largest"),
+        most("  < .1", "small", longer, 0.05, "largest"),
+        said(alike, other == 0 < leave, f"{other} of {leave}", "0"),
+        said("  and that do not run, unmesh, or stick", unknown == 0, f"{unknown}", "0"),
+        Statement("beyond, an old tooth is met again: cells not followed", "", lost),
+    ]
 
 
-def figure(ds: xr.Dataset) -> Any:
+def figure(ds: xr.Dataset, smooth: xr.Dataset) -> Any:
     """Maps of the exponent without and with restitution; the exponent and the recoil over the drive."""
     with page_of(130.0, 2, 2) as (page, ((plastic, bouncing), (lines, recoil))):
-        for axes, e in ((plastic, 0.0), (bouncing, 0.6)):
-            draw_map(page, axes, ds.isel(R_v=0).sel(e=e, method="nearest"))
-        smooth = ds.isel(R_v=0, e=0)
-        chosen = [smooth.sel(I_c=kappa * 2.5e-3, method="nearest") for kappa in (0.01, 0.1, 0.18, 1.0)]
-        draw_lines(lines, chosen)
-        draw_recoil(recoil, chosen)
+        draw_map(plastic, smooth)
+        draw_map(bouncing, ds.isel(R_v=0).sel(e=0.6, method="nearest"))
+        for i, kappa in enumerate((0.01, 0.1, 0.18, 1.0)):
+            line, look = smooth.sel(I_c=kappa * 2.5e-3, method="nearest"), {"color": COLOURS[i]}
+            lines.semilogx(line.alpha, line.s, linestyle=DASHES[i], label=f"{line.kappa:.2g}", **look)
+            if line.out.any():
+                there = np.flatnonzero(np.isfinite(line.s.values))[-1]
+                lines.plot(line.alpha[there], line.s[there], "x", markersize=5, **look)
+            recoil.loglog(line.alpha, line.pitches.where(line.pitches > 0), linestyle=DASHES[i], **look)
+            if kappa == 0.18:  # what (1) says of the strongest drive
+                most = (1 - line.kappa) ** 2 / (8 * line.kappa)
+                recoil.plot(1e5, most, "o", markersize=4, clip_on=False, **look)
+        lines.axhline(0.5, color="0.7", linewidth=0.6)
+        lines.set(xlabel=r"drive, $\alpha$ [1]", ylabel="exponent, $s$ [1]", xlim=(0.1, 1e5), ylim=(0.3, 1.0))
+        lines.legend(title=r"$\kappa$", title_fontsize=7, loc="upper right")
+        recoil.axhline(0.5, color="0.4", linewidth=0.8)
+        direct_label(recoil, 3e3, 0.72, "out of mesh", fontsize=7)
+        recoil.set(xlabel=r"drive, $\alpha$ [1]", ylabel="recoil [pitch]", xlim=(0.1, 1e5), ylim=(3e-3, 1.0))
     return page
 
 
-def draw_map(page: Any, axes: Any, ds: xr.Dataset) -> None:
-    """s over alpha and kappa; hatched where the clock unmeshes, grey where an old tooth is met."""
-    axes.set(xscale="log", yscale="log")
-    alpha, kappa = ds.alpha.values, ds.kappa.values
-    shown = axes.pcolormesh(alpha, kappa, ds.s, vmin=1 / 3, vmax=1, cmap="cividis", rasterized=True)
-    bar = page.colorbar(shown, ax=axes, label="exponent, $s$ [1]", pad=0.02, ticks=[1 / 3, 0.5, 0.75, 1])
+def draw_map(axes: Any, ds: xr.Dataset) -> None:
+    """s over alpha and kappa; hatched where the clock unmeshes, white where an old tooth is met."""
+    alpha, kappa, ticks = ds.alpha.values, ds.kappa.values, {"ticks": [1 / 3, 0.5, 0.75, 1]}
+    axes.set(xscale="log", yscale="log", xlabel=r"drive, $\alpha$ [1]", ylabel=r"wheel over foliot, $\kappa$ [1]")
+    bar = colour_map(axes, alpha, kappa, ds.s, "exponent, $s$ [1]", ticks, vmin=1 / 3, vmax=1)
     bar.ax.set_yticklabels(["1/3", "1/2", "3/4", "1"])
     axes.contour(alpha, kappa, ds.s, levels=[0.5], colors="white", linewidths=0.8)
     hatch(axes, alpha, kappa, ds.out.values, "////", "0.4")
     axes.axhline(BORDER, color="C3", linewidth=0.8, linestyle="--")
-    axes.set(xlabel=r"drive, $\alpha$ [1]", ylabel=r"wheel over foliot, $\kappa$ [1]", xlim=(0.13, 7e4))
-    axes.set_title(f"$e = {float(ds.e):.1g}$", fontsize=8)
+    axes.set(xlim=(0.13, 7e4))
+    axes.set_title(f"$e = {ds.e:.1g}$", fontsize=8)
     direct_label(axes, 2e3, 8e-3, "unmeshes", fontsize=7)
-    if not (ds.status == FALLS_BACK).any():
-        direct_label(axes, 2e3, 0.25, r"$3-2\sqrt{2}$", "C3", fontsize=7)
-    else:
+    if (ds.status == FALLS_BACK).any():
         direct_label(axes, 2e2, 1.5, "old tooth met again", fontsize=7)
+    else:
+        direct_label(axes, 2e3, 0.25, r"$3-2\sqrt{2}$", "C3", fontsize=7)
 
 
-def draw_lines(axes: Any, chosen: Sequence[xr.Dataset]) -> None:
-    """s over alpha, to the drive that unmeshes the clock."""
-    for i, line in enumerate(chosen):
-        axes.semilogx(line.alpha, line.s, color=COLOURS[i], linestyle=DASHES[i], label=f"{float(line.kappa):.2g}")
-        there = np.flatnonzero(np.isfinite(line.s.values))[-1]
-        if line.out.any():
-            axes.plot(line.alpha[there], line.s[there], "x", color=COLOURS[i], markersize=5)
-    axes.axhline(0.5, color="0.7", linewidth=0.6)
-    axes.set(xlabel=r"drive, $\alpha$ [1]", ylabel="exponent, $s$ [1]", xlim=(0.1, 1e5), ylim=(0.3, 1.0))
-    axes.legend(title=r"$\kappa$", title_fontsize=7, loc="upper right")
-
-
-def draw_recoil(axes: Any, chosen: Sequence[xr.Dataset]) -> None:
-    """Recoil over alpha, with what (1) says of the strongest drive."""
-    for i, line in enumerate(chosen):
-        axes.loglog(line.alpha, line.pitches.where(line.pitches > 0), color=COLOURS[i], linestyle=DASHES[i])
-    kappa = float(chosen[2].kappa)
-    axes.plot(1e5, (1 - kappa) ** 2 / (8 * kappa), "o", color=COLOURS[2], markersize=4, clip_on=False)
-    axes.axhline(0.5, color="0.4", linewidth=0.8)
-    direct_label(axes, 3e3, 0.72, "out of mesh", fontsize=7)
-    axes.set(xlabel=r"drive, $\alpha$ [1]", ylabel="recoil [pitch]", xlim=(0.1, 1e5), ylim=(3e-3, 1.0))
-
-
-def conclude(path: str) -> tuple[Groups, list[str], Any]:
+def conclude(path: str) -> Conclusion:
     """Statements and the figure."""
     ds = prepared(read_result(path, "verge", ["R_v", "e", "I_c", "tau"], "verge_unmeshes.toml"))
+    smooth = ds.isel(R_v=0, e=0)
     groups = {
-        "In mesh": mesh(ds),
-        "Exponents": exponents(ds),
-        "Where s is 1/2": halves(ds),
+        "In mesh": mesh(ds, smooth),
+        "Exponents": exponents(smooth),
+        "Where s is 1/2": halves(ds, smooth),
         "Restitution": restitution(ds),
     }
-    return groups, [NOTES], lambda: figure(ds)
+    return groups, [NOTES], lambda: figure(ds, smooth)
 
 
-def main(arguments: Sequence[str]) -> int:
-    """Table and figure of the result that is named; 1 if a statement does not hold."""
-    return report(__file__, ["verge_unmeshes.h5"], arguments, conclude)
+main = partial(report, __file__, ["verge_unmeshes.h5"], conclude=conclude)
 
 
 if __name__ == "__main__":
