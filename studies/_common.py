@@ -11,6 +11,7 @@ import textwrap
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,7 @@ from _figures import plain_ticks as plain_ticks
 from _figures import quality_bar as quality_bar
 
 import sweep
+from kernels.interface import Status
 from sweep.file.overwriting import check_target
 
 
@@ -81,6 +83,12 @@ def differing(what: str, theory: str, here: Any, value: float, allowed: float, d
 def said(what: str, holds: Any, here: str = "", theory: str = "", refuted: bool = False) -> Statement:
     """What holds or does not, without a number that it deviates by."""
     return Statement(what, theory, here, None, bool(holds), refuted)
+
+
+def all_ok(ds: xr.Dataset) -> Statement:
+    """Whether every cell is OK."""
+    share = float((ds.status == Status.OK).mean())
+    return said("cells that are OK", share == 1.0, f"{share:.0%}", "all")
 
 
 def most(what: str, theory: str, off: Any, allowed: float, here: str = "largest deviation") -> Statement:
@@ -201,10 +209,22 @@ def report(
     if len(arguments) != len(inputs):
         print(f"use: python {Path(script).name} {' '.join(inputs)} [--force]", file=sys.stderr)
         return 2
+    return shown(Path(arguments[0]).with_suffix(".png"), lambda: conclude(*arguments), force, source)
+
+
+def script(name: str, inputs: str, conclude: Callable[..., Conclusion], source: str = "theory") -> Callable[..., int]:
+    """`main` of the script that concludes so, with its inputs as `report` has them; it runs if `name` is "__main__"."""
+    main = partial(report, conclude.__code__.co_filename, inputs.split(), conclude=conclude, source=source)
+    if name == "__main__":
+        sys.exit(main(sys.argv[1:]))
+    return main
+
+
+def shown(target: Path, conclude: Callable[[], Conclusion], force: bool, source: str = "theory") -> int:
+    """Prints what is concluded and saves its figure; the exit status of `report`."""
     try:
-        target = Path(arguments[0]).with_suffix(".png")
         check_target(target, force=force)
-        groups, notes, draw = conclude(*arguments)
+        groups, notes, draw = conclude()
         page = draw()
         print("\n".join([*table(groups, source), "", *notes, ""]))
         print(f"figure: {charts.save(page, target)}")

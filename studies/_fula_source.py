@@ -71,29 +71,38 @@ def judged(what: str, printed: Printed, here: float, expected: Sequence[str] = (
     return Statement(what, f"{printed}", f"{here:.5g}  {word}", here / float(printed) - 1, word in expected)
 
 
-def partial_systems(J: np.ndarray, k: np.ndarray) -> Mapping[str, dict[int, float]]:
-    """Rows of a table by (26), (27): J of b and e of a, and their products, by number of the mass, from 1."""
-    e = 1e3 / k
-    a = {j + 1: e[j - 1] * e[j] / (e[j - 1] + e[j]) for j in range(1, len(J))}
-    b = {j + 1: J[j] * J[j + 1] / (J[j] + J[j + 1]) for j in range(len(J) - 1)}
-    return {
-        "e": dict(enumerate(e, 1)),
-        "J of b": b,
-        "e of a": a,
-        "J e of a": {j: J[j - 1] * x for j, x in a.items()},
-        "J e of b": {j: x * e[j - 1] for j, x in b.items()},
-    }
+def in_source_units(chain: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """J, k and h of a chain in SI units, in those of the source."""
+    return {"J": 1e3 / KGF * chain["J"], "k": chain["k"] / KGF, "h": chain["h"] / KGF}
 
 
 def tables_2_to_4(chains: Mapping[int, Mapping[str, np.ndarray]]) -> list[Statement]:
-    """Every number that can be read, beside the partial systems of each chain."""
+    """Every number that can be read, beside the partial systems of each chain by (26), (27), masses counted from 1."""
     lines = []
     for n, rows in PARTIAL.items():
-        here = partial_systems(chains[n]["J"], chains[n]["k"])
+        J, k = chains[n]["J"], chains[n]["k"]
+        e = 1e3 / k
+        a = {j + 1: e[j - 1] * e[j] / (e[j - 1] + e[j]) for j in range(1, n)}
+        b = {j + 1: J[j] * J[j + 1] / (J[j] + J[j + 1]) for j in range(n - 1)}
+        here = {"e": dict(enumerate(e, 1)), "J of b": b, "e of a": a}
+        here["J e of a"] = {j: J[j - 1] * x for j, x in a.items()}
+        here["J e of b"] = {j: x * e[j - 1] for j, x in b.items()}
         for row, values in rows.items():
             for j, printed in values.items():
                 expected = ("slip",) if printed in SLIPS else ("reproduced", "near")
                 lines.append(judged(f"Table {10 - n}, {row}, {j}", printed, here[row][j], expected))
+    return lines
+
+
+def tables_3_to_5(chains: Mapping[int, Mapping[str, np.ndarray]]) -> list[Statement]:
+    """Every number of the reduced chains."""
+    lines = []
+    for n, (table, rows) in CHAINS.items():
+        for name, values in rows.items():
+            for i, printed in enumerate(values):
+                what = f"{table}, {name}{i + 1}"
+                expected = (CARRIED[what],) if what in CARRIED else ("reproduced", "near")
+                lines.append(judged(what, printed, chains[n][name][i], expected))
     return lines
 
 

@@ -8,6 +8,7 @@ terminal events. `FOLLOWERS` has those that are installed by their names.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import cache
 from importlib.util import find_spec
 from typing import Any
@@ -17,6 +18,39 @@ import numpy as np
 START = 1.1
 """Speed at the first switch over that of the cycle."""
 FOREVER = 1e9
+
+
+def installed(**by_module: dict[str, Any]) -> dict[str, Any]:
+    """The followers by their names, of those modules that are installed."""
+    return {name: one for module, some in by_module.items() if find_spec(module) for name, one in some.items()}
+
+
+def diffrax_motion(
+    solver: str, rates: Any, begin: Any, until: Any, args: Any, rtol: Any, event: Any = None, steps: int = 100_000
+) -> Any:
+    """What diffrax's solver gives from 0 until a time or an event, whose root is found a thousand times as sharply."""
+    import diffrax
+    import optimistix
+
+    root = optimistix.Newton(rtol=1e-3 * rtol, atol=1e-3 * rtol)
+    return diffrax.diffeqsolve(
+        diffrax.ODETerm(rates), getattr(diffrax, solver)(), t0=0.0, t1=until, dt0=None, y0=begin, args=args,
+        stepsize_controller=diffrax.PIDController(rtol=rtol, atol=1e-3 * rtol),
+        event=None if event is None else diffrax.Event(event, root), max_steps=steps, throw=False,
+    )  # fmt: skip
+
+
+def side_by_side(motion: Callable[..., Any], *axes: int | None) -> Callable[..., Any]:
+    """A function of cells as jax makes it, in double precision: all cells at once, along the axes given."""
+
+    @cache
+    def compiled() -> Any:
+        import jax
+
+        jax.config.update("jax_enable_x64", True)
+        return jax.jit(jax.vmap(motion, in_axes=axes))
+
+    return lambda *cells: np.asarray(compiled()(*(np.asarray(x) if np.ndim(x) else x for x in cells)))
 
 
 def swings(rtol: float, multiplier: float) -> int:
@@ -60,15 +94,8 @@ class Scipy(OneByOne):
             return float(state[1] if which else state[0] + 1.0)
 
         event.terminal = True  # type: ignore[attr-defined]
-        found = solve_ivp(
-            lambda t, state: (state[1], -1.0 - a * state[1] - friction),
-            (0.0, FOREVER),
-            begin,
-            "DOP853",
-            events=event,
-            rtol=self.rtol,
-            atol=1e-3 * self.rtol,
-        )
+        how = {"events": event, "rtol": self.rtol, "atol": 1e-3 * self.rtol}
+        found = solve_ivp(lambda _, u: (u[1], -1.0 - a * u[1] - friction), (0.0, FOREVER), begin, "DOP853", **how)
         return found.t[-1], *found.y[:, -1]
 
 
@@ -120,57 +147,28 @@ class Diffrax:
 
     def settle(self, a: Any, R: Any, speed: Any, count: Any) -> Any:
         """Rows of period, amplitude and speed before the switch."""
-        return np.asarray(_diffrax()(*map(np.asarray, (a, R, speed, count)), self.rtol))
+        return _all_settled(a, R, speed, count, self.rtol)
 
 
-@cache
-def _diffrax() -> Any:
-    import diffrax
+def _settled(a: Any, R: Any, speed: Any, count: Any, rtol: Any) -> Any:
     import jax
-    import optimistix
 
-    jax.config.update("jax_enable_x64", True)
-    term = diffrax.ODETerm(lambda t, y, args: jax.numpy.stack([y[1], -1.0 - args[0] * y[1] - args[1]]))
+    def rates(t: Any, y: Any, args: Any) -> Any:
+        return jax.numpy.stack([y[1], -1.0 - args[0] * y[1] - args[1]])
 
-    def leg(begin: Any, a: Any, friction: Any, which: int, rtol: Any) -> Any:
-        def condition(t: Any, y: Any, args: Any, **_: Any) -> Any:
-            return y[1] if which else y[0] + 1.0
-
-        root = optimistix.Newton(rtol=1e-3 * rtol, atol=1e-3 * rtol)
-        found = diffrax.diffeqsolve(
-            term,
-            diffrax.Dopri8(),
-            t0=0.0,
-            t1=FOREVER,
-            dt0=None,
-            y0=begin,
-            args=(a, friction),
-            stepsize_controller=diffrax.PIDController(rtol=rtol, atol=1e-3 * rtol),
-            event=diffrax.Event(condition, root),
-            max_steps=100_000,
-            throw=False,
-        )
+    def leg(begin: Any, friction: Any, event: Any) -> Any:
+        found = diffrax_motion("Dopri8", rates, begin, FOREVER, (a, friction), rtol, event)
         return found.ts[-1], found.ys[-1]
 
-    def half_swing(a: Any, R: Any, speed: Any, rtol: Any) -> Any:
-        out, top = leg(jax.numpy.stack([1.0, speed]), a, R, 1, rtol)
-        back, last = leg(jax.numpy.stack([top[0], 0.0]), a, -R, 0, rtol)
+    def half_swing(_: Any, found: Any) -> Any:
+        out, top = leg(jax.numpy.stack([1.0, found[2]]), R, lambda t, y, args, **_: y[1])
+        back, last = leg(jax.numpy.stack([top[0], 0.0]), -R, lambda t, y, args, **_: y[0] + 1.0)
         return out + back, top[0], -last[1]
 
-    def settled(a: Any, R: Any, speed: Any, count: Any, rtol: Any) -> Any:
-        begin = (0.0 * speed, 0.0 * speed, START * speed)
-        time, top, last = jax.lax.fori_loop(0, count, lambda _, found: half_swing(a, R, found[2], rtol), begin)
-        return jax.numpy.stack([2.0 * time, top, last])
-
-    return jax.jit(jax.vmap(settled, in_axes=(0, 0, 0, 0, None)))
+    begin = (0.0 * speed, 0.0 * speed, START * speed)
+    time, top, last = jax.lax.fori_loop(0, count, half_swing, begin)
+    return jax.numpy.stack([2.0 * time, top, last])
 
 
-FOLLOWERS = {
-    name: follower
-    for name, module, follower in (
-        ("heyoka.py", "heyoka", Heyoka),
-        ("diffrax", "diffrax", Diffrax),
-        ("scipy", "scipy", Scipy),
-    )
-    if find_spec(module)
-}
+_all_settled = side_by_side(_settled, 0, 0, 0, 0, None)
+FOLLOWERS = installed(heyoka={"heyoka.py": Heyoka}, diffrax={"diffrax": Diffrax}, scipy={"scipy": Scipy})

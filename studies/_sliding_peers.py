@@ -7,11 +7,11 @@ Each follower gives the places of cells at given times, at one tolerance; NaN wh
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache, partial
-from importlib.util import find_spec
+from functools import partial
 from typing import Any
 
 import numpy as np
+from _peers import diffrax_motion, installed, side_by_side
 from scipy.integrate import solve_ivp
 
 MU = 1.0
@@ -65,49 +65,19 @@ def motion(belt: float, fall: float, until: float, rtol: float, longest: float =
     return np.concatenate([*found, [[found[-1][0, -1] + belt * (until - t)], [belt]]], axis=1)
 
 
-@cache
-def _kvaerno5() -> Any:
+def _kvaerno5(belt: Any, fall: Any, until: Any, rtol: Any) -> Any:
     import diffrax
     import jax
 
-    jax.config.update("jax_enable_x64", True)
-
-    def rates(t: Any, u: Any, cell: Any) -> Any:
-        belt, fall = cell
+    def rates(t: Any, u: Any, args: Any) -> Any:
         return jax.numpy.stack([u[1], fall * u[1] - u[0] - MU * jax.numpy.sign(u[1] - belt)])
 
-    def place(belt: Any, fall: Any, until: Any, rtol: Any) -> Any:
-        end = diffrax.diffeqsolve(
-            diffrax.ODETerm(rates),
-            diffrax.Kvaerno5(),
-            t0=0.0,
-            t1=until,
-            dt0=None,
-            y0=jax.numpy.stack([0.0 * belt, belt]),
-            args=(belt, fall),
-            stepsize_controller=diffrax.PIDController(rtol=rtol, atol=1e-3 * rtol),
-            max_steps=MOST,
-            throw=False,
-        )
-        right = end.result == diffrax.RESULTS.successful
-        return jax.numpy.where(right, end.ys[-1, 0], jax.numpy.nan)
-
-    return jax.jit(jax.vmap(place, in_axes=(0, 0, 0, None)))
+    begin = jax.numpy.stack([0.0 * belt, belt])
+    end = diffrax_motion("Kvaerno5", rates, begin, until, None, rtol, steps=MOST)
+    return jax.numpy.where(end.result == diffrax.RESULTS.successful, end.ys[-1, 0], jax.numpy.nan)
 
 
-def diffrax_places(belt: Any, fall: Any, until: Any, rtol: float) -> Any:
-    """By Kvaerno5, all cells side by side by jax."""
-    return np.asarray(_kvaerno5()(np.asarray(belt), np.asarray(fall), np.asarray(until), rtol))
-
-
-FOLLOWERS: dict[str, Callable[[Any, Any, Any, float], Any]] = {
-    name: follower
-    for name, module, follower in (
-        ("scipy Radau", "scipy", partial(scipy_places, "Radau")),
-        ("scipy BDF", "scipy", partial(scipy_places, "BDF")),
-        ("scipy LSODA", "scipy", partial(scipy_places, "LSODA")),
-        ("diffrax Kvaerno5", "diffrax", diffrax_places),
-        ("scipy DOP853, modes by hand", "scipy", modes),
-    )
-    if find_spec(module)
-}
+FOLLOWERS: dict[str, Callable[[Any, Any, Any, float], Any]] = installed(
+    scipy={f"scipy {method}": partial(scipy_places, method) for method in ("Radau", "BDF", "LSODA")},
+    diffrax={"diffrax Kvaerno5": side_by_side(_kvaerno5, 0, 0, 0, None)},
+) | {"scipy DOP853, modes by hand": modes}

@@ -14,15 +14,13 @@ A stronger drive hastens by recoil and retards by the wider swing; both balance 
 
 from __future__ import annotations
 
-import sys
-from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, compared, direct_label, page_of, plain_ticks, read_result, report
+from _common import Conclusion, Groups, Statement, all_ok, compared, read_result, script
+from _figures import direct_label, page_of, plain_ticks
 
-from kernels.interface import Status
 from sweep.show.charts import COLOURS
 
 DAY = 86400.0
@@ -48,26 +46,22 @@ def near(what: str, theory: str, off: xr.DataArray, allowed: xr.DataArray) -> St
     return Statement(what, theory, f"{share:.2f} of the next order", float(abs(off).max()), share <= 1)
 
 
-def balance(line: xr.Dataset) -> Statement:
-    """The swing at which a change of the drive changes nothing."""
-    A = np.hypot(line.phi0, 4 / (line.phi0 * line.Q)).item()
-    here = float(np.interp(0.0, line.period_by_mu, line.angle_size))
-    what = f"phi0 = {np.degrees(line.phi0.item()):g} degrees: A of s = 0 [degrees]"
-    return compared(what, f"{np.degrees(A):.5g}", np.degrees(here), np.degrees(A), 0.005, 5)
-
-
 def statements(ds: xr.Dataset) -> Groups:
     """Theory beside each cell; where drive does not matter; the verge."""
-    ok = float((ds.status == Status.OK).mean())
     worst, theory = (1 / 3 / float(abs(s).where(np.degrees(ds.A) < 5).max()) for s in (ds.s, ds.s_theory))
     cells = [
-        Statement("cells that are OK", "all", f"{ok:.0%}", None, ok == 1.0),
+        all_ok(ds),
         near("amplitude/A - 1, next order A^2/16 + e", "(1)", ds.angle_size / ds.A - 1, ds.A**2 / 16 + ds.e),
         near("P/P0 - 1", "(2)", ds.error - ds.error_theory, ds.next),
         near("s", "(3)", ds.s - ds.s_theory, ds.next),
     ]
     ratio = compared("the verge's 1/3 over the largest abs(s), A < 5 degrees", f"{theory:.4g}", worst, theory, 0.01, 5)
-    balances = [balance(ds.isel(phi0=k)) for k in range(ds.sizes["phi0"])]
+    balances = []  # the swing at which a change of the drive changes nothing
+    for line in (ds.isel(phi0=k) for k in range(ds.sizes["phi0"])):
+        A = np.degrees(np.hypot(line.phi0, 4 / (line.phi0 * line.Q)).item())
+        here = np.degrees(np.interp(0.0, line.period_by_mu, line.angle_size))
+        what = f"phi0 = {np.degrees(line.phi0.item()):g} degrees: A of s = 0 [degrees]"
+        balances.append(compared(what, f"{A:.5g}", here, A, 0.005, 5))
     return {"Every cell": cells, "Recoil and circular error in balance": balances, "Beside the verge": [ratio]}
 
 
@@ -96,13 +90,10 @@ def figure(ds: xr.Dataset) -> Any:
     return page
 
 
-def conclude(path: str) -> tuple[Groups, list[str], Any]:
+def conclude(path: str) -> Conclusion:
     """Statements and the figure."""
     ds = with_theory(read_result(path, "anchor_scene:KERNEL", ["phi0", "mu"], "anchor.toml"))
     return statements(ds), NOTES.splitlines(), lambda: figure(ds)
 
 
-main = partial(report, __file__, ["anchor.h5"], conclude=conclude)
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+main = script(__name__, "anchor.h5", conclude)

@@ -20,13 +20,14 @@ the sign of `at` or the drive in it, and vanishes where J1 does, at a = 3.832 ra
 from __future__ import annotations
 
 import math
-import sys
-from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, compared, differing, direct_label, page_of, plain_ticks, read_result, report
+from _common import Conclusion, Statement, compared, differing, most, read_result, said, script
+from _figures import direct_label, page_of, plain_ticks
+from matplotlib.colors import SymLogNorm
+from scipy.special import j1, jn_zeros
 
 import sweep
 from sweep.show.charts import COLOURS, DASHES, MARKS
@@ -37,27 +38,16 @@ LARGE = 20.0
 FIRST = 0.02
 FLAT = 1e-3
 """Loss [s/day] that counts as none; the sweep is right to rtol 1e-11 of a period, 1e-6 s/day."""
-WATCH = {"mu": 0.15, "m": 1e-4, "g": 9.81, "pivot": 5e-5, "end": 3.75e-5, "stiffness": 2.96e-7}
-"""Friction coefficient, mass [kg], gravity [m/s^2], radii of pivot and of its end [m], spring [N m/rad] of a watch."""
+WATCH = 0.15, 1e-4 * 9.81, 5e-5, 3.75e-5, 2.96e-7
+"""Friction coefficient, weight [N], radii of pivot and of its end [m], spring [N m/rad] of a watch."""
+HOLLOW = {"markerfacecolor": "white", "markersize": 3.6, "linestyle": ""}
+"""Marks of what is computed."""
 
 NOTES = """\
 loss: how much slower than 2 pi/omega_d, in s a day; deviation: relative, of losses the largest difference in s/day
 allowed: 1e-3 s/day where there is no loss; 2 % of (1) at amplitudes over 20 r and 20 abs(at), 1e-6 between the scene
 and the kernel `balance_driven`; 2 % of the least drive for what grids of m can tell; 0.005 rad of 3.8317\
 """
-
-
-def pivot_friction(mu: float, m: float, g: float, radius: float) -> float:
-    """R [N m] of a pivot of this radius [m], lying on its side; the contact climbs the hole by arctan(mu).
-
-    The page's R = mu m g r is this to first order in mu.
-    """
-    return m * g * radius * mu / math.sqrt(1 + mu * mu)
-
-
-def end_friction(mu: float, m: float, g: float, radius: float) -> float:
-    """R [N m] of a flat end of this radius [m], upright and evenly pressed: a disc rubs at 2/3 of its radius."""
-    return 2 / 3 * mu * m * g * radius
 
 
 def reach(ds: xr.Dataset) -> xr.DataArray:
@@ -82,44 +72,35 @@ def theory(ds: xr.Dataset) -> xr.DataArray:
 
 
 def impulses(ds: xr.Dataset) -> list[Statement]:
-    """Where impulses do not touch the rate, and by how much they do elsewhere."""
-    there = ds.loss.where(abs(ds["at"] + ds.r) < 1e-12)
-    still = float(abs(there).max())
-    span = f"{float(ds.a.where(there.notnull()).min()):.2f} to {float(ds.a.where(there.notnull()).max()):.2f} rad"
+    """Where impulses do not touch the rate, by how much they do elsewhere, and `balance_driven` at the centre."""
+    there = abs(ds["at"] + ds.r) < 1e-12
+    still, span = float(abs(ds.loss).where(there).max()), ds.a.where(there & ds.loss.notnull())
     away = ds.where(abs(ds["at"] + ds.r) > 1e-3)
-    light = away.where(away.a > LARGE * np.maximum(abs(away["at"]), away.r))
-    ratio = light.loss / theory(light)
+    ratio = (away.loss / theory(away)).where(away.a > LARGE * np.maximum(abs(away["at"]), away.r))
     turns = int(((away.loss.diff("w") * np.sign(away["at"] + away.r)) > 0).sum())
     worst = float(abs(away.loss).max())
-    return [
-        Statement(f"at = -r: loss at every drive, a = {span} [s/day]", "0", "at most", still, still < FLAT),
-        Statement(
-            f"elsewhere (1), a > 20 r, 20 abs(at): {int(ratio.notnull().sum())} cells", "1", "largest deviation",
-            float(abs(ratio - 1).max()), float(abs(ratio - 1).max()) < FIRST,
-        ),
-        Statement("  amplitudes at which the loss is stationary", "none", f"{turns} of the grid", None, turns == 0),
-        Statement("  largest loss or gain on the grid [s/day]", "-", f"{worst:.0f}", None, worst > 100),
-        *beside_kernel(ds),
-    ]  # fmt: skip
-
-
-def beside_kernel(ds: xr.Dataset) -> list[Statement]:
-    """Impulses at the centre: the scene beside `balance_driven`, and beside integrations of it by others."""
-    middle = ds.sel(at=0, method="nearest")
+    middle, light = ds.sel(at=0, method="nearest"), {"zeta": 0.005, "omega_n": 1.0, "w": 0.01}
     fixed = {"zeta": float(ds.zeta), "omega_n": float(ds.omega_n)}
-    axes = {"r": ds.r.values, "w": ds.w.values}
-    made = sweep.run(sweep.study(kernel="balance_driven", axes=axes, fixed=fixed, rtol=1e-12))
+    made = driven({"r": ds.r.values, "w": ds.w.values}, fixed, 1e-12)
     off = max(float(abs(middle.clock / made.period - 1).max()), float(abs(middle.a / made.amplitude - 1).max()))
-    other = sweep.study(
-        kernel="balance_driven", axes={"r": [0.001, 0.01]}, fixed={"zeta": 0.005, "omega_n": 1.0, "w": 0.01}, rtol=1e-12
-    )
-    known = sweep.run(other)
-    losses = (DAY * (known.period / (2 * math.pi) - 1)).values  # against the balance without any friction
+    # by other integrations, against the balance without any friction
+    losses = (DAY * (driven({"r": [0.001, 0.01]}, light, 1e-12).period / (2 * math.pi) - 1)).values
+    what = f"at = -r: loss at every drive, a = {float(span.min()):.2f} to {float(span.max()):.2f} rad [s/day]"
+    cells = f"elsewhere (1), a > 20 r, 20 abs(at): {int(ratio.notnull().sum())} cells"
     return [
-        Statement("at = 0: period and amplitude by `balance_driven`", "the same", "largest", off, off < 1e-6),
+        most(what, "0", still, FLAT, "at most"),
+        most(cells, "1", abs(ratio - 1).max(), FIRST),
+        said("  amplitudes at which the loss is stationary", turns == 0, f"{turns} of the grid", "none"),
+        said("  largest loss or gain on the grid [s/day]", worst > 100, f"{worst:.0f}", "-"),
+        most("at = 0: period and amplitude by `balance_driven`", "the same", off, 1e-6, "largest"),
         differing("  zeta = .005, w = .01, r = .001: loss by solve_ivp [s/day]", "1.77", losses[0], 1.77, 0.01, 4),
         differing("  r = .01", "49.7", losses[1], 49.7, 0.1, 4),
     ]
+
+
+def driven(axes: dict[str, Any], fixed: dict[str, float], rtol: float) -> xr.Dataset:
+    """A balance that is pushed at the centre, by the kernel."""
+    return sweep.run(kernel="balance_driven", axes=axes, fixed=fixed, rtol=rtol)
 
 
 def lifts(ds: xr.Dataset) -> list[Statement]:
@@ -128,66 +109,49 @@ def lifts(ds: xr.Dataset) -> list[Statement]:
     for beta in ds.beta.values:
         line = ds.sel(beta=beta).isel(r=-1)
         k = int(line.loss.fillna(-1.0).argmax("m"))
-        a, worst = float(line.amplitude[k]), float(line.loss[k])
-        least = float(line.m[int(line.amplitude.notnull().argmax("m"))])
-        ends = bool(0 < k < line.m.size - 1 and 1.1 * beta < a < 2.0 * beta)
-        here = f"{worst:.0f} at {math.degrees(a):.0f} degree = {a / beta:.2f} lifts"
+        a, least = float(line.amplitude[k]), float(line.m[int(line.amplitude.notnull().argmax("m"))])
+        here = f"{float(line.loss[k]):.0f} at {math.degrees(a):.0f} degree = {a / beta:.2f} lifts"
         what = f"lift +-{math.degrees(beta):.0f} degree: greatest loss [s/day] at amplitude"
-        lines.append(
-            Statement(what, "1 to 2 lifts", f"{here}, m {float(line.m[k]) / least:.2f} times the least", None, ends)
-        )
+        holds = 0 < k < line.m.size - 1 and 1.1 * beta < a < 2.0 * beta
+        lines.append(said(what, holds, f"{here}, m {float(line.m[k]) / least:.2f} times the least", "1 to 2 lifts"))
     free = ds.sel(r=0).loss
-    gains = bool((free.where(free.notnull(), -1.0) < 0).all())
+    gains = (free.where(free.notnull(), -1.0) < 0).all()
     here = f"{float(free.min()):.2f} at most [s/day]"
-    return [*lines, Statement("no solid friction: a lift gains, at every torque", "< 0", here, None, gains)]
+    return [*lines, said("no solid friction: a lift gains, at every torque", gains, here, "< 0")]
 
 
 def positions(ds: xr.Dataset) -> list[Statement]:
     """The amplitude at which positions agree, and what poise does elsewhere."""
-    from scipy.special import j1, jn_zeros
-
-    spread = ds.loss.isel(hang=0) - ds.loss.isel(hang=2)
+    spread, a, first = ds.loss.isel(hang=0) - ds.loss.isel(hang=2), ds.a.isel(hang=0), jn_zeros(1, 1)[0]
     zero = float(sweep.where_exponent(spread.swap_dims(w="a0"), "a0", 0.0, values=True).abscissa)
-    rate = -2 * DAY * float(ds.poise) * j1(ds.a.isel(hang=0)) / ds.a.isel(hang=0)
-    off = float(abs(spread - rate).max() / abs(spread).max())
-    level = float(abs(ds.loss.isel(hang=1)).max() / abs(spread).max())
+    rate = -2 * DAY * float(ds.poise) * j1(a) / a
+    off, level = (abs(x).max() / abs(spread).max() for x in (spread - rate, ds.loss.isel(hang=1)))
     return [
-        differing(
-            "positions agree at the amplitude [rad]", f"{jn_zeros(1, 1)[0]:.4f}", zero, jn_zeros(1, 1)[0], 5e-3, 5
-        ),
-        Statement("top heavy against bottom heavy, by J1(a)/a", "the same", "of the largest", off, off < 5e-3),
-        Statement("heavy at the side: of that", "0", "", level, level < 5e-3),
+        differing("positions agree at the amplitude [rad]", f"{first:.4f}", zero, first, 5e-3, 5),
+        most("top heavy against bottom heavy, by J1(a)/a", "the same", off, 5e-3, "of the largest"),
+        most("heavy at the side: of that", "0", level, 5e-3, ""),
     ]
 
 
 def pivots() -> list[Statement]:
-    """From the page's mu, m, g and radius to r, and what the position does to amplitude and rate of a watch."""
-    mu, m, g, k = (WATCH[name] for name in ("mu", "m", "g", "stiffness"))
-    upright, flat = pivot_friction(mu, m, g, WATCH["pivot"]) / k, end_friction(mu, m, g, WATCH["end"]) / k
-    study = sweep.study(
-        kernel="balance_driven", axes={"r": [flat, upright]}, fixed={"zeta": 1 / 600, "omega_n": 15.708, "w": 0.2}
-    )
-    ds = sweep.run(study)
+    """From the page's mu, m, g and radius to r, and what the position does to amplitude and rate of a watch.
+
+    On its side a pivot climbs its hole by arctan(mu), so that R = mu m g r/sqrt(1 + mu^2), the page's R to first order
+    in mu. Upright its flat end is evenly pressed, and a disc rubs at 2/3 of its radius.
+    """
+    mu, weight, pivot, end, k = WATCH
+    upright, flat = weight * pivot * mu / math.sqrt(1 + mu * mu) / k, 2 / 3 * mu * weight * end / k
+    ds = driven({"r": [flat, upright]}, {"zeta": 1 / 600, "omega_n": 15.708, "w": 0.2}, 1e-9)
     loss, a = lost(ds, ds.period).values, np.degrees(ds.amplitude.values)
     work = (2 * ds.r * ds.amplitude + math.pi / 600 * ds.amplitude**2).values
+    close = abs(upright - 0.025) < 5e-4 and abs(flat - 0.0125) < 5e-4
+    amplitudes = "same drive, w = 0.2: amplitude hanging, lying [degree]"
     return [
         compared("R = mu m g r/sqrt(1 + mu^2), r = 50 um [N m]", "mu m g r = 7.36e-09", upright * k, 7.36e-9, 0.02, 4),
-        Statement("r = R/k, hanging and lying [rad]", "0.025, 0.0125", f"{upright:.4f}, {flat:.4f}", None,
-                  bool(abs(upright - 0.025) < 5e-4 and abs(flat - 0.0125) < 5e-4)),
-        Statement("same drive, w = 0.2: amplitude hanging, lying [degree]", "by the work", f"{a[1]:.0f}, {a[0]:.0f}",
-                  float(abs(work / 0.2 - 1).max()), bool(abs(work / 0.2 - 1).max() < 0.02)),
-        Statement("  loss hanging, lying [s/day]", "-", f"{loss[1]:.2f}, {loss[0]:.2f}", None, bool(loss[1] > loss[0])),
-    ]  # fmt: skip
-
-
-def figure(ds: xr.Dataset, lift: xr.Dataset, hung: xr.Dataset) -> Any:
-    """Loss against amplitude for impulses, over their angle, for lifts and in positions; for two columns of print."""
-    with page_of(125.0, 2, 2) as (page, ((lines, plane), (lifted, posed))):
-        draw_lines(lines, ds.isel(r=1))
-        draw_plane(page, plane, ds.isel(r=1))
-        draw_lifts(lifted, lift.isel(r=-1))
-        draw_positions(posed, hung)
-    return page
+        said("r = R/k, hanging and lying [rad]", close, f"{upright:.4f}, {flat:.4f}", "0.025, 0.0125"),
+        most(amplitudes, "by the work", abs(work / 0.2 - 1).max(), 0.02, f"{a[1]:.0f}, {a[0]:.0f}"),
+        said("  loss hanging, lying [s/day]", loss[1] > loss[0], f"{loss[1]:.2f}, {loss[0]:.2f}", "-"),
+    ]
 
 
 def draw_lines(axes: Any, ds: xr.Dataset) -> None:
@@ -195,12 +159,12 @@ def draw_lines(axes: Any, ds: xr.Dataset) -> None:
     for k, at in enumerate((-0.05, -0.025, -0.0125, 0.0, 0.05)):
         line = ds.sel(at=at, method="nearest").sortby("w")
         axes.plot(line.a, theory(line), color=COLOURS[k], linewidth=0.9)
-        look = {"linestyle": "", "color": COLOURS[k], "markerfacecolor": "white", "markersize": 3.6}
-        axes.plot(line.a[::4], line.loss[::4], MARKS[k], **look)
+        axes.plot(line.a[::4], line.loss[::4], MARKS[k], color=COLOURS[k], **HOLLOW)
         text = f"${1e3 * at:+.3g}$ mrad" if at else "centre"
-        direct_label(axes, 1.15 * float(line.a.max()), float(theory(line)[int(line.a.argmax("w"))]), text, COLOURS[k],
-                     fontsize=6.5, ha="left", va="top" if at == -0.0125 else "center")  # fmt: skip
-    axes.plot([], [], "o", color="0.3", markerfacecolor="white", markersize=3.6, label="computed")
+        x, y = 1.15 * float(line.a.max()), float(theory(line)[int(line.a.argmax("w"))])
+        place = {"ha": "left", "va": "top" if at == -0.0125 else "center"}
+        direct_label(axes, x, y, text, COLOURS[k], fontsize=6.5, **place)
+    axes.plot([], [], "o", color="0.3", label="computed", **HOLLOW)
     axes.plot([], [], color="0.3", linewidth=0.9, label="theory, light losses")
     axes.set_yscale("symlog", linthresh=1.0, linscale=0.6)
     axes.set_yticks([-1000, -100, -10, -1, 0, 1, 10, 100, 1000])
@@ -212,12 +176,9 @@ def draw_lines(axes: Any, ds: xr.Dataset) -> None:
 
 def draw_plane(page: Any, axes: Any, ds: xr.Dataset) -> None:
     """Loss over angle of the impulse and drive; it vanishes on the line at = -r."""
-    from matplotlib.colors import SymLogNorm
-
-    at, w = 1e3 * ds["at"].values, ds.w.values
-    loss = ds.loss.transpose("w", "at").values
-    norm = SymLogNorm(1.0, vmin=-1000, vmax=1000)
-    mesh = axes.pcolormesh(at, w, loss, norm=norm, cmap="RdBu_r", shading="gouraud", rasterized=True)
+    loss, norm = ds.loss.transpose("w", "at"), SymLogNorm(1.0, vmin=-1000, vmax=1000)
+    look = {"norm": norm, "cmap": "RdBu_r", "shading": "gouraud", "rasterized": True}
+    mesh = axes.pcolormesh(1e3 * ds["at"].values, ds.w.values, loss.values, **look)
     bar = page.colorbar(mesh, ax=axes, label="loss [s/day]", pad=0.02)
     bar.set_ticks([-1000, -100, -10, 0, 10, 100, 1000])
     axes.axvline(-1e3 * float(ds.r), color="black", linestyle=(0, (4, 2)), linewidth=0.9, label="$-r$: isochronous")
@@ -230,8 +191,8 @@ def draw_lifts(axes: Any, ds: xr.Dataset) -> None:
     """Loss over amplitude by lift; the mark is where the rate does not depend on the torque."""
     for k, beta in enumerate(ds.beta.values):
         line = ds.sel(beta=beta)
-        axes.loglog(line.amplitude, line.loss, color=COLOURS[k], linestyle=DASHES[k],
-                    label=f"lift ±{math.degrees(beta):.0f} degree")  # fmt: skip
+        text = f"lift ±{math.degrees(beta):.0f} degree"
+        axes.loglog(line.amplitude, line.loss, color=COLOURS[k], linestyle=DASHES[k], label=text)
         top = line.isel(m=int(line.loss.fillna(-1.0).argmax("m")))
         axes.plot(float(top.amplitude), float(top.loss), "o", color=COLOURS[k])
     axes.plot([], [], "o", color="black", label="rate independent of the torque")
@@ -242,15 +203,12 @@ def draw_lifts(axes: Any, ds: xr.Dataset) -> None:
 
 def draw_positions(axes: Any, ds: xr.Dataset) -> None:
     """Rate over amplitude, position by position, with J1."""
-    from scipy.special import j1
-
     wide = np.linspace(1.0, 6.5, 200)
     for k, hang in enumerate(ds.hang.values):
-        line = ds.isel(hang=k)
+        line, text = ds.isel(hang=k), f"{math.degrees(hang):.0f} degree"
         drop = -DAY * float(ds.poise) * math.cos(hang) * j1(wide) / wide
         axes.plot(wide, drop, color=COLOURS[k], linewidth=0.9)
-        axes.plot(line.a, line.loss, MARKS[k], color=COLOURS[k], markerfacecolor="white", markersize=3.6,
-                  linestyle="", label=f"{math.degrees(hang):.0f} degree")  # fmt: skip
+        axes.plot(line.a, line.loss, MARKS[k], color=COLOURS[k], label=text, **HOLLOW)
     axes.axvline(3.8317, ymax=0.6, color="0.5", linestyle=(0, (4, 2)), linewidth=0.9)
     direct_label(axes, 3.8317, 5.0, "220 degree", "0.35", fontsize=7)
     axes.plot([], [], color="black", linewidth=0.9, label=r"$\propto J_1(a)/a$")
@@ -258,18 +216,24 @@ def draw_positions(axes: Any, ds: xr.Dataset) -> None:
     axes.legend(title="heavy point from the top", fontsize=7, title_fontsize=7, loc="upper right", ncols=2)
 
 
-def read(path: str, lift_path: str, hung_path: str) -> tuple[xr.Dataset, xr.Dataset, xr.Dataset]:
-    """The three sweeps with `loss` and, of the scenes, amplitude `a`. Raises SweepError where one is none of these."""
+def figure(ds: xr.Dataset, lift: xr.Dataset, hung: xr.Dataset) -> Any:
+    """Loss against amplitude for impulses, over their angle, for lifts and in positions; for two columns of print."""
+    with page_of(125.0, 2, 2) as (page, ((lines, plane), (lifted, posed))):
+        draw_lines(lines, ds.isel(r=1))
+        draw_plane(page, plane, ds.isel(r=1))
+        draw_lifts(lifted, lift.isel(r=-1))
+        draw_positions(posed, hung)
+    return page
+
+
+def conclude(path: str, lift_path: str, hung_path: str) -> Conclusion:
+    """Statements and the figure."""
     ds = read_result(path, "balance_scene:KERNEL", ["r", "at", "w"], "balance_isochronism.toml")
     lift = read_result(lift_path, "balance_driven", ["r", "beta", "m"], "balance_isochronism_lift.toml")
     hung = read_result(hung_path, "balance_scene:KERNEL", ["hang", "w"], "balance_isochronism_positions.toml")
     ds, hung = (part.assign(a=reach(part), loss=lost(part, part.clock)) for part in (ds, hung))
-    return ds, lift.assign(loss=lost(lift, lift.period)), hung.assign_coords(a0=("w", hung.a.isel(hang=1).values))
-
-
-def conclude(*paths: str) -> tuple[Groups, list[str], Any]:
-    """Statements and the figure."""
-    ds, lift, hung = read(*paths)
+    lift = lift.assign(loss=lost(lift, lift.period))
+    hung = hung.assign_coords(a0=("w", hung.a.isel(hang=1).values))
     groups = {
         "Impulses before, at and behind the centre": impulses(ds),
         "A lift": lifts(lift),
@@ -279,9 +243,4 @@ def conclude(*paths: str) -> tuple[Groups, list[str], Any]:
     return groups, [NOTES], lambda: figure(ds, lift, hung)
 
 
-INPUTS = ["balance_isochronism.h5", "balance_isochronism_lift.h5", "balance_isochronism_positions.h5"]
-main = partial(report, __file__, INPUTS, conclude=conclude)
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+main = script(__name__, "balance_isochronism.h5 balance_isochronism_lift.h5 balance_isochronism_positions.h5", conclude)

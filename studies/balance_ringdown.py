@@ -13,21 +13,25 @@ the period is so of the free balance alone: driven, it loses (study `balance_iso
 from __future__ import annotations
 
 import math
-import sys
-from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, compared, differing, direct_label, hatch, read_result, report
+from _common import Conclusion, Statement, compared, differing, most, read_result, said, script
+from _figures import columns_of, direct_label, hatch
+from matplotlib.colors import LogNorm
+from scipy.integrate import solve_ivp
 
 import sweep
 from kernels.interface import Status
-from sweep.show import charts
 from sweep.show.charts import COLOURS, MARKS
 
 LIGHT = 0.01
 """Damping up to which delta = pi zeta to 5e-5."""
+SHOWN = (0.02, 0.06)
+"""zeta, r/theta0 of the ring-down that is drawn."""
+CELLS = ((0.005, 0.002), (0.02, 0.06), (0.1, 0.02), (0.3, 0.1), (1e-3, 0.14))
+"""zeta, r [rad] that are followed by DOP853 from 1 rad, with omega_n = 1/s."""
 
 NOTES = """\
 theory: the balance rests at the first turning point within r of the spring's zero; x = pi zeta theta0/(2 r)
@@ -36,15 +40,9 @@ the next term of theory, 0.5 zeta^2 and r/theta0 of themselves. Allowed: 0.1 and
 numbers; 1e-8 of what DOP853 gives at rtol 1e-12; 1e-6 of zeta^2/2; 1e-13 of a formula against the kernel's other form
 the page: "vibration stops when A = theta +- r becomes smaller than r", A the amplitude about the shifted centre"""
 
-SHOWN = (0.02, 0.06)
-"""zeta, r/theta0 of the ring-down that is drawn."""
-CELLS = ((0.005, 0.002), (0.02, 0.06), (0.1, 0.02), (0.3, 0.1), (1e-3, 0.14))
-"""zeta, r [rad] that are followed by DOP853 from 1 rad, with omega_n = 1/s."""
-
 
 def turning_points(zeta: float, r: float, start: float, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Times of rest and the angles there, by integrating (3) from rest to rest; `omega_n` is 1/s."""
-    from scipy.integrate import solve_ivp
 
     def rest(t: float, y: Any) -> float:
         return float(y[1])
@@ -81,43 +79,6 @@ def motion(zeta: float, r: float, start: float, t: Any, count: int) -> np.ndarra
     return angle
 
 
-def followed() -> list[Statement]:
-    """Half swings and turning points by integration, beside the page's formulas."""
-    half, reach = 0.0, 0.0
-    for zeta, r in CELLS:
-        times, angles = turning_points(zeta, r, 1.0, 3)
-        swing = math.pi / math.sqrt(1 - zeta**2)
-        half = max(half, float(abs(np.diff(times) / swing - 1).max()))
-        formula = [float(motion(zeta, r, 1.0, k * swing, k)) for k in (1, 2, 3)]
-        reach = max(reach, float(abs(angles[1:] - formula).max()))
-    radii = [r for _, r in CELLS]
-    free = f"free half swing, r = {min(radii):g} to {max(radii):g} rad, DOP853"
-    return [
-        Statement(free, "pi/omega_d at any r", "largest deviation", half, half < 1e-8),
-        Statement("turning points by (10) and DOP853", "the same", "largest difference", reach, reach < 1e-8),
-    ]
-
-
-def page_rule(ds: xr.Dataset) -> list[Statement]:
-    """Where the page's rule, read as it stands, ends: at the first rest with abs(theta) - r < r."""
-    swings = ds.where(ds.swings & (ds.N > 0), drop=True)
-    E = np.exp(-math.pi * swings.zeta / np.sqrt(1 - swings.zeta**2))
-    C = (1 + E) / (1 - E)
-    need = np.ceil(np.log((abs(swings.theta0) + swings.r * C) / (2 * swings.r + swings.r * C)) / -np.log(E))
-    early = (swings.N - np.maximum(need, 0)).where(swings.N > 0)
-    share = float((early > 0).sum() / early.notnull().sum())
-    most = float(early.max())
-    zeta, r = CELLS[-1]
-    _, angles = turning_points(zeta, r, 1.0, 4)
-    words = f"rests at {abs(angles[4]):.3f} rad, after 4; by the page at {abs(angles[3]):.3f} > r, after 3"
-    right = bool(abs(angles[4]) <= r < abs(angles[3]) < 2 * r)
-    return [
-        Statement("the page's rule stops too early", "-", f"{share:.0%} of cells, by {most:.0f} half swing", None,
-                  bool(0.2 < share < 0.8 and most == 1)),
-        Statement(f"  zeta = {zeta:g}, r = {r:g} rad, DOP853", "abs(theta) <= r", words, None, right),
-    ]  # fmt: skip
-
-
 def scaled(ds: xr.Dataset) -> xr.Dataset:
     """`ds` with its groups: `x`, count `N`, `slow` = period over 2 pi/omega_n, minus 1, and where it swings."""
     ds = ds.assign(x=math.pi * ds.zeta * abs(ds.theta0) / (2 * ds.r), N=ds.half_swings)
@@ -128,67 +89,81 @@ def scaled(ds: xr.Dataset) -> xr.Dataset:
 def counts(ds: xr.Dataset) -> list[Statement]:
     """How many half swings, in the two limits and between."""
     light = ds.where((ds.zeta <= LIGHT) & (ds.N > 0))
+    off = abs(light.N - light.law)
     allowed = 1 + light.law * (0.5 * light.zeta**2 + light.r / abs(ds.theta0))
-    worst = float((abs(light.N - light.law) / allowed).max())
-    most = f"off by {float(abs(light.N - light.law).max()):.2f} at most"
     solid, viscous = ds.isel(zeta=0), ds.isel(r=0)
-    few = sweep.fit_exponent(solid.N.where(solid.x < 0.1, drop=True), "r")
+    few = sweep.fit_exponent(solid.N.where(solid.x < 0.1, drop=True), "r").exponent
     many = viscous.where((viscous.zeta < 0.1) & (viscous.x > 100), drop=True)
-    steep = sweep.fit_exponent(many.N, "zeta")
+    steep = sweep.fit_exponent(many.N, "zeta").exponent
     slope = float((1 / np.log1p(many.x) - 1).mean())  # dln(ln(1 + x)/zeta)/dlnzeta for x >> 1
+    most = f"off by {float(off.max()):.2f} at most"
     return [
-        Statement(f"N = ln(1 + x)/(pi zeta), zeta <= {LIGHT:g}", "all cells", most, None, worst < 1),
-        differing("exponent of N in r, x < 0.1", "-1", float(few.exponent), -1.0, 0.1, 5),
-        differing("exponent of N in zeta, x > 100", f"{slope:.3f}", float(steep.exponent), slope, 0.05, 5),
+        said(f"N = ln(1 + x)/(pi zeta), zeta <= {LIGHT:g}", (off / allowed).max() < 1, most, "all cells"),
+        differing("exponent of N in r, x < 0.1", "-1", float(few), -1.0, 0.1, 5),
+        differing("exponent of N in zeta, x > 100", f"{slope:.3f}", float(steep), slope, 0.05, 5),
     ]
 
 
 def rest(ds: xr.Dataset) -> list[Statement]:
-    """Where and when it rests."""
+    """Where and when it rests, also by the page's rule as it stands: at the first rest with abs(theta) - r < r."""
     far = float((abs(ds.stop_angle) / ds.r).max())
     creeping = ds.where(~ds.swings, drop=True)
-    creeps = bool((creeping.stop_angle == np.sign(creeping.theta0) * creeping.r).all())
+    creeps = (creeping.stop_angle == np.sign(creeping.theta0) * creeping.r).all()
     near, cells = int((ds.status == Status.GRAZING).sum()), ds.status.size
+    swings = ds.where(ds.swings & (ds.N > 0), drop=True)
+    E = np.exp(-math.pi * swings.zeta / np.sqrt(1 - swings.zeta**2))
+    C = (1 + E) / (1 - E)
+    need = np.ceil(np.log((abs(swings.theta0) + swings.r * C) / (2 * swings.r + swings.r * C)) / -np.log(E))
+    early = (swings.N - np.maximum(need, 0)).where(swings.N > 0)
+    share, most = float((early > 0).sum() / early.notnull().sum()), float(early.max())
+    zeta, r = CELLS[-1]
+    third, fourth = abs(turning_points(zeta, r, 1.0, 4)[1][3:])
+    words = f"rests at {fourth:.3f} rad, after 4; by the page at {third:.3f} > r, after 3"
     return [
-        Statement("it rests within r of the spring's zero", "yes", f"largest abs(theta)/r {far:.6f}", None, far <= 1),
-        Statement("zeta >= 1: creeps to r, never to 0", "yes", f"{creeping.status.size} cells", None, creeps),
-        Statement("counts that the last digits decide", "few", f"{near} of {cells} cells", None, near < 1e-3 * cells),
-        *page_rule(ds),
-    ]
+        said("it rests within r of the spring's zero", far <= 1, f"largest abs(theta)/r {far:.6f}", "yes"),
+        said("zeta >= 1: creeps to r, never to 0", creeps, f"{creeping.status.size} cells", "yes"),
+        said("counts that the last digits decide", near < 1e-3 * cells, f"{near} of {cells} cells", "few"),
+        said("the page's rule stops too early", 0.2 < share < 0.8 and most == 1,
+             f"{share:.0%} of cells, by {most:.0f} half swing", "-"),
+        said(f"  zeta = {zeta:g}, r = {r:g} rad, DOP853", fourth <= r < third < 2 * r, words, "abs(theta) <= r"),
+    ]  # fmt: skip
 
 
 def isochronism(ds: xr.Dataset) -> list[Statement]:
-    """What friction does to the period of the free balance."""
+    """What friction does to the period of the free balance, followed by integration, and by the kernel."""
+    half, reach = 0.0, 0.0
+    for zeta, r in CELLS:
+        times, angles = turning_points(zeta, r, 1.0, 3)
+        swing = math.pi / math.sqrt(1 - zeta**2)
+        half = max(half, abs(np.diff(times) / swing - 1).max())
+        reach = max(reach, *(abs(angles[k] - float(motion(zeta, r, 1.0, k * swing, k))) for k in (1, 2, 3)))
+    radii = [r for _, r in CELLS]
+    free = f"free half swing, r = {min(radii):g} to {max(radii):g} rad, DOP853"
     swinging = ds.period.where(ds.swings, drop=True)
     exact = 2 * math.pi / ds.omega_n / np.sqrt((1 - swinging.zeta) * (1 + swinging.zeta))
-    off = float(abs(swinging / exact - 1).max())
-    first, light = ds.isel(zeta=0, r=0), ds.sel(zeta=LIGHT, method="nearest")
-    zeta, damped, lost = float(first.zeta), float(light.zeta), 86400 * float(light.slow[0])
-    slower, loses = (
-        f"period omega_n/(2 pi) - 1 at zeta = {zeta:g}",
-        f"viscous damping loses, zeta = {damped:.3g} [s/day]",
-    )
+    off = abs(swinging / exact - 1).max()
+    first, light = ds.isel(zeta=0, r=0), ds.sel(zeta=LIGHT, method="nearest").isel(r=0)
+    zeta, damped = float(first.zeta), float(light.zeta)
+    slower, loses = f"period omega_n/(2 pi) - 1 at zeta = {zeta:g}", "viscous damping loses, zeta = "
     return [
-        *followed(),
-        Statement("period = 2 pi/(omega_n sqrt(1 - zeta^2))", "yes", "largest deviation", off, off < 1e-13),
+        most(free, "pi/omega_d at any r", half, 1e-8),
+        most("turning points by (10) and DOP853", "the same", reach, 1e-8, "largest difference"),
+        most("period = 2 pi/(omega_n sqrt(1 - zeta^2))", "yes", off, 1e-13),
         compared(slower, "zeta^2/2", float(first.slow), zeta**2 / 2, 1e-6, 4),
-        compared(loses, "86400 zeta^2/2", lost, 43200 * damped**2, 1e-3, 4),
+        compared(
+            f"{loses}{damped:.3g} [s/day]", "86400 zeta^2/2", 86400 * float(light.slow), 43200 * damped**2, 1e-3, 4
+        ),
     ]
 
 
 def figure(ds: xr.Dataset) -> Any:
     """The count over both frictions, its collapse on one law, and the period; for two columns of print."""
-    with charts.style():
-        page = charts.new_figure(charts.PAGE, 118.0)
-        left, right = page.subfigures(1, 2, width_ratios=(1.12, 1))
-        whole, swing = left.subplots(2, 1, height_ratios=(1.7, 1))
-        upper, lower = right.subplots(2, 1)
-        draw_map(left, whole, ds)
+    with columns_of(118.0, {"nrows": 2, "height_ratios": (1.7, 1)}, {"nrows": 2}) as (page, left, panels):
+        plane, swing, law, period = panels
+        draw_map(left, plane, ds)
         draw_motion(swing)
-        draw_law(upper, ds)
-        draw_period(lower, ds)
-        for axes, text in ((whole, "a"), (swing, "b"), (upper, "c"), (lower, "d")):
-            charts.letter(axes, text)
+        draw_law(law, ds)
+        draw_period(period, ds)
     return page
 
 
@@ -213,8 +188,6 @@ def draw_motion(axes: Any) -> None:
 
 def draw_map(page: Any, axes: Any, ds: xr.Dataset) -> None:
     """N over zeta and r/theta0; below the broken line viscous friction takes more from the first swing."""
-    from matplotlib.colors import LogNorm
-
     n = ds.N.where(ds.swings & (ds.N > 0)).transpose("r", "zeta")
     zeta, r = ds.zeta.values, ds.r.values / abs(float(ds.theta0))
     mesh = axes.pcolormesh(zeta, r, n, norm=LogNorm(1, 1e4), cmap="cividis", shading="nearest", rasterized=True)
@@ -234,43 +207,33 @@ def draw_law(axes: Any, ds: xr.Dataset) -> None:
     """pi zeta N against x: one curve for all light damping."""
     x = np.geomspace(1e-4, 1e4, 200)
     axes.loglog(x, np.log1p(x), color="black", label=r"$\ln(1+x)$")
-    for k, zeta in enumerate((1e-4, 1e-3, 1e-2, 0.3)):
+    for k, (text, zeta) in enumerate({"10^{-4}": 1e-4, "10^{-3}": 1e-3, "10^{-2}": 1e-2, "0.3": 0.3}.items()):
         row = ds.sel(zeta=zeta, method="nearest")
         row = row.where(row.N > 0, drop=True).isel(r=slice(None, None, 8))
         style = {"markerfacecolor": "white", "markersize": 3.4, "linestyle": "", "markeredgewidth": 0.8}
-        name = rf"$\zeta={_power(zeta)}$"
-        axes.plot(row.x, math.pi * row.zeta * row.N, MARKS[k], color=COLOURS[k], label=name, **style)
+        axes.plot(row.x, math.pi * row.zeta * row.N, MARKS[k], color=COLOURS[k], label=rf"$\zeta={text}$", **style)
     axes.set(xlim=(1e-4, 1e4), ylabel=r"$\pi\zeta N$ [1]")
     axes.set_xlabel(r"viscous over solid friction, $x=\pi\zeta\theta_0/(2r)$ [1]")
     axes.legend(loc="lower right", ncols=1, borderaxespad=0.3, labelspacing=0.25)
-
-
-def _power(x: float) -> str:
-    """A number below 0.1 as its power of ten."""
-    return f"{x:g}" if x > 0.1 else f"10^{{{round(math.log10(x))}}}"
 
 
 def draw_period(axes: Any, ds: xr.Dataset) -> None:
     """How much viscous damping slows the balance, at three solid frictions: the marks lie on each other."""
     zeta = np.geomspace(1e-4, 0.9999, 300)
     axes.loglog(zeta, 1 / np.sqrt(1 - zeta**2) - 1, color="black", label=r"$(1-\zeta^2)^{-1/2}-1$")
-    for k, (r, size) in enumerate(((1e-4, 6.5), (1e-2, 4.2), (0.5, 2.0))):
+    for k, (text, r, size) in enumerate((("10^{-4}", 1e-4, 6.5), ("10^{-2}", 1e-2, 4.2), ("0.5", 0.5, 2.0))):
         row = ds.sel(r=r * abs(float(ds.theta0)), method="nearest").isel(zeta=slice(None, None, 10))
         look = {"markerfacecolor": "none", "markersize": size, "linestyle": "", "markeredgewidth": 0.8}
-        axes.plot(row.zeta, row.slow, MARKS[0], color=COLOURS[k], label=rf"$r/\theta_0={_power(r)}$", **look)
+        axes.plot(row.zeta, row.slow, MARKS[0], color=COLOURS[k], label=rf"$r/\theta_0={text}$", **look)
     axes.set(xlabel=r"viscous damping, $\zeta$ [1]", ylabel=r"$\omega_nP/2\pi-1$ [1]", xlim=(8e-5, 1.4))
     axes.legend(loc="upper left", borderaxespad=0.3, labelspacing=0.25)
 
 
-def conclude(path: str) -> tuple[Groups, list[str], Any]:
+def conclude(path: str) -> Conclusion:
     """Statements and the figure."""
     ds = scaled(read_result(path, "balance", ["zeta", "r"], "balance_ringdown.toml"))
     groups = {"Half swings": counts(ds), "Rest": rest(ds), "Isochronism of the free balance": isochronism(ds)}
     return groups, [NOTES], lambda: figure(ds)
 
 
-main = partial(report, __file__, ["balance_ringdown.h5"], conclude=conclude)
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+main = script(__name__, "balance_ringdown.h5", conclude)

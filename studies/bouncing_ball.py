@@ -17,13 +17,12 @@ bounces, and the push at which they double; from there on the two differ as the 
 from __future__ import annotations
 
 import math
-import sys
-from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, compared, direct_label, page_of, read_result, report
+from _common import Conclusion, Statement, compared, most, read_result, said, script
+from _figures import direct_label, page_of
 
 from kernels.interface import Status
 from sweep.show.charts import COLOURS
@@ -61,12 +60,11 @@ def statements(ds: xr.Dataset) -> list[Statement]:
         "height of each even bounce by (1)": even.x / np.sqrt(even.push**2 - least**2),
         "even bounces come every 2 pi": even.time.diff("passage") / (2.0 * math.pi),
     }
-    far = {what: float(abs(ratio - 1.0).max()) for what, ratio in off.items()}
     counted = ", ".join(map(str, sorted(found)))
     return [
-        *(Statement(what, "", "", most, most <= 1e-6) for what, most in far.items()),
+        *(most(what, "", abs(ratio - 1.0).max(), 1e-6, "") for what, ratio in off.items()),
         compared("push at which bounces double", f"{doubles:.6f}", float(begins), doubles, 1e-4, 6),
-        Statement("heights beyond it, to 1.7", "2, 4, 8", counted, None, {2, 4} <= found <= {2, 4, 8}),
+        said("heights beyond it, to 1.7", {2, 4} <= found <= {2, 4, 8}, counted, "2, 4, 8"),
     ]
 
 
@@ -88,14 +86,10 @@ def figure(ds: xr.Dataset) -> Any:
     return page
 
 
-def conclude(path: str) -> tuple[Groups, list[str], Any]:
+def conclude(path: str) -> Conclusion:
     """Statements and the figure."""
     ds = read_result(path, "ball_scene:KERNEL", ["push"], "bouncing_ball.toml")
     return {"Bounces": statements(ds)}, NOTES.splitlines(), lambda: figure(ds)
 
 
-main = partial(report, __file__, ["bouncing_ball.h5"], conclude=conclude)
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+main = script(__name__, "bouncing_ball.h5", conclude)

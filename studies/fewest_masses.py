@@ -25,12 +25,12 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, columns, page_of, table
+from _common import Groups, columns, said, shown
+from _figures import page_of
 
 import sweep
 from kernels.catalogue import KERNELS
 from kernels.interface import load
-from sweep.show import charts
 from sweep.show.charts import COLOURS, MARKS
 
 METHODS = ("rivin", "guyan", "irs", "craig_bampton", "modal")
@@ -53,8 +53,7 @@ def swept(chains: dict[str, np.ndarray], outputs: list[str], reduction: str = "n
     """One cell a chain; what else differs from cell to cell, or is the same of all, is in `more`."""
     fixed = {"reduction": reduction, "h": DAMPER} | {name: v for name, v in more.items() if np.ndim(v) == 0}
     axes = {name: v.tolist() for name, v in (chains | more).items() if np.ndim(v) > 0}
-    study = sweep.study(kernel="drivetrain", design="zip", rtol=1e-7, outputs=outputs, axes=axes, fixed=fixed)
-    return sweep.run(study, workers=1)
+    return sweep.run(kernel="drivetrain", design="zip", rtol=1e-7, outputs=outputs, axes=axes, fixed=fixed, workers=1)
 
 
 def bands(chains: dict[str, np.ndarray]) -> np.ndarray:
@@ -84,18 +83,15 @@ def needed(chains: dict[str, np.ndarray]) -> xr.Dataset:
     """Masses kept and errors over (reduction, drivetrain, inside), and seconds a cell by method."""
     count, f_max = len(chains["J"]), bands(chains)
     many = {name: np.repeat(values, len(INSIDE), axis=0) for name, values in chains.items()}
-    kept, off, error = [], [], []
+    dims, inside = ("reduction", "drivetrain", "inside"), np.arange(MASSES) < np.tile(INSIDE, count)[:, None]
+    found: dict[str, list[Any]] = {"kept": [], "off": [], "error": []}
     for name in METHODS:
         ds = swept(many, ["n_kept", "frf_error", "frequency_error"], reduction=name, f_max=f_max.ravel(), tol=TOLERANCE)
-        kept.append(ds.n_kept.values.reshape(count, -1))
-        off.append(ds.frf_error.values.reshape(count, -1))
-        inside = np.arange(MASSES) < np.tile(INSIDE, count)[:, None]
-        error.append(abs(ds.frequency_error.where(inside)).max("mode").values.reshape(count, -1))
-    dims = ("reduction", "drivetrain", "inside")
-    return xr.Dataset(
-        {"kept": (dims, np.array(kept)), "off": (dims, np.array(off)), "error": (dims, np.array(error))},
-        coords={"reduction": list(METHODS), "inside": list(INSIDE)},
-    )
+        worst = abs(ds.frequency_error.where(inside)).max("mode")
+        for part, values in zip(found, (ds.n_kept, ds.frf_error, worst), strict=True):
+            found[part].append(values.values.reshape(count, -1))
+    made = {part: (dims, np.array(values)) for part, values in found.items()}
+    return xr.Dataset(made, coords={"reduction": list(METHODS), "inside": list(INSIDE)})
 
 
 def cost(chains: dict[str, np.ndarray]) -> xr.Dataset:
@@ -108,16 +104,10 @@ def cost(chains: dict[str, np.ndarray]) -> xr.Dataset:
     band = bands(few)[:, 3]
     words = load(KERNELS["drivetrain"]).parameter("reduction").choices
     how = {"found": {"tol": TOLERANCE}, "five": {"n_keep": TIMED_SIZE}}
-    spent = [[timed(few, reduction=words[name], f_max=band, **how[way]) for way in how] for name in METHODS]
-    dims = ("reduction", "way")
-    return xr.Dataset(
-        {
-            "time": (dims, 1e6 * np.array(spent)[:, :, 0]),
-            "off": (dims, np.array(spent)[:, :, 1]),
-            "full": 1e6 * timed(few)[0],
-        },
-        coords={"reduction": list(METHODS), "way": list(how)},
-    )
+    spent = np.array([[timed(few, reduction=words[name], f_max=band, **how[way]) for way in how] for name in METHODS])
+    dims, coords = ("reduction", "way"), {"reduction": list(METHODS), "way": list(how)}
+    made = {"time": (dims, 1e6 * spent[..., 0]), "off": (dims, spent[..., 1]), "full": 1e6 * timed(few)[0]}
+    return xr.Dataset(made, coords=coords)
 
 
 def write_points(path: Path) -> None:
@@ -132,18 +122,18 @@ def write_points(path: Path) -> None:
 
 def statements(ds: xr.Dataset) -> Groups:
     """What each method needs."""
-    more = (ds.kept - ds.inside).mean("drivetrain")
-    modal = bool((ds.kept.sel(reduction="modal") == ds.inside).all())
-    order = [float(more.sel(reduction=name).mean()) for name in METHODS]
-    lines = [
-        Statement("modal: as many as there are frequencies", "yes", "all cells", None, modal),
-        Statement("no method needs fewer", "yes", "all cells", None, bool((ds.kept >= ds.inside).all())),
-        Statement("Rivin needs the most, then Guyan, then IRS", "yes", ", ".join(f"+{x:.2f}" for x in order[:3]), None,
-                  order[0] > order[1] > order[2]),
-        Statement("frequencies in the band are held", f"{TOLERANCE:g}", f"{float(ds.error.max()):.4f}", None,
-                  bool(ds.error.max() <= TOLERANCE)),
-    ]  # fmt: skip
-    return {f"Masses for {100 * TOLERANCE:g} %": lines}
+    more, worst = (ds.kept - ds.inside).mean("drivetrain"), float(ds.error.max())
+    modal, fewer = (ds.kept.sel(reduction="modal") == ds.inside).all(), (ds.kept < ds.inside).any()
+    order = [float(more.sel(reduction=name).mean()) for name in METHODS[:3]]
+    here, ranked = ", ".join(f"+{x:.2f}" for x in order), order[0] > order[1] > order[2]
+    return {
+        f"Masses for {100 * TOLERANCE:g} %": [
+            said("modal: as many as there are frequencies", modal, "all cells", "yes"),
+            said("no method needs fewer", not fewer, "all cells", "yes"),
+            said("Rivin needs the most, then Guyan, then IRS", ranked, here, "yes"),
+            said("frequencies in the band are held", worst <= TOLERANCE, f"{worst:.4f}", f"{TOLERANCE:g}"),
+        ]
+    }
 
 
 def notes(ds: xr.Dataset, times: xr.Dataset) -> list[str]:
@@ -164,22 +154,19 @@ def notes(ds: xr.Dataset, times: xr.Dataset) -> list[str]:
 
 def figure(ds: xr.Dataset, times: xr.Dataset) -> Any:
     """Median of masses needed with the middle 80 %; how many beyond the frequencies in the band suffice; and cost."""
+    names = [name.replace("_", "-") for name in METHODS]
     with page_of(82.0, 1, 3, width_ratios=(1.1, 1.1, 1)) as (page, (left, right, dear)):
         for i, name in enumerate(METHODS):
-            kept = ds.kept.sel(reduction=name)
+            kept, look = ds.kept.sel(reduction=name), {"marker": MARKS[i], "color": COLOURS[i]}
             low, mean, high = (kept.quantile(q, "drivetrain").values for q in (0.1, 0.5, 0.9))
-            label = name.replace("_", "-")
-            left.errorbar(
-                ds.inside + 0.08 * (i - 2), mean, (mean - low, high - mean), marker=MARKS[i],
-                color=COLOURS[i], label=label, elinewidth=0.6, capsize=1.5,
-            )  # fmt: skip
+            bars = {"label": names[i], "elinewidth": 0.6, "capsize": 1.5}
+            left.errorbar(ds.inside + 0.08 * (i - 2), mean, (mean - low, high - mean), **look, **bars)
             beyond = (kept - ds.inside).values.ravel()
-            share = [np.mean(beyond <= extra) for extra in range(9)]
-            right.plot(range(9), share, marker=MARKS[i], color=COLOURS[i], label=label)
-            five, fewest = float(times.off[i, 1]), float(times.off[i, 0])
+            right.plot(range(9), [np.mean(beyond <= extra) for extra in range(9)], label=names[i], **look)
+            fewest, five = times.off.values[i]
             dear.plot([five, fewest], [-i, -i], color=COLOURS[i], linewidth=0.8)
-            dear.plot(five, -i, marker=MARKS[i], color=COLOURS[i], fillstyle="none")
-            dear.plot(fewest, -i, marker=MARKS[i], color=COLOURS[i])
+            dear.plot(five, -i, fillstyle="none", **look)
+            dear.plot(fewest, -i, **look)
         left.axhline(MASSES, color="0.5", linewidth=0.7)
         left.text(0.6, MASSES + 0.15, "the full chain", fontsize=7, color="0.3")
         left.set(xlabel="frequencies in the band [1]", ylabel="masses needed for 1 % [1]", ylim=(0, MASSES + 0.7))
@@ -192,36 +179,30 @@ def figure(ds: xr.Dataset, times: xr.Dataset) -> Any:
         for label, fill in (("fewest for 1 %", "full"), ("five masses", "none")):
             dear.plot([], [], "o", color="0.3", fillstyle=fill, label=label)
         dear.legend(loc="lower right", fontsize=7)
-        names = [name.replace("_", "-") for name in METHODS]
         dear.set(xscale="log", xlabel="median error of receptance [1]", xlim=(3e-5, 3), ylim=(-len(names) - 0.4, 0.6))
         dear.set_yticks(range(0, -len(names), -1), labels=names)
         dear.set_yticks([], minor=True)
     return page
 
 
+def conclusions(count: int) -> Any:
+    """Statements, tables and the figure of so many drivetrains."""
+    chains = drivetrains(count)
+    ds, times = needed(chains), cost(chains)
+    return statements(ds), notes(ds, times), lambda: figure(ds, times)
+
+
 def main(arguments: Sequence[str]) -> int:
     """Table and figure; 1 if a statement does not hold."""
-    from sweep.file.overwriting import check_target
-
     if list(arguments) == ["points"]:
         write_points(Path(__file__).with_suffix(".csv"))
         return 0
-    force, arguments = "--force" in arguments, [argument for argument in arguments if argument != "--force"]
-    if len(arguments) > 1 or not all(a.isdigit() and int(a) > 0 for a in arguments):
+    counts = [argument for argument in arguments if argument != "--force"]
+    if len(counts) > 1 or not all(a.isdigit() and int(a) > 0 for a in counts):
         print("use: python fewest_masses.py [drivetrains] [--force]", file=sys.stderr)
         return 2
-    target = Path("fewest_masses.png")
-    try:
-        check_target(target, force=force)
-    except sweep.SweepError as error:
-        print(error, file=sys.stderr)
-        return 2
-    chains = drivetrains(int(arguments[0]) if arguments else DRIVETRAINS)
-    ds, times = needed(chains), cost(chains)
-    groups = statements(ds)
-    print("\n".join([*table(groups, "expected"), "", *notes(ds, times), ""]))
-    print(f"figure: {charts.save(figure(ds, times), target)}")
-    return int(any(s.holds is False for lines in groups.values() for s in lines))
+    count = int(counts[0]) if counts else DRIVETRAINS
+    return shown(Path("fewest_masses.png"), lambda: conclusions(count), "--force" in arguments, "expected")
 
 
 if __name__ == "__main__":

@@ -16,13 +16,13 @@ At given drive and friction (1) is least at y = 3/4; at given Q it is least at y
 from __future__ import annotations
 
 import math
-import sys
-from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, columns, compared, differing, direct_label, hatch, page_of, read_result, report
+from _common import Conclusion, Statement, columns, compared, differing, most, read_result, said, script
+from _figures import direct_label, hatch, page_of
+from matplotlib.colors import LogNorm
 
 import sweep
 from kernels.interface import Status
@@ -30,7 +30,6 @@ from sweep.show.charts import COLOURS
 
 SHOWN = (1e6, 1e4, 1e2, 1.0)
 """alpha of the lines in the figure."""
-
 DAY = 86400.0
 GOALS = {"1 min/day": 15, "1 s/day": 900}
 """How many times less than the verge's 15 min/day."""
@@ -56,7 +55,7 @@ def at(alpha: Any, kappa: Any, design: str = "product") -> xr.Dataset:
     return scaled(sweep.run(kernel="foliot", method="segments", rtol=1e-7, design=design, axes=axes, fixed=fixed))
 
 
-def lines(ds: xr.Dataset, alpha: float) -> xr.Dataset:
+def line_of(ds: xr.Dataset, alpha: Any) -> xr.Dataset:
     """The sweep of the spring at the drive next to `alpha`."""
     return ds.isel({ds.alpha.dims[0]: int(np.argmin(abs(np.log(ds.alpha.values / float(alpha)))))})
 
@@ -67,35 +66,6 @@ def first_order(alpha: Any, kappa: Any) -> Any:
     return kappa**-0.75 * alpha**-0.25 / np.sqrt(4 * math.pi * np.where(y < 1, 1 - y, np.nan))
 
 
-def laws(ds: xr.Dataset) -> list[Statement]:
-    """How the sensitivity falls with the spring, from that of the foliot to the line of (1)."""
-    strong = lines(ds, ds.alpha.max())
-    alpha, bare = float(strong.alpha), at(strong.alpha.values, 0.0).s.item()
-    window = 10.0, 1000.0
-    fall = sweep.fit_exponent(strong.s, "kappa", window)
-    by_drive = sweep.fit_exponent(ds.s.sel(k=100.0, method="nearest"), "alpha", (1e5, None))
-    middle = strong.sel(k=100.0, method="nearest")
-    theory = float(first_order(alpha, middle.kappa.item()))
-    slack = (math.pi / 16) * math.sqrt(window[1] / alpha) + 1 / window[0] ** 1.75  # of (1), and of the next order
-    weak, steep = f"s at kappa = {ds.kappa[0]:.0e}: still", f"exponent of s in kappa, 10 to 1000, alpha = {alpha:.0e}"
-    return [
-        compared(f"{weak} the foliot's", f"{bare:.6f}", float(strong.s[0]), bare, 1e-2, 6),
-        differing(steep, "-3/4", fall.exponent.item(), -0.75, slack),
-        differing("exponent of s in alpha at kappa = 100", "-1/4", by_drive.exponent.item(), -0.25, 0.02),
-        compared(f"s at kappa = {middle.kappa:.4g}", f"(1) = {theory:.6g}", middle.s.item(), theory, 1e-3, 6),
-        agreement(ds),
-    ]
-
-
-def agreement(ds: xr.Dataset) -> Statement:
-    """The exact s against differences of ln P: P sqrt(mu/phi0) is a function of a sqrt(phi0/mu) and kappa."""
-    inner = ds.where((ds.alpha > 99) & (ds.kappa < 10), drop=True)
-    by_a, by_k = sweep.local_exponent(inner.period, "a"), sweep.local_exponent(inner.period, "k")
-    off = float(abs(0.5 + by_a / 2 + by_k - inner.s).max())
-    rough = float(np.diff(np.log(ds.k)).max() ** 4) / 4  # differences are of fourth order
-    return Statement("differences of ln P against the exact s", "0", "largest distance", off, off < rough)
-
-
 def best_springs(ds: xr.Dataset) -> xr.Dataset:
     """The springs of least sensitivity at the drives of the grid from alpha = 10 on; `blur`: error of interpolation."""
     strong = ds.where(ds.alpha > 9.99, drop=True)
@@ -104,136 +74,127 @@ def best_springs(ds: xr.Dataset) -> xr.Dataset:
     return found.assign(blur=("cell", (place.abscissa_error / place.abscissa).values))
 
 
-def end(ds: xr.Dataset, alpha: float) -> float:
-    """The strongest spring [kappa] that the drive still throws over, to one part in 2000."""
-    line = lines(ds, alpha)
-    last = int(np.flatnonzero(line.s.notnull())[-1])
-    fine = at(line.alpha.item(), np.geomspace(*line.kappa.values[last : last + 2], 201)).isel(a=0)
-    return float(fine.kappa[fine.s.notnull()][-1])
+def laws(ds: xr.Dataset) -> list[Statement]:
+    """How the sensitivity falls with the spring, from that of the foliot to the line of (1)."""
+    strong = line_of(ds, ds.alpha.max())
+    alpha, bare = float(strong.alpha), at(strong.alpha.values, 0.0).s.item()
+    low, high = 10.0, 1000.0
+    fall = sweep.fit_exponent(strong.s, "kappa", (low, high)).exponent.item()
+    by_drive = sweep.fit_exponent(ds.s.sel(k=100.0, method="nearest"), "alpha", (1e5, None)).exponent.item()
+    middle = strong.sel(k=100.0, method="nearest")
+    theory = float(first_order(alpha, middle.kappa.item()))
+    slack = (math.pi / 16) * math.sqrt(high / alpha) + 1 / low**1.75  # of (1), and of the next order
+    # the exact s beside differences of ln P: P sqrt(mu/phi0) is a function of a sqrt(phi0/mu) and kappa
+    inner = ds.where((ds.alpha > 99) & (ds.kappa < 10), drop=True)
+    by_a, by_k = sweep.local_exponent(inner.period, "a"), sweep.local_exponent(inner.period, "k")
+    off = abs(0.5 + by_a / 2 + by_k - inner.s).max()
+    rough = float(np.diff(np.log(ds.k)).max() ** 4) / 4  # differences are of fourth order
+    weak, steep = f"s at kappa = {ds.kappa[0]:.0e}: still", f"exponent of s in kappa, 10 to 1000, alpha = {alpha:.0e}"
+    return [
+        compared(f"{weak} the foliot's", f"{bare:.6f}", float(strong.s[0]), bare, 1e-2, 6),
+        differing(steep, "-3/4", fall, -0.75, slack),
+        differing("exponent of s in alpha at kappa = 100", "-1/4", by_drive, -0.25, 0.02),
+        compared(f"s at kappa = {middle.kappa:.4g}", f"(1) = {theory:.6g}", middle.s.item(), theory, 1e-3, 6),
+        most("differences of ln P against the exact s", "0", off, rough, "largest distance"),
+    ]
 
 
 def optimum(ds: xr.Dataset, springs: xr.Dataset) -> list[Statement]:
-    """The best spring, where there is no cycle any more, and what is told from rest."""
+    """The best spring, by drive and at a given Q; where there is no cycle any more; and what is told from rest."""
     found = []
     for alpha in (1e6, 1e4, 1e2):
-        cell = lines(springs, alpha)
-        place, steadied = float(cell.kappa / cell.alpha), float(cell.s * cell.alpha)
-        next_order, last = 1e-4 + 1 / alpha + float(cell.blur), 1e-3 + 4 / alpha
-        best, most = f"alpha = {alpha:.0e}: best spring, kappa/alpha", "  strongest with a cycle"
+        best, line = line_of(springs, alpha), line_of(ds, alpha)
+        last = int(np.flatnonzero(line.s.notnull())[-1])  # the strongest spring with a cycle, to one part in 2000
+        fine = at(line.alpha.item(), np.geomspace(*line.kappa.values[last : last + 2], 201)).isel(a=0)
+        end = float(fine.kappa[fine.s.notnull()][-1]) / alpha
+        near, place = 1e-4 + 1 / alpha + float(best.blur), float(best.kappa / best.alpha)
+        what = f"alpha = {alpha:.0e}: best spring, kappa/alpha"
         found += [
-            compared(best, "9/pi^2 = 0.91189", place, 9 / math.pi**2, next_order, 6),
-            compared("  s alpha there", "pi/27^(1/2) = 0.60460", steadied, math.pi / 27**0.5, next_order, 6),
-            compared("  A/phi0 there", "2/3^(1/2) = 1.15470", float(cell.A), 2 / 3**0.5, next_order, 6),
-            compared(most, "16/pi^2 = 1.6211", end(ds, alpha) / alpha, 16 / math.pi**2, last, 5),
+            compared(what, "9/pi^2 = 0.91189", place, 9 / math.pi**2, near, 6),
+            compared(
+                "  s alpha there", "pi/27^(1/2) = 0.60460", float(best.s * best.alpha), math.pi / 27**0.5, near, 6
+            ),
+            compared("  A/phi0 there", "2/3^(1/2) = 1.15470", float(best.A), 2 / 3**0.5, near, 6),
+            compared("  strongest with a cycle", "16/pi^2 = 1.6211", end, 16 / math.pi**2, 1e-3 + 4 / alpha, 5),
         ]
-    return [*found, envelope(1000.0), from_rest(ds)]
-
-
-def envelope(Q: float) -> Statement:
-    """The least sensitivity at given Q."""
+    Q = 1000.0
     kappa = np.geomspace(Q / 10, Q, 61)
-    ds = at(Q**2 / kappa, kappa, "zip")
-    place = sweep.where_exponent(ds.s, "kappa", 0.0).abscissa.item()
+    place = sweep.where_exponent(at(Q**2 / kappa, kappa, "zip").s, "kappa", 0.0).abscissa.item()
     cell = at(Q**2 / place, place).isel(a=0, k=0)
     what = f"least s Q at Q = {Q:g}, there kappa/Q = {place / Q:.4f}"
-    return compared(what, "1/2", float(cell.s * cell.Q), 0.5, 3 / Q, 6)
-
-
-def from_rest(ds: xr.Dataset) -> Statement:
-    """Self-starting is where the first swing of a free balance under constant torque passes phi0."""
+    # self-starting is where the first swing of a free balance under constant torque passes phi0
     zeta = np.minimum(1 / (2 * ds.Q), 1 - 1e-15)
     reach = (1 + np.exp(-math.pi * zeta / np.sqrt(1 - zeta**2))) / ds.kappa
     cells = ds.s.notnull()
     wrong = int((((ds.status == Status.NOT_SELF_STARTING) != (reach < 1)) & cells).sum())
-    here = f"{wrong} of {int(cells.sum())} cells"
-    return Statement(
-        "not self-starting unless kappa < 1 + e^(-pi zeta/(1-zeta^2)^(1/2))", "0 cells", here, None, not wrong
-    )
+    rule = "not self-starting unless kappa < 1 + e^(-pi zeta/(1-zeta^2)^(1/2))"
+    return [
+        *found,
+        compared(what, "1/2", float(cell.s * cell.Q), 0.5, 3 / Q, 6),
+        said(rule, not wrong, f"{wrong} of {int(cells.sum())} cells", "0 cells"),
+    ]
 
 
 def improvement(ds: xr.Dataset) -> list[Statement]:
     """What the paper expects of a spring: by what factor the sensitivity falls at best."""
-    gain = {alpha: at(alpha, 0.0).s.item() / float(lines(ds, alpha).s.min()) for alpha in (1e4, 1e2, 1.0, 1e-2)}
-    said = {1e4: True, 1e2: True}
-    return [
-        Statement(f"best spring, s of alpha = {alpha:g} falls by", "dramatically" if alpha in said else "", f"{x:.4g}",
-                  None, x > (10 if alpha in said else 1))
-        for alpha, x in gain.items()
-    ]  # fmt: skip
-
-
-def per_day(s: float) -> str:
-    """Seconds a day by 1 % of torque."""
-    return f"{0.01 * DAY * s:.3g}"
-
-
-def wanted(line: xr.Dataset, least: xr.Dataset, s: float) -> str:
-    """The spring for a sensitivity at one drive: kappa and Q; * where it is not self-starting."""
-    if not s > float(least.s):
-        return "out of reach"
-    kappa = sweep.where_exponent(line.s, "kappa", s, (None, float(least.kappa)), values=True).abscissa.item()
-    cell = at(line.alpha.item(), kappa).isel(a=0, k=0)
-    return f"{kappa:.3g}, {float(cell.Q):.3g}" + "*" * int(cell.status == Status.NOT_SELF_STARTING)
+    found = []
+    for alpha, least, word in ((1e4, 10, "dramatically"), (1e2, 10, "dramatically"), (1.0, 1, ""), (1e-2, 1, "")):
+        gain = at(alpha, 0.0).s.item() / float(line_of(ds, alpha).s.min())
+        found.append(said(f"best spring, s of alpha = {alpha:g} falls by", gain > least, f"{gain:.4g}", word))
+    return found
 
 
 def clock(ds: xr.Dataset, springs: xr.Dataset) -> list[str]:
-    """Springs for the clockmaker, by drive."""
+    """Springs for the clockmaker, by drive: kappa and Q; * where it is not self-starting."""
     rows: list[tuple[str, ...]] = [("alpha", "s/day by 1 % of torque", "torque steady to", *GOALS, "best spring")]
     for alpha in (10.0, 1e2, 1e3, 1e4, 1e6):
-        line, least, bare = lines(ds, alpha), lines(springs, alpha), at(alpha, 0.0).s.item()
-        found = (wanted(line, least, bare / factor) for factor in GOALS.values())
-        last = f"{float(least.kappa):.3g}, {float(least.Q):.3g}*: {per_day(least.s)} s/day"
-        rows.append((f"{alpha:g}", per_day(bare), f"{1.5 / 1.44 / bare:.2f} %", *found, last))
+        line, best, bare = line_of(ds, alpha), line_of(springs, alpha), at(alpha, 0.0).s.item()
+        found = []
+        for s in (bare / factor for factor in GOALS.values()):
+            if not s > float(best.s):
+                found.append("out of reach")
+                continue
+            kappa = sweep.where_exponent(line.s, "kappa", s, (None, float(best.kappa)), values=True).abscissa.item()
+            cell = at(line.alpha.item(), kappa).isel(a=0, k=0)
+            star = "*" if cell.status == Status.NOT_SELF_STARTING else ""
+            found.append(f"{kappa:.3g}, {float(cell.Q):.3g}{star}")
+        least = f"{float(best.kappa):.3g}, {float(best.Q):.3g}*: {0.01 * DAY * float(best.s):.3g} s/day"
+        rows.append((f"{alpha:g}", f"{0.01 * DAY * bare:.3g}", f"{1.5 / 1.44 / bare:.2f} %", *found, least))
     heading = "THE VERGE'S 15 MIN/DAY, and the springs (kappa, Q) that make less of it; *: not self-starting"
     return [heading, *columns(rows, "   ")]
-
-
-def figure(ds: xr.Dataset, springs: xr.Dataset) -> Any:
-    """Sensitivity against the spring, and a map of it over spring and drive."""
-    with page_of(84.0, 1, 2, width_ratios=(1, 1.05)) as (page, (left, right)):
-        draw_lines(left, ds, springs)
-        draw_map(right, ds)
-    return page
 
 
 def draw_lines(axes: Any, ds: xr.Dataset, springs: xr.Dataset) -> None:
     """s against kappa at several drives: exact, by (1), and the best springs."""
     for alpha, colour in zip(SHOWN, COLOURS, strict=False):
-        line = lines(ds, alpha)
+        line = line_of(ds, alpha)
         started = line.status == Status.OK
         axes.loglog(line.kappa, line.s.where(started), color=colour)
         axes.loglog(line.kappa, line.s.where(~started), color=colour, linestyle=(0, (2.5, 1)))
-        power = round(math.log10(alpha))
-        if power == 0:
+        if alpha == 1.0:
             direct_label(axes, 3, 0.45, r"$\alpha = 1$", colour, ha="left")
             continue
-        cell, few = lines(springs, alpha), line.kappa.values[::10]
+        cell, few = line_of(springs, alpha), line.kappa.values[::10]
         few = few[(few > alpha ** (-1 / 3)) & (few < 1.6 * alpha)]
         axes.plot(few, first_order(alpha, few), "x", color="black", markersize=3.5, markeredgewidth=0.7)
         axes.plot(cell.kappa, cell.s, "o", color=colour)
-        direct_label(axes, 2.4 * cell.kappa, cell.s, rf"$\alpha = 10^{{{power}}}$", colour, ha="left")
+        text = rf"$\alpha = 10^{{{round(math.log10(alpha))}}}$"
+        direct_label(axes, 2.4 * cell.kappa, cell.s, text, colour, ha="left")
     axes.set(xlabel=r"spring, $\kappa = k\varphi_0/\mu$ [1]", ylabel=r"sensitivity to torque, $s$ [1]")
     axes.set(xlim=(ds.kappa.min(), 10 * ds.kappa.max()), ylim=(2e-7, 1.5))
-    key(axes)
-    day = axes.secondary_yaxis("right", functions=(lambda s: 0.01 * DAY * s, lambda rate: rate / (0.01 * DAY)))
-    day.set_ylabel("rate [s/day] by 1 % of torque")
-    axes.tick_params(axis="y", which="both", right=False)
-
-
-def key(axes: Any) -> None:
-    """What lines and marks mean, whatever their colour."""
     looks = {"self-starting": {}, "not self-starting": {"linestyle": (0, (2.5, 1))}}
     looks |= {"theory of first order": {"marker": "x", "linestyle": ""}}
     looks |= {"best spring": {"marker": "o", "linestyle": ""}}
     for name, look in looks.items():
         axes.plot([], [], color="black", label=name, **look)
     axes.legend(loc="lower left")
+    day = axes.secondary_yaxis("right", functions=(lambda s: 0.01 * DAY * s, lambda rate: rate / (0.01 * DAY)))
+    day.set_ylabel("rate [s/day] by 1 % of torque")
+    axes.tick_params(axis="y", which="both", right=False)
 
 
 def draw_map(axes: Any, ds: xr.Dataset) -> None:
     """s over spring and drive; hatched where there is no cycle, and where it does not start by itself."""
-    from matplotlib.colors import LogNorm
-
     kappa, alpha, rate = ds.kappa.values, ds.alpha.values, 0.01 * DAY * ds.s.values
     axes.set(xscale="log", yscale="log", xlabel=r"spring, $\kappa = k\varphi_0/\mu$ [1]")
     axes.set(ylabel=r"drive, $\alpha = \mu/(a^2\varphi_0)$ [1]", ylim=(alpha.min(), alpha.max()))
@@ -253,7 +214,15 @@ def draw_map(axes: Any, ds: xr.Dataset) -> None:
     axes.annotate("best spring", (3e3, 3e3), (1e6, 4e2), arrowprops=arrow, **how)
 
 
-def conclude(path: str) -> tuple[Groups, list[str], Any]:
+def figure(ds: xr.Dataset, springs: xr.Dataset) -> Any:
+    """Sensitivity against the spring, and a map of it over spring and drive."""
+    with page_of(84.0, 1, 2, width_ratios=(1, 1.05)) as (page, (left, right)):
+        draw_lines(left, ds, springs)
+        draw_map(right, ds)
+    return page
+
+
+def conclude(path: str) -> Conclusion:
     """Statements, springs for the clockmaker, and the figure."""
     ds = scaled(read_result(path, "foliot", ["a", "k"], "hairspring.toml"))
     springs = best_springs(ds)
@@ -261,8 +230,4 @@ def conclude(path: str) -> tuple[Groups, list[str], Any]:
     return groups, [NOTES, "", *clock(ds, springs)], lambda: figure(ds, springs)
 
 
-main = partial(report, __file__, ["hairspring.h5"], conclude=conclude)
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+main = script(__name__, "hairspring.h5", conclude)

@@ -12,17 +12,16 @@ figure the crank is the root of an equation of second degree in e^2, so that no 
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Sequence
-from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, compared, differing, direct_label, hatch, quality_bar, read_result, report
+from _common import Conclusion, Statement, compared, differing, read_result, said, script, solved
+from _figures import columns_of, direct_label, hatch, plain_ticks, quality_bar
+from matplotlib.colors import LogNorm
+from matplotlib.lines import Line2D
 
-import sweep
-from sweep.show import charts
 from sweep.show.charts import COLOURS, DASHES
 
 WANTED = math.radians(15.0)
@@ -43,26 +42,21 @@ transmission angle: least angle of coupler and arm over the turn; below 40 degre
 
 def of_amplitude(ds: xr.Dataset, wanted: float = WANTED) -> xr.Dataset:
     """Machines of one amplitude over d, b and f: every output, and the crank `e`, between two cranks of the sweep."""
-    swing = ds.A1
-    above = swing >= wanted
+    above = wanted <= ds.A1
     n = above.argmax("e")
     there = above.any("e") & (n > 0)
     n = n.where(there, 1)
-    share = (wanted - swing.isel(e=n - 1)) / (swing.isel(e=n) - swing.isel(e=n - 1))
-    names = ("thd", "transmission_angle", "rate_max", "rate_min")
-    full = ds[list(names)].assign(crank=ds.e.broadcast_like(swing))
+    low, high = ds.A1.isel(e=n - 1), ds.A1.isel(e=n)
+    share = (wanted - low) / (high - low)
+    full = ds[["thd", "transmission_angle"]].assign(crank=ds.e.broadcast_like(ds.A1))
     made = full.isel(e=n - 1) * (1 - share) + full.isel(e=n) * share
     return made.where(there).drop_vars("e").transpose("d", "b", "f")
 
 
-def crank_at_border(b: Any, d: Any, f: Any) -> Any:
-    """The longest crank that turns."""
-    return np.minimum(np.minimum(d + f - b, b + f - d), b + d - f)
-
-
-def reaches(b: Any, d: Any, f: Any, wanted: float = WANTED) -> Any:
-    """Whether the amplitude is passed before the crank locks."""
-    return crank_at_border(b, d, f) * f > b * d * math.sin(wanted) ** 2
+def to_spare(b: Any, d: Any, f: Any, wanted: float = WANTED) -> tuple[Any, Any]:
+    """The longest crank that turns, and whether the amplitude is passed before it locks."""
+    longest = np.minimum(np.minimum(d + f - b, b + f - d), b + d - f)
+    return longest, (longest * f > b * d * math.sin(wanted) ** 2) & (longest > 0)
 
 
 def crank_of(b: Any, d: Any, f: Any, wanted: float = WANTED) -> Any:
@@ -79,13 +73,12 @@ def crank_of(b: Any, d: Any, f: Any, wanted: float = WANTED) -> Any:
 
 def machines_on(b: Any, d: float, f: Any) -> xr.Dataset:
     """The machines of the wanted amplitude over b and f, as `of_amplitude`, with the crank of `crank_of`."""
-    names = ["thd", "transmission_angle"]
     motor, coupler = np.meshgrid(b, f, indexing="ij")
-    there = reaches(motor, d, coupler) & (crank_at_border(motor, d, coupler) > 0)
+    there = to_spare(motor, d, coupler)[1]
     axes = {"b": motor[there], "f": coupler[there], "e": crank_of(motor[there], d, coupler[there])}
-    found = sweep.run(sweep.study(kernel="polisher", design="zip", axes=axes, fixed={"d": d}, outputs=names, rtol=1e-6))
+    found = solved("polisher", design="zip", outputs=["thd", "transmission_angle"], rtol=1e-6, d=d, **axes)
     made = xr.Dataset(coords={"b": b, "f": f, "d": d})
-    for name, values in {"crank": axes["e"], **{name: found[name].values for name in names}}.items():
+    for name, values in {"crank": axes["e"], "thd": found.thd, "transmission_angle": found.transmission_angle}.items():
         whole = np.full(there.shape, math.nan)
         whole[there] = values
         made[name] = (("b", "f"), whole)
@@ -95,108 +88,54 @@ def machines_on(b: Any, d: float, f: Any) -> xr.Dataset:
 def best(machines: xr.Dataset) -> xr.Dataset:
     """For each d and b the machine with the coupler of least distortion."""
     known = machines.thd.notnull().any("f")
-    found = machines.isel(f=machines.thd.fillna(math.inf).argmin("f"))
-    return found.where(known)
+    return machines.isel(f=machines.thd.fillna(math.inf).argmin("f")).where(known)
 
 
-def existence(ds: xr.Dataset, machines: xr.Dataset) -> list[Statement]:
+def existence(machines: xr.Dataset) -> list[Statement]:
     """Which machines of the amplitude there are."""
-    b, d, f = machines.b, machines.d, machines.f
-    within = reaches(b, d, f) & (crank_at_border(b, d, f) > 0)
-    within = within.transpose("d", "b", "f")
-    found = machines.thd.notnull()
-    strangers = int((found & ~within).sum())
-    share = float(found.sum() / within.sum())
-    spare = crank_at_border(b, d, f) / machines.crank - 1
+    longest, there = to_spare(machines.b, machines.d, machines.f)
+    within, found = there.transpose("d", "b", "f"), machines.thd.notnull()
+    strangers, share = int((found & ~within).sum()), float(found.sum() / within.sum())
+    spare = float((longest / machines.crank - 1).min())
     return [
-        Statement("machines beyond the border", "none", f"{strangers} of {int(found.sum())}", None, strangers == 0),
-        Statement("of those within it, in the sweep's cranks", "most", f"{share:.1%}", None, share > 0.5),
-        Statement(
-            "crank to spare before it locks, least", "> 0", f"{float(spare.min()):.2%}", None, float(spare.min()) > 0
-        ),
+        said("machines beyond the border", strangers == 0, f"{strangers} of {int(found.sum())}", "none"),
+        said("of those within it, in the sweep's cranks", share > 0.5, f"{share:.1%}", "most"),
+        said("crank to spare before it locks, least", spare > 0, f"{spare:.2%}", "> 0"),
     ]
 
 
 def quality(machines: xr.Dataset) -> list[Statement]:
-    """How harmonic, and at what price."""
+    """How harmonic, and at what price: distortion, transmission angle and crank."""
     arm = machines.sel(d=ARM, method="nearest")
-    top = best(arm)
-    paper, same = arm.interp(b=PAPER["b"], f=PAPER["f"]), top.interp(b=PAPER["b"])
-    reach = top.b[top.thd.notnull()]
-    falls = bool((top.thd.dropna("b").diff("b").tail(b=20) < 0).all())
-    widest = top.isel(b=-1)
-    exact = exactly(widest, float(arm.d))
+    top, paper = best(arm), arm.interp(b=PAPER["b"], f=PAPER["f"])
+    same, widest = top.interp(b=PAPER["b"]), top.isel(b=-1)
+    reach = float(top.b[top.thd.notnull()][-1] / arm.d)
+    falls = (top.thd.dropna("b").diff("b").tail(b=20) < 0).all()
+    lengths = {"b": float(widest.b), "d": float(arm.d), "f": float(widest.f), "e": float(widest.crank)}
+    exact = solved("polisher", outputs=["A1", "thd"], rtol=1e-10, **{**lengths, "e": [lengths["e"]]}).isel(e=0)
+    # only ratios of lengths count: a shorter arm is better as a farther motor is, and by no more
+    pairs = {name: [x, 0.789 * x] for name, x in lengths.items()}
+    one, other = solved("polisher", design="zip", rtol=1e-12, **pairs).thd.values
+
+    def described(what: str, machine: xr.Dataset, holds: Any) -> Statement:
+        angle, crank = math.degrees(machine.transmission_angle), 1e3 * float(machine.crank)
+        return said(what, holds, f"{float(machine.thd):.2%}, {angle:.0f} degree, e = {crank:.1f} mm")
+
+    far = f"best of the sweep, b = {1e3 * float(widest.b):.0f}, f = {1e3 * float(widest.f):.0f} mm"
     return [
-        _described("the paper's machine", paper, bool(np.degrees(paper.transmission_angle) > 40)),
-        _described("best coupler for its motor's place", same, bool(same.thd < paper.thd)),
-        similar(widest, float(arm.d)),
-        Statement(
-            "the farther the motor, in arms, the less distortion", "-",
-            f"falls to the edge, b/d = {float(reach[-1] / arm.d):.3g}: no best", None, falls,
-        ),
-        _described(f"best of the sweep, b = {1e3 * float(widest.b):.0f}, f = {1e3 * float(widest.f):.0f} mm", widest,
-                   bool(widest.thd < same.thd)),
+        described("the paper's machine", paper, np.degrees(paper.transmission_angle) > 40),
+        described("best coupler for its motor's place", same, same.thd < paper.thd),
+        differing("distortion of a machine 0.789 times as large", f"{one:.6f}", float(other), float(one), 1e-12, 6),
+        said("the farther the motor, in arms, the less distortion", falls,
+             f"falls to the edge, b/d = {reach:.3g}: no best", "-"),
+        described(far, widest, widest.thd < same.thd),
         compared("its amplitude, degree", "15", math.degrees(exact.A1), 15.0, 1e-4, 6),
         compared("its distortion, once more", f"{float(widest.thd):.5f}", float(exact.thd), float(widest.thd), 1e-3, 5),
     ]  # fmt: skip
 
 
-def exactly(machine: xr.Dataset, d: float) -> xr.Dataset:
-    """The machine solved itself, not interpolated between cranks."""
-    study = sweep.study(
-        kernel="polisher", axes={"e": [float(machine.crank)]}, outputs=["A1", "thd"], rtol=1e-10,
-        fixed={"b": float(machine.b), "d": d, "f": float(machine.f)},
-    )  # fmt: skip
-    return sweep.run(study).isel(e=0)
-
-
-def similar(machine: xr.Dataset, d: float) -> Statement:
-    """Only ratios of lengths count: a shorter arm is better as a farther motor is, and by no more."""
-    lengths = {"b": float(machine.b), "d": d, "f": float(machine.f), "e": float(machine.crank)}
-    axes = {name: [value, 0.789 * value] for name, value in lengths.items()}
-    one, other = sweep.run(sweep.study(kernel="polisher", design="zip", axes=axes, rtol=1e-12)).thd.values
-    return differing("distortion of a machine 0.789 times as large", f"{one:.6f}", float(other), float(one), 1e-12, 6)
-
-
-def _described(what: str, machine: xr.Dataset, holds: bool) -> Statement:
-    """Distortion, transmission angle and crank of a machine; `holds`: what is said of it in the notes."""
-    angle = math.degrees(machine.transmission_angle)
-    here = f"{float(machine.thd):.2%}, {angle:.0f} degree, e = {1e3 * float(machine.crank):.1f} mm"
-    return Statement(what, "", here, None, holds)
-
-
-def statements(ds: xr.Dataset) -> Groups:
-    """Every line of the table, by heading."""
-    machines = of_amplitude(ds)
-    return {
-        "Machines of 15 degree": existence(ds, machines),
-        "Distortion, transmission angle, crank (arm 380 mm)": quality(machines),
-    }
-
-
-def figure(ds: xr.Dataset) -> Any:
-    """Distortion over motor and coupler, with the border of lock-up; the best coupler; a cut; for a page of print."""
-    b, f = (np.arange(float(x[0]), float(x[-1]) + 1e-9, FINE) for x in (ds.b, ds.f))
-    arms = [machines_on(b, float(d), f) for d in ds.d]
-    usual = next(arm for arm in arms if abs(arm.d - ARM) < 1e-9)
-    with charts.style():
-        page = charts.new_figure(charts.PAGE, 96.0)
-        left, right = page.subfigures(1, 2, width_ratios=(1.2, 1))
-        whole = left.subplots()
-        upper, lower = right.subplots(2, 1)
-        draw_map(left, whole, usual)
-        draw_best(upper, arms)
-        draw_cut(lower, machines_on(np.array([PAPER["b"]]), ARM, f).isel(b=0))
-        for axes, text in ((whole, "a"), (upper, "b"), (lower, "c")):
-            charts.letter(axes, text)
-    return page
-
-
 def draw_map(page: Any, axes: Any, arm: xr.Dataset) -> None:
     """Distortion over b and f for one arm, the crank it takes, and where the motor locks instead."""
-    from matplotlib.colors import LogNorm
-    from matplotlib.lines import Line2D
-
     b, f = 1e3 * arm.b.values, 1e3 * arm.f.values
     thd = 100 * arm.thd.transpose("f", "b").values
     mesh = axes.pcolormesh(b, f, thd, norm=LogNorm(2, 40), cmap="cividis_r", shading="nearest", rasterized=True)
@@ -216,36 +155,41 @@ def draw_map(page: Any, axes: Any, arm: xr.Dataset) -> None:
     axes.set(xlabel="motor from pivot, $b$ [mm]", ylabel="coupler, $f$ [mm]", xlim=(b[0], b[-1]), ylim=(f[0], f[-1]))
 
 
-def draw_best(axes: Any, arms: Sequence[xr.Dataset]) -> None:
-    """The least distortion over all couplers, for each arm."""
+def draw_least(best_of: Any, cut: Any, arms: Sequence[xr.Dataset], line: xr.Dataset) -> None:
+    """The least distortion over all couplers, for each arm; a cut, with motor and arm of the paper's machine."""
     for k, arm in enumerate(arms):
-        top = best(arm)
-        look = {"color": COLOURS[k], "linestyle": DASHES[k]}
-        axes.plot(1e3 * top.b, 100 * top.thd, label=f"$d={1e3 * float(arm.d):.0f}$ mm", **look)
-    axes.set(xlabel="motor from pivot, $b$ [mm]", ylabel="least distortion [%]", yscale="log")
-    axes.set_yticks([2, 5, 10, 20, 40], labels=["2", "5", "10", "20", "40"])
-    axes.minorticks_off()
-    axes.legend(loc="upper right")
+        top, text = best(arm), f"$d={1e3 * float(arm.d):.0f}$ mm"
+        best_of.plot(1e3 * top.b, 100 * top.thd, color=COLOURS[k], linestyle=DASHES[k], label=text)
+    best_of.set(xlabel="motor from pivot, $b$ [mm]", ylabel="least distortion [%]", yscale="log")
+    plain_ticks(best_of.yaxis, (2, 5, 10, 20, 40))
+    best_of.legend(loc="upper right")
+    f = 1e3 * line.f
+    cut.plot(f, 100 * line.thd, color=COLOURS[0], label="distortion [%]")
+    cut.plot(f, np.degrees(line.transmission_angle), "--", color=COLOURS[1], label="transmission angle [degree]")
+    cut.axvline(1e3 * PAPER["f"], color="0.5", linewidth=0.8, linestyle=":", label="the paper's coupler")
+    cut.set(xlabel="coupler, $f$ [mm]", ylabel="[%], [degree]", ylim=(0, 75), xlim=(300, 800))
+    cut.legend(loc="center right", bbox_to_anchor=(1.0, 0.36), fontsize=7)
 
 
-def draw_cut(axes: Any, cut: xr.Dataset) -> None:
-    """Distortion and transmission angle over the coupler, with motor and arm of the paper's machine."""
-    f = 1e3 * cut.f
-    axes.plot(f, 100 * cut.thd, color=COLOURS[0], label="distortion [%]")
-    axes.plot(f, np.degrees(cut.transmission_angle), "--", color=COLOURS[1], label="transmission angle [degree]")
-    axes.axvline(1e3 * PAPER["f"], color="0.5", linewidth=0.8, linestyle=":", label="the paper's coupler")
-    axes.set(xlabel="coupler, $f$ [mm]", ylabel="[%], [degree]", ylim=(0, 75), xlim=(300, 800))
-    axes.legend(loc="center right", bbox_to_anchor=(1.0, 0.36), fontsize=7)
+def figure(ds: xr.Dataset) -> Any:
+    """Distortion over motor and coupler, with the border of lock-up; the best coupler; a cut; for a page of print."""
+    b, f = (np.arange(float(x[0]), float(x[-1]) + 1e-9, FINE) for x in (ds.b, ds.f))
+    arms = [machines_on(b, float(d), f) for d in ds.d]
+    with columns_of(96.0, {}, {"nrows": 2}, 1.2) as (page, left, (plane, best_of, cut)):
+        draw_map(left, plane, next(arm for arm in arms if abs(arm.d - ARM) < 1e-9))
+        draw_least(best_of, cut, arms, machines_on(np.array([PAPER["b"]]), ARM, f).isel(b=0))
+    return page
 
 
-def conclude(path: str) -> tuple[Groups, list[str], Any]:
+def conclude(path: str) -> Conclusion:
     """Statements and the figure."""
     ds = read_result(path, "polisher", ["d", "b", "f", "e"], "polisher_design.toml")
-    return statements(ds), [NOTES], lambda: figure(ds)
+    machines = of_amplitude(ds)
+    groups = {
+        "Machines of 15 degree": existence(machines),
+        "Distortion, transmission angle, crank (arm 380 mm)": quality(machines),
+    }
+    return groups, [NOTES], lambda: figure(ds)
 
 
-main = partial(report, __file__, ["polisher_design.h5"], conclude=conclude, source="expected")
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+main = script(__name__, "polisher_design.h5", conclude, "expected")

@@ -11,16 +11,15 @@ sweep wears the sum of t_i h_i(r); the most even sum of given mean is a least-sq
 from __future__ import annotations
 
 import math
-import sys
-from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, compared, page_of, read_result, report
+from _common import Conclusion, Statement, compared, most, read_result, said, script, solved
+from _figures import page_of
 from _polishing import KEPT, POINTS, area, best_settings, disc, least, one_setting, unevenness
+from scipy.optimize import brentq, nnls
 
-import sweep
 from sweep.show.charts import COLOURS
 
 TOOLS = (
@@ -37,8 +36,6 @@ length found by roots, 2 % of A0's slopes over 1 mm of throw
 
 def mixture(ds: xr.Dataset) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Profiles of mean 1, one a row; the shares of the wear by each; the mixed profile."""
-    from scipy.optimize import nnls
-
     weight = area(ds.radius)
     rows = ds.wear.stack(setting=("e", "w_x")).transpose("setting", "radius").values
     rows = rows / (rows * weight).sum(axis=1, keepdims=True)
@@ -50,29 +47,24 @@ def mixture(ds: xr.Dataset) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def optimum(ds: xr.Dataset) -> list[Statement]:
     """What a sequence gains over one setting, and whether it is the best."""
-    weight = area(ds.radius)
-    rows, shares, mixed = mixture(ds)
+    weight, (rows, shares, mixed) = area(ds.radius), mixture(ds)
     scale = float((mixed * weight).sum() / (mixed**2 * weight).sum())
     slope = rows @ ((scale * mixed - 1) * weight)  # of the sum of squares, 0 where a share is above 0
     used = shares > 1e-9
-    worst = max(float(abs(slope[used]).max()), float(-slope[~used].min(initial=0.0)))
-    best, alone = float(unevenness(mixed, weight)), one_setting(ds)
-    single = best_settings(ds)[0].uneven
-    return [
-        *alone,
-        Statement("best sequence", "-", f"{best:.1%}, centre {mixed[0]:.2f}, {used.sum()} settings", None,
-                  bool(best < single / 35 and least(mixed, weight, ds.radius.values) > KEPT)),
-        Statement("  conditions of an optimum", "0", "largest breach", worst, worst < 1e-6),
-        *[Statement(f"  {s:.0%} of the wear at", "", where) for s, where in steps(ds, shares)],
-    ]  # fmt: skip
-
-
-def steps(ds: xr.Dataset, shares: np.ndarray) -> list[tuple[float, str]]:
-    """Shares above a hundredth with their settings, largest first."""
-    places = [(float(e), float(w)) for e in ds.e.values for w in ds.w_x.values]
+    worst = max(abs(slope[used]).max(), -slope[~used].min(initial=0.0))
+    best, single = float(unevenness(mixed, weight)), best_settings(ds)[0].uneven
+    holds = best < single / 35 and least(mixed, weight, ds.radius.values) > KEPT
+    places = [(100 * e, 100 * (w - float(ds.L))) for e in ds.e.values for w in ds.w_x.values]
     order = [i for i in np.argsort(-shares) if shares[i] > 0.01]
-    return [(float(shares[i]), f"e = {100 * places[i][0]:g} cm, offset {100 * (places[i][1] - float(ds.L)):.0f} cm")
-            for i in order]  # fmt: skip
+    return [
+        *one_setting(ds),
+        said("best sequence", holds, f"{best:.1%}, centre {mixed[0]:.2f}, {used.sum()} settings", "-"),
+        most("  conditions of an optimum", "0", worst, 1e-6, "largest breach"),
+        *(
+            Statement(f"  {shares[i]:.0%} of the wear at", "", "e = {:g} cm, offset {:.0f} cm".format(*places[i]))
+            for i in order
+        ),
+    ]
 
 
 def middle(d: float, e: float, b: float, f: float) -> float:
@@ -82,45 +74,36 @@ def middle(d: float, e: float, b: float, f: float) -> float:
 
 def correction(ds: xr.Dataset) -> list[Statement]:
     """How far O_DH moves on the arm so that the middle stays when the throw goes from 10 to 15 cm."""
-    from scipy.optimize import brentq
-
     b, d, f = (float(ds[name]) for name in "bdf")
     kept = middle(d, 0.10, b, f)
-    exact = brentq(lambda x: middle(x, 0.15, b, f) - kept, 0.37, 0.45, xtol=1e-14)
+    exact, small = (brentq(lambda x, e=e: middle(x, e, b, f) - kept, 0.37, 0.45, xtol=1e-15) for e in (0.15, 0.101))
     # the kernel's own angles there, and its slopes for small steps
-    study = sweep.study(
-        kernel="polisher", design="zip", axes={"d": [d, exact, d], "e": [0.10, 0.15, 0.15]}, fixed={"b": b, "f": f}
-    )
-    cells = sweep.run(study)
-    small = brentq(lambda x: middle(x, 0.101, b, f) - kept, 0.37, 0.45, xtol=1e-15) - d
+    cells = solved("polisher", design="zip", d=[d, exact, d], e=[0.10, 0.15, 0.15], b=b, f=f)
     slope = -float(cells.A0_e[0] / cells.A0_d[0]) * 1e-3
-    shift = math.degrees(float(cells.A0[2] - cells.A0[0]))
+    kept_by, shift = float(cells.A0[1] - cells.A0[0]), math.degrees(float(cells.A0[2] - cells.A0[0]))
     return [
-        Statement("throw 10 to 15 cm, same arm: the middle moves by [degree]", "-", f"{shift:.3f}", None, shift < -1),
-        Statement("  O_DH moved to keep it: arm [cm]", "-", f"{100 * d:g} to {100 * exact:.3f}",
-                  float(cells.A0[1] - cells.A0[0]), bool(abs(cells.A0[1] - cells.A0[0]) < 1e-9)),
-        compared("  for 1 mm of throw, by A0_e/A0_d [um]", f"{1e6 * small:.2f}", 1e6 * slope, 1e6 * small, 0.02, 5),
+        said("throw 10 to 15 cm, same arm: the middle moves by [degree]", shift < -1, f"{shift:.3f}", "-"),
+        most("  O_DH moved to keep it: arm [cm]", "-", kept_by, 1e-9, f"{100 * d:g} to {100 * exact:.3f}"),
+        compared("  for 1 mm of throw, by A0_e/A0_d [um]", f"{1e6 * (small - d):.2f}", 1e6 * slope, 1e6 * (small - d),
+                 0.02, 5),
     ]  # fmt: skip
 
 
 def turning(ds: xr.Dataset) -> list[Statement]:
     """What it matters which way the work turns, on type A; type B is type A in a mirror, which is no finding."""
     names = ("b", "d", "f", "L", "tool_a", "tool_b", "preston", "pressure", "omega", "b_angle")
-    fixed = {**{name: float(ds[name]) for name in names}, "type": "A", "e": 0.1, "w_x": 0.53}
-    spin = float(ds.Omega)
-    both = sweep.run(
-        kernel="polisher_wear", axes={"Omega": [spin, -spin]}, fixed=fixed, along={"radius": ds.radius.values[::10]}
-    )
+    fixed, spin = {name: float(ds[name]) for name in names} | {"e": 0.1, "w_x": 0.53}, float(ds.Omega)
+    both = solved("polisher_wear", Omega=[spin, -spin], along={"radius": ds.radius.values[::10]}, **fixed)
     off = float(abs(both.wear[1] / both.wear[0] - 1).max())
     # the way out takes the crank from one dead point to the other, the way back the rest of its turn
-    b, d, f, e = fixed["b"], fixed["d"], float(ds.f), 0.1
+    b, d, f, e = fixed["b"], fixed["d"], fixed["f"], fixed["e"]
     dead = [math.acos((b * b + (f + s * e) ** 2 - d * d) / (2 * b * (f + s * e))) for s in (1, -1)]
     out = 0.5 + (dead[1] - dead[0]) / (2 * math.pi)
+    changes = "  so the wear changes where the work turns the other way"
     return [
-        Statement("share of the crank's turn in which the arm goes out", "", f"{out:.3f}", None, abs(out - 0.5) > 1e-3),
-        Statement("  so the wear changes where the work turns the other way", "> 0.1 %", f"{off:.2%}", None,
-                  1e-3 < off < 0.05),
-    ]  # fmt: skip
+        said("share of the crank's turn in which the arm goes out", abs(out - 0.5) > 1e-3, f"{out:.3f}"),
+        said(changes, 1e-3 < off < 0.05, f"{off:.2%}", "> 0.1 %"),
+    ]
 
 
 def figure(ds: xr.Dataset) -> Any:
@@ -135,21 +118,16 @@ def figure(ds: xr.Dataset) -> Any:
 
 def draw_machines(axes: Any, ds: xr.Dataset) -> None:
     """Pivot, motor, crank, coupler and arm of both types at e = 10 cm, the paper's figure 3."""
-    b, d = float(ds.b), float(ds.d)
-    turn = 1.0
-    study = sweep.study(
-        kernel="polisher_motion", axes={"type": ["A", "B"]}, along={"crank_angle": np.array([turn])},
-        fixed={"b": b, "d": d, "f": float(ds.f), "e": 0.1, "omega": 1.0}, outputs=["alpha"],
-    )  # fmt: skip
-    angles = sweep.run(study).alpha.values.ravel()
-    pin = np.array([b + 0.1 * math.cos(turn), 0.1 * math.sin(turn)])
-    ring = np.linspace(0, 2 * np.pi, 100)
-    axes.plot(b + 0.1 * np.cos(ring), 0.1 * np.sin(ring), color="0.7", linewidth=0.8, label="circle of the crank")
+    b, d, e, turn = float(ds.b), float(ds.d), 0.1, 1.0
+    ring, pin = np.linspace(0, 2 * np.pi, 100), (b + e * math.cos(turn), e * math.sin(turn))
+    axes.plot(b + e * np.cos(ring), e * np.sin(ring), color="0.7", linewidth=0.8, label="circle of the crank")
     axes.plot([b, pin[0]], [0, pin[1]], color="black", label="crank, $e$")
-    for k, (kind, alpha) in enumerate(zip("AB", angles, strict=True)):
-        end = d * np.array([math.cos(alpha), math.sin(alpha)])
-        axes.plot([0, end[0]], [0, end[1]], color=COLOURS[k], label=f"arm, type {kind}")
-        axes.plot([end[0], pin[0]], [end[1], pin[1]], "--", color=COLOURS[k], label=f"coupler, type {kind}")
+    machine = {"b": b, "d": d, "f": float(ds.f), "e": e, "omega": 1.0}
+    motion = solved("polisher_motion", type=["A", "B"], along={"crank_angle": [turn]}, outputs=["alpha"], **machine)
+    for k, (kind, alpha) in enumerate(zip("AB", motion.alpha.values.ravel(), strict=True)):
+        x, y = d * math.cos(alpha), d * math.sin(alpha)
+        axes.plot([0, x], [0, y], color=COLOURS[k], label=f"arm, type {kind}")
+        axes.plot([x, pin[0]], [y, pin[1]], "--", color=COLOURS[k], label=f"coupler, type {kind}")
     axes.plot([0, b], [0, 0], "o", color="black", markersize=4, label="pivot, motor")
     axes.set(xlabel="$x$ [m]", ylabel="$y$ [m]", xlim=(-0.25, 0.95), ylim=(-0.19, 0.53))
     axes.set_aspect("equal", "box")
@@ -204,7 +182,7 @@ def draw_shares(page: Any, axes: Any, ds: xr.Dataset) -> None:
     axes.set(xlabel="offset [mm]", ylabel="eccentricity, $e$ [mm]")
 
 
-def conclude(path: str) -> tuple[Groups, list[str], Any]:
+def conclude(path: str) -> Conclusion:
     """Statements and the figure."""
     ds = read_result(path, "polisher_wear", ["e", "w_x"], "polisher_sequence.toml")
     groups = {
@@ -215,8 +193,4 @@ def conclude(path: str) -> tuple[Groups, list[str], Any]:
     return groups, [NOTES], lambda: figure(ds)
 
 
-main = partial(report, __file__, ["polisher_sequence.h5"], conclude=conclude)
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+main = script(__name__, "polisher_sequence.h5", conclude)

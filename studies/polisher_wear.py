@@ -12,15 +12,14 @@ the workpiece is said to have a hole.
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Sequence
-from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, compared, hatch, page_of, quality_bar, read_result, report
+from _common import Conclusion, Statement, compared, most, read_result, said, script
+from _figures import hatch, page_of, quality_bar
 from _polishing import KEPT, area, least, one_setting, unevenness
+from matplotlib.patches import Patch
 
 from sweep.show.charts import COLOURS
 
@@ -31,6 +30,8 @@ PROFILES = (0.50, 0.54, 0.56, 0.58)
 """Workpiece centres [m] whose profiles are drawn."""
 USUAL = 0.10
 """Eccentricity [m] of the profiles."""
+SHAPES = {"disc": (2, 0.04), "ellipse": (2, 0.08), "rhombus 1:2": (1, 0.08), "rhombus 1:1": (1, 0.04)}
+"""Exponent and half width [m] of the tools."""
 
 NOTES = """\
 unevenness: standard deviation of the wear over the workpiece's area, over its mean; least: the least wear of the inner
@@ -52,23 +53,26 @@ def scaled(ds: xr.Dataset) -> xr.Dataset:
     )
 
 
-def swing(ds: xr.Dataset) -> xr.DataArray:
-    """Half amplitude A1 of the arm, by the paper's (37) and (40), corrected."""
+def tool(ds: xr.Dataset, name: str) -> xr.Dataset:
+    """The wear by one of the tools."""
+    n, b = SHAPES[name]
+    return ds.sel(tool_n=n).sel(tool_b=b, method="nearest")
+
+
+def numbers(ds: xr.Dataset) -> list[Statement]:
+    """The way of the arm over a middle that the tool never leaves, times pressure; and how far numbers may be off."""
     b, d, f = float(ds.b), float(ds.d), float(ds.f)
     far, near = (np.arccos((b * b + d * d - c * c) / (2 * b * d)) for c in (f + ds.e, abs(f - ds.e)))
-    return 0.5 * (far - near)
-
-
-def centre(ds: xr.Dataset) -> Statement:
-    """What the middle of the workpiece loses under a tool that never leaves it: the way of the arm over it."""
-    small = ds.sel(tool_n=2, w_x=0.50).isel(tool_b=-1, radius=0)
-    small = small.where(swing(small) * float(ds.L) < 0.04, drop=True).isel(e=0)
-    way = 4 * float(swing(small)) * float(small.w_x) * float(ds.omega) / (2 * np.pi)
-    theory = float(ds.preston) * float(ds.pressure) * way * UM_PER_HOUR
-    return compared(
-        f"wear of the centre, e = {CM * float(small.e):g} cm [um/h]", f"{theory:.5g}",
-        float(small.wear) * UM_PER_HOUR, theory, 1e-2, 5,
-    )  # fmt: skip
+    swing = 0.5 * (far - near)  # half amplitude of the arm, by the paper's (37) and (40), corrected
+    small = ds.sel(tool_n=2, w_x=0.50).isel(tool_b=-1, radius=0).assign(swing=swing)
+    small = small.where(swing * float(ds.L) < 0.04, drop=True).isel(e=0)
+    way = 4 * float(small.swing) * float(small.w_x) * float(ds.omega) / (2 * np.pi)
+    theory, here = (UM_PER_HOUR * x for x in (float(ds.preston) * float(ds.pressure) * way, float(small.wear)))
+    worst = (ds.wear_error / ds.wear.max("radius")).max()
+    return [
+        compared(f"wear of the centre, e = {CM * float(small.e):g} cm [um/h]", f"{theory:.5g}", here, theory, 1e-2, 5),
+        most("error of every profile, over its largest wear", "", worst, 1e-4, "at most"),
+    ]
 
 
 def edge(ds: xr.Dataset, load: xr.Dataset) -> list[Statement]:
@@ -80,94 +84,68 @@ def edge(ds: xr.Dataset, load: xr.Dataset) -> list[Statement]:
     pressed = ds.wear.sel(tool_n=2).isel(tool_b=0).sel(e=USUAL, method="nearest")
     ratio = load.wear.isel(radius=-1) / pressed.interp(radius=load.radius[-1]).sel(w_x=load.w_x, method="nearest")
     middle = load.wear.isel(radius=0) / pressed.isel(radius=0).sel(w_x=load.w_x, method="nearest")
-    texts = [f"{float(r):.3g} at {MM * float(r.w_x - ds.L):.0f} mm" for r in ratio]
-    off = float(middle.isel(w_x=0) - 1)
+    here = ", ".join(f"{float(r):.3g} at {MM * float(r.w_x - ds.L):.0f} mm" for r in ratio)
+    within, off = ((ratio > 3) & (ratio < 5)).all(), float(middle.isel(w_x=0) - 1)
     return [
-        Statement(
-            "disc: wear by load over that by pressure, 2 mm from the edge", "3 to 5", ", ".join(texts), None,
-            bool(((ratio > 3) & (ratio < 5)).all()),
-        ),
-        Statement("disc, no offset: the same at the centre", "1", f"{1 + off:.6f}", off, abs(off) < 1e-4),
-    ]  # fmt: skip
+        said("disc: wear by load over that by pressure, 2 mm from the edge", within, here, "3 to 5"),
+        most("disc, no offset: the same at the centre", "1", off, 1e-4, f"{1 + off:.6f}"),
+    ]
 
 
-def worst_error(ds: xr.Dataset) -> Statement:
-    """How far the numbers may be off."""
-    worst = float((ds.wear_error / ds.wear.max("radius")).max())
-    return Statement("error of every profile, over its largest wear", "", "at most", worst, worst <= 1e-4)
+def least_uneven(ds: xr.Dataset, *over: str, hole: bool = False) -> xr.Dataset:
+    """The cell of least unevenness, of all, or of those without a hole."""
+    uneven = ds.uneven if hole else ds.uneven.where(ds.least >= KEPT)
+    return ds.isel({name: int(k) for name, k in uneven.argmin(list(over)).items()})
 
 
-def offsets(ds: xr.Dataset) -> list[Statement]:
-    """What moving the workpiece does, tool by tool: the least uneven profile has a hole, so holes are left out."""
-    lines = []
-    for name, n, b in SHAPES:
-        tool = ds.sel(tool_n=n).sel(tool_b=b, method="nearest").sel(e=USUAL, method="nearest")
-        aligned = tool.sel(w_x=float(tool.L), method="nearest")
-        bored, best = least_uneven(tool, ("w_x",)), least_uneven(without_hole(tool), ("w_x",))
-        lines.append(
-            Statement(
-                f"{name}, e = 10 cm: the least uneven has a hole", "", told(bored), None, bool(bored.least < KEPT)
-            )
-        )
-        text = f"{told(best)}; no offset {100 * float(aligned.uneven):.0f} %"
-        gain = float(best.uneven / aligned.uneven)
-        lines.append(Statement("  without a hole an offset evens by a third at least", "", text, None, gain < 2 / 3))
-    return lines
-
-
-def without_hole(ds: xr.Dataset) -> xr.Dataset:
-    """The profiles without a hole; others NaN."""
-    return ds.where(ds.least >= KEPT)
-
-
-def least_uneven(ds: xr.Dataset, over: Sequence[str]) -> xr.Dataset:
-    """The cell of least unevenness."""
-    return ds.isel({name: int(k) for name, k in ds.uneven.argmin(list(over)).items()})
-
-
-def told(cell: xr.Dataset) -> str:
+def described(cell: xr.Dataset) -> str:
     """Unevenness, place and hole of a cell."""
     place = f"{100 * float(cell.uneven):.1f} % at e = {CM * float(cell.e):g} cm, "
     return f"{place}offset {CM * float(cell.w_x - cell.L):.3g} cm, least {float(cell.least):.2f}"
 
 
+def offsets(ds: xr.Dataset) -> list[Statement]:
+    """What moving the workpiece does, tool by tool: the least uneven profile has a hole, so holes are left out."""
+    lines = []
+    for name in SHAPES:
+        usual = tool(ds, name).sel(e=USUAL, method="nearest")
+        aligned = float(usual.uneven.sel(w_x=float(ds.L), method="nearest"))
+        bored, best = least_uneven(usual, "w_x", hole=True), least_uneven(usual, "w_x")
+        here = f"{described(best)}; no offset {100 * aligned:.0f} %"
+        lines += [
+            said(f"{name}, e = 10 cm: the least uneven has a hole", bored.least < KEPT, described(bored)),
+            said("  without a hole an offset evens by a third at least", best.uneven / aligned < 2 / 3, here),
+        ]
+    return lines
+
+
 def eccentricities(ds: xr.Dataset) -> list[Statement]:
     """What the eccentricity does."""
-    tool = ds.sel(tool_n=2).isel(tool_b=0)
-    aligned = tool.uneven.isel(w_x=0)
-    evenest = aligned.isel(e=int(aligned.argmin("e")))
-    text = (
-        f"{100 * float(aligned[0]):.0f} % at 2 cm, least {100 * float(evenest):.0f} % at {CM * float(evenest.e):g} cm"
-    )
-    lost = tool.average.isel(w_x=0)
+    disc = ds.sel(tool_n=2).isel(tool_b=0)
+    aligned, lost = (disc[name].isel(w_x=0) for name in ("uneven", "average"))
+    even = aligned.isel(e=int(aligned.argmin("e")))
+    here = f"{100 * float(aligned[0]):.0f} % at 2 cm, least {100 * float(even):.0f} % at {CM * float(even.e):g} cm"
+    text = f"{UM_PER_HOUR * float(lost[0]):.3g} at 2 cm, at most {UM_PER_HOUR * float(lost.max()):.3g}"
+    grows = "disc, no offset: mean wear more than doubles with throw [um/h]"
     return [
-        Statement("disc, no offset: throw halves the unevenness", "", text, None, bool(evenest < 0.5 * aligned[0])),
-        *one_setting(tool),
-        Statement(
-            "disc, no offset: mean wear more than doubles with throw [um/h]", "",
-            f"{UM_PER_HOUR * float(lost[0]):.3g} at 2 cm, at most {UM_PER_HOUR * float(lost.max()):.3g}", None,
-            bool(lost.max() > 2 * lost[0]),
-        ),
-    ]  # fmt: skip
-
-
-SHAPES = (
-    ("disc", 2, 0.04),
-    ("ellipse", 2, 0.08),
-    ("rhombus 1:2", 1, 0.08),
-    ("rhombus 1:1", 1, 0.04),
-)
+        said("disc, no offset: throw halves the unevenness", even < 0.5 * aligned[0], here),
+        *one_setting(disc),
+        said(grows, lost.max() > 2 * lost[0], text),
+    ]
 
 
 def figure(ds: xr.Dataset, load: xr.Dataset) -> Any:
     """Profiles of three tools, and how uneven they are over offset and eccentricity; for two columns of print."""
-    from matplotlib.patches import Patch
-
     with page_of(116.0, 2, 3) as (page, (upper, lower)):
-        for k, (name, n, b) in enumerate(SHAPES[:3]):
-            tool = ds.sel(tool_n=n).sel(tool_b=b, method="nearest")
-            draw_profiles(upper[k], tool, name, k, load if k == 0 else None)
-            mesh = draw_map(lower[k], tool, k)
+        for axes, plane, name in zip(upper, lower, SHAPES, strict=False):
+            draw_profiles(axes, tool(ds, name), name)
+            mesh = draw_map(plane, tool(ds, name))
+        for place, colour in zip(PROFILES, COLOURS, strict=False):
+            dashed = load.wear.sel(w_x=place, method="nearest")
+            upper[0].plot(MM * dashed.radius, UM_PER_HOUR * dashed, "--", color=colour, linewidth=0.9)
+        upper[0].plot([], [], "k--", linewidth=0.9, label="(a) constant load")
+        upper[0].set_ylabel("wear [µm/h]")
+        lower[0].set_ylabel("eccentricity, $e$ [mm]")
         quality_bar(page, mesh, list(lower), "unevenness of the wear [1]", pad=0.01)
         hole = Patch(facecolor="0.4", edgecolor="white", hatch="////", linewidth=0, label="(d-f) a hole in the middle")
         star = lower[0].get_legend_handles_labels()[0]
@@ -175,22 +153,16 @@ def figure(ds: xr.Dataset, load: xr.Dataset) -> Any:
     return page
 
 
-def draw_profiles(axes: Any, tool: xr.Dataset, name: str, k: int, load: xr.Dataset | None) -> None:
-    """Wear along the radius at some offsets; dashed under a constant load."""
-    for j, place in enumerate(PROFILES):
+def draw_profiles(axes: Any, tool: xr.Dataset, name: str) -> None:
+    """Wear along the radius at some offsets."""
+    for place, colour in zip(PROFILES, COLOURS, strict=False):
         line = tool.wear.sel(e=USUAL, method="nearest").sel(w_x=place, method="nearest")
-        offset = MM * float(line.w_x - tool.L)
-        axes.plot(MM * line.radius, UM_PER_HOUR * line, color=COLOURS[j], label=f"(a-c) offset {offset:.0f} mm")
-        if load is not None:
-            dashed = load.wear.sel(w_x=place, method="nearest")
-            axes.plot(MM * dashed.radius, UM_PER_HOUR * dashed, "--", color=COLOURS[j], linewidth=0.9)
+        text = f"(a-c) offset {MM * float(line.w_x - tool.L):.0f} mm"
+        axes.plot(MM * line.radius, UM_PER_HOUR * line, color=colour, label=text)
     axes.set(xlabel="radius [mm]", title=f"{name}, $e=100$ mm", xlim=(0, 100), ylim=(0, None))
-    if load is not None:
-        axes.set_ylabel("wear [µm/h]")
-        axes.plot([], [], "k--", linewidth=0.9, label="(a) constant load")
 
 
-def draw_map(axes: Any, tool: xr.Dataset, k: int) -> Any:
+def draw_map(axes: Any, tool: xr.Dataset) -> Any:
     """Unevenness over offset and eccentricity."""
     uneven = tool.uneven.transpose("e", "w_x")
     x, y = MM * (tool.w_x - tool.L).values, MM * tool.e.values
@@ -199,21 +171,19 @@ def draw_map(axes: Any, tool: xr.Dataset, k: int) -> Any:
     lines = axes.contour(x, y, uneven, levels=[0.3, 0.5], colors="white", linewidths=0.7)
     for text in axes.clabel(lines, fmt="%g", fontsize=7):
         text.set_bbox({"facecolor": "0.35", "edgecolor": "none", "pad": 0.5})
-    best = least_uneven(without_hole(tool), ("e", "w_x"))
-    axes.plot(MM * float(best.w_x - tool.L), MM * float(best.e), "*", color="white", markeredgecolor="black",
-              markersize=8, label="(d-f) most even without a hole, on the grid")  # fmt: skip
+    best, look = least_uneven(tool, "e", "w_x"), {"color": "white", "markeredgecolor": "black", "markersize": 8}
+    name = "(d-f) most even without a hole, on the grid"
+    axes.plot(MM * float(best.w_x - tool.L), MM * float(best.e), "*", label=name, **look)
     axes.set(xlabel="offset [mm]")
-    if k == 0:
-        axes.set_ylabel("eccentricity, $e$ [mm]")
     return mesh
 
 
-def conclude(path: str, loaded: str) -> tuple[Groups, list[str], Any]:
+def conclude(path: str, loaded: str) -> Conclusion:
     """Statements and the figure."""
     ds = scaled(read_result(path, "polisher_wear", ["tool_n", "tool_b", "e", "w_x"], "polisher_wear.toml"))
     load = read_result(loaded, "polisher_wear", ["w_x"], "polisher_wear_load.toml")
     groups = {
-        "Numbers": [centre(ds), worst_error(ds)],
+        "Numbers": numbers(ds),
         "Offset": offsets(ds),
         "Eccentricity": eccentricities(ds),
         "Constant load": edge(ds, load),
@@ -221,8 +191,4 @@ def conclude(path: str, loaded: str) -> tuple[Groups, list[str], Any]:
     return groups, [NOTES], lambda: figure(ds, load)
 
 
-main = partial(report, __file__, ["polisher_wear.h5", "polisher_wear_load.h5"], conclude=conclude)
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+main = script(__name__, "polisher_wear.h5 polisher_wear_load.h5", conclude)

@@ -11,14 +11,12 @@ P = F(alpha)/a with alpha = mu/(a^2 phi0), so with s = -d ln P/d ln mu the expon
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Sequence
-from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, differing, direct_label, page_of, read_result, report
+from _common import Conclusion, Groups, differing, read_result, script
+from _figures import direct_label, page_of
 
 import sweep
 from sweep.show.charts import COLOURS, MARKS
@@ -48,9 +46,8 @@ def sampled(drive: float, kind: str, n: int) -> xr.Dataset:
     """Cells of a design around a drive alpha, for a = phi0 = 1."""
     torque = {**RANGES["mu"], "start": 0.9048 * drive, "stop": 1.1052 * drive}
     axes = {**RANGES, "mu": torque, **KEPT}
-    return sweep.run(
-        kernel="foliot", rtol=1e-10, outputs=["period"], design={"kind": kind, "n": n, "seed": 1}, axes=axes
-    )
+    design = {"kind": kind, "n": n, "seed": 1}
+    return sweep.run(kernel="foliot", rtol=1e-10, outputs=["period"], design=design, axes=axes)
 
 
 def exponent(drive: float) -> float:
@@ -108,14 +105,10 @@ def figure(found: xr.Dataset) -> Any:
     return page
 
 
-def conclude(path: str) -> tuple[Groups, Sequence[str], Any]:
+def conclude(path: str) -> Conclusion:
     """Table, notes and figure of a result."""
     ds = read_result(path, "foliot", ["cell"], TOML)
     return statements(ds), NOTES.splitlines(), lambda: figure(against_drive())
 
 
-main = partial(report, __file__, ["rate_parameters.h5"], conclude=conclude)
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+main = script(__name__, "rate_parameters.h5", conclude)

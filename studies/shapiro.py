@@ -14,13 +14,12 @@ the drive by exp(-2 pi/w sqrt(J_n^2 - detuning^2)). Without the drive (ac = 0, n
 
 from __future__ import annotations
 
-import sys
-from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, differing, direct_label, page_of, read_result, report
+from _common import Conclusion, Statement, differing, most, read_result, said, script
+from _figures import direct_label, page_of
 from matplotlib.colors import ListedColormap
 from scipy.special import jv
 
@@ -32,9 +31,8 @@ BORDER = 0.5
 NOTES = "decay: ln(multiplier) w/2 pi, squared; by (1) it is J_n^2 - detuning^2"
 
 
-def read(path: str) -> xr.Dataset:
+def scaled(ds: xr.Dataset) -> xr.Dataset:
     """The sweep with Bessel's function, and the square of how fast disturbances decay."""
-    ds = read_result(path, "junction_scene:KERNEL", ["w", "order", "ac", "detuning"], "shapiro.toml")
     bessel = xr.apply_ufunc(jv, ds.order, ds.ac)
     rate = -ds.w / (2.0 * np.pi) * np.log(ds.multiplier)
     return ds.assign(bessel=bessel, decay=rate**2, locked=ds.status == Status.OK)
@@ -50,17 +48,16 @@ def statements(ds: xr.Dataset) -> list[Statement]:
     exact = float(abs(free.decay - (1.0 - free.detuning**2)).where(free.locked).max())
     middle = abs(ds.decay - ds.bessel**2).where(own).sel(detuning=0.0).max(("order", "ac"))
     falls = float(np.log(middle[1] / middle[0]) / np.log(ds.w[1] / ds.w[0]))
-    lines = [
-        Statement("period of the cycle", "2 pi/w", "", periods, periods <= 1e-6),
-        Statement("decay without a drive", "1 - detuning^2", "", exact, exact <= 1e-5),
+    return [
+        most("period of the cycle", "2 pi/w", periods, 1e-6, ""),
+        most("decay without a drive", "1 - detuning^2", exact, 1e-5, ""),
         *(
-            Statement(f"w = {w:g}: n turns a period by (1), but for {BORDER / w:.2f}", "all cells", "", None, here)
+            said(f"w = {w:g}: n turns a period by (1), but for {BORDER / w:.2f}", here, "", "all cells")
             for w, here in zip(ds.w.values, right, strict=True)
         ),
         Statement("decay in the middle beside (1)", "", ", ".join(f"{off:.4f}" for off in middle.values)),
         differing("its deviation goes as w to the power", "-2", falls, -2.0, 0.2, 3),
-    ]  # fmt: skip
-    return lines
+    ]
 
 
 def figure(ds: xr.Dataset) -> Any:
@@ -85,14 +82,10 @@ def figure(ds: xr.Dataset) -> Any:
     return page
 
 
-def conclude(path: str) -> tuple[Groups, list[str], Any]:
+def conclude(path: str) -> Conclusion:
     """Statements and the figure."""
-    ds = read(path)
+    ds = scaled(read_result(path, "junction_scene:KERNEL", ["w", "order", "ac", "detuning"], "shapiro.toml"))
     return {"Shapiro steps": statements(ds)}, [NOTES], lambda: figure(ds)
 
 
-main = partial(report, __file__, ["shapiro.h5"], conclude=conclude)
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+main = script(__name__, "shapiro.h5", conclude)

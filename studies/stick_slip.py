@@ -11,29 +11,19 @@ that locates no kink. Last, the cost of a digit. Times are noisy and only told.
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import (
-    Groups,
-    Statement,
-    cheapest,
-    direct_label,
-    draw_costs,
-    measured,
-    page_of,
-    plain_ticks,
-    read_result,
-    report,
-    solved_by,
-)
+from _common import Conclusion, Statement, cheapest, measured, read_result, said, script, solved_by
+from _figures import direct_label, draw_costs, page_of, plain_ticks
 from _sliding_peers import FOLLOWERS, motion
+from belt_scene import KERNEL, SCENE
 
 from kernels.interface import FIRST_REFUSAL, Status
+from kernels.stepping import stepped_kernel
 from sweep.show.charts import COLOURS, DASHES, method_look
 
 TOLERANCES = 10.0 ** -np.arange(3.0, 10.5, 3.0)
@@ -79,82 +69,64 @@ def last_count(flips: float, mu: Any, belt: Any, fall: Any) -> Any:
     return mu / belt + 0.5 * (flips - 1.0) * (slip + fall - place)
 
 
-def ours(belt: Any, fall: Any, rtol: float) -> Any:
-    """Times of the last count by `dop853`; NaN where that is not OK."""
-    from belt_scene import KERNEL
-
-    outputs, status = solved_by(KERNEL, "dop853", rtol, mu=1.0, flips=FLIPS, belt=belt, fall=fall)
-    return np.where(status == Status.OK, outputs, np.nan)
-
-
-def chattering(belt: Any, fall: Any) -> Any:
-    """The same by dopri5 at a fixed step that locates no kink, which chatters about it."""
-    from belt_scene import SCENE
-
-    from kernels.stepping import stepped_kernel
-
-    kernel, cells = stepped_kernel(**{**SCENE, "name": "belt_steps"}), {"belt": belt, "fall": fall, "step": STEP}
-    outputs, status = solved_by(kernel, "dopri5", LOOSE, mu=1.0, flips=FLIPS, location=0.0, **cells)
-    return np.where(status < FIRST_REFUSAL, outputs, np.nan)
-
-
 def errors(follow: Callable[..., Any], belt: Any, fall: Any, rtol: float) -> Any:
     """How late others are, relative to the time: by how far the mass is from where it rides past."""
     true = last_count(FLIPS, 1.0, belt, fall)
     return abs(follow(belt, fall, true, rtol) - 1.0) / (belt * true)
 
 
+def errors_of_ours(kernel: Any, belt: Any, fall: Any, rtol: float, method: str = "dop853", **more: Any) -> Any:
+    """Of the time of the last count, relative; NaN where there is none."""
+    time, status = solved_by(kernel, method, rtol, mu=1.0, flips=FLIPS, belt=belt, fall=fall, **more)
+    given = status == Status.OK if not more else status < FIRST_REFUSAL
+    return abs(np.where(given, time, np.nan) / last_count(FLIPS, 1.0, belt, fall) - 1.0)
+
+
 def others(ds: xr.Dataset) -> xr.Dataset:
-    """Maps of the errors of those that do not slide, NaN where they give up."""
+    """Maps of the errors of those that do not slide, NaN where they give up; our dopri5 chatters about the kink."""
     some = ds.isel({"belt": slice(None, None, COARSE), "fall": slice(None, None, COARSE)})
     belt, fall = (np.ravel(x) for x in np.meshgrid(some.belt, some.fall, indexing="ij"))
-    found = {"fixed step": abs(chattering(belt, fall) / last_count(FLIPS, 1.0, belt, fall) - 1.0)}
+    steps = stepped_kernel(**{**SCENE, "name": "belt_steps"})
+    found = {"fixed step": errors_of_ours(steps, belt, fall, LOOSE, "dopri5", step=STEP, location=0.0)}
     for name in ("scipy Radau", "scipy LSODA"):
         found[name] = errors(FOLLOWERS[name], belt, fall, LOOSE)
     shape = (some.belt.size, some.fall.size)
-    return xr.Dataset(
-        {name: (("belt", "fall"), off.reshape(shape)) for name, off in found.items()},
-        {"belt": some.belt, "fall": some.fall},
-    )
+    made = {name: (("belt", "fall"), off.reshape(shape)) for name, off in found.items()}
+    return xr.Dataset(made, {"belt": some.belt, "fall": some.fall})
 
 
 def all_costs(tell: bool) -> dict[str, xr.Dataset]:
     """What a digit costs, of ours and of others where these are to be told."""
     random = np.random.default_rng(1)
     belt, fall = 10.0 ** random.uniform(-1.0, -0.4, CELLS), 10.0 ** random.uniform(-1.5, -0.4, CELLS)
-    true = last_count(FLIPS, 1.0, belt, fall)
-    found = {"dop853 (slides)": measured(lambda rtol: abs(ours(belt, fall, rtol) / true - 1.0), TOLERANCES)}
+    found = {"dop853 (slides)": measured(partial(errors_of_ours, KERNEL, belt, fall), TOLERANCES)}
     for name, follow in FOLLOWERS.items() if tell else ():
-        off = partial(errors, follow, belt[::FEW], fall[::FEW])
-        found[name] = measured(off, TOLERANCES)
+        found[name] = measured(partial(errors, follow, belt[::FEW], fall[::FEW]), TOLERANCES)
     return found
 
 
-def maps(ds: xr.Dataset) -> list[Statement]:
-    """What our methods do over twenty cycles."""
-    lines = []
+def statements(ds: xr.Dataset, unslid: xr.Dataset) -> tuple[list[Statement], list[Statement]]:
+    """What our methods do over twenty cycles, and what those do that do not slide."""
+    lines, failures, ok = [], [], ds.status == Status.OK
     for method in map(str, ds["method"].values):
-        here = ds.sel({"method": method})
-        share = float((here.status == Status.OK).mean())
-        lines.append(Statement(f"{method} is OK", ">= 99 %", f"{share:.1%}", None, share >= 0.99))
-    worst = float(ds.off.where(ds.status == Status.OK).max())
-    return [*lines, Statement("worst error of what is OK", "<= 1e-9", f"{worst:.1e}", None, worst <= 1e-9)]
-
-
-def failures(found: xr.Dataset) -> list[Statement]:
-    """What those do that do not slide."""
-    lines = []
-    for name, off in found.items():
-        given, right = float(off.notnull().mean()), float((off <= 1e-4).mean())
-        what = f"{name}: cells given up, cells right to 1e-4"
-        lines.append(Statement(what, "", f"{1.0 - given:.0%}, {right:.0%}"))
-    return lines
+        share = float(ok.sel({"method": method}).mean())
+        lines.append(said(f"{method} is OK", share >= 0.99, f"{share:.1%}", ">= 99 %"))
+    worst = float(ds.off.where(ok).max())
+    for name, off in unslid.items():
+        here = f"{1.0 - float(off.notnull().mean()):.0%}, {float((off <= 1e-4).mean()):.0%}"
+        failures.append(Statement(f"{name}: cells given up, cells right to 1e-4", "", here))
+    return [*lines, said("worst error of what is OK", worst <= 1e-9, f"{worst:.1e}", "<= 1e-9")], failures
 
 
 def figure(ds: xr.Dataset, unslid: xr.Dataset, found: dict[str, xr.Dataset]) -> Any:
     """The motion; the error over the belt's speed, of a method that slides and of those that do not; costs."""
     with page_of(72.0, 1, 3) as (page, (left, middle, right)):
-        draw_motion(left)
+        for i, fall in enumerate((0.02, 0.1, 0.4)):
+            place, speed = motion(0.3, fall, float(last_count(FLIPS, 1.0, 0.3, fall)), 1e-8, SHOWN)
+            left.plot(place, speed, color=COLOURS[i], linestyle=DASHES[i], label=f"{fall:g}")
+        left.set(xlabel="place, $x$ [1]", ylabel="speed, $x'$ [1]", ylim=(-1.25, 0.45))
+        small = {"fontsize": 7, "title_fontsize": 7, "ncols": 3, "columnspacing": 0.9}
+        left.legend(loc="lower left", title="fall of friction [1]", **small)
         draw_errors(middle, ds.sel({"method": "taylor"}), unslid)
         places = {"dop853 (slides)": (2.0, 15.0), "scipy DOP853, modes by hand": (0.45, 20.0)}
         draw_costs(right, found, places)
@@ -162,18 +134,6 @@ def figure(ds: xr.Dataset, unslid: xr.Dataset, found: dict[str, xr.Dataset]) -> 
         direct_label(right, 0.95, 0.13, none, "0.35", fontsize=7, ha="right", transform=right.transAxes)
         right.set(xlim=(5e-6, 2e-2), ylim=(1e-16, 10))
     return page
-
-
-def draw_motion(axes: Any) -> None:
-    """Speed over place, for three falls of friction."""
-    for i, fall in enumerate((0.02, 0.1, 0.4)):
-        until = float(last_count(FLIPS, 1.0, 0.3, fall))
-        place, speed = motion(0.3, fall, until, 1e-8, SHOWN)
-        axes.plot(place, speed, color=COLOURS[i], linestyle=DASHES[i], label=f"{fall:g}")
-    axes.set(xlabel="place, $x$ [1]", ylabel="speed, $x'$ [1]", ylim=(-1.25, 0.45))
-    axes.legend(
-        loc="lower left", title="fall of friction [1]", fontsize=7, title_fontsize=7, ncols=3, columnspacing=0.9
-    )
 
 
 def draw_errors(axes: Any, slides: xr.Dataset, unslid: xr.Dataset) -> None:
@@ -193,22 +153,15 @@ def draw_errors(axes: Any, slides: xr.Dataset, unslid: xr.Dataset) -> None:
     plain_ticks(axes.xaxis, (0.01, 0.03, 0.1, 0.3))
 
 
-def conclude(path: str, tell: bool = True) -> tuple[Groups, list[str], Any]:
+def conclude(path: str, tell: bool = True) -> Conclusion:
     """Statements and the figure; costs of ours alone where those of others are not to be told."""
     ds = read_result(path, "belt_scene:KERNEL", ["method", "belt", "fall"], "stick_slip.toml")
     true = xr.apply_ufunc(last_count, float(ds.flips), 1.0, ds.belt, ds.fall)
     ds = ds.assign(off=abs(ds.time / true - 1.0))
     unslid, found = others(ds), all_costs(tell)
-    groups = {
-        "Twenty cycles": maps(ds),
-        f"Two cycles without sliding, rtol {LOOSE:g}": failures(unslid),
-        "Cost of two cycles": cheapest(found),
-    }
-    return groups, NOTES.splitlines(), lambda: figure(ds, unslid, found)
+    cycles, failures = statements(ds, unslid)
+    groups = {"Twenty cycles": cycles, f"Two cycles without sliding, rtol {LOOSE:g}": failures}
+    return groups | {"Cost of two cycles": cheapest(found)}, NOTES.splitlines(), lambda: figure(ds, unslid, found)
 
 
-main = partial(report, __file__, ["stick_slip.h5"], conclude=conclude)
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+main = script(__name__, "stick_slip.h5", conclude)

@@ -16,13 +16,12 @@ alone, to which the ride on the belt adds a time of distance over speed.
 
 from __future__ import annotations
 
-import sys
-from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, compared, direct_label, page_of, read_result, report
+from _common import Conclusion, Statement, compared, most, read_result, said, script
+from _figures import direct_label, page_of
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from scipy.special import i1
@@ -60,15 +59,15 @@ def sticking(ds: xr.Dataset) -> list[Statement]:
     ok, rests = (ds.where(ds.status == status, drop=True) for status in (Status.OK, Status.COMES_TO_REST))
     off = max(abs(float(ok.period.sel(belt=belt)) / by_hand(ds, belt) - 1.0) for belt in ok.belt.values)
     end = brentq(lambda size: float(averaged(ds, size)) - size, 0.5, 5.0)
-    steady, decay = abs(rests.place / friction(ds, rests.belt) - 1.0).max(), abs(ok.multiplier).max()
+    steady, decay = abs(rests.place / friction(ds, rests.belt) - 1.0).max(), float(abs(ok.multiplier).max())
     given = int(ok.period.notnull().sum()), rests.belt.size
     return [
-        Statement("cells that stick and slip, that rest", "all", f"{given}", None, sum(given) == ds.belt.size),
-        Statement("period beside slip by scipy and ride", "", "", off, off <= 1e-8),
-        Statement("largest multiplier, as it sticks", "0", f"{float(decay):.1e}", None, bool(decay < 1e-8)),
+        said("cells that stick and slip, that rest", sum(given) == ds.belt.size, f"{given}", "all"),
+        most("period beside slip by scipy and ride", "", off, 1e-8, ""),
+        said("largest multiplier, as it sticks", decay < 1e-8, f"{decay:.1e}", "0"),
         compared("fastest belt on which it sticks", "end of (1)", float(ok.belt.max()), end, 0.04, 4),
-        Statement("place of steady sliding", "F(belt)", "", float(steady), bool(steady < 1e-8)),
-    ]  # fmt: skip
+        most("place of steady sliding", "F(belt)", steady, 1e-8, ""),
+    ]
 
 
 def dividing(ds: xr.Dataset) -> list[Statement]:
@@ -76,12 +75,13 @@ def dividing(ds: xr.Dataset) -> list[Statement]:
     size = friction(ds, ds.belt.values) - ds.place.values
     few, off = size < 0.45, float(abs(averaged(ds, size) / ds.belt.values - 1.0).max())
     start = np.polyval(np.polyfit(size[few] ** 2, ds.belt.values[few], 2), 0.0) if few.sum() > 2 else np.nan
+    grows = float(ds.multiplier.min())
+    unstable = (ds.status == Status.UNSTABLE).all() and grows > 1.0
     return [
-        Statement("it is unstable", "all cells", f"multiplier from {float(ds.multiplier.min()):.4f}", None,
-                  bool((ds.status == Status.UNSTABLE).all() and ds.multiplier.min() > 1.0)),
+        said("it is unstable", unstable, f"multiplier from {grows:.4f}", "all cells"),
         compared("belt where its amplitude is 0", "F'(belt) = -2 zeta", float(start), begins(ds), 2e-4, 5),
-        Statement("speed of the belt beside (1), up to 5 %", "", "", off, off <= 0.05),
-    ]  # fmt: skip
+        most("speed of the belt beside (1), up to 5 %", "", off, 0.05, ""),
+    ]
 
 
 def begins(ds: xr.Dataset) -> float:
@@ -108,7 +108,7 @@ def figure(ds: xr.Dataset, unstable: xr.Dataset) -> Any:
     return page
 
 
-def conclude(path: str, other: str) -> tuple[Groups, list[str], Any]:
+def conclude(path: str, other: str) -> Conclusion:
     """Statements and the figure."""
     ds = read_result(path, "stribeck_scene:KERNEL", ["belt"], "stribeck.toml")
     unstable = read_result(other, "stribeck_scene:KERNEL", ["cell"], "stribeck_unstable.toml")
@@ -116,8 +116,4 @@ def conclude(path: str, other: str) -> tuple[Groups, list[str], Any]:
     return groups, [], lambda: figure(ds, unstable)
 
 
-main = partial(report, __file__, ["stribeck.h5", "stribeck_unstable.h5"], conclude=conclude)
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+main = script(__name__, "stribeck.h5 stribeck_unstable.h5", conclude)

@@ -9,15 +9,14 @@ against the best reference among the methods. Times are noisy and only told; wha
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, page_of, report
+from _common import Conclusion, Statement, said, script
+from _figures import page_of
 
 import sweep
 from sweep.explore.work_precision import TOLERANCES, precision_text, work_precision
@@ -54,30 +53,24 @@ def savings(found: xr.Dataset) -> xr.Dataset:
     rows = []
     for rtol in found.rtol.values:
         name = best_single(found, rtol)
-        auto, single = (found.sel({"method": m, "rtol": rtol}) for m in ("auto", name))
-        shares = float(given(auto)), float(given(single))
-        ratio = float(single.seconds / auto.seconds)
-        rows.append((name, *shares, ratio, float(auto.seconds), str(auto.methods_used.item())))
-    keys = ("single", "auto_gives", "single_gives", "saved", "seconds", "used")
-    columns = zip(*rows, strict=True)
-    return xr.Dataset({k: ("rtol", list(v)) for k, v in zip(keys, columns, strict=True)}, {"rtol": found.rtol})
+        auto, single = (found.sel({"method": m, "rtol": rtol}, drop=True) for m in ("auto", name))
+        row = {"single": name, "auto_gives": given(auto), "single_gives": given(single), "used": auto.methods_used}
+        rows.append(xr.Dataset({**row, "saved": single.seconds / auto.seconds}))
+    return xr.concat(rows, found.rtol)
 
 
 def statements(found: xr.Dataset) -> list[Statement]:
     """What is checked of one kernel, and what is told of its times."""
-    made = savings(found)
-    auto = found.sel({"method": "auto"})
+    made, auto = savings(found), found.sel({"method": "auto"})
     silent, cells = float(auto.silent.max()), found.attrs["cells"]
     over = float((auto.error_worst / (auto.rtol + found.attrs["reference_error"])).max())
+    as_many = (made.auto_gives >= made.single_gives - AS_MANY).all()
+    shares = f"{100 * float(made.auto_gives.min()):.4g} % beside {100 * float(made.single_gives.min()):.4g} %"
     lines = [
-        Statement("auto is silently wrong", "nowhere", f"{100 * silent:g} % of {cells} cells", None, silent == 0),
-        Statement("auto, worst error over rtol", "<= 1", f"{over:.2g}", None, over <= 1),
-        Statement(
-            "auto gives the cells that the best single method does", "all, or more",
-            f"{100 * float(made.auto_gives.min()):.4g} % beside {100 * float(made.single_gives.min()):.4g} %", None,
-            bool((made.auto_gives >= made.single_gives - AS_MANY).all()),
-        ),
-    ]  # fmt: skip
+        said("auto is silently wrong", silent == 0, f"{100 * silent:g} % of {cells} cells", "nowhere"),
+        said("auto, worst error over rtol", over <= 1, f"{over:.2g}", "<= 1"),
+        said("auto gives the cells that the best single method does", as_many, shares, "all, or more"),
+    ]
     for rtol in made.rtol.values:
         row = made.sel({"rtol": rtol})
         text = f"{float(row.saved):.2f} of {row.single.item()}, which gives {100 * float(row.single_gives):.4g} %"
@@ -91,11 +84,8 @@ def figure(parts: Sequence[xr.Dataset]) -> Any:
         for k, found in enumerate(parts):
             draw_row(axes, found, -k)
         axes.axvline(1.0, color="black", linewidth=0.8)
-        axes.set(
-            xscale="log",
-            xlabel=f"time over that of auto, at rtol = $10^{{{np.log10(SHOWN):.0f}}}$ [1]",
-            ylim=(-len(parts) + 0.4, 0.6),
-        )
+        axes.set(xscale="log", xlabel=f"time over that of auto, at rtol = $10^{{{np.log10(SHOWN):.0f}}}$ [1]")
+        axes.set_ylim(-len(parts) + 0.4, 0.6)
         axes.set_yticks(range(0, -len(parts), -1), labels=[found.attrs["title"] for found in parts])
         axes.set_yticks([], minor=True)
         look = {"color": "0.3", "marker": "o", "linestyle": "", "markersize": 4}
@@ -122,22 +112,13 @@ def draw_row(axes: Any, found: xr.Dataset, place: float) -> None:
             axes.plot(ratio, place, "o", color="0.3", markerfacecolor="none", markersize=10, markeredgewidth=0.7)
 
 
-def charted(path: Path, cells: int, tolerances: Sequence[float]) -> list[xr.Dataset]:
-    """Every method on the cells of each study file that stands beside the first."""
-    files = [path.with_name(f"{path.stem}{part}.toml") for part in PARTS]
-    return [work_precision(sweep.study(file), cells=cells, tolerances=tolerances) for file in files]
-
-
-def conclude(path: str, cells: int = 1024, tolerances: Sequence[float] = TOLERANCES) -> tuple[Groups, list[str], Any]:
+def conclude(path: str, cells: int = 1024, tolerances: Sequence[float] = TOLERANCES) -> Conclusion:
     """Statements, tables and the figure."""
-    parts = charted(Path(path), cells, tolerances)
+    files = [Path(path).with_name(f"{Path(path).stem}{part}.toml") for part in PARTS]
+    parts = [work_precision(sweep.study(file), cells=cells, tolerances=tolerances) for file in files]
     groups = {found.attrs["title"]: statements(found) for found in parts}
     tables = [f"{found.attrs['title']}\n{precision_text(found, complete=True)}\n" for found in parts]
     return groups, [NOTES, "", *tables], lambda: figure(parts)
 
 
-main = partial(report, __file__, ["what_auto_saves.toml"], conclude=conclude)
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+main = script(__name__, "what_auto_saves.toml", conclude)

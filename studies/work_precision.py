@@ -22,7 +22,8 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, cheapest, differing, direct_label, measured, page_of, report
+from _common import Conclusion, Statement, cheapest, differing, measured, said, script
+from _figures import direct_label, page_of
 from _peers import FOLLOWERS, swings
 
 import sweep
@@ -38,6 +39,10 @@ PEER_CELLS = {"heyoka.py": 1, "diffrax": 2, "scipy": 10}
 LONGEST = 10.0
 ORDERS = {"euler": (1, 1e-2), "semi_implicit": (1, 1e-2), "verlet": (2, 1e-2), "rk4": (4, 1e-2)}
 """Order, and by how much the exponent of the error in the step may be off, for steps from 0.01 to 0.1 s."""
+PLACES = {
+    "auto": (0.6, 1.0), "coulomb": (0.85, 9.0), "quadrature": (1.7, 9.0), "segments": (1.9, 1.0), "sdirk4": (1.9, 2.0),
+}  # fmt: skip
+"""Where the names of methods stand whose marks are close: factors of time and error. Others stand above their marks."""
 
 NOTES = """\
 error: the largest of period, amplitude and speed at the switch, relative; of fixed steps: of the third switch's time
@@ -45,29 +50,28 @@ The other libraries are given how many half swings it takes until nothing is lef
 diffrax follows all clocks side by side, each for as many half swings as the slowest"""
 
 
-def cycles(study: sweep.study.read.Study, cells: int) -> dict[str, Any] | None:
-    """True values of the outputs, by mpmath; None where it is not installed or the oracle is not at hand."""
-    oracle = _oracle("foliot_oracles")
-    if oracle is None:
-        return None
-    columns = precision_cells(study, cells)
-    fixed = {name: study.fixed[name] for name in ("mu", "phi0", "a", "R", "c", "n", "k", "e") if name in study.fixed}
-    rows = []
-    for values in zip(*columns.values(), strict=True):
-        cell = {**fixed, **dict(zip(columns, map(float, values), strict=True))}
-        rows.append([float(x) for x in oracle.cycle(**cell, digits=DIGITS)])
-    names = ("period", "amplitude", "crossing_speed", "sensitivity", "multiplier")
-    found = dict(zip(names, np.transpose(rows), strict=True))
-    return {name: found[name] for name in study.outputs}
-
-
-def _oracle(name: str) -> Any:
+def oracle(name: str) -> Any:
+    """A module of true values by mpmath; None where that is not installed or the module is not at hand."""
     folder = str(Path(__file__).parents[1] / "tests" / "oracles")
     sys.path += [] if folder in sys.path else [folder]
     try:
         return import_module(name)
     except ImportError:
         return None
+
+
+def cycles(study: sweep.study.read.Study, cells: int) -> dict[str, Any] | None:
+    """True values of the outputs; None where there is no oracle."""
+    truth, columns, rows = oracle("foliot_oracles"), precision_cells(study, cells), []
+    if truth is None:
+        return None
+    fixed = {name: study.fixed[name] for name in ("mu", "phi0", "a", "R", "c", "n", "k", "e") if name in study.fixed}
+    for values in zip(*columns.values(), strict=True):
+        cell = {**fixed, **dict(zip(columns, map(float, values), strict=True))}
+        rows.append([float(x) for x in truth.cycle(**cell, digits=DIGITS)])
+    names = ("period", "amplitude", "crossing_speed", "sensitivity", "multiplier")
+    found = dict(zip(names, np.transpose(rows), strict=True))
+    return {name: found[name] for name in study.outputs}
 
 
 def swept(study: sweep.study.read.Study, found: xr.Dataset) -> xr.Dataset:
@@ -92,33 +96,42 @@ def peers(study: sweep.study.read.Study, true: Any, cells: int, tolerances: Sequ
     """Other libraries on some of the cells, by name; none where the truth is not at hand."""
     if true is None:
         return {}
-    given = precision_cells(study, cells)
+    given, found = precision_cells(study, cells), {}
     left = solved(replace(sampled(study, cells), outputs=("multiplier",), method="auto", rtol=1e-6))[0]["multiplier"]
     rows = np.transpose([given["a"], given["R"], left, *true.values()])
-    return {name: _followed(one, rows[:: PEER_CELLS[name]], tolerances) for name, one in FOLLOWERS.items()}
+    for name, follower in FOLLOWERS.items():
+        off = partial(errors_of, cache(follower), rows[:: PEER_CELLS[name]])  # made once a tolerance, and not timed
+        found[name] = measured(off, tolerances)
+    return found
 
 
-def _followed(follower: Any, rows: Any, tolerances: Sequence[float]) -> xr.Dataset:
+def errors_of(made: Any, rows: Any, rtol: float) -> Any:
+    """The largest relative error of each clock by a follower."""
     a, R, left, *true = rows.T
-    made = cache(follower)  # made once for each tolerance, and not timed
-
-    def off(rtol: float) -> Any:
-        found = made(rtol).settle(a, R, true[2], [swings(rtol, x) for x in left])
-        return abs(found / np.transpose(true) - 1).max(axis=1)
-
-    return measured(off, tolerances)
+    found = made(rtol).settle(a, R, true[2], [swings(rtol, x) for x in left])
+    return abs(found / np.transpose(true) - 1).max(axis=1)
 
 
-def stepped(path: Path) -> xr.Dataset | None:
-    """Relative error of the third switch, median and worst clock, and calls of the rates, over method and step."""
-    oracle = _oracle("scene_oracles")
-    if oracle is None:
-        return None
+def orders(path: Path) -> list[Statement]:
+    """The exponent in the step of the error of the third switch, and what order 1 and 4 cost in calls of the rates."""
+    truth, lines = oracle("scene_oracles"), []
+    if truth is None:
+        return []
     ds = sweep.run(sweep.study(path))
     fixed = [float(ds[name]) for name in ("phi0", "a", "c")]
-    true = [float(oracle.quadratic_foliot(float(mu), *fixed, int(ds.flips))[0]) for mu in ds.mu]
+    true = [float(truth.quadratic_foliot(float(mu), *fixed, int(ds.flips))[0]) for mu in ds.mu]
     error = abs(ds.time / xr.DataArray(true, dims="mu") - 1)
-    return xr.Dataset({"median": error.median("mu"), "worst": error.max("mu"), "calls": ds.rate_calls.mean("mu")})
+    for name, (order, allowed) in ORDERS.items():
+        row = error.median("mu").sel({"method": name}).where((ds.step > 0.01) & (ds.step < 0.1), drop=True)
+        slope = float(np.polyfit(np.log(row.step), np.log(row), 1)[0])
+        what = f"{name}: exponent of the error in the step"
+        lines.append(differing(what, str(order), slope, order, allowed * order * 5))
+    for name in ("verlet", "rk4", "dopri5", "dop853"):
+        worst, calls = (x.sel({"method": name}) for x in (error.max("mu"), ds.rate_calls.mean("mu")))
+        calls = calls.where(worst <= 1e-7)
+        text = "-" if bool(calls.isnull().all()) else f"{float(calls.min()):.4g}"
+        lines.append(Statement(f"{name}: calls of the rates for 1e-7", "", text))
+    return lines
 
 
 def honesty(title: str, found: xr.Dataset) -> list[Statement]:
@@ -128,9 +141,9 @@ def honesty(title: str, found: xr.Dataset) -> list[Statement]:
     silent, unsolved = float(found.silent.max()), float(auto.unsolved.max())
     cells = f"{found.attrs['cells']} cells, {len(found.rtol)} tolerances"
     return [
-        Statement(f"{title}: silently wrong", "none", f"{100 * silent:g} % of {cells}", None, silent == 0),
-        Statement(f"{title}: auto, worst error over rtol", "<= 1", f"{over:.2g}", None, over <= 1),
-        Statement(f"{title}: auto leaves unsolved", "none", f"{100 * unsolved:g} %", None, unsolved == 0),
+        said(f"{title}: silently wrong", silent == 0, f"{100 * silent:g} % of {cells}", "none"),
+        said(f"{title}: auto, worst error over rtol", over <= 1, f"{over:.2g}", "<= 1"),
+        said(f"{title}: auto leaves unsolved", unsolved == 0, f"{100 * unsolved:g} %", "none"),
     ]
 
 
@@ -138,32 +151,6 @@ def whole(found: xr.Dataset) -> dict[str, xr.Dataset]:
     """By method, the worst error and the time of each tolerance at which it solves all cells."""
     rows = {str(name): found.sel({"method": name}) for name in found["method"].values}
     return {name: row.assign(worst=row.error_worst.where(row.unsolved + row.silent == 0)) for name, row in rows.items()}
-
-
-def orders(found: xr.Dataset) -> list[Statement]:
-    """The error's exponent in the step, and what order 1 and 4 cost."""
-    lines = []
-    for name, (order, allowed) in ORDERS.items():
-        row = found["median"].sel({"method": name}).where((found.step > 0.01) & (found.step < 0.1), drop=True)
-        slope = float(np.polyfit(np.log(row.step), np.log(row), 1)[0])
-        what = f"{name}: exponent of the error in the step"
-        lines.append(differing(what, str(order), slope, order, allowed * order * 5))
-    for name in ("verlet", "rk4", "dopri5", "dop853"):
-        row = found.sel({"method": name})
-        calls = row.calls.where(row.worst <= 1e-7)
-        text = "-" if bool(calls.isnull().all()) else f"{float(calls.min()):.4g}"
-        lines.append(Statement(f"{name}: calls of the rates for 1e-7", "", text))
-    return lines
-
-
-PLACES = {
-    "auto": (0.6, 1.0),
-    "coulomb": (0.85, 9.0),
-    "quadrature": (1.7, 9.0),
-    "segments": (1.9, 1.0),
-    "sdirk4": (1.9, 2.0),
-}
-"""Where the names of methods stand whose marks are close: factors of time and error. Others stand above their marks."""
 
 
 def figure(found: xr.Dataset, others: dict[str, xr.Dataset]) -> Any:
@@ -189,29 +176,22 @@ def figure(found: xr.Dataset, others: dict[str, xr.Dataset]) -> Any:
     return page
 
 
-def conclude(path: str, cells: int = 400, tolerances: Sequence[float] = TOLERANCES) -> tuple[Groups, list[str], Any]:
+def conclude(path: str, cells: int = 400, tolerances: Sequence[float] = TOLERANCES) -> Conclusion:
     """Statements, tables and the figure."""
     study, drag = (sweep.study(Path(path).with_name(f"work_precision{end}.toml")) for end in ("", "_drag"))
-    true = cycles(study, cells)
-    keys = {"cells": cells, "tolerances": tolerances}
-    coulomb, dragged = (
-        work_precision(one, truth=of, **keys) for one, of in ((study, true), (drag, cycles(drag, cells)))
-    )
-    fixed = stepped(Path(path).with_name("work_precision_steps.toml"))
+    true, keys = cycles(study, cells), {"cells": cells, "tolerances": tolerances}
+    coulomb = work_precision(study, truth=true, **keys)
+    dragged = work_precision(drag, truth=cycles(drag, cells), **keys)
+    steps = orders(Path(path).with_name("work_precision_steps.toml"))
     coulomb, others = swept(study, coulomb), peers(study, true, cells, tolerances)
     missing = [Statement(name, "", "not installed") for name in PEER_CELLS if name not in others]
     groups = {
         "Honesty": [*honesty("viscous and Coulomb", coulomb), *honesty("drag", dragged)],
         "Cost, viscous and Coulomb": [*cheapest(whole(coulomb) | others), *missing],
         "Cost, drag": cheapest(whole(dragged)),
-    }
-    groups |= {} if fixed is None else {"Fixed steps": orders(fixed)}
+    } | ({"Fixed steps": steps} if steps else {})
     tables = [f"{one.attrs['title']}\n{precision_text(one, complete=True)}\n" for one in (coulomb, dragged)]
     return groups, [NOTES, "", *tables], lambda: figure(coulomb, others)
 
 
-main = partial(report, __file__, ["work_precision.toml"], conclude=conclude)
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+main = script(__name__, "work_precision.toml", conclude)
