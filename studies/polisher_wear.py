@@ -144,6 +144,8 @@ def figure(ds: xr.Dataset, load: xr.Dataset) -> Any:
             dashed = load.wear.sel(w_x=place, method="nearest")
             upper[0].plot(MM * dashed.radius, UM_PER_HOUR * dashed, "--", color=colour, linewidth=0.9)
         upper[0].plot([], [], "k--", linewidth=0.9, label="(a) constant load")
+        for axes in upper:
+            axes.set_ylim(0, None)
         upper[0].set_ylabel("wear [µm/h]")
         lower[0].set_ylabel("eccentricity, $e$ [mm]")
         quality_bar(page, mesh, list(lower), "unevenness of the wear [1]", pad=0.01)
@@ -159,7 +161,7 @@ def draw_profiles(axes: Any, tool: xr.Dataset, name: str) -> None:
         line = tool.wear.sel(e=USUAL, method="nearest").sel(w_x=place, method="nearest")
         text = f"(a-c) offset {MM * float(line.w_x - tool.L):.0f} mm"
         axes.plot(MM * line.radius, UM_PER_HOUR * line, color=colour, label=text)
-    axes.set(xlabel="radius [mm]", title=f"{name}, $e=100$ mm", xlim=(0, 100), ylim=(0, None))
+    axes.set(xlabel="radius [mm]", title=f"{name}, $e=100$ mm", xlim=(0, 100))
 
 
 def draw_map(axes: Any, tool: xr.Dataset) -> Any:
