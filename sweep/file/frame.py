@@ -176,7 +176,6 @@ class _Image(io.RawIOBase):
 
 def _lay_out(image: _Image, schema: Schema, cuts: Mapping[str, Cut], aligned: int) -> None:
     """Has HDF5 write all that is no number, and then find a place for each; objects of so many bytes are aligned."""
-    import h5netcdf
     import h5py
     from h5py import h5f, h5fd, h5p
 
@@ -190,38 +189,27 @@ def _lay_out(image: _Image, schema: Schema, cuts: Mapping[str, Cut], aligned: in
     made.set_attr_phase_change(COMPACT, 0)
     made.set_attr_creation_order(h5p.CRT_ORDER_TRACKED | h5p.CRT_ORDER_INDEXED)
     made.set_link_creation_order(h5p.CRT_ORDER_TRACKED | h5p.CRT_ORDER_INDEXED)
-    dims = {c.name: c.dims for c in schema.coordinates}
-    with h5py.File(h5f.create(b"result", h5f.ACC_TRUNC, made, access)) as plain, h5netcdf.File(plain, "r+") as file:
-        # xarray's way to mark what belongs to the coordinates of all variables, and of one
-        away = [c.name for c in schema.coordinates if c.dims and not set(c.dims) & {c.name, *schema.grid.dims}]
-        _say(file, {**_attrs(schema), **({"coordinates": " ".join(away)} if away else {})})
-        file.dimensions = schema.sizes
-        for coordinate in schema.coordinates:
-            _write_coordinate(file, plain, coordinate)
-        for column in schema.columns:
-            dims[column.name] = over = (*schema.grid.dims, *column.dims)
-            beside = [c.name for c in schema.coordinates if c.dims != (c.name,) and set(c.dims) <= set(over)]
-            variable = file.create_variable(column.name, over, column.dtype, dcpl=_how(cuts["cells"].chunk(column)))
-            _say(variable, {**column.attrs, **({"coordinates": " ".join(beside)} if beside else {})})
+    with h5py.File(h5f.create(b"result", h5f.ACC_TRUNC, made, access)) as file:
+        dims = _write_variables(file, schema, cuts["cells"])
         tables: dict[str, dict[str, Any]] = {}
         for name, cut in cuts.items():
             paths = [column.name if name == "cells" else f"{name}/{column.name}" for column in cut.columns]
             blocks = (cut.blocks.size, cut.blocks.cells, cut.blocks.row)
             tables[name] = {"grid": cut.grid, "blocks": blocks, "paths": paths}
-            for column, path in zip(cut.columns, paths if name == "rows" else (), strict=False):
-                how = _how(cut.chunk(column))
-                plain.create_dataset(path, (*cut.grid, *column.shape), column.dtype, dcpl=how)
-        integrity = plain.create_group("integrity")
+            for column in cut.columns if name == "rows" else ():
+                shape = (*cut.grid, *column.shape)
+                _make(file.require_group(name), column.name, shape, column.dtype, cut.chunk(column))
+        integrity = file.create_group("integrity")
         _say(integrity, {"format": FORMAT, "contents": json.dumps({"tables": tables, "dims": dims})})
         shapes: dict[str, tuple[int, ...]] = {"key": (BYTES,), "ending": (ENDING_BYTES,)}
         shapes |= {f"{name}_digests": (cut.blocks.count, len(cut.columns), BYTES) for name, cut in cuts.items()}
         pieces = [integrity.create_dataset(name, shape, "u1") for name, shape in shapes.items()]
         # from here on nothing is made, and places alone are found, that of the key first
-        plain.flush()
+        file.flush()
         for data in pieces:
             data[...] = np.zeros(data.shape, "u1")
         for path in (path for table in tables.values() for path in table["paths"]):
-            data = plain[path]
+            data = file[path]
             if data.chunks is None:
                 data[()] = np.nan if data.dtype.kind == "f" else -1
             else:
@@ -229,33 +217,57 @@ def _lay_out(image: _Image, schema: Schema, cuts: Mapping[str, Cut], aligned: in
                 data.id.write_direct_chunk((0,) * data.ndim, bytes(image.chunk))
 
 
-def _write_coordinate(file: Any, plain: Any, coordinate: Any) -> None:
-    """Words as characters, as netCDF has them; a single number in its object header."""
+def _write_variables(file: Any, schema: Schema, cut: Cut) -> dict[str, tuple[str, ...]]:
+    """Dimensions, coordinates and columns as netCDF4 and xarray know them; gives the dimensions of each variable."""
+    coordinates, sizes = [], dict(schema.sizes)
+    for c in schema.coordinates:
+        values, over, attrs = np.asarray(c.values), c.dims, dict(c.attrs)
+        if values.dtype.kind == "U":  # as characters
+            texts = np.array([word.encode() for word in values.ravel()])
+            values = texts.view("S1").reshape(*values.shape, texts.dtype.itemsize)
+            over, attrs = (*over, f"string{texts.dtype.itemsize}"), {**attrs, "_Encoding": "utf-8"}
+            sizes[over[-1]] = texts.dtype.itemsize
+        coordinates.append((c.name, over, values, attrs))
+    numbers = {dim: np.int32(number) for number, dim in enumerate(sizes)}
+
+    def described(data: Any, over: tuple[str, ...], attrs: Mapping[str, Any], title: str) -> None:
+        """Says over which dimensions a variable is, or that it is the first of them."""
+        _say(data, attrs)
+        if over[:1] == (data.name[1:],):
+            data.make_scale(title)
+            data.attrs["_Netcdf4Dimid"] = numbers[over[0]]
+            if len(over) > 1:
+                data.attrs["_Netcdf4Coordinates"] = np.array([numbers[dim] for dim in over])
+        else:
+            for place, dim in enumerate(over):
+                data.dims[place].attach_scale(file[dim])
+
+    # xarray's way to mark what belongs to the coordinates of all variables, and of one
+    away = [c.name for c in schema.coordinates if c.dims and not set(c.dims) & {c.name, *schema.grid.dims}]
+    _say(file, {**_attrs(schema), **({"coordinates": " ".join(away)} if away else {})})
+    own = {name for name, over, *_ in coordinates if over[:1] == (name,)}
+    for dim, size in sizes.items():
+        if dim not in own:
+            title = f"This is a netCDF dimension but not a netCDF variable.{size:10}"
+            described(_make(file, dim, (size,), ">f4", ()), (dim,), {}, title)
+    for name, over, values, attrs in sorted(coordinates, key=lambda found: found[0] not in own):
+        data = _make(file, name, values.shape, values.dtype, values.shape, header=not over)
+        data[...] = values
+        described(data, over, attrs, name)
+    dims = {c.name: c.dims for c in schema.coordinates}
+    for column in schema.columns:
+        dims[column.name] = over = (*schema.grid.dims, *column.dims)
+        beside = [c.name for c in schema.coordinates if c.dims != (c.name,) and set(c.dims) <= set(over)]
+        data = _make(file, column.name, schema.shape(column), column.dtype, cut.chunk(column))
+        described(data, over, {**column.attrs, **({"coordinates": " ".join(beside)} if beside else {})}, column.name)
+    return dims
+
+
+def _make(
+    group: Any, name: str, shape: tuple[int, ...], dtype: Any, chunk: tuple[int, ...], header: bool = False
+) -> Any:
+    """A dataset, in chunks with a checksum each; (): in one piece, which may be in its object `header`."""
     import h5py
-
-    values, dims, attrs = np.asarray(coordinate.values), coordinate.dims, dict(coordinate.attrs)
-    if values.dtype.kind == "U":
-        words = np.array([word.encode() for word in values.ravel()])
-        values = words.view("S1").reshape(*values.shape, words.dtype.itemsize)
-        dims, attrs = (*dims, f"string{words.dtype.itemsize}"), {**attrs, "_Encoding": "utf-8"}
-        if dims[-1] not in file.dimensions:
-            file.dimensions[dims[-1]] = words.dtype.itemsize
-    if dims:
-        how = _how(values.shape)
-        _say(file.create_variable(coordinate.name, dims, values.dtype, data=values, dcpl=how), attrs)
-        return
-    # h5py and h5netcdf would not keep it there
-    space, kind = h5py.h5s.create(h5py.h5s.SCALAR), h5py.h5t.py_create(values.dtype)
-    single = h5py.Dataset(h5py.h5d.create(plain.id, coordinate.name.encode(), kind, space, _how(())))
-    single[()] = values
-    _say(single, attrs)
-
-
-def _how(chunk: tuple[int, ...]) -> Any:
-    """How HDF5 makes a dataset: in chunks with a checksum; (): in its object header.
-
-    An output that is a single number is in one piece: h5py gives it no properties.
-    """
     from h5py import h5d, h5p
 
     how = h5p.create(h5p.DATASET_CREATE)
@@ -265,9 +277,11 @@ def _how(chunk: tuple[int, ...]) -> Any:
         how.set_fletcher32()
         how.set_fill_time(h5d.FILL_TIME_NEVER)
         how.set_alloc_time(h5d.ALLOC_TIME_LATE)
-    else:
+    elif header:
         how.set_layout(h5d.COMPACT)
-    return how
+    space = h5py.h5s.create_simple(shape) if shape else h5py.h5s.create(h5py.h5s.SCALAR)
+    kind = h5py.h5t.py_create(np.dtype(dtype), logical=True)
+    return h5py.Dataset(h5d.create(group.id, name.encode(), kind, space, how))
 
 
 def _say(thing: Any, attrs: Mapping[str, Any]) -> None:
