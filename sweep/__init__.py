@@ -33,7 +33,7 @@ _MODULES = {
     "run": "runs.run",
     "plot": "show.figures",
     "kernels": "show.kernels",
-    "to_toml": "study.toml",
+    "to_toml": "study.read",
 }
 """Public names and the modules they live in, each imported when one of its names is first used."""
 _WITHOUT_DATASETS = {"study", "to_toml", "plan", "kernels", "solver", "StudyError", "SweepError"}

@@ -29,4 +29,4 @@ from sweep.runs.run import run as run
 from sweep.show.figures import plot as plot
 from sweep.show.kernels import kernels as kernels
 from sweep.study.read import study as study
-from sweep.study.toml import to_toml as to_toml
+from sweep.study.read import to_toml as to_toml

@@ -18,7 +18,7 @@ from sweep.cli import main
 from sweep.errors import SweepError
 from sweep.runs.run import run
 from sweep.study.read import study as as_study
-from sweep.study.toml import to_toml
+from sweep.study.read import to_toml
 
 STUDY = """# How fast does a stone fall?
 title = "Stones"

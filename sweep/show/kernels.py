@@ -13,8 +13,8 @@ import numpy as np
 from kernels import catalogue
 from kernels.interface import KINDS, Field, Kernel, Status
 from sweep.errors import SweepError
-from sweep.study.kernel_lookup import load_kernel
 from sweep.study.mistakes import limits
+from sweep.study.model import load_kernel
 from sweep.words import Table, listed, page, paragraph, quoted
 
 

@@ -1,17 +1,15 @@
 """A study: TOML (or a dict) in, a checked `Study` out, all mistakes at once. The only room that imports pint.
 
 Others may use
-    `read`           study: of a file, of keys, or of a result
-    `model`          Study, Axis, Summary
-    `kernel_lookup`  load_kernel: a kernel by the name that a study gives it
-    `keys`           KEYS: what may stand at the top of a study
-    `mistakes`       Mistakes, gathered and raised together; limits: what a field allows, in words
-    `units`          scale, exponents
-    `toml`           to_toml: a study as the text of its file
-    `condition`      Condition, cells_where, names_in: read by Python's grammar, never run by it
-    `designs`        a sampled design's axes for SALib
+    `read`       study: of a file, of keys, or of a result; to_toml: a study as the text of its file
+    `model`      Study, Axis, Summary; load_kernel: a kernel by the name that a study gives it
+    `keys`       KEYS: what may stand at the top of a study
+    `mistakes`   Mistakes, gathered and raised together; limits: what a field allows, in words
+    `units`      scale, exponents
+    `condition`  Condition, cells_where, names_in: read by Python's grammar, never run by it
+    `designs`    a sampled design's axes for SALib
 
-`values` (what stands under a key) and `summary` are behind `read`.
+`values`, what stands under a key, is behind `read`.
 The room itself may be called: `sweep.study(...)` is `sweep.study.read.study`.
 """
 

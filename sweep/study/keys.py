@@ -11,21 +11,20 @@ from typing import Any
 import numpy as np
 
 from kernels import catalogue
-from kernels.interface import Kernel
+from kernels.interface import Field, Kernel
 from sweep.errors import StudyError
 from sweep.study.condition import cells_where
 from sweep.study.designs import field_of, read_designs
-from sweep.study.kernel_lookup import load_kernel
 from sweep.study.mistakes import Entry, Mistakes, check_limits, exact_float, one_of, text
-from sweep.study.model import SETTINGS, Axis, Block, Study, differs, frozen, setting
-from sweep.study.summary import read_summary
+from sweep.study.model import SETTINGS, Axis, Block, Study, Summary, differs, frozen, load_kernel, setting
 from sweep.study.values import Floats, axis, quantity
-from sweep.words import listed, nearest
+from sweep.words import did_you_mean, listed, nearest
 
 KEYS = (
     "title", "question", "kernel", "method", "rtol", "outputs", "design", "axes", "blocks", "where", "fixed", "along",
     "summary",
 )  # fmt: skip
+REDUCTIONS = ("min", "max", "mean", "argmin", "argmax", "histogram")
 
 Fixed = dict[str, float | Floats]
 
@@ -50,7 +49,7 @@ def read_keys(said: Mapping[str, Any], source_text: str, source: str, folder: Pa
     summary = None
     if "summary" in keys:
         together = [block.axes for block in blocks or [Block(design, tuple(axes))] if block.design != "product"]
-        summary = read_summary(keys, axes, together, [o for o in kernel.outputs if o.name in outputs])
+        summary = _summary(keys, axes, together, [o for o in kernel.outputs if o.name in outputs])
         # those that are reduced come last
         axes = dict(sorted(axes.items(), key=lambda item: item[0] in summary.over))
     if where.strip():
@@ -199,3 +198,82 @@ def _check_methods(
         cure = f"use {listed(['auto', *able])}{too}" if able else cure
         for word in (word for word in words if wanting.get(word)):
             mistakes.add(where, f"{word} {verb} {listed(wanting[word], word='and')}; {cure}")
+
+
+def _summary(
+    keys: Entry, axes: Mapping[str, Axis], together: Sequence[Sequence[str]], asked: Sequence[Field]
+) -> Summary:
+    """What is kept instead of every cell, of the output fields asked for; `together` are axes that run together.
+
+    [summary]
+    over = ["mu"]                                             # axes to reduce; default: all
+    outputs.period = ["min", "mean", "argmin", "histogram"]   # default: all that need no edges, of every output
+
+    [summary.edges.period]                                    # of the histogram's bins, written like an axis
+    spacing = "log"
+    start = 1e-3
+    stop = 1e3
+    num = 61
+    """
+    table = keys.table("summary", 'summary.over = ["mu"]').keys("over", "outputs", "edges")
+    over = tuple(axes)
+    if axes and table["over"].value is not None:
+        example = 'a list of axes, e.g. ["mu"]; leave it out to reduce all'
+        named = table["over"].words([*axes, *keys.mistakes.meant], example)
+        over = tuple(name for name in axes if name in named)
+        for block in (block for block in together if len({name in named for name in block}) > 1):
+            cure = f"{listed(block, word='and')} run together and are reduced together; name all of them, or none"
+            table["over"].wrong(cure)
+    fields = {field.name: field for field in asked}
+    outputs: dict[str, tuple[str, ...]] = dict.fromkeys(fields, REDUCTIONS[:-1])
+    given = table.table("outputs", 'outputs.period = ["min", "max"]')
+    for name in given.value:
+        if asked and name not in fields:
+            there = f"; there are {listed(fields, word='and')}"
+            given[name].unknown(name, fields, "is none of the outputs asked for", there)
+        words = given[name].words(REDUCTIONS, 'a list of reductions, e.g. ["min", "max"]')
+        if name in fields:
+            outputs[name] = tuple(r for r in REDUCTIONS if r in words)
+    edges = _edges(table, outputs, fields)
+    # reductions of one output may be called as another output, or as an axis
+    called = [name for output, reductions in outputs.items() for name in names(output, reductions, over)]
+    if twice := sorted({name for name in called if called.count(name) > 1} | (set(called) & set(axes))):
+        table["outputs"].wrong(f"two variables would be called {listed(twice)}; ask for one of them")
+    return Summary(over, outputs, edges)
+
+
+def _edges(table: Entry, outputs: Mapping[str, Sequence[str]], fields: Mapping[str, Field]) -> dict[str, Floats]:
+    """Bounds of the bins of every histogram."""
+    given, edges = table.table("edges", "[summary.edges.period] with num = 61"), dict[str, Floats]()
+    if not table.mistakes.good("outputs", "summary.outputs", "summary.edges"):
+        return {}
+    wanted = [name for name, reductions in outputs.items() if "histogram" in reductions]
+    for name in given.value:
+        if name in wanted:
+            # numbers also where the output is an array
+            edges[name] = values = axis(given[name], Field(name, fields[name].unit, "")).values
+            if len(values) == 1:
+                given[name].wrong("expected at least 2 edges, found 1")
+            elif len(values) and not (np.isfinite(values).all() and (np.diff(values) > 0).all()):
+                given[name].wrong("expected finite edges, each larger than the one before")
+        else:
+            cure = f'; ask for it: outputs.{name} = ["histogram"]' if name in outputs else did_you_mean(name, wanted)
+            given[name].wrong(f"there is no histogram of {name}{cure}")
+            wanted = [meant for meant in wanted if meant != nearest(name, wanted)]
+    for name in (name for name in wanted if name not in given.value):
+        entry = '{ spacing = "log", start = 1e-3, stop = 1e3, num = 61 }'
+        given[name].wrong(f"missing; its histogram needs them, e.g. {entry}")
+    return edges
+
+
+def names(output: str, reductions: Sequence[str], over: Sequence[str]) -> list[str]:
+    """What the reductions of an output are called in the result."""
+    found = [f"{output}_count"]
+    for reduction in reductions:
+        parts = [reduction]
+        if reduction in ("argmin", "argmax"):
+            parts = [f"{reduction}_{name}" for name in (*over, "status")]
+        elif reduction == "histogram":
+            parts = ["histogram", "below", "above"]
+        found += [f"{output}_{part}" for part in parts]
+    return found

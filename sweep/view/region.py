@@ -23,7 +23,7 @@ from sweep.results.export import export
 from sweep.results.statuses import flag_words
 from sweep.show.view import ANCILLARY, View, coordinate, is_number_axis, lines_of, view
 from sweep.study.model import SETTINGS, Axis, Study
-from sweep.study.toml import to_toml
+from sweep.study.read import to_toml
 
 PLACE = "place along "
 """Coordinates of a slice that say where its cells are in the result."""

@@ -14,7 +14,7 @@ from sweep.cli import main
 from sweep.results.statuses import (
     account,
 )
-from sweep.study.toml import to_toml
+from sweep.study.read import to_toml
 
 
 def cells(*status):

@@ -16,7 +16,7 @@ from sweep.file import disk
 from sweep.file.open import open_result
 from sweep.file.store import Store, unfinished_of
 from sweep.file.verify import verify
-from sweep.study.toml import to_toml
+from sweep.study.read import to_toml
 
 MEGABYTES = 4
 

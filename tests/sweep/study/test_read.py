@@ -14,7 +14,7 @@ import sweep
 from kernels import catalogue
 from kernels.interface import FIRST_REFUSAL, Field
 from sweep.study.designs import GENERATORS
-from sweep.study.kernel_lookup import load_kernel
+from sweep.study.model import load_kernel
 
 MASS = [0.1, 0.2, 0.7]
 
