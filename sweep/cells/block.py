@@ -15,13 +15,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kernels.interface import Status
-from sweep.cells.compiling import compiling_told, work_clock
 from sweep.cells.grid import Cells, Grid, SolveCells, empty_cells
 from sweep.cells.partition import Partition, boxes, row_blocks
 from sweep.cells.reduce import Reducer, part_columns, seconds_a_cell
 from sweep.cells.schema import cells_of, columns
 from sweep.cells.solve import NONE, Solver
-from sweep.cells.timing import LANES, Sample, partition, take_sample, tolerated
+from sweep.cells.timing import LANES, Sample, compiling_told, partition, take_sample, tolerated, work_clock
 from sweep.errors import SweepError
 
 if TYPE_CHECKING:

@@ -81,13 +81,13 @@ class Grid(Box):
         study, settings = self.study, [name for name in SETTINGS if name in self.study.axes]
         if not study.where:
             return np.ones(len(cells), bool)
-        holds: NDArray[np.bool_] = cells_where(study.where, study.kernel, settings, lambda name: self._of(name, cells))
-        return holds
 
-    def _of(self, name: str, cells: NDArray[np.int64]) -> Floats:
-        """A parameter's or setting's numbers in some flat cells."""
-        source = self.study.follows.get(name, name)
-        return self.values(source, cells) if source in self.study.axes else np.full(len(cells), self.study.fixed[name])
+        def numbers(name: str) -> Floats:
+            source = study.follows.get(name, name)
+            return self.values(source, cells) if source in study.axes else np.full(len(cells), study.fixed[name])
+
+        holds: NDArray[np.bool_] = cells_where(study.where, study.kernel, settings, numbers)
+        return holds
 
     def settings(self, start: int, stop: int) -> tuple[int | NDArray[np.int8], float | Floats]:
         """Method number (-1: auto) and rtol of the cells: one for all, or where it is an axis one per cell."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -28,15 +28,6 @@ MOST_TRIED = 4096
 """Lengths of a box that are looked at."""
 UNNOTICED = 1.01
 """Share of idle lanes below which fewer are not worth a smaller box."""
-
-
-class Strip(NamedTuple):
-    """Rows from `row` on, of `cells` cells each, from cell number `cell` on."""
-
-    row: int
-    rows: int
-    cell: int
-    cells: int
 
 
 @dataclass(frozen=True)
@@ -73,23 +64,24 @@ class Partition:
         """Flat range of a block, or of the blocks from `start` to `stop`."""
         return self.first(start), self.first(start + 1 if stop is None else stop)
 
-    def strips(self, start: int, stop: int, capacity: int) -> Iterator[Strip]:
+    def strips(self, start: int, stop: int, capacity: int) -> Iterator[tuple[int, int, int, int]]:
         """Cut the blocks `start` to `stop`, which are rows, into strips of at most `capacity` cells, or one row.
 
-        A row longer than that comes in several strips, cut at the same places always.
+        Yields its first row, its rows, its first cell and the cells of each row. A row that is longer comes in several
+        strips, cut at the same places always.
         """
         place = start
         while place < stop:
             cell, end = self.bounds(place)
             if end - cell > capacity:
                 for first in range(cell, end, capacity):
-                    yield Strip(place, 1, first, min(capacity, end - first))
+                    yield place, 1, first, min(capacity, end - first)
                 place += 1
                 continue
             # as many as are of equal length and follow each other
             whole = (self.row or self.size) // self.cells - place % self.per_row
             rows = min(stop - place, capacity // (end - cell), max(1, whole if self.per_row > 1 else self.count))
-            yield Strip(place, rows, cell, end - cell)
+            yield place, rows, cell, end - cell
             place += rows
 
 

@@ -48,15 +48,17 @@ _OF_METHOD = np.roll(np.arange(256), -1)
 """Where each int8 code, taken as an uint8, is counted: among `STATUSES`; among the methods, none before them."""
 
 
-def row_columns(study: Study) -> tuple[Column, ...]:
-    """The columns of a part of a study with a summary, which are those of one cell, reduced."""
+def part_columns(study: Study) -> tuple[Column, ...]:
+    """The columns of a part; of a study with a summary they are those of one cell, reduced."""
+    if study.summary is None:
+        return schema.columns(study)
     found = reduced(study, 0, 1, _zeros(study, 1))
     return tuple(Column(name, c.dtype.str[1:], (), c.shape[1:], {}) for name, c in found.items())
 
 
 def nothing(study: Study, rows: int) -> Rows:
     """Rows of no cell at all."""
-    found = {column.name: column.empty(rows) for column in row_columns(study)}
+    found = {column.name: column.empty(rows) for column in part_columns(study)}
     _clear(found)
     return found
 
@@ -101,11 +103,11 @@ class Reducer:
     def solve(self, start: int, stop: int, rows: Mapping[str, Any]) -> None:
         """Fill `rows` with the rows `start` to `stop`."""
         _clear(rows)
-        for strip in self.row_blocks.strips(start, stop, self.strip):
-            cells = self._cells.rows(slice(strip.rows * strip.cells))
-            self.solver.solve(strip.cell, cells)
-            place = slice(strip.row - start, strip.row - start + strip.rows)
-            found = reduced(self.study, strip.cell, strip.rows, cells)
+        for row, count, cell, each in self.row_blocks.strips(start, stop, self.strip):
+            cells = self._cells.rows(slice(count * each))
+            self.solver.solve(cell, cells)
+            place = slice(row - start, row - start + count)
+            found = reduced(self.study, cell, count, cells)
             merge({name: column[place] for name, column in rows.items()}, found)
 
 
@@ -229,11 +231,6 @@ def _zeros(study: Study, cells: int) -> Cells:
     for column in (*found.outputs.values(), found.status, found.used):
         column.fill(0)
     return found
-
-
-def part_columns(study: Study) -> tuple[Column, ...]:
-    """The columns of a part."""
-    return schema.columns(study) if study.summary is None else row_columns(study)
 
 
 def output_schema(study: Study, fingerprint: Mapping[str, str]) -> Schema:

@@ -247,7 +247,12 @@ class Solver:
         self.status[_rows(cells)] = NO_METHOD
         missed: list[tuple[int, Places, Floats]] = []
         for turn in self._turns:
-            able = self._fitting(turn, cells)
+            able = cells  # that the method can do, and to which the turn comes
+            for term in turn.absent:
+                if len(able):
+                    able = _where(able, term.holds(self.inputs)[able])
+            if turn.sooner is not None and len(able):
+                able = _where(able, turn.sooner(*self._inputs_of(able)) == turn.early)
             bound = self._bound(turn.number, able) if len(able) else None
             if bound is not None:
                 meets = bound <= self._inputs_of(able)[-1]
@@ -271,15 +276,6 @@ class Solver:
                 hits = (turns_of_cells == k) & (bounds[k] < known)
                 if hits.any():
                     self._better(missed[k][0], cells[hits], bounds[k, hits])
-
-    def _fitting(self, turn: Turn, cells: Places) -> Places:
-        """Cells whose terms the method of a turn can do, and to which the turn comes."""
-        for term in turn.absent:
-            if len(cells):
-                cells = _where(cells, term.holds(self.inputs)[cells])
-        if turn.sooner is not None and len(cells):
-            cells = _where(cells, turn.sooner(*self._inputs_of(cells)) == turn.early)
-        return cells
 
     def _better(self, number: int, cells: Places, bound: Floats | None) -> None:
         """Run a method, but keep what an earlier one gave to cells where this one is not better.

@@ -1,12 +1,19 @@
-"""A timed sample spread over the grid, and blocks of a size that follows from it."""
+"""A timed sample spread over the grid, and blocks of a size that follows from it.
+
+A function of columns is compiled when it is called first, which takes seconds: it is told while it lasts, and does not
+count. How long numba compiles, numba itself tells.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import math
+import sys
+import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -39,8 +46,8 @@ LEAST_BLOCKS = 8
 BLOCK_BYTES, MOST_BLOCKS = 8 << 20, 100_000
 GOLDEN = 0.6180339887498949
 """Multiples of it, modulo 1, fill an interval evenly and fall into step with the length of no axis."""
-
-Clock = Callable[[], float]
+SILENT_SECONDS = 1.0
+"""What is compiled in less time is not told."""
 
 
 @dataclass(frozen=True)
@@ -74,13 +81,12 @@ UNSAMPLED = Sample(np.zeros(1), np.ones(1), 1)
 """Stands in where no cell is left to compute: every block weighs its cells."""
 
 
-def take_sample(solver: SolveCells, columns: Sequence[Column], size: int, clock: Clock | None = None) -> Sample:
+def take_sample(solver: SolveCells, columns: Sequence[Column], size: int, clock: Callable[[], float]) -> Sample:
     """Times a few cells at up to 64 places of the grid, in a few hundredths of a second or a hundredth of the run.
 
     A probe has few enough cells for 64 of them in the budget, and enough to see past the cost of a call. Probes that
     fail are left out. Raises what the kernel does where all fail.
     """
-    clock = clock or time.perf_counter
     made: dict[int, dict[int, float]] = {}
     faults: list[Exception] = []
 
@@ -163,3 +169,71 @@ def tolerated() -> Iterator[list[Exception]]:
         raise
     except Exception as fault:
         faults.append(fault)
+
+
+class WorkClock:
+    """Seconds of this process in which numba neither compiled, nor loaded what it has compiled before, in any thread.
+
+    Attributes
+    ----------
+    flag : number with a `value`
+        How many compilations, one for another, are going on; others may look at it.
+    compiled : float
+        Seconds that were spent on those.
+    """
+
+    def __init__(self) -> None:
+        self.flag: Any = SimpleNamespace(value=0)
+        self.compiled, self._begun, self._watched = 0.0, 0.0, False
+        self._lock = threading.Lock()
+
+    def __call__(self) -> float:
+        self.watch()
+        with self._lock:
+            now = self._begun if self.flag.value else time.perf_counter()
+            return now - self.compiled
+
+    def watch(self) -> None:
+        """From now on, if numba is loaded."""
+        event: Any = sys.modules.get("numba.core.event")
+        if event is not None and not self._watched:
+            actions = {"on_start": self._start, "on_end": self._end}
+            listener = type("Listener", (event.Listener,), {name: staticmethod(f) for name, f in actions.items()})
+            event.register("numba:compiler_lock", listener())
+            self._watched = True
+
+    def _start(self, event: Any) -> None:
+        with self._lock:
+            self._begun = self._begun if self.flag.value else time.perf_counter()
+            self.flag.value += 1
+
+    def _end(self, event: Any) -> None:
+        with self._lock:
+            if not self.flag.value:
+                return  # it began before it was watched
+            self.flag.value -= 1
+            if not self.flag.value:
+                self.compiled += time.perf_counter() - self._begun
+
+
+work_clock = WorkClock()
+"""That of this process."""
+
+
+@contextlib.contextmanager
+def compiling_told(name: str, note: Callable[[str], None]) -> Iterator[None]:
+    """Notes that a kernel is compiled, once, where that takes long."""
+    work_clock.watch()
+    done = threading.Event()
+
+    def tell() -> None:
+        while not done.wait(SILENT_SECONDS):
+            if work_clock.flag.value:
+                note(f"compiling {name} ...")
+                return
+
+    threading.Thread(target=tell, daemon=True).start()
+    try:
+        yield
+    finally:
+        done.set()

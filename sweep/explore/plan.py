@@ -16,13 +16,12 @@ import numpy as np
 
 from kernels.interface import Status, machine_code_folder
 from sweep.cells.block import Blocks, Guard, cut, faults_reported, sampled_study
-from sweep.cells.compiling import SILENT_SECONDS, work_clock
 from sweep.cells.fingerprint import fingerprint
 from sweep.cells.grid import Grid, SolveCells, empty_cells
 from sweep.cells.reduce import output_schema, strip_bytes
 from sweep.cells.sample import require_asked
 from sweep.cells.solve import Solver
-from sweep.cells.timing import Sample, tolerated
+from sweep.cells.timing import SILENT_SECONDS, Sample, tolerated, work_clock
 from sweep.errors import SweepError
 from sweep.explore.scaling import scaling
 from sweep.file.frame import cuts_of, expected_size

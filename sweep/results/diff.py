@@ -138,16 +138,21 @@ def diff(a: xr.Dataset, b: xr.Dataset | None = None, rtol: float = 0.0) -> Diffe
     for x, y in zip(*(pieces(d[compared], cells) for d in (first, second)), strict=True):
         for name, distance in found.outputs.items():
             one = x[name].transpose(*cells, ...)
-            apart = _relative(one.values, y[name].transpose(*one.dims).values)
+            here, there = one.values, y[name].transpose(*one.dims).values
+            # 0 of equal values and of two NaN, infinite where one alone is NaN
+            with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
+                apart = np.abs(here - there) / np.maximum(np.abs(here), np.abs(there))
+            apart[(here == there) | (np.isnan(here) & np.isnan(there))] = 0.0
+            apart[np.isnan(apart)] = np.inf
             apart = apart.max(axis=tuple(range(len(cells), one.ndim)), initial=0.0)
             distance.cells += int((apart > rtol).sum())
             if apart.size and apart.max() > distance.largest:
                 distance.largest, distance.example = float(apart.max()), _example(x, int(apart.argmax()))
         codes = np.stack([x[STATUS].values.ravel(), y[STATUS].transpose(*cells).values.ravel()])
         pairs, places, counts = np.unique(codes, axis=1, return_index=True, return_counts=True)
-        for here, there, place, count in zip(*pairs.tolist(), places.tolist(), counts.tolist(), strict=True):
-            if here != there:
-                pair = words[0].get(here, str(here)), words[1].get(there, str(there))
+        for old, new, place, count in zip(*pairs.tolist(), places.tolist(), counts.tolist(), strict=True):
+            if old != new:
+                pair = words[0].get(old, str(old)), words[1].get(new, str(new))
                 found.statuses[pair] = found.statuses.get(pair, 0) + count
                 found.examples.setdefault(pair, _example(x, place))
     return found
@@ -166,12 +171,3 @@ def two_results(name: str, a: Any, b: Any) -> tuple[xr.Dataset, xr.Dataset]:
         f"sweep.{name}: expected two Datasets, found {found or 'none'}; "
         f'write sweep.{name}(first, second), and open a file first, e.g. first = sweep.open_result("first.h5")'
     )
-
-
-def _relative(x: Any, y: Any) -> Any:
-    """Relative distances; 0 of equal values and of two NaN, infinite where one alone is NaN."""
-    with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-        found = np.abs(x - y) / np.maximum(np.abs(x), np.abs(y))
-    found[(x == y) | (np.isnan(x) & np.isnan(y))] = 0.0
-    found[np.isnan(found)] = np.inf
-    return found

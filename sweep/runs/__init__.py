@@ -7,6 +7,6 @@ Others may use
     `progress`  Progress: how far it is, and how long it will take
     `log`       log, log_path, logging_to, read_lines: the log beside a result
 
-`loop` takes what was asked for, times a sample, cuts the grid, and has blocks computed on a `bench`: by threads here,
-or by the workers of a `cluster`. `to_file` continues and keeps what is computed; `extend` reuses cells.
+`loop` takes what was asked for, times a sample, cuts the grid, and has blocks computed, each on a bench: by threads
+here, or by the workers of a `cluster`. `to_file` continues and keeps what is computed; `extend` reuses cells.
 """

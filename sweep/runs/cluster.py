@@ -33,9 +33,9 @@ from sweep.cells.solve import Solver
 from sweep.errors import Incomplete, SweepError
 from sweep.file import disk
 from sweep.file.reading import again
-from sweep.runs.bench import Bench, Done, Found
 from sweep.runs.isolate import Processes
 from sweep.runs.log import log
+from sweep.runs.loop import Bench, Done, Found
 from sweep.study.model import Study
 
 CONNECT_SECONDS = 10

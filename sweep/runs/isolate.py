@@ -22,11 +22,10 @@ from types import ModuleType
 from typing import Any
 
 from sweep.cells.block import Unsolved, sampled_by, told
-from sweep.cells.compiling import work_clock
 from sweep.cells.grid import Cells, Grid
 from sweep.cells.schema import cells_of, columns
 from sweep.cells.solve import Solver
-from sweep.cells.timing import Sample
+from sweep.cells.timing import Sample, work_clock
 from sweep.errors import SweepError
 from sweep.file.open import memory
 from sweep.study.model import Study

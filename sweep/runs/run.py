@@ -107,12 +107,19 @@ def run(
             hint = did_you_mean(key, [*options, *KEYS]) or f"; a study has {listed(KEYS, word='and')}"
             raise SweepError(f"sweep.run: no such keyword {key}{hint}")
     task = Task(as_study(study, **keys), path, **options)
-    if path is None:
-        return _run_in_memory(task)
-    ending = run_to_file(task)
-    if ending == "not begun":
-        raise SweepError("until: the time was up before the first cell could be computed")
-    return open_unfinished(task.output) if ending == "unfinished" else open_result(task.output)
+    if path is not None:
+        ending = run_to_file(task)
+        if ending == "not begun":
+            raise SweepError("until: the time was up before the first cell could be computed")
+        return open_unfinished(task.output) if ending == "unfinished" else open_result(task.output)
+    with contextlib.ExitStack() as stack:
+        loop = Loop(task, stack)
+        sink, jobs = _Memory(loop.blocks), range(loop.blocks.count)
+        loop.begin(jobs)
+        loop.compute(jobs, sink)
+        loop.progress.end()
+    found = sink.arrays if task.study.summary is None else gathered(task.study, sink.arrays)
+    return in_memory(task.said({"start": loop.began, **loop.endings()}), found)
 
 
 def complete(study: Study, path: str | os.PathLike[str], **options: Any) -> Ending:
@@ -160,14 +167,3 @@ class _Memory:
         for name, place in self.room(job).items():
             if not np.may_share_memory(place, arrays[name]):
                 place[...] = arrays[name]
-
-
-def _run_in_memory(task: Task) -> xr.Dataset:
-    with contextlib.ExitStack() as stack:
-        loop = Loop(task, stack)
-        sink, jobs = _Memory(loop.blocks), range(loop.blocks.count)
-        loop.begin(jobs)
-        loop.compute(jobs, sink)
-        loop.progress.end()
-    found = sink.arrays if task.study.summary is None else gathered(task.study, sink.arrays)
-    return in_memory(task.said({"start": loop.began, **loop.endings()}), found)
