@@ -76,6 +76,12 @@ COMMANDS = {
 
 def parser() -> argparse.ArgumentParser:
     """All commands and their options."""
+    from importlib import metadata
+
+    try:
+        version = metadata.version("foliot")
+    except metadata.PackageNotFoundError:
+        version = "(not installed)"
     codes = "\n".join(f"  {code:3}  {text}" for code, text in EXIT_CODES.items())
     top = argparse.ArgumentParser(
         prog="sweep",
@@ -83,7 +89,7 @@ def parser() -> argparse.ArgumentParser:
         epilog=f"exit status:\n{codes}",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    top.add_argument("--version", action="version", version=_version())
+    top.add_argument("--version", action="version", version=f"foliot {version}")
     commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
     for name, one in COMMANDS.items():
         text = one.function.__doc__ or ""
@@ -93,12 +99,3 @@ def parser() -> argparse.ArgumentParser:
         for names, keys, *_ in one.options:
             made.add_argument(*names, **keys)
     return top
-
-
-def _version() -> str:
-    from importlib import metadata
-
-    try:
-        return f"foliot {metadata.version('foliot')}"
-    except metadata.PackageNotFoundError:
-        return "foliot (not installed)"

@@ -8,6 +8,6 @@ Others may use
     `schema`       what a result of cells holds, as CF names it
     `solve`        Solver: one cell, by the method asked for or by the cheapest; which methods may solve a study
     `reduce`       what any result holds, of cells or a summary; Reducer: cells to rows, rows to one
-    `block`        a study cut into blocks, and how one of them is computed; Guard: a bad cell costs one cell
+    `block`        a study cut into blocks; Bench: where one of them is computed; Guard: a bad cell costs one cell
     `fingerprint`  what decides the numbers, and in what two of them differ
 """

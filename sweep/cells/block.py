@@ -8,9 +8,10 @@ from __future__ import annotations
 import contextlib
 import math
 import threading
-from collections.abc import Callable, Iterator, Mapping
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -181,6 +182,51 @@ class Guard:
         cells.status.fill(Status.FAILED)
         cells.used.fill(NONE)
         self._report(BadCell(start, self.grid.cell(start), reason))
+
+
+Found = bytes | Mapping[str, Any] | None
+"""A block that is not in the sink of the run yet: digests of what a worker has written to the file, or its numbers."""
+
+
+class Sink(Protocol):
+    """Where blocks go: `room` gives the columns to fill, `put` takes a block and gives what is still to be put."""
+
+    def room(self, job: int) -> Mapping[str, Any]: ...
+    def put(self, job: int, arrays: Any) -> Found: ...
+
+
+@dataclass(frozen=True)
+class Done:
+    """A block that is computed, the seconds it took, its cells that FAILED, and what is still to be put."""
+
+    block: int
+    seconds: float
+    bad: Sequence[BadCell] = ()
+    found: Found = None
+
+
+class Bench:
+    """Computes blocks into a sink, in any thread; each makes a solver of its own, by default one of this process."""
+
+    def __init__(
+        self, study: Study, blocks: Blocks, sink: Sink, solver: Callable[[], SolveCells] | None = None
+    ) -> None:
+        self._study, self._blocks, self._sink, self._solver = study, blocks, sink, solver or (lambda: Solver(study))
+        self._here = threading.local()
+
+    def block(self, job: int, wanted: Any = None) -> Done:
+        """Computes a block; of its cells only those wanted, by default all. Raises SweepError."""
+        here, (start, stop) = self._here, self._blocks.bounds(job)
+        with faults_reported(f"{self._blocks.label(job)} cannot be computed or kept"):
+            if not hasattr(here, "solve"):
+                here.bad = []
+                here.solve = block_solver(self._study, Guard(self._solver(), here.bad.append))
+            here.bad.clear()
+            begun = time.perf_counter()
+            arrays = self._sink.room(job)
+            here.solve(start, stop, arrays, wanted)
+            found = self._sink.put(job, arrays)
+            return Done(job, time.perf_counter() - begun, [*here.bad], found)
 
 
 def told(fault: BaseException) -> str:

@@ -30,11 +30,11 @@ def sampled(study: Study, cells: int) -> Study:
     Cells that the study does not ask for are left out, unless it asks for none.
     """
     grid = Grid(study)
-    chosen = _spread(grid.size, cells)
+    chosen = spread(grid.size, cells)
     if study.where:
-        many = _spread(grid.size, MOST_TRIED)
+        many = spread(grid.size, MOST_TRIED)
         if len(asked := many[grid.asked(many)]):
-            chosen = asked[_spread(len(asked), cells)]
+            chosen = asked[spread(len(asked), cells)]
     return _picked(grid, chosen if set(study.axes).difference(SETTINGS) else chosen[:1])
 
 
@@ -46,7 +46,7 @@ def drawn(study: Study, cells: int, rng: np.random.Generator) -> Study:
     return _picked(grid, np.resize(asked if len(asked) else row, cells))
 
 
-def _spread(size: int, count: int) -> Any:
+def spread(size: int, count: int) -> Any:
     """At most so many places of so many, spread evenly."""
     return np.unique(np.linspace(0, size - 1, min(count, size)).astype(np.int64))
 

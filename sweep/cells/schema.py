@@ -67,11 +67,6 @@ class Schema:
     attrs: Mapping[str, Any]
 
     @property
-    def cell_bytes(self) -> int:
-        """Bytes of one cell over all columns."""
-        return sum(column.cell_bytes for column in self.columns)
-
-    @property
     def sizes(self) -> dict[str, int]:
         """Length of every dimension, those of the grid first."""
         own = {d: n for column in self.columns for d, n in zip(column.dims, column.shape, strict=True)}

@@ -8,7 +8,6 @@ import numpy as np
 import xarray as xr
 
 from sweep.cells.schema import STATUS
-from sweep.errors import SweepError
 from sweep.results.statuses import flag_words
 from sweep.study.condition import Condition
 from sweep.words import did_you_mean, listed, require_dataset
@@ -39,13 +38,10 @@ def where(dataset: xr.Dataset, condition: str) -> xr.Dataset:
     """
     require_dataset("where", dataset)
 
-    def refused(what: str) -> SweepError:
-        return SweepError(f"--where {condition}: {what}")
-
     def variable(name: str) -> xr.DataArray:
         """A variable with flags as words."""
         if name not in dataset.variables:
-            raise refused(f"the result has no {name}{did_you_mean(name, map(str, dataset.variables))}")
+            raise chosen.refusal(f"the result has no {name}{did_you_mean(name, map(str, dataset.variables))}")
         found = dataset[name].compute()
         words = flag_words(found)
         if not words:
@@ -57,12 +53,13 @@ def where(dataset: xr.Dataset, condition: str) -> xr.Dataset:
     def words(name: str) -> Iterable[str]:
         return flag_words(dataset[name]).values() or sorted(set(map(str, np.unique(dataset[name].values))))
 
+    chosen = Condition(condition, variable, words, "--where ")
     if STATUS not in dataset:
-        raise refused("a summary keeps no cells to choose from")
-    truth = Condition(condition, variable, words, "--where ").truth()
+        raise chosen.refusal("a summary keeps no cells to choose from")
+    truth = chosen.truth()
     dims = [str(dim) for dim in dataset[STATUS].dims]
     if others := sorted({str(dim) for dim in truth.dims} - set(dims)):
-        raise refused(f"runs along {listed(others)}, not the cells")
+        raise chosen.refusal(f"runs along {listed(others)}, not the cells")
     flat = dataset if dims == ["cell"] else dataset.stack(cell=dims, create_index=False)
     mask = truth.broadcast_like(dataset[STATUS]).transpose(*dims).values.ravel()
     return flat.transpose("cell", ...).isel(cell=np.flatnonzero(mask))

@@ -27,7 +27,7 @@ from typing import Any
 
 import distributed
 
-from sweep.cells.block import Blocks, faults_reported, warm
+from sweep.cells.block import Bench, Blocks, Done, Found, faults_reported, warm
 from sweep.cells.fingerprint import difference, fingerprint
 from sweep.cells.solve import Solver
 from sweep.errors import Incomplete, SweepError
@@ -35,7 +35,6 @@ from sweep.file import disk
 from sweep.file.reading import again
 from sweep.runs.isolate import Processes
 from sweep.runs.log import log
-from sweep.runs.loop import Bench, Done, Found
 from sweep.study.model import Study
 
 CONNECT_SECONDS = 10
@@ -205,7 +204,7 @@ class Remote:
         blocks = Blocks(study, partition)
         sink = _Sink(blocks, shared)
         weakref.finalize(self, sink.close)
-        return Bench(study, blocks, sink, processes)
+        return Bench(study, blocks, sink, None if processes is None else processes.solver)
 
 
 class _Sink:

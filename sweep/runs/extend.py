@@ -19,6 +19,7 @@ from sweep.cells.block import block_solver
 from sweep.cells.fingerprint import is_of_program
 from sweep.cells.grid import Grid
 from sweep.cells.partition import box_slices
+from sweep.cells.sample import spread
 from sweep.cells.schema import METHOD_USED, STATUS, columns
 from sweep.errors import SweepError
 from sweep.file.reading import StoredFile
@@ -105,9 +106,10 @@ class Reused:
         for status, used in zip(*(flat_pieces(self._numbers[name]) for name in (STATUS, METHOD_USED)), strict=True):
             codes = 256 * status.astype(int) + used
             for code in np.unique(codes).tolist():
-                kinds.setdefault(code, []).extend((size + _spread(np.flatnonzero(codes == code))).tolist())
+                same = np.flatnonzero(codes == code)
+                kinds.setdefault(code, []).extend((size + same[spread(len(same), SAMPLE)]).tolist())
             size += len(codes)
-        chosen = np.concatenate([_spread(np.array(cells)) for cells in kinds.values()])
+        chosen = np.concatenate([np.array(cells)[spread(len(cells), SAMPLE)] for cells in kinds.values()])
         # the old values keep their order among the new ones
         places = np.unravel_index(chosen, self._numbers[STATUS].shape)
         new = [np.flatnonzero(p >= 0)[place] for p, place in zip(self._positions, places, strict=True)]
@@ -140,11 +142,6 @@ class Precomputed:
     def fill(self, start: int, stop: int, arrays: Mapping[str, Any]) -> None:
         for name, values in self.arrays.items():
             arrays[name][...] = values[start:stop]
-
-
-def _spread(cells: Any) -> Any:
-    """No more than `SAMPLE` of some cells, evenly spread among them."""
-    return cells[np.unique(np.linspace(0, len(cells) - 1, min(SAMPLE, len(cells))).astype(np.intp))]
 
 
 def _positions(old: Axis, new: Axis) -> Any:

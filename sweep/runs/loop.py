@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import os
 import platform
-import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -18,15 +17,14 @@ from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
-from sweep.cells.block import BadCell, Blocks, Guard, block_solver, cut, faults_reported, sampled_study
+from sweep.cells.block import Bench, Blocks, Done, Sink, cut, sampled_study
 from sweep.cells.fingerprint import fingerprint
 from sweep.cells.partition import Partition
 from sweep.cells.reduce import output_schema
 from sweep.cells.sample import require_asked
 from sweep.cells.schema import Schema
-from sweep.cells.solve import Solver
 from sweep.cells.timing import UNSAMPLED, Sample
 from sweep.errors import SweepError, missing
 from sweep.runs.extend import Precomputed, Reused
@@ -111,50 +109,6 @@ class Task:
     def said(self, attrs: Mapping[str, str]) -> Schema:
         """What its result holds, with further attributes."""
         return replace(self.schema, attrs={**self.schema.attrs, **attrs})
-
-
-Found = bytes | Mapping[str, Any] | None
-"""A block that is not in the sink of the run yet: digests of what a worker has written to the file, or its numbers."""
-
-
-class Sink(Protocol):
-    """Where blocks go: `room` gives the columns to fill, `put` takes a block and gives what is still to be put."""
-
-    def room(self, job: int) -> Mapping[str, Any]: ...
-    def put(self, job: int, arrays: Any) -> Found: ...
-
-
-@dataclass(frozen=True)
-class Done:
-    """A block that is computed, the seconds it took, its cells that FAILED, and what is still to be put."""
-
-    block: int
-    seconds: float
-    bad: Sequence[BadCell] = ()
-    found: Found = None
-
-
-class Bench:
-    """Computes blocks into a sink, in any thread; each has a solver of its own, or a process of `processes`."""
-
-    def __init__(self, study: Study, blocks: Blocks, sink: Sink, processes: Processes | None = None) -> None:
-        self._study, self._blocks, self._sink, self._processes = study, blocks, sink, processes
-        self._here = threading.local()
-
-    def block(self, job: int, wanted: Any = None) -> Done:
-        """Computes a block; of its cells only those wanted, by default all. Raises SweepError."""
-        here, (start, stop) = self._here, self._blocks.bounds(job)
-        with faults_reported(f"{self._blocks.label(job)} cannot be computed or kept"):
-            if not hasattr(here, "solve"):
-                here.bad = []
-                cells = Solver(self._study) if self._processes is None else self._processes.solver()
-                here.solve = block_solver(self._study, Guard(cells, here.bad.append))
-            here.bad.clear()
-            begun = time.perf_counter()
-            arrays = self._sink.room(job)
-            here.solve(start, stop, arrays, wanted)
-            found = self._sink.put(job, arrays)
-            return Done(job, time.perf_counter() - begun, [*here.bad], found)
 
 
 class Loop:
@@ -263,7 +217,7 @@ class Loop:
         Raises SweepError, TimeUp, KeyboardInterrupt, Terminated.
         """
         cluster, known, study = self._cluster, self._reused, self.task.study
-        bench = Bench(study, self.blocks, sink, self._processes)
+        bench = Bench(study, self.blocks, sink, None if self._processes is None else self._processes.solver)
         if cluster is not None:
             isolated = None if self._processes is None else (self._processes.limit, self._processes.cost)
             words = study.to_json(), dict(self.task.fingerprint), self.blocks.partition
