@@ -22,26 +22,36 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable
 from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, compared, page_of, read_result, report
+from _common import Conclusion, Statement, compared, most, read_result, report, said, solved
+from _figures import page_of
+from scipy.optimize import brentq
 
-import sweep
 from sweep.show.charts import COLOURS, MARKS
 
 DAY = 86400.0
 SMALL = 0.125
 """Depth of the differences that stand for first order."""
-KNOWN = {0.04: (51.33, 52.00, 53.66), 1.4629905875801047: (3.168, 3.212, 3.291), 100.0: (0.6312, 0.6295, 0.6278)}
+HALF = 1.4629905875801047
+"""alpha where s = 1/2, and friction does not count."""
+KNOWN = {0.04: (51.33, 52.00, 53.66), HALF: (3.168, 3.212, 3.291), 100.0: (0.6312, 0.6295, 0.6278)}
 """Half periods at depth -0.5, 0 and 0.5, harmonic 1, by another integration, to the digits given."""
 OIL = ((0.0, 3.0), (20.0, 1.0), (40.0, 0.42))
 """Viscosity of an oil at temperatures [degree C], over that at 20; chosen here, as a clock oil's."""
 YEAR, ROOM_DAY = 8.0, 2.0
 """Half the swing of the temperature over the year and over the day [K], about 15 degree C."""
+SEASONS = {0.1: "0.1", HALF: "1.46", 30.0: "30"}
+"""Drives of the clocks that are followed over a year."""
+NOISES = {
+    "torque": ({"sigma": 0.05, "sigma_a": 0.0}, lambda s: s),
+    "friction": ({"sigma": 0.0, "sigma_a": 0.05}, lambda s: abs(2 * s - 1)),
+    "both": ({"sigma": 0.05, "sigma_a": 0.05}, lambda s: 1 - s),
+}
+"""Cells of noise of 5 %, and what of it (4) has in the rate."""
 
 NOTES = """\
 rates in s/day; deviation: relative, of rates the difference
@@ -51,91 +61,72 @@ thick at 0 degree C as at 20, chosen here; the room swings by 8 K over the year 
 """
 
 
-def andrade(temperature: Any) -> Any:
-    """Viscosity over that at 20 degree C by exp(B/T), T absolute; B from the first two points of `OIL`."""
-    (low, thick), (mid, _), _ = OIL
-    B = math.log(thick) / (1 / (low + 273.15) - 1 / (mid + 273.15))
-    return np.exp(B * (1 / (np.asarray(temperature) + 273.15) - 1 / (mid + 273.15)))
+def viscosity(temperature: Any, law: str) -> Any:
+    """Viscosity over that at 20 degree C, exp(B/(T + C)) through the three points of `OIL` ("Vogel").
 
-
-def vogel(temperature: Any) -> Any:
-    """The same by exp(B/(T + C)) through the three points of `OIL`."""
-    from scipy.optimize import brentq
-
+    By "Andrade" T + C is the absolute temperature, and B from the first two points.
+    """
     (low, thick), (mid, _), (high, thin) = OIL
 
-    def misses(C: float) -> float:
+    def at(t: Any, C: float) -> Any:
         B = math.log(thick) / (1 / (low + C) - 1 / (mid + C))
-        return B * (1 / (high + C) - 1 / (mid + C)) - math.log(thin)
+        return B * (1 / (t + C) - 1 / (mid + C))
 
-    C = brentq(misses, 60.0, 1000.0)
-    B = math.log(thick) / (1 / (low + C) - 1 / (mid + C))
-    return np.exp(B * (1 / (np.asarray(temperature) + C) - 1 / (mid + C)))
+    C = 273.15 if law == "Andrade" else brentq(lambda C: at(high, C) - math.log(thin), 60.0, 1000.0)
+    return np.exp(at(np.asarray(temperature), C))
 
 
-def over_the_swing(ds: xr.Dataset) -> list[Statement]:
-    """Half periods against known ones, and what average of a(phi) would give them."""
-    lines = []
-    for mu, known in KNOWN.items():
-        here = ds.interval.sel(mu=mu, harmonic=1).sel(depth=[-0.5, 0.0, 0.5], method="nearest").values
-        off = float(max(abs(here / known - 1)))
-        text = ", ".join(f"{x:.4g}" for x in here)
-        lines.append(Statement(f"half period at depth -.5, 0, .5, alpha = {mu:.3g}", f"{known}", text, off, off < 3e-4))
-    weak = ds.sel(mu=0.04, harmonic=1)
-    theory = 2 / 0.04 + 2 / (1 - weak.depth)
-    off = float(abs(weak.interval / theory - 1).where(abs(weak.depth) < 0.6).max())
-    lines.append(
-        Statement("weak drive: the mean and the turn, (1), alpha = .04", "1e-2", "largest deviation", off, off < 1e-2)
-    )
-    strong = averages(ds).sel(mu=100.0, harmonic=1)
-    lines.append(compared("strong drive: mean by the energy, (2): effect of depth", f"{float(strong.energy):.5f}",
-                          float(strong.effect), float(strong.energy), 0.05, 4))  # fmt: skip
-    worst = float(DAY * SMALL * abs(averages(ds).effect).max())
-    lines.append(
-        Statement("the paper: only the mean over a period counts", "0", f"up to {worst:.0f} s/day at depth {SMALL:g}",
-                  None, worst < 1.0, True)
-    )  # fmt: skip
-    return lines
+def cycles(mu: Any) -> xr.Dataset:
+    """The foliot with even friction."""
+    return solved("foliot", mu=np.atleast_1d(mu), a=1, phi0=1, rtol=1e-12)
 
 
 def averages(ds: xr.Dataset) -> xr.Dataset:
     """dlnP/ddepth, `effect`, and what means of the friction over angle, time or energy would make of it."""
     up, down = (ds.interval.sel(depth=sign * SMALL, method="nearest") for sign in (1, -1))
     effect = (up - down) / (2 * SMALL * ds.interval.sel(depth=0, method="nearest"))
-    study = sweep.study(
-        kernel="foliot_motion", axes={"mu": ds.mu.values}, fixed={"a": 1.0, "phi0": 1.0},
-        along={"phase": np.linspace(0.0, 0.5, 4001)},
-    )  # fmt: skip
-    motion = sweep.run(study)
-    wave = np.cos(ds.harmonic * math.pi * motion.angle)
-    speed = abs(motion.speed)
-    s = cycles(ds.mu.values).sensitivity
+    along = {"phase": np.linspace(0.0, 0.5, 4001)}
+    motion = solved("foliot_motion", mu=ds.mu, a=1, phi0=1, along=along)
+    wave, speed = np.cos(ds.harmonic * math.pi * motion.angle), abs(motion.speed)
+    s = cycles(ds.mu).sensitivity
     means = {"angle": speed, "time": 0 * speed + 1, "energy": speed**2}
     found = {name: (2 * s - 1) * (wave * w).mean("phase") / w.mean("phase") for name, w in means.items()}
     return xr.Dataset({"effect": effect.reset_coords(drop=True), **found})
 
 
-def cycles(mu: Any, a: float = 1.0) -> xr.Dataset:
-    """The foliot with even friction."""
-    return sweep.run(sweep.study(kernel="foliot", axes={"mu": list(mu)}, fixed={"a": a, "phi0": 1.0}, rtol=1e-12))
+def over_the_swing(ds: xr.Dataset, means: xr.Dataset) -> list[Statement]:
+    """Half periods against known ones, and what average of a(phi) would give them."""
+    lines = []
+    for mu, known in KNOWN.items():
+        here = ds.interval.sel(mu=mu, harmonic=1).sel(depth=[-0.5, 0.0, 0.5], method="nearest").values
+        what, text = f"half period at depth -.5, 0, .5, alpha = {mu:.3g}", ", ".join(f"{x:.4g}" for x in here)
+        lines.append(most(what, f"{known}", here / known - 1, 3e-4, text))
+    weak, strong = ds.sel(mu=0.04, harmonic=1), means.sel(mu=100.0, harmonic=1)
+    off = (weak.interval / (2 / 0.04 + 2 / (1 - weak.depth)) - 1).where(abs(weak.depth) < 0.6)
+    energy, worst = float(strong.energy), float(DAY * SMALL * abs(means.effect).max())
+    by_energy, here = "strong drive: mean by the energy, (2): effect of depth", f"up to {worst:.0f} s/day at depth"
+    return [
+        *lines,
+        most("weak drive: the mean and the turn, (1), alpha = .04", "1e-2", off, 1e-2),
+        compared(by_energy, f"{energy:.5f}", strong.effect, energy, 0.05, 4),
+        said("the paper: only the mean over a period counts", worst < 1.0, f"{here} {SMALL:g}", "0", True),
+    ]
 
 
-def gain(mu: float, viscosity: Any) -> np.ndarray:
+def gain(mu: float, a: Any) -> np.ndarray:
     """Rate [s/day] against the clock at viscosity 1, by the friction of each."""
-    a = np.atleast_1d(viscosity)
-    study = sweep.study(kernel="foliot", axes={"a": a}, fixed={"mu": mu, "phi0": 1.0}, rtol=1e-12, outputs=["period"])
-    periods = sweep.run(study).period.values
-    return DAY * (float(cycles([mu]).period[0]) / periods - 1)
+    periods = solved("foliot", a=a, mu=mu, phi0=1, rtol=1e-12, outputs=["period"]).period.values
+    return DAY * (float(cycles(mu).period[0]) / periods - 1)
 
 
-def seasons(mu: float, oil: Callable[[Any], Any]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Days of a year, rates of their means, and viscosities at every two hours of it."""
+def seasons(mu: float, law: str) -> tuple[np.ndarray, np.ndarray]:
+    """Mean rates of the days of a year, and viscosities at every two hours of it."""
     hour = np.arange(0, 365 * 12)
     temperature = 15 - YEAR * np.cos(2 * np.pi * hour / hour.size) - ROOM_DAY * np.cos(2 * np.pi * hour / 12)
-    viscosity = oil(temperature) / oil(15.0)
-    fine = np.geomspace(viscosity.min(), viscosity.max(), 400)
-    rate = np.interp(np.log(viscosity), np.log(fine), gain(mu, fine))
-    return np.arange(365), rate.reshape(365, 12).mean(axis=1), viscosity
+    oil = viscosity(temperature, law) / viscosity(15.0, law)
+    fine = np.geomspace(oil.min(), oil.max(), 400)
+    rate = np.interp(np.log(oil), np.log(fine), gain(mu, fine))
+    return rate.reshape(365, 12).mean(axis=1), oil
 
 
 def year_by_slopes(mu: float, x: np.ndarray) -> float:
@@ -149,123 +140,105 @@ def year_by_slopes(mu: float, x: np.ndarray) -> float:
     return DAY * float(np.mean(np.exp(rate)) - 1)
 
 
-def by_season(ds: xr.Dataset) -> list[Statement]:
+def by_season() -> list[Statement]:
     """Rates over a year, and their mean from the sensitivity and its slopes."""
     lines = []
-    for mu in (0.1, 1.4629905875801047, 30.0):
-        s = float(cycles([mu]).sensitivity[0])
-        spans = []
-        for oil in (andrade, vogel):
-            _, rate, viscosity = seasons(mu, oil)
-            spans.append(rate.max() - rate.min())
-        ends = gain(mu, np.array([viscosity.min(), 1.0, viscosity.max()]))
-        text = f"{spans[0]:.4g} by Andrade, {spans[1]:.4g} by Vogel"
+    for mu in SEASONS:
+        s = float(cycles(mu).sensitivity[0])
+        (andrade, _), (rate, oil) = (seasons(mu, law) for law in ("Andrade", "Vogel"))
+        widest, span, year = float(np.ptp(gain(mu, [oil.min(), 1.0, oil.max()]))), np.ptp(rate), float(rate.mean())
+        text = f"{np.ptp(andrade):.4g} by Andrade, {span:.4g} by Vogel"
         what = f"alpha = {mu:.3g}, s = {s:.3f}: daily rates differ over the year by [s/day]"
-        most = float(np.ptp(ends))
-        lines.append(Statement(what, f"0.5 to 1 times {most:.4g}", text, None, bool(0.5 * most < spans[1] < most)))
-        year, theory = float(seasons(mu, vogel)[1].mean()), year_by_slopes(mu, np.log(viscosity))
-        what = "  mean rate of the year by s and three slopes of it, (3)"
-        lines.append(compared(what, f"{theory:.1f}", year, theory, 0.01, 5))
-        power = DAY * float(np.mean(viscosity ** (1 - 2 * s)) - 1)
+        theory, power = year_by_slopes(mu, np.log(oil)), DAY * float(np.mean(oil ** (1 - 2 * s)) - 1)
+        slopes, mean = "  mean rate of the year by s and three slopes of it, (3)", "  the same by a power mean of a"
         near = abs(power - year) < 0.1 * abs(year)
-        what = f"  the same by a power mean of a, exponent {1 - 2 * s:+.2f}"
-        lines.append(Statement(what, f"{power:.1f}", f"{year:.1f}", None, near, True))
+        lines += [
+            said(what, 0.5 * widest < span < widest, text, f"0.5 to 1 times {widest:.4g}"),
+            compared(slopes, f"{theory:.1f}", year, theory, 0.01, 5),
+            said(f"{mean}, exponent {1 - 2 * s:+.2f}", near, f"{year:.1f}", f"{power:.1f}", True),
+        ]
     return lines
 
 
-def by_noise(noisy: xr.Dataset) -> list[Statement]:
+def scatters(noisy: xr.Dataset) -> xr.Dataset:
+    """Scatter of the rate by each noise, over its unit, and the `s` and half period `T` of each clock."""
+    clock = cycles(noisy.mu)
+    s, T = clock.sensitivity, clock.period / 2
+    unit = DAY * 0.05 * np.sqrt(T / noisy.averaging_time)
+    found = {
+        name: np.sqrt((noisy.rate_scatter_s_per_day.sel(cell) ** 2).mean("seed")) / unit
+        for name, (cell, _) in NOISES.items()
+    }
+    return xr.Dataset({name: y.reset_coords(drop=True) for name, y in found.items()}).assign(s=s, T=T)
+
+
+def by_noise(scatter: xr.Dataset) -> list[Statement]:
     """(4), clock by clock."""
     lines = []
-    for mu in noisy.mu.values:
-        cycle = cycles([mu]).isel(mu=0)
-        s, half = float(cycle.sensitivity), float(cycle.period) / 2
-        unit = DAY * 0.05 * math.sqrt(half / float(noisy.averaging_time))
-        scatter = np.sqrt((noisy.rate_scatter_s_per_day.sel(mu=mu) ** 2).mean("seed"))
-        hours = 20000 * half / 3600
-        allowed = 3 / math.sqrt(2 * 0.6 * 64 * max(hours - 1, 1))
-        for name, cell, share in (
-            ("torque", {"sigma": 0.05, "sigma_a": 0}, s), ("friction", {"sigma": 0, "sigma_a": 0.05}, abs(2 * s - 1)),
-            ("both", {"sigma": 0.05, "sigma_a": 0.05}, 1 - s),
-        ):  # fmt: skip
-            here = float(scatter.sel(cell)) / unit
+    for mu in scatter.mu.values:
+        clock = scatter.sel(mu=mu)
+        hours = 20000 * float(clock["T"]) / 3600
+        allowed = 3 / math.sqrt(2 * 0.6 * 64 * max(hours - 1, 1)) + 0.02
+        for name, (_, law) in NOISES.items():
+            share, here = float(law(clock.s)), float(clock[name])
             what = f"alpha = {mu:.3g}: scatter by 5 % noise of {name}, over unit"
             if share < 1e-3:
-                lines.append(Statement(what, "0 to first order", f"{here:.4f}", None, here < 0.1))
+                lines.append(said(what, here < 0.1, f"{here:.4f}", "0 to first order"))
             else:
-                lines.append(compared(what, f"(4) {share:.4f} +- {allowed + 0.02:.0%}", here, share, allowed + 0.02, 4))
+                lines.append(compared(what, f"(4) {share:.4f} +- {allowed:.0%}", here, share, allowed, 4))
     return lines
 
 
-def figure(ds: xr.Dataset, noisy: xr.Dataset) -> Any:
+def figure(ds: xr.Dataset, means: xr.Dataset, scatter: xr.Dataset) -> Any:
     """Periods, averages, seasons, noise; for two columns of print."""
     with page_of(120.0, 2, 2) as (page, ((swing, mean), (year, noise))):
-        draw_swing(swing, ds)
-        draw_means(mean, ds)
-        draw_year(year)
-        draw_noise(noise, noisy)
+        for k, mu in enumerate(ds.mu.values):
+            line = ds.interval.sel(mu=mu, harmonic=1)
+            change = 100 * (line / line.sel(depth=0, method="nearest") - 1)
+            swing.plot(ds.depth, change, MARKS[k % len(MARKS)] + "-", color=COLOURS[k], markersize=3, label=f"{mu:.3g}")
+        swing.set(xlabel="depth, $d$ [1]", ylabel="change of the period [%]", ylim=(-5, 10))
+        swing.legend(title=r"$\alpha$", loc="upper left")
+
+        first = means.sel(harmonic=1)
+        mean.semilogx(first.mu, first.effect, "o", color="black", label="true")
+        for k, name in enumerate(("angle", "time", "energy")):
+            look = {"linestyle": "", "color": COLOURS[k], "markerfacecolor": "none"}
+            mean.semilogx(first.mu, first[name], MARKS[k + 1], label=f"mean over {name}", **look)
+        mean.axhline(0, color="0.7", linewidth=0.6)
+        mean.set(xlabel=r"drive, $\alpha$ [1]", ylabel=r"$\mathrm{d}\ln P/\mathrm{d}d$ [1]")
+        mean.legend(loc="best", fontsize=7)
+
+        for k, (mu, name) in enumerate(SEASONS.items()):
+            year.plot(seasons(mu, "Vogel")[0] / 60, "-", color=COLOURS[k], label=rf"$\alpha={name}$")
+            year.plot(seasons(mu, "Andrade")[0] / 60, ":", color=COLOURS[k])
+        year.plot([], [], "-", color="black", label="Vogel")
+        year.plot([], [], ":", color="black", label="Andrade")
+        year.set(xlabel="day of the year, from the coldest [day]", ylabel="rate [min/day]")
+        year.set(xlim=(0, 364), ylim=(-550, 900))
+        year.legend(loc="upper right", fontsize=7, ncols=2)
+
+        s = np.linspace(1 / 3, 1, 100)
+        for k, (name, (_, law)) in enumerate(NOISES.items()):
+            label = "both, one noise" if name == "both" else name
+            noise.plot(s, law(s), color=COLOURS[k])
+            noise.plot(scatter.s, scatter[name], MARKS[k], color=COLOURS[k], markerfacecolor="white", label=label)
+        noise.plot([], [], color="black", label="theory")
+        noise.set(xlabel="sensitivity, $s$ [1]", ylabel=r"scatter over $\sigma\sqrt{T/\tau}$ [1]", ylim=(0, 1.7))
+        noise.legend(title="noise of", loc="upper center", fontsize=7, ncols=2)
     return page
 
 
-def draw_swing(axes: Any, ds: xr.Dataset) -> None:
-    """Half period over depth, over that of even friction."""
-    for k, mu in enumerate(ds.mu.values):
-        line = ds.interval.sel(mu=mu, harmonic=1)
-        change = 100 * (line / line.sel(depth=0, method="nearest") - 1)
-        axes.plot(ds.depth, change, MARKS[k % len(MARKS)] + "-", color=COLOURS[k], markersize=3, label=f"{mu:.3g}")
-    axes.set(xlabel="depth, $d$ [1]", ylabel="change of the period [%]", ylim=(-5, 10))
-    axes.legend(title=r"$\alpha$", loc="upper left")
-
-
-def draw_means(axes: Any, ds: xr.Dataset) -> None:
-    """First order in the depth beside three means."""
-    found = averages(ds).sel(harmonic=1)
-    axes.semilogx(found.mu, found.effect, "o", color="black", label="true")
-    for k, name in enumerate(("angle", "time", "energy")):
-        look = {"linestyle": "", "color": COLOURS[k], "markerfacecolor": "none"}
-        axes.semilogx(found.mu, found[name], MARKS[k + 1], label=f"mean over {name}", **look)
-    axes.axhline(0, color="0.7", linewidth=0.6)
-    axes.set(xlabel=r"drive, $\alpha$ [1]", ylabel=r"$\mathrm{d}\ln P/\mathrm{d}d$ [1]")
-    axes.legend(loc="best", fontsize=7)
-
-
-def draw_year(axes: Any) -> None:
-    """Rate over the year by both laws of viscosity."""
-    for k, (mu, name) in enumerate(((0.1, "0.1"), (1.4629905875801047, "1.46"), (30.0, "30"))):
-        for oil, dashes in ((vogel, "-"), (andrade, ":")):
-            days, rate, _ = seasons(mu, oil)
-            axes.plot(days, rate / 60, dashes, color=COLOURS[k], label=rf"$\alpha={name}$" if dashes == "-" else None)
-    axes.plot([], [], "-", color="black", label="Vogel")
-    axes.plot([], [], ":", color="black", label="Andrade")
-    axes.set(xlabel="day of the year, from the coldest [day]", ylabel="rate [min/day]", xlim=(0, 364), ylim=(-550, 900))
-    axes.legend(loc="upper right", fontsize=7, ncols=2)
-
-
-def draw_noise(axes: Any, noisy: xr.Dataset) -> None:
-    """Scatter over its unit against s, with (4)."""
-    s = np.linspace(1 / 3, 1, 100)
-    cells = ({"sigma": 0.05, "sigma_a": 0}, {"sigma": 0, "sigma_a": 0.05}, {"sigma": 0.05, "sigma_a": 0.05})
-    laws = (s, abs(2 * s - 1), 1 - s)
-    clock = cycles(noisy.mu.values)
-    unit = DAY * 0.05 * np.sqrt(clock.period / 2 / float(noisy.averaging_time))
-    for k, (cell, name, law) in enumerate(zip(cells, ("torque", "friction", "both, one noise"), laws, strict=True)):
-        scatter = np.sqrt((noisy.rate_scatter_s_per_day.sel(cell) ** 2).mean("seed"))
-        axes.plot(s, law, color=COLOURS[k])
-        axes.plot(clock.sensitivity, scatter / unit, MARKS[k], color=COLOURS[k], markerfacecolor="white", label=name)
-    axes.plot([], [], color="black", label="theory")
-    axes.set(xlabel="sensitivity, $s$ [1]", ylabel=r"scatter over $\sigma\sqrt{T/\tau}$ [1]", ylim=(0, 1.7))
-    axes.legend(title="noise of", loc="upper center", fontsize=7, ncols=2)
-
-
-def conclude(path: str, noise_path: str) -> tuple[Groups, list[str], Any]:
+def conclude(path: str, noise_path: str) -> Conclusion:
     """Statements and the figure."""
     ds = read_result(path, "friction_scene:KERNEL", ["mu", "harmonic", "depth"], "friction_varies.toml")
     noisy = read_result(noise_path, "foliot_noise", ["mu", "sigma", "sigma_a", "seed"], "friction_varies_noise.toml")
+    means, scatter = averages(ds), scatters(noisy)
     groups = {
-        "Friction over the swing": over_the_swing(ds),
-        "Friction by season": by_season(ds),
-        "Noise of friction and torque": by_noise(noisy),
+        "Friction over the swing": over_the_swing(ds, means),
+        "Friction by season": by_season(),
+        "Noise of friction and torque": by_noise(scatter),
     }
-    return groups, [NOTES], lambda: figure(ds, noisy)
+    return groups, [NOTES], lambda: figure(ds, means, scatter)
 
 
 main = partial(report, __file__, ["friction_varies.h5", "friction_varies_noise.h5"], conclude=conclude)

@@ -15,15 +15,15 @@ so a period tells dry friction from the rest, and the amplitude, v^2/(2 mu), has
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, page_of, plain_ticks, read_result, report
+from _common import Conclusion, Statement, most, read_result, report, said, solved
+from _figures import page_of, plain_ticks
 from clock_losses import SHARES, SUM, THRESHOLD, Measured, forecast
 
-import sweep
 from sweep.show.charts import COLOURS
 
 CLOCKS = ("equal shares", "mostly dry", "mostly viscous", "mostly drag", "mostly impacts")
@@ -52,24 +52,52 @@ def losses(ds: xr.Dataset, clock: int, like: Measured) -> Any:
     return np.array([one.R, one.a, one.c, 1.0 - one.e**2], float) / like.units
 
 
-def matrices(ds: xr.Dataset, clock: int, over: float, amplitude: bool, count: int = 12) -> tuple[Any, Any, Any]:
-    """Torques spread evenly in ln mu over this factor about the middle, and `Measured.matrix` of a clock there."""
-    middle, one = measured(ds, clock, False).middle, ds.isel(point=clock)
+def matrices(ds: xr.Dataset, over: float, amplitude: bool, number: int = 12) -> tuple[Any, Any, Any]:
+    """Torques spread evenly in ln mu over this factor about the middle, and `Measured.matrix` of the first clock."""
+    middle, one = measured(ds, 0, False).middle, ds.isel(point=0)
     least = max(middle / np.sqrt(over), 1.05 * float(one.R))
-    mu = np.append(np.geomspace(least, least * over, count), middle)
-    fixed = {name: float(one[name]) for name in ("R", "a", "c", "n", "e", "phi0")}
-    cells = sweep.run(sweep.study(kernel="foliot", axes={"mu": mu}, fixed=fixed, rtol=1e-10))
-    there = Measured(mu, cells.period.values, cells.amplitude.values if amplitude else None, fixed["phi0"], NOISE)
-    J, by_u = there.matrix(losses(ds, clock, there))
-    return mu[:-1], np.delete(J, [count, 2 * count + 1] if amplitude else [count], axis=0), by_u
+    mu = np.append(np.geomspace(least, least * over, number), middle)
+    clock = {name: one[name] for name in ("R", "a", "c", "n", "e", "phi0")}
+    cells = solved("foliot", mu=mu, **clock, rtol=1e-10)
+    swing = cells.amplitude.values if amplitude else None
+    there = Measured(mu, cells.period.values, swing, float(one.phi0), NOISE)
+    J, by_u = there.matrix(losses(ds, 0, there))
+    return mu[:-1], np.delete(J, [number, 2 * number + 1] if amplitude else [number], axis=0), by_u
 
 
-def best_torques(ds: xr.Dataset, over: float = 10.0) -> tuple[Any, float, float]:
-    """12 torques of 25, some of them more than once, at which the shares vary least, by exchange.
+def knowable(ds: xr.Dataset) -> list[Statement]:
+    """Forecast errors by spread of the torques, with and without amplitudes, for the clock of equal shares."""
 
-    And the sum of the variances of the four shares there, and at 12 torques spread evenly, both square rooted.
+    def row(values: Any, digits: int = 2) -> str:
+        return ", ".join(f"{x:.{digits}g}" for x in values)
+
+    lines = []
+    for over in SPREADS:
+        (alone, weak), (both, strong) = (forecast(*matrices(ds, over, amplitude)[1:]) for amplitude in (False, True))
+        errors = f"torques over a factor {over:g}: error of dry, viscous, drag, impacts"
+        values = f"{row(weak, 3)}; {row(strong, 3)}"
+        lines += [
+            Statement(errors, "", row(alone[:4])),
+            most("  with amplitudes, and of drag with impacts", "< .3", both.max(), 0.3, row(both)),
+            Statement("  singular values, by periods; with amplitudes", "", values),
+        ]
+        if over == 10.0:
+            worth, off = weak[-1] / strong[-1], float(alone[3] / alone[0])
+            least = "  the least, by periods alone, over that with amplitudes"
+            apart = "  by periods alone: error of impacts over that of dry"
+            lines += [
+                most(least, "< 1/10", worth, 0.1, f"{worth:.3f}"),
+                Statement(apart, "> 3", f"{off:.1f}", off, off > 3.0),
+            ]
+    return lines
+
+
+def chosen(ds: xr.Dataset) -> list[Statement]:
+    """Which 12 torques to measure of 25 within a factor of 10, some more than once: where the shares vary least.
+
+    By exchange; compared are the sums of the variances of the four shares, square rooted, and 12 torques spread evenly.
     """
-    mu, J, by_u = matrices(ds, 0, over, True, 25)
+    mu, J, by_u = matrices(ds, 10.0, True, 25)
     pairs = J.reshape(2, 25, 4).transpose(1, 0, 2)
 
     def error(places: Any) -> float:
@@ -82,121 +110,73 @@ def best_torques(ds: xr.Dataset, over: float = 10.0) -> tuple[Any, float, float]
         for i in range(12):
             trials = [np.append(np.delete(places, i), k) for k in range(25)]
             places = min(trials, key=error)
-    return np.sort(mu[places]), error(places), even
-
-
-def knowable(ds: xr.Dataset) -> list[Statement]:
-    """Forecast errors by spread of the torques, with and without amplitudes, for the clock of equal shares."""
-    lines = []
-    for over in SPREADS:
-        (alone, weak), (both, strong) = (forecast(*matrices(ds, 0, over, amplitude)[1:]) for amplitude in (False, True))
-        what = f"torques over a factor {over:g}: "
-        lines += [
-            Statement(what + "error of dry, viscous, drag, impacts", "", _row(alone[:4])),
-            Statement("  with amplitudes, and of drag with impacts", "< .3", _row(both), float(both.max()),
-                      bool(both.max() < 0.3)),
-            Statement("  singular values, by periods; with amplitudes", "", f"{_row(weak, 3)}; {_row(strong, 3)}"),
-        ]  # fmt: skip
-        if over == 10.0:
-            worth = float(weak[-1] / strong[-1])
-            lines.append(Statement("  the least, by periods alone, over that with amplitudes", "< 1/10", f"{worth:.3f}",
-                                   worth, worth < 0.1))  # fmt: skip
-            off = float(alone[3] / alone[0])
-            lines.append(Statement("  by periods alone: error of impacts over that of dry", "> 3", f"{off:.1f}", off,
-                                   off > 3.0))  # fmt: skip
-    return lines
-
-
-def _row(values: Any, digits: int = 2) -> str:
-    return ", ".join(f"{x:.{digits}g}" for x in values)
+    least = error(places)
+    values, counts = np.unique(np.round(mu[places], 1), return_counts=True)
+    text = ", ".join(f"{n} x {x:g}" for x, n in zip(values, counts, strict=True))
+    together, ratio = "  error of the four shares together, over that of even ones", least / even
+    return [
+        said("12 best torques within a factor 10, by exchange", len(values) < 7, text),
+        Statement(together, "< 0.95", f"{least:.3f} / {even:.3f}", ratio, ratio < 0.95),
+    ]
 
 
 def covered(ds: xr.Dataset, clocks: int) -> list[Statement]:
     """One noisy measurement of each clock: whether the best fit comes back, and intervals hold the true shares."""
-    held, worst, sums = [], 0.0, []
+    held, off, sums = [], [], []
     for clock in range(clocks):
         exact, noisy = measured(ds, clock, True), measured(ds, clock, True, NOISE)
-        u = losses(ds, clock, exact)
-        true = SUM @ exact.predicted(u[None])[1][0]
-        worst = max(worst, float(abs(SUM @ exact.predicted(exact.fit()[0][None])[1][0] - true).max()))
+        true = SUM @ exact.predicted(losses(ds, clock, exact)[None])[1][0]
+        off.append(SUM @ exact.predicted(exact.fit()[0][None])[1][0] - true)
         best, least = noisy.fit()
         sums.append(least)
         shares = range(len(SHARES)) if clocks > 1 else (0, 4)
         held += [noisy.fit(share, true[share], best)[1] - least < THRESHOLD for share in shares]
-    mean = float(np.mean(sums))
-    enough = 20.0 - 3.0 * np.sqrt(40.0 / clocks) < mean < 20.0 + 3.0 * np.sqrt(40.0 / clocks)
-    count = f"{sum(held)} of {len(held)}"
+    mean, share = float(np.mean(sums)), float(np.mean(held))
+    enough = abs(mean - 20.0) < 3.0 * np.sqrt(40.0 / clocks)
+    hold = "  with noise: intervals of 95 % that hold the true share"
+    over = "  sum of squares over the noise, mean; 24 numbers, 4 losses"
     return [
-        Statement(f"{clocks} clocks without noise: shares fitted", "1e-3", "largest deviation", worst, worst < 1e-3),
-        Statement("  with noise: intervals of 95 % that hold the true share", "> 4/5", count, float(np.mean(held)),
-                  bool(np.mean(held) >= 0.8)),
-        Statement("  sum of squares over the noise, mean; 24 numbers, 4 losses", "20", f"{mean:.1f}", mean / 20 - 1,
-                  bool(enough)),
-    ]  # fmt: skip
-
-
-def chosen(ds: xr.Dataset) -> list[Statement]:
-    """Which torques to measure."""
-    mu, least, even = best_torques(ds)
-    values, counts = np.unique(np.round(mu, 1), return_counts=True)
-    text = ", ".join(f"{n} x {x:g}" for x, n in zip(values, counts, strict=True))
-    return [
-        Statement("12 best torques within a factor 10, by exchange", "", text, None, bool(len(values) < 7)),
-        Statement("  error of the four shares together, over that of even ones", "< 0.95", f"{least:.3f} / {even:.3f}",
-                  least / even, bool(least < 0.95 * even)),
-    ]  # fmt: skip
+        most(f"{clocks} clocks without noise: shares fitted", "1e-3", np.array(off), 1e-3),
+        Statement(hold, "> 4/5", f"{sum(held)} of {len(held)}", share, share >= 0.8),
+        Statement(over, "20", f"{mean:.1f}", mean / 20 - 1, bool(enough)),
+    ]
 
 
 def figure(ds: xr.Dataset, clocks: int) -> Any:
-    """What can be known by the spread of the torques, and intervals of known clocks; for two columns of print."""
-    with page_of(72.0, 1, 2) as (page, (left, right)):
-        draw_spread(left, ds)
-        draw_intervals(right, ds, clocks)
+    """Forecast errors over the spread of the torques, and intervals of 95 % of known clocks; for two columns."""
+    rings = {"color": "black", "markerfacecolor": "white", "markersize": 3}
+    with page_of(72.0, 1, 2) as (page, (spread, intervals)):
+        spreads = np.geomspace(2.0, 60.0, 12)
+        for dashes, amplitude in (("--", False), ("-", True)):
+            errors = np.array([forecast(*matrices(ds, over, amplitude)[1:])[0] for over in spreads])
+            for k, name in enumerate(SHARES):
+                spread.loglog(spreads, errors[:, k], dashes, color=COLOURS[k], label=name if amplitude else None)
+        spread.plot([], [], "--", color="black", label="periods alone")
+        spread.axhline(0.25, color="0.6", linewidth=0.6)
+        spread.set(xlabel="largest over least torque [1]", ylabel="standard error of a share [1]", ylim=(2e-3, 5))
+        plain_ticks(spread.xaxis, (2, 5, 10, 20, 50))
+        spread.legend(fontsize=6.5, ncols=2, loc="lower left")
+
+        for clock in range(clocks):
+            noisy = measured(ds, clock, True, NOISE)
+            true = SUM @ noisy.predicted(losses(ds, clock, noisy)[None])[1][0]
+            best = noisy.fit()
+            for k, name in enumerate(SHARES):
+                low, here, high = noisy.interval(k, best)
+                x, bar = clock + 0.16 * (k - 2), {"linewidth": 2.2, "solid_capstyle": "butt"}
+                label = None if clock else name
+                intervals.plot([x, x], [low, high], color=COLOURS[k], label=label, **bar)
+                intervals.plot(x, here, "_", color=COLOURS[k], markersize=5)
+                intervals.plot(x, true[k], "o", **rings)
+        intervals.plot([], [], "o", label="true", **rings)
+        intervals.tick_params(axis="x", which="minor", bottom=False, top=False)
+        intervals.set_xticks(range(len(CLOCKS)), [name.replace(" ", "\n") for name in CLOCKS], fontsize=7)
+        intervals.set(ylabel="share of the loss [1]", ylim=(-0.03, 1.35))
+        intervals.legend(fontsize=6.5, ncols=3, loc="upper left")
     return page
 
 
-def draw_spread(axes: Any, ds: xr.Dataset) -> None:
-    """Forecast errors over the spread of the torques, by periods alone and with amplitudes."""
-    spreads = np.geomspace(2.0, 60.0, 12)
-    for dashes, amplitude in (("--", False), ("-", True)):
-        errors = np.array([forecast(*matrices(ds, 0, over, amplitude)[1:])[0] for over in spreads])
-        for k, name in enumerate(SHARES):
-            label = name if amplitude else None
-            axes.loglog(spreads, errors[:, k], dashes, color=COLOURS[k], label=label)
-    axes.plot([], [], "--", color="black", label="periods alone")
-    axes.axhline(0.25, color="0.6", linewidth=0.6)
-    axes.set(xlabel="largest over least torque [1]", ylabel="standard error of a share [1]", ylim=(2e-3, 5))
-    plain_ticks(axes.xaxis, (2, 5, 10, 20, 50))
-    axes.legend(fontsize=6.5, ncols=2, loc="lower left")
-
-
-def draw_intervals(axes: Any, ds: xr.Dataset, clocks: int) -> None:
-    """Intervals of 95 % of each clock, beside the true shares."""
-    for clock in range(clocks):
-        noisy = measured(ds, clock, True, NOISE)
-        true = SUM @ noisy.predicted(losses(ds, clock, noisy)[None])[1][0]
-        best = noisy.fit()
-        for k, name in enumerate(SHARES):
-            low, here, high = noisy.interval(k, best)
-            x = clock + 0.16 * (k - 2)
-            axes.plot(
-                [x, x],
-                [low, high],
-                color=COLOURS[k],
-                linewidth=2.2,
-                solid_capstyle="butt",
-                label=None if clock else name,
-            )
-            axes.plot(x, here, "_", color=COLOURS[k], markersize=5)
-            axes.plot(x, true[k], "o", color="black", markerfacecolor="white", markersize=3)
-    axes.plot([], [], "o", color="black", markerfacecolor="white", markersize=3, label="true")
-    axes.tick_params(axis="x", which="minor", bottom=False, top=False)
-    axes.set_xticks(range(len(CLOCKS)), [name.replace(" ", "\n") for name in CLOCKS], fontsize=7)
-    axes.set(ylabel="share of the loss [1]", ylim=(-0.03, 1.35))
-    axes.legend(fontsize=6.5, ncols=3, loc="upper left")
-
-
-def conclude(path: str, tell: bool = True) -> tuple[Groups, list[str], Any]:
+def conclude(path: str, tell: bool = True) -> Conclusion:
     """Statements and the figure; `tell`: all shares of all clocks are fitted, not two of the first."""
     clocks = len(CLOCKS) if tell else 1
     ds = read_result(path, "foliot", ["point", "mu"], "losses_from_periods.toml")
@@ -208,9 +188,7 @@ def conclude(path: str, tell: bool = True) -> tuple[Groups, list[str], Any]:
     return groups, [NOTES], lambda: figure(ds, clocks if tell else 0)
 
 
-def main(arguments: Sequence[str]) -> int:
-    """Table and figure of the result that is named; 1 if a statement does not hold."""
-    return report(__file__, ["losses_from_periods.h5"], arguments, conclude)
+main = partial(report, __file__, ["losses_from_periods.h5"], conclude=conclude)
 
 
 if __name__ == "__main__":

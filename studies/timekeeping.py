@@ -33,34 +33,36 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, columns, compared, differing, page_of, read_result, report
+from _common import Conclusion, Statement, columns, compared, differing, power, read_result, report, solved
+from _figures import page_of
 
-import sweep
 from sweep.show.charts import COLOURS
 
 DAY = 86400.0
-CLOCKS = {"verge": "timekeeping.toml", "Bürgi": "timekeeping_buergi.toml", "spring": "timekeeping_spring.toml"}
+CLOCKS = {"verge": "timekeeping", "Bürgi": "timekeeping_buergi", "spring": "timekeeping_spring"}
 GOALS = {"15 min/day": 900.0, "1 min/day": 60.0, "1 s/day": 1.0}
 TIMES = ("white", "1 min", "1 h", "1 day")
 """Correlation of the torque, along `tau_c`."""
 LINEAR = 0.3
 """Noise beyond which torque would now and then vanish, and the linear law says no more than that."""
+Clocks = dict[str, xr.Dataset]
 
 
 def without_noise(ds: xr.Dataset) -> xr.Dataset:
     """The clock's cycle on steady torque."""
-    fixed = {name: float(ds[name]) for name in ("phi0", "a", "k")}
-    return sweep.run(sweep.study(kernel="foliot", rtol=1e-9, axes={"mu": [float(ds.mu)]}, fixed=fixed)).isel(mu=0)
+    return solved("foliot", mu=[float(ds.mu)], phi0=ds.phi0, a=ds.a, k=ds.k, rtol=1e-9).isel(mu=0)
 
 
-def read(path: str, toml: str) -> xr.Dataset:
-    """One clock: its noisy runs with s, T, and means over seeds. Raises SweepError where it is none of this study."""
-    ds = read_result(path, "foliot_noise", ["sigma", "tau_c", "seed"], toml)
+def read(path: str, name: str) -> xr.Dataset:
+    """One clock: its noisy runs with s, T, means over seeds and the scatter over sigma [s/day] at sigma = 0.01."""
+    ds = read_result(path, "foliot_noise", ["sigma", "tau_c", "seed"], f"{name}.toml")
     cycle = without_noise(ds)
     ds = ds.assign_coords(s=float(cycle.sensitivity), T=float(cycle.period) / 2)
     seeds, rate = ds.sizes["seed"], ds.rate_error_s_per_day
+    scatter = np.sqrt((ds.rate_scatter_s_per_day**2).mean("seed"))
     return ds.assign(
-        scatter=np.sqrt((ds.rate_scatter_s_per_day**2).mean("seed")),
+        scatter=scatter,
+        per_sigma=scatter.sel(sigma=0.01) / 0.01,
         gain=rate.mean("seed"),
         gain_error=rate.std("seed", ddof=1) / math.sqrt(seeds),
         blur=1 / math.sqrt(2 * 0.6 * seeds * (math.floor(float(ds.half_swings * ds["T"] / ds.averaging_time)) - 1)),
@@ -118,66 +120,51 @@ def second_order(ds: xr.Dataset, tau_c: float) -> float:
 
 
 def clock_statements(name: str, ds: xr.Dataset) -> list[Statement]:
-    """What theory says of one clock's runs."""
+    """What theory says of one clock's runs.
+
+    The power of sigma has no error of sampling: the same noise at every sigma. The mean rate at the largest noise is
+    held to (2) within four standard errors and the next order; where they are over a tenth of it, it is only told.
+    """
     (time, _), d = slopes(ds)
-    s = -(d["m"][0] + d["u"][0] * d["m"][1] / (1 - d["u"][1])) / time
-    lines = [compared(f"{name}: s from the half-swing map", f"{float(ds.s):.6f} +- 1e-4", s, float(ds.s), 1e-4, 6)]
+    s, known = -(d["m"][0] + d["u"][0] * d["m"][1] / (1 - d["u"][1])) / time, float(ds.s)
+    lines = [compared(f"{name}: s from the half-swing map", f"{known:.6f} +- 1e-4", s, known, 1e-4, 6)]
     allowed = 3 * float(ds.blur)
     for j, time_name in enumerate(TIMES):
-        part, expected = ds.isel(tau_c=j), float(law(ds, ds.tau_c[j]))
-        found = float(part.scatter.sel(sigma=0.01)) / 0.01
-        what = f"  scatter over sigma, {time_name} [s/day]"
-        lines.append(compared(what, f"(1) = {expected:.4g} +- {allowed:.0%}", found, expected, allowed, 4))
-    return [*lines, linearity(ds), *losses(ds)]
-
-
-def linearity(ds: xr.Dataset) -> Statement:
-    """The power of sigma in the scatter of white noise; the same noise at every sigma, so no error of sampling."""
-    line = ds.scatter.isel(tau_c=0).sel(sigma=slice(None, 0.03))
-    power = np.polyfit(np.log(line.sigma), np.log(line), 1)[0].item()
-    return differing("  power of sigma in the scatter, white", "1 +- 0.01", power, 1, 0.01, 4)
-
-
-def losses(ds: xr.Dataset) -> list[Statement]:
-    """The mean rate at the largest noise against (2), within four standard errors and the next order."""
-    lines = []
+        theory, what = float(law(ds, ds.tau_c[j])), f"  scatter over sigma, {time_name} [s/day]"
+        lines.append(compared(what, f"(1) = {theory:.4g} +- {allowed:.0%}", ds.per_sigma[j], theory, allowed, 4))
+    by_sigma = power(ds.scatter.isel(tau_c=0).sel(sigma=slice(None, 0.03)))
+    lines.append(differing("  power of sigma in the scatter, white", "1 +- 0.01", by_sigma, 1, 0.01, 4))
     for j in (0, 1):
         part, sigma = ds.isel(tau_c=j, sigma=-1), float(ds.sigma[-1])
-        expected = sigma**2 * second_order(ds, float(ds.tau_c[j]))
-        error = float(part.gain_error) / expected
-        what = f"  loss at sigma = {sigma:g}, {TIMES[j]} [s/day]"
+        theory = sigma**2 * second_order(ds, float(ds.tau_c[j]))
+        error, what = float(part.gain_error) / theory, f"  loss at sigma = {sigma:g}, {TIMES[j]} [s/day]"
         allowed = 4 * error + 5 * sigma**2
-        line = compared(what, f"(2) = {expected:.4g} +- {allowed:.0%}", -float(part.gain), expected, allowed, 4)
+        line = compared(what, f"(2) = {theory:.4g} +- {allowed:.0%}", -part.gain, theory, allowed, 4)
         lines.append(line if error < 0.1 else replace(line, here=f"{line.here} +- {part.gain_error:.1g}", holds=None))
     return lines
 
 
-def lasting(clocks: dict[str, xr.Dataset]) -> list[Statement]:
+def lasting(clocks: Clocks) -> list[Statement]:
     """eps/s of a lasting change, by the series of s at weak and at strong drive."""
-    verge, buergi = (clocks[name] for name in ("verge", "Bürgi"))
-    alpha = [float(ds.mu / (ds.a**2 * ds.phi0)) for ds in (verge, buergi)]
-    b2 = (3 / alpha[1]) ** (2 / 3)
-    weak, strong = 1 / (1 + alpha[0]), 1 / 3 + 4 * b2 / 45 + 52 * b2**2 / 4725
+    verge, buergi = clocks["verge"], clocks["Bürgi"]
+    alpha, strong = (float(ds.mu / (ds.a**2 * ds.phi0)) for ds in (verge, buergi))
+    b2 = (3 / strong) ** (2 / 3)
     minute = 100 * 60 / DAY
+    series = minute / (1 / 3 + 4 * b2 / 45 + 52 * b2**2 / 4725)
+    per_cent = f"verge, 1 % of rate: lasting change of torque [%], +- {1e-6:g}"
+    by_series, by_minute = f"1/s by its series = {series:.4g}", "Bürgi, 1 min/day: lasting change [%], +- 1e-3"
     return [
-        compared(
-            f"verge, 1 % of rate: lasting change of torque [%], +- {1e-6:g}", f"1 + alpha = {1 / weak:.5g}",
-            1 / float(verge.s), 1 / weak, 1e-6, 5,
-        ),
-        compared(
-            "Bürgi, 1 min/day: lasting change [%], +- 1e-3", f"1/s by its series = {minute / strong:.4g}",
-            minute / float(buergi.s), minute / strong, 1e-3, 4,
-        ),
-    ]  # fmt: skip
+        compared(per_cent, f"1 + alpha = {1 + alpha:.5g}", 1 / verge.s, 1 + alpha, 1e-6, 5),
+        compared(by_minute, by_series, minute / buergi.s, series, 1e-3, 4),
+    ]
 
 
-def table(clocks: dict[str, xr.Dataset]) -> list[str]:
+def table(clocks: Clocks) -> list[str]:
     """The torque noise, in % of the torque, that scatters a clock by each goal; the lasting change that shifts it."""
     rows = [("clock", "goal", *(f"noise, {x}" for x in TIMES), "lasting change")]
     for name, ds in clocks.items():
-        per_sigma = ds.scatter.sel(sigma=0.01) / 0.01
         for goal, rate in GOALS.items():
-            sigma = [*(rate / per_sigma).values, rate / (DAY * float(ds.s))]
+            sigma = [*(rate / ds.per_sigma).values, rate / (DAY * float(ds.s))]
             rows.append((name, goal, *(f"{100 * x:.3g}" + " *" * int(x > LINEAR) for x in sigma)))
     return [
         "Torque noise, in % of the torque, that scatters the rate by the goal from day to day; by its correlation",
@@ -186,7 +173,7 @@ def table(clocks: dict[str, xr.Dataset]) -> list[str]:
     ]
 
 
-def in_words(clocks: dict[str, xr.Dataset]) -> list[str]:
+def in_words(clocks: Clocks) -> list[str]:
     """The answer, from the numbers."""
     white, _, hour, day = clocks["verge"].scatter.sel(sigma=0.1).values
     eps = {"verge": 900, "Bürgi": 60, "spring": 1}
@@ -204,47 +191,38 @@ noise, a share of sigma^2; what differs from day to day stays.\
 """.splitlines()
 
 
-def figure(clocks: dict[str, xr.Dataset]) -> Any:
-    """Scatter against noise, against correlation, and loss against noise."""
-    with page_of(76.0, 1, 3) as (page, panels):
-        for draw, axes in zip((draw_scatter, draw_correlation, draw_losses), panels, strict=True):
-            for i, (name, ds) in enumerate(clocks.items()):
-                draw(axes, ds, name, COLOURS[i], "os^"[i])
-        page.legend(*panels[1].get_legend_handles_labels(), loc="outside upper center", ncols=3)
-        frame(panels[0])
-    return page
-
-
-def frame(axes: Any) -> None:
-    """The goals, and what the lines and marks of panel (a) mean."""
-    for name, rate in GOALS.items():
-        axes.axhline(rate, color="0.6", linewidth=0.6)
-        axes.text(1.03, rate, name.removesuffix("/day"), fontsize=7, va="center", transform=axes.get_yaxis_transform())
-    axes.plot([], [], "o-", color="black", markerfacecolor="white", label="white")
-    axes.plot([], [], "o", color="black", linestyle=(0, (5, 1.5)), label="of a day")
-    axes.legend(loc="lower right", title="torque noise", borderaxespad=0.2)
-
-
-def draw_scatter(axes: Any, ds: xr.Dataset, name: str, colour: str, mark: str) -> None:
-    """White noise and noise of a day, with (1)."""
+def figure(clocks: Clocks) -> Any:
+    """Scatter against noise, white and of a day, with (1); against correlation; loss against white noise, with (2)."""
     wide = np.geomspace(1e-3, 0.3, 2)
-    for j, dashes, fill in ((0, "-", "white"), (3, (0, (5, 1.5)), colour)):
-        axes.loglog(wide, law(ds, ds.tau_c[j]) * wide, color=colour, linestyle=dashes)
-        axes.plot(ds.sigma, ds.scatter.isel(tau_c=j), mark, color=colour, markerfacecolor=fill)
-    axes.set(xlim=(1e-3, 0.3), ylim=(1e-4, 1e4), xlabel=r"torque noise, $\sigma$ [1]")
-    axes.set_ylabel("scatter of the rate from day to day [s/day]")
-
-
-def draw_correlation(axes: Any, ds: xr.Dataset, name: str, colour: str, mark: str) -> None:
-    """Scatter over s sigma at sigma = 0.01."""
-    T, unit = float(ds["T"]), DAY * float(ds.s)
-    theta = np.geomspace(0.1, 10 * DAY / T, 300)
-    y = ds.scatter.sel(sigma=0.01) / (0.01 * unit)
-    look = {"fmt": mark, "color": colour, "markerfacecolor": "white", "linewidth": 0.8}
-    axes.errorbar(lasts(ds, ds.tau_c), y, float(ds.blur) * y, label=name, **look)
-    axes.loglog(lasts(ds, theta), law(ds, theta) / unit, color=colour, linewidth=0.8)
-    axes.set(xlim=(1e-6, 10), ylim=(1e-3, 1.2), xlabel="correlation time of the torque [day]")
-    axes.set_ylabel(r"scatter over $s\sigma$ [1]")
+    with page_of(76.0, 1, 3) as (page, (scatter, correlation, losses)):
+        for (name, ds), colour, mark in zip(clocks.items(), COLOURS, "os^", strict=False):
+            for j, dashes, fill in ((0, "-", "white"), (3, (0, (5, 1.5)), colour)):
+                scatter.loglog(wide, law(ds, ds.tau_c[j]) * wide, color=colour, linestyle=dashes)
+                scatter.plot(ds.sigma, ds.scatter.isel(tau_c=j), mark, color=colour, markerfacecolor=fill)
+            look = {"fmt": mark, "color": colour, "markerfacecolor": "white", "linewidth": 0.8}
+            unit, theta = DAY * float(ds.s), np.geomspace(0.1, 10 * DAY / float(ds["T"]), 300)
+            y = ds.per_sigma / unit
+            correlation.errorbar(lasts(ds, ds.tau_c), y, float(ds.blur) * y, label=name, **look)
+            correlation.loglog(lasts(ds, theta), law(ds, theta) / unit, color=colour, linewidth=0.8)
+            white = ds.isel(tau_c=0)
+            white = white.sel(sigma=white.gain < -2 * white.gain_error)  # known to half of itself
+            losses.errorbar(white.sigma, -white.gain, white.gain_error, **look)
+            losses.loglog(wide, second_order(ds, 0.0) * wide**2, color=colour)
+        for goal, rate in GOALS.items():
+            scatter.axhline(rate, color="0.6", linewidth=0.6)
+            look = {"fontsize": 7, "va": "center", "transform": scatter.get_yaxis_transform()}
+            scatter.text(1.03, rate, goal.removesuffix("/day"), **look)
+        scatter.set(xlim=(1e-3, 0.3), ylim=(1e-4, 1e4), xlabel=r"torque noise, $\sigma$ [1]")
+        scatter.set_ylabel("scatter of the rate from day to day [s/day]")
+        correlation.set(xlim=(1e-6, 10), ylim=(1e-3, 1.2), xlabel="correlation time of the torque [day]")
+        correlation.set_ylabel(r"scatter over $s\sigma$ [1]")
+        losses.set(xlim=(1e-3, 0.3), ylim=(1e-6, 1e4), xlabel=r"torque noise, $\sigma$, white [1]")
+        losses.set_ylabel("mean loss [s/day]")
+        page.legend(*correlation.get_legend_handles_labels(), loc="outside upper center", ncols=3)
+        scatter.plot([], [], "o-", color="black", markerfacecolor="white", label="white")
+        scatter.plot([], [], "o", color="black", linestyle=(0, (5, 1.5)), label="of a day")
+        scatter.legend(loc="lower right", title="torque noise", borderaxespad=0.2)
+    return page
 
 
 def lasts(ds: xr.Dataset, tau_c: Any) -> Any:
@@ -253,28 +231,15 @@ def lasts(ds: xr.Dataset, tau_c: Any) -> Any:
     return float(ds["T"]) / DAY / 2 * (1 + r) / (1 - r)
 
 
-def draw_losses(axes: Any, ds: xr.Dataset, name: str, colour: str, mark: str) -> None:
-    """Mean loss by white noise where it is known to half of itself, with (2)."""
-    part = ds.isel(tau_c=0).sel(sigma=ds.gain.isel(tau_c=0) < -2 * ds.gain_error.isel(tau_c=0))
-    axes.errorbar(
-        part.sigma, -part.gain, part.gain_error, fmt=mark, color=colour, markerfacecolor="white", linewidth=0.8
-    )
-    wide = np.geomspace(1e-3, 0.3, 2)
-    axes.loglog(wide, second_order(ds, 0.0) * wide**2, color=colour)
-    axes.set(
-        xlim=(1e-3, 0.3), ylim=(1e-6, 1e4), xlabel=r"torque noise, $\sigma$, white [1]", ylabel="mean loss [s/day]"
-    )
-
-
-def conclude(*paths: str) -> tuple[Groups, list[str], Any]:
+def conclude(*paths: str) -> Conclusion:
     """Statements, tables and the figure."""
-    clocks = {name: read(path, toml) for (name, toml), path in zip(CLOCKS.items(), paths, strict=True)}
-    groups: Groups = {name: clock_statements(name, ds) for name, ds in clocks.items()}
+    clocks = {name: read(path, study) for (name, study), path in zip(CLOCKS.items(), paths, strict=True)}
+    groups = {name: clock_statements(name, ds) for name, ds in clocks.items()}
     groups["Lasting changes, eps/s"] = lasting(clocks)
     return groups, [*table(clocks), "", *in_words(clocks)], lambda: figure(clocks)
 
 
-main = partial(report, __file__, [toml.replace(".toml", ".h5") for toml in CLOCKS.values()], conclude=conclude)
+main = partial(report, __file__, [f"{study}.h5" for study in CLOCKS.values()], conclude=conclude)
 
 
 if __name__ == "__main__":

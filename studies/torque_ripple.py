@@ -27,7 +27,9 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, compared, differing, direct_label, page_of, read_result, report
+from _common import Conclusion, Statement, compared, differing, most, power, read_result, report
+from _figures import direct_label, page_of
+from matplotlib.lines import Line2D
 from scipy.optimize import brentq
 
 from sweep.show.charts import COLOURS, DASHES
@@ -95,86 +97,63 @@ def scaled(ds: xr.Dataset) -> xr.Dataset:
     return ds.assign(K=at_0["change"], L=at_0["change_s"], curvature=curvature)
 
 
+def degree(line: xr.Dataset, harmonic: int) -> float:
+    """Exponent of the depth in |P/P0 - 1| about depth 0.02."""
+    return power(line.change.sel(harmonic=harmonic, depth=slice(0.01, 0.05)))
+
+
 def linear(ds: xr.Dataset) -> list[Statement]:
     """First order in the depth: the coefficients against (1), and how far the period really is linear in the depth."""
     lines = []
-    for name, line in zip(DRIVES, (ds.isel(a=i) for i in range(3)), strict=True):
-        alpha, h = float(line.alpha), line.harmonic.values
-        off = abs(line.K - first_order(alpha, h)).max().item()
+    for i, name in enumerate(DRIVES):
+        line, h = ds.isel(a=i), ds.harmonic.values
+        alpha, text = float(line.alpha), f"{h.size} harmonics"
         expected = first_order_sensitivity(alpha, h)
-        off_s = (abs(line.L - expected) / np.maximum(abs(expected), 1)).max().item()
-        lines += [
-            Statement(f"{name}, alpha = {alpha:.4g}: worst of K", "(1)", f"{len(h)} harmonics", off, off < SLACK),
-            Statement(
-                "  worst of ds/ddepth, over 1 or itself", "(1)", f"{len(h)} harmonics", off_s, off_s < 10 * SLACK
-            ),
-        ]
-    return [
-        *lines,
-        *(
-            differing(f"{DRIVES[i]}: power of the depth, h = 1", "1", degree(ds.isel(a=i), 1), 1, 0.05, 4)
-            for i in (1, 2)
-        ),
-    ]
-
-
-def degree(line: xr.Dataset, harmonic: int) -> float:
-    """Exponent of the depth in |P/P0 - 1| about depth 0.02."""
-    part = line.change.sel(harmonic=harmonic, depth=slice(0.01, 0.05))
-    return float(np.polyfit(np.log(part.depth), np.log(abs(part)), 1)[0])
-
-
-def falls(ds: xr.Dataset) -> list[Statement]:
-    """High harmonics: amplitudes, freed of their phases, against (2) and its slope in alpha."""
-    lines = []
+        off = (line.L - expected) / np.maximum(abs(expected), 1)
+        lines.append(
+            most(f"{name}, alpha = {alpha:.4g}: worst of K", "(1)", line.K - first_order(alpha, h), SLACK, text)
+        )
+        lines.append(most("  worst of ds/ddepth, over 1 or itself", "(1)", off, 10 * SLACK, text))
     for i in (1, 2):
-        period, rate = amplitudes(ds.isel(a=i))
-        lines += [
-            differing(f"{DRIVES[i]}: power of the harmonic in K", "-1/2", power(period), -0.5, 0.05, 4),
-            compared("  K over its envelope", "1", height(period), 1, 0.05, 4),
-            differing("  power of the harmonic in ds/ddepth", "+1/2", power(rate), 0.5, 0.05, 4),
-            compared("  ds/ddepth over its envelope", "1", height(rate), 1, 0.05, 4),
-        ]
+        lines.append(differing(f"{DRIVES[i]}: power of the depth, h = 1", "1", degree(ds.isel(a=i), 1), 1, 0.05, 4))
     return lines
 
 
-def amplitudes(line: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray]:
-    """K and ds/ddepth over cosine and sine of the phase in (2), from harmonic 16 on and away from zeros.
+def falls(ds: xr.Dataset) -> list[Statement]:
+    """High harmonics: amplitudes, freed of their phases, against (2) and its slope in alpha.
 
-    Each has its `envelope` as a coordinate.
+    They are K and ds/ddepth over cosine and sine of the phase in (2), from harmonic 16 on and away from zeros. The
+    power is NaN if signs differ.
     """
-    alpha, h = float(line.alpha), line.harmonic
-    of_period, of_rate = (("harmonic", y) for y in envelopes(alpha, h.values))
-    phase = math.pi / 4 - h * math.pi * (amplitude(alpha) - 1) / 2
-    far = h >= 16
-    period = (
-        (line.K / -np.cos(phase)).assign_coords(envelope=of_period).where(far & (abs(np.cos(phase)) > 0.7), drop=True)
-    )
-    rate = (line.L / np.sin(phase)).assign_coords(envelope=of_rate).where(far & (abs(np.sin(phase)) > 0.7), drop=True)
-    return period, rate
+    lines = []
+    for i in (1, 2):
+        line, h = ds.isel(a=i), ds.harmonic
+        alpha = float(line.alpha)
+        phase = math.pi / 4 - h * math.pi * (amplitude(alpha) - 1) / 2
+        for name, y, wave, envelope, expected in zip(
+            ("K", "ds/ddepth"), (line.K, line.L), (-np.cos(phase), np.sin(phase)), envelopes(alpha, h), (-0.5, 0.5),
+            strict=True,
+        ):  # fmt: skip
+            size = (y / wave).where((h >= 16) & (abs(wave) > 0.7), drop=True)
+            exponent = power(size) if abs(np.sign(size).sum()) == size.size else math.nan
+            what = f"{DRIVES[i]}: power" if name == "K" else "  power"
+            theory = "-1/2" if name == "K" else "+1/2"
+            lines += [
+                differing(f"{what} of the harmonic in {name}", theory, exponent, expected, 0.05, 4),
+                compared(f"  {name} over its envelope", "1", (size / envelope).mean(), 1, 0.05, 4),
+            ]
+    return lines
 
 
-def power(y: xr.DataArray) -> float:
-    """Exponent of the harmonic; NaN if the signs differ."""
-    return float(np.polyfit(np.log(y.harmonic), np.log(abs(y)), 1)[0]) if abs(np.sign(y).sum()) == y.size else math.nan
-
-
-def height(y: xr.DataArray) -> float:
-    """Mean of an amplitude over its envelope."""
-    return float((y / y.envelope).mean())
-
-
-def weak(ds: xr.Dataset) -> list[Statement]:
+def weak(line: xr.Dataset) -> list[Statement]:
     """Weak drive: the mean of 1/torque, quadratic and the same for all harmonics that inertia does not blur."""
-    line = ds.isel(a=0)
-    alpha, even = float(line.alpha), line.sel(harmonic=2)
-    half = even.change.sel(depth=0.5).item()
+    alpha, even, whole = float(line.alpha), line.sel(harmonic=2), 1 / 0.75**0.5 - 1
     return [
         differing("power of the depth, h = 2", "2", degree(line, 2), 2, 0.1, 4),
-        compared("P/P0 - 1 over depth^2, h = 2", "1/2", even.curvature.item(), 0.5, 2 * alpha, 4),
-        compared("P/P0 - 1 at depth 0.5, h = 2", f"{1 / 0.75**0.5 - 1:.4f}", half, 1 / 0.75**0.5 - 1, 3 * alpha, 4),
-        compared("K/alpha, h = 1", "-2", line.K.sel(harmonic=1).item() / alpha, -2, 2 * alpha, 4),
-        differing("K/alpha, h = 2", "0", even.K.item() / alpha, 0, alpha, 2),
+        compared("P/P0 - 1 over depth^2, h = 2", "1/2", even.curvature, 0.5, 2 * alpha, 4),
+        compared("P/P0 - 1 at depth 0.5, h = 2", f"{whole:.4f}", even.change.sel(depth=0.5), whole, 3 * alpha, 4),
+        compared("K/alpha, h = 1", "-2", line.K.sel(harmonic=1) / alpha, -2, 2 * alpha, 4),
+        differing("K/alpha, h = 2", "0", even.K / alpha, 0, alpha, 2),
     ]
 
 
@@ -183,38 +162,47 @@ def in_words(ds: xr.Dataset) -> list[str]:
     text = ["A RIPPLE OF A TENTH OF THE TORQUE, all harmonics"]
     for i, name in enumerate(DRIVES):
         line = ds.isel(a=i).sel(depth=0.1)
-        change, of_s = abs(line.change), abs(line.change_s / float(ds.sensitivity.isel(a=i).sel(depth=0, harmonic=1)))
+        change, of_s = abs(line.change), abs(line.change_s / ds.sensitivity.isel(a=i).sel(depth=0, harmonic=1))
         h, h_s = (int(y.harmonic[int(y.argmax("harmonic"))]) for y in (change, of_s))
-        text.append(
-            f"{name} drive: P changes by up to {change.max():.2%} (h = {h}), "
-            f"s by up to {of_s.max():.1%} of itself (h = {h_s})"
-        )
+        by_period = f"P changes by up to {change.max():.2%} (h = {h})"
+        text.append(f"{name} drive: {by_period}, s by up to {of_s.max():.1%} of itself (h = {h_s})")
     return [*text, "", *ANSWER]
 
 
 def figure(ds: xr.Dataset) -> Any:
-    """Change of the period against depth; first-order coefficients of period and sensitivity against the harmonic."""
-    with page_of(82.0, 1, 3) as (page, panels):
-        draw_depths(panels[0], ds)
-        draw_harmonics(panels[1], ds, ds.K, first_order, 0)
-        draw_harmonics(panels[2], ds, ds.L, first_order_sensitivity, 1)
-        panels[1].set(ylim=(2e-5, 2), ylabel=r"$|\mathrm{d}\ln P/\mathrm{d}\,\mathrm{depth}|$ at depth 0 [1]")
-        panels[2].set(ylim=(2e-3, 20), ylabel=r"$|\mathrm{d}s/\mathrm{d}\,\mathrm{depth}|$ at depth 0 [1]")
-        page.legend(handles=[*panels[1].get_legend_handles_labels()[0], *keys()], loc="outside upper center", ncols=3)
-        direct_label(panels[1], 20, 0.25, "$h^{-1/2}$")
-        direct_label(panels[2], 3, 2.6, "$h^{1/2}$")
+    """Change of the period against depth; first-order coefficients of period and sensitivity against the harmonic.
+
+    Of the coefficients marks are the kernel's, a dot is theory, and dashes are the envelopes of (2).
+    """
+    with page_of(82.0, 1, 3) as (page, (depths, of_period, of_rate)):
+        draw_depths(depths, ds)
+        some = np.intersect1d(ds.harmonic, np.geomspace(1, 64, 30).round())
+        for which, (axes, found, theory) in enumerate(
+            ((of_period, ds.K, first_order), (of_rate, ds.L, first_order_sensitivity))
+        ):
+            for i, mark in enumerate("os^"):
+                alpha, name = float(ds.alpha[i]), rf"{DRIVES[i]}, $\alpha = {float(ds.alpha[i]):.3g}$"
+                size = abs(found.isel(a=i).sel(harmonic=some))
+                axes.loglog(some, size, mark, color=COLOURS[i], markerfacecolor="white", label=name)
+                axes.plot(some, abs(theory(alpha, some)), ".", color="black", markersize=1.5)
+                if i:
+                    look = {"color": COLOURS[i], "linestyle": (0, (5, 1.5)), "linewidth": 0.8}
+                    axes.plot(some, envelopes(alpha, some)[which], **look)
+            axes.set(xlim=(0.9, 72), xlabel="harmonic, $h$ [1]")
+        of_period.set(ylim=(2e-5, 2), ylabel=r"$|\mathrm{d}\ln P/\mathrm{d}\,\mathrm{depth}|$ at depth 0 [1]")
+        of_rate.set(ylim=(2e-3, 20), ylabel=r"$|\mathrm{d}s/\mathrm{d}\,\mathrm{depth}|$ at depth 0 [1]")
+        direct_label(of_period, 20, 0.25, "$h^{-1/2}$")
+        direct_label(of_rate, 3, 2.6, "$h^{1/2}$")
+        dot = {"color": "black", "marker": ".", "markersize": 3, "linestyle": ""}
+        dashes = {"color": "0.3", "linestyle": (0, (5, 1.5)), "linewidth": 0.8}
+        keys = [
+            *of_period.get_legend_handles_labels()[0],
+            Line2D([], [], label="(b, c) theory of first order", **dot),
+            Line2D([], [], label="(b, c) its envelope", **dashes),
+            Line2D([], [], label="(a) change of 1 % and of 1 min a day", color="0.6", linewidth=0.6),
+        ]
+        page.legend(handles=keys, loc="outside upper center", ncols=3)
     return page
-
-
-def keys() -> list[Any]:
-    """What marks and lines mean, whatever their colour."""
-    from matplotlib.lines import Line2D
-
-    return [
-        Line2D([], [], color="black", marker=".", markersize=3, linestyle="", label="(b, c) theory of first order"),
-        Line2D([], [], color="0.3", linestyle=(0, (5, 1.5)), linewidth=0.8, label="(b, c) its envelope"),
-        Line2D([], [], color="0.6", linewidth=0.6, label="(a) change of 1 % and of 1 min a day"),
-    ]
 
 
 def draw_depths(axes: Any, ds: xr.Dataset) -> None:
@@ -227,29 +215,17 @@ def draw_depths(axes: Any, ds: xr.Dataset) -> None:
     for name, limit in LIMITS.items():
         axes.axhline(limit, color="0.6", linewidth=0.6, zorder=0)
         direct_label(axes, 0.6, limit, name, "0.35", fontsize=7)
-    axes.annotate("changes sign", (0.14, 6e-4), (0.03, 4e-6), color=COLOURS[0], fontsize=7, ha="center",
-                  arrowprops={"arrowstyle": "->", "linewidth": 0.6, "color": COLOURS[0]})  # fmt: skip
+    arrow = {"arrowstyle": "->", "linewidth": 0.6, "color": COLOURS[0]}
+    look = {"color": COLOURS[0], "fontsize": 7, "ha": "center", "arrowprops": arrow}
+    axes.annotate("changes sign", (0.14, 6e-4), (0.03, 4e-6), **look)
     axes.legend(loc="upper left")
     axes.set(xlim=(2e-3, 1), ylim=(1e-6, 3), xlabel="depth of the ripple [1]", ylabel="$|P/P_0 - 1|$ [1]")
 
 
-def draw_harmonics(axes: Any, ds: xr.Dataset, found: xr.DataArray, theory: Any, which: int) -> None:
-    """A coefficient at some harmonics, theory as a dot, and the envelopes of (2)."""
-    h = np.intersect1d(ds.harmonic, np.geomspace(1, 64, 30).round())
-    for i, mark in enumerate("os^"):
-        alpha = float(ds.alpha[i])
-        axes.loglog(h, abs(found.isel(a=i).sel(harmonic=h)), mark, color=COLOURS[i], markerfacecolor="white",
-                    label=rf"{DRIVES[i]}, $\alpha = {alpha:.3g}$")  # fmt: skip
-        axes.plot(h, abs(theory(alpha, h)), ".", color="black", markersize=1.5)
-        if i:
-            axes.plot(h, envelopes(alpha, h)[which], color=COLOURS[i], linestyle=(0, (5, 1.5)), linewidth=0.8)
-    axes.set(xlim=(0.9, 72), xlabel="harmonic, $h$ [1]")
-
-
-def conclude(path: str) -> tuple[Groups, list[str], Any]:
+def conclude(path: str) -> Conclusion:
     """Statements, the answer in words, and the figure."""
     ds = scaled(read_result(path, "foliot_ripple", ["a", "harmonic", "depth"], "torque_ripple.toml"))
-    groups = {"First order in the depth": linear(ds), "High harmonics": falls(ds), "Weak drive": weak(ds)}
+    groups = {"First order in the depth": linear(ds), "High harmonics": falls(ds), "Weak drive": weak(ds.isel(a=0))}
     return groups, in_words(ds), lambda: figure(ds)
 
 
