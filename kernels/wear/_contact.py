@@ -9,7 +9,6 @@ misjudge counts as noise. Source: derived here; (2) is DLMF 8.17.7.
 """
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
@@ -17,7 +16,7 @@ from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.vectors import magnitude, sqrt
 from kernels.maths.small_dense import sort
 from kernels.wear import _tool
-from kernels.wear._tool import PIECES, arctan2, mirrored, outline, power, sincos
+from kernels.wear._tool import PIECES, Circle, arctan2, outline, power, sincos
 
 POINTS = (2 * (_tool.ARC_LIMIT + 2 * PIECES), 3)
 """Shape of a list of points on the edge of a disc: its direction from the centre, X and Y."""
@@ -27,20 +26,6 @@ _TERMS = 80
 _ASIDE = 0.38
 _SLACK = 1e-9
 _TURN = 2.0 * math.pi
-
-
-class Room(NamedTuple):
-    """Space for crossings of a piece, points of `POINTS`, and the stack of intervals."""
-
-    found: np.ndarray
-    points: np.ndarray
-    stack: np.ndarray
-
-
-@jit_apart
-def room():
-    """A `Room`."""
-    return Room(np.empty(_tool.ARC_LIMIT), np.empty(POINTS), np.empty(_tool.STACK))
 
 
 @jit_apart
@@ -69,17 +54,9 @@ def sector(piece, x, tool):
 
 
 @jit_apart
-def whole_area(tool):
-    """Area of the tool."""
-    low, _, _ = sector(0.0, 1.0, tool)
-    high, _, _ = sector(1.0, 1.0, tool)
-    return 4.0 * (low + high)
-
-
-@jit_apart
 def _outline_within(piece, mirror, tool, disc, count, room):
     """Adds the points of half a piece on the disc's edge; its share of (1), what it may be wrong by, and the count."""
-    seen, found, first = mirrored(disc, mirror), room.found, np.int64(1)
+    seen, found, first = Circle(disc.x, mirror * disc.y, disc.radius), room.found, np.int64(1)
     start = _tool.vertex_excess(piece, tool, seen)
     found[0] = 0.0
     number = _tool.crossings(piece, tool, seen, start, found, first, room.stack)
@@ -119,15 +96,6 @@ def _on_edge(x, y, disc):
     return magnitude(_beyond(x, y, disc)) <= 4.0 * _EPS * far * far
 
 
-@jit
-def _bulge(t):
-    """t - sin t, for t >= 0."""
-    if t > 0.5:
-        return t - sincos(t)[0]
-    y = t * t
-    return t * y / 6.0 * (1.0 - y / 20.0 * (1.0 - y / 42.0 * (1.0 - y / 72.0 * (1.0 - y / 110.0 * (1.0 - y / 156.0)))))
-
-
 @jit_apart
 def _arc_within(tool, disc, one, two, turn):
     """Share of (1) of the arc of the disc's edge between two points, by about `turn`, and what it may be wrong by."""
@@ -138,7 +106,11 @@ def _arc_within(tool, disc, one, two, turn):
         turn = magnitude(arctan2(u * dy - v * dx, u * (u + dx) + v * (v + dy)))
     s, c = sincos(one[0] + _ASIDE * turn)
     beyond = _tool.excess(tool, cx + radius * c, cy + radius * s)
-    share = 0.5 * (x * dy - y * dx) + 0.5 * radius * radius * _bulge(turn)
+    y2, bulge = turn * turn, turn - sincos(turn)[0]  # t - sin t
+    if not turn > 0.5:
+        bulge = 1.0 - y2 / 42.0 * (1.0 - y2 / 72.0 * (1.0 - y2 / 110.0 * (1.0 - y2 / 156.0)))
+        bulge = turn * y2 / 6.0 * (1.0 - y2 / 20.0 * bulge)
+    share = 0.5 * (x * dy - y * dx) + 0.5 * radius * radius * bulge
     far = radius + magnitude(cx) + magnitude(cy) + tool.a + tool.b
     sides = magnitude(x * dy) + magnitude(y * dx)
     noise = 4.0 * _EPS * (sides + magnitude(share) + far * (magnitude(dx) + magnitude(dy)))
@@ -148,43 +120,42 @@ def _arc_within(tool, disc, one, two, turn):
 
 
 @jit_apart
-def _edge_within(tool, disc, points, count):
-    """Share of (1) of all arcs of the disc's edge within the tool, and what it may be wrong by."""
-    if count == 0:
-        inside = _tool.excess(tool, disc.x + disc.radius, disc.y) < 0.0
-        area = math.pi * disc.radius * disc.radius if inside else 0.0
-        return area, 4.0 * _EPS * area
-    for i in range(1, count):  # by their direction
-        j = i
-        while j > 0 and points[j - 1, 0] > points[j, 0]:
-            for c in range(3):
-                points[j - 1, c], points[j, c] = points[j, c], points[j - 1, c]
-            j -= 1
-    total, noise = 0.0, 0.0
-    for j in range(count):
-        k = j + 1 if j + 1 < count else 0
-        turn = points[k, 0] - points[j, 0] + (_TURN if k == 0 else 0.0)
-        share, doubt = _arc_within(tool, disc, points[j], points[k], turn)
-        total, noise = total + share, noise + doubt
-    return total, noise
-
-
-@jit_apart
 def contact_area(tool, whole, disc, room):
-    """Area of the tool within the disc (a `Circle`), and what it may be wrong by; whole: `whole_area`."""
+    """Area of the tool within the disc (a `Circle`), and what it may be wrong by.
+
+    whole : area of the tool
+    room : a `_pressure.Memory`, for crossings of a piece, points of `POINTS`, and the stack of intervals
+    """
     x, y, radius = magnitude(disc.x), magnitude(disc.y), disc.radius
     if sqrt((x + tool.a) * (x + tool.a) + (y + tool.b) * (y + tool.b)) <= radius:
         return whole, 4.0 * _EPS * whole
     left, below = max(x - tool.a, 0.0), max(y - tool.b, 0.0)
     if sqrt(left * left + below * below) >= radius:
         return 0.0, 0.0
-    total, noise, count = 0.0, 0.0, np.int64(0)
+    # along the outline
+    total, noise, count, points = 0.0, 0.0, np.int64(0), room.points
     for k in range(2 * PIECES):
         share, doubt, count = _outline_within(float(k // 2), -1.0 if k % 2 else 1.0, tool, disc, count, room)
         total, noise = total + share, noise + doubt
-    share, doubt = _edge_within(tool, disc, room.points, count)
+
+    # arcs of the disc's edge between the points on it, by their direction
+    arcs, doubts = 0.0, 0.0
+    if count == 0 and _tool.excess(tool, disc.x + radius, disc.y) < 0.0:
+        arcs, doubts = math.pi * radius * radius, 4.0 * _EPS * (math.pi * radius * radius)
+    for i in range(1, count):
+        j = i
+        while j > 0 and points[j - 1, 0] > points[j, 0]:
+            for c in range(3):
+                points[j - 1, c], points[j, c] = points[j, c], points[j - 1, c]
+            j -= 1
+    for j in range(count):
+        k = j + 1 if j + 1 < count else 0
+        turn = points[k, 0] - points[j, 0] + (_TURN if k == 0 else 0.0)
+        share, doubt = _arc_within(tool, disc, points[j], points[k], turn)
+        arcs, doubts = arcs + share, doubts + doubt
+
     most = min(whole, math.pi * radius * radius)
-    total, noise = total + share, noise + doubt
+    total, noise = total + arcs, noise + doubts
     if not (total >= -_SLACK * most - noise and total <= (1.0 + _SLACK) * most + noise):
         return min(max(total, 0.0), most), most
     return min(max(total, 0.0), most), noise

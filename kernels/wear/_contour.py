@@ -72,15 +72,6 @@ class Sight(NamedTuple):
     blur: float
 
 
-class Margins(NamedTuple):
-    """rho^2, rho^2 - (w-r)^2, (w+r)^2 - rho^2 of an outline's point, and their rounding, absolute."""
-
-    rho2: float
-    near: float
-    wide: float
-    noise: float
-
-
 SPARE = (5, GROUP)
 """Shape of a scene's spare."""
 
@@ -88,47 +79,20 @@ SPARE = (5, GROUP)
 @jit
 def _passage(scene, c, s, top, bottom, polish, arc):
     """Sum over the strokes of E dtheta/dphi at one angle of the arm; `polish(p, q, arc)` is E."""
-    strokes = _dwell.strokes(scene.arm, c, s, top, bottom)
-    forth = strokes.forth_dwell * _polish(scene, strokes.forth, polish, arc)
+    ride, strokes = scene.ride, _dwell.strokes(scene.arm, c, s, top, bottom)
+    p, q = extremes(ride.speed * strokes.forth, ride.spin, scene.r, ride.w)
+    forth = strokes.forth_dwell * polish(p, q, arc)
     if scene.arm.whirls:
         return forth
-    back = strokes.back_dwell * _polish(scene, strokes.back, polish, arc)
+    p, q = extremes(ride.speed * strokes.back, ride.spin, scene.r, ride.w)
+    back = strokes.back_dwell * polish(p, q, arc)
     return where(strokes.back_dwell > 0.0, back, 0.0) + forth
-
-
-@jit
-def _polish(scene, rate, polish, arc):
-    p, q = extremes(scene.ride.speed * rate, scene.ride.spin, scene.r, scene.ride.w)
-    return polish(p, q, arc)
-
-
-@jit
-def _along(p, q, arc):
-    return along_arc(p, q, arc.s, arc.c)
-
-
-@jit
-def _half(p, q, arc):
-    return half_circle(p, q)
 
 
 @jit
 def from_frame(ride, c, s):
     """Cosine and sine from the frame, of an angle (c, s) from the direction of w."""
     return ride.turn_c * c - ride.turn_s * s, ride.turn_s * c + ride.turn_c * s
-
-
-@jit
-def _weight(scene, there, c, s):
-    """`_pressure.weight` at the angles of all lanes that are there; tabulated areas are looked up one by one."""
-    areas, rows, i = scene.areas, scene.spare, cells_at(0)
-    if areas.panels == 0:
-        return 1.0 + 0.0 * s, 0.0 * s, 0.0 * s
-    rows[0][i], rows[1][i] = where(there, c, _NO_ANGLE), s
-    for lane in range(GROUP):
-        if rows[0][lane] < _NO_ANGLE:
-            rows[2][lane], rows[3][lane], rows[4][lane] = _pressure.weight(areas, rows[0][lane], rows[1][lane])
-    return rows[2][i], rows[3][i], rows[4][i]
 
 
 @jit_call
@@ -140,8 +104,15 @@ def _at_angle(scene, c, s, arc, blur):
     cosine, sine = from_frame(scene.ride, c, s)
     top, bottom, noise = _dwell.gaps(scene.arm, cosine, sine)
     there = (top > 0.0) & (bottom > 0.0) & ((sine > 0.0) | scene.arm.whirls)
-    weight, doubt, slope = _weight(scene, there, c, s)
-    total = weight * _passage(scene, cosine, sine, top, bottom, _along, arc)
+    areas, rows, i = scene.areas, scene.spare, cells_at(0)
+    weight, doubt, slope = 1.0 + 0.0 * s, 0.0 * s, 0.0 * s
+    if areas.panels > 0:  # tabulated areas are looked up one by one
+        rows[0][i], rows[1][i] = where(there, c, _NO_ANGLE), s
+        for lane in range(GROUP):
+            if rows[0][lane] < _NO_ANGLE:
+                rows[2][lane], rows[3][lane], rows[4][lane] = _pressure.weight(areas, rows[0][lane], rows[1][lane])
+        weight, doubt, slope = rows[2][i], rows[3][i], rows[4][i]
+    total = weight * _passage(scene, cosine, sine, top, bottom, along_arc, arc)
     noise = total * (noise * blur + (doubt + 4.0 * _EPS * slope * blur))
     return where(there, total, 0.0), where(there, noise, 0.0)
 
@@ -162,40 +133,31 @@ def vertex_margins(piece, scene):
     return near if magnitude(near) > least else 0.0, wide if magnitude(wide) > least else 0.0
 
 
-@jit
-def _margins(piece, spot, scene):
-    """The `Margins` of a spot of the outline.
-
-    From the vertex on, as `crossings` has it: what rounds at the vertex rounds alike where panels are split.
-    """
-    x, y, missing, reach, tool = spot.x, spot.y, spot.missing, scene.ride.reach, scene.tool
-    far = reach + x
-    rho2 = far * far + y * y
-    near, wide = vertex_margins(piece, scene)
-    if not _tool.on_x_axis(piece):
-        inward, aside = missing * (missing - 2.0 * tool.b), x * (x + 2.0 * reach)
-        noise = 4.0 * _EPS * (magnitude(inward) + magnitude(aside))
-        return Margins(rho2, near + (inward + aside), -(wide + (inward + aside)), noise)
-    side = _tool.side_of(piece)
-    inward = missing * (missing - 2.0 * side * (reach + side * tool.a))
-    noise = 2.0 * _EPS * (magnitude(inward) + y * y)
-    return Margins(rho2, near + (inward + y * y), -(wide + (inward + y * y)), noise)
-
-
 @jit_call
 def about_pivot(scene, piece, spot):
     """The `Sight` of a spot of the outline; its rounding is infinite where that is not on the ring."""
-    w, r = scene.ride.w, scene.r
-    rho2, near, wide, noise = _margins(piece, spot, scene)
+    w, r, reach, tool = scene.ride.w, scene.r, scene.ride.reach, scene.tool
+    x, y, missing, far = spot.x, spot.y, spot.missing, reach + spot.x
+    rho2 = far * far + y * y
+    # rho^2 - (w-r)^2, (w+r)^2 - rho^2 from the vertex on, as `crossings` has them: what rounds at the vertex rounds
+    # alike where panels are split
+    if _tool.on_x_axis(piece):
+        side = _tool.side_of(piece)
+        inward, aside, rough = missing * (missing - 2.0 * side * (reach + side * tool.a)), y * y, 2.0
+    else:
+        inward, aside, rough = missing * (missing - 2.0 * tool.b), x * (x + 2.0 * reach), 4.0
+    noise = rough * _EPS * (magnitude(inward) + magnitude(aside))
+    near_vertex, wide_vertex = vertex_margins(piece, scene)
+    near, wide = near_vertex + (inward + aside), -(wide_vertex + (inward + aside))
     there = (near > 0.0) & (wide > 0.0) & (rho2 > 0.0)
     rho2, near, wide = where(there, rho2, 1.0), where(there, near, 1.0), where(there, wide, 1.0)
-    far, rho, area = scene.ride.reach + spot.x, sqrt(rho2), sqrt(near) * sqrt(wide)
+    rho, area = sqrt(rho2), sqrt(near) * sqrt(wide)
     chi = Direction(0.5 * ((w - r) * (w + r) + rho2) / (w * rho), 0.5 * area / (w * rho))
-    outward = far * spot.dx + spot.y * spot.dy
+    outward = far * spot.dx + y * spot.dy
     chi_slope = -(rho2 - (w - r) * (w + r)) * outward / (rho2 * area)
-    gamma_slope = (far * spot.dy - spot.y * spot.dx) / rho2
+    gamma_slope = (far * spot.dy - y * spot.dx) / rho2
     arc = Direction(sqrt(smaller(0.25 * near / (w * r), 1.0)), sqrt(smaller(0.25 * wide / (w * r), 1.0)))
-    gamma = Direction(far / rho, spot.y / rho)
+    gamma = Direction(far / rho, y / rho)
     blur = where(there, 4.0 * _EPS + noise / near + noise / wide, math.inf)
     return Sight(chi, gamma, chi_slope, gamma_slope, arc, blur)
 
@@ -214,9 +176,10 @@ def _on_outline(piece, x, scene):
     there = sight.blur < math.inf
     blur = where(there, sight.blur, 0.0)
     total, noise, turned = 0.0 * x, 0.0 * x, 1.0 + blur * sight.chi.s / _EPS
+    sense = 1.0 if piece == 0.0 or piece == 3.0 else -1.0  # whether x runs counterclockwise about the tool
     for side in (1.0, -1.0):
         c, s = phi_of(sight, side)
-        slope = _tool.sense(piece) * (side * sight.chi_slope - sight.gamma_slope)
+        slope = sense * (side * sight.chi_slope - sight.gamma_slope)
         for half in (1.0, -1.0):
             value, doubt = _at_angle(scene, c, half * s, sight.arc, turned)
             total = total + slope * value
@@ -244,36 +207,28 @@ def far_side_alone(scene, pose):
     """2 E(theta, pi) dtheta/du."""
     if not (scene.arm.whirls or (pose.top > 0.0 and pose.bottom > 0.0)):
         return 0.0
-    return 2.0 * pose.growth * _passage(scene, pose.c, pose.s, pose.top, pose.bottom, _half, 0.0)
-
-
-@jit_apart
-def _far_side(u, scene):
-    """Integrand of the second integral of (2), both halves."""
-    pose = _dwell.pose_at(scene.arm, u)
-    weight, doubt = pressed(scene, pose.c, pose.s)
-    total = far_side_alone(scene, pose) * weight
-    return total, total * (pose.noise + doubt)
-
-
-@jit_apart
-def _on_pivot(u, scene):
-    """Integrand of int v dtheta over the strokes for a work on the pivot, where v does not hang on psi."""
-    arm, spin, pose = scene.arm, scene.ride.spin, _dwell.pose_at(scene.arm, u)
-    strokes, speed = _dwell.strokes(arm, pose.c, pose.s, pose.top, pose.bottom), scene.ride.speed
-    back, forth = magnitude(speed * strokes.back - spin), magnitude(speed * strokes.forth - spin)
-    total = strokes.back_dwell * back + strokes.forth_dwell * forth
-    return pose.growth * scene.r * total, 4.0 * _EPS * pose.growth * scene.r * total
+    return 2.0 * pose.growth * _passage(scene, pose.c, pose.s, pose.top, pose.bottom, half_circle, 0.0)
 
 
 @jit
 def integrand(kind, nodes, count, scene):
-    """The integrand of a panel of that kind and its rounding at its nodes."""
+    """The integrand of a panel of that kind and its rounding at its nodes: of (2), or of a work on the pivot."""
     if kind < FAR_SIDE:
         along_outline(kind, nodes, count, scene)
         return
+    arm, ride = scene.arm, scene.ride
     for j in range(count):
+        pose = _dwell.pose_at(arm, nodes.x[j])
         if kind == FAR_SIDE:
-            nodes.value[j], nodes.doubt[j] = _far_side(nodes.x[j], scene)
-        else:
-            nodes.value[j], nodes.doubt[j] = _on_pivot(nodes.x[j], scene)
+            weight, doubt = pressed(scene, pose.c, pose.s)
+            nodes.value[j] = far_side_alone(scene, pose) * weight
+            nodes.doubt[j] = nodes.value[j] * (pose.noise + doubt)
+        else:  # int v dtheta over the strokes, where v does not hang on psi
+            strokes = _dwell.strokes(arm, pose.c, pose.s, pose.top, pose.bottom)
+            back, forth = (
+                magnitude(ride.speed * strokes.back - ride.spin),
+                magnitude(ride.speed * strokes.forth - ride.spin),
+            )
+            total = strokes.back_dwell * back + strokes.forth_dwell * forth
+            nodes.value[j] = pose.growth * scene.r * total
+            nodes.doubt[j] = 4.0 * _EPS * pose.growth * scene.r * total

@@ -147,7 +147,7 @@ def find_stops(scene, still):
 
     Those of (4) are shut in between samples, then found by the Illinois rule.
 
-    scene : of `_profile`
+    scene : of `_contour`
     """
     arm, speed, w, r, turned = scene.arm, scene.ride.speed, scene.ride.w, scene.r, scene.ride.spin * scene.r
     first, last = span(arm)

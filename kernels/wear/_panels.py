@@ -1,4 +1,4 @@
-"""Panels of the integrals of `_contour`: where they are split.
+"""Wear at one radius, by panels of the integrals of `_contour`, and what needs no integral.
 
 The integrands are smooth but for ends of contact at rho = abs(w +- r), where the arm turns and where v is 0
 (`_dwell`): crossings of circles with the outline, where panels are split. Derived here.
@@ -12,21 +12,27 @@ import numpy as np
 from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.vectors import magnitude, sqrt
 from kernels.maths import quadrature
-from kernels.maths.quadrature import ROOM, Nodes, open_panel
+from kernels.maths.quadrature import ROOM, Nodes, adapt, open_panel
 from kernels.maths.small_dense import sort
-from kernels.wear import _dwell, _tool
-from kernels.wear._contour import FAR_SIDE, SPARE, about_pivot, along_outline, from_frame, phi_of, vertex_margins
+from kernels.wear import _dwell, _pressure, _tool
+from kernels.wear._contour import (
+    FAR_SIDE,
+    SPARE,
+    SPIN,
+    about_pivot,
+    along_outline,
+    far_side_alone,
+    from_frame,
+    integrand,
+    phi_of,
+    pressed,
+    vertex_margins,
+)
 from kernels.wear._tool import CROSSING_LIMIT, PIECES, Circle, arctan2, outline, sincos
 
+_EPS = 2.0**-52
 _AT_TURN = 1e-11  # a gap over its largest, or a step: beyond that a split is none where the arm turns
 _TURN = 2.0 * math.pi
-
-
-class Stops(NamedTuple):
-    """Angles of the arm at which wear is not smooth, and how many."""
-
-    angles: np.ndarray
-    count: int
 
 
 class Room(NamedTuple):
@@ -86,39 +92,38 @@ def _settled(x, scene, piece):
 
 
 @jit_apart
-def _splits_of(piece, scene, stops, room):
-    """Puts the ends of a piece's panels into `room`, split where contact ends or v is 0; how many panels.
-
-    Splits are where circles cross the piece: two about the pivot, then those of radius r about the work's centre with
-    the arm at each stop, on either side of it. A circle that coincides with the outline splits none.
-    """
-    tool, ride, r, found, splits = scene.tool, scene.ride, scene.r, room.found, np.int64(1)
-    near, wide = vertex_margins(piece, scene)
-    found[0] = 0.0
-    for j in range(2 + 2 * stops.count):
-        if j < 2:
-            circle, start = Circle(-ride.reach, 0.0, ride.w + r if j else magnitude(ride.w - r)), wide if j else near
-        else:
-            s, c = sincos(stops.angles[j // 2 - 1])
-            x, y = work_centre(scene, c, s)
-            circle = Circle(x, -y if j % 2 else y, r)
-            start = _tool.vertex_excess(piece, tool, circle)
-        if splits + CROSSING_LIMIT < found.size:
-            number = _tool.crossings(piece, tool, circle, start, found, splits, room.stack)
-            for i in range(splits, number if 1 < j < 6 and not scene.arm.whirls else splits):
-                found[i] = _settled(found[i], scene, piece)
-            splits = max(number, splits)
-    found[splits] = 1.0
-    sort(found, splits + 1)
-    return splits
-
-
-@jit_apart
 def open_outline(count, scene, stops, room):
-    """Opens the panels of the contour that have wear amid them; how many panels there are then."""
-    found, nodes = room.found, room.nodes
+    """Opens the panels of the contour that have wear amid them; how many panels there are then.
+
+    Pieces are split where contact ends or v is 0: where circles cross them, two about the pivot, then those of radius r
+    about the work's centre with the arm at each stop, on either side of it. A circle that coincides with the outline
+    splits none.
+    """
+    tool, ride, r, found, nodes = scene.tool, scene.ride, scene.r, room.found, room.nodes
     for k in range(PIECES):
-        piece, splits = float(k), _splits_of(float(k), scene, stops, room)
+        piece, splits = float(k), np.int64(1)
+        near, wide = vertex_margins(piece, scene)
+        found[0] = 0.0
+        for j in range(2 + 2 * stops):
+            if j < 2:
+                circle, start = (
+                    Circle(-ride.reach, 0.0, ride.w + r if j else magnitude(ride.w - r)),
+                    wide if j else near,
+                )
+            else:
+                s, c = sincos(room.still[j // 2 - 1])
+                x, y = work_centre(scene, c, s)
+                circle = Circle(x, -y if j % 2 else y, r)
+                start = _tool.vertex_excess(piece, tool, circle)
+            if splits + CROSSING_LIMIT < found.size:
+                number = _tool.crossings(piece, tool, circle, start, found, splits, room.stack)
+                for i in range(splits, number if 1 < j < 6 and not scene.arm.whirls else splits):
+                    found[i] = _settled(found[i], scene, piece)
+                splits = max(number, splits)
+        found[splits] = 1.0
+        sort(found, splits + 1)
+
+        # no panel where there is nothing amid it
         for first in range(0, splits, ROOM):
             here = min(ROOM, splits - first)
             for j in range(ROOM):
@@ -143,7 +148,7 @@ def _phase(arm, eta):
 
 
 @jit_apart
-def open_split(pool, count, kind, low, high, scene, stops):
+def open_split(room, count, kind, low, high, scene, stops):
     """Opens panels of that kind from arm's angle low to high, split at the stops; how many panels there are then.
 
     None is longer than a quarter of a turn, or half of what the arm rocks: 21 nodes may miss a dwell in all of it.
@@ -153,29 +158,97 @@ def open_split(pool, count, kind, low, high, scene, stops):
     start = low
     while start < high:
         end = min(high, start + longest)
-        for k in range(stops.count):
-            turns = math.floor((stops.angles[k] - start) / _TURN) if arm.whirls else 0.0
-            stop = stops.angles[k] - turns * _TURN
+        for k in range(stops):
+            turns = math.floor((room.still[k] - start) / _TURN) if arm.whirls else 0.0
+            stop = room.still[k] - turns * _TURN
             end = stop if start < stop < end else end
         first = _phase(arm, start)
-        open_panel(pool, count, kind, first, _phase(arm, end) - first)
+        open_panel(room.pool, count, kind, first, _phase(arm, end) - first)
         count += 1
         start = end
     return count
 
 
 @jit_apart
-def open_far_side(pool, scene, angles, number, stops):
+def open_far_side(room, scene, number, stops):
     """Opens the panels of the second integral of (2), from the arcs about the pivot; how many there are."""
-    arm, ride = scene.arm, scene.ride
+    arm, ride, angles = scene.arm, scene.ride, room.angles
     turn = arctan2(ride.turn_s, ride.turn_c) + (math.pi if scene.r > ride.w else 0.0)
     count = np.int64(0)
     for j in range(0, number, 2):
         low, high = turn - angles[j + 1], turn - angles[j]
         if arm.whirls:
-            count = open_split(pool, count, FAR_SIDE, low, high, scene, stops)
+            count = open_split(room, count, FAR_SIDE, low, high, scene, stops)
         else:
             for k in range(-2, 3):
                 first, last = max(low + k * _TURN, arm.least), min(high + k * _TURN, arm.most)
-                count = open_split(pool, count, FAR_SIDE, first, last, scene, stops)
+                count = open_split(room, count, FAR_SIDE, first, last, scene, stops)
     return count
+
+
+@jit_apart
+def _weight_about(scene, angle):
+    """Weight of the pressure where the point at psi = pi is at this angle from the arm; its largest for NaN."""
+    areas, (s, c) = scene.areas, sincos(angle)
+    if angle == angle:
+        return _pressure.weight(areas, -c if scene.r > scene.ride.w else c, s)[0]
+    return 1.0 / max(areas.lowest, _pressure.FAINT * areas.largest) if areas.panels > 0 else 1.0
+
+
+@jit_apart
+def profile(scene, rtol, room):
+    """I(r) of (1) of `_contour`, and its error: inf if it could not be had.
+
+    The circle that counts is that of radius r where the arm stands still (its crank has no throw, or none that float64
+    could tell), else about the pivot.
+    """
+    arm, tool, ride, r, angles = scene.arm, scene.tool, scene.ride, scene.r, room.angles
+    s, c = sincos(arm.least)
+    stands, near, far = not arm.whirls and not arm.most > arm.least, math.nan, math.nan
+    if stands:
+        x, y = work_centre(scene, c, s)
+        circle = Circle(x, y, r)
+    else:
+        circle = Circle(-ride.reach, 0.0, magnitude(ride.w - r))
+        near, far = vertex_margins(0.0, scene)[0], vertex_margins(2.0, scene)[0]
+    number, unsure, about = _tool.arcs(tool, circle, near, far, angles, room.found, room.stack)
+    if number < 0:
+        return math.nan, math.inf
+    length = 0.0
+    for j in range(0, number, 2):
+        length += angles[j + 1] - angles[j]
+    weight, doubt = pressed(scene, c, s)
+    unit = _TURN * magnitude(ride.speed) * ride.w
+    if stands:
+        total = weight * _TURN * magnitude(ride.spin) * r * length
+        return total, (64.0 * _EPS + doubt) * total
+    if ride.w > 0.0 and r == 0.0 and scene.areas.panels == 0:  # the way of the centre, whatever the arm's rate
+        turn, passed = arctan2(ride.turn_s, ride.turn_c), 0.0  # the arm's angle within the arcs
+        for j in range(0, number, 2):
+            low, high = turn - angles[j + 1], turn - angles[j]
+            if arm.whirls:
+                passed += high - low
+            else:  # both strokes
+                for shift in (-_TURN, 0.0, _TURN):
+                    passed += 2.0 * max(min(high + shift, arm.most) - max(low + shift, arm.least), 0.0)
+        return unit * passed, 64.0 * _EPS * unit * (passed + (1.0 if passed > 0.0 else 0.0))
+    stops = _dwell.find_stops(scene, room.still)
+    if ride.w == 0.0:  # about the pivot v is the same all along an arc
+        first, last = _dwell.span(arm) if arm.whirls else (arm.least, arm.most)
+        count = open_split(room, np.int64(0), SPIN, first, last, scene, stops)
+    else:  # by parts, (2)
+        count = open_far_side(room, scene, number, stops)
+        if r > 0.0:
+            count = open_outline(count, scene, stops, room)
+    value, error = adapt(integrand, scene, room.pool, room.nodes, count, rtol)
+    if unsure > 0.0:  # so much of the circle, about that angle, may be in contact or not
+        way = 1.0 if arm.whirls else arm.most - arm.least
+        error += 8.0 * unsure * far_side_alone(scene, _dwell.pose_at(arm, 0.0)) / way * _weight_about(scene, about)
+    if ride.w == 0.0:
+        return weight * value * length, weight * (error * length + (64.0 * _EPS + doubt * length) * value)
+    if r == 0.0:
+        most = 0.0
+        for j in range(number):
+            most = max(most, _weight_about(scene, angles[j]))
+        error += 64.0 * _EPS * (value + unit * most)
+    return value, error

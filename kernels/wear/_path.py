@@ -59,28 +59,22 @@ class Step(NamedTuple):
 
 
 class Place(NamedTuple):
-    """X, Y and their rates."""
+    """X, Y and their rates, and cosine and sine of the direction of the tool's centre from the pivot."""
 
     x: float
     y: float
     vx: float
     vy: float
-
-
-@jit
-def _arm(step, s):
-    """The arm's angle from b and its rate over the crank's, at a time s of a step."""
-    course = step.course
-    crank = linkage.crank_at(step.cranked + course.speed * s, course.b_angle)
-    alpha, rate, _ = linkage.motion(course.lengths, course.margin, course.side, crank)
-    return alpha, rate
+    c: float
+    s: float
 
 
 @jit_apart
 def position(step, s):
     """The `Place` of the point at a time s of a step."""
     course = step.course
-    alpha, rate = _arm(step, s)
+    crank = linkage.crank_at(step.cranked + course.speed * s, course.b_angle)
+    alpha, rate, _ = linkage.motion(course.lengths, course.margin, course.side, crank)
     rate, r, spin = course.speed * rate, course.r, course.spin
     sine, cosine = sincos(step.turned + spin * s)
     sine, cosine = r * sine, r * cosine
@@ -92,19 +86,19 @@ def position(step, s):
         py * cosine_arm - px * sine_arm,
         vx * cosine_arm + vy * sine_arm,
         vy * cosine_arm - vx * sine_arm,
+        cosine_arm,
+        sine_arm,
     )
 
 
-@jit_apart
-def facing(step, s):
-    """Cosine and sine of the arm's angle from the direction of w at a time s of a step."""
-    x, y = step.course.x, step.course.y
-    alpha, _ = _arm(step, s)
-    sine_arm, cosine_arm = sincos(alpha + (step.course.b_angle + step.course.beta))
+@jit
+def facing(course, place):
+    """Cosine and sine of the arm's angle from the direction of w, with the point at a place."""
+    x, y = course.x, course.y
     w = sqrt(x * x + y * y)
     if not w > 0.0:
         return 1.0, 0.0
-    return (x * cosine_arm + y * sine_arm) / w, (x * sine_arm - y * cosine_arm) / w
+    return (x * place.c + y * place.s) / w, (x * place.s - y * place.c) / w
 
 
 @jit_apart
@@ -163,12 +157,6 @@ def judged(tool, one, two, h, curve):
     x_least, x_most = _rate_bounds(tool.a, tool.n, one.x, two.x, spread, one.vx, curve * h)
     y_least, y_most = _rate_bounds(tool.b, tool.m, one.y, two.y, spread, one.vy, curve * h)
     return ONCE if x_least + y_least > 0.0 or x_most + y_most < 0.0 else UNKNOWN
-
-
-@jit
-def within(step, place):
-    """Whether a place is within the tool."""
-    return excess(step.course.tool, place.x, place.y) < 0.0
 
 
 @jit_apart

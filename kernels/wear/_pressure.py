@@ -19,7 +19,7 @@ from kernels.maths.decimals import PI, cosine, multiples, precise
 from kernels.maths.elementary import in_unit
 from kernels.maths.small_dense import sort
 from kernels.wear import _contact, _scene, _tool
-from kernels.wear._tool import Circle, Tool, arctan2, sincos
+from kernels.wear._tool import Circle, arctan2, sincos
 
 PANEL_LIMIT = 1024
 LOW, HIGH, DOUBT, SLOPE, FIRST = range(5)
@@ -59,30 +59,23 @@ class Areas(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """Space for a table, for the rest of its `Areas`, and for building it."""
+    """Space for a table, for the rest of its `Areas`, and for building it: for stops, values, and `contact_area`."""
 
     table: np.ndarray
     rest: np.ndarray
     stops: np.ndarray
     values: np.ndarray
-    room: _contact.Room
-
-
-class Overhang(NamedTuple):
-    """The tool and its area, L, w and the workpiece's radius."""
-
-    tool: Tool
-    whole: float
-    reach: float
-    w: float
-    radius: float
+    found: np.ndarray
+    points: np.ndarray
+    stack: np.ndarray
 
 
 @jit_apart
 def memory():
     """A `Memory`."""
-    stops, values = np.empty(_tool.ARC_LIMIT), np.empty(NODES + _TESTS)
-    return Memory(np.empty(TABLE), np.empty(3), stops, values, _contact.room())
+    stops, values, found = np.empty(_tool.ARC_LIMIT), np.empty(NODES + _TESTS), np.empty(_tool.ARC_LIMIT)
+    points, stack = np.empty(_contact.POINTS), np.empty(_tool.STACK)
+    return Memory(np.empty(TABLE), np.empty(3), stops, values, found, points, stack)
 
 
 @jit
@@ -90,27 +83,6 @@ def _folded(phi):
     """The angle in [0, pi] of the same cosine, of one in [-2 pi, 2 pi]."""
     phi = magnitude(phi)
     return _TURN - phi if phi > math.pi else phi
-
-
-@jit_apart
-def _stops(scene, stops):
-    """Angles between which the table's panels are opened: an even grid, and where the rim passes vertices; how many."""
-    tool, _, reach, w, radius = scene
-    a, b, near, high = tool.a, tool.b, tool.a * tool.half_x, tool.b * tool.half_y
-    count = np.int64(0)
-    for k in range(_STARTS + 1):
-        stops[count] = math.pi * k / _STARTS
-        count += 1
-    for x, y in ((a, 0.0), (-a, 0.0), (0.0, b), (near, high), (-near, high)):
-        x = x + reach
-        rho = sqrt(x * x + y * y)
-        cosine, unit = w * w + rho * rho - radius * radius, 2.0 * w * rho
-        if magnitude(cosine) < unit:
-            chi, gamma = arctan2(sqrt((unit - cosine) * (unit + cosine)), cosine), arctan2(y, x)
-            stops[count], stops[count + 1] = _folded(chi + gamma), _folded(chi - gamma)
-            count += 2
-    sort(stops, count)
-    return count
 
 
 @jit_apart
@@ -136,18 +108,18 @@ def _polynomial(row, t):
 
 
 @jit_apart
-def _fit(row, low, high, scene, values, room):
+def _fit(row, low, high, tool, whole, ride, radius, memory):
     """Fills a panel; its least and largest area, and the least noise of its values.
 
     The error is four times the last three coefficients, and not less than what is seen at two angles more.
     """
-    middle, half = 0.5 * (low + high), 0.5 * (high - low)
+    middle, half, values = 0.5 * (low + high), 0.5 * (high - low), memory.values
     least, most, noise, calm = math.inf, 0.0, 0.0, math.inf
     for j in range(NODES + _TESTS):
         t = _COSINES[1, j] if j < NODES else _TRIED[j - NODES]
         s, c = sincos(middle + half * t)
-        disc = Circle(scene.w * c - scene.reach, -scene.w * s, scene.radius)
-        values[j], doubt = _contact.contact_area(scene.tool, scene.whole, disc, room)
+        disc = Circle(ride.w * c - ride.reach, -ride.w * s, radius)
+        values[j], doubt = _contact.contact_area(tool, whole, disc, memory)
         least, most = min(least, values[j]), max(most, values[j])
         noise, calm = max(noise, doubt), min(calm, doubt)
     slope, last = 0.0, 0.0
@@ -168,18 +140,35 @@ def _fit(row, low, high, scene, values, room):
 @jit_apart
 def table_of(arm, tool, ride, radius, tolerance, memory):
     """The `Areas` of a machine whose workpiece has that radius, to a relative tolerance."""
-    table, stops = memory.table, memory.stops
-    whole = _contact.whole_area(tool)
-    radius = min(radius, 4.0 * (ride.reach + ride.w + tool.a + tool.b))
-    scene, turn = Overhang(tool, whole, ride.reach, ride.w, radius), arctan2(ride.turn_s, ride.turn_c)
-    largest, lowest = min(whole, math.pi * radius * radius), math.inf
-    todo, count, low = _stops(scene, stops), np.int64(0), 0.0
+    table, stops, reach, w = memory.table, memory.stops, ride.reach, ride.w
+    whole = 4.0 * (_contact.sector(0.0, 1.0, tool)[0] + _contact.sector(1.0, 1.0, tool)[0])
+    radius = min(radius, 4.0 * (reach + w + tool.a + tool.b))
+    turn = arctan2(ride.turn_s, ride.turn_c)
+
+    # angles between which panels are opened, the first one last: an even grid, and where the rim passes vertices
+    todo = np.int64(0)
+    for k in range(_STARTS + 1):
+        stops[todo] = math.pi * k / _STARTS
+        todo += 1
+    near, high = tool.a * tool.half_x, tool.b * tool.half_y
+    for x, y in ((tool.a, 0.0), (-tool.a, 0.0), (0.0, tool.b), (near, high), (-near, high)):
+        x = x + reach
+        rho = sqrt(x * x + y * y)
+        cosine, unit = w * w + rho * rho - radius * radius, 2.0 * w * rho
+        if magnitude(cosine) < unit:
+            chi, gamma = arctan2(sqrt((unit - cosine) * (unit + cosine)), cosine), arctan2(y, x)
+            stops[todo], stops[todo + 1] = _folded(chi + gamma), _folded(chi - gamma)
+            todo += 2
+    sort(stops, todo)
     for k in range(todo // 2):
         stops[k], stops[todo - 1 - k] = stops[todo - 1 - k], stops[k]
+
+    largest, lowest = min(whole, math.pi * radius * radius), math.inf
+    count, low = np.int64(0), 0.0
     while todo > 0:
         high = stops[todo - 1]
         if high - low > _EPS and _passes(arm, turn, low, high):
-            least, most, calm = _fit(table[count], low, high, scene, memory.values, memory.room)
+            least, most, calm = _fit(table[count], low, high, tool, whole, ride, radius, memory)
             fine = table[count, DOUBT] <= max(tolerance * least, 32.0 * calm) or most <= FAINT * largest
             if not (fine or high - low <= _NARROW) and count + todo + 1 < PANEL_LIMIT and todo < stops.size:
                 stops[todo] = 0.5 * (low + high)
@@ -235,9 +224,3 @@ def weight(areas, c, s):
     if not (area > 2.0 * row[DOUBT] and area > faintest):
         return 1.0 / faintest, _HOPELESS, 0.0
     return 1.0 / area, row[DOUBT] / area * 2.0, 2.0 * row[SLOPE] / area
-
-
-@jit
-def leaves(areas):
-    """Whether the tool may leave the workpiece wholly."""
-    return areas.panels > 0 and not areas.lowest > FAINT * areas.largest

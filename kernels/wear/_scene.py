@@ -9,9 +9,9 @@ from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.vectors import magnitude, not_, sqrt, where
 from kernels.maths.elementary import in_unit, mantissa_exponent, scale
 from kernels.polisher import extremes, linkage
-from kernels.wear import _dwell, _tool
+from kernels.wear import _dwell
 from kernels.wear._dwell import Arm
-from kernels.wear._tool import Tool, sincos
+from kernels.wear._tool import Tool, power, sincos
 
 ANGLE_LIMIT = 1e6
 """Angles beyond which no digits are left of their sines."""
@@ -90,7 +90,8 @@ def without_units(p):
     fine = a >= _SPAN and b >= _SPAN and (w == 0.0 or w >= _SPAN) and (reach == 0.0 or reach >= _SPAN)
     fine = fine and (p.workpiece_radius == 0.0 or in_unit(p.workpiece_radius, unit) >= _SPAN)
     verdict = verdict if fine or verdict >= FIRST_REFUSAL else OUT_OF_RANGE
-    tool = _tool.tool_of(a, b, p.tool_n, p.tool_m)
+    n, m = p.tool_n, p.tool_m
+    tool = Tool(a, b, n, m, power(0.5, 1.0 / n), power(0.5, 1.0 / m))
     return Setup(_dwell.arm_of(lengths, margin), tool, ride, unit, pace, verdict)
 
 
@@ -120,25 +121,13 @@ PARAMETERS = (
     Field("tool_n", "1", "exponent of abs(X/a), along the arm; 2: ellipse, 1: rhombus, 100: square", 2.0, **_EXPONENT),
     Field("tool_m", "1", "exponent of abs(Y/b), across the arm", "tool_n", **_EXPONENT),
     Field("preston", "1/Pa", "wear per way and pressure", lower=0.0, open_lower=True),
-    Field(
-        "pressure",
-        "Pa",
-        "pressure under the tool, if constant; or else load and workpiece_radius",
-        default=0.0,
-        lower=0.0,
-        open_lower=True,
-    ),
-    Field(
-        "load", "N", "force on the tool, if constant: pressure is load over the area of contact", default=0.0, lower=0.0
-    ),
-    Field(
-        "workpiece_radius",
-        "m",
-        "radius of the workpiece, beyond which nothing wears; needed with load; 0: no rim",
-        default=0.0,
-        lower=0.0,
-    ),
-)
+    Field("pressure", "Pa", "pressure under the tool, if constant; or else load and workpiece_radius",
+          default=0.0, lower=0.0, open_lower=True),
+    Field("load", "N", "force on the tool, if constant: pressure is load over the area of contact",
+          default=0.0, lower=0.0),
+    Field("workpiece_radius", "m", "radius of the workpiece, beyond which nothing wears; needed with load; 0: no rim",
+          default=0.0, lower=0.0),
+)  # fmt: skip
 
 Machine = namedtuple("Machine", [field.name for field in PARAMETERS])
 

@@ -45,8 +45,9 @@ def _second_series(x, y):
 
 
 @jit_call
-def along_arc(p, q, s, c):
-    """(2), within some ulp; s and c from 0 to 1."""
+def along_arc(p, q, arc):
+    """(2), within some ulp; `arc`: cosine and sine of psi/2, from 0 to 1."""
+    c, s = arc
     largest = larger(p, q)
     unit = where(largest > 0.0, largest, 1.0)
     p, q = larger(p / unit, _FLAT), larger(q / unit, _FLAT)
@@ -72,8 +73,11 @@ def along_arc(p, q, s, c):
 
 
 @jit_apart
-def half_circle(p, q):
-    """(2) up to psi = pi: a quarter of an ellipse's circumference, twice, by the arithmetic-geometric mean."""
+def half_circle(p, q, arc):
+    """(2) up to psi = pi: a quarter of an ellipse's circumference, twice, by the arithmetic-geometric mean.
+
+    `arc` stands where `along_arc` has it.
+    """
     largest = max(p, q)
     if not largest > 0.0:
         return 0.0

@@ -103,12 +103,6 @@ def sincos(x):
 
 
 @jit_apart
-def tool_of(a, b, n, m):
-    """The `Tool`."""
-    return Tool(a, b, n, m, power(0.5, 1.0 / n), power(0.5, 1.0 / m))
-
-
-@jit_apart
 def _along(x, k, j, middle):
     """`Along` of exponents k and j, `middle` being the largest `small`."""
     if k >= 1.0:
@@ -146,18 +140,6 @@ def on_x_axis(piece):
 def side_of(piece):
     """+1 where X > 0."""
     return 1.0 if piece < 1.5 else -1.0
-
-
-@jit
-def sense(piece):
-    """+1 where x runs counterclockwise about the tool, else -1."""
-    return 1.0 if piece == 0.0 or piece == 3.0 else -1.0
-
-
-@jit
-def mirrored(circle, mirror):
-    """The circle as the half Y >= 0 of the outline sees it, for mirror = 1, or the half Y <= 0, for -1."""
-    return Circle(circle.x, mirror * circle.y, circle.radius)
 
 
 @jit_apart
@@ -218,20 +200,13 @@ def _slope_bounds(piece, tool, one, two):
 
 
 @jit_apart
-def _excess(piece, x, tool, circle, start):
-    """Squared distance from the centre, less that of the circle, and its derivative."""
-    end, spot = _end(piece, x, tool, circle, start), outline(piece, x, tool)
-    return end.excess, 2.0 * (end.u * spot.dx + end.v * spot.dy)
-
-
-@jit_apart
 def _root(piece, low, high, tool, circle, start):
     """The crossing between low and high, where there is just one: Newton within the bracket."""
-    beyond, _ = _excess(piece, high, tool, circle, start)
-    rising = beyond > 0.0
+    rising = _end(piece, high, tool, circle, start).excess > 0.0
     x = 0.5 * (low + high)
     for _ in range(_NEWTON_LIMIT):
-        value, slope = _excess(piece, x, tool, circle, start)
+        end, spot = _end(piece, x, tool, circle, start), outline(piece, x, tool)
+        value, slope = end.excess, 2.0 * (end.u * spot.dx + end.v * spot.dy)
         if (value > 0.0) == rising:
             high = x
         else:
@@ -260,7 +235,8 @@ def crossings(piece, tool, circle, start, found, count, stack):
     for _ in range(_INTERVAL_LIMIT):
         if top == 0:
             return count
-        right = _top(stack, top - 1)
+        row = stack[top - 1]
+        right = End(row[0], row[1], row[2], row[3], row[4], row[5])
         x = math.nan
         least = _least_square(left.u, right.u) + _least_square(left.v, right.v)
         most = max(left.u * left.u, right.u * right.u) + max(left.v * left.v, right.v * right.v)
@@ -290,12 +266,6 @@ def crossings(piece, tool, circle, start, found, count, stack):
 def _put(stack, k, end):
     row = stack[k]
     row[0], row[1], row[2], row[3], row[4], row[5] = end
-
-
-@jit
-def _top(stack, k):
-    row = stack[k]
-    return End(row[0], row[1], row[2], row[3], row[4], row[5])
 
 
 @jit_apart
@@ -330,7 +300,7 @@ def arcs(tool, circle, near, far, angles, found, stack):
     angles[0] = -math.pi
     for k in range(2 * PIECES):
         piece, mirror = float(k // 2), 1.0 if k % 2 else -1.0
-        start, seen = near if k < 2 else far, mirrored(circle, mirror)
+        start, seen = near if k < 2 else far, Circle(circle.x, mirror * circle.y, circle.radius)
         if not on_x_axis(piece) or start != start:
             start = vertex_excess(piece, tool, seen)
         number = crossings(piece, tool, seen, start, found, first, stack)

@@ -27,6 +27,7 @@ from kernels.polisher import linkage
 from kernels.wear import _path, _pressure, _scene
 from kernels.wear._path import INSIDE, ONCE, OUTSIDE, STEPS, Course, Step, position
 from kernels.wear._scene import Machine, signed_in_unit
+from kernels.wear._tool import excess
 
 _EPS = 2.0**-52
 _TURN = 2.0 * math.pi
@@ -48,7 +49,7 @@ def _speed(s, step):
     v = sqrt(there.vx * there.vx + there.vy * there.vy)
     if step.areas.panels == 0:
         return v, 4.0 * _EPS * v
-    cosine, sine = _path.facing(step, s)
+    cosine, sine = _path.facing(step.course, there)
     weight, doubt, slope = _pressure.weight(step.areas, cosine, sine)
     return weight * v, weight * v * (4.0 * _EPS + doubt + 8.0 * _EPS * slope)
 
@@ -83,7 +84,7 @@ def _way_in_step(step, h, curve, rtol, room):
         high = stack[top - 1]
         two = position(step, high)
         verdict = _path.judged(tool, one, two, high - low, curve)
-        before, after = _path.within(step, one), _path.within(step, two)
+        before, after = excess(tool, one.x, one.y) < 0.0, excess(tool, two.x, two.y) < 0.0
         tiny = high - low <= least
         if not (verdict in (INSIDE, OUTSIDE, ONCE) or tiny):
             stack[top] = 0.5 * (low + high)
@@ -202,13 +203,8 @@ POLISHER_WEAR_POINT = kernel(
     ),
     check=_scene.check,
     methods=(
-        tracing(
-            "path",
-            "time split at every entry and exit, adaptive to rtol between them",
-            _follow,
-            buffers=_buffers,
-            loop=cell_by_cell,
-        ),
+        tracing("path", "time split at every entry and exit, adaptive to rtol between them",
+                _follow, buffers=_buffers, loop=cell_by_cell),
     ),
     example=_scene.EXAMPLE | {"r0": 0.05, "theta0": 0.0, "tau": 100.0},
-)
+)  # fmt: skip

@@ -29,7 +29,7 @@ from kernels.lanes.ranges import partly
 from kernels.lanes.records import read
 from kernels.lanes.wiring import kernel, tracing
 from kernels.maths.elementary import in_unit, is_normal
-from kernels.wear import _panels, _pressure, _profile, _scene
+from kernels.wear import _panels, _pressure, _scene
 from kernels.wear._contour import Scene
 from kernels.wear._scene import Machine
 
@@ -50,19 +50,20 @@ def _contour(i, columns, room, memory):
     areas = _pressure.areas_of(p, rtol, i == 0, read(Machine, columns, h), columns.rtol[h], memory)
     setup, rim, hard = _scene.without_units(p), p.workpiece_radius, max(p.pressure, p.load)
     turns = _scene.turns_fully(setup.verdict)
+    leaves = areas.panels > 0 and not areas.lowest > _pressure.FAINT * areas.largest  # the tool may leave the workpiece
     units = setup.pace + (setup.unit if areas.panels == 0 else -setup.unit)
     most, worst, normal = 0.0, 0.0, True
     for k in range(columns.radius.size):
         radius, wear, doubt, held = columns.radius[k], math.nan, math.nan, True
         if turns and radius > rim > 0.0:
             wear, doubt = 0.0, 0.0
-        elif turns and _pressure.leaves(areas) and not radius < rim * (1.0 - _AT_RIM):
+        elif turns and leaves and not radius < rim * (1.0 - _AT_RIM):
             doubt = math.inf
         elif turns:
             r = in_unit(radius, setup.unit)
             r = r if r > _FAINT or setup.ride.w == 0.0 else 0.0
             scene = Scene(setup.arm, setup.tool, setup.ride, r, areas, room.spare)
-            value, error = _profile.profile(scene, 0.7 * rtol, room)
+            value, error = _panels.profile(scene, 0.7 * rtol, room)
             wear = _scene.with_units(value / _FOUR_PI2, p.preston, hard, units)
             if value > 0.0 and not is_normal(wear):
                 wear, held, normal = math.nan, False, False
@@ -97,13 +98,8 @@ POLISHER_WEAR = kernel(
     record=Machine,
     check=_scene.check,
     methods=(
-        tracing(
-            "contour",
-            "integral along the tool's outline, adaptive to rtol at every radius",
-            _contour,
-            buffers=_buffers,
-            loop=cell_by_cell,
-        ),
+        tracing("contour", "integral along the tool's outline, adaptive to rtol at every radius",
+                _contour, buffers=_buffers, loop=cell_by_cell),
     ),
     example=_scene.EXAMPLE,
-)
+)  # fmt: skip
