@@ -37,24 +37,16 @@ def _filled_up(compiled, columns, per_cell, read):
             column[...] = result[:n]
 
 
-@jit
-def _in_lanes(body, columns, buffers):
-    n = columns[0].shape[0]
-    for i in range(0, n, WIDTH):
-        body(lanes_at(min(i, n - WIDTH)), columns, *buffers)
+def _looped(index, width):
+    """A loop that calls a body with the index of so many cells at a time; the last ones once more beside others."""
 
+    @jit
+    def loop(body, columns, buffers):
+        n = columns[0].shape[0]
+        for i in range(0, n, width):
+            body(index(min(i, n - width)), columns, *buffers)
 
-@jit
-def _one_by_one(body, columns, buffers):
-    for i in range(columns[0].shape[0]):
-        body(i, columns, *buffers)
-
-
-@jit
-def _in_groups(body, columns, buffers):
-    n = columns[0].shape[0]
-    for i in range(0, n, WIDTH):
-        body(min(i, n - WIDTH), columns, *buffers)
+    return loop
 
 
 def _plain(body, columns, buffers):
@@ -63,9 +55,9 @@ def _plain(body, columns, buffers):
             body(i, columns, *buffers)
 
 
-in_lanes = _in_lanes if COMPILED else _plain
-cell_by_cell = _one_by_one if COMPILED else _plain
-in_groups = _in_groups if COMPILED else _plain
+in_lanes = _looped(lanes_at, WIDTH) if COMPILED else _plain
+cell_by_cell = _looped(np.int64, 1) if COMPILED else _plain
+in_groups = _looped(np.int64, WIDTH) if COMPILED else _plain
 
 
 def entry_of(function, per_cell, kept, read=0):
