@@ -307,18 +307,6 @@ def sdirk4_step(state, first, law, h, scales):
 
 
 @jit
-def _step_factor(ratio):
-    """0.9 ratio^(-1/5), from 0.2 to 5, for a step whose error was `ratio` of what is allowed."""
-    ratio = where(ratio < 1e6, ratio, 1e6)  # NaN too: the step overflowed
-    ratio = where(ratio > 1e-6, ratio, 1e-6)
-    e = exponent(ratio)
-    m = ratio * pow2(-e) - 1.0
-    log2_ratio = e + m * (4.0 / 3.0 - m * (1.0 / 3.0))  # within 0.01
-    factor = larger(_SAFETY * exp(-0.2 * LN2 * log2_ratio), _SHRINK + 0.0 * ratio)
-    return smaller(factor, _GROW + 0.0 * ratio)
-
-
-@jit
 def _left(state, acceleration, law, leg):
     """Falls to 0 where a leg ends, and its rate: the least of speed along the leg, way left to the switch, and memory.
 
@@ -365,7 +353,15 @@ def _to_end(step, state, law, leg, h, tolerance, active):
         state, first = choose(accepted, new, state), choose(accepted, last, first)
         t = where(accepted, t + h, t)
         most = where(accepted, _longest(new[1], last[1], leg), h)
-        h = where(moving, smaller(h * _step_factor(ratio), most), h)
+
+        # the next step: 0.9 ratio^(-1/5) of this one, from 0.2 to 5
+        ratio = where(ratio < 1e6, ratio, 1e6)  # NaN too: the step overflowed
+        ratio = where(ratio > 1e-6, ratio, 1e-6)
+        e = exponent(ratio)
+        m = ratio * pow2(-e) - 1.0
+        log2_ratio = e + m * (4.0 / 3.0 - m * (1.0 / 3.0))  # within 0.01
+        factor = larger(_SAFETY * exp(-0.2 * LN2 * log2_ratio), _SHRINK + 0.0 * ratio)
+        h = where(moving, smaller(h * smaller(factor, _GROW + 0.0 * ratio), most), h)
 
     low, high, shorter = 0.0 * h, h, 0.5 * h
     new, last, _ = step(state, first, law, shorter, leg.scales)
@@ -427,20 +423,6 @@ def _turned(state, law, slow, problem):
     rest = (x, 0.0 * x, x_mu, jump * v_mu, x_start, jump * v_start, decay)
     behind = _moved(rest, law, problem.inwards - held_in, after_rest)
     return choose(still, behind, state), jump, x, x_start, before + after_rest
-
-
-@jit
-def _coasted(state, law):
-    """The state at the switch after uniform motion, and the time that takes; its speeds are those that friction wants.
-
-    Those of the integration waver about them by its tolerance.
-    """
-    x, v, x_mu, v_mu, x_start, v_start, decay = state
-    _, force, _, force_mu, _, force_start, slope = rates(state, law)
-    v, v_mu, v_start = v + force / slope, v_mu + force_mu / slope, v_start + force_start / slope
-    time = -(x + 1.0) / v
-    moved = (fma(time, v_mu, x_mu), v_mu, fma(time, v_start, x_start), v_start, fma(time, slope, decay))
-    return (0.0 * x - 1.0, v, *moved), time
 
 
 @jit_call
@@ -509,8 +491,13 @@ def half_swing(step, start, problem, tolerance, active):
         rising = rising & not_(turning)
 
         uniform = inward & (state[6] > forgotten - 1e-3)
-        if any_lane(uniform):
-            at_switch, coast = _coasted(state, falling)
+        if any_lane(uniform):  # at speeds that friction wants: those of the integration waver about them
+            x, v, x_mu, v_mu, x_start, v_start, decay = state
+            _, force, _, force_mu, _, force_start, slope = rates(state, falling)
+            v, v_mu, v_start = v + force / slope, v_mu + force_mu / slope, v_start + force_start / slope
+            coast = -(x + 1.0) / v
+            moved = (fma(coast, v_mu, x_mu), v_mu, fma(coast, v_start, x_start), v_start, fma(coast, slope, decay))
+            at_switch = (zero - 1.0, v, *moved)
             state, time = choose(uniform, at_switch, state), where(uniform, time + coast, time)
         stopped = inward & (state[0] + 1.0 > _ARRIVED + _ROUNDED * top)
         if any_lane(stopped):

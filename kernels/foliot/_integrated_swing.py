@@ -13,10 +13,11 @@ v1^2 - F^2 rising; so the one root is found, and if help was needed on the cycle
 
 import math
 
-from kernels.foliot._half_swing import half_swing, problem_of, pull
+from kernels.foliot._half_swing import dopri5_step, half_swing, problem_of, pull, sdirk4_step
 from kernels.lanes.codes import INACCURATE, NOT_CONVERGED, OK, STEP_LIMIT, STICKS
 from kernels.lanes.jit import jit, jit_inline
 from kernels.lanes.vectors import any_lane, choose, fma, magnitude, not_, sqrt, where
+from kernels.lanes.wiring import method
 from kernels.maths.elementary import larger, smaller
 
 NEWTON_LIMIT = 60
@@ -94,7 +95,7 @@ def held(problem, top):
 
 
 @jit_inline
-def limit_cycle(step, stiffest, scene, ripple, rtol):
+def limit_cycle(step, stiffest, rippled, rtol):
     """The limit cycle.
 
     Newton's method on v1 within a bracket, first with a coarse tolerance, then with one that follows the square of
@@ -105,15 +106,14 @@ def limit_cycle(step, stiffest, scene, ripple, rtol):
     Parameters
     ----------
     step, stiffest : of `_half_swing`, and EXPLICIT or IMPLICIT
-    scene : `_units.Scene`
-    ripple : (depth, harmonic) of (2), or SMOOTH
+    rippled : a `_units.Scene`, and (depth, harmonic) of (2), or SMOOTH
 
     Returns
     -------
     cycle : half period, amplitude, speed before the switch, s, multiplier
     verdict : OK, INACCURATE, STICKS, NOT_CONVERGED or STEP_LIMIT
     """
-    problem = problem_of(scene, ripple, rtol)
+    problem = problem_of(*rippled, rtol)
     zero, one, stiff = 0.0 * problem.e, 0.0 * problem.e + 1.0, problem.stiffness * problem.pace
     v, slow = first_speed(problem.pace)
     tolerance = where(slow, _CHECK * _enough(problem, zero, 2.0 * stiff), _COARSE)  # steps are short whatever it is
@@ -180,3 +180,25 @@ def limit_cycle(step, stiffest, scene, ripple, rtol):
         v, tolerance = where(active, new, v), where(active, following, tolerance)
         tighter, before = where(active & loose, tighter * factor, tighter), where(active, relative, before)
     return cycle, verdict
+
+
+@jit
+def dopri5(rippled, rtol):
+    """Dormand-Prince 5(4) over half swings, each switch located and restarted at, and Newton on their map."""
+    return limit_cycle(dopri5_step, EXPLICIT, rippled, rtol)
+
+
+@jit
+def sdirk4(rippled, rtol):
+    """The same by an L-stable implicit method of order 4, for what is stiff."""
+    return limit_cycle(sdirk4_step, IMPLICIT, rippled, rtol)
+
+
+def by_steps(units, sooner=None):
+    """Both as methods of a kernel, `sooner` of the first."""
+    explicit = "adaptive Runge-Kutta of order 5, Newton on the half-swing map"
+    implicit = "implicit Runge-Kutta of order 4, L-stable, for what is stiff"
+    return (
+        method("dopri5", explicit, dopri5, units=units, sooner=sooner),
+        method("sdirk4", implicit, sdirk4, units=units),
+    )

@@ -63,7 +63,7 @@ _ROUNDING = 2e-14
 @jit
 def _problem(p):
     """The cell's terms, friction of any degree as it is down to rest; and its units."""
-    scene, units = _units.without_dimensions(_units.terms(p))
+    scene, units = _units.without_dimensions(p)
     return problem_of(scene, (p.depth, p.harmonic), 0.0 * p.e), units
 
 

@@ -59,14 +59,6 @@ class Half(NamedTuple):
 
 
 @jit_call
-def _opening(scene, v, force):
-    """Time for which the wheel, thrown back with the foliot, lags: until the foliot slows down by 1/kappa, or rests."""
-    if scene.r * scene.kappa < 1.0 and scene.d > 0.0:
-        return log(force * scene.kappa) / scene.d
-    return linear_flow.first_reversal(0.5 * scene.d, 0.0, -v, -scene.r)
-
-
-@jit_call
 def _safe_step(scene, gap, v, w, force):
     """A time in which the gap does not close but at its end, and nearly does.
 
@@ -74,8 +66,10 @@ def _safe_step(scene, gap, v, w, force):
     falls with the speed.
     """
     pull, closing = 1.0 / scene.kappa, w - v
-    if force > pull and not closing > 0.0:
-        return _opening(scene, v, force)
+    if force > pull and not closing > 0.0:  # the wheel lags until the foliot slows down by 1/kappa, or rests
+        if scene.r * scene.kappa < 1.0 and scene.d > 0.0:
+            return log(force * scene.kappa) / scene.d
+        return linear_flow.first_reversal(0.5 * scene.d, 0.0, -v, -scene.r)
     strength = pull - min(force, 0.0)
     root = sqrt(closing * closing + 2.0 * strength * gap)
     return 2.0 * gap / (root + closing) if closing > 0.0 else (root - closing) / strength

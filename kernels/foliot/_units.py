@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 from kernels.lanes.jit import jit
 from kernels.lanes.ranges import judged
-from kernels.lanes.vectors import any_lane, nearest, not_, sqrt, where
-from kernels.maths.elementary import is_normal, mantissa_exponent, measured, power, scale
+from kernels.lanes.vectors import any_lane, not_, where
+from kernels.maths.elementary import is_normal, mantissa_exponent, measured, power, scale, scaled_root
 from kernels.maths.pairs import two_sum
 
 
@@ -81,12 +81,6 @@ class Cycle(NamedTuple):
 
 
 @jit
-def terms(p):
-    """The foliot of a record that has more parameters."""
-    return Foliot(p.mu, p.phi0, p.a, p.R, p.R_s, p.c, p.n, p.k, p.e)
-
-
-@jit
 def without_drag(p):
     """The foliot of a `LinearFoliot`."""
     return Foliot(p.mu, p.phi0, p.a, p.R, p.R_s, 0.0, 1.0, p.k, p.e)
@@ -99,13 +93,6 @@ def errors(swing, sensitivity, multiplier):
 
 
 @jit
-def _root(m, e):
-    """Square root of m 2^e, m in [0.5, 4), as a pair again."""
-    half = nearest(0.5 * e - 0.25)
-    return sqrt(m * where(e - 2.0 * half > 0.5, 2.0, 1.0)), half
-
-
-@jit
 def _times(x, unit, e_unit):
     """x times a unit, and whether that is a normal number where x is not zero."""
     m, e = mantissa_exponent(where(x > 0.0, x, 1.0))
@@ -115,10 +102,10 @@ def _times(x, unit, e_unit):
 
 @jit
 def without_dimensions(p):
-    """The scene of a `Foliot`, and its units."""
+    """The scene of a record with the parameters of a `Foliot`, and its units."""
     (m_mu, e_mu), (m_phi, e_phi) = mantissa_exponent(p.mu), mantissa_exponent(p.phi0)
-    t, e_t = _root(m_phi / m_mu, e_phi - e_mu)
-    v, e_v = _root(m_phi * m_mu, e_phi + e_mu)
+    t, e_t = scaled_root(m_phi / m_mu, e_phi - e_mu)
+    v, e_v = scaled_root(m_phi * m_mu, e_phi + e_mu)
     (d, fine_d), (kappa, fine_kappa) = _times(p.a, t, e_t), _times(p.k, t * t, 2.0 * e_t)
     powered = p.n > 0.0
     solid, drag = where(powered, 0.0, p.c), where(powered, p.c, 0.0)

@@ -11,10 +11,9 @@ spring; `taylor` and `dopri5`, which do what `segments` cannot, follow the cycle
 """
 
 from kernels.foliot import _coulomb, _friction_quadrature, _taylor_swing, _viscous
-from kernels.foliot._half_swing import dopri5_step, sdirk4_step
-from kernels.foliot._integrated_swing import EXPLICIT, IMPLICIT, SMOOTH, limit_cycle
+from kernels.foliot._integrated_swing import SMOOTH, by_steps
 from kernels.foliot._linear_swing import segments
-from kernels.foliot._units import UNITS, Foliot, spare_torque
+from kernels.foliot._units import UNITS, Foliot, given, spare_torque, without_dimensions
 from kernels.interface import Field
 from kernels.lanes.codes import BAD_INPUT, NEVER_STARTS, NO_LIMIT_CYCLE, OK
 from kernels.lanes.jit import jit
@@ -23,9 +22,10 @@ from kernels.lanes.wiring import kernel, method
 
 
 @jit
-def dopri5(scene, rtol):
-    """Dormand-Prince 5(4) over half swings, each switch located and restarted at, and Newton on their map."""
-    return limit_cycle(dopri5_step, EXPLICIT, scene, SMOOTH, rtol)
+def _unrippled(p):
+    """The scene with no ripple, and its units."""
+    scene, units = without_dimensions(p)
+    return (scene, SMOOTH), units
 
 
 def dopri5_is_cheaper(p, rtol):
@@ -34,24 +34,17 @@ def dopri5_is_cheaper(p, rtol):
 
 
 @jit
-def sdirk4(scene, rtol):
-    """The same by an L-stable implicit method of order 4, for what is stiff."""
-    return limit_cycle(sdirk4_step, IMPLICIT, scene, SMOOTH, rtol)
-
-
-@jit
 def check(p):
-    """What no method is asked.
+    """What no method is asked; of a record that may have more parameters.
 
     BAD_INPUT: stiction below the friction of motion. NEVER_STARTS: torque that cannot overcome solid friction.
     NO_LIMIT_CYCLE: nothing that takes energy.
     """
-    mu, _, a, R, R_s, c, n, k, e = p
-    friction = where(k > 0.0, R, R_s)  # a spring helps stiction be overcome
-    spare = spare_torque(mu, friction, where(n > 0.0, 0.0, c))
-    lossless = not_((a > 0.0) | (R > 0.0) | (c > 0.0) | (e < 1.0))
+    friction = where(p.k > 0.0, p.R, p.R_s)  # a spring helps stiction be overcome
+    spare = spare_torque(p.mu, friction, where(p.n > 0.0, 0.0, p.c))
+    lossless = not_((p.a > 0.0) | (p.R > 0.0) | (p.c > 0.0) | (p.e < 1.0))
     verdict = where(spare > 0.0, where(lossless, NO_LIMIT_CYCLE, OK), NEVER_STARTS)
-    return where(R_s >= R, verdict, BAD_INPUT)
+    return where(p.R_s >= p.R, verdict, BAD_INPUT)
 
 
 PARAMETERS = (
@@ -100,9 +93,7 @@ FOLIOT = kernel(
         method("map", "exact map from switch to switch, iterated from rest",
                _viscous.event_map, _viscous.event_map_bound, **_VISCOUS),
         _taylor_swing.by_taylor(Foliot._fields, rippled=False),
-        method("dopri5", "adaptive Runge-Kutta of order 5, Newton on the half-swing map",
-               dopri5, units=UNITS, sooner=dopri5_is_cheaper),
-        method("sdirk4", "implicit Runge-Kutta of order 4, L-stable, for what is stiff", sdirk4, units=UNITS),
+        *by_steps((_unrippled, given), sooner=dopri5_is_cheaper),
     ),
     example={"mu": 1.0, "phi0": 1.0, "a": 1.0},
 )  # fmt: skip

@@ -27,8 +27,7 @@ import numpy as np
 
 from kernels.foliot import _linear_swing, _units
 from kernels.foliot._units import LinearFoliot, Scene
-from kernels.foliot.cycle import FOLIOT
-from kernels.foliot.cycle import check as check_foliot
+from kernels.foliot.cycle import FOLIOT, check
 from kernels.integrate import linear_flow
 from kernels.interface import FIRST_REFUSAL, Field
 from kernels.lanes.codes import INACCURATE, NOT_SELF_STARTING, OK, OUT_OF_RANGE, STICKS, TOO_SHORT
@@ -88,26 +87,6 @@ class Averages(NamedTuple):
 
 
 @jit_call
-def _closed(averages, run, time, clock):
-    """Closes the averaging times that end within a half swing that began at `run` and lasted `time`.
-
-    Those that lie wholly within the half swing share one y.
-    """
-    closed, reading, rate, squares = averages
-    tau = clock.tau
-    slope = (clock.nominal - time) / time
-    ratio = (run.t + time) / tau
-    until = nearest(ratio)
-    until = where(until > ratio, until - 1.0, until)
-    at_first = fma(slope, (closed + 1.0) * tau - run.t, run.gain)
-    first = (at_first - reading) / tau
-    squares = where(closed > 0.0, fma(first - rate, first - rate, squares), squares)
-    more = until > closed + 1.0
-    squares = where(more, fma(slope - first, slope - first, squares), squares)
-    return Averages(until, fma(slope, until * tau - run.t, run.gain), where(more, slope, first), squares)
-
-
-@jit_call
 def _beat(run, averages, z, z_apart, clock):
     """One half swing with the torque of (1), and whether it comes to the switch."""
     begun = run.t > 0.0
@@ -123,9 +102,19 @@ def _beat(run, averages, z, z_apart, clock):
     legs = _linear_swing.half_swing(torque, scene, start)
     goes_on = legs.comes & ((start < 0.0) | (fma(scene.kappa, legs.top, torque) > scene.rho_s))
     later = run.t + legs.time
-    passes = later >= (averages.closed + 1.0) * clock.tau
-    if any_lane(passes):
-        averages = choose(passes, _closed(averages, run, legs.time, clock), averages)
+    closed, reading, rate, squares = averages
+    tau = clock.tau
+    passes = later >= (closed + 1.0) * tau
+    if any_lane(passes):  # averaging times end within the half swing; those that lie wholly within it share one y
+        slope, ratio = (clock.nominal - legs.time) / legs.time, later / tau
+        until = nearest(ratio)
+        until = where(until > ratio, until - 1.0, until)
+        first = (fma(slope, (closed + 1.0) * tau - run.t, run.gain) - reading) / tau
+        squares = where(closed > 0.0, fma(first - rate, first - rate, squares), squares)
+        more = until > closed + 1.0
+        squares = where(more, fma(slope - first, slope - first, squares), squares)
+        ended = Averages(until, fma(slope, until * tau - run.t, run.gain), where(more, slope, first), squares)
+        averages = choose(passes, ended, averages)
     truncated = where(short, run.truncated + 1.0, run.truncated)
     return Run(x, apart, legs.speed, later, run.gain + (clock.nominal - legs.time), truncated), averages, goes_on
 
@@ -216,12 +205,6 @@ def _uniforms():
     """Rows for random numbers."""
     n = PAIRS * GROUP
     return np.empty(n), np.empty(n), np.empty(n), np.empty(n)
-
-
-@jit
-def check(p):
-    """As for `foliot`."""
-    return check_foliot(_units.terms(p))
 
 
 PARAMETERS = (

@@ -13,13 +13,11 @@ Leaves out: the geometry of the pallets that makes the ripple. Source: as `folio
 import math
 
 from kernels.foliot import _taylor_swing, _units
-from kernels.foliot._half_swing import dopri5_step, sdirk4_step
-from kernels.foliot._integrated_swing import EXPLICIT, IMPLICIT, limit_cycle
-from kernels.foliot.cycle import FOLIOT
-from kernels.foliot.cycle import check as check_foliot
+from kernels.foliot._integrated_swing import by_steps
+from kernels.foliot.cycle import FOLIOT, check
 from kernels.interface import Field
 from kernels.lanes.jit import jit
-from kernels.lanes.wiring import kernel, method
+from kernels.lanes.wiring import kernel
 
 HIGHEST = 1000.0
 """Of harmonics: more waves than steps that the integrator may take follow from more."""
@@ -28,31 +26,8 @@ HIGHEST = 1000.0
 @jit
 def _taken(p):
     """The scene with its ripple, and its units."""
-    scene, units = _units.without_dimensions(_units.terms(p))
+    scene, units = _units.without_dimensions(p)
     return (scene, (p.depth, p.harmonic)), units
-
-
-UNITS = _taken, _units.given
-
-
-@jit
-def dopri5(rippled, rtol):
-    """Dormand-Prince 5(4) over half swings, each switch located and restarted at, and Newton on their map."""
-    scene, ripple = rippled
-    return limit_cycle(dopri5_step, EXPLICIT, scene, ripple, rtol)
-
-
-@jit
-def sdirk4(rippled, rtol):
-    """The same by an L-stable implicit method of order 4, for what is stiff."""
-    scene, ripple = rippled
-    return limit_cycle(sdirk4_step, IMPLICIT, scene, ripple, rtol)
-
-
-@jit
-def check(p):
-    """As of `foliot`."""
-    return check_foliot(_units.terms(p))
 
 
 FOLIOT_RIPPLE = kernel(
@@ -70,9 +45,7 @@ FOLIOT_RIPPLE = kernel(
     check=check,
     methods=(
         _taylor_swing.by_taylor((*_units.Foliot._fields, "depth", "harmonic"), rippled=True),
-        method("dopri5", "adaptive Runge-Kutta of order 5, Newton on the half-swing map",
-               dopri5, units=UNITS),
-        method("sdirk4", "implicit Runge-Kutta of order 4, L-stable, for what is stiff", sdirk4, units=UNITS),
+        *by_steps((_taken, _units.given)),
     ),
     example={"mu": 1.0, "phi0": 1.0, "a": 1.0, "depth": 0.3, "harmonic": 2.0},
 )  # fmt: skip

@@ -28,9 +28,9 @@ from kernels.lanes.codes import NEVER_STARTS, NO_METHOD, NOT_CONVERGED, OK, STEP
 from kernels.lanes.columns import cell_by_cell
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.ranges import judged
-from kernels.lanes.vectors import magnitude, nearest, sqrt, where
+from kernels.lanes.vectors import magnitude, sqrt, where
 from kernels.lanes.wiring import kernel, method
-from kernels.maths.elementary import mantissa_exponent, measured, scale
+from kernels.maths.elementary import mantissa_exponent, measured, scale, scaled_root
 
 HALF_PERIODS = 600
 """Half periods that are followed until one repeats the one before; secants between them."""
@@ -62,18 +62,11 @@ class Units(NamedTuple):
 
 
 @jit
-def _root(m, e):
-    """sqrt(m 2^e) as a mantissa and an exponent."""
-    half = nearest(0.5 * e - 0.25)
-    return sqrt(m * where(e - 2.0 * half > 0.5, 2.0, 1.0)), half
-
-
-@jit
 def without_dimensions(p):
     """The scene of `_two_bodies` and its units."""
     (tau, e_tau), (I_v, e_v), (I_c, e_c) = mantissa_exponent(p.tau), mantissa_exponent(p.I_v), mantissa_exponent(p.I_c)
     (n, e_n), (phi0, e_phi) = mantissa_exponent(p.n), mantissa_exponent(p.phi0)
-    time, e_time = _root(I_v * phi0 / (n * tau), e_v + e_phi - e_n - e_tau)
+    time, e_time = scaled_root(I_v * phi0 / (n * tau), e_v + e_phi - e_n - e_tau)
     e_kappa = 2.0 * e_n + e_c - e_v
     c, e_c_v = mantissa_exponent(where(p.c_v > 0.0, p.c_v, p.I_v))
     e_d = e_c_v + e_time - e_v
@@ -111,14 +104,6 @@ def given(units, answer, verdict):
     return cycle, judged(sound, sound and speed > 0.0 and recoil >= 0.0, verdict)
 
 
-@jit
-def _why(end):
-    """The status of a half period that ends without an escape."""
-    if end == _two_bodies.OUT_OF_MESH:
-        return UNMESHES
-    return NO_METHOD if end == _two_bodies.FALLS_BACK else STEP_LIMIT
-
-
 @jit_call
 def repeated(scene):
     """The half period that repeats, the clock started from rest; its relative error; the status.
@@ -133,7 +118,8 @@ def repeated(scene):
     for _ in range(HALF_PERIODS):
         if half.end != _two_bodies.DONE:
             if not tried:
-                return half, math.nan, _why(half.end)
+                refusal = NO_METHOD if half.end == _two_bodies.FALLS_BACK else STEP_LIMIT
+                return half, math.nan, UNMESHES if half.end == _two_bodies.OUT_OF_MESH else refusal
             v, w, gap, tried, ceiling = floor, floor, 0.0, False, v
             half = half_period(scene, v, w, gap)
             continue

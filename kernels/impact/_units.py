@@ -21,9 +21,9 @@ from typing import NamedTuple
 
 from kernels.lanes.jit import jit
 from kernels.lanes.ranges import judged, or_none
-from kernels.lanes.vectors import choose, magnitude, nearest, not_, sqrt, where
+from kernels.lanes.vectors import choose, magnitude, not_, where
 from kernels.maths import pairs as _pairs
-from kernels.maths.elementary import in_unit, is_normal, mantissa_exponent, measured, scale
+from kernels.maths.elementary import in_unit, is_normal, mantissa_exponent, measured, scale, scaled_root
 
 HALF_PITCH = 2e-15
 """Share of p/4 within which h is p/4."""
@@ -115,10 +115,8 @@ def without_dimensions(p):
 
     m_tau, e_tau = mantissa_exponent(p.torque)
     step = _TWO_PI[0] / p.teeth
-    half = nearest(0.5 * (e_c - e_tau) - 0.25)
-    odd = (e_c - e_tau) - 2.0 * half > 0.5
-    time = sqrt(step * (m_c / m_tau) * where(odd, 2.0, 1.0))
-    return scene, Units(time, half, step * s_c, f_c, s_c / s_v, f_c - f_v, step, fine)
+    time, e_time = scaled_root(step * (m_c / m_tau), e_c - e_tau)
+    return scene, Units(time, e_time, step * s_c, f_c, s_c / s_v, f_c - f_v, step, fine)
 
 
 @jit

@@ -93,6 +93,13 @@ def in_unit(x, e):
 
 
 @jit
+def scaled_root(m, e):
+    """sqrt(m 2^e) for a positive m, as a number again and the exponent of its unit."""
+    half = nearest(0.5 * e - 0.25)
+    return sqrt(m * where(e - 2.0 * half > 0.5, 2.0, 1.0)), half
+
+
+@jit
 def exp(x):
     """e^x within 1 ulp; 0 below -745, inf above 710, and 0 of NaN."""
     x = where(x > -760.0, x, -760.0)
