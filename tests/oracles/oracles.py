@@ -3,7 +3,7 @@
 Arguments are float64 and taken as exact.
 """
 
-from mpmath import exp, expm1, findroot, log, log1p, mp, mpf, sinh, tanh
+from mpmath import exp, expm1, log, log1p, mp, mpf, sinh, tanh
 
 DIGITS = 50
 
@@ -40,31 +40,6 @@ def foliot_angle(mu, phi0, a, phase):
         t = period * (phase if sign > 0 else phase - mpf(1) / 2)
         forgotten = -expm1(-a * t) / a
         return sign * (phi0 + (v0 + mu / a) * forgotten - mu / a * t), sign * (v0 - (a * v0 + mu) * forgotten)
-
-
-def foliot_by_waiting(mu, phi0, a, half_swings):
-    """Period, amplitude and crossing speed after that many half swings from rest at phi = 0.
-
-    Follows the motion x = v E/a -+ mu (t - E/a)/a, E = 1 - exp(-a t), from switch to switch: nothing of the limit
-    cycle's equations is used.
-    """
-    mu, phi0, a = mpf(mu), mpf(phi0), mpf(a)
-
-    def way(v, t):  # along the drive
-        forgotten = -expm1(-a * t) / a
-        return v * forgotten + mu / a * (t - forgotten)
-
-    def flight(v, distance):  # v: speed along the drive at the start, <= 0 after a switch
-        guess = (abs(v) + (v * v + 2 * mu * distance) ** mpf("0.5")) / mu + a * distance / mu
-        t = findroot(lambda t: way(v, t) - distance, (guess, guess * mpf("1.01")))
-        return t, v + (mu - a * v) * -expm1(-a * t) / a
-
-    _, v = flight(mpf(0), phi0)
-    for _ in range(half_swings):
-        before = v
-        t, v = flight(-before, 2 * phi0)
-    turning = log1p(a * before / mu) / a
-    return 2 * t, phi0 - way(-before, turning), v
 
 
 def foliot_design(period, amplitude, phi0):

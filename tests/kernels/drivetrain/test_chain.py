@@ -7,7 +7,6 @@ import reduction_oracles
 from columns import checked, relative_error, solve
 from mpmath import mp, mpf
 
-from kernels.drivetrain.receptance import MILLING_MACHINE
 from kernels.drivetrain.reduced import DRIVETRAIN
 from kernels.interface import Status
 from kernels.lanes.jit import COMPILED
@@ -93,17 +92,6 @@ def test_the_sum_of_inverse_squares_is_dunkerleys():
     flexibility = np.cumsum(1 / k[:, ::-1], axis=1)[:, ::-1]
     found, *_ = solved(J, k)
     np.testing.assert_allclose((1 / (2 * np.pi * found) ** 2).sum(1), (J * flexibility).sum(1), rtol=1e-14)
-
-
-def test_the_milling_machine_has_the_frequencies_and_the_damping_that_were_found_for_it():
-    """Table 1 of the source in its own units, which makes the same machine without dampers."""
-    J = np.array([25.7, 1.25, 0.284, 0.769, 1.45, 6.50, 96.00, 99.44])
-    k = np.array([7.53, 3.79, 0.839, 1.372, 4.01, 2.80, 5.25, 1.192]) * 1e6
-    expected = [10.591, 19.785, 53.104, 102.530, 226.916, 346.664, 388.156, 714.607]
-    np.testing.assert_allclose(solved(J, k)[0][0], expected, atol=6e-4)
-    _, damping, status = solved(*(MILLING_MACHINE[name] for name in "Jkh"))
-    assert status[0] == Status.OK
-    np.testing.assert_allclose(damping[0, :5], [0.317, 0.076, 0.126, 0.020, 0.018], atol=5e-4)
 
 
 @pytest.mark.parametrize("values", [[1.0, 2.1e90], [1.0, 1e-310]])

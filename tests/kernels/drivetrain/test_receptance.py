@@ -6,14 +6,13 @@ import pytest
 from columns import checked, solve
 from mpmath import mp, mpc
 
-from kernels.drivetrain.receptance import DRIVETRAIN_FRF, MILLING_MACHINE
+from kernels.drivetrain.receptance import DRIVETRAIN_FRF
 from kernels.drivetrain.reduced import DRIVETRAIN
 from kernels.interface import Status
 from kernels.lanes.jit import COMPILED
 
 CELLS = 24 if COMPILED else 4
 NAN, INF = np.nan, np.inf
-KGF_M = 9.80665  # N m
 
 
 def chains(n, decades, damping, seed=1, cells=CELLS):
@@ -114,19 +113,6 @@ def test_amplitude_phase_and_decibel_are_those_of_the_receptance_and_the_drive_p
         np.testing.assert_allclose(outputs["phase"], np.angle(H), rtol=0, atol=1e-15)
         np.testing.assert_allclose(outputs["amplitude_dB"], 20 * np.log10(abs(H)), rtol=1e-15, atol=1e-14)
         assert read > 1 or ((outputs["phase"] >= -np.pi) & (outputs["phase"] < 0)).all()
-
-
-def test_the_milling_machine_answers_at_its_spindle_as_was_found_for_it():
-    """Static 3.9534e-3 rad/(kgf m), peak 15.15e-3 at 19.1 Hz, shoulder 6.28e-3 at 10 Hz; at the motor 1.22e-3."""
-    J, k, h = (np.array([MILLING_MACHINE[name]]) for name in "Jkh")
-    frequency = np.concatenate([[0.0, 10.0], np.arange(18.0, 20.5, 0.05)])
-    amplitude = KGF_M * receptances(J, k, h, 1, 1, frequency)[0]["amplitude"][0]
-    assert amplitude[0] == pytest.approx(3.9534e-3, rel=5e-4)
-    assert amplitude[1] == pytest.approx(6.28e-3, rel=1e-3)
-    assert amplitude.max() == pytest.approx(15.15e-3, rel=1e-3)
-    assert frequency[amplitude.argmax()] == pytest.approx(19.1, abs=0.06)
-    motor = KGF_M * receptances(J, k, h, 8, 8, np.arange(1.0, 60.0, 0.5))[0]["amplitude"][0]
-    assert motor.max() == pytest.approx(1.22e-3, rel=5e-3)
 
 
 @pytest.mark.parametrize("mass", [0.0, 4.0, 1.5, -1.0, NAN, INF])

@@ -43,14 +43,6 @@ def test_closed_form_is_right_to_1e_15_over_60_decades(low, high):
         assert error[worst] <= promise[worst], (name, [float(c[worst]) for c in columns])
 
 
-@pytest.mark.parametrize("alpha", [0.02, 1.0, 1.46299058758010465706, 30.0])
-def test_closed_form_is_what_waiting_for_the_cycle_gives(alpha):
-    outputs, _ = solve(FOLIOT, "closed", [alpha * 0.09 * 0.7], [0.7], [0.3])
-    waited = oracles.foliot_by_waiting(alpha * 0.09 * 0.7, 0.7, 0.3, half_swings=60)
-    for name, truth in zip(NAMES, waited, strict=False):
-        assert relative_error(outputs[name], [truth])[0] < 1e-15, name
-
-
 @pytest.mark.parametrize(("low", "high"), [(-12, -1), (-1, 1.5), (1.5, 12)])
 def test_asymptotic_errors_stay_below_their_bounds(low, high):
     columns = scenes(low, high)

@@ -9,7 +9,6 @@ from mpmath import mpf
 from kernels.foliot.cycle import FOLIOT
 from kernels.foliot.motion import FOLIOT_MOTION
 from kernels.interface import Status
-from kernels.lanes.jit import COMPILED
 
 
 def test_angle_and_speed_are_right_to_4e_15_of_their_largest():
@@ -37,20 +36,6 @@ def test_friction_takes_2_mu_phi0_in_every_half_swing(alpha):
     cycle, _ = solve(FOLIOT, "closed", [mu], [phi0], [a])
     lost = a * np.sum(weights * motion["speed"][0] ** 2) * 0.25 * cycle["period"][0]
     assert lost == pytest.approx(2 * mu * phi0, rel=1e-12)
-
-
-def test_it_starts_at_the_switch_rises_to_the_amplitude_and_turns_over_at_half_time():
-    half = 10000 if COMPILED else 1000
-    phase = np.linspace(0, 1, 2 * half + 1)
-    motion, _ = solve(FOLIOT_MOTION, "closed", [3.0], [0.5], [1.1], along=[phase])
-    cycle, _ = solve(FOLIOT, "closed", [3.0], [0.5], [1.1])
-    angle, speed = motion["angle"][0], motion["speed"][0]
-    assert angle[0] == 0.5 == -angle[half]
-    assert speed[0] == -speed[half]
-    assert speed[0] == pytest.approx(cycle["crossing_speed"][0], rel=1e-15)
-    assert angle.max() == pytest.approx(cycle["amplitude"][0], rel=10 / half**2)
-    assert np.allclose(angle[:half], -angle[half:-1], atol=1e-14)
-    assert np.allclose(np.gradient(angle, phase * cycle["period"][0])[1:-1], speed[1:-1], atol=10 / half)
 
 
 @pytest.mark.parametrize("method", ["closed", "segments"])

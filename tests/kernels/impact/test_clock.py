@@ -165,19 +165,6 @@ def test_an_escape_height_of_a_quarter_pitch_is_the_clock_without_drop_however_i
         np.testing.assert_allclose(outputs["period"][:3], 2 * half, rtol=3e-15)
 
 
-@pytest.mark.parametrize("method", ["closed", "events"] if COMPILED else ["closed"])
-@pytest.mark.parametrize("clock", [(4.0, 0.2, 0.05), (2.0, 0.0, 0.1)])
-def test_the_period_goes_as_torque_to_minus_one_half_and_the_swing_knows_no_torque(method, clock):
-    n = 49 if COMPILED else 5
-    columns = joined(*[cell_of(*clock)] * n)
-    columns[0] = 10 ** np.linspace(-12, 12, n)
-    outputs, status = solve(IMPACT, method, *columns)
-    steady = outputs["period"] * np.sqrt(columns[0])
-    assert (status == Status.OK).all()
-    assert abs(steady / steady[0] - 1).max() < 1e-14
-    assert abs(outputs["swing"] / outputs["swing"][0] - 1).max() < 1e-14
-
-
 def test_no_impact_cycle_keeps_more_than_seven_eighths_of_the_speed():
     random, n = np.random.default_rng(9), 10_000 if COMPILED else 20
     bent = clocks(n, seed=9, kappa=(-3, 5), e=random.uniform(0.875, 1.0 - 2.0**-53, n), nu=1.0)

@@ -184,16 +184,6 @@ def test_a_lever_so_bent_that_both_pallets_hold_the_wheel_is_refused():
     assert not (status == Status.TOOTH_JUMPED).any()
 
 
-def test_with_little_restitution_a_clock_is_nearly_plastic():
-    plastic, _ = events(2.0, 0.1, 0.0)
-    for e in (1e-3, 1e-6):
-        bouncing, status = events(2.0, 0.1, e)
-        assert status[0] == Status.OK
-        assert np.isinf(bouncing["impacts"][0])
-        assert abs(bouncing["period"][0] / plastic["period"][0] - 1) < 3 * e
-        assert bouncing["multiplier"][0] == pytest.approx(plastic["multiplier"][0], rel=1e-12)
-
-
 @pytest.mark.parametrize(
     ("scene", "rtol", "status"),
     [

@@ -72,16 +72,6 @@ def test_every_closed_output_has_its_digits(kind, kind_of_arm):
     assert np.isnan([outputs[name] for name in (*RATES, "theta_lock", "theta_lock_outer")]).all()
 
 
-def test_the_papers_machine_swings_as_its_figures_say():
-    e = [0.0, 5.0, 10.0, 15.0]
-    outputs, status = solve(POLISHER, "stable", *FIGURE, e)
-    assert (status == Status.OK).all()
-    np.testing.assert_allclose(np.degrees(outputs["A0"]), [39.2603, 39.0843, 38.4038, 36.0997], atol=1e-4)
-    np.testing.assert_allclose(outputs["A1"], [0, 0.136733, 0.280338, 0.452891], atol=1e-6)
-    np.testing.assert_allclose(np.degrees(outputs["theta_plus"]), [143.574, 142.411, 142.241, 142.785], atol=1e-3)
-    np.testing.assert_allclose(np.degrees(outputs["theta_minus"]), [-36.426, -33.732, -28.268, -15.227], atol=1e-3)
-
-
 def test_derivatives_are_those_of_the_angles():
     """Of the oracle, which the kernel is compared with: its differences over 1e-20."""
     with mp.workdps(50):

@@ -88,16 +88,6 @@ def test_over_many_turns_a_point_wears_as_its_ring():
     assert value[0] / tau == pytest.approx(ring["wear"][0, 0], rel=5e-3)
 
 
-@pytest.mark.skipif(not COMPILED, reason="many turns")
-def test_wear_adds_up_over_time():
-    """The second half of the time is a run of its own, from where the first ended after whole turns of the crank."""
-    turns = 8 * 2 * math.pi
-    whole, _, _ = wear(tau=2 * turns)
-    first, _, _ = wear(tau=turns)
-    second, _, _ = wear(tau=turns, theta0=0.3 + 0.4 * turns)
-    assert whole[0] == pytest.approx(first[0] + second[0], rel=1e-10)
-
-
 @pytest.mark.skipif(not COMPILED, reason="thousands of areas")
 def test_under_a_load_a_point_wears_by_the_speed_over_the_area_of_contact():
     """In time steps of 1e-5 of it, as far as they tell; within the rim as under a pressure."""
