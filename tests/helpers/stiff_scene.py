@@ -4,37 +4,37 @@ import bounce_scene
 
 from kernels.scene import Field, cos, scene_kernel, sin
 
-SPEED = Field("speed", "rad/s", "speed at the switch")
-FORCE, EPS = Field("force", "rad/s^2", "lagging drive"), Field("eps", "s", "lag", lower=0.0, open_lower=True)
+
+def drawn(force, clock, side, eps, relaxes):
+    """Speed and force: to cos(clock) by a law that is not linear, and on it from the start; or to the side."""
+    wave = -sin(clock) - (1.0 + force**2) * (force - cos(clock)) / eps
+    return (1.0 - relaxes) * force, (1.0 - relaxes) * wave + relaxes * (side - force) / eps, 1.0
 
 
-def followed_wave(speed, force, clock, side, eps):
-    """The force is drawn to cos(clock) by a law that is not linear, and is on it from the start."""
-    return force, -sin(clock) - (1.0 + force**2) * (force - cos(clock)) / eps, 1.0 + 0.0 * side
+def met(speed, force, clock, side, level, relaxes):
+    """A speed; or, of what relaxes, first a time, then a force."""
+    second = 0.5 * ((1.0 + side) * (1.0 - clock) + (1.0 - side) * (force - level))
+    return (1.0 - relaxes) * (level - speed) + relaxes * second
 
 
-WAVE = scene_kernel(
-    name="wave",
-    doc="speed by a force that follows a wave; Prothero and Robinson's test",
-    states=(SPEED, FORCE, Field("clock", "s", "time by the clock")),
-    parameters=(EPS, Field("level", "rad/s", "speed at the switch")),
-    rates=followed_wave,
-    surface=lambda speed, level: level - speed,
+DRAWN = scene_kernel(
+    name="drawn",
+    doc="a force that follows a wave, Prothero and Robinson's test; or relaxes from 1 to -1, and is met on its way",
+    states=(
+        Field("speed", "rad/s", "speed at the switch"),
+        Field("force", "rad/s^2", "lagging drive"),
+        Field("clock", "s", "time by the clock"),
+    ),
+    parameters=(
+        Field("eps", "s", "lag", lower=0.0, open_lower=True),
+        Field("level", "1", "speed or force at the switch"),
+        Field("relaxes", "1", "1: it relaxes behind the first switch; 0: it follows the wave"),
+    ),
+    rates=drawn,
+    surface=met,
     start=lambda: (0.0, 1.0, 0.0),
-    example={"eps": 1e-3, "level": 0.5},
+    example={"eps": 1e-3, "level": 0.5, "relaxes": 0.0},
 )
-
-PASSED = scene_kernel(
-    name="passed",
-    doc="a state that relaxes from 1 to -1 behind the first switch, and is met on its way",
-    states=(FORCE, Field("clock", "s", "time by the clock")),
-    parameters=(EPS, Field("level", "rad/s^2", "force at the second switch")),
-    rates=lambda force, side, eps: ((side - force) / eps, 1.0 + 0.0 * force),
-    surface=lambda force, clock, side, level: 0.5 * ((1.0 + side) * (1.0 - clock) + (1.0 - side) * (force - level)),
-    start=lambda: (1.0, 0.0),
-    example={"eps": 1e-3, "level": 0.5},
-)
-
 
 RAISED = scene_kernel(
     name="raised",

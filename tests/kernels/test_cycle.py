@@ -1,9 +1,10 @@
 """Limit cycles of scenes: against closed forms, the foliot's own kernel, and in the words of their statuses."""
 
+import foliot_scene
 import numpy as np
 import pytest
-import rich_scene
 from columns import checked, estimated, solve
+from junction_scene import KERNEL as JUNCTION
 from kicked_scene import KICKED
 from mpmath import mp, mpf
 from scipy.integrate import solve_ivp
@@ -12,7 +13,7 @@ from kernels.cycle import cycle_kernel
 from kernels.foliot.cycle import FOLIOT
 from kernels.interface import Status
 from kernels.lanes.jit import COMPILED
-from kernels.scene import Field, SceneError, sin
+from kernels.scene import Field, SceneError
 
 pytestmark = pytest.mark.skipif(not COMPILED, reason="a cycle takes minutes as plain Python")
 
@@ -96,10 +97,11 @@ def test_what_comes_to_rest_slowly_is_no_cycle_of_tiny_size():
 
 
 def test_the_foliot_as_a_scene_has_the_cycle_of_its_own_kernel():
-    """Five decades of drive, four losses; a minute of compiling where nothing is kept."""
+    """Five decades of drive, four losses; most of a minute of compiling where nothing is kept."""
+    known = foliot_scene.KERNEL
     scene = cycle_kernel(
-        name="rich_cycle", doc="foliot", states=rich_scene.RICH.outputs[2:], parameters=rich_scene.RICH.parameters[:-1],
-        rates=rich_scene.rates, surface=rich_scene.surface, start=rich_scene.start, switch=rich_scene.switch,
+        name="foliot_cycle", doc="foliot", states=known.outputs[2:], parameters=known.parameters[:-1],
+        rates=foliot_scene.rates, surface=foliot_scene.surface, start=foliot_scene.start, switch=foliot_scene.switch,
     )  # fmt: skip
     mu = np.tile(10.0 ** np.linspace(-1.0, 4.0, 6), 4)
     losses = {name: np.zeros(24) for name in ("a", "c", "R")} | {"e": np.ones(24)}
@@ -130,19 +132,12 @@ def test_a_cycle_of_half_the_sides_and_a_surface_of_two_states_are_refused():
 
 
 def test_a_phase_that_is_locked_to_its_drive_goes_on_by_whole_turns():
-    """phi' = bias + sin(theta) - sin(phi), theta' = 1: locked, and between two steps."""
-    turn = 2.0 * np.pi
-    junction = cycle_kernel(
-        name="junction", doc="driven junction", states=(Field("phi", "rad", "phase"), Field("theta", "rad", "drive")),
-        parameters=(Field("bias", "1", "current"),), turns={"phi": turn}, start=lambda: (0.0, 0.0),
-        rates=lambda phi, theta, bias: (bias + sin(theta) - sin(phi), 1.0), surface=lambda theta: turn - theta,
-        switch=lambda phi, theta: (phi, theta - turn),
-    )  # fmt: skip
-    cells = {"bias": np.array([0.0, 0.3, 1.2, 0.9]), "flips": 1.0, "settle": 16.0}
-    found, status = solve(junction, "taylor", **cells, asked=("period", "phi", "phi_turns"))
-    assert list(status[:3]) == [Status.OK] * 3
-    assert list(found["phi_turns"][:3]) == [0.0, 0.0, 1.0]
-    assert status[3] == Status.NOT_CONVERGED
-    own = solve_ivp(lambda t, y: [1.2 + np.sin(t) - np.sin(y[0])], (0.0, 12 * turn), [0.0], rtol=1e-11, atol=1e-12)
-    assert np.cos(own.y[0, -1] - found["phi"][2]) == pytest.approx(1.0, abs=1e-15)
-    assert np.sin(own.y[0, -1] - found["phi"][2]) == pytest.approx(0.0, abs=1e-8)
+    """phase' = detuning + cos(drive) - sin(phase), drive' = 1: locked, and between two steps."""
+    cells = {"detuning": [0.0, 0.3, 1.2, 0.9], "order": 0.0, "ac": 1.0, "w": 1.0, "flips": 1.0, "settle": 16.0}
+    found, status = solve(JUNCTION, "taylor", **cells, asked=("period", "phase", "phase_turns"))
+    assert list(status) == [Status.OK] * 3 + [Status.NOT_CONVERGED]
+    assert list(found["phase_turns"][:3]) == [0.0, 0.0, 1.0]
+    end = 24.0 * np.pi
+    own = solve_ivp(lambda t, y: [1.2 + np.cos(t) - np.sin(y[0])], (0.0, end), [0.0], rtol=1e-11, atol=1e-12)
+    assert np.cos(own.y[0, -1] - found["phase"][2]) == pytest.approx(1.0, abs=1e-15)
+    assert np.sin(own.y[0, -1] - found["phase"][2]) == pytest.approx(0.0, abs=1e-8)

@@ -40,9 +40,9 @@ def test_a_ball_is_at_rest_when_its_bounces_accumulate(kernel, rtol):
 
 
 @many
-@pytest.mark.parametrize("method", ["rodas5p", "dop853"])
-def test_every_method_carries_it_there(method):
-    outputs, status = solve(BALL, method, [9.81], 0.3, flips=2000.0, rtol=1e-8)
+def test_a_method_of_steps_carries_it_there():
+    """All of them by the same code; benchmarks/honesty/families.py tries them."""
+    outputs, status = solve(BALL, "dop853", [9.81], 0.3, flips=2000.0, rtol=1e-8)
     assert status[0] == Status.COMES_TO_REST
     assert relative_error(outputs["time"], [rest(9.81, 0.3, 1.0)])[0] < 1e-8
 

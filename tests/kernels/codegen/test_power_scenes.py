@@ -1,29 +1,78 @@
-"""Powers of a state that bring it to rest or hold its place: against the energy integral, a Beta function."""
+"""Powers of a state, which have no series where it turns: against integrals in 24 digits, and of the energy, a Beta."""
 
 import numpy as np
 import pytest
+import scene_oracles as oracles
 from columns import relative_error, solve
 from mpmath import mp, mpf
+from rich_scene import RICH
 
 from kernels.interface import Status
 from kernels.lanes.jit import COMPILED
 from kernels.scene import Field, power, scene_kernel, sign
 
 TOLERANCES = [1e-10, 1e-12] if COMPILED else [1e-10]
-"""By one series; `slide` is followed by both."""
 
 
 def fields(*names):
     return tuple(Field(name, "1", name) for name in names)
 
 
-@pytest.fixture(scope="module")
-def slide():
-    return scene_kernel(
-        name="slide", doc="v' = -a v - abs(v)^n sign v, to the switch at x = 5", states=fields("x", "v"),
-        parameters=fields("n", "a"), rates=lambda x, v, n, a: (v, -a * v - power(abs(v), n) * sign(v)),
-        surface=lambda x: 5.0 - x, start=lambda: (0.0, 1.0),
-    )  # fmt: skip
+GENERAL = scene_kernel(
+    name="general", doc="foliot with drag of any power", states=fields("angle", "speed"),
+    parameters=fields("mu", "phi0", "a", "c", "n", "speed0"),
+    rates=lambda speed, side, mu, a, c, n: (speed, side * mu - a * speed - c * power(abs(speed), n) * sign(speed)),
+    surface=lambda angle, side, phi0: phi0 - side * angle, start=lambda speed0: (0.0, speed0),
+)  # fmt: skip
+
+
+def followed(*cells, flips=2.0, rtol=1e-9):
+    """Outputs and status of foliots that start from rest."""
+    columns = np.broadcast_arrays(*(np.atleast_1d(np.asarray(c, float)) for c in cells), 0.0, flips)
+    return solve(GENERAL, "taylor", *map(np.ascontiguousarray, columns), rtol=rtol)
+
+
+@pytest.mark.parametrize("rtol", [1e-5, 1e-9])
+def test_any_power_is_right_to_the_tolerance(rtol):
+    cells = [2.0, 0.7, 4.5], [1.0, 2.0, 0.4], [0.3, 0.05, 0.0], [0.4, 0.2, 0.1], [1.5, 0.5, 2.7]
+    if not COMPILED:
+        cells = [c[:1] for c in cells]
+    outputs, status = followed(*cells, rtol=rtol)
+    assert (status == Status.OK).all()
+    truths = [oracles.power_foliot(*cell, 2) for cell in zip(*cells, strict=True)]
+    assert relative_error(outputs["time"], [t for t, _ in truths]).max() < rtol
+    assert relative_error(abs(outputs["speed"]), [v for _, v in truths]).max() < rtol
+
+
+def test_the_power_0_is_dry_friction_and_the_power_2_is_quadratic_drag():
+    mu, R = mpf(3), mpf(1)
+    outputs, status = followed(3.0, 2.0, [0.0, 0.3], [1.0, 0.4], [0.0, 2.0])
+    assert (status == Status.OK).all()
+    v = mp.sqrt(2 * (mu - R) * 2)
+    top = v * v / (2 * (mu + R))
+    dry = v / (mu - R) + v / (mu + R) + mp.sqrt(2 * (top + 4) / (mu - R))
+    drag, _ = oracles.quadratic_foliot(3.0, 2.0, 0.3, 0.4, 2)
+    assert relative_error(outputs["time"], [dry, drag]).max() < 1e-9
+
+
+@pytest.mark.skipif(not COMPILED, reason="thousands of steps")
+def test_over_decades_what_is_not_remarked_is_right():
+    random = np.random.default_rng(6)
+    cells = [10.0 ** random.uniform(-4, 4, 200) for _ in range(4)] + [random.uniform(-0.9, 6.0, 200)]
+    outputs, status = followed(*cells, flips=1.0, rtol=1e-6)
+    finer, again = followed(*cells, flips=1.0, rtol=1e-8)
+    fine = (status == Status.OK) & (again == Status.OK)
+    assert fine.mean() > 0.5
+    for name in ("time", "speed"):
+        np.testing.assert_allclose(outputs[name][fine], finer[name][fine], rtol=1e-6)
+
+
+@pytest.mark.parametrize("rtol", [1e-6, 1e-13] if COMPILED else [1e-10])
+@pytest.mark.parametrize("a", [0.0, 1.0])
+def test_what_a_power_below_1_brings_to_rest_sticks(rtol, a):
+    n = np.array([0.5, 0.3, 0.05, 0.8] if COMPILED else [0.5, 0.3])
+    _, status = solve(GENERAL, "taylor", 0.0, 5.0, a, 1.0, n, 1.0, flips=1.0, rtol=rtol)
+    assert (status == Status.STICKS).all()
 
 
 @pytest.fixture(scope="module")
@@ -33,14 +82,6 @@ def swing():
         parameters=fields("n", "x0", "v0"), rates=lambda x, v, n: (v, -power(abs(x), n) * sign(x)),
         surface=lambda x, side: side * x, start=lambda x0, v0: (x0, v0),
     )  # fmt: skip
-
-
-@pytest.mark.parametrize("rtol", [1e-6, 1e-13] if COMPILED else [1e-10])
-@pytest.mark.parametrize("a", [0.0, 1.0])
-def test_what_a_power_below_1_brings_to_rest_sticks(slide, rtol, a):
-    n = np.array([0.5, 0.3, 0.05, 0.8] if COMPILED else [0.5, 0.3])
-    _, status = solve(slide, "taylor", n, np.full(len(n), a), np.ones(len(n)), rtol=rtol)
-    assert (status == Status.STICKS).all()
 
 
 def quarter(n, x0, v0):
@@ -67,11 +108,7 @@ def test_an_oscillator_switched_at_its_own_kink_keeps_its_period(swing, rtol, x0
 @pytest.mark.skipif(not COMPILED, reason="thousands of steps")
 def test_what_a_tighter_tolerance_can_do_a_wider_one_does_not_refuse():
     """v' = (1 - v)/eps: v comes to 1 in the last digit alone, where the steps are free of eps."""
-    lag = scene_kernel(
-        name="lag", doc="x' = v, v' = (1 - v)/eps", states=fields("x", "v"), parameters=fields("eps"),
-        rates=lambda v, eps: (v, (1.0 - v) / eps), surface=lambda x: 1.0 - x, start=lambda: (0.0, 0.0),
-    )  # fmt: skip
     for rtol in (1e-6, 1e-10, 1e-13):
-        outputs, status = solve(lag, "dop853", np.array([1e-5]), np.ones(1), rtol=rtol)
+        outputs, status = solve(RICH, "dop853", [1e5], 1.0, a=1e5, flips=1.0, rtol=rtol)
         assert status[0] == Status.OK
         assert relative_error(outputs["time"], [1 + mpf(10) ** -5])[0] < max(rtol, 1e-13)

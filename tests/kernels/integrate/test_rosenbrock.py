@@ -8,7 +8,7 @@ import stiff_oracles
 from columns import relative_error, solve
 from lag_scene import KERNEL as LAG
 from mpmath import mp, mpf
-from stiff_scene import PASSED, WAVE
+from stiff_scene import DRAWN
 
 import sweep
 from kernels.codegen.stepped import stepped
@@ -68,7 +68,7 @@ def test_the_series_gives_up_where_stability_limits_its_steps_and_auto_goes_on()
 @pytest.mark.parametrize("rtol", [1e-4, 1e-7, 1e-10])
 def test_a_stiff_law_that_is_not_linear_keeps_to_the_wave_that_it_follows(rtol):
     eps, level = 10.0 ** -np.linspace(0.0, 9.0, 19), 0.5
-    outputs, status = solve(WAVE, "rodas5p", eps, level, flips=1.0, rtol=rtol)
+    outputs, status = solve(DRAWN, "rodas5p", eps, level, 0.0, flips=1.0, rtol=rtol)
     time = mp.asin(mpf(level))  # force = cos(clock), speed = sin(clock)
     assert not status.any()
     assert (off(outputs, [(time, time, mp.cos(time))] * len(eps), ("time", "clock", "force")) < rtol).all()
@@ -79,7 +79,7 @@ def test_a_stiff_law_that_is_not_linear_keeps_to_the_wave_that_it_follows(rtol):
 @pytest.mark.parametrize("level", [0.5, -0.5])
 def test_a_switch_while_a_state_relaxes_is_met_where_it_is(level, rtol):
     eps = 10.0 ** -np.arange(0.0, 16.0)
-    outputs, status = solve(PASSED, "rodas5p", eps, level, flips=2.0, rtol=rtol)
+    outputs, status = solve(DRAWN, "rodas5p", eps, level, 1.0, flips=2.0, rtol=rtol)
     truths = [-mpf(one) * mp.log((1 + mpf(level)) / 2) for one in eps]
     assert not status.any()
     assert (relative_error(outputs["interval"], truths) < rtol).all()

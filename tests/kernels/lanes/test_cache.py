@@ -137,7 +137,7 @@ from columns import solve
 from numba.core import event
 from own_scene import KERNEL
 with event.install_recorder("numba:compile") as recorder:
-    _, status = solve(KERNEL, "taylor", **{name: [value] for name, value in KERNEL.example.items()})
+    _, status = solve(KERNEL, "taylor_once", **{name: [value] for name, value in KERNEL.example.items()})
 print(status[0], sum(one.is_start for _, one in recorder.buffer))
 """
 """Prints the status of a cell, and how many functions were compiled."""

@@ -110,12 +110,11 @@ def test_a_pulse_of_the_switch_itself_is_seen():
 
 
 @pytest.mark.skipif(not COMPILED, reason="many steps")
-@pytest.mark.parametrize("method", ["rk4", "dop853"])
-def test_at_a_fixed_step_a_pulse_between_the_points_is_not_quiet(method):
+def test_at_a_fixed_step_a_pulse_between_the_points_is_not_quiet():
     kernel = scene("gaussian_steps", gaussian, make=stepped_kernel)
     w = np.array([1e-3, 0.01, 0.1, 0.3, 1.0])
     for step in (2.9, 0.3):
-        outputs, status = solve(kernel, method, w, 1e4, 19.3, 1.0, flips=1.0, step=step, rtol=1e-6)
+        outputs, status = solve(kernel, "rk4", w, 1e4, 19.3, 1.0, flips=1.0, step=step, rtol=1e-6)
         true = [float(area(of_gaussian, each, 1e4, 19.3)) for each in w]
         assert ((status == Status.INACCURATE) | (abs(outputs["x"] / true - 1) <= outputs["error"])).all()
         assert status[0] == Status.INACCURATE
