@@ -18,12 +18,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from _figures import charts
-from _figures import direct_label as direct_label
-from _figures import draw_costs as draw_costs
-from _figures import hatch as hatch
-from _figures import page_of as page_of
-from _figures import plain_ticks as plain_ticks
-from _figures import quality_bar as quality_bar
 
 import sweep
 from kernels.interface import Status

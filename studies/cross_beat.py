@@ -21,13 +21,11 @@ shakes one foliot, nothing if they are equal.                                   
 from __future__ import annotations
 
 import math
-import sys
-from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Conclusion, Statement, compared, count, differing, most, power, read_result, report, said, solved
+from _common import Conclusion, Statement, compared, count, differing, most, power, read_result, said, script, solved
 from _figures import page_of, plain_ticks
 
 from sweep.show.charts import COLOURS, MARKS
@@ -177,8 +175,4 @@ def conclude(path: str) -> Conclusion:
     return groups, [NOTES], lambda: figure(ds, halves)
 
 
-main = partial(report, __file__, ["cross_beat.h5"], conclude=conclude)
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+main = script(__name__, "cross_beat.h5", conclude)

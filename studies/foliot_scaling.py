@@ -10,13 +10,11 @@ out here. Only alpha = mu/(a^2 phi0) counts: a P and A = phi_max/phi0 are functi
 from __future__ import annotations
 
 import math
-import sys
-from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Conclusion, Statement, compared, most, read_result, report, said, solved
+from _common import Conclusion, Statement, compared, most, read_result, said, script, solved
 
 import sweep
 from sweep.show import charts
@@ -347,8 +345,4 @@ def conclude(path: str) -> Conclusion:
     return groups, [NOTES], lambda: figure(ds, half, motion)
 
 
-main = partial(report, __file__, ["foliot_scaling.h5"], conclude=conclude, source="paper")
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+main = script(__name__, "foliot_scaling.h5", conclude, source="paper")

@@ -15,13 +15,11 @@ there s = (3 a^2 phi0/(2 R))^(1/3). As mu grows without end, s - 1/3 goes as 4/4
 
 from __future__ import annotations
 
-import sys
-from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Conclusion, Statement, compared, differing, most, read_result, report, said, solved
+from _common import Conclusion, Statement, compared, differing, most, read_result, said, script, solved
 from _figures import direct_label, hatch, page_of
 
 import sweep
@@ -195,8 +193,4 @@ def conclude(laws_path: str, map_path: str) -> Conclusion:
     return groups, [NOTES], lambda: figure(laws, grid, line)
 
 
-main = partial(report, __file__, ["friction_laws.h5", "friction_laws_map.h5"], conclude=conclude)
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+main = script(__name__, "friction_laws.h5 friction_laws_map.h5", conclude)

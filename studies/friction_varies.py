@@ -21,13 +21,11 @@ both by sqrt(T/tau), and the two at once, of one noise, as (1 - s) sigma (`share
 from __future__ import annotations
 
 import math
-import sys
-from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Conclusion, Statement, compared, most, read_result, report, said, solved
+from _common import Conclusion, Statement, compared, most, read_result, said, script, solved
 from _figures import page_of
 from scipy.optimize import brentq
 
@@ -241,8 +239,4 @@ def conclude(path: str, noise_path: str) -> Conclusion:
     return groups, [NOTES], lambda: figure(ds, means, scatter)
 
 
-main = partial(report, __file__, ["friction_varies.h5", "friction_varies_noise.h5"], conclude=conclude)
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+main = script(__name__, "friction_varies.h5 friction_varies_noise.h5", conclude)

@@ -14,13 +14,11 @@ Denny's loses is not known here. Only their abstracts were at hand, and no numbe
 from __future__ import annotations
 
 import math
-import sys
-from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Conclusion, Statement, count, most, paragraph, read_result, report, said, solved
+from _common import Conclusion, Statement, count, most, paragraph, read_result, said, script, solved
 from _figures import colour_map, direct_label, hatch, page_of
 from matplotlib.colors import ListedColormap
 from matplotlib.lines import Line2D
@@ -224,8 +222,4 @@ def conclude(path: str, lever_path: str) -> Conclusion:
     return groups, [NOTES, "", *words(closed)], lambda: figure(closed, motion, bent)
 
 
-main = partial(report, __file__, ["impact_map.h5", "impact_map_lever.h5"], conclude=conclude)
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+main = script(__name__, "impact_map.h5 impact_map_lever.h5", conclude)

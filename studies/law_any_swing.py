@@ -18,13 +18,11 @@ Exact for every clock, since no other quantity has a time in it: with p_n = dlnP
 from __future__ import annotations
 
 import itertools
-import sys
-from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Conclusion, Statement, count, most, read_result, report, said, solved
+from _common import Conclusion, Statement, count, most, read_result, said, script, solved
 from _figures import page_of
 from _losses import any_swing, shares
 
@@ -141,8 +139,4 @@ def conclude(path: str) -> Conclusion:
     return groups, [NOTES], lambda: figure(ds, single)
 
 
-main = partial(report, __file__, ["law_any_swing.h5"], conclude=conclude)
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+main = script(__name__, "law_any_swing.h5", conclude)

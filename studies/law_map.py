@@ -17,13 +17,11 @@ dlnv = (1 - s) dlnmu: with (1) this says how many decades of torque an exponent 
 from __future__ import annotations
 
 import math
-import sys
-from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Conclusion, Statement, compared, count, differing, most, read_result, report, solved
+from _common import Conclusion, Statement, compared, count, differing, most, read_result, script, solved
 from _figures import colour_map, direct_label, hatch, page_of
 from _losses import any_swing, shares
 from scipy.optimize import brentq
@@ -246,8 +244,4 @@ def conclude(path: str) -> Conclusion:
     return groups, [law, "", NOTES], lambda: figure(ds, pure)
 
 
-main = partial(report, __file__, ["law_map.h5"], conclude=conclude)
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+main = script(__name__, "law_map.h5", conclude)

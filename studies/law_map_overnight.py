@@ -21,13 +21,11 @@ mu = R (18 R/(a^2 phi0))^(1/6), and
 from __future__ import annotations
 
 import math
-import sys
-from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Conclusion, Statement, compared, count, differing, most, paragraph, power, report, said, solved
+from _common import Conclusion, Statement, compared, count, differing, most, paragraph, power, said, script, solved
 from _figures import colour_map, direct_label, page_of, plain_ticks
 from scipy.optimize.elementwise import find_root
 
@@ -192,8 +190,4 @@ def conclude(path: str, borders_path: str) -> Conclusion:
     return groups, [NOTES, "", *answer(ds)], lambda: figure(ds, fine)
 
 
-main = partial(report, __file__, ["law_map_overnight.h5", "law_map_borders_fine.h5"], conclude=conclude)
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+main = script(__name__, "law_map_overnight.h5 law_map_borders_fine.h5", conclude)

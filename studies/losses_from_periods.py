@@ -14,13 +14,11 @@ so a period tells dry friction from the rest, and the amplitude, v^2/(2 mu), has
 
 from __future__ import annotations
 
-import sys
-from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Conclusion, Statement, most, read_result, report, said, solved
+from _common import Conclusion, Statement, most, read_result, said, script, solved
 from _figures import page_of, plain_ticks
 from clock_losses import SHARES, SUM, THRESHOLD, Measured, forecast
 
@@ -188,8 +186,4 @@ def conclude(path: str, tell: bool = True) -> Conclusion:
     return groups, [NOTES], lambda: figure(ds, clocks if tell else 0)
 
 
-main = partial(report, __file__, ["losses_from_periods.h5"], conclude=conclude)
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+main = script(__name__, "losses_from_periods.h5", conclude)

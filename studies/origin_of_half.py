@@ -18,14 +18,12 @@ from __future__ import annotations
 
 import itertools
 import math
-import sys
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Conclusion, Statement, compared, differing, most, read_result, report, said, solved
+from _common import Conclusion, Statement, compared, differing, most, read_result, said, script, solved
 from _figures import direct_label, page_of
 
 import sweep
@@ -220,8 +218,4 @@ def conclude(path: str) -> Conclusion:
     return groups, [NOTES], lambda: figure(ds)
 
 
-main = partial(report, __file__, ["origin_of_half.h5"], conclude=conclude)
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+main = script(__name__, "origin_of_half.h5", conclude)

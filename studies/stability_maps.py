@@ -23,7 +23,8 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, direct_label, page_of, read_result, report
+from _common import Groups, Statement, read_result, report
+from _figures import direct_label, page_of
 from scipy.integrate import DOP853, RK45
 
 import sweep

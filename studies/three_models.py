@@ -17,14 +17,12 @@ only the abstracts were at hand: the models are of their kind, no number is thei
 from __future__ import annotations
 
 import math
-import sys
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Conclusion, Statement, compared, differing, most, read_result, report, solved
+from _common import Conclusion, Statement, compared, differing, most, read_result, script, solved
 from _figures import direct_label, page_of, plain_ticks
 
 import sweep
@@ -190,9 +188,4 @@ def conclude(path: str, denny_path: str, viscous_path: str) -> Conclusion:
     return groups, [NOTES, "", f"all three models: {target}"], lambda: figure(ds)
 
 
-INPUTS = ["three_models.h5", "three_models_denny.h5", "three_models_viscous.h5"]
-main = partial(report, __file__, INPUTS, conclude=conclude)
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+main = script(__name__, "three_models.h5 three_models_denny.h5 three_models_viscous.h5", conclude)

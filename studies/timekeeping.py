@@ -25,15 +25,13 @@ Derived here.
 from __future__ import annotations
 
 import math
-import sys
 from dataclasses import replace
-from functools import partial
 from itertools import product
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Conclusion, Statement, columns, compared, differing, power, read_result, report, solved
+from _common import Conclusion, Statement, columns, compared, differing, power, read_result, script, solved
 from _figures import page_of
 
 from sweep.show.charts import COLOURS
@@ -239,8 +237,4 @@ def conclude(*paths: str) -> Conclusion:
     return groups, [*table(clocks), "", *in_words(clocks)], lambda: figure(clocks)
 
 
-main = partial(report, __file__, [f"{study}.h5" for study in CLOCKS.values()], conclude=conclude)
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+main = script(__name__, "timekeeping.h5 timekeeping_buergi.h5 timekeeping_spring.h5", conclude)

@@ -21,13 +21,11 @@ Derived here.
 from __future__ import annotations
 
 import math
-import sys
-from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Conclusion, Statement, compared, differing, most, power, read_result, report
+from _common import Conclusion, Statement, compared, differing, most, power, read_result, script
 from _figures import direct_label, page_of
 from matplotlib.lines import Line2D
 from scipy.optimize import brentq
@@ -229,8 +227,4 @@ def conclude(path: str) -> Conclusion:
     return groups, in_words(ds), lambda: figure(ds)
 
 
-main = partial(report, __file__, ["torque_ripple.h5"], conclude=conclude)
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+main = script(__name__, "torque_ripple.h5", conclude)

@@ -27,13 +27,11 @@ behind the pallet which it has left, as heavy ones do with e > 0.
 from __future__ import annotations
 
 import math
-import sys
-from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Conclusion, Statement, compared, differing, most, read_result, report, said, solved
+from _common import Conclusion, Statement, compared, differing, most, read_result, said, script, solved
 from _figures import colour_map, direct_label, hatch, page_of
 from scipy.optimize import brentq
 
@@ -204,8 +202,4 @@ def conclude(path: str) -> Conclusion:
     return groups, [NOTES], lambda: figure(ds, smooth)
 
 
-main = partial(report, __file__, ["verge_unmeshes.h5"], conclude=conclude)
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+main = script(__name__, "verge_unmeshes.h5", conclude)
