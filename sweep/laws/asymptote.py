@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from sweep.laws.curves import Window, check_end, check_options, described, fit_lines, title
+from sweep.laws.curves import Window, check_options, described, fit_lines, title
 from sweep.laws.fits import Found, fitted
 from sweep.laws.lines import rounding
 from sweep.laws.loglog import Array, slope_bounds, slopes
@@ -88,8 +88,7 @@ def fit_correction(
     >>> print(f"{float(sweep.fit_correction(ds.period, 'mu').exponent):.4f}")
     -0.3334
     """
-    check_options(confidence, noise, sigma)
-    check_end("end", end)
+    check_options(confidence, noise, sigma, end=end)
     sign = 1.0 if end == "high" else -1.0
 
     def each(t: Array, z: Array, errors: Array | None, bounds: Array | None) -> dict[str, Any]:

@@ -83,26 +83,24 @@ def compare_laws(y: xr.DataArray, dim: str, window: Window | None = None, *, sig
 
 def _table(t: Array, z: Array, tried: list[Found]) -> xr.Dataset:
     """All that `compare_laws` says of laws, the best first."""
-    span, least, least_bic = float(t[-1] - t[0]), tried[0].aicc, min(f.bic for f in tried)
-    worse = {f.law.name: min(f.aicc - least, f.bic - least_bic) for f in tried}
-
-    def chi_squared(f: Found) -> float:
-        """Chance of so large a one; NaN where the noise is not known."""
-        return math.nan if f.sigma is None else float(gammaincc((t.size - f.law.numbers) / 2, f.square / 2))
-
-    columns: dict[str, list[Any]] = {
-        "aicc": [f.aicc for f in tried],
-        "bic": [f.bic for f in tried],
-        "worse": list(worse.values()),
+    span, names = float(t[-1] - t[0]), [f.law.name for f in tried]
+    off, aicc, bic = (np.array(one) for one in zip(*((f.off, f.aicc, f.bic) for f in tried), strict=True))
+    worse = np.minimum(aicc - aicc.min(), bic - bic.min())
+    columns: dict[str, Any] = {
+        "aicc": aicc,
+        "bic": bic,
+        "worse": worse,
         "numbers": [f.law.numbers for f in tried],
-        "scatter": [math.sqrt(float(np.mean(f.off**2))) for f in tried],
+        "scatter": np.sqrt((off**2).mean(axis=1)),
         "residual": [f.residual for f in tried],
-        "runs": [float(runs_chance(f.off)) for f in tried],
-        "chi_squared": [chi_squared(f) for f in tried],
+        "runs": runs_chance(off),
+        "chi_squared": [
+            math.nan if f.sigma is None else float(gammaincc((t.size - f.law.numbers) / 2, f.square / 2)) for f in tried
+        ],
         "formula": [f.law.formula for f in tried],
         "exponents": [_exponents(f, span) for f in tried],
     }
-    alive = [f for f in tried if worse[f.law.name] <= BEYOND_DOUBT]
+    alive = [f for f, by in zip(tried, worse, strict=True) if by <= BEYOND_DOUBT]
     chosen = min(alive, key=lambda f: (f.law.numbers, not f.law.power, f.aicc))
     margin = min((f.aicc for f in tried if f is not chosen), default=math.inf) - chosen.aicc
     text = f"{chosen.law.name} ({chosen.law.formula}): " + "no power law; " * (not any(f.law.power for f in alive))
@@ -112,14 +110,12 @@ def _table(t: Array, z: Array, tried: list[Found]) -> xr.Dataset:
         text += f"all others are ruled out, the next by {margin:.3g} in AICc"
     if chosen.residual > 8 * rounding(t, z) and chosen.denied(t, "even"):
         text += "; but what it leaves has a shape, so that none of them is the law"
-    rows = zip(
-        [f.law.name for f in tried], (f"{one:.3g}" for one in columns["worse"]), columns["exponents"], strict=True
-    )
+    rows = zip(names, (f"{one:.3g}" for one in worse), columns["exponents"], strict=True)
     summary = Table(list(rows), ("law", "worse", "exponents")).text(indent="", wide=True)
     about = {name: {"units": "1", "long_name": words} for name, words in NAMES.items()}
     variables: dict[str, Any] = {name: ("law", column, about.get(name)) for name, column in columns.items()}
-    variables |= {"fitted": (("law", "point"), np.exp([z - f.off for f in tried]))}
-    variables |= {"x": ("point", np.exp(t)), "y": ("point", np.exp(z)), "law": [f.law.name for f in tried]}
+    variables |= {"fitted": (("law", "point"), np.exp(z - off))}
+    variables |= {"x": ("point", np.exp(t)), "y": ("point", np.exp(z)), "law": names}
     attrs = {"chosen": chosen.law.name, "margin": margin, "verdict": text, "summary": summary}
     return xr.Dataset(variables, attrs=attrs)
 

@@ -33,8 +33,8 @@ def check_output(y: Any) -> None:
         raise SweepError(f"{title(y)}: expected real numbers, found {y.dtype}")
 
 
-def check_options(confidence: float, noise: bool | str | None = None, sigma: Any = None) -> None:
-    """Raises SweepError where confidence is no share, noise none of the words, or both noise and sigma are given."""
+def check_options(confidence: float, noise: bool | str | None = None, sigma: Any = None, **ends: str) -> None:
+    """Raises SweepError where confidence is no share, noise none of the words or given beside sigma, or an end none."""
     if not 0 < confidence < 1:
         raise SweepError(f"confidence: expected a number between 0 and 1, found {confidence}")
     words = [word for word in NOISES if word != "noise"]
@@ -42,12 +42,9 @@ def check_options(confidence: float, noise: bool | str | None = None, sigma: Any
         raise SweepError(f"noise: expected True, False or one of {', '.join(words)}; found {noise!r}")
     if noise is not None and sigma is not None:
         raise SweepError("noise does not go with sigma, which says all of the noise; give one of them")
-
-
-def check_end(name: str, end: str) -> None:
-    """Raises SweepError where it is neither end of a window."""
-    if end not in ("low", "high"):
-        raise SweepError(f'{name}: expected "low" or "high", found {end!r}')
+    for name, end in ends.items():
+        if end not in ("low", "high"):
+            raise SweepError(f'{name}: expected "low" or "high", found {end!r}')
 
 
 def one_line(y: Any, what: str) -> None:
@@ -156,7 +153,7 @@ def fit_lines(
     present = np.isfinite(z) if errors is None else np.isfinite(z) & np.isfinite(errors)
     columns: dict[str, Any] = {}
     places = PLACES_OF_LAW if fewest == FEWEST_OF_LAW else 2
-    for pattern, which in alike(present):
+    for pattern, which in alike(present, plain=True):
         at = np.flatnonzero(pattern)
         at = at[np.argsort(t[at], kind="stable")]
         if at.size >= fewest and np.unique(t[at]).size >= places:

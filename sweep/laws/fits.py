@@ -77,10 +77,10 @@ class Found(NamedTuple):
         return bool(columns.size and regress(t, every, self.off[None], noise, columns.shape[1], self.sigma).denied[0])
 
 
-DAMPINGS = 10.0 ** np.array([-7.0, -3.0, -2.0, -1.0, 0.0, 1.0, 3.0])
-"""Of a Gauss-Newton step, all of which are tried at once; the best is taken."""
-STEPS = 30
-"""Gauss-Newton steps at most."""
+DAMPINGS = 10.0 ** np.array([[-7.0, -3.0, -1.0, 1.0], [-7.0, -2.0, 0.0, 3.0]])
+"""Of Gauss-Newton steps with and without what b takes up; all are tried at once, and the best is taken."""
+STEPS, ENOUGH = 30, 1e-6
+"""Steps at most, and the part of a sum of squares that a step must take away for another one."""
 MOST_LINES = 16
 """That are fitted at once, so that what is held stays below some 50 MB."""
 
@@ -98,7 +98,12 @@ def fitted(laws: Sequence[Law], t: Array, z: Array, errors: Array | None = None)
     most = MOST_LINES if errors is None else 1
     for first in range(0, len(z) if laws else 0, most):
         part = z[first : first + most]
-        for k, one in enumerate(_nearest(laws, t, part, None if errors is None else errors[first])):
+        rows = _Rows(laws, t, part, None if errors is None else errors[first])
+        moving = np.arange(len(rows.q))
+        for _ in range(STEPS):
+            if moving.size:
+                moving = rows.step(moving)
+        for k, one in enumerate(rows.found()):
             found[first + k % len(part)][one.law.name] = one
     if ONE in laws and errors is None:
         for line, row in zip(found, z, strict=True):
@@ -107,90 +112,102 @@ def fitted(laws: Sequence[Law], t: Array, z: Array, errors: Array | None = None)
     return found
 
 
-def _nearest(laws: Sequence[Law], t: Array, z: Array, errors: Array | None) -> list[Found]:
-    """Each law fitted to each line z (m, n); law by law."""
-    root, lines, n = np.ones_like(t) if errors is None else 1 / errors, len(z), t.size
-    # rows are laws times lines; q that a law does not have are 0 and stay so
-    law, wanted = np.repeat(np.arange(len(laws)), lines), np.tile(z, (len(laws), 1))
-    limits = np.zeros((2, len(laws), max(1, *(len(one.q) for one in laws))))
-    for k, one in enumerate(laws):
-        limits[:, k, : len(one.q)] = np.reshape([(number.least, number.most) for number in one.q], (-1, 2)).T
-    low, high = limits[:, law]
-    q = _starts(laws, t, z, root, limits.shape[2])
+class _Rows:
+    """Laws times lines z (m, n), law by law, each with its q; those that a law does not have are 0 and stay so."""
 
-    def project(rows: NDArray[np.intp], at: Array) -> tuple[Array, Array, Array, Array]:
+    def __init__(self, laws: Sequence[Law], t: Array, z: Array, errors: Array | None):
+        self.laws, self.t, self.errors = laws, t, errors
+        self.root = np.ones_like(t) if errors is None else 1 / errors
+        self.law, self.z = np.repeat(np.arange(len(laws)), len(z)), np.tile(z, (len(laws), 1))
+        limits = np.zeros((2, len(laws), max(1, *(len(law.q) for law in laws))))
+        for k, law in enumerate(laws):
+            limits[:, k, : len(law.q)] = np.reshape([(one.least, one.most) for one in law.q], (-1, 2)).T
+        self.low, self.high = limits[:, self.law]
+        self.q = self._starts(z, limits.shape[2])
+        self.off, self.b, self.basis, self.back = self._project(np.arange(len(self.q)), self.q)
+        self.square = (self.off**2).sum(axis=1)
+        self.rounding = (ROUNDING * (1 + abs(self.z).max(axis=1))) ** 2
+
+    def _starts(self, z: Array, most: int) -> Array:
+        """The q of a grid that are nearest to the lines."""
+        own = [law for law in self.laws if not law.starts_as]
+        tries = [np.array(list(itertools.product(*(number.starts for number in law.q)))) for law in own]
+        edges = np.cumsum([0, *map(len, tries)])
+        q = np.zeros((edges[-1], most))
+        for start, some in zip(edges, tries, strict=False):
+            q[start : start + len(some), : some.shape[1]] = some
+        shift, basis, _ = _linear(own, np.repeat(np.arange(len(own)), np.diff(edges)), q, self.t, self.root)
+        wanted = (z[:, None] - shift) * self.root
+        square = (wanted**2).sum(axis=2) - (np.einsum("gnk,mgn->mgk", basis, wanted) ** 2).sum(axis=2)
+        best = {}
+        for law, a, b in zip(own, edges, edges[1:], strict=False):
+            best[law.name] = q[a + np.nanargmin(square[:, a:b], axis=1)]
+        return np.concatenate([best[law.starts_as or law.name] for law in self.laws])
+
+    def _project(self, rows: NDArray[np.intp], q: Array) -> tuple[Array, Array, Array, Array]:
         """Weighted distances (r, n), infinite where there is no curve, b (r, k), and Q, R of the columns."""
-        shift, basis, back = _linear(laws, law[rows], at, t, root)
-        off = (wanted[rows] - shift) * root
+        shift, basis, back = _linear(self.laws, self.law[rows], q, self.t, self.root)
+        off = (self.z[rows] - shift) * self.root
         along = (off[:, None] @ basis)[:, 0]
         off = off - (basis @ along[..., None])[..., 0]
         b: Array = np.linalg.solve(back, along[..., None])[..., 0].astype(np.float64)
         return np.where(np.isnan(off), np.inf, off), b, basis, back
 
-    def derivatives(rows: NDArray[np.intp]) -> tuple[Array, Array]:
-        """Of the curves at fixed b (r, q, n) by q, and the columns with theirs (1 + q, k, r, n)."""
-        every = np.nan_to_num(_curves(laws, law[rows], q[rows], t, limits.shape[2]), posinf=0.0, neginf=0.0)
-        by_q = every[1:, 0] + np.einsum("qkrn,rk->qrn", every[1:, 1:], b[rows])
-        return by_q.transpose(1, 0, 2) * root, every[:, 1:] * root
+    def _derivatives(self, rows: NDArray[np.intp]) -> tuple[Array, Array]:
+        """Of the weighted curves at fixed b (r, q, n) by q, and the columns with theirs (1 + q, k, r, n)."""
+        every = _curves(self.laws, self.law[rows], self.q[rows], self.t, self.q.shape[1])
+        every = np.nan_to_num(every, posinf=0.0, neginf=0.0) * self.root
+        by_q = every[1:, 0] + np.einsum("qkrn,rk->qrn", every[1:, 1:], self.b[rows])
+        return by_q.transpose(1, 0, 2), every[:, 1:]
 
-    rows = np.arange(len(q))
-    off, b, basis, back = project(rows, q)
-    square = (off**2).sum(axis=1)
-    for _ in range(STEPS):
-        # of the distances, which b follows (Golub and Pereyra, 1973)
-        by_q, columns = derivatives(rows)
-        turned = np.linalg.solve(back[rows].transpose(0, 2, 1), np.einsum("qkrn,rn->rkq", columns[1:], off[rows]))
-        by_q += (turned.transpose(0, 2, 1) - by_q @ basis[rows]) @ basis[rows].transpose(0, 2, 1)
-        normal = by_q @ by_q.transpose(0, 2, 1)
-        trace = np.trace(normal, axis1=1, axis2=2)
-        moves = (trace > 1e-200) & (trace < np.inf) & (square[rows] < np.inf)  # else nothing moves the points
+    def step(self, rows: NDArray[np.intp]) -> NDArray[np.intp]:
+        """Moves the q of rows by a damped Gauss-Newton step; those for which another one is worth it."""
+        # derivatives of the distances, which b follows (Golub and Pereyra, 1973), and without this (Kaufman, 1975)
+        by_q, columns = self._derivatives(rows)
+        back, basis = self.back[rows].transpose(0, 2, 1), self.basis[rows]
+        turned = np.linalg.solve(back, np.einsum("qkrn,rn->rkq", columns[1:], self.off[rows]))
+        by_q -= (by_q @ basis) @ basis.transpose(0, 2, 1)
+        alone = by_q @ by_q.transpose(0, 2, 1)
+        normal = np.stack([alone, alone + turned.transpose(0, 2, 1) @ turned], axis=1)
+        trace = np.trace(normal, axis1=2, axis2=3)[..., None]
+        moves = ((trace > 1e-200) & (trace < np.inf)).all(axis=(1, 2)) & (
+            self.square[rows] < np.inf
+        )  # else nothing does
         rows, by_q, normal, trace = (part[moves] for part in (rows, by_q, normal, trace))
         if not rows.size:
-            break
-        scale = (np.einsum("rqq->rq", normal) + 1e-12 * trace[:, None])[:, None, None] * np.eye(q.shape[1])
-        right = (by_q @ off[rows, :, None])[:, None]
-        change = np.linalg.solve(normal[:, None] + DAMPINGS[:, None, None] * scale, right)[..., 0]
-        there = np.clip(q[rows, None] + change, low[rows, None], high[rows, None]).reshape(-1, q.shape[1])
-        tried = project(np.repeat(rows, DAMPINGS.size), there)
+            return rows
+        scale = (np.einsum("rmqq->rmq", normal) + 1e-12 * trace)[:, :, None, None] * np.eye(by_q.shape[1])
+        right = (by_q @ self.off[rows, :, None])[:, None, None]
+        change = np.linalg.solve(normal[:, :, None] + DAMPINGS[..., None, None] * scale, right)
+        there = self.q[rows, None] + change.reshape(rows.size, DAMPINGS.size, -1)
+        there = np.clip(there, self.low[rows, None], self.high[rows, None]).reshape(-1, by_q.shape[1])
+        tried = self._project(np.repeat(rows, DAMPINGS.size), there)
         squares = (tried[0] ** 2).sum(axis=1)
         best = squares.reshape(rows.size, -1).argmin(axis=1) + np.arange(rows.size) * DAMPINGS.size
-        least, before = squares[best], square[rows]
-        better = least < before
-        taken, best = rows[better], best[better]
-        q[taken], square[taken] = there[best], squares[best]
-        off[taken], b[taken], basis[taken], back[taken] = (part[best] for part in tried)
-        rows = rows[better & (before - least >= 1e-6 * before)]
-    by_q, columns = derivatives(np.arange(len(q)))
-    jacobian = np.concatenate([by_q.transpose(0, 2, 1), columns[0].transpose(1, 2, 0)], axis=2)
-    left = np.array([n - one.numbers for one in laws])[law]
-    doubt = np.sqrt(square / left if errors is None else np.ones_like(square))[:, None] * _doubts(jacobian)
-    deviance = square
-    if errors is None:  # what rounding leaves
-        deviance = n * np.log(square / n + (ROUNDING * (1 + abs(wanted).max(axis=1))) ** 2)
-    found = []
-    for row, one in enumerate(laws[k] for k in law.tolist()):
-        own = np.r_[: len(one.q), q.shape[1] : q.shape[1] + one.columns]
-        numbers = np.concatenate([q[row], b[row]])[own]
-        of_points = jacobian[row][:, own] / root[:, None], off[row] / root, errors, doubt[row, own]
-        found.append(Found(one, numbers, *of_points, float(deviance[row]), int(errors is None)))
-    return found
+        least, before = squares[best], self.square[rows]
+        taken, best = rows[least < before], best[least < before]
+        self.q[taken], self.square[taken] = there[best], squares[best]
+        self.off[taken], self.b[taken], self.basis[taken], self.back[taken] = (part[best] for part in tried)
+        above_rounding = least > self.rounding[rows] * (self.root @ self.root)
+        return np.asarray(rows[(least < before) & (before - least >= ENOUGH * before) & above_rounding])
 
-
-def _starts(laws: Sequence[Law], t: Array, z: Array, root: Array, most: int) -> Array:
-    """The q (laws times m, most) of a grid that are nearest to lines z (m, n), law by law."""
-    own = [one for one in laws if not one.starts_as]
-    tries = [np.array(list(itertools.product(*(number.starts for number in one.q)))) for one in own]
-    edges = np.cumsum([0, *map(len, tries)])
-    q = np.zeros((edges[-1], most))
-    for start, some in zip(edges, tries, strict=False):
-        q[start : start + len(some), : some.shape[1]] = some
-    shift, basis, _ = _linear(own, np.repeat(np.arange(len(own)), np.diff(edges)), q, t, root)
-    wanted = (z[:, None] - shift) * root
-    square = (wanted**2).sum(axis=2) - (np.einsum("gnk,mgn->mgk", basis, wanted) ** 2).sum(axis=2)
-    best = {}
-    for one, a, b in zip(own, edges, edges[1:], strict=False):
-        best[one.name] = q[a + np.nanargmin(square[:, a:b], axis=1)]
-    return np.concatenate([best[one.starts_as or one.name] for one in laws])
+    def found(self) -> list[Found]:
+        """Each law of each line."""
+        by_q, columns = self._derivatives(np.arange(len(self.q)))
+        jacobian = np.concatenate([by_q.transpose(0, 2, 1), columns[0].transpose(1, 2, 0)], axis=2)
+        numbers, n, doubt = np.concatenate([self.q, self.b], axis=1), self.t.size, _doubts(jacobian)
+        deviance = self.square
+        if self.errors is None:
+            deviance = n * np.log(self.square / n + self.rounding)
+            left = np.array([n - law.numbers for law in self.laws])[self.law]
+            doubt *= np.sqrt(self.square / left)[:, None]
+        found = []
+        for row, law in enumerate(self.laws[k] for k in self.law.tolist()):
+            own = np.r_[: len(law.q), by_q.shape[1] : by_q.shape[1] + law.columns]
+            of_points = jacobian[row][:, own] / self.root[:, None], self.off[row] / self.root, self.errors
+            of_law = doubt[row, own], float(deviance[row]), int(self.errors is None)
+            found.append(Found(law, numbers[row, own], *of_points, *of_law))
+        return found
 
 
 def _linear(laws: Sequence[Law], law: NDArray[np.intp], q: Array, t: Array, root: Array) -> tuple[Array, Array, Array]:

@@ -13,7 +13,6 @@ from scipy.special import gammaincc, ndtri, stdtrit
 from sweep.errors import SweepError
 from sweep.laws.curves import (
     Window,
-    check_end,
     check_options,
     described,
     fit_lines,
@@ -125,9 +124,9 @@ def fit_exponent(
     >>> print(f"{float(sweep.fit_exponent(ds.period, 'mu').exponent):.4f}")
     -0.3334
     """
+    check_options(confidence, noise, sigma, **({} if towards is None else {"towards": towards}))
     if towards is not None:
         return _by_window(y, dim, window, towards, confidence=confidence, noise=noise, sigma=sigma, bound=bound)
-    check_options(confidence, noise, sigma)
     each = functools.partial(fit_line, confidence=confidence, noise=noise)
     fit = fit_lines(each, y, dim, window, sigma, stated_bound(y, bound), FEWEST)
     units, place = str(y.attrs.get("units", "1")), str(y.coords[dim].attrs.get("units", "1"))
@@ -139,7 +138,6 @@ def fit_exponent(
 
 def _by_window(y: xr.DataArray, dim: str, window: Window | None, end: str, **keys: Any) -> xr.Dataset:
     """Fits over ever smaller windows that reach to one end, and whether their exponents come to rest."""
-    check_end("towards", end)
     if window is not None:
         raise SweepError("window does not go with towards, which chooses the windows")
     one_line(y, "take")
@@ -231,7 +229,7 @@ def _noisy(t: Array, z: Array, centre: Array, word: str, confidence: float) -> d
     columns[:, 1] = t - centre[0]
     inside = inliers(t, columns[:, :2], z) if word in ("noise", "outliers") else np.ones(z.shape, bool)
     kind, fits, both, errors, ends = np.full(len(z), word, "U10"), np.ones(len(z)), *np.empty((3, 2, len(z)))
-    for pattern, rows in alike(inside):
+    for pattern, rows in alike(inside, plain=word == "even"):
         line = regress(t[pattern], columns[pattern], z[rows][:, pattern], word, 2)
         # a point that is left out counts as one that is not known
         wider = t.size / pattern.sum()

@@ -28,8 +28,9 @@ NEAR, WIDEST = 6, 6
 FEW = 20
 """Points below which noise is not told from a bend."""
 
-LINES = 250
-"""Lines that are taken at once, so that what is held stays below some 50 MB."""
+LINES, VALUES = 250, 100_000
+"""Lines, or values of lines of which no more than one noise is tried, that are taken at once, so that what is held
+stays below some 50 MB."""
 
 EPSILON = float(np.finfo(np.float64).eps)
 
@@ -91,8 +92,8 @@ def _by_runs(t: Array, z: Array, function: Callable[[Array, Array], Array]) -> A
     return found.reshape(z.shape)
 
 
-def alike(present: NDArray[np.bool_]) -> list[tuple[NDArray[np.bool_], NDArray[np.intp]]]:
-    """Patterns among rows (m, n), and which rows have each, at most LINES at once."""
+def alike(present: NDArray[np.bool_], plain: bool = False) -> list[tuple[NDArray[np.bool_], NDArray[np.intp]]]:
+    """Patterns among rows (m, n), and which rows have each, at most LINES at once, or `plain` rows of VALUES."""
     if not len(present):
         return []
     if present.all():
@@ -100,7 +101,8 @@ def alike(present: NDArray[np.bool_]) -> list[tuple[NDArray[np.bool_], NDArray[n
     else:
         patterns, which = np.unique(present, axis=0, return_inverse=True)
     parts = [(p, np.flatnonzero(which.reshape(-1) == number)) for number, p in enumerate(patterns)]
-    return [(p, rows[i : i + LINES]) for p, rows in parts for i in range(0, rows.size, LINES)]
+    most = max(LINES, VALUES // max(1, present.shape[1])) if plain else LINES
+    return [(p, rows[i : i + most]) for p, rows in parts for i in range(0, rows.size, most)]
 
 
 def runs(present: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,7 +19,7 @@ from sweep.laws.loglog import Array
 
 Parts = tuple[Array | float, ...]
 """Shift and columns of (1), each at all points (g, n) of all q, or less where it is the same; what is left out is 0."""
-Curve = Callable[[Array, Array, float], Iterator[Parts]]
+Curve = Callable[[Array, Array, float], Iterable[Parts]]
 """Of q (k, g, 1), s and the span: the parts of (1), then their derivatives by each of the q."""
 
 
@@ -91,23 +91,9 @@ def _stretched_exponential(q: Array, s: Array, span: float) -> Iterator[Parts]:
     yield 0.0, 0.0, way * np.exp(q[0] * way)
 
 
-def _two_exponentials(q: Array, s: Array, span: float) -> Iterator[Parts]:
+def _two_exponentials(q: Array, s: Array, span: float) -> Iterable[Parts]:
     """Two laws over x instead of ln x; among them 1/cosh(x/X)."""
     return TWO.curve(q, np.exp(span * (s - 1)), span)
-
-
-def _fixed(*columns: Callable[[Array, float], Array]) -> Curve:
-    """A constant and columns of s and the span alone."""
-    return lambda q, s, span: iter([(0.0, 1.0, *(column(s, span) for column in columns))])
-
-
-def _x(s: Array, span: float) -> Array:
-    """x over the last x."""
-    return np.asarray(np.exp(span * (s - 1)))
-
-
-def _s(s: Array, span: float) -> Array:
-    return s
 
 
 Bend = Callable[[Any, Any], Iterator[Any]]
@@ -218,7 +204,7 @@ def _two(name: str, formula: str, bend: Bend, *shape: Number) -> Law:
     return Law(name, formula, _bent(bend), 3, q, ("p low", "p high"), starts_as=starts_as)
 
 
-ONE = Law("one law", "A x^p", _fixed(_s), 2, exponents=("p",))
+ONE = Law("one law", "A x^p", lambda q, s, span: [(0.0, 1.0, s)], 2, exponents=("p",))
 TWO = _two("two laws", "bend fading exponentially", _logistic)
 BENDS = (
     TWO,
@@ -238,10 +224,10 @@ LOG_CORRECTION = Law("logarithmic correction", "A x^p (1 + B ln(x/x0))^c", _log_
 LOGARITHM = Number(-2 + 1e-9, 2 - 1e-9, (-1.9, -1.5, -0.5, 0.5, 1.5, 1.9))
 OTHER_FUNCTIONS = (
     Law("logarithm", "A x^p (1 + B ln x)", _logarithm, 2, (LOGARITHM,), ("p",), power=False),
-    Law("exponential", "A exp(-x/X)", _fixed(_x), 2, power=False),
+    Law("exponential", "A exp(-x/X)", lambda q, s, span: [(0.0, 1.0, np.exp(span * (s - 1)))], 2, power=False),
     Law("stretched exponential", "A exp(-(x/X)^b)", _stretched_exponential, 2, (POWER,), power=False),
-    Law("cut-off", "A exp(-x/X) x^p", _fixed(_x, _s), 3, (), ("p",), False),
-    Law("lognormal", "A exp(-B ln(x/X)^2)", _fixed(_s, lambda s, span: s**2), 3, power=False),
+    Law("cut-off", "A exp(-x/X) x^p", lambda q, s, span: [(0.0, 1.0, np.exp(span * (s - 1)), s)], 3, (), ("p",), False),
+    Law("lognormal", "A exp(-B ln(x/X)^2)", lambda q, s, span: [(0.0, 1.0, s, s**2)], 3, power=False),
     Law("two exponentials", "A exp(-x/X), with a bend to exp(-x/Y)", _two_exponentials, 3, TWO.q, power=False),
 )
 LAWS = (ONE, *OTHER_FUNCTIONS, OFFSET, CORRECTION, *BENDS, THREE)
