@@ -16,18 +16,14 @@ sticking, and against a hairspring that it hardly overcomes; truth is the kernel
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Sequence
-from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, Statement, read_result, report
+from _common import Conclusion, Statement, read_result, said, script, solved
 from _figures import direct_label, page_of
 from scipy.integrate import DOP853, RK45
 
-import sweep
 from kernels.interface import FIRST_REFUSAL, Field, Status
 from kernels.stepping import stepped_kernel
 from sweep.show.charts import method_look
@@ -86,6 +82,14 @@ truth: kernel foliot_start. A value is wrong in silence if it is off by more tha
 and what is stated\
 """
 
+GRIDS = {"stability_maps": "mu", "stability_maps_sticking": "R", "stability_maps_spring": "k"}
+"""Studies of a foliot, and what each is over."""
+MARGIN = {
+    "mu": (r"torque, $\mu$ [rad/s$^2$]", lambda mu: mu),
+    "R": (r"distance from sticking, $1 - R/\mu$ [1]", lambda R: 1 - R),
+    "k": (r"distance from grazing, $1 - k\varphi_0/2\mu$ [1]", lambda k: 1 - k / 2),
+}
+"""How far a foliot is from not flipping, where mu = phi0 = 1 in the last two."""
 
 RUNGE_KUTTA = {
     "euler": (np.zeros((1, 1)), np.ones(1)),
@@ -123,161 +127,120 @@ def eigenvalue(method: str, ah: Any, wh: Any) -> Any:
     return abs(np.stack([trace / 2 + part, trace / 2 - part])).max(axis=0)
 
 
+def by_theory(ds: xr.Dataset, method: str) -> xr.DataArray:
+    """The eigenvalue over the damping and frequency of a sweep."""
+    return xr.DataArray(eigenvalue(method, ds.a.values[:, None], ds.w.values[None, :]), dims=("a", "w"))
+
+
 def grown(ds: xr.Dataset) -> xr.DataArray:
     """Growth per step of the oscillator's amplitude; inf where it left the numbers."""
     size = np.hypot(ds.angle, ds.speed / np.maximum(ds.w, 1e-3))
-    growth = size ** (1 / STEPS)
-    return growth.where(ds.status < FIRST_REFUSAL, np.inf)
+    return (size ** (1 / STEPS)).where(ds.status < FIRST_REFUSAL, np.inf).transpose("method", "a", "w")
 
 
-def with_truth(ds: xr.Dataset) -> xr.Dataset:
-    """`ds` with the true relative error `off` of the period; inf where the foliot does not flip at all.
+def with_truth(ds: xr.Dataset, axis: str) -> xr.Dataset:
+    """`ds` with the true relative error `off` of the period, whether it is `told`, and whether that is `wrong`.
 
-    A period here is twice the time between the last two flips.
+    A period here is twice the time between the last two flips; `off` is inf where the foliot does not flip at all.
     """
-    axis = swept(ds)
-    study = sweep.study(
-        kernel="foliot_start",
-        rtol=1e-11,
-        outputs=["flip_time"],
-        axes={axis: ds[axis].values},
-        fixed={name: float(ds[name]) for name in ("mu", "a", "phi0", "R", "k") if name != axis and name in ds},
-        along={"flip": [float(ds.flips) - 1, float(ds.flips)]},
-    )
-    truth = sweep.run(study, progress=False)
+    clock = {name: ds[name] for name in ("mu", "a", "phi0", "R", "k") if name in ds}
+    along = {"flip": [float(ds.flips) - 1, float(ds.flips)]}
+    truth = solved("foliot_start", **clock, along=along, outputs=["flip_time"], rtol=1e-11)
     period = 2 * truth.flip_time.diff("flip").isel(flip=0, drop=True)
-    return ds.assign(off=abs(ds.period / period - 1).where(truth.status < FIRST_REFUSAL, np.inf))
-
-
-def swept(ds: xr.Dataset) -> str:
-    """The foliot's parameter that a sweep is over."""
-    return next(str(name) for name in ds.status.dims if name not in ("method", "step"))
+    off = abs(ds.period / period - 1).where(truth.status < FIRST_REFUSAL, np.inf)
+    told = ds.status < FIRST_REFUSAL
+    return ds.assign(off=off, told=told, wrong=told & (off > WRONG)).transpose("method", "step", axis)
 
 
 def foliots(ds: xr.Dataset) -> list[Statement]:
     """What becomes of a foliot's cells."""
-    given = ds.status < FIRST_REFUSAL
-    silent = given & (ds.off > 10 * np.maximum(1e-9, ds.error))
-    lines = [
-        Statement(
-            "values off by more than ten times what is stated",
-            "none",
-            f"{int(silent.sum())} of {ds.status.size}",
-            None,
-            not silent.any(),
-        )
-    ]
-    for method in map(str, ds.method.values):
-        here = ds.sel({"method": method})
-        wrong = float(((here.off > WRONG) & (here.status < FIRST_REFUSAL)).mean())
-        refused = float((here.status >= FIRST_REFUSAL).mean())
-        lines.append(
-            Statement(f"{method}: off by {WRONG:.0%} and more, told; refused", "", f"{wrong:.1%}; {refused:.1%}")
-        )
+    silent = ds.told & (ds.off > 10 * np.maximum(1e-9, ds.error))
+    here, what = f"{int(silent.sum())} of {ds.status.size}", "values off by more than ten times what is stated"
+    lines = [said(what, not silent.any(), here, "none")]
+    for method in map(str, ds["method"].values):
+        one = ds.sel({"method": method})
+        here = f"{one.wrong.mean():.1%}; {1 - one.told.mean():.1%}"
+        lines.append(Statement(f"{method}: off by {WRONG:.0%} and more, told; refused", "", here))
     return lines
 
 
 def oscillators(ds: xr.Dataset) -> list[Statement]:
     """Growth against theory, well away from the border."""
-    growth = grown(ds)
     lines = []
-    for method in map(str, ds.method.values):
-        theory = xr.DataArray(eigenvalue(method, ds.a.values[:, None], ds.w.values[None, :]), dims=("a", "w"))
-        clear = abs(theory.values - 1) > 0.1
-        here = growth.sel({"method": method}).transpose("a", "w").values
-        agrees = ((here > 1) == (theory.values > 1))[clear].mean()
-        lines.append(
-            Statement(f"{method} grows where abs(R) > 1", "all cells", f"{agrees:.4f} of them", None, bool(agrees == 1))
-        )
+    for method, growth in zip(map(str, ds["method"].values), grown(ds), strict=True):
+        theory = by_theory(ds, method).values
+        clear = abs(theory - 1) > 0.1
+        agrees = ((growth.values > 1) == (theory > 1))[clear].mean()
+        lines.append(said(f"{method} grows where abs(R) > 1", agrees == 1, f"{agrees:.4f} of them", "all cells"))
     return lines
 
 
 def hard(method: str, step: float = 0.02) -> list[str]:
     """Status and stated error of the hard cases."""
-    names = ("mu", "a", "R", "c", "k")
-    axes = {name: [cell.get(name, 0.0) for cell in CASES.values()] for name in names}
-    fixed = {"phi0": 1.0, "step": step, "flips": 60.0}
-    ds = sweep.run(
-        sweep.study(kernel="foliot_steps", method=method, rtol=1e-6, design="zip", axes=axes, fixed=fixed),
-        progress=False,
-    )
+    axes = {name: [cell.get(name, 0.0) for cell in CASES.values()] for name in ("mu", "a", "R", "c", "k")}
+    how = {"method": method, "rtol": 1e-6, "design": "zip"}
+    ds = solved("foliot_steps", **how, **axes, phi0=1, step=step, flips=60)
     return [
         f"{name:<26}{method:<10}{Status(int(status)).name:<14}stated error {float(error):.1e}"
         for name, status, error in zip(CASES, ds.status.values, ds.error.values, strict=True)
     ]
 
 
-def figure(linear: xr.Dataset, foliot: Sequence[xr.Dataset]) -> Any:
+def figure(linear: xr.Dataset, foliot: dict[str, xr.Dataset]) -> Any:
     """Where the oscillator grows; the longest step that holds a foliot's period to 10 %, over three margins."""
     with page_of(120.0, 2, 2) as (page, panels):
-        draw_growth(panels[0, 0], linear)
-        for axes, ds in zip(panels.flat[1:], foliot, strict=True):
-            draw_steps(axes, ds)
-        border = panels[0, 0].plot([], [], color="0.3", linewidth=0.9, label="(a) border by theory")
-        marks = [line for line in panels[0, 0].lines if line.get_marker() not in ("None", "")]
+        growth = panels[0, 0]
+        draw_growth(growth, linear)
+        for axes, (axis, ds) in zip(panels.flat[1:], foliot.items(), strict=True):
+            draw_steps(axes, ds, axis)
+        border = growth.plot([], [], color="0.3", linewidth=0.9, label="(a) border by theory")
+        marks = [line for line in growth.lines if line.get_marker() not in ("None", "")]
         page.legend(handles=[*marks, *border], loc="outside lower center", ncols=7, columnspacing=1.0)
     return page
 
 
 def draw_growth(axes: Any, ds: xr.Dataset) -> None:
     """The border above which the oscillator grows: lines by theory, marks as followed, at every so many-th damping."""
-    for method in map(str, ds["method"].values):
-        look, some = method_look(method), slice(2, None, max(1, ds.a.size // 10))
-        theory = eigenvalue(method, ds.a.values[None, :], ds.w.values[:, None])
+    some = slice(2, None, max(1, ds.a.size // 10))
+    for method, growth in zip(map(str, ds["method"].values), grown(ds), strict=True):
+        look = method_look(method)
+        theory = by_theory(ds, method).transpose("w", "a")
         axes.contour(ds.a, ds.w, theory, levels=[1], colors=[look["color"]], linewidths=0.9)
-        grows = (grown(ds.sel({"method": method})) > 1).transpose("a", "w").isel(a=some)
+        grows = (growth > 1).isel(a=some)
         first = ds.w.values[grows.argmax("w").values]
         shown = np.where(grows.any("w") & ~grows.isel(w=0), first, np.nan)
         axes.plot(ds.a[some], shown, **{**look, "linestyle": ""}, markersize=4, label=method)
     axes.set(xlabel="damping, $ah$ [1]", ylabel=r"frequency, $\omega h$ [1]", xlim=(0, 8), ylim=(0, 8))
 
 
-MARGIN = {
-    "mu": (r"torque, $\mu$ [rad/s$^2$]", lambda mu: mu),
-    "R": (r"distance from sticking, $1 - R/\mu$ [1]", lambda R: 1 - R),
-    "k": (r"distance from grazing, $1 - k\varphi_0/2\mu$ [1]", lambda k: 1 - k / 2),
-}
-"""How far a foliot is from not flipping, where mu = phi0 = 1 in the last two."""
-
-
-def draw_steps(axes: Any, ds: xr.Dataset) -> None:
+def draw_steps(axes: Any, ds: xr.Dataset, axis: str) -> None:
     """The longest step up to which all steps that are not refused give the period to 10 %."""
-    label, margin = MARGIN[swept(ds)]
+    label, margin = MARGIN[axis]
+    across, ds = margin(ds[axis].values), ds.sortby("step")
+    place = xr.DataArray(np.arange(ds.step.size), dims="step")
     for method in map(str, ds["method"].values):
-        here = ds.sel({"method": method}).transpose("step", swept(ds)).sortby("step")
-        right = (here.off <= WRONG) & (here.status < FIRST_REFUSAL)
-        first = right.argmax("step")
-        place = xr.DataArray(np.arange(here.step.size), dims="step")
-        ends = place.where((place > first) & ~right).min("step").fillna(here.step.size) - 1
-        longest = here.step.values[ends.values.astype(int)]
-        across = margin(ds[swept(ds)].values)
-        axes.plot(across, np.where(right.any("step"), longest, np.nan), **method_look(method), markersize=4,
-                  linewidth=0.9, markevery=max(1, across.size // 10))  # fmt: skip
+        one = ds.sel({"method": method})
+        right = one.told & (one.off <= WRONG)
+        ends = place.where((place > right.argmax("step")) & ~right).min("step").fillna(ds.step.size) - 1
+        longest = np.where(right.any("step"), ds.step.values[ends.values.astype(int)], np.nan)
+        look = {**method_look(method), "markersize": 4, "linewidth": 0.9, "markevery": max(1, across.size // 10)}
+        axes.plot(across, longest, **look)
     axes.set(xscale="log", yscale="log", xlabel=label, ylabel="longest step for 10 %, $h$ [s]", ylim=(0.015, 80))
     axes.axhline(float(ds.step.max()), color="0.7", linewidth=4.0, zorder=0)
     direct_label(axes, 0.03, 0.93, "longest step tried", "0.35", fontsize=7, ha="left", transform=axes.transAxes)
 
 
-def conclude(path: str, oscillator: str, *paths: str) -> tuple[Groups, list[str], Any]:
+def conclude(path: str, oscillator: str, *paths: str) -> Conclusion:
     """Statements and the figure."""
     linear = read_result(oscillator, "stability_maps:KERNEL", ["method", "a", "w"], "stability_maps_oscillator.toml")
-    grids = [
-        with_truth(read_result(one, "foliot_steps", ["method", axis, "step"], f"{name}.toml"))
-        for one, (name, axis) in zip((path, *paths), GRIDS.items(), strict=True)
-    ]
-    groups = {"Oscillator": oscillators(linear)}
-    groups |= {name: foliots(ds) for name, ds in zip(("Drive", "Near sticking", "Spring"), grids, strict=True)}
+    grids = {}
+    for one, (name, axis) in zip((path, *paths), GRIDS.items(), strict=True):
+        grids[axis] = with_truth(read_result(one, "foliot_steps", ["method", axis, "step"], f"{name}.toml"), axis)
+    names = {"mu": "Drive", "R": "Near sticking", "k": "Spring"}
+    groups = {"Oscillator": oscillators(linear)} | {names[axis]: foliots(ds) for axis, ds in grids.items()}
     notes = [NOTES, "", *(line for m in ("euler", "verlet", "rk4", "dop853", "moreau") for line in hard(m))]
     return groups, notes, lambda: figure(linear, grids)
 
 
-GRIDS = {"stability_maps": "mu", "stability_maps_sticking": "R", "stability_maps_spring": "k"}
-"""Studies of a foliot, and what each is over."""
-
-
-INPUTS = [f"stability_maps{end}.h5" for end in ("", "_oscillator", "_sticking", "_spring")]
-main = partial(report, __file__, INPUTS, conclude=conclude)
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+INPUTS = "stability_maps.h5 stability_maps_oscillator.h5 stability_maps_sticking.h5 stability_maps_spring.h5"
+main = script(__name__, INPUTS, conclude)
