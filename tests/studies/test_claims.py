@@ -124,6 +124,7 @@ TABLE = {
     "timekeeping": Claims({
         f"timekeeping{part}": {
             "sigma": [0.003, 0.01, 0.1], "tau_c": tau_c, "averaging_time": 3600.0, "half_swings": half_swings,
+            "seed": 2,
         }
         for part, tau_c, half_swings in (
             ("", [0, 1.25, 75, 1800], 15300), ("_buergi", [0, 2.5, 150, 3600], 30600),
