@@ -107,6 +107,17 @@ def solved(kernel: str, **given: Any) -> xr.Dataset:
     return sweep.run(sweep.study(kernel=kernel, axes=axes, fixed=fixed, allow_import=":" in kernel, **keys))
 
 
+def last_passage(x: Any, y: Any, value: float, way: float = 0.0) -> float:
+    """Where y passes a value last, upwards (`way` 1) or downwards (-1) if so said; NaN where it does not."""
+    log_x, y = np.log(np.asarray(x)), np.asarray(y)
+    cross = (y[:-1] - value) * (y[1:] - value) <= 0
+    there = np.flatnonzero(cross & (y[1:] != y[:-1]) & (way * (y[1:] - y[:-1]) >= 0))
+    if not there.size:
+        return float("nan")
+    i = there[-1]
+    return float(np.exp(log_x[i] + (value - y[i]) / (y[i + 1] - y[i]) * (log_x[i + 1] - log_x[i])))
+
+
 def power(y: xr.DataArray) -> float:
     """The exponent of a line over its one dimension, by least squares."""
     return float(np.polyfit(np.log(y[y.dims[0]]), np.log(abs(y)), 1)[0])

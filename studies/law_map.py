@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Conclusion, Statement, compared, count, differing, most, read_result, script, solved
+from _common import Conclusion, Statement, compared, count, differing, last_passage, most, read_result, script, solved
 from _figures import colour_map, direct_label, hatch, page_of
 from _losses import any_swing, shares
 from scipy.optimize import brentq
@@ -110,11 +110,7 @@ def widths(ds: xr.Dataset) -> list[Statement]:
     )
     lines = []
     for what, s, (start, end), theory in known:
-        behind = s if end < start else s.where(s.mu > s.mu[int(s.argmin("mu"))])
-        places = [
-            sweep.where_exponent(behind, "mu", start + part * (end - start), values=True).abscissa
-            for part in (0.25, 0.75)
-        ]
+        places = [last_passage(s.mu, s, start + part * (end - start)) for part in (0.25, 0.75)]
         width = abs(np.log10(places[1] / places[0]))
         lines.append(compared(f"{what}: decades", f"{theory:.3f}", width, theory, 0.03, 4))
     return lines

@@ -26,10 +26,21 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Conclusion, Statement, count, differing, most, power, read_result, said, script, solved
+from _common import (
+    Conclusion,
+    Statement,
+    count,
+    differing,
+    last_passage,
+    most,
+    power,
+    read_result,
+    said,
+    script,
+    solved,
+)
 from _figures import colour_map, direct_label, hatch, page_of
 
-import sweep
 from sweep.show.charts import COLOURS, DASHES, MARKS
 
 STRONG = 1e4
@@ -91,11 +102,9 @@ def ends(smooth: xr.Dataset) -> list[Statement]:
 
 def passage(smooth: xr.Dataset, value: float) -> xr.DataArray:
     """For each kappa the alpha at which s falls through a value, or rises through one below 1/2 on its way to that."""
-    s = smooth.s.assign_coords(tau=smooth.alpha.values).reset_coords(drop=True)
-    least = s.tau[s.fillna(np.inf).argmin("tau")]
-    s = s.where(s.tau <= least if value > 0.5 else s.tau >= least)
-    found = sweep.where_exponent(s, "tau", value, values=True).abscissa
-    return found.assign_coords(I_c=smooth.kappa.values).rename(I_c="kappa")
+    way = -1.0 if value > 0.5 else 1.0
+    found = [last_passage(smooth.alpha, line, value, way) for line in smooth.s.transpose("I_c", "tau").values]
+    return xr.DataArray(found, {"kappa": smooth.kappa.values}, ("kappa",))
 
 
 def turns(smooth: xr.Dataset, upper: xr.DataArray, lower: xr.DataArray) -> list[Statement]:
