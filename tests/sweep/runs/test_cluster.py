@@ -146,7 +146,7 @@ def test_workers_killed_in_the_middle_cost_nothing_but_time(client, output, monk
 def test_a_block_of_which_every_worker_dies_ends_the_run_and_is_named(client, output):
     study = tall(60, "slow:LETHAL")
     with pytest.raises(SweepError, match=r"cells 12 to 13 .*KilledWorker.*isolated"):
-        elsewhere(study, output, cluster=client, block_cells=1, until=datetime.now() + timedelta(seconds=100))
+        elsewhere(study, output, cluster=client, block_cells=1, until=datetime.now() + timedelta(seconds=300))
     same(quiet(study, output), quiet(study))  # nobody dies of it here
 
 
