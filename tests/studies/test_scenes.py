@@ -198,7 +198,7 @@ def test_a_point_of_the_tool_wears_by_its_mean_speed(X, Y, beta):
         return abs(rate * place - Omega * (place - 0.5))
 
     true = 1e-13 * 7000 * quad(speed, 0, 2 * np.pi, limit=400, epsrel=1e-8)[0] / (2 * np.pi)
-    here = polisher_zone.tool_wear(ds, polisher_zone.swings(ds), np.array(X), np.array(Y), beta)[0]
+    here = polisher_zone.tool_wear(ds, polisher_zone.swings(ds, ds.e.values), np.array(X), np.array(Y), beta)[0]
     assert float(here) == pytest.approx(true, rel=1e-5)  # 720 crank angles of a speed that bends: 1e-6
 
 
