@@ -210,7 +210,7 @@ def lobes():
 
 @pytest.mark.parametrize(("n", "i"), [(8, 1200), (5, 9000)])
 def test_lobes_fulfil_the_equation_of_the_delay_in_50_digits(lobes, n, i):
-    chain, f = chatter_lobes.chains(lobes)[n], chatter_lobes.FREQUENCIES[i]
+    chain, f = fula.chain(lobes, n), chatter_lobes.FREQUENCIES[i]
     with mpmath.workdps(50):
         H = receptance(chain["J"], chain["k"], chain["h"], f, 1, 1)
         for k in (0, 3):
@@ -220,13 +220,13 @@ def test_lobes_fulfil_the_equation_of_the_delay_in_50_digits(lobes, n, i):
 
 def test_responses_of_the_milling_machine_are_those_of_the_damped_chain():
     ds = sweep.run(sweep.study(fula.__file__.replace(".py", ".toml")))
-    chain, w = fula.source_chain(ds), 2 * np.pi * 230.0
+    chain, w = fula.chain(ds, 8), 2 * np.pi * 230.0
 
     def grid(c):
         return np.diag(c + np.concatenate([[0.0], c[:-1]])) - np.diag(c[:-1], 1) - np.diag(c[:-1], -1)
 
     true = np.linalg.solve(grid(chain["k"]) + 1j * w * grid(chain["h"]) - w**2 * np.diag(chain["J"]), np.eye(8)[0])[0]
-    assert fula.responses(ds, np.array([230.0]))[0][0] == pytest.approx(true, rel=1e-12)
+    assert fula.response(chain, np.array([230.0]))[0] == pytest.approx(true, rel=1e-12)
 
 
 def test_the_law_of_correlated_noise_is_that_of_a_sum_of_products():
