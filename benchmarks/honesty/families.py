@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kernels.interface import FIRST_REFUSAL, Status
-from kernels.scene import Field, cos, exp, scene_kernel, sign, sin, sqrt, where
+from kernels.scene import Field, cos, exp, floor, scene_kernel, sign, sin, sqrt, where
 
 sys.path.append(str(Path(__file__).parents[2] / "tests" / "helpers"))
 from columns import solve
@@ -233,6 +233,27 @@ def behind(random, n):
     a = random.uniform(0.1, 3.0, n)
     flips = random.integers(1, 9, n).astype(float)
     return {"a": a, "v0": np.sqrt(2 * a) * random.uniform(1.01, 3.0, n), "flips": flips}
+
+
+def _broken_jump_truth(c, d, T, flips):
+    """x = t + d jumps to the whole number below it at t = c."""
+    c, d, T = REAL(1) * c, REAL(1) * d, REAL(1) * T
+    x = c + d
+    end = np.floor(x) + T - c
+    return Truth(T, [T, end], [T, np.maximum(abs(x), abs(end))], 10 / np.maximum(abs(x - np.rint(x)), 1e-19))
+
+
+@family(
+    scene(
+        "broken_jump", "t x", "c d T", lambda t, x: (1.0, 1.0), lambda t, c, T, side: where(side > 0.0, c - t, T - t),
+        lambda d: (0.0, d), lambda t, x: (t, floor(x)),
+    ), _broken_jump_truth,
+)  # fmt: skip
+def broken_jump(random, n):
+    """A jump that is another one on the other side of a kink, with the kink next to the surface."""
+    c = random.uniform(1.0, 5.0, n)
+    d = np.rint(c) + 1.0 - c + random.choice([-1.0, 1.0, 0.0], n) * 10.0 ** random.uniform(-17, -1, n)
+    return {"c": c, "d": d, "T": c + random.uniform(0.5, 2.0, n), "flips": np.full(n, 2.0)}
 
 
 def _zeno_truth(h, e, flips):

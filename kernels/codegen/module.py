@@ -90,7 +90,7 @@ def {name}(state, mode, unit, cores):
 SCENE = """
 M = Written(
     rates, surface, kinks, switched, started, natural_signs, underflows, jet, lost, hidden, bounds, made,
-    {numbers}, {alternating}, {most_kinks}, cell_of({cell}), {slides}, {hiding}, {passable}, None, None,
+    {numbers}, {alternating}, {most_kinks}, cell_of({cell}), {slides}, {hiding}, {passable}, {deciding}, None, None,
 )
 """
 
@@ -384,6 +384,16 @@ class Writer:
             surfaces=tuple(float(j in further) for j in range(self.kinks)) if further else None,
         )  # fmt: skip
 
+    def _deciding(self):
+        """1 for each kink, but for further surfaces and the surface's own u, on whose side a switch's result hangs."""
+        signs = {x.args[0] for x in needed(*self.recorded.switched) if x.kind == INPUT}
+        of_surface = self.recorded.events[0][2]
+        found = tuple(
+            float(f".sign_{j}" in signs and j not in self.recorded.surfaces and u is not of_surface)
+            for j, u in enumerate(self.recorded.graph.kinks)
+        )
+        return found if any(found) else None
+
     def _lost(self):
         if self.scene.exact_start:
             return self.function("lost", "Nothing.", (self.recorded.graph.of(0.0),), single=True)
@@ -426,6 +436,7 @@ class Writer:
                     float(not any(x.kind == INPUT and x.args[0] == "side" for x in needed(event)))
                     for event in (recorded.surface, *recorded.graph.kinks)
                 ),
+                deciding=self._deciding(),
                 alternating=tuple((-1.0) ** j for j in range(len(self.states))),
                 most_kinks=KINK_LIMIT if scene.most_kinks is None else float(scene.most_kinks),
                 cell=f"{len(self.states)}, {len(self.parameters)}, {self.kinks}",

@@ -183,6 +183,18 @@ def either_unsure(unsure, judged):
 
 
 @symbolic
+def undecided(m, state, mode, gaps, margin, switches, verdict):
+    """The verdict: INACCURATE where a kink whose side decides what the switch does is too close to tell its side."""
+    if m.deciding is None:
+        return verdict
+    close = tuple(
+        (decides > 0.5) & (magnitude(gap) > 0.0) & (magnitude(gap) <= margin * size)
+        for decides, gap, (size, _) in zip(m.deciding, gaps, m.made(state, mode)[1:], strict=True)
+    )
+    return where(switches & any_of(close) & (verdict < INACCURATE), INACCURATE, verdict)
+
+
+@symbolic
 def which_met(signs, surfaces, first, met):
     """The signs, of surfaces 1 where they are met and else -1."""
     further = tuple(
@@ -306,6 +318,7 @@ def advance(m, leg, memory, i, tells, slides, surfaces):
             errors, rates = carried.behind(tells, errors, state, mode, rates, switches)
             before_it, old, old_mode = m.surface(state, mode), state, mode
             gaps = m.kinks(state, mode)
+            verdict = undecided(m, state, mode, gaps, BLUR * tolerance, switches, verdict)
             jumped = m.switched(state, mode)
             mode, side = Mode(side, signs, parameters, False), where(switches, -side, side)
             gaps_behind = m.kinks(jumped, Mode(side, signs, parameters, False))

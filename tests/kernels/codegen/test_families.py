@@ -24,7 +24,7 @@ CELLS = 40
     ("name", "method"),
     [
         ("blow_up", "dop853"), ("windows", "taylor"), ("behind", "dop853"), ("moving_surface", "taylor"),
-        ("pulses", "taylor"),
+        ("pulses", "taylor"), ("broken_jump", "taylor"),
     ],
 )  # fmt: skip
 def test_what_is_ok_is_right_and_most_of_what_can_be_solved_is_ok(name, method):
