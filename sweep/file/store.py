@@ -49,7 +49,8 @@ def lock_of(output: Path) -> Path:
 class Store:
     """The result of one sweep while it is written, locked for this process. Made by `opened`.
 
-    It is at `path`, and will be at `output`; `file` is None until `begin`, `resume` or `reopen`.
+    It is at `path`, and will be at `output`, where it is when `finished`; `file` is None until `begin`, `resume` or
+    `reopen`.
     """
 
     def __init__(self, output: Path) -> None:
@@ -60,6 +61,7 @@ class Store:
         self._synced, self._size, self._elsewhere = time.monotonic(), 0, False
         self._checked: Future[list[int]] | None = None
         self._closing = threading.Event()
+        self.finished = False
 
     @property
     def table(self) -> Table:
@@ -197,6 +199,7 @@ class Store:
                     f"{self.output}: differs when read back from what was written; the disk may be failing"
                 )
             disk.rename(self.path, self.output)
+            self.finished = True
             disk.sync_folder(self.output.parent)
         return []
 

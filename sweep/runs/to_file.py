@@ -58,6 +58,8 @@ def run_to_file(task: Task, precomputed: Precomputed | None = None) -> Ending:
             _computed(store, task, precomputed, standing == "reused")
             return "complete"
         except (KeyboardInterrupt, Terminated, TimeUp) as reason:
+            if store.finished:  # the signal came while the result was put in its place
+                raise
             kept = "before the first block"
             if store.file is not None:
                 store.commit()
