@@ -40,10 +40,17 @@ def unfinished(output):
 
 
 def test_cells_that_are_cheap_beside_a_call_are_solved_by_few_calls():
-    slow.calls.clear()
-    ds = quiet(stone(kernel="slow:CALLED", axes={"height": np.linspace(1.0, 9.0, 32_000)}), workers=1)
-    assert (ds.status == Status.OK).all()
-    assert len(slow.calls) < 32_000 / 30  # of a busy machine, where a call seems to take longer; 30 of a quiet one
+    """The best of three runs: on a busy machine a call may seem to take longer."""
+
+    def calls():
+        slow.calls.clear()
+        ds = quiet(stone(kernel="slow:CALLED", axes={"height": np.linspace(1.0, 9.0, 32_000)}), workers=1)
+        assert (ds.status == Status.OK).all()
+        return [*slow.calls]
+
+    fewest = min((calls() for _ in range(3)), key=len)
+    assert len(fewest) < 40
+    assert max(fewest) > 1000
 
 
 @pytest.mark.parametrize(
