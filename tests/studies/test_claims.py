@@ -135,6 +135,7 @@ TABLE = {
         "harmonic": [*range(1, 9), *range(16, 33, 2), 33, 35, 40, 41, 50, 51, 64],
         "depth": [0.0, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5],
     }}, ""),
+    "which_average": Claims({"which_average": {}}, "", 1),
     "verge_unmeshes": Claims({
         "verge_unmeshes": {"e": [0, 0.4, 0.9], "I_c": 2.5e-6 * 10 ** (np.array([0, 4, 8, 9, 12, 14]) / 4)},
     }, "", 2),
