@@ -305,11 +305,12 @@ def _child(events, log, kind, output, workers, cells, cluster):
 
 
 def _note_phases(events, output):
-    opened, finish, rename, sync = Store._take_up, Store.finish, disk.rename, disk.sync_folder
+    resume, finish, rename, sync = Store.resume, Store.finish, disk.rename, disk.sync_folder
 
-    def at_work(self, file):
-        opened(self, file)
+    def at_work(self, *words):
+        damaged = resume(self, *words)
         events.note(WORK)
+        return damaged
 
     def at_its_end(self, *words):
         events.note(END)
@@ -325,11 +326,11 @@ def _note_phases(events, output):
         if events.found()[-1][0] == RENAME:
             events.note(AFTER if folder == output.parent else BETWEEN)
 
-    Store._take_up, Store.finish, disk.rename, disk.sync_folder = at_work, at_its_end, renamed, synced
+    Store.resume, Store.finish, disk.rename, disk.sync_folder = at_work, at_its_end, renamed, synced
 
 
 def _note_acknowledged(told):
-    real = Store._commit
+    real = Store.commit
 
     def noting(self):
         blocks = [index for index, _ in list(self._waiting)]
@@ -337,7 +338,7 @@ def _note_acknowledged(told):
         if blocks:
             os.write(told, f"{json.dumps([str(self.path), blocks])}\n".encode())
 
-    Store._commit = noting
+    Store.commit = noting
 
 
 if __name__ == "__main__":

@@ -16,7 +16,6 @@ import sys
 import threading
 import time
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -33,7 +32,7 @@ from sweep.cells.schema import columns
 from sweep.cells.solve import Solver
 from sweep.file import disk
 from sweep.file.frame import cuts_of
-from sweep.file.reading import READERS, StoredFile
+from sweep.file.reading import StoredFile
 from sweep.file.store import opened, unfinished_of
 from sweep.study.model import Study
 
@@ -139,7 +138,7 @@ def many(folder: Path, count: int) -> None:
         begun = time.perf_counter()
         file = store.found()
         assert file is not None
-        store.resume(file)
+        store.resume(file, ())
         left = store.missing()
         taken = time.perf_counter() - begun
     assert left == [table.blocks.count - 1]
@@ -171,14 +170,13 @@ def reading(folder: Path, cells: int, rounds: int) -> None:
 
 
 def unchecked(file: StoredFile) -> None:
-    """The same chunks, read into arrays by as many threads, and not looked at."""
+    """The same chunks, read into arrays, and not looked at."""
     table = file.tables["cells"]
     bounds = [table.blocks.bounds(block) for block in range(table.blocks.count)]
-    with ThreadPoolExecutor(READERS) as pool:
-        for column in table.columns:
-            numbers = column.empty(table.blocks.size)
-            parts = [((numbers[slice(*found)],), int(column.at[block])) for block, found in enumerate(bounds)]
-            list(pool.map(lambda part: disk.read_all(file.fd, *part), parts))
+    for column in table.columns:
+        numbers = column.empty(table.blocks.size)
+        for block, found in enumerate(bounds):
+            disk.read_all(file.fd, (numbers[slice(*found)],), int(column.at[block]))
 
 
 PEAK = """

@@ -1,18 +1,19 @@
 """A result before its first number: HDF5 makes all of it; but for numbers, digests and the ending it stays as it is.
 
 HDF5 checks every byte of names, attributes and coordinates that it reads: texts have a fixed length and stand in object
-headers, coordinates are one chunk with a checksum each, single numbers stand in headers too. The zeros that it writes
-over the chunks of outputs are kept from the disk: instead, each chunk of statuses says PENDING, and behind each other
-chunk stands a checksum that is wrong, so that nobody takes what is not computed yet for numbers.
+headers, coordinates are one chunk with a checksum each, single numbers stand in headers too. Each chunk of statuses
+says PENDING. The zeros that HDF5 writes over other chunks are kept from the disk: a wrong checksum stands behind them
+instead, so that nobody takes what is not computed yet for numbers.
 """
 
 from __future__ import annotations
 
+import errno
 import io
 import json
 import math
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,7 +26,7 @@ from sweep.cells.reduce import part_columns
 from sweep.cells.schema import STATUS, Column, Schema
 from sweep.file import disk
 from sweep.file.fletcher import checksum
-from sweep.file.reading import BYTES, ENDING_BYTES, FORMAT, Numbers, StoredFile, digest_before
+from sweep.file.reading import BYTES, ENDING_BYTES, FORMAT, StoredFile, digest_before
 from sweep.study.model import ARRAY
 
 if TYPE_CHECKING:
@@ -33,17 +34,13 @@ if TYPE_CHECKING:
 
 PAGE = 4096
 WORTH_A_PAGE = 10 * PAGE
-"""Chunks of so many bytes begin on a page of their own, at a cost of a tenth at most;"""
-SHARED_WORTH_A_PAGE = PAGE
-"""so do shorter ones, where several machines write."""
+"""Chunks of so many bytes begin on a page of their own, at a cost of a tenth at most."""
 GATHERED_BYTES = 8 << 20
 """Bytes of the rows that are reduced to groups at a time."""
 COMPACT = 1 << 15
 """Attributes up to which HDF5 keeps them in an object header."""
 LONG = 1 << 12
 """Bytes of a coordinate to which the study in the file refers, so that its text fits into an object header."""
-PIECE = 1 << 20
-"""Bytes of short chunks that are written at a time."""
 WRONG = b"\xff" * 4
 """A checksum that zeros have not."""
 
@@ -92,98 +89,61 @@ def _attrs(schema: Schema) -> dict[str, Any]:
     return {**schema.attrs, "study_json": study}
 
 
-def create(path: Path, schema: Schema, cuts: Mapping[str, Cut], shared: bool = False) -> StoredFile:
+def create(path: Path, schema: Schema, cuts: Mapping[str, Cut]) -> StoredFile:
     """Makes a result of which nothing is computed yet, with room on the disk for all of it. Raises OSError.
 
-    Of the output's `schema`, with tables as `cuts_of` gives them; `shared`, where several machines may write.
+    Of the output's `schema`, with tables as `cuts_of` gives them.
     """
-    image = _Image()
-    _lay_out(image, schema, cuts, SHARED_WORTH_A_PAGE if shared else WORTH_A_PAGE)
-    fd = disk.open_file(path, os.O_CREAT | os.O_TRUNC | os.O_RDWR)
-    try:
-        disk.reserve(fd, image.size)
-        for at, page in image.pages.items():
-            disk.write_all(fd, (page[: image.size - at],), at)
-    finally:
-        os.close(fd)
+    with _Skeleton(disk.open_file(path, os.O_CREAT | os.O_TRUNC | os.O_RDWR), "r+") as skeleton:
+        try:
+            _lay_out(skeleton, schema, cuts)
+        except Exception:
+            if not skeleton.refused:
+                raise
+        if skeleton.refused:
+            raise OSError(skeleton.refused, os.strerror(skeleton.refused))
+        disk.reserve(skeleton.fileno(), skeleton.seek(0, os.SEEK_END))
     file = StoredFile(path, os.O_RDWR)
-    try:
-        for column in (column for table in file.tables.values() for column in table.columns if column.check):
-            _write_pending(file.fd, column)
-        file.key = digest_before(file.fd, file.key_at)
-        disk.write_all(file.fd, (file.key,), file.key_at)
-        disk.fsync(file.fd)
-    except OSError:
-        file.close()
-        raise
+    file.key = digest_before(file.fd, file.key_at)
+    disk.write_all(file.fd, (file.key,), file.key_at)
+    disk.fsync(file.fd)
     return file
 
 
-def _write_pending(fd: int, column: Numbers) -> None:
-    """Says of each chunk of a column that it is not computed yet; of short ones behind each other at once."""
-    size, pending = column.size + column.check, WRONG
-    if column.name == STATUS:
-        pending = bytes([Status.PENDING]) * column.size
-        pending += checksum(pending, column.size)
-    elif size < PAGE:
-        pending = bytes(column.size) + WRONG
-    some = max(1, PIECE // size) if len(pending) == size else 1
-    for run in np.split(column.at, np.flatnonzero(np.diff(column.at) != size) + 1):
-        for first in range(0, len(run), some):
-            chunks = run[first : first + some]
-            disk.write_all(fd, (pending * len(chunks),), int(chunks[0]) + size - len(pending))
+class _Skeleton(io.FileIO):
+    """The file as HDF5 writes it, but for the zeros of each chunk, which has `chunk` bytes, behind which is WRONG.
 
+    HDF5 cannot go on where the system refuses to write, nor end: it is left to believe that all is well, and the error
+    number is kept as `refused`: an exception would keep what HDF5 has open beyond the end of Python.
+    """
 
-class _Image(io.RawIOBase):
-    """The file as HDF5 writes it, in `pages` by where they begin, but for zeros of the length of a `chunk`."""
-
-    def __init__(self) -> None:
-        self.pages: dict[int, bytearray] = {}
-        self.at = self.size = self.chunk = 0
-
-    def seek(self, offset: int, whence: int = 0) -> int:
-        self.at = offset + (0, self.at, self.size)[whence]
-        return self.at
-
-    def truncate(self, size: int | None = None) -> int:
-        self.size = self.at if size is None else size
-        return self.size
-
-    def readinto(self, buffer: Any) -> int:
-        for page, here, there in self._pieces(len(buffer)):
-            buffer[there] = page[here]
-        return len(buffer)
+    chunk = refused = 0
 
     def write(self, piece: Any) -> int:
+        at, size = self.tell(), len(piece)
+        write: Any = disk.write_all
         # HDF5 writes nothing else of a chunk's length that begins with zeros: its tables begin with addresses
-        if len(piece) == self.chunk and bytes(piece[:BYTES]) == bytes(BYTES):
-            self.at += len(piece)
-        else:
-            for page, here, there in self._pieces(len(piece)):
-                page[here] = piece[there]
-        self.size = max(self.size, self.at)
-        return len(piece)
-
-    def _pieces(self, count: int) -> Iterator[tuple[bytearray, slice, slice]]:
-        """So many bytes from here on: a page, where they are in it, and which of them they are."""
-        begin, end = self.at, self.at + count
-        while self.at < end:
-            start, page = self.at, self.at // PAGE * PAGE
-            self.at = min(end, page + PAGE)
-            here, there = slice(start - page, self.at - page), slice(start - begin, self.at - begin)
-            yield self.pages.setdefault(page, bytearray(PAGE)), here, there
+        if size == self.chunk and bytes(piece[:BYTES]) == bytes(min(BYTES, size)):
+            at, piece, write = at + size - len(WRONG), WRONG, disk.write  # there may be millions of them
+        try:
+            if not self.refused:
+                write(self.fileno(), (bytes(piece),), at)
+        except OSError as fault:
+            self.refused = fault.errno or errno.EIO
+        self.seek(at + len(piece))
+        return size
 
 
-def _lay_out(image: _Image, schema: Schema, cuts: Mapping[str, Cut], aligned: int) -> None:
-    """Has HDF5 write all that is no number, and then find a place for each; objects of so many bytes are aligned."""
+def _lay_out(skeleton: _Skeleton, schema: Schema, cuts: Mapping[str, Cut]) -> None:
+    """Has HDF5 write all that is no number, and then find a place for each."""
     import h5py
     from h5py import h5f, h5fd, h5p
 
     access, made = h5p.create(h5p.FILE_ACCESS), h5p.create(h5p.FILE_CREATE)
     access.set_fclose_degree(h5f.CLOSE_STRONG)
     access.set_libver_bounds(h5f.LIBVER_V110, h5f.LIBVER_V110)
-    access.set_alignment(aligned, PAGE)
-    access.set_fileobj_driver(h5fd.fileobj_driver, image)
+    access.set_alignment(WORTH_A_PAGE, PAGE)
+    access.set_fileobj_driver(h5fd.fileobj_driver, skeleton)
     # each thing behind the last one
     made.set_file_space_strategy(h5f.FSPACE_STRATEGY_NONE, False, 1)
     made.set_attr_phase_change(COMPACT, 0)
@@ -212,61 +172,64 @@ def _lay_out(image: _Image, schema: Schema, cuts: Mapping[str, Cut], aligned: in
             data = file[path]
             if data.chunks is None:
                 data[()] = np.nan if data.dtype.kind == "f" else -1
-            else:
-                image.chunk = data.dtype.itemsize * math.prod(data.chunks) + len(WRONG)
-                data.id.write_direct_chunk((0,) * data.ndim, bytes(image.chunk))
+                continue
+            # the first chunk that is written has HDF5 find a place for all, and fill them
+            first = np.full(data.chunks, data.fillvalue, data.dtype).tobytes()
+            skeleton.chunk = len(first) + len(WRONG)
+            data.id.write_direct_chunk((0,) * data.ndim, first + checksum(first, len(first)))
 
 
 def _write_variables(file: Any, schema: Schema, cut: Cut) -> dict[str, tuple[str, ...]]:
     """Dimensions, coordinates and columns as netCDF4 and xarray know them; gives the dimensions of each variable."""
-    coordinates, sizes = [], dict(schema.sizes)
+    sizes = dict(schema.sizes)
+    variables: list[tuple[str, tuple[str, ...], Any, Mapping[str, Any]]] = []  # and their numbers, or how to make them
     for c in schema.coordinates:
-        values, over, attrs = np.asarray(c.values), c.dims, dict(c.attrs)
+        values, over, attrs = np.asarray(c.values), c.dims, c.attrs
         if values.dtype.kind == "U":  # as characters
             texts = np.array([word.encode() for word in values.ravel()])
             values = texts.view("S1").reshape(*values.shape, texts.dtype.itemsize)
             over, attrs = (*over, f"string{texts.dtype.itemsize}"), {**attrs, "_Encoding": "utf-8"}
             sizes[over[-1]] = texts.dtype.itemsize
-        coordinates.append((c.name, over, values, attrs))
-    numbers = {dim: np.int32(number) for number, dim in enumerate(sizes)}
-
-    def described(data: Any, over: tuple[str, ...], attrs: Mapping[str, Any], title: str) -> None:
-        """Says over which dimensions a variable is, or that it is the first of them."""
+        variables.append((c.name, over, values, attrs))
+    own = {name for name, over, *_ in variables if over[:1] == (name,)}
+    for dim in (dim for dim in sizes if dim not in own):
+        variables.append((dim, (dim,), None, {}))
+    for column in schema.columns:
+        over = (*schema.grid.dims, *column.dims)
+        # xarray's way to mark what belongs to the coordinates of a variable, and of all
+        beside = [c.name for c in schema.coordinates if c.dims != (c.name,) and set(c.dims) <= set(over)]
+        variables.append((column.name, over, column, {**column.attrs, **_listed(beside)}))
+    away = [c.name for c in schema.coordinates if c.dims and not set(c.dims) & {c.name, *schema.grid.dims}]
+    _say(file, {**_attrs(schema), **_listed(away)})
+    for name, over, what, attrs in sorted(variables, key=lambda found: found[1][:1] != (found[0],)):
+        if isinstance(what, Column):
+            data = _make(file, name, schema.shape(what), what.dtype, cut.chunk(what))
+        elif what is None:
+            data = _make(file, name, (sizes[name],), ">f4", ())
+        else:
+            data = _make(file, name, what.shape, what.dtype, what.shape or None)
+            data[...] = what
         _say(data, attrs)
-        if over[:1] == (data.name[1:],):
-            data.make_scale(title)
-            data.attrs["_Netcdf4Dimid"] = numbers[over[0]]
+        if over[:1] == (name,):
+            unnamed = f"This is a netCDF dimension but not a netCDF variable.{sizes[name]:10}"
+            data.make_scale(unnamed if what is None else name)
+            numbers = [np.int32(list(sizes).index(dim)) for dim in over]
+            data.attrs["_Netcdf4Dimid"] = numbers[0]
             if len(over) > 1:
-                data.attrs["_Netcdf4Coordinates"] = np.array([numbers[dim] for dim in over])
+                data.attrs["_Netcdf4Coordinates"] = np.array(numbers)
         else:
             for place, dim in enumerate(over):
                 data.dims[place].attach_scale(file[dim])
-
-    # xarray's way to mark what belongs to the coordinates of all variables, and of one
-    away = [c.name for c in schema.coordinates if c.dims and not set(c.dims) & {c.name, *schema.grid.dims}]
-    _say(file, {**_attrs(schema), **({"coordinates": " ".join(away)} if away else {})})
-    own = {name for name, over, *_ in coordinates if over[:1] == (name,)}
-    for dim, size in sizes.items():
-        if dim not in own:
-            title = f"This is a netCDF dimension but not a netCDF variable.{size:10}"
-            described(_make(file, dim, (size,), ">f4", ()), (dim,), {}, title)
-    for name, over, values, attrs in sorted(coordinates, key=lambda found: found[0] not in own):
-        data = _make(file, name, values.shape, values.dtype, values.shape, header=not over)
-        data[...] = values
-        described(data, over, attrs, name)
     dims = {c.name: c.dims for c in schema.coordinates}
-    for column in schema.columns:
-        dims[column.name] = over = (*schema.grid.dims, *column.dims)
-        beside = [c.name for c in schema.coordinates if c.dims != (c.name,) and set(c.dims) <= set(over)]
-        data = _make(file, column.name, schema.shape(column), column.dtype, cut.chunk(column))
-        described(data, over, {**column.attrs, **({"coordinates": " ".join(beside)} if beside else {})}, column.name)
-    return dims
+    return dims | {c.name: (*schema.grid.dims, *c.dims) for c in schema.columns}
 
 
-def _make(
-    group: Any, name: str, shape: tuple[int, ...], dtype: Any, chunk: tuple[int, ...], header: bool = False
-) -> Any:
-    """A dataset, in chunks with a checksum each; (): in one piece, which may be in its object `header`."""
+def _listed(names: list[str]) -> dict[str, str]:
+    return {"coordinates": " ".join(names)} if names else {}
+
+
+def _make(group: Any, name: str, shape: tuple[int, ...], dtype: Any, chunk: tuple[int, ...] | None) -> Any:
+    """A dataset, in chunks with a checksum each; (): in one piece; None: in its object header."""
     import h5py
     from h5py import h5d, h5p
 
@@ -275,9 +238,11 @@ def _make(
     if chunk:
         how.set_chunk(chunk)
         how.set_fletcher32()
-        how.set_fill_time(h5d.FILL_TIME_NEVER)
         how.set_alloc_time(h5d.ALLOC_TIME_LATE)
-    elif header:
+        how.set_fill_time(h5d.FILL_TIME_ALLOC if name == STATUS else h5d.FILL_TIME_NEVER)
+        if name == STATUS:
+            how.set_fill_value(np.array(Status.PENDING, dtype))
+    elif chunk is None:
         how.set_layout(h5d.COMPACT)
     space = h5py.h5s.create_simple(shape) if shape else h5py.h5s.create(h5py.h5s.SCALAR)
     kind = h5py.h5t.py_create(np.dtype(dtype), logical=True)

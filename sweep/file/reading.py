@@ -8,16 +8,14 @@ thread. A table in the file has a digest of each chunk, a row of them for each b
 
 from __future__ import annotations
 
-import bisect
 import errno
 import itertools
 import json
 import math
+import operator
 import os
-import stat
 import struct
 from collections.abc import Iterable, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -37,14 +35,8 @@ UNFINISHED = ".unfinished"
 """How the name of a result ends while its sweep runs."""
 BYTES, ENDING_BYTES = 16, 256
 """Of a digest; of what is written when all is done: JSON, and its digest."""
-READERS = 4
-"""Threads that read a large piece,"""
-LARGE = 32 << 20
-"""of so many bytes."""
-SIGNATURE = b"\x89HDF\r\n\x1a\n"
-"""How files of HDF5 begin."""
 FILE_END = 28, 8
-"""Where, and in how many bytes, they say how long they are."""
+"""Where, and in how many bytes, files of HDF5 say how long they are."""
 OF_NETCDF = {"CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_Netcdf4Coordinates", "_Netcdf4Dimid", "coordinates"}
 """Attributes that say nothing to a user."""
 DAMAGE = (OSError, EOFError, LookupError, ValueError, TypeError, AttributeError, RuntimeError)
@@ -54,9 +46,7 @@ OF_DAMAGE = (errno.EINVAL, errno.EOVERFLOW)
 
 
 class Damaged(SweepError):
-    """What is read is no result of this program, or is damaged beside its numbers: `reason` says where."""
-
-    reason = ""
+    """What is read is no result of this program, or is damaged beside its numbers."""
 
 
 class StoredFile:
@@ -85,20 +75,18 @@ class StoredFile:
             self._read()
             if not self.ending and flags == os.O_RDONLY and self.path.suffix != UNFINISHED:
                 raise ValueError("what was written at its end is damaged")
-        except BaseException as fault:
+        except (FileNotFoundError, NotADirectoryError):
+            raise
+        except DAMAGE as fault:
             self.close()
-            if isinstance(fault, FileNotFoundError | NotADirectoryError) or not isinstance(fault, DAMAGE):
-                raise
             raise _refusal(self.path, fault) from fault
 
     def _read(self) -> None:
         """All but numbers, by HDF5, which checks that, whatever has the file's name by now. Raises one of DAMAGE."""
         import h5py
 
-        if not stat.S_ISREG(os.fstat(self.fd).st_mode) or read_bytes(self.fd, 0, len(SIGNATURE)) != SIGNATURE:
-            raise ValueError("it is no file of HDF5")
-        with os.fdopen(os.dup(self.fd), "rb", 0) as raw, h5py.File(raw, "r") as file:
-            integrity = _own(file, "integrity").attrs
+        with os.fdopen(os.dup(self.fd), "rb", 0) as raw, h5py.File(raw, "r") as h5:
+            integrity = _own(h5, "integrity").attrs
             if (number := integrity.get("format")) != FORMAT:
                 raise SweepError(
                     f"{self.path}: a result of another format ({number}); this version of foliot reads format {FORMAT} "
@@ -106,18 +94,18 @@ class StoredFile:
                 )
             contents = json.loads(integrity["contents"])
             self.dims = {name: tuple(dims) for name, dims in contents["dims"].items()}
-            self.key_at, self.ending_at = (_own(file, f"integrity/{k}").id.get_offset() for k in ("key", "ending"))
+            self.key_at, self.ending_at = (_own(h5, f"integrity/{k}").id.get_offset() for k in ("key", "ending"))
             self.key = read_bytes(self.fd, self.key_at, BYTES)
             self.ending = ending_of(read_bytes(self.fd, self.ending_at, ENDING_BYTES))
-            self.tables = {name: Table(self, file, name, **keys) for name, keys in contents["tables"].items()}
+            self.tables = {name: Table(self, h5, name, **keys) for name, keys in contents["tables"].items()}
             self.coords = {}
-            for name in self.dims.keys() - self.columns():
-                data = _own(file, name)
+            for name in (name for name in self.dims if name not in self.columns()):
+                data = _own(h5, name)
                 attrs, values = _attrs(data), data[()]
                 if attrs.pop("_Encoding", None):
                     values = np.char.decode(values.view(f"S{values.shape[-1]}")[..., 0], "utf-8")
                 self.coords[name] = Coordinate(name, self.dims[name], values, attrs)
-            attrs = _attrs(file)
+            attrs = _attrs(h5)
         self.work = "rows" if "rows" in self.tables else "cells"
         self.attrs = {**attrs, "study_json": study_together(attrs["study_json"], self.coords), **self.ending}
 
@@ -213,45 +201,26 @@ class Table:
 
 
 class Numbers:
-    """A column over its grid: numbers by indices and slices with positive steps for each dimension, checked.
+    """A column over its grid: numbers by integers and slices with positive steps, checked.
 
     Each cell has the shape `own`, each chunk, which begins at one of `at`, `size` bytes and a checksum of `check` bytes
-    behind it, a single number none. Raises ValueError where it has another shape, or other chunks, than it was made
-    with.
+    behind it, a single number none.
     """
 
     def __init__(self, table: Table, number: int, data: Any) -> None:
-        self.table, self.number, path, grid, count = table, number, data.name, table.grid, table.blocks.count
-        self.name, self.shape, self.dtype, self.attrs = path.split("/")[-1], data.shape, data.dtype, _attrs(data)
-        self.own, self.check = data.shape[len(grid) :], 4 * data.fletcher32
-        self.dims = table.file.dims.get(self.name, ())
-        self.size = self.dtype.itemsize * math.prod((*table.box, *self.own))
-        if data.shape[: len(grid)] != grid or (data.chunks or ()) != (*table.box, *self.own):
-            raise ValueError(f"{path} has another shape than it was made with")
-        if not self.check:
-            self.at = np.array([data.id.get_offset()])
-            return
-        # that HDF5 counts them has it compare the checksums of its tables
-        chunks = {block: self._chunk(data, block) for block in (0, count // 2, count - 1)}
-        if data.id.get_num_chunks() != count or any(chunk[1:] != (0, self.size + 4) for chunk in chunks.values()):
-            raise ValueError(f"{path} has other chunks than it was made with")
-        # HDF5 has put them at one distance, but maybe the first ones into a gap before; where that ends is halved for
-        last = chunks[count - 1][0]
-        step = last - self._chunk(data, max(0, count - 2))[0]
-        self.at = last - step * np.arange(count)[::-1]
-        gap = bisect.bisect_left(range(count), True, key=lambda block: self._chunk(data, block)[0] == self.at[block])
-        self.at[:gap] = chunks[0][0] + step * np.arange(gap)
-        if any(chunk[0] != self.at[block] for block, chunk in chunks.items()):
-            raise ValueError(f"{path} has its chunks in other places than it was made with")
-
-    def _chunk(self, data: Any, block: int) -> tuple[int, int, int]:
-        """Where HDF5 has a chunk, which filters it left out, and its bytes with checksum."""
-        corner = np.unravel_index(self.table.blocks.first(block), self.table.grid)
-        found = data.id.get_chunk_info_by_coord((*map(int, corner), *(0 for _ in self.own)))
-        return found.byte_offset, found.filter_mask, found.size
+        self.table, self.number, self.name = table, number, data.name.rpartition("/")[2]
+        self.shape, self.dtype, self.attrs = data.shape, data.dtype, _attrs(data)
+        self.own, self.dims = data.shape[len(table.grid) :], table.file.dims.get(self.name, ())
+        self.size, self.check = self.dtype.itemsize * math.prod((*table.box, *self.own)), 4 * data.fletcher32
+        chunks: list[Any] = []  # as HDF5 has them, in the order of blocks
+        if self.check:
+            data.id.chunk_iter(chunks.append)
+        self.at = np.array([chunk.byte_offset for chunk in chunks] if self.check else [data.id.get_offset()])
+        if data.shape[: len(table.grid)] != table.grid or len(self.at) != table.blocks.count:
+            raise ValueError(f"{data.name} has another shape, or other chunks, than it was made with")
 
     def __reduce__(self) -> Any:
-        return _column, (self.table.file, self.table.name, self.number)
+        return operator.getitem, (self.table.file, self.name)
 
     @property
     def values(self) -> Any:
@@ -282,46 +251,30 @@ class Numbers:
         return found if self.digest(block, found, behind) == digest else None
 
     def __getitem__(self, key: Any) -> Any:
-        """By what is given for each dimension, or for the first ones. Raises SweepError where damaged."""
-        key = key if isinstance(key, tuple) else (key,)
-        key = key if Ellipsis in key else (*key, Ellipsis)
-        place, left = key.index(Ellipsis), len(self.shape) - len(key) + 1
-        key = (*key[:place], *[slice(None)] * left, *key[place + 1 :])
-        grid, box = self.table.grid, self.table.box
+        """By what is given for the first dimensions. Raises SweepError where damaged."""
+        key, grid, box = key if isinstance(key, tuple) else (key,), self.table.grid, self.table.box
+        key += (slice(None),) * (len(self.shape) - len(key))
         runs = [
             range(n)[k if isinstance(k, slice) else slice(k, k + 1 or None)] for n, k in zip(grid, key, strict=False)
         ]
-        out = np.empty((*map(len, runs), *self.own), self.dtype)
+        # all places from the first to the last one wanted, of which those wanted are a view
+        spans = [(run[0], run[-1] + 1) if run else (0, 0) for run in runs]
+        out = np.empty((*(stop - start for start, stop in spans), *self.own), self.dtype)
         counts = [-(-n // m) for n, m in zip(grid, box, strict=True)]
-
-        def fill(corner: tuple[int, ...]) -> None:
-            """Reads what is wanted of one block, straight to its place where it can."""
-            there: list[Any] = []
-            here: list[Any] = []
-            whole = []
-            for at, m, n, run in zip(corner, box, grid, runs, strict=True):
-                begin, end = at * m, min((at + 1) * m, n)
-                low, high = (min(max(0, -((run.start - x) // run.step)), len(run)) for x in (begin, end))
-                there.append(slice(low, high))
-                here.append(slice(run[low] - begin, run[high - 1] - begin + 1, run.step))
-                whole.append(end - begin)
-            view = out[(*there, ...)]
-            shape = (*whole, *self.own)
+        for corner in itertools.product(*(range(a // m, -(-b // m)) for (a, b), m in zip(spans, box, strict=True))):
+            # straight to its place where all of a block is wanted and lies in one piece
+            ends = [(c * m, min((c + 1) * m, n)) for c, m, n in zip(corner, box, grid, strict=True)]
+            both = [(max(a, start), min(b, stop)) for (a, b), (start, stop) in zip(ends, spans, strict=True)]
+            view = out[tuple(slice(a - start, b - start) for (a, b), (start, _) in zip(both, spans, strict=True))]
+            shape = (*(b - a for a, b in ends), *self.own)
             cells = view if view.shape == shape and view.flags.c_contiguous else np.empty(shape, self.dtype)
-            self._checked(int(np.ravel_multi_index(corner, counts)) if grid else 0, cells)
+            self._fill(int(np.ravel_multi_index(corner, counts)) if grid else 0, cells)
             if cells is not view:
-                view[...] = cells[(*here, ...)]
+                view[...] = cells[tuple(slice(a - c, b - c) for (a, b), (c, _) in zip(both, ends, strict=True))]
+        wanted = (slice(None, None, k.step) if isinstance(k, slice) else 0 for k in key[: len(grid)])
+        return out[(*wanted, *key[len(grid) :])]
 
-        corners = itertools.product(*(sorted({at // m for at in run}) for run, m in zip(runs, box, strict=True)))
-        if out.nbytes < LARGE:
-            for corner in corners:
-                fill(corner)
-        else:
-            with ThreadPoolExecutor(READERS) as pool:
-                list(pool.map(fill, corners))
-        return out[(*(slice(None) if isinstance(k, slice) else 0 for k in key[: len(grid)]), *key[len(grid) :])]
-
-    def _checked(self, block: int, out: Any) -> None:
+    def _fill(self, block: int, out: Any) -> None:
         """Fills in the cells of a block. Raises SweepError where it is damaged, or the file is closed."""
         file = self.table.file
         if file.fd < 0:
@@ -353,44 +306,35 @@ def _refusal(path: Path, fault: BaseException) -> SweepError:
         return SweepError(f"{path}: is {'a folder' if path.is_dir() else 'no file'}, not the result of a sweep")
     if isinstance(fault, OSError) and fault.errno and fault.errno not in OF_DAMAGE:
         return SweepError(f"{path}: cannot be read ({os.strerror(fault.errno)})")
-    refused = Damaged(
-        f"{path}: not the result of a sweep (exports are for xarray and other programs), or damaged; move it away or "
-        "choose another name"
+    reason = (str(fault).splitlines() or [type(fault).__name__])[0]
+    return Damaged(
+        f"{path}: not the result of a sweep (exports are for xarray and other programs), or damaged ({reason}); "
+        "move it away or choose another name"
     )
-    refused.reason = (str(fault).splitlines() or [type(fault).__name__])[0]
-    return refused
 
 
-def _column(file: StoredFile, table: str, number: int) -> Numbers:
-    return file.tables[table].columns[number]
-
-
-def _own(file: Any, path: str) -> Any:
+def _own(h5: Any, path: str) -> Any:
     """What has a path. Raises ValueError where it lies elsewhere, or the file has no room for it: that is not read."""
     import h5py
 
-    for end in (k for k in range(1, len(path) + 1) if path[k : k + 1] in ("/", "")):
-        if not isinstance(file.get(path[:end], getlink=True), h5py.HardLink):
-            raise ValueError(f"{path} is not in the file itself")
-    found = file[path]
-    if isinstance(found, h5py.Dataset) and (
-        found.external or found.is_virtual or found.compression or found.nbytes > file.id.get_filesize()
+    group, _, name = path.rpartition("/")
+    parent = _own(h5, group) if group else h5
+    found = parent[name] if isinstance(parent.get(name, getlink=True), h5py.HardLink) else None
+    if found is None or (
+        isinstance(found, h5py.Dataset)
+        and (found.external or found.is_virtual or found.compression or found.nbytes > h5.id.get_filesize())
     ):
         raise ValueError(f"{path} is not in the file itself, or has not the size that it says")
     return found
 
 
 def _attrs(thing: Any) -> dict[str, Any]:
-    """What HDF5 says of a file or a variable; texts as str, single numbers as that. TypeError where a text is none."""
+    """What HDF5 says of a file or a variable; texts as str, single numbers as that."""
     found = {}
-    for name in thing.attrs:
-        if name not in OF_NETCDF:
-            value = thing.attrs[name]
-            value = value.decode() if isinstance(value, bytes) else value
-            found[name] = value[0] if getattr(value, "shape", ()) == (1,) else value
-    for name in ("units", "long_name", "study_json", "fingerprint", "start"):
-        if not isinstance(found.get(name, ""), str):
-            raise TypeError(f"{name} is no text")
+    for name in (name for name in thing.attrs if name not in OF_NETCDF):  # those may stand in the heap
+        value = thing.attrs[name]
+        value = value.decode() if isinstance(value, bytes) else value
+        found[name] = value[0] if getattr(value, "shape", ()) == (1,) else value
     return found
 
 

@@ -11,13 +11,10 @@ blocks at a time: numbers, fdatasync, digests. The next sync brings the digests 
 from __future__ import annotations
 
 import contextlib
-import itertools
 import os
-import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -49,8 +46,7 @@ def lock_of(output: Path) -> Path:
 class Store:
     """The result of one sweep while it is written, locked for this process. Made by `opened`.
 
-    It is at `path`, and will be at `output`, where it is when `finished`; `file` is None until `begin`, `resume` or
-    `reopen`.
+    It is at `path`, and will be at `output`, where it is when `finished`; `file` is None until `begin` or `resume`.
     """
 
     def __init__(self, output: Path) -> None:
@@ -59,8 +55,6 @@ class Store:
         self.file: StoredFile | None = None
         self._waiting: deque[tuple[int, bytes]] = deque()
         self._synced, self._size, self._elsewhere = time.monotonic(), 0, False
-        self._checked: Future[list[int]] | None = None
-        self._closing = threading.Event()
         self.finished = False
 
     @property
@@ -73,55 +67,49 @@ class Store:
         """What an earlier run left; None where there is nothing. Raises SweepError where it is damaged."""
         if not self.path.exists():
             return None
-        try:
+        with contextlib.suppress(Damaged):
             file = StoredFile(self.path, os.O_RDWR)
             if file.is_as_made():
                 return file
-        except Damaged:
-            pass
         raise SweepError(f"{self.path}: damaged beside its numbers; remove it, or give it up with --force")
 
-    def begin(self, schema: Schema, cuts: Mapping[str, Cut], shared: bool = False) -> None:
+    def begin(self, schema: Schema, cuts: Mapping[str, Cut]) -> None:
         """Makes the file, with room on the disk for all of it. Raises SweepError."""
         with disk.refusing(self.path):
             try:
-                file = create(self.temporary, schema, cuts, shared)
+                file = create(self.temporary, schema, cuts)
                 disk.rename(self.temporary, self.path)
                 disk.sync_folder(self.path.parent)
             except OSError:
                 with contextlib.suppress(OSError):
                     disk.remove(self.temporary)
                 raise
-            file.path = self.path
-            self._take_up(file)
+        file.path = self.path
+        self.resume(file, ())
 
-    def resume(self, file: StoredFile) -> None:
-        """Takes up what an earlier run left, which is compared with its digests meanwhile. Raises SweepError."""
-        self._take_up(file)
-        done = np.flatnonzero(self.table.done).tolist()
-        left = itertools.takewhile(lambda block: not self._closing.is_set(), done)
-        self._checked = ThreadPoolExecutor(1).submit(self.table.damaged, left)
+    def resume(self, file: StoredFile, damaged: Sequence[int] | None = None) -> Sequence[int]:
+        """Takes up what an earlier run left, but for the blocks that are damaged, which it gives: None: looks for them.
 
-    def _take_up(self, file: StoredFile) -> None:
+        Raises SweepError.
+        """
         if file.ending:  # it was killed just before it was renamed, or is taken up again
             file.ending = {}
             with disk.refusing(self.path):
                 disk.write_all(file.fd, (ending_text({}),), file.ending_at)
         self.file, self._size = file, os.fstat(file.fd).st_size
+        if damaged is None:
+            damaged = self.table.damaged(np.flatnonzero(self.table.done).tolist())
+        self.table.digests[list(damaged)] = 0
+        return damaged
 
-    def _check(self) -> None:
-        """Raises Incomplete where the file is not what it was, or not where it was: no block of ours counts there."""
-        assert self.file is not None
-        ours = os.fstat(self.file.fd)
-        try:
-            there = os.path.samestat(self.path.stat(), ours)
-        except OSError as fault:
-            there = not isinstance(fault, FileNotFoundError | NotADirectoryError)  # a network may be slow to answer
-        if not there or ours.st_size < self._size or read_bytes(self.file.fd, self.file.key_at, BYTES) != self.file.key:
-            raise Incomplete(
-                f"{self.path}: was moved, removed, cut or overwritten while the run wrote to it; if it was moved, move "
-                "it back, and the same command continues; else remove what is left, and begin anew"
-            )
+    def reopen(self, damaged: Sequence[int]) -> None:
+        """Takes a finished result up again, some blocks of which are to be computed again. Raises SweepError."""
+        with disk.refusing(self.output):
+            disk.rename(self.output, self.path)
+            disk.sync_folder(self.output.parent)
+        file = self.found()
+        assert file is not None
+        self.resume(file, damaged)
 
     @property
     def count(self) -> int:
@@ -145,52 +133,40 @@ class Store:
     def tick(self) -> None:
         """Acknowledges what is written, if it is time to. Raises SweepError."""
         if time.monotonic() - self._synced >= SYNC_SECONDS:
-            self._commit()
+            self.commit()
 
     def commit(self) -> None:
-        """Acknowledges all that is written, and brings that to the disk too. Raises SweepError."""
-        self._commit()
-        with disk.refusing(self.path):
-            disk.sync_numbers(self.table.file.fd)
+        """Acknowledges all that is written, by one thread at a time: numbers, then digests.
 
-    def _commit(self) -> None:
-        """By one thread at a time."""
-        self._check()
-        self._synced = time.monotonic()
-        waiting = dict(self._waiting.popleft() for _ in range(len(self._waiting)))
+        Raises SweepError; Incomplete where the file is not what it was, or not where it was: no block counts there.
+        """
+        file, self._synced = self.table.file, time.monotonic()
         with disk.refusing(self.path):
-            if waiting:
-                disk.sync_numbers(self.table.file.fd)
+            ours = os.fstat(file.fd)
+            there = disk.mark(self.path)[:1] == (ours.st_ino,) and ours.st_size >= self._size
+            if not there or read_bytes(file.fd, file.key_at, BYTES) != file.key:
+                raise Incomplete(
+                    f"{self.path}: was moved, removed, cut or overwritten while the run wrote to it; if it was moved, "
+                    "move it back, and the same command continues; else remove what is left, and begin anew"
+                )
+            if waiting := dict(self._waiting.popleft() for _ in range(len(self._waiting))):
+                disk.sync_numbers(file.fd)
                 self.table.write_digests(waiting)
 
-    def _undo(self, blocks: Iterable[int]) -> None:
-        """Takes blocks out of those that are done. Raises SweepError."""
-        with disk.refusing(self.path):
-            self.table.write_digests(dict.fromkeys(blocks, bytes(self.table.row_bytes)))
-
-    def finish(self, texts: Mapping[str, str], gather: Gather | None) -> list[int]:
+    def finish(self, texts: Mapping[str, str], gather: Gather | None) -> None:
         """Puts the result in its place, with what is known at the end; of a summary, its rows are gathered first.
 
-        Returns the blocks that turned out to be damaged, or are not acknowledged: there are none, or the result stays
-        where it is, and they have to be computed again. Raises SweepError.
+        Raises SweepError where it cannot, and the result stays where it is.
         """
         file, cells = self.table.file, self.table.file.tables["cells"]
+        self.commit()
         with disk.refusing(self.output):
-            self.commit()
             if self._elsewhere:
                 disk.forget(file.fd)
-            checked, self._checked = self._checked, None
-            self._undo(checked.result() if checked is not None else [])
-            found = self.missing()
-            if not found and gather is not None:
-                found = self.table.damaged(range(self.table.blocks.count))
-                self._undo(found)
-                if not found:
-                    digests = {block: cells.write(block, gather(file, block)) for block in range(cells.blocks.count)}
-                    disk.sync_numbers(file.fd)
-                    cells.write_digests(digests)
-            if found:
-                return found
+            if gather is not None:
+                digests = {block: cells.write(block, gather(file, block)) for block in range(cells.blocks.count)}
+                disk.sync_numbers(file.fd)
+                cells.write_digests(digests)
             disk.write_all(file.fd, (ending_text(texts),), file.ending_at)
             disk.fsync(file.fd)
             last = cells.blocks.count - 1
@@ -201,17 +177,6 @@ class Store:
             disk.rename(self.path, self.output)
             self.finished = True
             disk.sync_folder(self.output.parent)
-        return []
-
-    def reopen(self, damaged: Iterable[int]) -> None:
-        """Takes a finished result up again, some blocks of which are to be computed again. Raises SweepError."""
-        with disk.refusing(self.output):
-            disk.rename(self.output, self.path)
-            disk.sync_folder(self.output.parent)
-            file = self.found()
-            assert file is not None
-            self._take_up(file)
-            self._undo(damaged)
 
     def shared(self) -> tuple[Path, bytes] | None:
         """By what another process opens the file to write blocks; None where blocks of two would share a page."""
@@ -224,14 +189,12 @@ class Store:
             disk.remove(self.path)
 
     def close(self) -> None:
-        """Acknowledges what is written, if that can be, and gives the file back."""
-        self._closing.set()
-        if self._checked is not None:
-            self._checked.result()
+        """Acknowledges what is written, brings that to the disk if that can be, and gives the file back."""
         if self.file is not None:
-            with contextlib.suppress(SweepError):
+            with contextlib.suppress(SweepError), disk.refusing(self.path):
                 if self._waiting:
                     self.commit()
+                disk.sync_numbers(self.file.fd)
             self.file.close()
 
 

@@ -79,8 +79,7 @@ def verify(path: str | os.PathLike[str]) -> Verdict:
     except (FileNotFoundError, NotADirectoryError):
         raise SweepError(f"{output}: no such file, and no sweep that writes it") from None
     except Damaged as fault:
-        structure = "its structure is damaged, or it is not the result of a sweep"
-        return Verdict(output, False, "", (f"{structure} ({fault.reason})",))
+        return Verdict(output, False, "its structure is damaged, or it is not the result of a sweep", (str(fault),))
 
 
 def _verdict(output: Path, file: StoredFile) -> Verdict:

@@ -194,11 +194,6 @@ class Loop:
         start, stop = self.blocks.cells(job)
         return stop - start
 
-    def again(self, job: int) -> None:
-        """A block is damaged on the disk, and has to be computed once more."""
-        self.progress.again(self._cells(job), self._weights[job])
-        self.progress.note(f"{self.blocks.label(job)} were damaged on the disk and are computed again")
-
     def endings(self) -> dict[str, str]:
         """What a result says of its run that is known at the end."""
         end = _now()

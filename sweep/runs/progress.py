@@ -97,10 +97,6 @@ class Progress:
             self._first_round = self._spent
         self.tick()
 
-    def again(self, cells: int, work: float) -> None:
-        """A block has to be computed once more."""
-        self.done, self._before, self._work_left = self.done - cells, self._before - cells, self._work_left + work
-
     def tick(self) -> None:
         """Says something if it is time to."""
         now = self._clock()

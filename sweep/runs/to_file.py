@@ -42,7 +42,7 @@ def run_to_file(task: Task, precomputed: Precomputed | None = None) -> Ending:
                 store.discard()
             return "done before"
         if found is not None and is_ours:
-            store.resume(found)
+            damaged = store.resume(found)
         elif found is None and standing == "damaged":
             store.reopen(damaged)
         else:
@@ -55,7 +55,7 @@ def run_to_file(task: Task, precomputed: Precomputed | None = None) -> Ending:
                     )
             store.discard()
         try:
-            _computed(store, task, precomputed, standing == "reused")
+            _computed(store, task, precomputed, standing == "reused", damaged)
             return "complete"
         except (KeyboardInterrupt, Terminated, TimeUp) as reason:
             if store.finished:  # the signal came while the result was put in its place
@@ -114,8 +114,10 @@ def _found(store: Store, task: Task) -> StoredFile | None:
         return None
 
 
-def _computed(store: Store, task: Task, known: Reused | Precomputed | None, reused: bool) -> None:
-    """Computes what is missing, and puts the result in its place."""
+def _computed(
+    store: Store, task: Task, known: Reused | Precomputed | None, reused: bool, damaged: Sequence[int]
+) -> None:
+    """Computes what is missing, which is said of blocks that are damaged, and puts the result in its place."""
     with contextlib.ExitStack() as stack:
         to_do, sampled = store.file is None or bool(store.missing()), known is None
         if to_do and reused:
@@ -128,18 +130,14 @@ def _computed(store: Store, task: Task, known: Reused | Precomputed | None, reus
         loop.begin(range(loop.blocks.count) if store.file is None else store.missing())
         if store.file is None:
             _begin(store, loop, known)
+        for block in damaged:
+            loop.progress.note(f"{loop.blocks.label(block)} were damaged on the disk and are computed again")
         sink = stack.enter_context(_Stored(store, loop, known))
-        for _ in range(3):  # times that damaged blocks are computed before the disk is given up
-            if missing := store.missing():
-                loop.compute(missing, sink, None if task.cluster is None else store.shared(), sink.tick)
-                sink.settle()
-            damaged = store.finish(loop.endings(), None if task.study.summary is None else sink.gathered)
-            if not damaged:
-                loop.progress.end()
-                return
-            for block in damaged:
-                loop.again(block)
-    raise SweepError(f"{store.path}: what is written there comes back damaged again and again; the disk is failing")
+        if missing := store.missing():
+            loop.compute(missing, sink, None if task.cluster is None else store.shared(), sink.tick)
+            sink.settle()
+        store.finish(loop.endings(), None if task.study.summary is None else sink.gathered)
+        loop.progress.end()
 
 
 def _begin(store: Store, loop: Loop, known: Reused | Precomputed | None) -> None:
@@ -153,7 +151,7 @@ def _begin(store: Store, loop: Loop, known: Reused | Precomputed | None) -> None
             f"{task.output}: needs {quantity(needed)}, only {quantity(free)} are free here; free some space, choose "
             "another folder with -o, fewer outputs, or keep a [summary] instead of every cell"
         )
-    store.begin(schema, cuts, task.cluster is not None)
+    store.begin(schema, cuts)
 
 
 class _Stored:

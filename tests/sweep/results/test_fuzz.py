@@ -126,7 +126,7 @@ CHANGES = [
     (of_another_shape, 2),
     (short_chunk, 2),
     (with_attribute("/", "end", np.zeros(3)), 0),
-    (with_attribute("height", "units", 5), 2),
+    (with_attribute("height", "units", 5), 0),
     (with_attribute("status", "flag_meanings", 3.0), 0),
 ]
 
