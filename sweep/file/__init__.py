@@ -5,8 +5,8 @@ it before the first number, with a place for each chunk of each column, one a bl
 threads, and workers elsewhere that see the file, write blocks to their places, with HDF5's own checksum behind each
 chunk (`fletcher`). When their bytes are on the disk, digests of their chunks are written to a table in the file, many
 blocks at a time: what has its digests is there, whatever happens (`store`). Blocks of an earlier run are compared with
-their digests before new ones are computed, and damaged ones computed again. Of a summary, rows of reductions are kept in
-the same way, and its columns made from them at the end. What is not computed yet is PENDING, and an error to whoever
+their digests before new ones are computed, and damaged ones computed again. Of a summary, rows of reductions are kept
+in the same way, and its columns made from them at the end. What is not computed yet is PENDING, and an error to whoever
 asks HDF5 for its numbers. All that reads a result compares it with its digests (`reading`).
 
 `open` gives a file as a Dataset (its arrays are `columns`), `verify` compares all of it with its digests. All calls
