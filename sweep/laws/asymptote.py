@@ -94,7 +94,7 @@ def fit_correction(
     def each(t: Array, z: Array, errors: Array | None, bounds: Array | None) -> dict[str, Any]:
         if end == "low":
             t, z, errors = -t[::-1], z[:, ::-1], None if errors is None else errors[:, ::-1]
-        tried = fitted((ONE, CORRECTION, LOG_CORRECTION), t, z, errors)
+        tried = fitted((ONE, CORRECTION, LOG_CORRECTION), t, z, errors, CORRECTION)
         every = [_one(t, row, laws, sign, confidence, noise) for row, laws in zip(z, tried, strict=True)]
         return {name: [one[name] for one in every] for name in every[0]}
 

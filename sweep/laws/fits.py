@@ -77,20 +77,26 @@ class Found(NamedTuple):
         return bool(columns.size and regress(t, every, self.off[None], noise, columns.shape[1], self.sigma).denied[0])
 
 
-DAMPINGS = 10.0 ** np.array([[-7.0, -3.0, -1.0, 1.0], [-7.0, -2.0, 0.0, 3.0]])
+DAMPINGS = np.array([[1e-7, 1e-1, 10.0, 1e3], [1e-7, 1e-2, 1.0, 1e2]])
 """Of Gauss-Newton steps with and without what b takes up; all are tried at once, and the best is taken."""
-STEPS, ENOUGH = 30, 1e-6
-"""Steps at most, and the part of a sum of squares that a step must take away for another one."""
+FURTHER = np.array([1.0, 4.0, 16.0])
+"""Times the step before, which are tried beside them: along a valley, Gauss-Newton steps are short."""
+STEPS, ENOUGH = 10, 1e-2
+"""Steps at most, three times as many of a law that is wanted; and what a step must take away of a deviance for
+another one: so much of 1 and of what the deviance is above the best, or the square for a law that is wanted."""
 MOST_LINES = 16
 """That are fitted at once, so that what is held stays below some 50 MB."""
 
 
 @np.errstate(all="ignore")  # what overflows is infinite, and no curve
-def fitted(laws: Sequence[Law], t: Array, z: Array, errors: Array | None = None) -> list[dict[str, Found]]:
+def fitted(
+    laws: Sequence[Law], t: Array, z: Array, errors: Array | None = None, wanted: Law | None = None
+) -> list[dict[str, Found]]:
     """For each line of z (m, n) the laws, by name, that are nearest to it, t rising; not those that have not two more
     points than numbers, at more places than numbers. `errors` (m, n) are standard errors, where they are known.
 
-    The law ONE is of the noise that suits it best, where that is not known.
+    The law ONE is of the noise that suits it best, where that is not known. Laws that are far from the points beside
+    others are not fitted to the last digit, but for that which is `wanted`.
     """
     places = np.unique(t).size
     laws = [law for law in laws if t.size >= law.numbers + 2 and places > law.numbers]
@@ -98,11 +104,13 @@ def fitted(laws: Sequence[Law], t: Array, z: Array, errors: Array | None = None)
     most = MOST_LINES if errors is None else 1
     for first in range(0, len(z) if laws else 0, most):
         part = z[first : first + most]
-        rows = _Rows(laws, t, part, None if errors is None else errors[first])
+        rows = _Rows(laws, t, part, None if errors is None else errors[first], wanted)
         moving = np.arange(len(rows.q))
-        for _ in range(STEPS):
-            if moving.size:
-                moving = rows.step(moving)
+        while moving.size:
+            for _ in range(STEPS if wanted is None else 3 * STEPS):
+                if moving.size:
+                    moving = rows.step(moving)
+            moving = rows.restarted()
         for k, one in enumerate(rows.found()):
             found[first + k % len(part)][one.law.name] = one
     if ONE in laws and errors is None:
@@ -115,34 +123,58 @@ def fitted(laws: Sequence[Law], t: Array, z: Array, errors: Array | None = None)
 class _Rows:
     """Laws times lines z (m, n), law by law, each with its q; those that a law does not have are 0 and stay so."""
 
-    def __init__(self, laws: Sequence[Law], t: Array, z: Array, errors: Array | None):
+    def __init__(self, laws: Sequence[Law], t: Array, z: Array, errors: Array | None, wanted: Law | None):
         self.laws, self.t, self.errors = laws, t, errors
         self.root = np.ones_like(t) if errors is None else 1 / errors
         self.law, self.z = np.repeat(np.arange(len(laws)), len(z)), np.tile(z, (len(laws), 1))
-        limits = np.zeros((2, len(laws), max(1, *(len(law.q) for law in laws))))
+        limits = np.zeros((2, len(laws), 3))
         for k, law in enumerate(laws):
             limits[:, k, : len(law.q)] = np.reshape([(one.least, one.most) for one in law.q], (-1, 2)).T
         self.low, self.high = limits[:, self.law]
-        self.q = self._starts(z, limits.shape[2])
-        self.off, self.b, self.basis, self.back = self._project(np.arange(len(self.q)), self.q)
-        self.square = (self.off**2).sum(axis=1)
+        self.wanted = np.array([law is wanted for law in laws])[self.law]
         self.rounding = (ROUNDING * (1 + abs(self.z).max(axis=1))) ** 2
+        self.q = self._starts(z)
+        self.off, self.b, self.basis, self.back = self._project(np.arange(len(self.q)), self.q)
+        self.square, self.before = (self.off**2).sum(axis=1), np.zeros_like(self.q)
 
-    def _starts(self, z: Array, most: int) -> Array:
+    def deviance(self, square: Array) -> Array:
+        """-2 ln likelihood of all rows, but for what they have in common."""
+        n = self.t.size
+        return square if self.errors is not None else n * np.log(square / n + self.rounding)
+
+    def _starts(self, z: Array) -> Array:
         """The q of a grid that are nearest to the lines."""
         own = [law for law in self.laws if not law.starts_as]
         tries = [np.array(list(itertools.product(*(number.starts for number in law.q)))) for law in own]
         edges = np.cumsum([0, *map(len, tries)])
-        q = np.zeros((edges[-1], most))
+        q = np.zeros((edges[-1], 3))
         for start, some in zip(edges, tries, strict=False):
             q[start : start + len(some), : some.shape[1]] = some
         shift, basis, _ = _linear(own, np.repeat(np.arange(len(own)), np.diff(edges)), q, self.t, self.root)
         wanted = (z[:, None] - shift) * self.root
         square = (wanted**2).sum(axis=2) - (np.einsum("gnk,mgn->mgk", basis, wanted) ** 2).sum(axis=2)
-        best = {}
-        for law, a, b in zip(own, edges, edges[1:], strict=False):
-            best[law.name] = q[a + np.nanargmin(square[:, a:b], axis=1)]
-        return np.concatenate([best[law.starts_as or law.name] for law in self.laws])
+        ends = zip(own, edges, edges[1:], strict=False)
+        best = {law.name: q[a + np.nanargmin(square[:, a:b], axis=1)] for law, a, b in ends}
+        every = [best[law.starts_as or law.name].copy() for law in self.laws]
+        for law, start in zip(self.laws, every, strict=True):
+            if law.starts_as:
+                start[:, len(law.q) - 1] = law.q[-1].starts[0]
+        return np.concatenate(every)
+
+    def restarted(self) -> NDArray[np.intp]:
+        """Rows of laws that end further from the points than the law that they have as a case: begun there again."""
+        names, m = [law.name for law in self.laws], len(self.q) // len(self.laws)
+        back = []
+        for k, law in enumerate(self.laws):
+            if law.starts_as in names:
+                case, own = (np.arange(m) + j * m for j in (names.index(law.starts_as), k))
+                worse = self.square[own] > self.square[case]
+                own, case = own[worse], case[worse]
+                for part in (self.q, self.square, self.off, self.b, self.basis, self.back):
+                    part[own] = part[case]
+                self.before[own] = 0.0
+                back.append(own)
+        return np.concatenate(back) if back else np.arange(0)
 
     def _project(self, rows: NDArray[np.intp], q: Array) -> tuple[Array, Array, Array, Array]:
         """Weighted distances (r, n), infinite where there is no curve, b (r, k), and Q, R of the columns."""
@@ -167,39 +199,48 @@ class _Rows:
         back, basis = self.back[rows].transpose(0, 2, 1), self.basis[rows]
         turned = np.linalg.solve(back, np.einsum("qkrn,rn->rkq", columns[1:], self.off[rows]))
         by_q -= (by_q @ basis) @ basis.transpose(0, 2, 1)
+        right = (by_q @ self.off[rows, :, None])[..., 0]
+        # q at a limit, beyond which the points are nearer, stay there
+        at, low, high = self.q[rows], self.low[rows], self.high[rows]
+        held = ((at <= low) & (right < 0)) | ((at >= high) & (right > 0))
+        by_q, turned = np.where(held[..., None], 0.0, by_q), np.where(held[:, None], 0.0, turned)
         alone = by_q @ by_q.transpose(0, 2, 1)
         normal = np.stack([alone, alone + turned.transpose(0, 2, 1) @ turned], axis=1)
         trace = np.trace(normal, axis1=2, axis2=3)[..., None]
-        moves = ((trace > 1e-200) & (trace < np.inf)).all(axis=(1, 2)) & (
-            self.square[rows] < np.inf
-        )  # else nothing does
-        rows, by_q, normal, trace = (part[moves] for part in (rows, by_q, normal, trace))
+        moves = ((trace > 1e-200) & (trace < np.inf)).all(axis=(1, 2)) & (self.square[rows] < np.inf)
+        rows, at, right, normal, trace = (part[moves] for part in (rows, at, np.where(held, 0.0, right), normal, trace))
         if not rows.size:
             return rows
-        scale = (np.einsum("rmqq->rmq", normal) + 1e-12 * trace)[:, :, None, None] * np.eye(by_q.shape[1])
-        right = (by_q @ self.off[rows, :, None])[:, None, None]
-        change = np.linalg.solve(normal[:, :, None] + DAMPINGS[..., None, None] * scale, right)
-        there = self.q[rows, None] + change.reshape(rows.size, DAMPINGS.size, -1)
-        there = np.clip(there, self.low[rows, None], self.high[rows, None]).reshape(-1, by_q.shape[1])
-        tried = self._project(np.repeat(rows, DAMPINGS.size), there)
+        scale = (np.einsum("rmqq->rmq", normal) + 1e-12 * trace)[:, :, None, None] * np.eye(at.shape[1])
+        change = np.linalg.solve(normal[:, :, None] + DAMPINGS[..., None, None] * scale, right[:, None, None, :, None])
+        change = change.reshape(rows.size, DAMPINGS.size, -1)
+        change = np.concatenate([change, self.before[rows, None] * FURTHER[:, None]], axis=1)
+        there = np.clip(at[:, None] + change, self.low[rows, None], self.high[rows, None])
+        tries = there.shape[1]
+        there = there.reshape(-1, at.shape[1])
+        tried = self._project(np.repeat(rows, tries), there)
         squares = (tried[0] ** 2).sum(axis=1)
-        best = squares.reshape(rows.size, -1).argmin(axis=1) + np.arange(rows.size) * DAMPINGS.size
-        least, before = squares[best], self.square[rows]
-        taken, best = rows[least < before], best[least < before]
+        best = squares.reshape(rows.size, -1).argmin(axis=1)
+        best += np.arange(rows.size) * tries
+        least, before = squares[best], self.deviance(self.square)
+        better = least < self.square[rows]
+        taken, best = rows[better], best[better]
+        self.before[taken] = there[best] - self.q[taken]
         self.q[taken], self.square[taken] = there[best], squares[best]
         self.off[taken], self.b[taken], self.basis[taken], self.back[taken] = (part[best] for part in tried)
-        above_rounding = least > self.rounding[rows] * (self.root @ self.root)
-        return np.asarray(rows[(least < before) & (before - least >= ENOUGH * before) & above_rounding])
+        after = self.deviance(self.square)
+        above = after.reshape(len(self.laws), -1) - after.reshape(len(self.laws), -1).min(axis=0)
+        enough = np.where(self.wanted, ENOUGH**2, ENOUGH * (1 + above.reshape(-1)))
+        return np.asarray(rows[(before - after >= enough)[rows]])
 
     def found(self) -> list[Found]:
         """Each law of each line."""
         by_q, columns = self._derivatives(np.arange(len(self.q)))
         jacobian = np.concatenate([by_q.transpose(0, 2, 1), columns[0].transpose(1, 2, 0)], axis=2)
-        numbers, n, doubt = np.concatenate([self.q, self.b], axis=1), self.t.size, _doubts(jacobian)
-        deviance = self.square
+        numbers, doubt = np.concatenate([self.q, self.b], axis=1), _doubts(jacobian)
+        deviance = self.deviance(self.square)
         if self.errors is None:
-            deviance = n * np.log(self.square / n + self.rounding)
-            left = np.array([n - law.numbers for law in self.laws])[self.law]
+            left = np.array([self.t.size - law.numbers for law in self.laws])[self.law]
             doubt *= np.sqrt(self.square / left)[:, None]
         found = []
         for row, law in enumerate(self.laws[k] for k in self.law.tolist()):
@@ -237,9 +278,10 @@ def _curves(laws: Sequence[Law], law: NDArray[np.intp], q: Array, t: Array, deri
     is 0. Behind them as many derivatives by q, likewise."""
     span, edges = float(t[-1] - t[0]), np.searchsorted(law, np.arange(len(laws) + 1))
     found, s = np.zeros((1 + derivatives, 1 + max(one.columns for one in laws), len(q), t.size)), (t - t[0]) / span
-    for one, a, b in zip(laws, edges, edges[1:], strict=False):
+    alike = [k for k, one in enumerate(laws) if not k or one.curve is not laws[k - 1].curve]
+    for one, a, b in zip(alike, edges[alike], [*edges[alike[1:]], len(q)], strict=True):
         if b > a:
-            curve = one.curve(q[a:b, : len(one.q)].T[:, :, None], s, span)
+            curve = laws[one].curve(q[a:b].T[:, :, None], s, span)
             for to, parts in zip(found, curve, strict=False):
                 for k, part in enumerate(parts):
                     to[k, a:b] = part

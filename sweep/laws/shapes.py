@@ -7,9 +7,8 @@ q are those few; positions and widths are parts of the window, exponents per win
 
 from __future__ import annotations
 
-import functools
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,7 +18,7 @@ from sweep.laws.loglog import Array
 
 Parts = tuple[Array | float, ...]
 """Shift and columns of (1), each at all points (g, n) of all q, or less where it is the same; what is left out is 0."""
-Curve = Callable[[Array, Array, float], Iterable[Parts]]
+Curve = Callable[[Array, Array, float], Iterator[Parts]]
 """Of q (k, g, 1), s and the span: the parts of (1), then their derivatives by each of the q."""
 
 
@@ -44,7 +43,7 @@ class Law(NamedTuple):
     power: bool = True
     """Whether it is a power law or several, and not another function."""
     starts_as: str = ""
-    """Law that it is if its last q is 0, and starts from."""
+    """Law that it is if its last q is 0, and is never further from the points than."""
 
     @property
     def numbers(self) -> int:
@@ -84,57 +83,59 @@ def _logarithm(q: Array, s: Array, span: float) -> Iterator[Parts]:
     yield ((s - 0.5) / brackets,)
 
 
-def _stretched_exponential(q: Array, s: Array, span: float) -> Iterator[Parts]:
+def _stretched(q: Array, s: Array, span: float) -> Iterator[Parts]:
     """q: b per window; the exponent is of size 1 at its large end."""
     way = s - (q[0] > 0)
     yield 0.0, 1.0, np.exp(q[0] * way)
     yield 0.0, 0.0, way * np.exp(q[0] * way)
 
 
-def _two_exponentials(q: Array, s: Array, span: float) -> Iterable[Parts]:
-    """Two laws over x instead of ln x; among them 1/cosh(x/X)."""
-    return TWO.curve(q, np.exp(span * (s - 1)), span)
+Bend = Callable[[Any, Any], tuple[Any, Any, Any]]
+"""Of v and k: b, which tends to 0 far below and to v far above, and its derivatives by v and k."""
 
 
-Bend = Callable[[Any, Any], Iterator[Any]]
-"""b(v; k), which tends to 0 far below and to v far above, then its derivatives by v and, where it has one, by k."""
-
-
-def _logistic(v: Any, k: Any) -> Iterator[Any]:
-    yield np.logaddexp(0, v)
-    yield expit(v)
-
-
-def _hyperbola(v: Any, k: Any) -> Iterator[Any]:
-    yield 0.5 * (v + np.hypot(v, 1))
-    yield 0.5 * (1 + v / np.hypot(v, 1))
-
-
-def _uneven(v: Any, k: Any) -> Iterator[Any]:
+def _logistic(v: Any, k: Any) -> tuple[Any, Any, Any]:
     """Widths exp(k) below and exp(-k) above."""
-    moved = v + 2 * np.sinh(-k) * math.log(2)
+    shift = 2 * math.log(2) * np.sinh(k)
+    moved = v - shift
     above = moved >= 0
     sign = np.where(above, -1.0, 1.0)
-    width = np.exp(sign * k)
-    b, slope = np.logaddexp(0, moved / width), expit(moved / width)
-    yield width * b + 2 * np.sinh(k) * math.log(2) * above
-    yield slope
-    yield sign * (width * b - moved * slope) + 2 * np.cosh(k) * math.log(2) * (above - slope)
+    own = np.exp(sign * k)
+    b, slope = own * np.logaddexp(0, moved / own), expit(moved / own)
+    by_k = sign * (b - moved * slope) + 2 * math.log(2) * np.cosh(k) * (above - slope)
+    return b + shift * above, slope, by_k
 
 
-def _bent(bend: Bend) -> Curve:
-    """Two laws that meet at q0 with a bend of width exp(q1), of shape q2 where it has one."""
+def _three_scales(v: Any, k: Any) -> tuple[Any, Any, Any]:
+    """A third of it of each width exp(k), 1, exp(-k), so that it begins sharply and fades slowly."""
+    parts = []
+    for sign in (-1, 0, 1):
+        width = np.exp(sign * k)
+        b, slope = width * np.logaddexp(0, v / width), expit(v / width)
+        parts.append((b, slope, sign * (b - v * slope)))
+    b, slope, by_k = (sum(part) / 3 for part in zip(*parts, strict=True))
+    return b, slope, by_k
+
+
+def _hyperbola(v: Any, k: Any) -> tuple[Any, Any, Any]:
+    root = np.hypot(v, 1)
+    return 0.5 * (v + root), 0.5 * (1 + v / root), 0.0
+
+
+def _bent(bend: Bend, over_x: bool = False) -> Curve:
+    """Two laws whose asymptotes meet at q0, with a bend of width exp(q1), of shape q2.
+
+    With `over_x` they are straight over x instead of ln x: exponentials, among them 1/cosh(x/X).
+    """
 
     def curve(q: Array, s: Array, span: float) -> Iterator[Parts]:
-        u, width = s - q[0], np.exp(q[1])
-        of_shape = bend(u / width, q[2] if len(q) > 2 else 0.0)
-        b = width * next(of_shape)
+        u, width = (np.exp(span * (s - 1)) if over_x else s) - q[0], np.exp(q[1])
+        b, slope, by_k = bend(u / width, q[2])
+        b = width * b
         yield 0.0, 1.0, u - b, b
-        slope = next(of_shape)
         yield 0.0, 0.0, slope - 1, -slope
         yield 0.0, 0.0, u * slope - b, b - u * slope
-        for by_k in of_shape:
-            yield 0.0, 0.0, -width * by_k, width * by_k
+        yield 0.0, 0.0, -width * by_k, width * by_k
 
     return curve
 
@@ -143,91 +144,57 @@ def _three(q: Array, s: Array, span: float) -> Iterator[Parts]:
     """q: where the first two laws meet, the logarithm of how much further the other two do, and of the width."""
     further, width = np.exp(q[1]), np.exp(q[2])
     u, v = s - q[0], s - q[0] - further
-    a, b = (width * np.logaddexp(0, one / width) for one in (u, v))
-    yield 0.0, 1.0, s - a, a - b, b
+    a, b = width * np.logaddexp(0, u / width), width * np.logaddexp(0, v / width)
     of_a, of_b = expit(u / width), expit(v / width)
+    yield 0.0, 1.0, s - a, a - b, b
     yield 0.0, 0.0, of_a, of_b - of_a, -of_b
     yield 0.0, 0.0, 0.0, further * of_b, -further * of_b
     a, b = a - u * of_a, b - v * of_b
     yield 0.0, 0.0, -a, a - b, b
 
 
-GRID = np.sinh(np.linspace(-9.0, 9.0, 361))
-"""Where slopes of bends without a closed form are integrated, in widths."""
-
-
-def _integrated(slope: Callable[[Any, Any], Any], k_of: Number) -> Bend:
-    """The bend of a slope that rises from 0 to 1, as k says."""
-
-    @functools.cache
-    def surface() -> Any:
-        """b - ln(1 + e^v) over asinh v and k, by trapezia of the slope, moved so that b tends to v."""
-        from scipy.interpolate import CubicHermiteSpline, RectBivariateSpline
-
-        shapes, rows = np.linspace(k_of.least, k_of.most, 41), []
-        for k in shapes:
-            steep = slope(GRID, k)
-            rise = np.append(0.0, np.cumsum(0.5 * (steep[1:] + steep[:-1]) * np.diff(GRID)))
-            moved = GRID + GRID[-1] - rise[-1]
-            inside = np.clip(moved, GRID[0], GRID[-1])
-            rows.append(CubicHermiteSpline(GRID, rise, steep)(inside) + moved - inside - np.logaddexp(0, GRID))
-        return RectBivariateSpline(np.arcsinh(GRID), shapes, np.array(rows).T)
-
-    def bend(v: Any, k: Any) -> Iterator[Any]:
-        at = np.arcsinh(np.clip(v, GRID[0], GRID[-1])), k
-        yield np.logaddexp(0, v) + surface().ev(*at)
-        yield expit(v) + surface().ev(*at, 1, 0) / np.hypot(v, 1)
-        yield surface().ev(*at, 0, 1)
-
-    return bend
-
-
-def _powered(v: Any, k: Any) -> Any:
-    """A logistic slope to the power exp(k): it fades so many times faster below than above."""
-    return np.exp(-np.exp(k) * np.logaddexp(0, -v))
-
-
-def _stretched(v: Any, k: Any) -> Any:
-    """A slope that fades as the exponential of the power exp(k) of v."""
-    return np.exp(-np.logaddexp(0, -np.sign(v) * abs(v) ** np.exp(k)))
-
-
 PLACE = Number(-1.0, 2.0, np.linspace(0.1, 0.9, 7))
 WIDTH = Number(-7.0, 1.0, np.log((0.01, 0.04, 0.12, 0.3)))
-POWER = Number(-60.0, 60.0, (-12.0, -6.0, -2.5, 2.5, 6.0, 12.0))
-SKEW, WIDTHS, FADING = Number(-2.5, 2.5, ()), Number(-2.0, 2.0, ()), Number(-1.2, 0.8, ())
-
-
-def _two(name: str, formula: str, bend: Bend, *shape: Number) -> Law:
-    """Two power laws with a bend."""
-    q, starts_as = (PLACE, WIDTH, *shape), "two laws" if shape else ""
-    return Law(name, formula, _bent(bend), 3, q, ("p low", "p high"), starts_as=starts_as)
-
-
-ONE = Law("one law", "A x^p", lambda q, s, span: [(0.0, 1.0, s)], 2, exponents=("p",))
-TWO = _two("two laws", "bend fading exponentially", _logistic)
+SKEW, SCALES = Number(-2.0, 2.0, (0.0,)), Number(0.0, 2.5, (0.8,))
+POWER = Number(-60.0, 60.0, (-12.0, -6.0, -2.5, -1.0, 1.0, 2.5, 6.0, 12.0))
+P_TWO = ("p low", "p high")
+ONE = Law("one law", "A x^p", lambda q, s, span: iter([(0.0, 1.0, s)]), 2, exponents=("p",))
+TWO = Law("two laws", "bend fading exponentially", _bent(_logistic), 3, (PLACE, WIDTH), P_TWO)
+SHAPED = TWO._replace(q=(*TWO.q, SKEW), starts_as=TWO.name)
 BENDS = (
     TWO,
-    _two("two laws, hyperbola", "bend fading as 1/ln x", _hyperbola),
-    _two("two laws, asymmetric bend", "fading faster on one side", _integrated(_powered, SKEW), SKEW),
-    _two("two laws, two widths", "one width below, another above", _uneven, WIDTHS),
-    _two("two laws, stretched bend", "fading as exp(-(ln x)^b)", _integrated(_stretched, FADING), FADING),
+    SHAPED._replace(name="two laws, two widths", formula="one width below, another above"),
+    TWO._replace(name="two laws, hyperbola", formula="bend fading as 1/ln x", curve=_bent(_hyperbola)),
+    SHAPED._replace(
+        name="two laws, three scales",
+        formula="bend of three widths, one in the other",
+        curve=_bent(_three_scales),
+        q=(*TWO.q, SCALES),
+    ),
 )
 SECOND = Number(0.02, 0.9, (0.15, 0.3, 0.45, 0.6)), Number(-2.5, 0.0, np.log((0.2, 0.35, 0.5)))
 THREE_Q = (*SECOND, WIDTH._replace(starts=WIDTH.starts[:3]))
 THREE = Law("three laws", "two bends of one width", _three, 4, THREE_Q, ("p low", "p middle", "p high"))
 OFFSET = Law("offset", "A x^p + C", _offset, 1, (POWER, Number(-1.57, 1.57, (-1.2, -0.3, 0.1, 0.8, 1.4))))
-CORRECTION_Q = Number(-30.0, 60.0, (-2.5, -0.7, -0.1, 0.1, 0.7, 2.5, 6.0)), POWER._replace(least=-80.0, most=80.0)
+CORRECTION_Q = Number(-30.0, 60.0, (-2.5, -0.7, -0.1, 0.1, 0.7, 2.5, 6.0, 14.0)), POWER._replace(least=-80.0, most=80.0)
 CORRECTION = Law("correction to scaling", "A x^p (1 + B x^-D)", _correction, 2, CORRECTION_Q, ("p",))
 LOG_Q = (Number(-3.0, 8.0, (-1.0, 1.0, 3.0, 5.0)),)
 LOG_CORRECTION = Law("logarithmic correction", "A x^p (1 + B ln(x/x0))^c", _log_correction, 3, LOG_Q, ("p",))
 LOGARITHM = Number(-2 + 1e-9, 2 - 1e-9, (-1.9, -1.5, -0.5, 0.5, 1.5, 1.9))
 OTHER_FUNCTIONS = (
     Law("logarithm", "A x^p (1 + B ln x)", _logarithm, 2, (LOGARITHM,), ("p",), power=False),
-    Law("exponential", "A exp(-x/X)", lambda q, s, span: [(0.0, 1.0, np.exp(span * (s - 1)))], 2, power=False),
-    Law("stretched exponential", "A exp(-(x/X)^b)", _stretched_exponential, 2, (POWER,), power=False),
-    Law("cut-off", "A exp(-x/X) x^p", lambda q, s, span: [(0.0, 1.0, np.exp(span * (s - 1)), s)], 3, (), ("p",), False),
-    Law("lognormal", "A exp(-B ln(x/X)^2)", lambda q, s, span: [(0.0, 1.0, s, s**2)], 3, power=False),
-    Law("two exponentials", "A exp(-x/X), with a bend to exp(-x/Y)", _two_exponentials, 3, TWO.q, power=False),
+    Law("exponential", "A exp(-x/X)", lambda q, s, span: iter([(0.0, 1.0, np.exp(span * (s - 1)))]), 2, power=False),
+    Law("stretched exponential", "A exp(-(x/X)^b)", _stretched, 2, (POWER,), power=False),
+    Law(
+        "cut-off",
+        "A exp(-x/X) x^p",
+        lambda q, s, span: iter([(0.0, 1.0, np.exp(span * (s - 1)), s)]),
+        3,
+        (),
+        ("p",),
+        False,
+    ),
+    Law("lognormal", "A exp(-B ln(x/X)^2)", lambda q, s, span: iter([(0.0, 1.0, s, s**2)]), 3, power=False),
+    Law("two exponentials", "A exp(-x/X), with a bend to exp(-x/Y)", _bent(_logistic, True), 3, TWO.q, power=False),
 )
 LAWS = (ONE, *OTHER_FUNCTIONS, OFFSET, CORRECTION, *BENDS, THREE)

@@ -72,11 +72,11 @@ def fit_two_laws(
     """Two power laws with a smooth crossover, equation (1), and whether one law would do.
 
     Where there is noise, intervals are those of the same mixture of noises as of `fit_exponent`, and also reach over
-    those of bends of other shapes that the points do not rule out (AICc within 20): hyperbolic, asymmetric, of two
-    widths, stretched. They are no promise for a truth like none of these. Where there is none, the uncertainty is how
-    far the truth is from (1): the interval of an exponent then reaches to where the local exponent tends at its end of
-    the window; that of the crossover to where the local exponent is half-way between the two, and to where the
-    tangents at the ends meet.
+    those of bends of other shapes that the points do not rule out (AICc within 20): hyperbolic, of two widths, of three
+    scales. They are no promise for a truth like none of these. Where there is none, the uncertainty is how far the
+    truth is from (1): the interval of an exponent then reaches to where the local exponent tends at its end of the
+    window; that of the crossover to where the local exponent is half-way between the two, and to where the tangents at
+    the ends meet.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def fit_two_laws(
         return _in_windows(y, dim, windows, confidence=confidence, noise=noise, sigma=sigma)
 
     def each(t: Array, z: Array, errors: Array | None, bounds: Array | None) -> dict[str, Any]:
-        tried = fitted((ONE, *BENDS, *OTHER_FUNCTIONS, THREE), t, z, errors)
+        tried = fitted((ONE, *BENDS, *OTHER_FUNCTIONS, THREE), t, z, errors, TWO)
         every = [_one(t, row, laws, confidence, noise) for row, laws in zip(z, tried, strict=True)]
         return {name: [one[name] for one in every] for name in every[0]}
 
