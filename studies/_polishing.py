@@ -1,15 +1,17 @@
-"""What studies of a polishing machine share: how uneven a profile of wear is, and the best that one setting can do."""
+"""What studies of a polishing machine share: how uneven a profile of wear is, the best of one and of few settings."""
 
 from __future__ import annotations
 
 import functools
+import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 from _common import Statement, compared
+from scipy.optimize import nnls
 
 import sweep
 
@@ -51,6 +53,16 @@ class Setting:
         return f"{self.uneven:.1%} at {place}, least {self.least:.2f}"
 
 
+DWELL = 0.05
+"""Standard error of a time of dwell: what a hand at a switch keeps."""
+SEVERAL = 10
+"""The most settings of a set that is looked for."""
+STARTS = 24
+"""Random sets that are improved."""
+WANTED = (0.02, 0.015, 0.012, 0.01)
+"""Unevenness to be expected, for which the fewest settings are told."""
+DRAWS = 4000
+"""Sets of times of dwell that are drawn."""
 NAMES = ("b", "d", "f", "omega", "b_angle", "L", "Omega", "tool_a", "preston", "pressure")
 """What says the machine, but for throw and offset."""
 
@@ -138,3 +150,88 @@ def one_setting(ds: xr.Dataset) -> list[Statement]:
             "disc, most even setting of the grid, solved again", f"{again:.5f}", float(here.min()), again, 1e-4, 5
         ),
     ]
+
+
+class Profiles(NamedTuple):
+    """Profiles of mean 1, (setting, radius), weights of the radii, |h_i - 1|, radii and settings."""
+
+    rows: Any
+    weight: Any
+    rough: Any
+    radius: Any
+    places: list[tuple[float, float]]
+
+    def times(self, chosen: Any, delta: float = DWELL) -> Any:
+        """The shares of these settings that make U of (1) of `polisher_robust` least."""
+        chosen, root = list(chosen), np.sqrt(self.weight)
+        kept = delta * np.diag(self.rough[chosen])
+        found, _ = nnls(np.vstack([self.rows[chosen].T * root[:, None], kept]), np.append(root, np.zeros(len(chosen))))
+        return found / found.sum()
+
+    def nominal(self, chosen: Any, times: Any) -> float:
+        """Unevenness with exact times."""
+        return float(unevenness(times @ self.rows[list(chosen)], self.weight))
+
+    def expected(self, chosen: Any, times: Any, delta: float = DWELL) -> float:
+        """U of (1) of `polisher_robust`."""
+        return float(np.hypot(self.nominal(chosen, times), delta * np.linalg.norm(times * self.rough[list(chosen)])))
+
+    def best(self, chosen: Any, delta: float = DWELL) -> float:
+        """U of these settings at their best."""
+        return self.expected(chosen, self.times(chosen, delta), delta)
+
+    def drawn(self, chosen: Any, times: Any, delta: float = DWELL) -> Any:
+        """Unevenness with drawn errors of dwell: root of the mean square, and below which 19 of 20 pieces are."""
+        errors = 1.0 + delta * np.random.default_rng(1).standard_normal((DRAWS, len(times)))
+        found = unevenness((times * errors) @ self.rows[list(chosen)], self.weight)
+        return float(np.sqrt(np.mean(found**2))), np.quantile(found, 0.95)
+
+
+def profiles(ds: xr.Dataset) -> Profiles:
+    """Of a result over e and w_x."""
+    weight, stacked = area(ds.radius), ds.wear.stack(setting=("e", "w_x")).transpose("setting", "radius")
+    rows = stacked.values / (stacked.values * weight).sum(1, keepdims=True)
+    places = [(float(e), float(w) - float(ds.L)) for e, w in stacked.setting.values]
+    return Profiles(rows, weight, unevenness(rows, weight), ds.radius.values, places)
+
+
+def of_sets(p: Profiles, sets: Any) -> Any:
+    """U of sets of settings, (..., n), by the least square (1) of shares that come to 1; infinite if one is below 0."""
+    sets = np.asarray(sets)
+    square = (p.rows * p.weight) @ p.rows.T + DWELL**2 * np.diag(p.rough**2)
+    times = np.linalg.solve(square[sets[..., :, None], sets[..., None, :]], np.ones((*sets.shape, 1)))[..., 0]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.where((times >= 0.0).all(-1), np.sqrt(1.0 / times.sum(-1) - 1.0), np.inf)
+
+
+def exchanged(p: Profiles, chosen: list[int]) -> list[int]:
+    """The set with one setting after another exchanged as long as that helps."""
+    least_yet, here = np.inf, float(of_sets(p, chosen))
+    while here < least_yet - 1e-9 or not np.isfinite(least_yet):
+        least_yet = here if np.isfinite(here) else 1.0
+        for i in range(len(chosen)):
+            rest = chosen[:i] + chosen[i + 1 :]
+            others = [k for k in range(len(p.rows)) if k not in rest]
+            found = of_sets(p, [[*rest, k] for k in others])
+            chosen, here = [*rest, others[int(found.argmin())]], float(found.min())
+    return chosen
+
+
+def fewest(p: Profiles) -> dict[int, list[int]]:
+    """The best set of each number of settings: of all pairs and threes; of more, by exchange, from several starts."""
+    random, sets = np.random.default_rng(1), {}
+    for n in range(2, SEVERAL + 1):
+        if n < 4:
+            starts = np.array(list(itertools.combinations(range(len(p.rows)), n)))
+            sets[n] = starts[int(of_sets(p, starts).argmin())].tolist()
+            continue
+        starts = [random.choice(len(p.rows), n, replace=False).tolist() for _ in range(STARTS)]
+        grown = [[*sets[n - 1], k] for k in range(len(p.rows)) if k not in sets[n - 1]]
+        starts.append(grown[int(of_sets(p, grown).argmin())])
+        sets[n] = min((exchanged(p, start) for start in starts), key=lambda chosen: float(of_sets(p, chosen)))
+    return sets
+
+
+def enough(p: Profiles, sets: dict[int, list[int]]) -> list[int]:
+    """The fewest settings that are expected to be as even as each of `WANTED`, with errors of dwell; 0: none."""
+    return [min((n for n, chosen in sets.items() if p.best(chosen) <= wanted), default=0) for wanted in WANTED]
