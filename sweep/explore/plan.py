@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 import os
 import shutil
-import tempfile
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +20,7 @@ from sweep.cells.grid import Grid, SolveCells, empty_cells
 from sweep.cells.reduce import output_schema, strip_bytes
 from sweep.cells.sample import require_asked
 from sweep.cells.solve import Solver
-from sweep.cells.timing import SILENT_SECONDS, Sample, tolerated, work_clock
+from sweep.cells.timing import SILENT_SECONDS, tolerated, work_clock
 from sweep.errors import SweepError
 from sweep.explore.scaling import scaling
 from sweep.file.frame import cuts_of, expected_size
@@ -33,8 +32,6 @@ from sweep.study.read import Given
 from sweep.study.read import study as as_study
 from sweep.words import Table, duration, paragraph, quantity, seconds_of
 
-TRIAL, WORTH_A_TRIAL = 32 << 20, 1 << 28
-"""Bytes written to see how fast the disk is, where so many are to be written."""
 DRAWN = 64
 """Cells beside the ends of axes that are solved to see their methods and statuses,"""
 LOOK_SECONDS, SHARE = 1.0, 0.25
@@ -87,22 +84,19 @@ class Plan:
     folder: str
     cell_seconds: float
     seconds: float
-    compile_seconds: float = 0.0
-    methods: dict[str, float] = field(default_factory=dict)
-    statuses: dict[str, float] = field(default_factory=dict)
-    sampled: int = 0
-    scaling: str = ""
+    compile_seconds: float
+    methods: dict[str, float]
+    statuses: dict[str, float]
+    sampled: int
+    scaling: str
 
     @property
     def warnings(self) -> list[str]:
         """What should be seen to before the run."""
-        resources = (
-            ("disk", self.output_bytes, self.free_bytes, f"free in {self.folder}"),
-            ("memory", self.memory_bytes, memory(), "there"),
-        )
+        disk = "disk", self.output_bytes, self.free_bytes, f"free in {self.folder}"
         return [
             f"the {what} is too small: {quantity(needed)} needed, {quantity(there)} {where}"
-            for what, needed, there, where in resources
+            for what, needed, there, where in (disk, ("memory", self.memory_bytes, memory(), "there"))
             if needed > there
         ]
 
@@ -172,51 +166,31 @@ def plan(
     folder = Path(path).absolute().parent if path is not None else Path.cwd()
     if not folder.is_dir():
         raise SweepError(f"{path}: there is no folder {folder}")
-    if isolate or cell_timeout is not None:
-        # every run of a kernel that may crash, or never end, begins processes, and compiles it, anew
-        processes = Processes(study, None if cell_timeout is None else seconds_of("cell_timeout", cell_timeout), 1)
-        begun = time.monotonic()
-        try:
-            sample, solver = processes.sampled(), processes.solver()
-            starting = time.monotonic() - begun - solver.seconds
-            found = _forecast(study, sample, crew, folder, solver)
-        finally:
-            processes.end()
-        compiled = starting if starting > SILENT_SECONDS else 0.0
-        return replace(found, seconds=starting + found.seconds, compile_seconds=compiled, scaling=NO_ADVICE)
-
-    before = work_clock.compiled
-    sample = sampled_study(study, note or (lambda text: None))
-    found = _forecast(study, sample, crew, folder, Guard(Solver(study), lambda cell: None))
-    allowed, advice = max(SHARE * found.seconds, ADVICE_SECONDS), NO_ADVICE
-    if ADVICE_CELLS * found.cell_seconds < allowed:
+    apart = isolate or cell_timeout is not None
+    with ExitStack() as stack:
+        before = work_clock.compiled
+        if apart:
+            begun = time.monotonic()
+            processes = Processes(study, None if cell_timeout is None else seconds_of("cell_timeout", cell_timeout), 1)
+            stack.callback(processes.end)
+            sample, isolated = processes.sampled(), processes.solver()
+            starting = time.monotonic() - begun - isolated.seconds
+            solver: SolveCells = isolated
+        else:
+            sample = sampled_study(study, note or (lambda text: None))
+            solver = Guard(Solver(study), lambda cell: None)
+        blocks = Blocks(study, cut(study, crew, sample))
+        seconds = RUN_SECONDS + sample.cost * blocks.rows.size / min(crew, blocks.count)
+        methods, statuses, looked_at = _looked_at(study, solver, min(LOOK_SECONDS, SHARE * seconds))
+    advice, allowed = NO_ADVICE, max(SHARE * seconds, ADVICE_SECONDS)
+    if not apart and ADVICE_CELLS * sample.cost < allowed:
         with faults_reported(f"{study.kernel_name}: the kernel failed"):
-            advice = scaling(study, allowed).advice
-    took = work_clock.compiled - before
-    compiled = took if took > SILENT_SECONDS else 0.0
-    again = 0.0 if _is_kept(study.kernel_name) else compiled
-    return replace(found, seconds=found.seconds + again, compile_seconds=compiled, scaling=advice)
-
-
-def _is_kept(kernel: str) -> bool:
-    """Whether the machine code of a kernel is there for the next run."""
-    return machine_code_folder() is not None and ":" not in kernel
-
-
-def _forecast(study: Study, sample: Sample, workers: int, folder: Path, solver: SolveCells) -> Plan:
-    """What a timed sample says, and some cells, each solved by itself."""
-    grid, blocks = Grid(study), Blocks(study, cut(study, workers, sample))
+            advice = scaling(study).advice
+    # every run of a kernel that may crash, or never end, begins processes, and compiles it, anew
+    compiling = starting if apart else work_clock.compiled - before
+    compiling = compiling if compiling > SILENT_SECONDS else 0.0
+    seconds += starting if apart else 0.0 if _is_kept(study.kernel_name) else compiling
     schema = output_schema(study, fingerprint(study))
-    output = expected_size(schema, cuts_of(study, schema, blocks.partition))
-    writing = output / _disk_speed(folder) if output > WORTH_A_TRIAL else 0.0
-    # blocks are written while others are computed
-    seconds = RUN_SECONDS + max(sample.cost * blocks.rows.size / min(workers, blocks.count), writing)
-    used, status = _looked_at(study, grid, solver, min(LOOK_SECONDS, SHARE * seconds))
-
-    def counted(numbers: Any, names: dict[int, str]) -> dict[str, float]:
-        found, counts = np.unique(numbers, return_counts=True)
-        return {names[int(n)]: float(c / len(numbers)) for n, c in zip(found, counts, strict=True)}
-
     return Plan(
         title=study.title,
         kernel=study.kernel_name,
@@ -225,25 +199,33 @@ def _forecast(study: Study, sample: Sample, workers: int, folder: Path, solver: 
         outputs=study.outputs,
         blocks=blocks.count,
         cells_per_block=blocks.cells(0)[1],
-        workers=workers,
-        output_bytes=output,
-        memory_bytes=2 * workers * (blocks.partition.cells * blocks.row_bytes + strip_bytes(study)),
+        workers=crew,
+        output_bytes=expected_size(schema, cuts_of(study, schema, blocks.partition)),
+        memory_bytes=2 * crew * (blocks.partition.cells * blocks.row_bytes + strip_bytes(study)),
         free_bytes=shutil.disk_usage(folder).free,
         folder=str(folder),
         cell_seconds=sample.cost,
         seconds=seconds,
-        methods=counted(used, {-1: "none", **dict(enumerate(m.name for m in study.kernel.methods))}),
-        statuses=counted(status, {int(s): s.name for s in Status}),
-        sampled=len(status),
+        compile_seconds=compiling,
+        methods=methods,
+        statuses=statuses,
+        sampled=looked_at,
+        scaling=advice,
     )
 
 
-def _looked_at(study: Study, grid: Grid, solver: SolveCells, seconds: float) -> tuple[Any, Any]:
-    """Methods and statuses of cells at the ends of axes; and, in some seconds, of others, one of each of equal shares.
+def _is_kept(kernel: str) -> bool:
+    """Whether the machine code of a kernel is there for the next run."""
+    return machine_code_folder() is not None and ":" not in kernel
+
+
+def _looked_at(study: Study, solver: SolveCells, seconds: float) -> tuple[dict[str, float], dict[str, float], int]:
+    """Shares of methods and statuses among cells at the ends of axes and, in some seconds, others; and their number.
 
     The ends are those of every axis, in the middle of the others, and of all axes at once: there a scene is most often
-    another one, and so is the method.
+    another one, and so is the method. The others are one of each of equal shares of the grid.
     """
+    grid = Grid(study)
     last, axis = np.array(grid.shape) - 1, np.eye(len(grid.shape), dtype=bool)
     middle = last // 2
     places = np.concatenate([[0 * last], [last], np.where(axis, 0, middle), np.where(axis, last, middle)])
@@ -261,20 +243,13 @@ def _looked_at(study: Study, grid: Grid, solver: SolveCells, seconds: float) -> 
         with tolerated():
             solver.solve(number, cells.rows(slice(sampled, sampled + 1)))
         sampled += 1
-    return cells.used[:sampled], cells.status[:sampled]
 
+    def shares(column: Any, names: dict[int, str]) -> dict[str, float]:
+        found, counts = np.unique(column[:sampled], return_counts=True)
+        return {names[int(n)]: float(c / sampled) for n, c in zip(found, counts, strict=True)}
 
-def _disk_speed(folder: Path) -> float:
-    """Bytes a second that are written and synced here, from a short trial; infinite where nothing can be written."""
-    piece = np.random.default_rng(0).bytes(TRIAL)
-    try:
-        with tempfile.TemporaryFile(dir=folder, buffering=0) as file:
-            begun = time.perf_counter()
-            file.write(piece)
-            os.fsync(file.fileno())
-            return TRIAL / (time.perf_counter() - begun)
-    except OSError:
-        return math.inf
+    methods = {-1: "none", **dict(enumerate(method.name for method in study.kernel.methods))}
+    return shares(cells.used, methods), shares(cells.status, {int(s): s.name for s in Status}), sampled
 
 
 def small_duration(seconds: float) -> str:

@@ -3,23 +3,20 @@
 A scaling multiplies each field i by a power s^w_i of a factor s. It holds if every output j is then multiplied by some
 power s^v_j, the same in every cell. Measuring lengths, masses, times or angles in another unit is such a scaling, so
 outputs depend on products of powers without units alone (Buckingham). Angles count here: an escapement's swing may be
-measured in any unit as long as nothing in it is a sine. Where another unit does not hold as declared, a number without
-unit may have one, as the strength of a drag c v^n has, which depends on n: its powers are tried, and two units at once.
+measured in any unit as long as nothing in it is a sine. Where a unit does not hold as declared, a number without unit
+may have one, as the strength of a drag c v^n has, which depends on n: a few powers of it are tried.
 """
 
 from __future__ import annotations
 
 import dataclasses
-import itertools
 import math
-import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kernels.interface import FIRST_REFUSAL, Field, Status
 from sweep.cells.grid import Cells
@@ -34,15 +31,13 @@ if TYPE_CHECKING:
     import xarray as xr
 
 CELLS, FEW = 24, 4
-"""On which scalings are tried; and before, since most of them do not hold, and may make cells dear."""
-SECONDS = 10.0
-"""That trying may take."""
+"""On which scalings are tried; and before, since most that do not hold may make cells dear."""
 RTOL, AGREEMENT = 1e-9, 30.0
 """Cells are solved to that at least, for a loose tolerance lets pass what does not hold; outputs may differ by that
 multiple of it."""
 FACTORS = (2.0, 0.25)
 """By powers of two numbers change no digit, and motions that never repeat stay the same."""
-POWERS = tuple(sign * Fraction(power, 2) for power in range(1, 7) for sign in (1, -1))
+POWERS = tuple(Fraction(power, 2) for power in (-2, -1, 1, 2))
 """That a number without unit is tried with."""
 LARGEST_DENOMINATOR, LARGEST_COMMON = 200, 4
 """Of an output's weight; and the largest by which a group is raised to have whole powers."""
@@ -147,7 +142,7 @@ class Scaling:
         return dataset
 
 
-def scaling(study: Given, seconds: float = SECONDS) -> Scaling:
+def scaling(study: Given) -> Scaling:
     """Groups of a study's parameters, and how many of its axes are superfluous.
 
     Scalings are tried on four cells, and those that hold there on 24.
@@ -155,8 +150,6 @@ def scaling(study: Given, seconds: float = SECONDS) -> Scaling:
     Parameters
     ----------
     study : Study, path, mapping of its keys, or Dataset that came from it
-    seconds : float
-        Time to try what the declared units do not tell; these are tried always.
 
     Raises
     ------
@@ -172,15 +165,11 @@ def scaling(study: Given, seconds: float = SECONDS) -> Scaling:
     one-dimensional in mu, a: only mu/(phi0 a^2) matters; 1 of these axes can be left out; tried on ... cells at random
     """
     study = as_study(study)
-    held, tried = _held(study, seconds)
+    held, tried = _held(study)
     fields = [f.name for f in (*study.kernel.parameters, *study.kernel.along)]
     weights = {f: [row[f] for row in held.values()] for f in fields if any(row.get(f) for row in held.values())}
     arrays = any(field.dims for field in study.kernel.parameters)
     present = [] if arrays else [name for name in weights if name not in study.along]
-
-    def against(name: str) -> dict[str, Fraction]:
-        """Powers of the parameters that lead, whose product scales against a field or an output."""
-        return {lead: -row[name] for lead, row in held.items()}
 
     def group(powers: Weights, most: int = 1) -> Group:
         """Their product, raised to whole powers where their denominator is no larger."""
@@ -191,16 +180,18 @@ def scaling(study: Given, seconds: float = SECONDS) -> Scaling:
     groups = []
     for i, name in enumerate(present):
         if name not in held:
-            like = next((other for other in present[:i] if weights[other] == weights[name]), None)
             # R/mu rather than R/(a^2 phi0)
-            groups.append(group({**({like: -ONE} if like else against(name)), name: ONE}, LARGEST_COMMON))
-    # an output that scales with what does not lead cannot be freed of units
+            like = next((other for other in present[:i] if weights[other] == weights[name]), None)
+            against = {like: -ONE} if like else {lead: -row[name] for lead, row in held.items()}
+            groups.append(group({**against, name: ONE}, LARGEST_COMMON))
+    # an output that scales with what is in no group cannot be freed of units
     stuck = [row for lead, row in held.items() if lead not in present]
+    free = [output.name for output in study.asked if not any(row[output.name] for row in stuck)]
     axes = tuple(name for name in study.axes if name in weights)
     unswept = np.array([row for name, row in weights.items() if name not in axes], float)
     return Scaling(
         groups=tuple(groups),
-        scales={o.name: group(against(o.name)) for o in study.asked if not any(row[o.name] for row in stuck)},
+        scales={name: group({lead: -row[name] for lead, row in held.items()}) for name in free},
         axes=axes,
         free=len(held) - int(np.linalg.matrix_rank(unswept) if unswept.size else 0),
         others=tuple(name for name in study.axes if name in fields and name not in axes),
@@ -208,7 +199,7 @@ def scaling(study: Given, seconds: float = SECONDS) -> Scaling:
     )
 
 
-def _held(study: Study, seconds: float) -> tuple[dict[str, Weights], int]:
+def _held(study: Study) -> tuple[dict[str, Weights], int]:
     """Scalings that hold on random cells, weights of fields and outputs, by the field that leads each: its weight is 1,
     and 0 in the others. And the number of cells."""
     study = dataclasses.replace(study, rtol=min(study.rtol, RTOL))
@@ -217,39 +208,28 @@ def _held(study: Study, seconds: float) -> tuple[dict[str, Weights], int]:
     units = {f.name: {base: p for base, p in exponents(f.unit).items() if p} for f in fields}
     # fields of the simplest unit lead; numbers without one, and what is no number of a cell, come last
     fields.sort(key=lambda f: (f in along, bool(f.dims), not units[f.name], sum(map(abs, units[f.name].values()))))
-    names = [field.name for field in fields]
     few, cells = (drawn(study, number, np.random.default_rng(2)) for number in (FEW, CELLS))
     old_few, old = solved(few), solved(cells)
-
-    until = time.monotonic() + seconds
+    valued = old.status < FIRST_REFUSAL
     # a coordinate may be a share of something, whatever its unit
     changes: list[Weights] = [{}, *({field.name: 0 * ONE} for field in along)]
-    changes += [{name: power} for name in names if not units[name] for power in POWERS]
-
-    def first(unit: Weights) -> Weights | None:
-        """Of the scalings by a unit, as declared or with a change, one that holds."""
-        declared = {name: sum((k * units[name].get(base, 0) for base, k in unit.items()), 0 * ONE) for name in names}
+    changes += [{field.name: power} for field in fields if not units[field.name] for power in POWERS]
+    held = dict[str, Weights]()
+    for base in sorted({base for powers in units.values() for base in powers}) if valued.any() else ():
+        declared = {field.name: Fraction(units[field.name].get(base, 0)) for field in fields}
         for change in changes:
-            if change and time.monotonic() > until:
-                break
             weights = {**declared, **change}
             if _tried(few, old_few, weights) and (row := _tried(cells, old, weights)):
-                return row
-        return None
-
-    bases = sorted({base for powers in units.values() for base in powers}) if _valued(old).any() else []
-    by_unit = {base: first({base: ONE}) for base in bases}
-    failed = [base for base, row in by_unit.items() if row is None]
-    pairs = [first({one: ONE, other: k}) for one, other in itertools.combinations(failed, 2) for k in (ONE, -ONE)]
-    rows = [row for row in (*by_unit.values(), *pairs) if row is not None]
-    held = dict[str, Weights]()
-    for name in names:  # their reduced echelon form
-        if lead := next((row for row in rows if row[name]), None):
-            reduced = {n: weight / lead[name] for n, weight in lead.items()}
-            held[name], rows = reduced, [row for row in rows if row is not lead]
-            rows = [_without(name, reduced, row) for row in rows]
-            held |= {n: _without(name, reduced, row) for n, row in held.items() if n != name}
-    return held, int(_valued(old).sum())
+                held[base] = row
+                break
+    rows, led = list(held.values()), dict[str, Weights]()
+    for field in fields:  # their reduced echelon form
+        if lead := next((row for row in rows if row[field.name]), None):
+            rows.remove(lead)
+            led[field.name] = {name: weight / lead[field.name] for name, weight in lead.items()}
+            rows = [_without(field.name, led[field.name], row) for row in rows]
+            led |= {n: _without(field.name, led[field.name], row) for n, row in led.items() if n != field.name}
+    return led, int(valued.sum())
 
 
 def _without(name: str, lead: Weights, row: Weights) -> Weights:
@@ -271,7 +251,7 @@ def _is_scalable(study: Study, field: Field) -> bool:
 
 def _tried(study: Study, old: Cells, weights: Weights) -> Weights | None:
     """Weights of fields, and of outputs as they come out, if these scale; statuses may change as rounding decides."""
-    fine, found = _valued(old), dict.fromkeys(old.outputs, 0 * ONE)
+    fine, found = old.status < FIRST_REFUSAL, dict.fromkeys(old.outputs, 0 * ONE)
     for factor in FACTORS:
         new = solved(multiplied(study, {name: factor ** float(weight) for name, weight in weights.items() if weight}))
         was, now = (np.where(c.status == Status.INACCURATE, Status.OK, c.status) for c in (old, new))
@@ -287,8 +267,3 @@ def _tried(study: Study, old: Cells, weights: Weights) -> Weights | None:
             if not np.allclose(after, expected, AGREEMENT * study.rtol, 0, equal_nan=True):
                 return None
     return {**weights, **found}
-
-
-def _valued(cells: Cells) -> NDArray[np.bool_]:
-    found: NDArray[np.bool_] = (cells.status < FIRST_REFUSAL) & (cells.status != Status.PENDING)
-    return found

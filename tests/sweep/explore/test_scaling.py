@@ -82,16 +82,6 @@ def test_a_parameter_whose_unit_depends_on_another_one_is_in_the_group(n, rtol):
     np.testing.assert_allclose(scaled, scaled[0], rtol=1e-8)
 
 
-@pytest.mark.parametrize("rtol", [1e-2, 1e-9])
-def test_an_exponent_that_is_swept_leaves_the_scaling_that_holds_at_every_exponent(rtol):
-    """(mu phi0)^(1/2) is a speed: in units in which that is kept, c v^n scales as mu does, whatever n."""
-    axes = dict.fromkeys(["mu", "c", "phi0"], DECADES) | {"n": [1.0, 1.5, 2.0, 2.5]}
-    found = scaling(sweep.study(kernel="foliot", axes=axes, rtol=rtol))
-    assert [str(g) for g in found.groups] == ["mu phi0", "c/mu"]
-    assert (found.free, found.others) == (1, ("n",))
-    assert "2-dimensional in mu, c, phi0 for each n: " in found.advice
-
-
 def test_a_law_that_holds_nearly_is_not_taken_for_a_scaling():
     """At strong drive P ~ mu^(-1/3), to 1e-3."""
     strong = {"spacing": "log", "start": 1e4, "stop": 1e6, "num": 5}
