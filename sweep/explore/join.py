@@ -97,7 +97,7 @@ def join(
     mark = {**_said(study), "joined": f"of two results (digest {digest.hexdigest()})"}
     if path is None:
         return in_memory(cell_schema(study, mark), arrays)
-    return store_cells(study, path, arrays, force, mark, versions)
+    return store_cells(study, path, arrays, force, mark, {"taken_over": versions})
 
 
 def _said(study: Study) -> dict[str, str]:

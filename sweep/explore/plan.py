@@ -171,7 +171,7 @@ def plan(
         before = work_clock.compiled
         if apart:
             begun = time.monotonic()
-            processes = Processes(study, None if cell_timeout is None else seconds_of("cell_timeout", cell_timeout), 1)
+            processes = Processes(study, None if cell_timeout is None else seconds_of("cell_timeout", cell_timeout))
             stack.callback(processes.end)
             sample, isolated = processes.sampled(), processes.solver()
             starting = time.monotonic() - begun - isolated.seconds

@@ -199,7 +199,7 @@ class Remote:
         if isolated is None:
             warm(Solver(study), study)
         else:
-            processes = Processes(study, isolated[0], os.cpu_count() or 1, isolated[1])
+            processes = Processes(study, *isolated)
             weakref.finalize(self, processes.end)
         blocks = Blocks(study, partition)
         sink = _Sink(blocks, shared)

@@ -1,8 +1,4 @@
-"""Extending a finished result: a study with more values on its axes takes the cells it shares over, bit for bit.
-
-A result that another version of foliot or of the compiler has computed is taken over where a sample of its cells, some
-of every status and method, comes out with the same bits again.
-"""
+"""Extending a finished result: a study with more values on its axes takes the cells it shares over, bit for bit."""
 
 from __future__ import annotations
 
@@ -15,39 +11,25 @@ from typing import Any
 import numpy as np
 
 from kernels.interface import Status
-from sweep.cells.block import block_solver
-from sweep.cells.fingerprint import is_of_program
 from sweep.cells.grid import Grid
 from sweep.cells.partition import box_slices
-from sweep.cells.sample import spread
-from sweep.cells.schema import METHOD_USED, STATUS, columns
+from sweep.cells.schema import STATUS, columns
 from sweep.errors import SweepError
 from sweep.file.reading import StoredFile
 from sweep.results.statuses import flat_pieces
 from sweep.study.model import Axis, Study
 
-SAMPLE = 8
-"""Cells of every status and method that are computed again where another version has computed the result."""
-TAKEN_OVER = "taken_over"
-"""Attribute of a result that says which of its cells another version has computed."""
-
 
 def obstacle(old: Mapping[str, str], new: Mapping[str, str]) -> str:
     """Why a result of one fingerprint cannot be extended to that of another, in a word; "" where it may be."""
     changed = {name for name in {*old, *new} - {"study"} if old.get(name) != new.get(name)}
-    others = sorted(name for name in changed if not name.startswith("axes.") and not is_of_program(name))
-    if others:
+    if others := sorted(name for name in changed if not name.startswith("axes.")):
         return f"{others[0]} differs, too"
     if new.get("design") != "product":
         return 'its design is not "product"'
     if "summary.over" in new:
         return "it holds a summary, not cells"
     return "" if changed else "nothing differs but words"
-
-
-def is_of_another_version(old: Mapping[str, str], new: Mapping[str, str]) -> bool:
-    """Whether the program differs that two fingerprints tell of."""
-    return any(is_of_program(name) and old.get(name) != new.get(name) for name in {*old, *new})
 
 
 def has_failed(output: Path) -> bool:
@@ -61,15 +43,14 @@ def has_failed(output: Path) -> bool:
 class Reused:
     """The cells of a finished result, in the grid of a study whose axes have all its values, in order, and more.
 
-    To `retry`, it is the same study, and cells that FAILED are not known. `attrs` are further attributes of what is
-    extended. Raises SweepError where the result cannot be read, or an axis lacks some of its values.
+    To `retry`, it is the same study, and cells that FAILED are not known. Raises SweepError where the result cannot be
+    read, or an axis lacks some of its values.
     """
 
     def __init__(self, output: Path, study: Study, retry: bool = False) -> None:
-        self._output, self._study, self._shape, self._retry = output, study, Grid(study).shape, retry
+        self._study, self._shape, self._retry = study, Grid(study).shape, retry
         self._stored = StoredFile(output)
         old = Study.from_json(self._stored.attrs["study_json"], declared=True)
-        self.attrs = {name: str(text) for name, text in self._stored.attrs.items() if name == TAKEN_OVER}
         self._numbers: Mapping[str, Any] = self._stored.columns()
         self._positions = [_positions(old.axes[name], axis) for name, axis in study.axes.items()]
 
@@ -98,35 +79,6 @@ class Reused:
         axes = [positions[s] >= 0 for positions, s in zip(self._positions, box, strict=True)]
         shared = reduce(np.logical_and.outer, axes).ravel()
         return shared, shared & np.ravel(self._numbers[STATUS][box] != Status.FAILED) if self._retry else shared
-
-    def check_sample(self) -> None:
-        """Computes some cells of every status and method again. Raises SweepError where one has other bits now."""
-        kinds: dict[int, list[int]] = {}
-        size = 0
-        for status, used in zip(*(flat_pieces(self._numbers[name]) for name in (STATUS, METHOD_USED)), strict=True):
-            codes = 256 * status.astype(int) + used
-            for code in np.unique(codes).tolist():
-                same = np.flatnonzero(codes == code)
-                kinds.setdefault(code, []).extend((size + same[spread(len(same), SAMPLE)]).tolist())
-            size += len(codes)
-        chosen = np.concatenate([np.array(cells)[spread(len(cells), SAMPLE)] for cells in kinds.values()])
-        # the old values keep their order among the new ones
-        places = np.unravel_index(chosen, self._numbers[STATUS].shape)
-        new = [np.flatnonzero(p >= 0)[place] for p, place in zip(self._positions, places, strict=True)]
-        solve = block_solver(self._study)
-        for cell in np.ravel_multi_index(new, self._shape).tolist():
-            old, again = ({c.name: c.empty(1) for c in columns(self._study)} for _ in range(2))
-            self.fill(cell, cell + 1, old)
-            solve(cell, cell + 1, again, None)
-            for name in old:
-                if old[name].tobytes() != again[name].tobytes():
-                    raise SweepError(
-                        f"{self._output}: cannot be extended, for another version has computed it: {name} of a cell "
-                        f"was {old[name][0]}, and comes out as {again[name][0]} now; choose another name, or overwrite "
-                        "it with --force"
-                    )
-        said = f"{size} cells of another version, {len(chosen)} of which came out with the same bits again"
-        self.attrs[TAKEN_OVER] = "\n".join([*self.attrs.values(), said])
 
 
 @dataclass

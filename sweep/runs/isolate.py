@@ -27,7 +27,6 @@ from sweep.cells.schema import cells_of, columns
 from sweep.cells.solve import Solver
 from sweep.cells.timing import Sample, work_clock
 from sweep.errors import SweepError
-from sweep.file.open import memory
 from sweep.study.model import Study
 
 CELL_SECONDS, DEARER = 60.0, 100.0
@@ -41,8 +40,8 @@ TRIALS = 3
 LOOK_SECONDS = 0.2
 """How often it is looked whether time goes by, or the machine slept."""
 
-Answer = tuple[list[Any], float, int]
-"""Columns of cells, the seconds that they took, and most bytes that their process ever had."""
+Answer = tuple[list[Any], float]
+"""Columns of cells, and the seconds that they took."""
 
 
 class Died(Unsolved):
@@ -50,17 +49,15 @@ class Died(Unsolved):
 
 
 class Processes:
-    """The processes, `count` of them, of a run on this machine.
+    """The processes of a run on this machine.
 
     A cell may take `limit` seconds; None: `CELL_SECONDS`, or longer where cells do. `cost` is what the dearest cell of
-    the timed sample takes; 0: not known yet.
+    the timed sample takes; 0: not known yet, then `dearest`, of those that have ended, stands in.
     """
 
-    def __init__(self, study: Study, limit: float | None, count: int, cost: float = 0.0) -> None:
+    def __init__(self, study: Study, limit: float | None, cost: float = 0.0) -> None:
         self.study, self.limit, self.cost, self.grid = study, limit, cost, Grid(study)
         self.text = study.to_json()
-        self.most_bytes = memory() / (2 * count)  # that a process may ever have had before it is replaced
-        self.good: int | None = None  # a cell that is known to end
         self.over, self.alone, self.dearest = False, threading.Lock(), 0.0
         self._idle: list[Isolated] = []
         self._solvers: list[Isolated] = []
@@ -76,7 +73,7 @@ class Processes:
         """What some cells may take. One of a sample is not waited for to its end: it is left out, but never FAILED."""
         cost = self.cost or self.dearest
         one = self.limit or max(CELL_SECONDS, DEARER * cost)
-        if cells == 1 and (self.cost or self.good is None):
+        if cells == 1 and (self.cost or not cost):
             return one
         return min(one, SEVERAL_SECONDS) + SLACK * cost * cells
 
@@ -112,18 +109,15 @@ class Isolated:
         for trial in range(1, TRIALS + 1):
             try:
                 with crew.alone if trial > 1 else contextlib.nullcontext():
-                    columns, seconds, most = self._solved(start, cells.number, wanted)
+                    columns, seconds = self._solved(start, cells.number, wanted)
                 break
             except Died:
                 if crew.over:  # it was killed with the run, so the cell is not to blame, and stays PENDING
                     raise SweepError("the run is being stopped") from None
                 if cells.number > 1 or trial == TRIALS:
                     raise
-        if most > crew.most_bytes:
-            self.end()
         self.seconds += seconds
         crew.dearest = max(crew.dearest, seconds / cells.number)
-        crew.good = start if crew.good is None else crew.good
         for column, values in zip(cells.columns, columns, strict=False):  # errors come last, and may not be wanted
             column[...] = values
 
@@ -146,20 +140,18 @@ class Isolated:
         raise Died("its process died" if code is None else f"its process ended with {code}")
 
     def _begin(self) -> Any:
-        """A process that has loaded the kernel, and solved a cell that is known to end. Raises SweepError."""
+        """A process that has loaded the kernel: it is asked for no cell. Raises SweepError."""
         for _ in range(10):
             try:
                 with self._lock:
                     if self._all.over:
                         raise SweepError("the run is being stopped")
                     process = self._process = _started(self._all.text)
-                good = self._all.good
-                _answer(process, LOAD_SECONDS + self._all.dearest * DEARER, good or 0, int(good is not None), None)
+                _answer(process, LOAD_SECONDS, 0, 0, None)
                 return process
             except SweepError:
                 raise
             except Exception as fault:
-                # a process that has not loaded the kernel is never asked for cells: they would be blamed for it
                 reason = told(fault)
                 self.end()
                 time.sleep(0.5)
@@ -256,8 +248,7 @@ def _serve(pipe: Any, flag: Any, text: str) -> None:
                 cells = cells_of({column.name: column.empty(count) for column in columns(solver.study)})
                 begun = work_clock()
                 solver.solve(start, cells, wanted)
-                most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
-                found, reason = (cells.columns, work_clock() - begun, most), ""
+                found, reason = (cells.columns, work_clock() - begun), ""
             except BaseException as fault:
                 found, reason = None, told(fault)
             pipe.send((found, reason))

@@ -138,7 +138,7 @@ class Loop:
             except ImportError:
                 raise missing("a cluster needs distributed", "cluster") from None
             self._cluster = stack.enter_context(Cluster(task.cluster, task.note))
-        self._processes = Processes(study, task.limit, task.cores) if task.isolate else None
+        self._processes = Processes(study, task.limit) if task.isolate else None
         self._threads = ThreadPoolExecutor(task.cores)
         stack.callback(self._close)
         sample = self._sample() if to_do and sampled else UNSAMPLED

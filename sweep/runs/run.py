@@ -15,7 +15,7 @@ from sweep.cells.partition import row_blocks
 from sweep.cells.reduce import gathered
 from sweep.errors import SweepError
 from sweep.file.open import in_memory, memory, open_result, open_unfinished
-from sweep.runs.extend import TAKEN_OVER, Precomputed
+from sweep.runs.extend import Precomputed
 from sweep.runs.loop import Loop, Task
 from sweep.runs.to_file import Ending, run_to_file
 from sweep.study.keys import KEYS
@@ -65,8 +65,8 @@ def run(
         Cells a block, instead of a size taken from a timed sample. A run that is continued keeps its own.
     extend : bool
         Where the output is complete for a study of which this one has all values on every axis, and more, compute the
-        new cells only; the output is replaced when all are there. One of an earlier version of foliot is taken over
-        if a sample of its cells, computed again, has the same bits.
+        new cells only; the output is replaced when all are there. One that another version of foliot has computed
+        cannot be extended.
     until : str or datetime, optional
         Stop at "07:00" or "2027-01-31 07:00", at most the time of a block later; the unfinished result is returned.
     cluster : str or distributed.Client, optional
@@ -133,18 +133,16 @@ def store_cells(
     arrays: Mapping[str, Any],
     force: bool = False,
     mark: Mapping[str, str] | None = None,
-    taken_over: str = "",
     attrs: Mapping[str, str] | None = None,
 ) -> xr.Dataset:
     """Writes the result of cells that are solved already, a file like that of `run`. Raises SweepError as `run`.
 
     Their columns are `arrays`, of shape (cells, ...), of outputs and of `schema.ANCILLARY`. `mark` is their
-    fingerprint, where that is not the one of the study and of this program; `taken_over` says which program has
-    computed them, where it was another; `attrs` are further attributes of the file.
+    fingerprint, where that is not the one of the study and of this program; `attrs` are further attributes of the file.
     """
     block = max(1, min(row_blocks(study).count, 1 << 16))
     task = Task(study, path, 1, force, progress=False, block_cells=block, fingerprint=mark or {})
-    run_to_file(task, Precomputed(arrays, {**(attrs or {}), **({TAKEN_OVER: taken_over} if taken_over else {})}))
+    run_to_file(task, Precomputed(arrays, attrs or {}))
     return open_result(task.output)
 
 

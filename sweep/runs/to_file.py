@@ -17,7 +17,7 @@ from sweep.file.open import stored_fingerprint
 from sweep.file.reading import StoredFile
 from sweep.file.store import Store, lock_of, opened, unfinished_of
 from sweep.file.verify import verify
-from sweep.runs.extend import Precomputed, Reused, has_failed, is_of_another_version, obstacle
+from sweep.runs.extend import Precomputed, Reused, has_failed, obstacle
 from sweep.runs.loop import Loop, Task
 from sweep.runs.pool import Terminated, TimeUp
 from sweep.words import quantity
@@ -92,10 +92,7 @@ def _standing(task: Task) -> tuple[Literal["nothing", "complete", "damaged", "re
         verify(task.output).require_whole()
         return "reused", ()
     what = f"cannot be extended, for {hindrance}" if task.extend else "holds the result of another study or version"
-    extendable = (
-        "; where its axes have only got more values, --extend computes the new cells alone; those of another version "
-        "it keeps if a sample of them still has the same bits"
-    )
+    extendable = "; where its axes have only got more values, --extend computes the new cells alone"
     cure = f"choose another name, or overwrite it with --force{'' if hindrance else extendable}"
     raise SweepError(f"{task.output}: {what}; {cure}\n{_changes(stored, task)}")
 
@@ -122,9 +119,6 @@ def _computed(
         to_do, sampled = store.file is None or bool(store.missing()), known is None
         if to_do and reused:
             known = stack.enter_context(contextlib.closing(Reused(task.output, task.study, task.retry_failed)))
-            if task.extend and is_of_another_version(stored_fingerprint(task.output), task.fingerprint):
-                task.note("another version has computed it; a sample of its cells is computed again")
-                known.check_sample()
         # signals are held back from here on, wherever they would leave half a file behind
         loop = Loop(task, stack, None if store.file is None else store.table.blocks, to_do, sampled, known)
         loop.begin(range(loop.blocks.count) if store.file is None else store.missing())
@@ -143,7 +137,7 @@ def _computed(
 def _begin(store: Store, loop: Loop, known: Reused | Precomputed | None) -> None:
     """Makes the file. Raises SweepError where it has no room on the disk."""
     task = loop.task
-    schema = task.said({"start": loop.began, **(known.attrs if known else {})})
+    schema = task.said({"start": loop.began, **(known.attrs if isinstance(known, Precomputed) else {})})
     cuts = cuts_of(task.study, schema, loop.blocks.partition)
     needed, free = expected_size(schema, cuts), disk.free(task.output.parent)
     if needed > free:

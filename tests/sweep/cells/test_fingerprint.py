@@ -180,8 +180,8 @@ KERNEL = replace(toy.KERNEL, methods=(replace(EXACT, solve=solve, bound=None),))
 """
 
 
-def test_cells_of_another_version_are_taken_over_where_a_sample_of_them_has_the_same_bits(tmp_path, monkeypatch):
-    """Another version has another source text; whether its numbers are the same, a sample of cells tells."""
+def test_cells_of_another_version_are_not_extended(tmp_path, monkeypatch):
+    """Another version has another source text, and may give other numbers."""
     (tmp_path / "edited_scene.py").write_text(OF_MINE)
     monkeypatch.syspath_prepend(tmp_path)
     output = tmp_path / "out.h5"
@@ -192,10 +192,6 @@ def test_cells_of_another_version_are_taken_over_where_a_sample_of_them_has_the_
 
     run([1.0, 2.0]).close()
     (tmp_path / "edited_scene.py").write_text(OF_MINE + "# edited\n")
-    with run([1.0, 1.5, 2.0], extend=True) as found:
-        assert found.attrs["taken_over"].startswith("2 cells of another version")
-    (tmp_path / "edited_scene.py").write_text(OF_MINE + "# edited again\n")
-    monkeypatch.setattr(sys.modules["edited_scene"], "FACTOR", 1.0 + 1e-15)
     before = output.read_bytes()
     with pytest.raises(sweep.SweepError, match="cannot be extended"):
         run([1.0, 1.5, 2.0, 3.0], extend=True)
