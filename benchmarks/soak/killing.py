@@ -330,7 +330,7 @@ def _note_phases(events, output):
 
 
 def _note_acknowledged(told):
-    real = Store.commit
+    real = Store._commit
 
     def noting(self):
         blocks = [index for index, _ in list(self._waiting)]
@@ -338,7 +338,7 @@ def _note_acknowledged(told):
         if blocks:
             os.write(told, f"{json.dumps([str(self.path), blocks])}\n".encode())
 
-    Store.commit = noting
+    Store._commit = noting
 
 
 if __name__ == "__main__":

@@ -15,6 +15,7 @@ import os
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -55,6 +56,8 @@ class Store:
         self.file: StoredFile | None = None
         self._waiting: deque[tuple[int, bytes]] = deque()
         self._synced, self._size, self._elsewhere = time.monotonic(), 0, False
+        self._syncing, self._last = ThreadPoolExecutor(1), Future[None]()  # beside those that compute
+        self._last.set_result(None)
         self.finished = False
 
     @property
@@ -120,23 +123,28 @@ class Store:
         """Numbers of the blocks that are not done, ascending."""
         return np.flatnonzero(~self.table.done).tolist()
 
-    def put(self, index: int, arrays: Mapping[str, Any]) -> None:
-        """Writes a block; it is acknowledged by `tick`, with others. Raises SweepError."""
-        with disk.refusing(self.path):
-            self._waiting.append((index, self.table.write(index, arrays)))
+    def put(self, index: int, found: bytes | Mapping[str, Any]) -> None:
+        """Writes a block, or takes the digests of one that another process has written and synced. Raises SweepError.
 
-    def take(self, index: int, digests: bytes) -> None:
-        """Acknowledges, by `tick`, a block that another process has written and synced."""
-        self._elsewhere = True
-        self._waiting.append((index, digests))
+        It is acknowledged by `tick`, with others.
+        """
+        with disk.refusing(self.path):
+            self._elsewhere |= isinstance(found, bytes)
+            self._waiting.append((index, found if isinstance(found, bytes) else self.table.write(index, found)))
 
     def tick(self) -> None:
-        """Acknowledges what is written, if it is time to. Raises SweepError."""
-        if time.monotonic() - self._synced >= SYNC_SECONDS:
-            self.commit()
+        """Has what is written acknowledged, if it is time to. Raises SweepError where that failed the last time."""
+        if self._last.done() and time.monotonic() - self._synced >= SYNC_SECONDS:
+            self._last.result()
+            self._last = self._syncing.submit(self._commit)
 
     def commit(self) -> None:
-        """Acknowledges all that is written, by one thread at a time: numbers, then digests.
+        """Acknowledges all that is written. Raises SweepError."""
+        self._last.result()
+        self._commit()
+
+    def _commit(self) -> None:
+        """By one thread at a time: numbers, then digests.
 
         Raises SweepError; Incomplete where the file is not what it was, or not where it was: no block counts there.
         """
@@ -192,10 +200,10 @@ class Store:
         """Acknowledges what is written, brings that to the disk if that can be, and gives the file back."""
         if self.file is not None:
             with contextlib.suppress(SweepError), disk.refusing(self.path):
-                if self._waiting:
-                    self.commit()
+                self.commit()
                 disk.sync_numbers(self.file.fd)
             self.file.close()
+        self._syncing.shutdown()
 
 
 @contextlib.contextmanager

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Mapping, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, Literal
 
+from sweep.cells.block import Blocks
 from sweep.cells.fingerprint import difference
 from sweep.cells.partition import row_blocks
 from sweep.cells.reduce import gathered
@@ -126,11 +126,18 @@ def _computed(
             _begin(store, loop, known)
         for block in damaged:
             loop.progress.note(f"{loop.blocks.label(block)} were damaged on the disk and are computed again")
-        sink = stack.enter_context(_Stored(store, loop, known))
         if missing := store.missing():
-            loop.compute(missing, sink, None if task.cluster is None else store.shared(), sink.tick)
-            sink.settle()
-        store.finish(loop.endings(), None if task.study.summary is None else sink.gathered)
+            shared = None if task.cluster is None else store.shared()
+            loop.compute(missing, _Stored(store, loop.blocks, known), shared, store.tick)
+
+        def gather(file: StoredFile, block: int) -> dict[str, Any]:
+            """A block of a summary's output, from its rows."""
+            first, last = file.tables["cells"].blocks.bounds(block)
+            per_row = row_blocks(task.study).per_row
+            rows = {name: c[first * per_row : last * per_row] for name, c in file.columns("rows").items()}
+            return gathered(task.study, rows)
+
+        store.finish(loop.endings(), None if task.study.summary is None else gather)
         loop.progress.end()
 
 
@@ -149,44 +156,14 @@ def _begin(store: Store, loop: Loop, known: Reused | Precomputed | None) -> None
 
 
 class _Stored:
-    """Where blocks of a run to a file go; they are brought to the disk by a thread beside those that compute."""
+    """Where blocks of a run to a file go, with the cells that are known."""
 
-    def __init__(self, store: Store, loop: Loop, known: Reused | Precomputed | None) -> None:
-        self._store, self._blocks, self._study, self._known = store, loop.blocks, loop.task.study, known
-        self.room = loop.blocks.own
-        self._syncing, self._last = ThreadPoolExecutor(1), Future[None]()
-        self._last.set_result(None)
-
-    def __enter__(self) -> _Stored:
-        return self
-
-    def __exit__(self, *fault: object) -> None:
-        self._syncing.shutdown()
+    def __init__(self, store: Store, blocks: Blocks, known: Reused | Precomputed | None) -> None:
+        self._store, self._blocks, self._known, self.room = store, blocks, known, blocks.own
 
     def put(self, job: int, found: bytes | Mapping[str, Any]) -> None:
-        """Stores a block, with the cells that are known, or acknowledges one that a worker has written."""
-        if isinstance(found, bytes):
-            self._store.take(job, found)
-            return
-        if self._known is not None:
+        if self._known is not None and not isinstance(found, bytes):
             # what came from elsewhere may be read only
             found = {name: c if c.flags.writeable else c.copy() for name, c in found.items()}
             self._known.fill(*self._blocks.bounds(job), found)
         self._store.put(job, found)
-
-    def tick(self) -> None:
-        """Acknowledges what is written, if it is time to. Raises SweepError."""
-        if self._last.done():
-            self.settle()
-            self._last = self._syncing.submit(self._store.tick)
-
-    def settle(self) -> None:
-        """Returns when nothing is being brought to the disk. Raises SweepError where it could not be."""
-        self._last.result()
-
-    def gathered(self, file: StoredFile, block: int) -> dict[str, Any]:
-        """A block of a summary's output, from its rows."""
-        first, last = file.tables["cells"].blocks.bounds(block)
-        per_row = row_blocks(self._study).per_row
-        rows = {name: c[first * per_row : last * per_row] for name, c in file.columns("rows").items()}
-        return gathered(self._study, rows)
