@@ -180,7 +180,12 @@ def _entry(name: str, script: Path) -> Iterator[str]:
     caption = script.with_suffix(".md").read_text(encoding="utf-8").strip()
     told = prose("\n".join(line for line in rest.splitlines() if line not in commands))
     yield from (f"## {name.replace('_', ' ')}", "", f"*{_plain(question)}*", "", f"![{name}](studies/{name}.png)", "")
-    yield from (caption, "", "```sh", *(re.split(r"  +", line.strip())[0] for line in commands), "```", "", *told, "")
+    yield from (caption, "")
+    for row in (ROOT / "docs" / "what_came_out.md").read_text(encoding="utf-8").splitlines():
+        if row.startswith(f"| `{name}` |"):
+            _, _, _, answer, checked, _ = row.replace("(theory/", "(../theory/").split("|")
+            yield f"**What came out.** {answer.strip()} *How it was checked, and its limits:* {checked.strip()}"
+    yield from ("", "```sh", *(re.split(r"  +", line.strip())[0] for line in commands), "```", "", *told, "")
 
 
 # commands

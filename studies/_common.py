@@ -6,6 +6,7 @@ theory says beside what comes out, and draws `<question>.png` beside the dataset
 
 from __future__ import annotations
 
+import re
 import sys
 import textwrap
 import time
@@ -214,7 +215,23 @@ def report(
     if len(arguments) != len(inputs):
         print(f"use: python {Path(script).name} {' '.join(inputs)} [--force]", file=sys.stderr)
         return 2
-    return shown(Path(arguments[0]).with_suffix(".png"), lambda: conclude(*arguments), force, source)
+
+    def concluded() -> Conclusion:
+        groups, notes, draw = conclude(*arguments)
+        return groups, [*notes, "", *what_came_out(Path(script).stem)], draw
+
+    return shown(Path(arguments[0]).with_suffix(".png"), concluded, force, source)
+
+
+def what_came_out(name: str) -> list[str]:
+    """The closing paragraph of a study as it is shipped: its row of the page "What came out", if that is there."""
+    page = Path(__file__).parents[1] / "docs" / "what_came_out.md"
+    for row in page.read_text(encoding="utf-8").splitlines() if page.exists() else ():
+        if row.startswith(f"| `{name}` |"):
+            _, _, question, answer, checked, _ = row.split("|")
+            text = f"As shipped: {question} {answer} How it was checked, and its limits: {checked}"
+            return paragraph(re.sub(r"\[(.+?)\]\(.+?\)", r"\1", text))
+    return []
 
 
 def script(name: str, inputs: str, conclude: Callable[..., Conclusion], source: str = "theory") -> Callable[..., int]:

@@ -25,7 +25,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, columns, said, shown
+from _common import Groups, columns, said, shown, what_came_out
 from _figures import page_of
 
 import sweep
@@ -189,7 +189,8 @@ def conclusions(count: int) -> Any:
     """Statements, tables and the figure of so many drivetrains."""
     chains = drivetrains(count)
     ds, times = needed(chains), cost(chains)
-    return statements(ds), notes(ds, times), lambda: figure(ds, times)
+    closing = ["", *what_came_out("fewest_masses")]
+    return statements(ds), [*notes(ds, times), *closing], lambda: figure(ds, times)
 
 
 def main(arguments: Sequence[str]) -> int:

@@ -187,7 +187,7 @@ def shape(motion: xr.Dataset) -> list[Statement]:
     sooner = ", ".join(f"{x:.3f} and {y:.3f} P" for x, y in zip(out, back, strict=True))
     rounder = "strong drive: rounder than a sine, time over A/2"
     return [
-        said(f"faster at A than at C, {', '.join(SHOWN)}", min(faster) > 1, times, "yes"),
+        said(f"faster at the switch A than at C, {', '.join(SHOWN)}", min(faster) > 1, times, "yes"),
         said("time from the switch to the peak, shorter than back", np.all(np.less(out, back)), sooner, "yes"),
         said(rounder, high > 2 / 3 + 0.01, f"{high:.3f} P, sine 0.667", "yes"),
     ]
@@ -322,6 +322,12 @@ def draw_trajectories(panels: Any, motion: xr.Dataset) -> None:
             axes.axhline(switch, color="black", linewidth=0.6, linestyle=(0, (4, 2)))
         axes.plot(phase, np.concatenate([angle, angle[1:]]), color=COLOURS[0])
         top = 1.5 * float(abs(angle).max())
+        if i == 1:  # the points of the table: the switch, the turn, and the switch's angle on the way back
+            turn = int(angle.argmax())
+            back = turn + int((angle[turn:] < 1).argmax())
+            for letter, j, shift in (("A", 0, (4, -9)), ("B", turn, (-3, 3)), ("C", back, (4, 2))):
+                axes.plot(phase[j] + 1, angle[j], "o", color="black", markersize=3)
+                axes.annotate(letter, (phase[j] + 1, angle[j]), shift, textcoords="offset points", fontsize=7)
         axes.set(xlim=(0, 2), ylim=(-top, top), ylabel=r"$\varphi/\varphi_0$ [1]")
         axes.set_title(rf"{name} drive, $\alpha = {alpha:g}$, $aP = {float(motion.aP[i]):.4g}$", loc="right")
         for k, sign in enumerate(("-", "+", "-", "+")):

@@ -32,6 +32,8 @@ FIVE = {
     "modal": (0, 0), "exact": (0, 0),
 }  # fmt: skip
 """Largest error of f1 to f4 and error of f5 [%] of five by each method, once in 50 digits; allowed 5 % and 0.001 %."""
+MARKED = np.array([0.2, 10.0, 15.0, 18.0, 20.0, 25.0])
+"""Frequencies [Hz] that are marked on the polar curve."""
 SPAN = 1000 / (2 * math.pi)
 """1000 rad/s in Hz."""
 NOTES = """\
@@ -163,6 +165,11 @@ def figure(ds: xr.Dataset) -> Any:
             polar.plot(shown.real, shown.imag, line, **look)
             amplitude.semilogy(f, abs(shown), line, **look)
             phase.plot(f, np.degrees(np.angle(H)), line, **look)
+            at = response(chain(ds, n), MARKED) * KGF * 1e3
+            mark = ("o", {"markersize": 6, "markerfacecolor": "white"}) if n == 8 else ("s", {"markersize": 2.5})
+            polar.plot(at.real, at.imag, mark[0], color=colour, **mark[1])
+        for place, name in zip(at, MARKED, strict=True):
+            polar.annotate(f"{name:g}", (place.real, place.imag), (5, -3), textcoords="offset points", fontsize=6.5)
         polar.set(xlabel="Re $H$ [10$^{-3}$ rad/(kgf m)]", ylabel="Im $H$ [10$^{-3}$ rad/(kgf m)]")
         polar.set_aspect("equal", "datalim")
         amplitude.legend(loc="upper right")

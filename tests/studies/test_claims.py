@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 import xarray as xr
-from _common import report
+from _common import report, what_came_out
 
 import sweep
 from kernels.lanes.jit import COMPILED
@@ -330,6 +330,13 @@ def test_a_study_file_opens_with_its_question_and_holds_no_mistake(path):
     assert path.read_text(encoding="utf-8").startswith("# ")
     assert study.question.endswith("?")
     assert study.title
+
+
+@pytest.mark.parametrize("name", sorted(p.stem for p in STUDIES.glob("*.png")))
+def test_a_study_closes_with_its_answer_and_how_that_was_checked(name):
+    told = " ".join(what_came_out(name))
+    assert "? " in told
+    assert " How it was checked, and its limits: " in told
 
 
 def test_a_picture_has_a_caption_of_two_to_four_sentences():
