@@ -2,8 +2,8 @@
 
     y = A x^p (1 + B x^-D)                                                                          (1)
 
-D > 0 where p holds at large x, D < 0 where it holds at small x. B and D are hardly told apart, so D is not estimated
-for the interval: each of a grid has its weight, by restricted likelihood, as each noise has.
+D > 0 where p holds at large x, D < 0 where it holds at small x. B and D are hardly told apart, so the interval reaches
+over those of every D that the points do not rule out.
 """
 
 from __future__ import annotations
@@ -15,19 +15,17 @@ import numpy as np
 import xarray as xr
 
 from sweep.laws.curves import Window, check_options, described, fit_lines, title
-from sweep.laws.fits import Found, fitted
+from sweep.laws.fits import Found, fitted, union
 from sweep.laws.lines import rounding
 from sweep.laws.loglog import Array, slope_bounds, slopes
-from sweep.laws.noise import BEYOND_DOUBT, regress, roughness
+from sweep.laws.noise import BEYOND_DOUBT, roughness
 from sweep.laws.shapes import CORRECTION, LOG_CORRECTION, ONE, Law
 
 SCATTERS = 0.3
 """Share of the distances from (1) that is noise between neighbours, from which on they are noise."""
-AS_WELL = 4.0
-"""Difference of AICc up to which a logarithmic correction, whose exponent is far harder to tell, is not ruled out."""
-CAUTION = 0.5
-"""Share of the level of intervals that counts where D is fitted as well: by trial, of whole ones 88 to 92 % held."""
-FADES = np.exp(np.linspace(-6.0, 6.0, 25)), 0.3, 80.0
+AS_WELL = 8.0
+"""Difference of AICc up to which another D, one law or a logarithmic correction are not ruled out."""
+FADES = np.exp([0, -6, -5, -4, -3, -2, -1, 1, 2, 3, 4, 5, 6]), 0.3, 80.0
 """How fast a correction may fade, per window: those tried about the best, to the power of its relative error, and the
 least and largest."""
 VERDICTS = ("a power law with a correction", "no power law with a correction", "no law at this end")
@@ -54,9 +52,9 @@ def fit_correction(
 ) -> xr.Dataset:
     """Asymptotic exponent by a correction to scaling, equation (1), and whether the points follow it.
 
-    Where there is noise, the interval is that of a mixture over all D and over the noises of `fit_exponent`, and
-    reaches over those of a logarithmic correction (1 + B ln x)^c and of one law where the points do not tell them from
-    (1). Where there is no noise, it is three times as far as the fit to the outer half of the window moves the
+    Where there is noise, the interval is that of a mixture of noises as of `fit_exponent`, and reaches over those of
+    all D, of a logarithmic correction (1 + B ln x)^c and of one law that the points do not rule out. Where there is no
+    noise, it is three times as far as the fit to the outer half of the window moves the
     exponent. There is no interval where the points deny (1): by polynomials beside it that describe them far better, by
     too few runs of signs where `noise="even"` or `sigma` is given, by chi-squared where `sigma` is.
 
@@ -107,7 +105,7 @@ def _one(
     t: Array, z: Array, tried: dict[str, Found], sign: float, confidence: float, noise: bool | str | None
 ) -> dict[str, Any]:
     """Numbers of one line; t runs towards the end where (1) is a power law, and exponents take `sign`."""
-    found, fits = tried[CORRECTION.name], True
+    found, fits, low, high = tried[CORRECTION.name], True, math.nan, math.nan
     exponent, fade, left = _outer(found, t)
     if abs(left) >= 1 and tried[ONE.name].aicc <= found.aicc + BEYOND_DOUBT:  # a correction that is none
         exponent, fade, left = float(tried[ONE.name].numbers[1] / (t[-1] - t[0])), math.nan, 0.0
@@ -117,9 +115,14 @@ def _one(
     word = noise if isinstance(noise, str) else "noise"
     if not noisy:
         low, high = _by_half(t, z, exponent)
-    else:
-        fits = not found.denied(t, word)
-        low, high = _mixture(t, z, tried, word, confidence) if fits else (math.nan, math.nan)
+    elif fits := not found.denied(t, word):
+        steps, least, most = FADES
+        best, sigma = float(np.clip(abs(found.numbers[1]), least, most)), found.sigma
+        far = np.clip(2 * np.nan_to_num(found.errors[1], posinf=most) / best, 0.02, 0.6)
+        laws = [_fading(float(fade)) for fade in np.clip(best * steps**far, least, most)]
+        own, *others = fitted(laws, t, z[None], None if sigma is None else sigma[None])[0].values()
+        others += [tried[ONE.name], tried[LOG_CORRECTION.name]]
+        low, high = union(t, own, others, _last, word, confidence, AS_WELL)[1][:, 0] / np.ptp(t)
     ends = sorted(sign * one for one in (low, high, exponent))[::2] if fits else (math.nan, math.nan)
     verdict = VERDICTS[1 if not fits else 0 if abs(left) < 1 else 2]
     of = {"exponent": sign * exponent, "exponent_low": ends[0], "exponent_high": ends[1], "verdict": verdict}
@@ -152,6 +155,10 @@ def _by_half(t: Array, z: Array, exponent: float) -> tuple[float, float]:
     return exponent - reach, exponent + reach
 
 
+def _last(law: Law) -> list[int]:
+    return [law.numbers - 1]
+
+
 def _fading(fade: float) -> Law:
     """(1) with a given D."""
 
@@ -159,31 +166,3 @@ def _fading(fade: float) -> Law:
         return CORRECTION.curve(np.stack([q[0], np.full_like(q[0], fade)]), s, span)
 
     return CORRECTION._replace(name=str(fade), curve=curve, q=CORRECTION.q[:1])
-
-
-def _mixture(t: Array, z: Array, tried: dict[str, Found], word: str, confidence: float) -> tuple[float, float]:
-    """Ends of the interval of the exponent, over all D and noises."""
-    found, span = tried[CORRECTION.name], float(t[-1] - t[0])
-    steps, least, most = FADES
-    best = float(np.clip(abs(found.numbers[1]), least, most))
-    doubt = float(np.nan_to_num(found.errors[1], posinf=best)) / best
-    fades = best * steps ** np.clip(doubt, 0.01, 0.5)
-    laws = [_fading(float(fade)) for fade in fades[(fades >= least) & (fades <= most)]]
-    parts = []
-    for one in fitted(laws, t, z[None], None if found.sigma is None else found.sigma[None])[0].values():
-        if np.isfinite(one.jacobian).all() and np.isfinite(one.errors).all():
-            part = regress(t, one.jacobian, one.off[None], word, sigma=one.sigma)
-            parts.append(part._replace(value=part.value + one.numbers[:, None]))
-    evidence = np.array([float(part.evidence[0]) for part in parts])
-    shares = np.exp(evidence - evidence.max())
-    both = parts[0]._replace(
-        weight=np.concatenate([one.weight * share for one, share in zip(parts, shares / shares.sum(), strict=True)]),
-        value=np.concatenate([one.value for one in parts]),
-        error=np.concatenate([one.error for one in parts]),
-        share=CAUTION * np.concatenate([one.share for one in parts]),
-    )
-    ends = both.interval(2, confidence)[:, 0].tolist()
-    for law, as_well in ((ONE, BEYOND_DOUBT), (LOG_CORRECTION, AS_WELL)):
-        if (one := tried[law.name]).aicc < found.aicc + as_well and np.isfinite(one.errors).all():
-            ends += one.interval(t, [law.numbers - 1], word, confidence)[0][:, 0].tolist()
-    return min(ends) / span, max(ends) / span

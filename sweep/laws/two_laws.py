@@ -16,11 +16,11 @@ import xarray as xr
 
 from sweep.errors import SweepError
 from sweep.laws.curves import Window, check_options, described, fit_lines, title
-from sweep.laws.fits import Found, fitted
+from sweep.laws.fits import Found, fitted, union
 from sweep.laws.lines import fit_exponent, fit_line, rounding
 from sweep.laws.loglog import Array, slopes, tends
 from sweep.laws.noise import BEYOND_DOUBT, roughness
-from sweep.laws.shapes import BENDS, ONE, OTHER_FUNCTIONS, THREE, TWO
+from sweep.laws.shapes import BENDS, ONE, OTHER_FUNCTIONS, THREE, TWO, Law
 
 TELLING = 16
 """Points from which noise is told from the misfit of a smooth truth,"""
@@ -145,24 +145,14 @@ def _one(t: Array, z: Array, tried: dict[str, Found], confidence: float, noise: 
     size = math.sqrt(float(two.off @ two.off) / (t.size - 5))
     noisy = two.sigma is not None or (_is_noise(t, z, two.off, size) if noise is None else bool(noise))
     word = noise if isinstance(noise, str) else "noise" if noisy else "even"
-
-    def ends(found: Found) -> tuple[Array, float]:
-        """Of the intervals of both exponents and of ln of where they meet, (2, 3); AICc."""
-        q = len(found.law.q)
-        of, aicc = found.interval(t, [q + 1, q + 2, 0], word, confidence)
-        return of * [1 / span, 1 / span, span] + [0.0, 0.0, t[0]], aicc
-
-    (low, high), aicc = ends(two)
-    best = np.array([*two.numbers[3:5] / span, t[0] + span * two.numbers[0]])
+    others = [tried[law.name] for law in BENDS[1:] if law.name in tried]
+    units, zero = np.array([1 / span, 1 / span, span]), np.array([0.0, 0.0, t[0]])
+    best = two.numbers[[3, 4, 0]] * units + zero
+    (low, high), every = union(t, two, others, _numbers, word, confidence, OTHER_SHAPES) * units + zero
     if noisy or roughness(t, two.off)[0] > SMOOTH_TO * size:
-        # over those of every bend of another shape that the points do not rule out
-        own, shaped = (low[2], high[2]), [ends(tried[law.name]) for law in BENDS[1:] if law.name in tried]
-        least = min(aicc, *(one for _, one in shaped)) + OTHER_SHAPES
-        every = np.array([(low, high), *(one for one, of_shape in shaped if of_shape <= least)])
-        low, high = every[:, 0].min(axis=0), every[:, 1].max(axis=0)
-        further = BEYOND_SHAPES * max(own[0] - low[2], high[2] - own[1])
+        further = BEYOND_SHAPES * np.nan_to_num(max(low[2] - every[0, 2], every[1, 2] - high[2]))
+        low, high = every
         low[2], high[2] = low[2] - further, high[2] + further
-        low, high = np.where(np.isnan(low), -np.inf, low), np.where(np.isnan(high), np.inf, high)  # not determined
     if not noisy:
         low, high = _widened(t, z, best, low, high)
     verdict, evidence = _verdict(t, z, tried, noisy)
@@ -179,6 +169,11 @@ def _one(t: Array, z: Array, tried: dict[str, Found], confidence: float, noise: 
         found["crossover"] = math.nan
     found |= {"verdict": verdict, "regimes": VERDICTS[verdict], "evidence": evidence}
     return found | {"residual": two.residual, "noisy": noisy}
+
+
+def _numbers(law: Law) -> list[int]:
+    """Both exponents and where the laws meet."""
+    return [len(law.q) + 1, len(law.q) + 2, 0]
 
 
 def _is_noise(t: Array, z: Array, off: Array, size: float) -> bool:
