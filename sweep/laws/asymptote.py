@@ -23,8 +23,9 @@ from sweep.laws.shapes import CORRECTION, LOG_CORRECTION, ONE, Law
 
 SCATTERS = 0.3
 """Share of the distances from (1) that is noise between neighbours, from which on they are noise."""
-AS_WELL = 8.0
-"""Difference of AICc up to which another D, one law or a logarithmic correction are not ruled out."""
+AS_WELL = 10.0
+"""Difference of AICc up to which another D is not ruled out; half of it for one law and for a logarithmic
+correction, whose exponent is far harder to tell."""
 FADES = np.exp([0, -6, -5, -4, -3, -2, -1, 1, 2, 3, 4, 5, 6]), 0.3, 80.0
 """How fast a correction may fade, per window: those tried about the best, to the power of its relative error, and the
 least and largest."""
@@ -121,7 +122,7 @@ def _one(
         far = np.clip(2 * np.nan_to_num(found.errors[1], posinf=most) / best, 0.02, 0.6)
         laws = [_fading(float(fade)) for fade in np.clip(best * steps**far, least, most)]
         own, *others = fitted(laws, t, z[None], None if sigma is None else sigma[None])[0].values()
-        others += [tried[ONE.name], tried[LOG_CORRECTION.name]]
+        others += [one for one in (tried[ONE.name], tried[LOG_CORRECTION.name]) if one.aicc < found.aicc + AS_WELL / 2]
         low, high = union(t, own, others, _last, word, confidence, AS_WELL)[1][:, 0] / np.ptp(t)
     ends = sorted(sign * one for one in (low, high, exponent))[::2] if fits else (math.nan, math.nan)
     verdict = VERDICTS[1 if not fits else 0 if abs(left) < 1 else 2]

@@ -9,7 +9,8 @@ import numpy as np
 import xarray as xr
 from scipy.special import gammaincc
 
-from sweep.laws.curves import Window, fit_lines, one_line, title
+from sweep.errors import SweepError
+from sweep.laws.curves import Window, check_output, fit_lines, title
 from sweep.laws.fits import Found, fitted
 from sweep.laws.lines import rounding
 from sweep.laws.loglog import Array
@@ -67,7 +68,11 @@ def compare_laws(y: xr.DataArray, dim: str, window: Window | None = None, *, sig
     >>> sweep.compare_laws(y, "x").attrs["chosen"]
     'offset'
     """
-    one_line(y, "compare laws of")
+    check_output(y)
+    if y.ndim != 1:
+        raise SweepError(
+            f"{title(y)} runs along {', '.join(map(str, y.dims))}; compare laws of one line, choose with .sel"
+        )
     found = xr.Dataset()
 
     def compared(t: Array, z: Array, errors: Array | None, bounds: Array | None) -> dict[str, Any]:

@@ -47,13 +47,6 @@ def check_options(confidence: float, noise: bool | str | None = None, sigma: Any
             raise SweepError(f'{name}: expected "low" or "high", found {end!r}')
 
 
-def one_line(y: Any, what: str) -> None:
-    """Raises SweepError where y has further dimensions."""
-    check_output(y)
-    if y.ndim != 1:
-        raise SweepError(f"{title(y)} runs along {', '.join(map(str, y.dims))}; {what} one line, choose with .sel")
-
-
 def positive_axis(y: xr.DataArray, dim: str, repeated: bool = False) -> tuple[str, Array]:
     """Dimension that `dim` runs along, and its values, fit to take logarithms of; some may be `repeated`."""
     check_output(y)

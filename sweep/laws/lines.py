@@ -10,14 +10,11 @@ import numpy as np
 import xarray as xr
 from scipy.special import gammaincc, ndtri, stdtrit
 
-from sweep.errors import SweepError
 from sweep.laws.curves import (
     Window,
     check_options,
     described,
     fit_lines,
-    log_of,
-    one_line,
     stated_bound,
     title,
 )
@@ -29,7 +26,6 @@ SMOOTH = 0.12
 """Share of the distances from a line that is noise, below which they are a bend and no noise."""
 FEWEST_FOR_BEND = 8
 """Points from which on a bend is looked for among noise."""
-FEWEST_IN_WINDOW, MOST_WINDOWS = 8, 8
 
 FIT_NAMES = {
     "exponent": "exponent of the power law",
@@ -64,7 +60,6 @@ def fit_exponent(
     noise: bool | str | None = None,
     sigma: Any = None,
     bound: Any = None,
-    towards: str | None = None,
 ) -> xr.Dataset:
     """Power law y = prefactor dim^exponent by a straight line in log-log over a window.
 
@@ -96,19 +91,12 @@ def fit_exponent(
     bound : number, DataArray or Dataset, optional
         Largest relative error of the values, which is not noise; of the result that y is an output of, what it states
         for each cell. Default: the `rtol` in the attributes of y.
-    towards : "high" or "low", optional
-        Fit ever smaller windows that all reach to this end, 1, 1/1.5, 1/1.5^2 ... of the range of ln dim, to see
-        whether the exponent comes to rest: y has one dimension, `window` is not given.
 
     Returns
     -------
     Dataset
         `exponent` with its interval and standard error, `verdict`, `kind` and more, each with a `long_name`. The
         dimensions are those of `y` but `dim`. NaN where there is no exponent. `attrs["summary"]` is a table.
-
-        With `towards` all run along `window`, the widest first. The exponent has a *plateau* where, from some window
-        on, one power law describes each of at least three, and their intervals have exponents in common: `attrs` have
-        `plateau` (1 or 0), its `exponent`, `exponent_low`, `exponent_high`, and `verdict`, a sentence.
 
     Raises
     ------
@@ -124,9 +112,7 @@ def fit_exponent(
     >>> print(f"{float(sweep.fit_exponent(ds.period, 'mu').exponent):.4f}")
     -0.3334
     """
-    check_options(confidence, noise, sigma, **({} if towards is None else {"towards": towards}))
-    if towards is not None:
-        return _by_window(y, dim, window, towards, confidence=confidence, noise=noise, sigma=sigma, bound=bound)
+    check_options(confidence, noise, sigma)
     each = functools.partial(fit_line, confidence=confidence, noise=noise)
     fit = fit_lines(each, y, dim, window, sigma, stated_bound(y, bound), FEWEST)
     units, place = str(y.attrs.get("units", "1")), str(y.coords[dim].attrs.get("units", "1"))
@@ -134,32 +120,6 @@ def fit_exponent(
     of |= dict.fromkeys(("low", "high", "centre"), place)
     law = f"{title(y)} = prefactor {dim}^exponent"
     return described(fit, FIT_NAMES, of, {"law": law, "y": title(y), "x": dim, "method": METHOD}, confidence)
-
-
-def _by_window(y: xr.DataArray, dim: str, window: Window | None, end: str, **keys: Any) -> xr.Dataset:
-    """Fits over ever smaller windows that reach to one end, and whether their exponents come to rest."""
-    if window is not None:
-        raise SweepError("window does not go with towards, which chooses the windows")
-    one_line(y, "take")
-    x = y[dim].values[np.isfinite(log_of(y).values)]
-    if x.size < FEWEST_IN_WINDOW:
-        raise SweepError(f"an exponent against the window needs at least {FEWEST_IN_WINDOW} points, found {x.size}")
-    low, high, fits = float(x.min()), float(x.max()), []
-    for reach in (high / low) ** 1.5 ** -np.arange(float(MOST_WINDOWS)):
-        smaller = (high / reach, high) if end == "high" else (low, low * reach)
-        if ((x >= smaller[0]) & (x <= smaller[1])).sum() >= FEWEST_IN_WINDOW:
-            fits.append(fit_exponent(y, dim, smaller, **keys))
-    found = xr.concat(fits, dim="window", combine_attrs="override")
-    p, below, above = (found[name].values for name in ("exponent", "exponent_low", "exponent_high"))
-    for first in range(p.size - 2):
-        if (found.fits.values[first:] == 1).all() and below[first:].max() <= above[first:].min():
-            place = float((found.low if end == "high" else found.high).values[first])
-            text = f"plateau: {below[first]:.6g} to {above[first]:.6g}"
-            text += f" in every window {'above' if end == 'high' else 'below'} {dim} = {place:.4g}"
-            here = {name: float(found[name][first]) for name in ("exponent", "exponent_low", "exponent_high")}
-            return found.assign_attrs(plateau=1, **here, verdict=text)
-    text = f"no plateau: the exponent still goes from {p[0]:.6g} to {p[-1]:.6g} as the window shrinks to the {end} end"
-    return found.assign_attrs(plateau=0, verdict=text)
 
 
 def rounding(t: Array, z: Array) -> Array:

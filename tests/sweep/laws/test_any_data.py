@@ -116,9 +116,9 @@ X = np.geomspace(1, 100, 12)
 LINE = xr.DataArray(X**-0.5, {"x": X}, "x", name="y")
 OF_AN_OUTPUT = (
     lambda y: sweep.fit_exponent(y, "x"), lambda y: sweep.fit_two_laws(y, "x"), lambda y: sweep.fit_correction(y, "x"),
-    lambda y: sweep.fit_exponent(y, "x", towards="high"), lambda y: sweep.compare_laws(y, "x"),
+    lambda y: sweep.compare_laws(y, "x"),
     lambda y: sweep.local_exponent(y, "x", error=True), lambda y: sweep.where_exponent(y, "x", -0.5),
-    lambda y: sweep.where_exponent(y, "x", 1.0, values=True), lambda y: sweep.exponent_map(y, "x"),
+    lambda y: sweep.where_exponent(y, "x", 1.0, values=True),
     lambda y: sweep.fit_collapse(y, "x", "L"),
 )  # fmt: skip
 

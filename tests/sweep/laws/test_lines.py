@@ -205,8 +205,6 @@ def test_a_window_holds_its_ends_to_rounding_and_may_be_open(window, points):
         ({"confidence": 95}, "confidence"),
         ({"confidence": 0.0}, "confidence"),
         ({"confidence": np.nan}, "confidence"),
-        ({"towards": "top"}, "towards"),
-        ({"towards": "high", "window": (1, 20)}, "towards"),
     ],
 )
 def test_what_a_line_cannot_be_fitted_with_is_refused(keys, message):
@@ -232,36 +230,6 @@ def test_a_result_states_the_errors_of_its_cells_by_cell_or_as_a_whole():
         np.testing.assert_allclose(found, expected)
     found = sweep.local_exponent(ds.period, "mu", error=True, bound=worse).exponent_error
     assert {2, 3, 5, 6} <= set(np.flatnonzero(found > told[1] + 1e-6)) <= {0, 1, 2, 3, 4, 5, 6}  # its neighbours
-
-
-# ever smaller windows
-
-
-@pytest.mark.parametrize("end", ["low", "high"])
-def test_windows_shrink_by_half_as_much_again_to_one_end(end):
-    """Of 41 points over four decades, eight are in 10^(0.7) and more."""
-    x = np.geomspace(1, 1e4, 41)
-    found = sweep.fit_exponent(curve(-0.5 * np.log(x), np.log(x)), "x", towards=end)
-    steps = np.floor(40 * 1.5 ** -np.arange(5.0) + 1e-9)
-    assert found.points.values.tolist() == (steps + 1).tolist()
-    lows, highs = (10 ** (4 - steps / 10), 1e4) if end == "high" else (1.0, 10 ** (steps / 10))
-    np.testing.assert_allclose(found.low, lows, rtol=1e-9)
-    np.testing.assert_allclose(found.high, highs, rtol=1e-9)
-
-
-def test_a_plateau_is_found_where_there_is_one_and_denied_where_the_exponent_goes_on():
-    x = np.geomspace(1e-3, 1e5, 161)
-    noise = 0.01 * np.random.default_rng(3).standard_normal(161)
-    low = sweep.fit_exponent(curve(np.log(1 / x + x**-0.5 * 1e-6) + noise, np.log(x)), "x", towards="low").attrs
-    assert low["plateau"] == 1
-    assert low["exponent_low"] <= -1 <= low["exponent_high"]
-    x = np.geomspace(0.8, 1e4, 41)
-    goes_on = sweep.fit_exponent(curve(np.log(x**-0.5 * np.log(2 * x)), np.log(x)), "x", towards="high")
-    assert goes_on.attrs["plateau"] == 0
-    assert "no plateau" in goes_on.attrs["verdict"]
-    for y in (curve(np.zeros((2, N))), curve(T)[:5]):
-        with pytest.raises(sweep.SweepError, match=r"one line|at least 8 points"):
-            sweep.fit_exponent(y, "x", towards="high")
 
 
 # where the lines of two windows meet
