@@ -27,8 +27,7 @@ import xarray as xr
 from kernels.interface import Status
 from sweep.cells.schema import ANCILLARY
 from sweep.explore.mesh import simplices, stretch
-from sweep.explore.refine import report
-from sweep.explore.refiner import LEVELS, Refiner
+from sweep.explore.refine import LEVELS, Refiner
 from sweep.explore.scattered import heights, located
 from sweep.study.model import Axis
 
@@ -85,7 +84,7 @@ def refined(function, axes, tolerance):
     first = first.assign_coords(dict(zip(names, grid, strict=True)))
     cells = Refiner(first, study, ["value"], tolerance, MOST_CELLS, solved)
     cells.refine()
-    return cells.points, cells.column("value"), report(cells, first)
+    return cells.points, cells.column("value"), cells.report(first)
 
 
 def true_error(function, points, values):
@@ -195,9 +194,9 @@ def holds_beside_infinity(axes):
     corners, shares, *_ = located(points @ stretched, places @ stretched)
     error = abs(np.where(shares == 0, 0.0, shares * logs[corners]).sum(axis=1) - np.log(pole(places))).max()
     cells = f"{axes} pole      {len(points):6} cells, {1e3 * spent / len(points):.2f} ms each"
-    cells += f"; {found.singular} left beside the border"
+    cells += f"; {found.jumps} left beside the border"
     print(f"{cells}; error told {found.error:.1e}, true {error:.1e}", flush=True)
-    return error <= found.error and len(points) < MOST_CELLS and found.singular > 0
+    return error <= found.error and len(points) < MOST_CELLS and found.jumps > 0
 
 
 def coverage(axes, number, seed):

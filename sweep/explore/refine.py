@@ -1,8 +1,11 @@
 """Cells where they are needed: a finished sweep refined until straight lines between cells are accurate to a tolerance.
 
-What is there is judged first: the cells around tell how far straight lines between neighbours are off. Where that is
-too much, and across a border between statuses, cells are put between them (`refiner`). Errors are those of logarithms
-where values are positive, as a scaling law wants it; elsewhere they are relative to the largest value.
+In every round cells are joined to simplices, intervals along one axis, in a box stretched to where an output bends.
+Each is judged: inside of one status by the cells around it (`mesh`), across a border between statuses by the length of
+its edges. Where that is not good enough an edge is cut in the middle, down to a fixed share of the first grid's step,
+but not beside a pole, where cuts lessen nothing. Where errors stay as they are all over a region, values are noisy, and
+no more cells are added. Errors are those of logarithms where values are positive, as a scaling law wants it; elsewhere
+they are relative to the largest value.
 
 Cells of one axis are a sweep over its values like any other. Cells of more axes lie anywhere, as those of a zip design.
 """
@@ -15,19 +18,20 @@ import json
 import math
 import os
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from kernels.interface import Status
 from sweep.cells.schema import ANCILLARY, STATUS, cell_schema
 from sweep.errors import SweepError
-from sweep.explore.mesh import Array
-from sweep.explore.refiner import SAME, Refiner
-from sweep.explore.scattered import MOST_AXES, REFINED_TO, axes_of
+from sweep.explore.mesh import Array, Indices, edges, errors_inside, largest, simplices, stretch
+from sweep.explore.scattered import MOST_AXES, REFINED_TO, Box, axes_of, heights, kinds
 from sweep.file import disk
 from sweep.file.open import in_memory
 from sweep.file.overwriting import check_target
@@ -40,6 +44,23 @@ if TYPE_CHECKING:
     import xarray as xr
 
 MOST_CELLS = 1_000_000
+LEVELS = {1: (20, 10, 20), 2: (10, 5, 5), 3: (6, 3, 3)}
+FURTHER_LEVELS = (4, 2, 2)
+"""How often a step of the first grid may be halved, by number of axes: inside of a status, for a jump has no straight
+line; across a border between statuses; and beside one, where values may go to infinity."""
+GROWTH, SETTLED = 1.5, 1.02
+"""Factors of the number of cells after which boxes are stretched anew: on the way, and at the end, since those who
+read the result stretch it by all of its cells."""
+LESSENING = 0.5
+"""A cut along each axis leaves a quarter of the distance from a straight line, where an output is smooth; of noise, and
+of the volume that is to be cut in it, more than this share."""
+CUTS, STAYS, JUMP = 6, 0.9, 0.2
+"""At a pole the change from cell to cell stays above a share of what it was so many cuts before, and lies on both sides
+of a new cell: at a jump one of them has less than a share of the other."""
+LATEST, NOISE_SIZE = 128, 8.0
+"""Cells added last, which tell noise; the error of a simplex in it, as a multiple of how far they are off, at most."""
+SAME = 2.0**-40
+"""Distance of places along an axis, from 0 to 1, that are the same."""
 
 
 @dataclass(frozen=True)
@@ -56,14 +77,13 @@ class Refinement:
         Cells of an even grid as fine as the finest step.
     error : float
         Largest error left of straight lines between cells, relative, as the cells around tell it; not across borders
-        of statuses, nor in `jumps` and `singular`.
+        of statuses, nor in `jumps`.
     tolerance : float
     complete : bool
         Whether the tolerance is met; not so where `most_cells` ran out, an output jumps, goes to infinity or is noisy.
     jumps : int
-        Places where the tolerance is not met although edges are cut as often as is allowed, or cuts lessen nothing.
-    singular : int
-        Likewise, as near borders of statuses as these are known, where values go to infinity or bend without end.
+        Places where the tolerance is not met although edges are cut as often as is allowed, or cuts lessen nothing: at
+        a jump, or where values go to infinity, as near borders of statuses.
     unseen : dict of str to str
         How far apart cells are along each axis, at most: nothing tells of a peak narrower than that.
     noise : float
@@ -77,9 +97,8 @@ class Refinement:
     tolerance: float
     complete: bool
     jumps: int
-    singular: int
     unseen: dict[str, str]
-    noise: float = 0.0
+    noise: float
 
     def __str__(self) -> str:
         text = f"{self.dataset[STATUS].size:,} cells, {self.added:,} of them added"
@@ -93,8 +112,6 @@ class Refinement:
             text += "; the tolerance is not met everywhere, allow more cells"
         if self.jumps:
             text += f"; not in {self.jumps:,} place{'s' * (self.jumps > 1)} where it jumps or diverges"
-        if self.singular:
-            text += f"; not in the {self.singular:,} nearest a border of statuses, where values diverge"
         apart = ", ".join(f"{width} in {name}" for name, width in self.unseen.items())
         return f"{text}\ncells are up to {apart} apart; a peak narrower than that is not seen"
 
@@ -155,39 +172,29 @@ def refine(
     rounds, numbers = _folder_of_rounds(path, dataset, force), itertools.count(1)
     options: dict[str, Any] = {"workers": workers, "isolate": isolate, "cell_timeout": cell_timeout}
 
+    def study_of(values: Mapping[str, Array], design: str = "zip") -> Study:
+        axes = {name: Axis(name, frozen(column), "values") for name, column in values.items()}
+        return dataclasses.replace(study, design=design, blocks=(), axes=axes, title=f"{study.title}, refined")
+
     def solve(values: Mapping[str, Array]) -> xr.Dataset:
         """A round of cells; of one that an earlier call has computed, the file is there."""
         file = None if rounds is None else rounds / f"{next(numbers)}.h5"
-        with run(_study_of(study, values, "zip"), file, progress=file is not None, **options) as found:
+        with run(study_of(values), file, progress=file is not None, **options) as found:
             return found.load()
 
     cells = Refiner(dataset, study, names, tolerance, most_cells, solve)
     cells.refine()
-    attrs = {REFINED_TO: json.dumps(dict.fromkeys(names, tolerance))}
-    found = report(cells, _gathered(cells, study, path, force, attrs))
-    if rounds is not None:
-        shutil.rmtree(rounds, ignore_errors=True)
-    return found
-
-
-def _study_of(study: Study, values: Mapping[str, Array], design: str) -> Study:
-    """Cells at some values of the axes."""
-    axes = {name: Axis(name, frozen(column), "values") for name, column in values.items()}
-    return dataclasses.replace(study, design=design, blocks=(), axes=axes, title=f"{study.title}, refined")
-
-
-def _gathered(
-    cells: Refiner, study: Study, path: str | os.PathLike[str] | None, force: bool, attrs: Mapping[str, str]
-) -> xr.Dataset:
-    """All cells in rising order, in a file or in memory."""
+    # all cells in rising order, in a file or in memory
     values = {name: cells.column(name) for name in cells.axes}
     order = np.lexsort(list(values.values())[::-1])
-    values = {name: column[order] for name, column in values.items()}
-    whole = _study_of(study, values, "product" if len(values) == 1 else "zip")
+    whole = study_of({n: column[order] for n, column in values.items()}, "product" if len(values) == 1 else "zip")
     arrays = {name: cells.column(name)[order] for name in (*study.outputs, *ANCILLARY)}
+    attrs = {REFINED_TO: json.dumps(dict.fromkeys(names, tolerance))}
     if path is None:
-        return in_memory(cell_schema(whole, {}), arrays).assign_attrs(attrs)
-    return store_cells(whole, path, arrays, force, attrs=attrs)
+        return cells.report(in_memory(cell_schema(whole, {}), arrays).assign_attrs(attrs))
+    found = cells.report(store_cells(whole, path, arrays, force, attrs=attrs))
+    shutil.rmtree(rounds or "", ignore_errors=True)
+    return found
 
 
 def _require(dataset: xr.Dataset, study: Study, names: Sequence[str], tolerance: float) -> None:
@@ -228,24 +235,196 @@ def _folder_of_rounds(path: str | os.PathLike[str] | None, dataset: xr.Dataset, 
     return rounds
 
 
-def report(cells: Refiner, dataset: xr.Dataset) -> Refinement:
-    """What came of it, with the dataset of all cells."""
-    found, box = cells.found, cells.box
-    left = found.valued & found.finest & found.wanted
-    steps = [np.diff(np.unique(column)) for column in cells.points.T]
-    widths = np.ptp(cells.points[found.corners[found.valued]], axis=1).max(axis=0, initial=0.0)
-    unseen = {}
-    for name, width, low, high, logarithmic in zip(cells.axes, widths, box.low, box.high, box.logarithmic, strict=True):
-        unseen[name] = f"a factor {(high / low) ** width:.3g}" if logarithmic else f"{width * (high - low):.3g}"
-    return Refinement(
-        dataset=dataset,
-        added=len(cells.points) - cells.first,
-        uniform=int(math.prod(round(1 / step[step > SAME].min()) + 1 for step in steps)),
-        error=float(found.size[found.valued & ~left].max(initial=0.0)),
-        tolerance=cells.tolerance,
-        complete=not (found.size > cells.tolerance).any(),
-        jumps=int((left & ~found.beside).sum()),
-        singular=int((left & found.beside).sum()),
-        unseen=unseen,
-        noise=max(cells.noise.values()),
-    )
+class Judged(NamedTuple):
+    """Simplices, and what is to become of them."""
+
+    corners: Indices
+    size: Array  # the error of straight lines in each
+    ends: Indices  # of the edge to cut, (m, 2)
+    wanted: NDArray[np.bool_]  # the error is too large
+    finest: NDArray[np.bool_]  # but the edge is not to be cut
+    valued: NDArray[np.bool_]  # inside of one status
+
+
+class Refiner:
+    """Cells joined to simplices, whose edges are cut until outputs can be interpolated.
+
+    It begins with a dataset; `solve` makes further ones, of cells with given values of the axes.
+    """
+
+    def __init__(
+        self,
+        dataset: xr.Dataset,
+        study: Study,
+        names: Sequence[str],
+        tolerance: float,
+        most_cells: int,
+        solve: Callable[[Mapping[str, Array]], xr.Dataset],
+    ) -> None:
+        self.tolerance, self.most, self._solve = tolerance, most_cells, solve
+        self.axes, even = list(study.axes), study.design != "product"
+        cells = dataset.load()
+        if cells[STATUS].ndim > 1:
+            # all along one dimension, which is the first one of traces too
+            cells = cells.stack(cell=list(cells[STATUS].dims), create_index=False).transpose("cell", ...)
+        self.parts, self.box = [cells], Box.of(cells, self.axes)
+        self.points = self.box.points(cells)  # from 0 to 1, shape (cells, axes)
+        self.first = len(self.points)
+        # the two cells that each was put between; of the first ones, itself
+        self.origins = np.stack([np.arange(self.first)] * 2, axis=1)
+        lengths = (len(axis) - 1 for axis in study.axes.values())
+        self._steps = np.array([self.first ** (1 / len(self.axes)) if even else length for length in lengths])
+        # how far values of an output scatter, which more cells do not lessen; 0 where they do
+        self.noise = dict.fromkeys(names, 0.0)
+        self._to_cut: dict[str, list[tuple[int, float]]] = {name: [] for name in names}
+
+    def refine(self) -> None:
+        """Rounds of cuts, each of edges that share no end, until nothing is to be cut however outputs are judged."""
+        # between two values nothing tells whether an output bends
+        for k in range(len(self.axes)):
+            if np.isin(self.points[:, k], (0, 1)).all():
+                middle = self.points[self.points[:, k] == 0]
+                middle[:, k] = 0.5
+                self._add(middle)
+        stretched_at = 0
+        while True:
+            if len(self.points) >= GROWTH * stretched_at:
+                stretches = {name: stretch(self.points, heights(self.column(name))) for name in self.noise}
+                stretched_at = len(self.points)
+            parts = [self._judged(name, stretches[name]) for name in self.noise]
+            self.found = found = Judged(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+            # worst first, as many as are allowed; none shares an end with one before: a cut changes what is known there
+            used, cuts = np.zeros(len(self.points), dtype=bool), []
+            todo = np.flatnonzero(found.wanted & ~found.finest)
+            for ends in found.ends[todo[np.argsort(np.round(-np.log(found.size[todo]), 6), kind="stable")]]:
+                if not used[ends].any():
+                    used[ends] = True
+                    cuts.append(ends)
+            if cuts := cuts[: max(0, self.most - len(self.points))]:
+                self._add(self.points[np.array(cuts)].mean(axis=1), np.array(cuts))
+            elif len(self.points) > SETTLED * stretched_at:
+                stretched_at = 0
+            else:
+                return
+
+    def column(self, name: str) -> Any:
+        """An axis, an output, or what is said of it, of all cells."""
+        return np.concatenate([part[name].values for part in self.parts])
+
+    def report(self, dataset: xr.Dataset) -> Refinement:
+        """What came of it, with the dataset of all cells."""
+        found, box = self.found, self.box
+        left = found.valued & found.finest & found.wanted
+        steps = [np.diff(np.unique(column)) for column in self.points.T]
+        widths = np.ptp(self.points[found.corners[found.valued]], axis=1).max(axis=0, initial=0.0)
+        apart = zip(self.axes, widths, box.low, box.high, box.logarithmic, strict=True)
+        return Refinement(
+            dataset=dataset,
+            added=len(self.points) - self.first,
+            uniform=int(math.prod(round(1 / step[step > SAME].min()) + 1 for step in steps)),
+            error=float(found.size[found.valued & ~left].max(initial=0.0)),
+            tolerance=self.tolerance,
+            complete=not (found.size > self.tolerance).any(),
+            jumps=int(left.sum()),
+            unseen={
+                name: f"a factor {(high / low) ** width:.3g}" if logarithmic else f"{width * (high - low):.3g}"
+                for name, width, low, high, logarithmic in apart
+            },
+            noise=max(self.noise.values()),
+        )
+
+    def _add(self, points: Array, ends: Indices | None = None) -> None:
+        """Solves further cells, maybe in the middles between two others.
+
+        Of places along an axis that rounding alone tells apart, all get the value of the first.
+        """
+        values = {}
+        for k, name in enumerate(self.axes):
+            places = np.round(np.concatenate([self.points[:, k], points[:, k]]) / SAME)
+            first, same = np.unique(places, return_index=True, return_inverse=True)[1:]
+            known = np.concatenate([self.column(name), self.box.values(k, points[:, k])])
+            values[name] = known[first[same[len(self.points) :]]]
+        self.parts.append(self._solve(values))
+        itself = len(self.points) + np.arange(len(points))
+        self.points = np.concatenate([self.points, points])
+        self.origins = np.concatenate([self.origins, np.stack([itself] * 2, axis=1) if ends is None else ends])
+
+    def _judged(self, name: str, stretched: Array) -> Judged:
+        """Errors of an output's straight lines between cells, and borders between statuses that are to be cut."""
+        points, axes, height = self.points, len(self.axes), heights(self.column(name))
+        finite = np.isfinite(np.stack([self.column(each) for each in self.noise])).all(axis=0)
+        places, kind = points @ stretched, kinds(self.column(STATUS), finite)
+        corners = simplices(places)
+        of_corners, pairs = kind[corners], edges(axes)
+        alike = (of_corners == of_corners[:, :1]).all(axis=1)
+        inside, border, beside_border = (2.0**-level for level in LEVELS.get(axes, FURTHER_LEVELS))
+
+        def extent(ends: Indices) -> Array:
+            """Of edges (..., 2), in steps of the first grid along the axis where they are longest."""
+            found: Array = (abs(points[ends[..., 0]] - points[ends[..., 1]]) * self._steps).max(axis=-1)
+            return found
+
+        # inside of one status: as the cells of that status tell
+        size, ends = errors_inside(places, height, kind, corners)
+        size[~alike | (of_corners[:, 0] < 0)] = 0.0
+
+        # across a border: infinite while edges are longer than they may stay
+        mixed = np.flatnonzero(~alike & (of_corners >= 0).any(axis=1))
+        across = of_corners[mixed][:, pairs[:, 0]] != of_corners[mixed][:, pairs[:, 1]]
+        length = np.where(across, extent(corners[mixed][:, pairs]), -1.0)
+        size[mixed] = np.where(length.max(axis=1, initial=-1.0) > border, math.inf, 0.0)
+        ends[mixed] = largest(corners[mixed], length)
+
+        # beside one: as near as the simplices across it may stay wide
+        least = np.full(len(corners), inside)
+        if not alike.all():
+            tree = cKDTree(points[np.unique(corners[~alike])] * self._steps)
+            apart = tree.query(points * self._steps, p=math.inf)[0]
+            least[alike & (apart <= border)[corners].any(axis=1)] = beside_border
+        valued = alike & (of_corners[:, 0] >= 0)
+        finest = (extent(ends) <= least) | (valued & np.isfinite(size) & self._is_at_pole(height)[ends.max(axis=1)])
+        wide = corners[valued & (size > max(self.tolerance, NOISE_SIZE * self.noise[name]))]
+        volume = float(abs(np.linalg.det(points[wide[:, 1:]] - points[wide[:, :1]])).sum())
+        self._to_cut[name].append((len(points), volume))
+        self.noise[name] = max(self.noise[name], self._noise(height, self._to_cut[name]))
+        wanted = size > max(self.tolerance, NOISE_SIZE * self.noise[name])
+        return Judged(corners, size, ends, wanted, finest, valued)
+
+    def _ancestors(self, cells: Indices) -> Indices:
+        """The younger ends of the edges that were cut for cells, as many cuts ago as there are axes."""
+        for _ in self.axes:
+            cells = self.origins[cells].max(axis=1)
+        return cells
+
+    def _is_at_pole(self, height: Array) -> NDArray[np.bool_]:
+        """Whether cuts have lessened nothing on the way to a cell, although there is no jump.
+
+        The first cells, which were put between none, count as jumps: nothing is known yet.
+        """
+        cells, found = np.arange(len(height)), []
+        with np.errstate(invalid="ignore"):
+            halves = np.sort(abs(height[:, None] - height[self.origins]), axis=1)
+            for _ in range(CUTS):
+                found.append(halves[cells])
+                cells = self._ancestors(cells)
+            small, large = np.moveaxis(np.array(found), 2, 0)
+            before, after = (np.median(part, axis=0) for part in (large[CUTS // 2 :], large[: CUTS // 2]))
+            stays: NDArray[np.bool_] = (after > STAYS * before) & ((small <= JUMP * large).sum(axis=0) <= 1)
+        return stays
+
+    def _noise(self, height: Array, to_cut: Sequence[tuple[int, float]]) -> float:
+        """How far the latest cells are off the line between the two that each was put between, where more cells do not
+        lessen that; `to_cut` has the number of cells, and the volume of what is too far off, of all rounds."""
+        cells, volume = to_cut[-1]
+        earlier = [v for count, v in to_cut if count * 2 ** len(self.axes) <= cells]
+        if not earlier or volume <= LESSENING * earlier[-1]:
+            return 0.0
+        with np.errstate(invalid="ignore"):
+            off = abs(height - height[self.origins].mean(axis=1))
+        off[self.origins[:, 0] == self.origins[:, 1]] = np.nan
+        latest = np.arange(max(0, cells - LATEST), cells)
+        before = off[self._ancestors(latest)]
+        known = np.isfinite(off[latest] + before)
+        if known.sum() <= 0.75 * LATEST or np.median((off[latest] - LESSENING * before)[known]) <= 0:
+            return 0.0
+        return float(np.median(off[latest][known]))

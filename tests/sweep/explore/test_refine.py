@@ -58,7 +58,7 @@ def test_a_surface_with_a_border_of_statuses():
     found = sweep.refine(foliot(mu=(0.1, 100.0, 7), R=(0.01, 10.0, 7)), ["period", "multiplier"], 2e-2, most_cells=8000)
     whole = found.dataset
     assert whole.sizes["cell"] < 4000
-    assert found.singular > 0
+    assert found.jumps > 0
     assert found.error <= 2e-2
     cells = list(zip(whole.mu.values.tolist(), whole.R.values.tolist(), strict=True))
     assert cells == sorted(cells)
@@ -90,7 +90,7 @@ def test_where_it_diverges_beside_a_border_interpolated_values_are_marked():
     between, truth = sweep.interpolated(found.dataset, at), sweep.run(**keys, axes=at)
     off = abs(between.sensitivity / truth.sensitivity - 1).values
     marked = (between.status == Status.INACCURATE).values
-    assert found.singular > 0
+    assert found.jumps > 0
     assert marked[-1, -1]
     assert (off[np.isfinite(between.sensitivity.values) & ~marked] < 5e-2).all()
     assert (off <= between.error_bound.values)[marked & np.isfinite(off)].all()
