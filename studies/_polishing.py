@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
-from _common import Statement, compared
+from _common import Statement, compared, solved
 from scipy.optimize import nnls
 
 import sweep
@@ -53,6 +53,8 @@ class Setting:
         return f"{self.uneven:.1%} at {place}, least {self.least:.2f}"
 
 
+TURN = 720
+"""Crank angles of a turn."""
 DWELL = 0.05
 """Standard error of a time of dwell: what a hand at a switch keeps."""
 SEVERAL = 10
@@ -235,3 +237,19 @@ def fewest(p: Profiles) -> dict[int, list[int]]:
 def enough(p: Profiles, sets: dict[int, list[int]]) -> list[int]:
     """The fewest settings that are expected to be as even as each of `WANTED`, with errors of dwell; 0: none."""
     return [min((n for n, chosen in sets.items() if p.best(chosen) <= wanted), default=0) for wanted in WANTED]
+
+
+def swings(ds: xr.Dataset, e: Any) -> xr.Dataset:
+    """alpha [rad] and its rate [rad/s] over a turn of the crank, by throw."""
+    machine = {name: float(ds[name]) for name in ("b", "d", "f", "omega", "b_angle")}
+    along = {"crank_angle": np.linspace(0, 2 * np.pi, TURN, endpoint=False)}
+    return solved("polisher_motion", e=e, along=along, outputs=["alpha", "alpha_rate"], rtol=1e-12, **machine)
+
+
+def tool_wear(ds: xr.Dataset, motion: xr.Dataset, X: Any, Y: Any, beta: float = 0.0) -> np.ndarray:
+    """Wear [m/s] of points X along and Y across the tool, by throw: by their mean speed against the work."""
+    turned = np.exp(1j * (motion.alpha.values + beta))[:, :, None]
+    place = turned * (float(ds.L) + np.ravel(X) + 1j * np.ravel(Y))
+    speed = abs(motion.alpha_rate.values[:, :, None] * place - float(ds.Omega) * (place - float(ds.w_x)))
+    mean = speed.mean(axis=1).reshape(ds.sizes["e"], *np.shape(X))
+    return float(ds.preston) * float(ds.pressure) * mean

@@ -25,11 +25,10 @@ import numpy as np
 import xarray as xr
 from _common import Conclusion, Statement, differing, most, read_result, said, script, solved
 from _figures import page_of
+from _polishing import swings, tool_wear
 
 from sweep.show.charts import COLOURS, DASHES, MARKS
 
-TURN = 720
-"""Crank angles of a turn."""
 RINGS, SPOKES = 24, 48
 """Points of the tool: Gauss in the square of the radius, evenly around."""
 A0 = {10.0: 38.4038, 15.0: 36.0997}
@@ -41,22 +40,6 @@ zone: mean radius of what is worn off, by volume; outer, inner: the tool's rim f
 allowed: no exception to (1), beside which no cell lies; 2e-3 of (2), what trapezoids of 2.5 mm in the radius leave;
 5e-5 degree of A0 as it is printed, 2e-3 degree of the middle, found on 720 crank angles\
 """
-
-
-def swings(ds: xr.Dataset, e: Any) -> xr.Dataset:
-    """alpha [rad] and its rate [rad/s] over a turn of the crank, by throw."""
-    machine = {name: float(ds[name]) for name in ("b", "d", "f", "omega", "b_angle")}
-    along = {"crank_angle": np.linspace(0, 2 * np.pi, TURN, endpoint=False)}
-    return solved("polisher_motion", e=e, along=along, outputs=["alpha", "alpha_rate"], rtol=1e-12, **machine)
-
-
-def tool_wear(ds: xr.Dataset, motion: xr.Dataset, X: Any, Y: Any, beta: float = 0.0) -> np.ndarray:
-    """Wear [m/s] of points X along and Y across the tool, by throw: by their mean speed against the work."""
-    turned = np.exp(1j * (motion.alpha.values + beta))[:, :, None]
-    place = turned * (float(ds.L) + np.ravel(X) + 1j * np.ravel(Y))
-    speed = abs(motion.alpha_rate.values[:, :, None] * place - float(ds.Omega) * (place - float(ds.w_x)))
-    mean = speed.mean(axis=1).reshape(ds.sizes["e"], *np.shape(X))
-    return float(ds.preston) * float(ds.pressure) * mean
 
 
 def prepared(ds: xr.Dataset) -> xr.Dataset:
