@@ -22,7 +22,7 @@ from _figures import charts
 
 import sweep
 from kernels.interface import Status
-from sweep.file.overwriting import check_target
+from sweep.file.disk import check_target
 
 
 @dataclass(frozen=True)

@@ -34,7 +34,7 @@ class Command(NamedTuple):
 
         Raises SweepError.
         """
-        from sweep.file.overwriting import check_target
+        from sweep.file.disk import check_target
 
         target = next((option for option in self.options if option.ending is not None), None)
         if target is not None:

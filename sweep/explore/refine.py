@@ -33,8 +33,8 @@ from sweep.errors import SweepError
 from sweep.explore.mesh import Array, Indices, edges, errors_inside, largest, simplices, stretch
 from sweep.explore.scattered import MOST_AXES, REFINED_TO, Box, axes_of, heights, kinds
 from sweep.file import disk
+from sweep.file.disk import check_target
 from sweep.file.open import in_memory
-from sweep.file.overwriting import check_target
 from sweep.runs.run import run, store_cells
 from sweep.study.model import Axis, Study, frozen
 from sweep.study.read import study as as_study

@@ -188,6 +188,17 @@ def mark(path: Path) -> tuple[int, ...]:
     return found.st_ino, found.st_size, found.st_mtime_ns
 
 
+def check_target(target: Path, *, force: bool = False, read: Sequence[Path] = ()) -> None:
+    """Raise SweepError where something is at `target`, unless by `force`, or where it is what is `read`."""
+    there = bool(mark(target))
+    if there and any(one.exists() and target.samefile(one) for one in read):
+        raise SweepError(f"{target} is what is read; name another file")
+    if there and not force:
+        raise SweepError(
+            f"{target} is there already; name another file, or overwrite it with --force (Python: force=True)"
+        )
+
+
 def free(path: Path) -> int:
     """Bytes that are free in a folder. Raises OSError."""
     return shutil.disk_usage(path).free

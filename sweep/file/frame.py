@@ -68,16 +68,9 @@ def cuts_of(study: Study, schema: Schema, blocks: Partition) -> dict[str, Cut]:
     return {"rows": Cut(columns, (rows.count,), blocks), "cells": Cut(schema.columns, schema.grid.shape, groups)}
 
 
-def expected_size(schema: Schema, cuts: Mapping[str, Cut]) -> int:
-    """Bytes that a result will take, but for some thousands: its names, what HDF5 says of each chunk, the chunks."""
-    size = (14 << 10) + sum(len(str(text)) for text in _attrs(schema).values())
-    size += sum(np.asarray(coordinate.values).nbytes for coordinate in schema.coordinates)
-    for cut in cuts.values():
-        for column in cut.columns:
-            chunk = math.prod(cut.chunk(column)) * np.dtype(column.dtype).itemsize + len(WRONG)
-            paged = -(-chunk // PAGE) * PAGE if chunk >= WORTH_A_PAGE else chunk
-            size += cut.blocks.count * (paged + BYTES + 16)
-    return size
+def expected_size(cuts: Mapping[str, Cut]) -> int:
+    """Bytes of the numbers of a result: nearly all of it, unless blocks have but a few cells."""
+    return sum(math.prod(cut.grid) * column.cell_bytes for cut in cuts.values() for column in cut.columns)
 
 
 def _attrs(schema: Schema) -> dict[str, Any]:

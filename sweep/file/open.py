@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 from sweep.cells.schema import Schema
 from sweep.errors import SweepError
 from sweep.file import disk
-from sweep.file.reading import StoredFile
 from sweep.file.store import unfinished_of
 from sweep.words import as_path
 
@@ -84,12 +83,6 @@ def in_memory(plan: Schema, arrays: Mapping[str, Any]) -> xr.Dataset:
     }
     coordinates = {c.name: (c.dims, c.values, dict(c.attrs)) for c in plan.coordinates}
     return xr.Dataset(variables, coordinates, dict(plan.attrs))
-
-
-def stored_fingerprint(output: Path) -> dict[str, str]:
-    """Fingerprint of a result. Raises SweepError where the file cannot be read, or is none of ours."""
-    with StoredFile(output) as file:
-        return file.fingerprint
 
 
 def memory() -> int:

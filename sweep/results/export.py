@@ -16,7 +16,7 @@ import xarray as xr
 from sweep.cells.reduce import BY_METHOD, BY_STATUS
 from sweep.errors import SweepError, missing
 from sweep.file import disk
-from sweep.file.overwriting import check_target
+from sweep.file.disk import check_target
 from sweep.results.statuses import flag_words, is_summary, pieces
 from sweep.words import as_path, cell, listed, require_dataset
 

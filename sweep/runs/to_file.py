@@ -13,7 +13,6 @@ from sweep.cells.reduce import gathered
 from sweep.errors import SweepError
 from sweep.file import disk
 from sweep.file.frame import cuts_of, expected_size
-from sweep.file.open import stored_fingerprint
 from sweep.file.reading import StoredFile
 from sweep.file.store import Store, lock_of, opened, unfinished_of
 from sweep.file.verify import verify
@@ -78,7 +77,8 @@ def _standing(task: Task) -> tuple[Literal["nothing", "complete", "damaged", "re
     """
     if not disk.mark(task.output):
         return "nothing", ()
-    stored = stored_fingerprint(task.output)
+    with StoredFile(task.output) as file:
+        stored = file.fingerprint
     if task.force:
         return "nothing", ()
     if stored == dict(task.fingerprint):
@@ -146,7 +146,7 @@ def _begin(store: Store, loop: Loop, known: Reused | Precomputed | None) -> None
     task = loop.task
     schema = task.said({"start": loop.began, **(known.attrs if isinstance(known, Precomputed) else {})})
     cuts = cuts_of(task.study, schema, loop.blocks.partition)
-    needed, free = expected_size(schema, cuts), disk.free(task.output.parent)
+    needed, free = expected_size(cuts), disk.free(task.output.parent)
     if needed > free:
         raise SweepError(
             f"{task.output}: needs {quantity(needed)}, only {quantity(free)} are free here; free some space, choose "

@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from sweep.errors import SweepError
-from sweep.file.overwriting import check_target
+from sweep.file.disk import check_target
 from sweep.laws.loglog import is_logarithmic, spans_decades
 from sweep.show.charts import (
     MARKS,

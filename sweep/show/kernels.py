@@ -134,7 +134,7 @@ def write_starter(name: str, path: Path, allow_import: bool = False, force: bool
 
     A kernel of one's own is looked up in the folder of the study, as it is when the study is run.
     """
-    from sweep.file.overwriting import check_target
+    from sweep.file.disk import check_target
 
     text = starter(name, load_kernel(name, allow_import, [path.parent]))
     check_target(path, force=force)

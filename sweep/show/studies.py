@@ -7,7 +7,7 @@ import shutil
 from pathlib import Path
 
 from sweep.errors import SweepError
-from sweep.file.overwriting import check_target
+from sweep.file.disk import check_target
 from sweep.words import Table, did_you_mean, listed
 
 HERE = Path(__file__).parents[1]
