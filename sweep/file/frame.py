@@ -41,6 +41,8 @@ COMPACT = 1 << 15
 """Attributes up to which HDF5 keeps them in an object header."""
 LONG = 1 << 12
 """Bytes of a coordinate to which the study in the file refers, so that its text fits into an object header."""
+TEXT_BYTES = 30 << 10
+"""Of the structure of a result, about."""
 WRONG = b"\xff" * 4
 """A checksum that zeros have not."""
 
@@ -69,8 +71,8 @@ def cuts_of(study: Study, schema: Schema, blocks: Partition) -> dict[str, Cut]:
 
 
 def expected_size(cuts: Mapping[str, Cut]) -> int:
-    """Bytes of the numbers of a result: nearly all of it, unless blocks have but a few cells."""
-    return sum(math.prod(cut.grid) * column.cell_bytes for cut in cuts.values() for column in cut.columns)
+    """Bytes that a result will take, about, unless blocks have but a few cells: texts, numbers."""
+    return TEXT_BYTES + sum(math.prod(cut.grid) * column.cell_bytes for cut in cuts.values() for column in cut.columns)
 
 
 def _attrs(schema: Schema) -> dict[str, Any]:
