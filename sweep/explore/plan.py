@@ -200,7 +200,7 @@ def plan(
         blocks=blocks.count,
         cells_per_block=blocks.cells(0)[1],
         workers=crew,
-        output_bytes=expected_size(cuts_of(study, schema, blocks.partition)),
+        output_bytes=expected_size(schema, cuts_of(study, schema, blocks.partition)),
         memory_bytes=2 * crew * (blocks.partition.cells * blocks.row_bytes + strip_bytes(study)),
         free_bytes=shutil.disk_usage(folder).free,
         folder=str(folder),

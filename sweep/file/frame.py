@@ -70,9 +70,11 @@ def cuts_of(study: Study, schema: Schema, blocks: Partition) -> dict[str, Cut]:
     return {"rows": Cut(columns, (rows.count,), blocks), "cells": Cut(schema.columns, schema.grid.shape, groups)}
 
 
-def expected_size(cuts: Mapping[str, Cut]) -> int:
-    """Bytes that a result will take, about, unless blocks have but a few cells: texts, numbers."""
-    return TEXT_BYTES + sum(math.prod(cut.grid) * column.cell_bytes for cut in cuts.values() for column in cut.columns)
+def expected_size(schema: Schema, cuts: Mapping[str, Cut]) -> int:
+    """Bytes that a result will take, about, unless blocks have but a few cells: texts, coordinates, numbers."""
+    coordinates = sum(np.asarray(coordinate.values).nbytes for coordinate in schema.coordinates)
+    numbers = sum(math.prod(cut.grid) * column.cell_bytes for cut in cuts.values() for column in cut.columns)
+    return TEXT_BYTES + coordinates + numbers
 
 
 def _attrs(schema: Schema) -> dict[str, Any]:

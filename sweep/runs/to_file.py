@@ -146,7 +146,7 @@ def _begin(store: Store, loop: Loop, known: Reused | Precomputed | None) -> None
     task = loop.task
     schema = task.said({"start": loop.began, **(known.attrs if isinstance(known, Precomputed) else {})})
     cuts = cuts_of(task.study, schema, loop.blocks.partition)
-    needed, free = expected_size(cuts), disk.free(task.output.parent)
+    needed, free = expected_size(schema, cuts), disk.free(task.output.parent)
     if needed > free:
         raise SweepError(
             f"{task.output}: needs {quantity(needed)}, only {quantity(free)} are free here; free some space, choose "
