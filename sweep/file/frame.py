@@ -77,15 +77,6 @@ def expected_size(schema: Schema, cuts: Mapping[str, Cut]) -> int:
     return TEXT_BYTES + coordinates + numbers
 
 
-def _attrs(schema: Schema) -> dict[str, Any]:
-    """Attributes of the file, whose study refers to long coordinates."""
-    study = schema.attrs["study_json"]
-    for c in schema.coordinates:
-        if np.asarray(c.values).nbytes >= LONG:
-            study = study.replace(ARRAY % c.values.tobytes().hex(), ARRAY % f"@{c.name}")
-    return {**schema.attrs, "study_json": study}
-
-
 def create(path: Path, schema: Schema, cuts: Mapping[str, Cut]) -> StoredFile:
     """Makes a result of which nothing is computed yet, with room on the disk for all of it. Raises OSError.
 
@@ -197,7 +188,11 @@ def _write_variables(file: Any, schema: Schema, cut: Cut) -> dict[str, tuple[str
         beside = [c.name for c in schema.coordinates if c.dims != (c.name,) and set(c.dims) <= set(over)]
         variables.append((column.name, over, column, {**column.attrs, **_listed(beside)}))
     away = [c.name for c in schema.coordinates if c.dims and not set(c.dims) & {c.name, *schema.grid.dims}]
-    _say(file, {**_attrs(schema), **_listed(away)})
+    study = schema.attrs["study_json"]
+    for c in schema.coordinates:
+        if np.asarray(c.values).nbytes >= LONG:  # the study refers to it
+            study = study.replace(ARRAY % c.values.tobytes().hex(), ARRAY % f"@{c.name}")
+    _say(file, {**schema.attrs, "study_json": study, **_listed(away)})
     for name, over, what, attrs in sorted(variables, key=lambda found: found[1][:1] != (found[0],)):
         if isinstance(what, Column):
             data = _make(file, name, schema.shape(what), what.dtype, cut.chunk(what))

@@ -66,15 +66,20 @@ class Store:
         assert self.file is not None, "the sweep has not begun"
         return self.file.tables[self.file.work]
 
-    def found(self) -> StoredFile | None:
-        """What an earlier run left; None where there is nothing. Raises SweepError where it is damaged."""
+    def found(self, give_up: bool = False) -> StoredFile | None:
+        """What an earlier run left; None where there is nothing, or to `give_up` what is damaged. Raises SweepError."""
         if not self.path.exists():
             return None
-        with contextlib.suppress(Damaged):
+        try:
             file = StoredFile(self.path, os.O_RDWR)
             if file.is_as_made():
                 return file
-        raise SweepError(f"{self.path}: damaged beside its numbers; remove it, or give it up with --force")
+        except SweepError as fault:
+            if not give_up and not isinstance(fault, Damaged):
+                raise
+        if not give_up:
+            raise SweepError(f"{self.path}: damaged beside its numbers; remove it, or give it up with --force")
+        return None
 
     def begin(self, schema: Schema, cuts: Mapping[str, Cut]) -> None:
         """Makes the file, with room on the disk for all of it. Raises SweepError."""

@@ -21,7 +21,6 @@ import time
 import weakref
 from collections.abc import Callable, Mapping
 from concurrent.futures import CancelledError, Future
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +31,7 @@ from sweep.cells.fingerprint import difference, fingerprint
 from sweep.cells.solve import Solver
 from sweep.errors import Incomplete, SweepError
 from sweep.file import disk
-from sweep.file.reading import again
+from sweep.file.reading import StoredFile, again
 from sweep.runs.isolate import Processes
 from sweep.runs.log import log
 from sweep.study.model import Study
@@ -93,7 +92,7 @@ class Cluster:
         found = Future[Done]()
 
         def ask() -> Any:
-            asked = self._client.submit(compute, self._remote, job, wanted, pure=False)
+            asked = self._client.submit(Remote.compute, self._remote, job, wanted, pure=False)
             self._asked.add(asked)
             return asked
 
@@ -164,7 +163,7 @@ def _reason(fault: BaseException) -> str:
 
 
 class Remote:
-    """A run as a worker knows it; where dask moves it to, it is made anew.
+    """A run as a worker knows it, and where its blocks go; where dask moves it to, it is made anew.
 
     Of the study as JSON; its fingerprint where the run was started (a worker with another one refuses); how the rows
     are cut; the file that blocks are to be written to (None: their numbers are sent); limit and cost of `Processes`
@@ -173,16 +172,23 @@ class Remote:
     """
 
     def __init__(self, *words: Any) -> None:
-        self._words, self.turn = words, threading.Lock()
+        self._words, self._turn = words, threading.Lock()
+        self._bench: Bench | None = None
+        self._file: StoredFile | None = None
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Remote, self._words
 
-    @cached_property
-    def bench(self) -> Bench:
+    def compute(self, job: int, wanted: Any) -> Done:
+        """Computes a block. Raises SweepError."""
+        where = f"worker on {socket.gethostname()}"
+        with self._turn, faults_reported(where):
+            self._bench = self._bench or self._begun(where)
+        return self._bench.block(job, wanted)
+
+    def _begun(self, where: str) -> Bench:
         """Loads and compiles the kernel. Raises SweepError where what computes here is not what was asked for."""
         text, mark, partition, shared, isolated, paths = self._words
-        where = f"worker on {socket.gethostname()}"
         if ":" in mark["kernel"]:
             sys.path.extend(path for path in paths if path not in sys.path and Path(path).is_dir())
         try:
@@ -195,26 +201,20 @@ class Remote:
                 f"{where}: what computes there is not what was asked for here; install the same versions on every "
                 "machine" + "".join(f"\n  {line}" for line in changed)
             )
-        processes = None
+        solver = None
         if isolated is None:
             warm(Solver(study), study)
         else:
             processes = Processes(study, *isolated)
             weakref.finalize(self, processes.end)
-        blocks = Blocks(study, partition)
-        sink = _Sink(blocks, shared)
-        weakref.finalize(self, sink.close)
-        return Bench(study, blocks, sink, None if processes is None else processes.solver)
-
-
-class _Sink:
-    """Where blocks of a worker go: the file, if it sees that; else their numbers are sent."""
-
-    def __init__(self, blocks: Blocks, shared: tuple[Path, bytes] | None) -> None:
-        self.room, self._file = blocks.own, None
+            solver = processes.solver
         if shared is not None:
+            path, key = shared
             with contextlib.suppress(OSError, SweepError):  # it is not seen here, or may not be written
-                self._file = again(*shared, os.O_RDWR)
+                self._file = again(path, key, os.O_RDWR)
+        blocks = Blocks(study, partition)
+        self.room = blocks.own
+        return Bench(study, blocks, weakref.proxy(self), solver)  # so that all ends when dask lets go of this
 
     def put(self, job: int, arrays: Mapping[str, Any]) -> Found:
         """The digests of what is written, and on the disk; or the numbers, which lie where nothing else will."""
@@ -225,14 +225,3 @@ class _Sink:
             digests = file.tables[file.work].write(job, arrays)
             disk.fsync(file.fd)
         return digests
-
-    def close(self) -> None:
-        if self._file is not None:
-            self._file.close()
-
-
-def compute(remote: Remote, job: int, wanted: Any) -> Done:
-    """Computes a block on a worker. Raises SweepError."""
-    with remote.turn, faults_reported(f"worker on {socket.gethostname()}"):
-        bench = remote.bench
-    return bench.block(job, wanted)

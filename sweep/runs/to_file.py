@@ -34,7 +34,7 @@ def run_to_file(task: Task, precomputed: Precomputed | None = None) -> Ending:
     with opened(task.output) as store:
         if left or seen != disk.mark(task.output):  # another run may have ended before this one had the lock
             standing, damaged = _standing(task)
-        found = _found(store, task)
+        found = store.found(task.force)
         is_ours = found is not None and found.fingerprint == dict(task.fingerprint)
         if standing == "complete":
             if is_ours:
@@ -101,16 +101,6 @@ def _changes(stored: Mapping[str, str], task: Task) -> str:
     return "\n".join(f"  {line}" for line in difference(dict(stored), dict(task.fingerprint)))
 
 
-def _found(store: Store, task: Task) -> StoredFile | None:
-    """What an earlier run left; None where that is damaged and given up."""
-    try:
-        return store.found()
-    except SweepError:
-        if not task.force:
-            raise
-        return None
-
-
 def _computed(
     store: Store, task: Task, known: Reused | Precomputed | None, reused: bool, damaged: Sequence[int]
 ) -> None:
@@ -123,7 +113,15 @@ def _computed(
         loop = Loop(task, stack, None if store.file is None else store.table.blocks, to_do, sampled, known)
         loop.begin(range(loop.blocks.count) if store.file is None else store.missing())
         if store.file is None:
-            _begin(store, loop, known)
+            schema = task.said({"start": loop.began, **(known.attrs if isinstance(known, Precomputed) else {})})
+            cuts = cuts_of(task.study, schema, loop.blocks.partition)
+            needed, free = expected_size(schema, cuts), disk.free(task.output.parent)
+            if needed > free:
+                raise SweepError(
+                    f"{task.output}: needs {quantity(needed)}, only {quantity(free)} are free here; free some space, "
+                    "choose another folder with -o, fewer outputs, or keep a [summary] instead of every cell"
+                )
+            store.begin(schema, cuts)
         for block in damaged:
             loop.progress.note(f"{loop.blocks.label(block)} were damaged on the disk and are computed again")
         if missing := store.missing():
@@ -139,20 +137,6 @@ def _computed(
 
         store.finish(loop.endings(), None if task.study.summary is None else gather)
         loop.progress.end()
-
-
-def _begin(store: Store, loop: Loop, known: Reused | Precomputed | None) -> None:
-    """Makes the file. Raises SweepError where it has no room on the disk."""
-    task = loop.task
-    schema = task.said({"start": loop.began, **(known.attrs if isinstance(known, Precomputed) else {})})
-    cuts = cuts_of(task.study, schema, loop.blocks.partition)
-    needed, free = expected_size(schema, cuts), disk.free(task.output.parent)
-    if needed > free:
-        raise SweepError(
-            f"{task.output}: needs {quantity(needed)}, only {quantity(free)} are free here; free some space, choose "
-            "another folder with -o, fewer outputs, or keep a [summary] instead of every cell"
-        )
-    store.begin(schema, cuts)
 
 
 class _Stored:
