@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
-from scipy.spatial import Delaunay
+from scipy.spatial import Delaunay, cKDTree
 from threadpoolctl import threadpool_limits
 
 from kernels.interface import FIRST_REFUSAL, Status
@@ -133,29 +133,26 @@ def interpolated(dataset: xr.Dataset, at: Mapping[str, Sequence[float] | Array])
     if set(at) != set(names):
         raise SweepError(f"at: expected values of {', '.join(names)}, found {', '.join(at) or 'none'}")
     grids = {name: np.asarray(values, dtype=np.float64) for name, values in at.items()}
-    mesh = np.meshgrid(*grids.values(), indexing="ij")
-    box, shape, status = Box.of(dataset, names), mesh[0].shape, dataset[STATUS].values
+    whole = np.meshgrid(*grids.values(), indexing="ij")
+    box, status, shape = Box.of(dataset, names), dataset[STATUS], whole[0].shape
     points = box.points(dataset)
-    places = box.points({name: column.ravel() for name, column in zip(grids, mesh, strict=True)})
-    corners, shares, *_ = located(points, places)
-    nearest = np.take_along_axis(corners, shares.argmax(axis=1)[:, None], 1)[:, 0]  # with the largest share
-    valued = status[nearest] < FIRST_REFUSAL
-    found = xr.Dataset(coords={name: (name, values, dataset[name].attrs) for name, values in grids.items()})
-    refined, inaccurate = json.loads(dataset.attrs.get(REFINED_TO, "{}")), status[nearest] == Status.INACCURATE
+    places = box.points({name: column.ravel() for name, column in zip(grids, whole, strict=True)})
+    nearest = dataset.isel({status.dims[0]: cKDTree(points).query(places)[1]})
+    valued, refined = nearest[STATUS].values < FIRST_REFUSAL, json.loads(dataset.attrs.get(REFINED_TO, "{}"))
     columns, error = dict[Any, Any](), np.zeros(len(places))
+    inaccurate = nearest[STATUS].values == Status.INACCURATE
     for name, variable in dataset.data_vars.items():
-        if variable.dims == dataset[STATUS].dims and variable.dtype.kind == "f" and name != ERROR_BOUND:
-            between, off = _between(variable.values, points, places, status)
-            columns[name] = np.where(np.isnan(variable.values[nearest]), np.nan, between)
+        if variable.dims == status.dims and variable.dtype.kind == "f" and name != ERROR_BOUND:
+            between, off = _between(variable.values, points, places, status.values)
+            columns[name] = np.where(nearest[name].isnull(), np.nan, between)
             if name in refined or not refined:
                 error = np.maximum(error, off)
                 inaccurate |= ~(off <= refined.get(name, sys.float_info.max))
-    columns[STATUS] = np.where(inaccurate & valued, np.int8(Status.INACCURATE), status[nearest])
+    columns[STATUS] = np.where(inaccurate & valued, np.int8(Status.INACCURATE), nearest[STATUS])
     if ERROR_BOUND in dataset:
-        columns[ERROR_BOUND] = np.where(valued, np.fmax(error, dataset[ERROR_BOUND].values[nearest]), np.nan)
-    for name, values in columns.items():
-        found[name] = (tuple(grids), values.reshape(shape), dataset[name].attrs)
-    return found.assign_attrs(dataset.attrs)
+        columns[ERROR_BOUND] = np.where(valued, np.fmax(error, nearest[ERROR_BOUND]), np.nan)
+    found = {name: (tuple(grids), values.reshape(shape), dataset[name].attrs) for name, values in columns.items()}
+    return xr.Dataset(found, {name: (name, v, dataset[name].attrs) for name, v in grids.items()}, dataset.attrs)
 
 
 def kinds(status: Indices, valued: NDArray[np.bool_]) -> Indices:
@@ -225,15 +222,14 @@ def on_lines(dataset: xr.Dataset, x: str) -> xr.Dataset:
         raise SweepError(
             f"{x}: no {FEWEST_ON_A_LINE} cells lie on one line from end to end of it; pick another axis, or {longest}"
         )
-    told = f"{count[long].sum()} of {count.sum()} cells lie on {long.sum()} lines from end to end of {x}"
     across, labels = others[0], lines[:, 0]
     if len(others) > 1:
         across = "line"
         labels = np.array([", ".join(f"{n} = {v:.6g}" for n, v in zip(others, place, strict=True)) for place in lines])
     outputs = [name for name, v in dataset.data_vars.items() if v.dims == (cell,) and v.dtype == np.float64]
-    cells = dataset[outputs].drop_vars([n for n, c in dataset.coords.items() if c.dims == (cell,)])
-    cells = cells.assign_coords({across: (cell, np.arange(len(lines))[line]), x: (cell, values)})
+    cells = dataset[outputs].reset_coords(drop=True).assign_coords({across: (cell, line), x: (cell, values)})
     both: Any = {cell: [across, x]}
     found = cells.isel({cell: long[line]}).set_index(both).unstack(str(cell))
+    told = f"{count[long].sum()} of {count.sum()} cells lie on {long.sum()} lines from end to end of {x}"
     found = found.assign_coords({across: labels[long], x: found[x].assign_attrs(dataset[x].attrs)})
     return found.assign_attrs(lines=f"{told}; take any line by --at, {longest}.")

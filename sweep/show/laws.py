@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import contextlib
-import csv
-import itertools
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,8 +24,6 @@ if TYPE_CHECKING:
 MOST_ROWS = 40
 POINTS = 12
 """Local exponents of a line that are printed."""
-WORST_MISFIT = 0.1
-"""Relative distance of a point beyond which a report does not speak of two laws."""
 RULED_OUT = 10.0
 """AICc or BIC above the least, from which on a law is ruled out."""
 REST = "Points, drift, residual, prefactor, and what the columns mean: --all; other laws: --compare."
@@ -143,24 +139,31 @@ def _remark(dataset: xr.Dataset, y: str) -> str:
     return f"Of {status.size} cells: {', '.join(parts)}." if parts else ""
 
 
-def laws_text(found: Laws, complete: bool = False) -> str:
-    """The laws as people read them: exponents and their intervals; by wish all columns and what they mean."""
+def law_tables(found: Laws, complete: bool = False) -> list[Table]:
+    """Exponents and their intervals, a row for each line; by wish all columns."""
 
-    def table(title: str, of: Sequence[xr.Dataset], heading: Sequence[str], cells: Any, keep: int | None) -> str:
-        """A row for each line: its place on the other axes, and the first cells of what is fitted."""
+    def table(title: str, of: Sequence[xr.Dataset], heading: Sequence[str], cells: Any, keep: int | None) -> Table:
+        """For each line its place on the other axes, and the first cells of what is fitted."""
         rows = [(place, cells(one)[:keep]) for fit in of for place, one in _lines(fit)]
+        if len(rows) > MOST_ROWS:
+            title += f"; {len(rows) - MOST_ROWS} more lines, choose with --at axis=value"
         texts = [(*place.values(), *fitted) for place, fitted in rows[:MOST_ROWS]]
-        more = f"\n  and {len(rows) - MOST_ROWS} more; choose with --at axis=value" if len(rows) > MOST_ROWS else ""
-        return Table(texts, (*rows[0][0], *heading[:keep]), title).text() + more
+        return Table(texts, (*rows[0][0], *heading[:keep]), title)
 
     heading = ("window", "p", "interval", "points", "drift", "residual", f"{found.y} at {found.x} = 1")
-    texts = [table(f"{found.y} ~ {found.x}^p", found.fits, heading, _fit_cells, None if complete else 3)]
+    tables = [table(f"{found.y} ~ {found.x}^p", found.fits, heading, _fit_cells, None if complete else 3)]
     if found.bend is not None:
         heading = ("p low", "interval", "p high", "interval", f"{found.x} between", "interval", "bend")
-        texts.append(table("two laws with a smooth bend", [found.bend], heading, _bend_cells, None if complete else 5))
+        tables.append(table("two laws with a smooth bend", [found.bend], heading, _bend_cells, None if complete else 5))
     if found.meeting is not None:
-        texts.append(table("the two laws meet", [found.meeting], (found.x, "", found.y), _meeting_cells, None))
-    return page(*texts, *map(paragraph, (found.remark, found.explanation if complete else REST)))
+        tables.append(table("the two laws meet", [found.meeting], (found.x, "", found.y), _meeting_cells, None))
+    return tables
+
+
+def laws_text(found: Laws, complete: bool = False) -> str:
+    """The laws as people read them; by wish all columns and what they mean."""
+    tables = (table.text() for table in law_tables(found, complete))
+    return page(*tables, *map(paragraph, (found.remark, found.explanation if complete else REST)))
 
 
 def exponents_text(found: xr.Dataset, x: str, complete: bool = False) -> str:
@@ -180,37 +183,22 @@ def sensitivity_text(found: xr.Dataset) -> str:
     return Table(rows, ("parameter", *(str(name).replace("_", " ") for name in found.data_vars))).text()
 
 
-def law_rows(found: Laws) -> Iterator[tuple[str, ...]]:
-    """Output, where, exponent, interval and largest distance: a row for one law, two rows for two with a bend."""
-    bends = itertools.repeat(None) if found.bend is None else _lines(found.bend)
-    for (place, fit), bend in zip(_lines(found.fits[0]), bends, strict=False):
-        where = ", ".join(f"{dim} = {label}" for dim, label in place.items())
-        name, both = f"{found.y} ({where})" if where else found.y, None if bend is None else bend[1]
-        if both is None or both.regimes.item() != 2 or both.residual.item() > WORST_MISFIT:
-            window, exponent, interval, _, _, residual, _ = _fit_cells(fit)
-            yield name, f"{found.x} {window}", exponent, interval, residual
-            continue
-        cells, meet, residual = _bend_cells(both), f"{both.crossover.item():.3g}", f"{both.residual.item():.1e}"
-        yield name, f"{found.x} << {meet}", *cells[:2], residual
-        yield name, f"{found.x} >> {meet}", *cells[2:4], residual
-
-
 def write_laws(found: Laws, path: Path) -> None:
     """The laws as csv: a row for each line and window; of two laws a row each. Raises SweepError."""
     parts = [(fit, "one") for fit in found.fits]
     parts += [] if found.bend is None else [(found.bend.sel(law=law), law) for law in ("low", "high")]
     parts += [] if found.meeting is None else [(found.meeting, "meeting")]
-    start = {"y": found.y, "x": found.x}
     lines = ((law, *line) for fit, law in parts for line in _lines(fit))
-    _write([start | {"law": law} | place | _numbers(one) for law, place, one in lines], path)
+    rows = [{"y": found.y, "x": found.x, "law": law} | place | _numbers(one) for law, place, one in lines]
+    _write([{name: cell(value) for name, value in row.items()} for row in rows], path)
 
 
-def _write(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
-    names = list(dict.fromkeys(name for row in rows for name in row))
-    with disk.replacing(path) as part, part.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(map(cell, names))
-        writer.writerows([cell(row.get(name, "")) for name in names] for row in rows)
+def _write(rows: Any, path: Path) -> None:
+    """Rows, or what pandas makes a table of, as csv."""
+    from pandas import DataFrame  # type: ignore[import-untyped]
+
+    with disk.replacing(path) as part:
+        DataFrame(rows).to_csv(part, index=False)
 
 
 def _numbers(one: xr.Dataset) -> dict[str, Any]:
@@ -277,7 +265,7 @@ def comparison(dataset: xr.Dataset, y: str | None, x: str, windows: Sequence[Seq
 def comparison_text(found: xr.Dataset, complete: bool = False) -> str:
     """Which laws are ruled out, and the verdict; by wish all columns and what they mean."""
     rows = []
-    for one in _laws_of(found):
+    for one in found.drop_dims("point").to_dataframe().reset_index().to_dict("records"):
         told = "ruled out" if one["worse"] > RULED_OUT else str(one["exponents"])
         runs = "-" if np.isnan(one["runs"]) else f"{one['runs']:.2g}" if one["runs"] >= 1e-4 else "< 1e-4"
         more = (f"{one['bic'] - float(found.bic.min()):.4g}", str(one["numbers"]), runs) if complete else ()
@@ -290,10 +278,6 @@ def comparison_text(found: xr.Dataset, complete: bool = False) -> str:
 
 def write_comparison(found: xr.Dataset, path: Path) -> None:
     """The table as csv, a row for each law. Raises SweepError."""
-    start, chosen = {"y": found.attrs["y"], "x": found.attrs["x"]}, found.attrs["chosen"]
-    _write([start | {"law": one["law"], "chosen": int(one["law"] == chosen)} | one for one in _laws_of(found)], path)
-
-
-def _laws_of(found: xr.Dataset) -> list[dict[str, Any]]:
-    rows: list[dict[str, Any]] = found.drop_dims("point").to_dataframe().reset_index().to_dict("records")
-    return rows
+    about = {"y": found.attrs["y"], "x": found.attrs["x"]}
+    table = found.drop_dims("point").to_dataframe().reset_index().assign(**about)
+    _write(table.assign(chosen=(table["law"] == found.attrs["chosen"]).astype(int)), path)

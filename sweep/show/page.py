@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 from sweep.errors import SweepError
 from sweep.file import disk
 from sweep.results.statuses import is_summary
-from sweep.show.laws import law_rows, laws
+from sweep.show.laws import law_tables, laws
 from sweep.show.text import head, outputs_of, sections, settings
 from sweep.words import Table
 
@@ -139,7 +139,7 @@ def _exponents(dataset: xr.Dataset) -> Iterator[str]:
     axis = next((name for name in axes if is_logarithmic(dataset[name].values)), None)
     if axis is None or status.size // dataset.sizes[axis] > MOST_LINES:
         return
-    rows, note = [], ""
+    note = ""
     for name in outputs_of(dataset):
         output = dataset[name]
         if output.attrs.get("units", "1") == "1" or output.dims != status.dims or not bool((output > 0).any()):
@@ -149,7 +149,6 @@ def _exponents(dataset: xr.Dataset) -> Iterator[str]:
         except SweepError:
             continue
         note = found.explanation
-        rows += list(law_rows(found))
-    if rows:
-        table = Table(rows, ("output", "over", "exponent", "interval", "largest misfit"), f"exponents in {axis}")
-        yield f"{_wide(table)}\n<p class='note'>{escape(note)}</p>"
+        yield from map(_wide, law_tables(found, complete=True))
+    if note:
+        yield f"<p class='note'>{escape(note)}</p>"
