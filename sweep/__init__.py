@@ -46,10 +46,6 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module 'sweep' has no attribute {name!r}")
     if name not in _WITHOUT_DATASETS:
         import_module("sweep.show.accessor")
-    # what a notebook shows of a study needs to know its cells, which is above the study
-    import_module("sweep.study.model").Study._repr_html_ = lambda study: import_module(
-        "sweep.show.notebook"
-    ).study_html(study)
     module = import_module(f"sweep.{_MODULES[name]}")
     # the room of that name is the function as well, and stays what `sweep.study.read` and its like begin with
     return module if name == "study" else getattr(module, name)

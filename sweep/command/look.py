@@ -219,14 +219,12 @@ def sensitivity(arguments: argparse.Namespace) -> None:
     o.FORCE,
     option("--where", "only cells for which this holds, e.g. \"status == 'OK' and R < 0.1\"", metavar="CONDITION"),
     switch("--compress", "of netCDF4 and zarr: smaller, every bit kept"),
-    switch("--float32", "of netCDF4 and zarr: outputs with 24 bits of precision"),
     *(o.UNITS, o.UNFINISHED),
 )
 def export(arguments: argparse.Namespace) -> None:
     """Write a result as csv, parquet, netCDF4 or zarr."""
-    keys = {name: getattr(arguments, name) for name in ("force", "compress", "float32")}
     with opened(arguments) as dataset:
-        sweep.export(dataset, arguments.output, **keys)
+        sweep.export(dataset, arguments.output, force=arguments.force, compress=arguments.compress)
 
 
 @command(

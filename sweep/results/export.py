@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import xarray as xr
 
 from sweep.cells.reduce import BY_METHOD, BY_STATUS
@@ -37,7 +36,6 @@ def export(
     *,
     force: bool = False,
     compress: bool = False,
-    float32: bool = False,
 ) -> Path:
     """Write a Dataset to `path`, as its suffix says: .csv, .parquet, .nc or .zarr.
 
@@ -52,13 +50,12 @@ def export(
     in that of the schema.
 
     nc, zarr: netCDF4, or a folder of zarr, with units, flags and all attributes; with `compress` smaller, every bit
-    kept; with `float32` outputs in 24 bits of precision.
+    kept.
 
     Raises
     ------
     SweepError
-        If the suffix is another, what writes it is not installed, or the file cannot be, or is not to be, written; if
-        float32 cannot hold a value.
+        If the suffix is another, what writes it is not installed, or the file cannot be, or is not to be, written.
 
     Examples
     --------
@@ -75,14 +72,14 @@ def export(
         raise SweepError(f"{target}: found {found}; export writes {listed(WRITERS, word='and')}, as the suffix says")
     if target.is_dir() and kind != ".zarr":
         raise SweepError(f"{target} is a folder; name a file in it")
-    if (compress or float32) and kind not in PACKED:
-        raise SweepError(f"{target}: compress and float32 are for {listed(PACKED, word='and')}")
+    if compress and kind not in PACKED:
+        raise SweepError(f"{target}: compress is for {listed(PACKED, word='and')}")
     source = dataset.encoding.get("source")
     check_target(target, force=force, read=[Path(source)] if source else [])
     try:
         with disk.replacing(target) as part:
             history = [text for text in str(dataset.attrs.get("history", "")).splitlines() if text != EXPORTED]
-            whole = _in_float32(dataset) if float32 else dataset if kind in PACKED else flat(dataset)
+            whole = dataset if kind in PACKED else flat(dataset)
             whole = whole.assign_attrs(history="\n".join([*history, EXPORTED]))
             WRITERS[kind](whole, part, **({"compress": True} if compress else {}))
     except ImportError as error:
@@ -90,24 +87,6 @@ def export(
     except RuntimeError as error:  # from HDF5
         raise SweepError(f"{target} cannot be written: {error}") from None
     return target
-
-
-def _in_float32(dataset: xr.Dataset) -> xr.Dataset:
-    """The Dataset with its outputs in float32. Raises SweepError, maybe as it is written, where that is too narrow."""
-
-    def single(values: Any, name: str) -> Any:
-        with np.errstate(over="ignore", under="ignore"):
-            found = np.asarray(values).astype(np.float32)
-        limits = np.finfo(np.float32)
-        lost = np.isfinite(values) & (np.isinf(found) | ((abs(found) < limits.smallest_normal) & (values != 0)))
-        if lost.any():
-            raise SweepError(f"{name}: float32 cannot hold {np.asarray(values)[lost].flat[0]!r}; export it in float64")
-        return found
-
-    whole = _in_pieces(dataset)
-    options: Any = {"dask": "parallelized", "output_dtypes": [np.float32], "keep_attrs": True}
-    doubles = {name: v for name, v in whole.data_vars.items() if v.dtype == np.float64}
-    return whole.assign({n: xr.apply_ufunc(single, v, kwargs={"name": str(n)}, **options) for n, v in doubles.items()})
 
 
 def _write_csv(dataset: xr.Dataset, path: Path) -> None:

@@ -9,7 +9,6 @@ Others may use
     `laws`     power laws along an axis and which law, as text and csv; pick
     `studies`  what comes with foliot, and copies to work on
     `kernels`  what can be swept, as text and HTML, and a study to begin with
-    `notebook` study_html: what a notebook shows of a study
 
 `view` chooses and letters what `figures` draws.
 """

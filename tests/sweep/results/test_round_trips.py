@@ -5,7 +5,6 @@ import itertools
 
 import h5py
 import numpy as np
-import pytest
 import xarray as xr
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -125,25 +124,3 @@ def test_a_dataset_comes_back_from_tables_of_text_and_of_types(tmp_path_factory,
     for name in ("period", "trace"):
         assert table.schema.field(name).metadata[b"units"].decode() == ds[name].units
     assert table.schema.metadata[b"study"].decode() == ds.attrs["study"]
-
-
-@pytest.mark.parametrize("suffix", [".nc", ".zarr"])
-@given(value=st.floats(allow_nan=True, allow_infinity=True))
-@settings(max_examples=25)
-def test_float32_is_rounded_to_nearest_or_refused(tmp_path_factory, suffix, value):
-    ds = xr.Dataset({"y": ("x", [1.0, value], {"units": "s"}), "n": ("x", [1, 2])}, {"x": [0.1, 0.2]})
-    path = tmp_path_factory.mktemp("out") / f"out{suffix}"
-    with np.errstate(over="ignore", under="ignore"):
-        near = np.float32(value)
-    limits = np.finfo(np.float32)
-    held = not np.isfinite(value) or value == 0 or limits.smallest_normal <= abs(near) <= limits.max
-    if not held:
-        with pytest.raises(sweep.SweepError, match="float32"):
-            sweep.export(ds, path, float32=True)
-        assert not path.exists()
-        return
-    keys = {"engine": "h5netcdf"} if suffix == ".nc" else {"engine": "zarr", "consolidated": False}
-    with xr.open_dataset(sweep.export(ds, path, float32=True), mask_and_scale=False, **keys) as back:
-        assert (back.y.dtype, back.n.dtype, back.x.dtype) == (np.float32, np.int64, np.float64)
-        np.testing.assert_array_equal(back.y, np.array([1.0, near], np.float32))
-        assert back.y.units == "s"

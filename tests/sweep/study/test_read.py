@@ -204,3 +204,9 @@ def test_a_kernel_beside_the_study_is_found(read, tmp_path):
         assert study.kernel is toy.KERNEL
     finally:
         sys.path[:] = path
+
+
+def test_the_text_of_a_study_is_no_path():
+    study = sweep.study(kernel="foliot", outputs=["period"], fixed={"phi0": 1.0, "a": 1.0}, axes={"mu": [0.1, 1.0]})
+    with pytest.raises(sweep.SweepError, match=r"the text of a study, not its path; write .*tomllib\.loads"):
+        sweep.study(sweep.to_toml(study))
