@@ -2,8 +2,8 @@
 
     y = L^b f(x / L^a)                                                                              (1)
 
-In logarithms the curves of all L are one, ln y = b ln L + g(ln x - a ln L). With g a spline, b and g are linear for
-given a: a is searched over all of its range, so there is no start to be stuck at.
+In logarithms the curves of all L are one, ln y = b ln L + g(ln x - a ln L). With g a polynomial, b and g are linear
+for given a: a is searched over all of its range, so there is no start to be stuck at.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
+from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
 from sweep.errors import SweepError
@@ -29,7 +30,7 @@ NAMES = {
     "dropped": "points that are missing or not positive, or lie where no other curve has any",
     "fits": "1 where the curves fall on one another within their own scatter",
 }
-FEWEST_POINTS = 10
+FEWEST_POINTS, MOST_DEGREE = 10, 18
 
 
 def fit_collapse(y: xr.DataArray, dim: str, over: str, *, sigma: Any = None, confidence: float = 0.95) -> xr.Dataset:
@@ -51,7 +52,7 @@ def fit_collapse(y: xr.DataArray, dim: str, over: str, *, sigma: Any = None, con
     Dataset
         `x_exponent` (a), `y_exponent` (b), each with `_low`, `_high`; `verdict`, words; `residual`; `points`,
         `dropped`; `fits`. The intervals are of noise about the common curve that may be autocorrelated along each
-        curve, or of `sigma`; without noise of how well a spline follows the curve. There are none where the curves do
+        curve, or of `sigma`; without noise of how well a polynomial follows the curve. There are none where the curves do
         not fall on one another: where levels, slopes and bows of their own describe them far better.
 
     Raises
@@ -83,12 +84,22 @@ def fit_collapse(y: xr.DataArray, dim: str, over: str, *, sigma: Any = None, con
         )
     points = Points(*(column[inside] for column in points))
     a = points.best(a - 0.3 * (1 + abs(a)), a + 0.3 * (1 + abs(a)), 41)
-    columns, b, off = _jacobian(points, a)
-    ends, fits = _intervals(points, columns, off, sigma is not None, confidence)
+    columns, b, off = points.curve(a)
+    _refuse_power_law(points, a, columns.shape[1])
     found = {"x_exponent": a, "y_exponent": b, "residual": float(np.sqrt(np.mean(off**2))), "points": points.t.size}
+    # whether a level, a slope and a bow of each curve describe the points far better than the common one
+    k, u = columns.shape[1], points.t - points.t.mean()
+    own = [here * u**power for here in points.size == np.unique(points.size)[1:, None] for power in range(3)]
+    basis, beside = np.linalg.qr(columns)[0], np.column_stack(own)
+    left, moved, _ = np.linalg.svd(beside - basis @ (basis.T @ beside), full_matrices=False)
+    beside = left[:, moved > 1e-6 * moved.max()][:, : max(0, off.size - k - 3)]
+    every, places = np.column_stack([columns, beside]), np.arange(float(off.size))
+    told = regress(places, every, off[None], "correlated", k, None if sigma is None else 1 / points.root)
+    fits = bool(not told.denied[0] or (sigma is None and abs(off).max() <= 1e-6 * (1 + np.ptp(points.z))))
+    for number, name in enumerate(("x_exponent", "y_exponent")):
+        low, high = told.interval(number, confidence)[:, 0] if fits else (math.nan, math.nan)
+        found |= {f"{name}_low": found[name] + min(low, 0.0), f"{name}_high": found[name] + max(high, 0.0)}
     found |= {"dropped": count - points.t.size, "fits": int(fits)}
-    for k, name in enumerate(("x_exponent", "y_exponent")):
-        found[f"{name}_low"], found[f"{name}_high"] = found[name] + ends[k] if fits else (math.nan, math.nan)
     result = xr.Dataset(found).assign(verdict="one curve" if fits else "not one curve")
     law = f"{title(y)} = {over}^b f({dim} / {over}^a)"
     return described(result, NAMES, {}, {"y": title(y), "x": dim, "over": over, "law": law}, confidence)
@@ -104,23 +115,20 @@ class Points(NamedTuple):
     root: Array
     """One over the standard error of z; 1 where it is not known."""
 
-    def spline(self, a: float) -> tuple[Array, Array, Array]:
-        """Columns of b and of a cubic spline of ln x - a ln L, its knots, and the numbers that fit best."""
-        from scipy.interpolate import BSpline
-
+    def curve(self, a: float) -> tuple[Array, float, Array]:
+        """Derivatives of z by a, b and the numbers of g, a polynomial; b; and the distances of the points, for an a."""
         u = self.t - a * self.size
-        pieces = int(min(20, max(1, u.size // 8)))
-        inner = np.interp(np.linspace(0, u.size - 1, pieces + 1), np.arange(u.size), np.sort(u))  # quantiles
-        knots = np.concatenate([[inner[0]] * 3, inner, [inner[-1]] * 3])
-        knots[-4:] += 1e-9 * (1 + abs(knots[-1]))
-        columns = np.column_stack([self.size - self.size.mean(), BSpline.design_matrix(u, knots, 3).toarray()])
+        half = max(float(np.ptp(u)) / 2, 1e-300)
+        basis = chebyshev.chebvander((u - u.min()) / half - 1, min(MOST_DEGREE, max(3, u.size // 7)))
+        columns = np.column_stack([self.size - self.size.mean(), basis])
         numbers = np.linalg.lstsq(columns * self.root[:, None], self.z * self.root, rcond=1e-10)[0]
-        return columns, knots, numbers.astype(np.float64)
+        steep = chebyshev.chebval((u - u.min()) / half - 1, chebyshev.chebder(numbers[1:])) / half
+        off: Array = self.z - columns @ numbers
+        return np.column_stack([-self.size * steep, columns]), float(numbers[0]), off
 
     def square(self, a: float) -> float:
         """Sum of squares about the common curve."""
-        columns, _, numbers = self.spline(a)
-        return float(((self.root * (self.z - columns @ numbers)) ** 2).sum())
+        return float(((self.root * self.curve(a)[2]) ** 2).sum())
 
     def shared(self, a: float) -> NDArray[np.bool_]:
         """Which points lie, in x / L^a, between the first and the last of another curve."""
@@ -142,6 +150,17 @@ class Points(NamedTuple):
         return float(minimize_scalar(self.square, bounds=around, method="bounded", options={"xatol": 1e-9}).x)
 
 
+def _refuse_power_law(points: Points, a: float, numbers: int) -> None:
+    """Raises SweepError where another a, far off, does as well: of a power law f any does."""
+    rounding = ROUNDING * (1 + abs(points.z).max())
+    least = points.square(a) + float((points.root**2).sum()) * (rounding**2 + 1e-20 * float(np.ptp(points.z)) ** 2)
+    worst = min(points.square(a + step) for step in (-0.25, 0.25))
+    if worst < least * (1 + 12.0 / max(1, points.z.size - numbers)):
+        raise SweepError(
+            "the curves collapse for any exponents of x: f is a power law, so a and b are not determined apart"
+        )
+
+
 def _points(y: xr.DataArray, dim: str, over: str, sigma: Any) -> tuple[Points, int]:
     """Points that are there, and how many could be."""
     check_output(y)
@@ -159,41 +178,3 @@ def _points(y: xr.DataArray, dim: str, over: str, sigma: Any) -> tuple[Points, i
         raise SweepError(few)
     root = np.ones(place.size) if sigma is None else 1 / errors[fine]
     return Points(t[order][place], z[fine], np.log(sizes)[curve], root), z.size
-
-
-def _jacobian(points: Points, a: float) -> tuple[Array, float, Array]:
-    """Derivatives of the curves by a, b and the spline, b, and the distances of the points.
-
-    Raises SweepError where another a, far off, does as well: of a power law f any does.
-    """
-    from scipy.interpolate import BSpline
-
-    columns, knots, numbers = points.spline(a)
-    rounding = ROUNDING * (1 + abs(points.z).max())
-    least = points.square(a) + float((points.root**2).sum()) * (rounding**2 + 1e-20 * float(np.ptp(points.z)) ** 2)
-    worst = min(points.square(a + step) for step in (-0.25, 0.25))
-    if worst < least * (1 + 12.0 / max(1, points.z.size - columns.shape[1] - 1)):
-        raise SweepError(
-            "the curves collapse for any exponents of x: f is a power law, so a and b are not determined apart"
-        )
-    steep: Array = BSpline(knots, numbers[1:], 3).derivative()(points.t - a * points.size)
-    used = columns[:, 1:][:, (columns[:, 1:] != 0).any(axis=0)]
-    matrix = np.column_stack([-points.size * steep, columns[:, 0], used])
-    return matrix, float(numbers[0]), points.z - columns @ numbers
-
-
-def _intervals(points: Points, columns: Array, off: Array, known: bool, confidence: float) -> tuple[Array, bool]:
-    """Ends of the intervals of a and b, about them, and whether the curves are one.
-
-    They are not where chi-squared says so, or where a level, a slope and a bow of each curve are better by far.
-    """
-    k, u = columns.shape[1], points.t - points.t.mean()
-    own = [here * u**power for here in points.size == np.unique(points.size)[1:, None] for power in range(3)]
-    basis, beside = np.linalg.qr(columns)[0], np.column_stack(own)
-    left, moved, _ = np.linalg.svd(beside - basis @ (basis.T @ beside), full_matrices=False)
-    beside = left[:, moved > 1e-6 * moved.max()][:, : max(0, off.size - k - 3)]
-    every, places = np.column_stack([columns, beside]), np.arange(float(off.size))
-    found = regress(places, every, off[None], "correlated", k, 1 / points.root if known else None)
-    smooth = not known and abs(off).max() <= 1e-6 * (1 + np.ptp(points.z))
-    ends = np.array([found.interval(number, confidence)[:, 0] for number in (0, 1)])
-    return np.clip(ends, [[-np.inf, 0.0]], [[0.0, np.inf]]), bool(smooth or not found.denied[0])
