@@ -56,8 +56,8 @@ def fit_correction(
     Where there is noise, the interval is that of a mixture of noises as of `fit_exponent`, and reaches over those of
     all D, of a logarithmic correction (1 + B ln x)^c and of one law that the points do not rule out. Where there is no
     noise, it is three times as far as the fit to the outer half of the window moves the
-    exponent. There is no interval where the points deny (1): by polynomials beside it that describe them far better, by
-    too few runs of signs where `noise="even"` or `sigma` is given, by chi-squared where `sigma` is.
+    exponent. There is no interval where the points deny (1): by polynomials beside it that describe them far better;
+    where `noise="even"` or `sigma` is given, by a shape of the distances; where `sigma` is, by chi-squared.
 
     Parameters
     ----------

@@ -52,8 +52,8 @@ def fit_collapse(y: xr.DataArray, dim: str, over: str, *, sigma: Any = None, con
     Dataset
         `x_exponent` (a), `y_exponent` (b), each with `_low`, `_high`; `verdict`, words; `residual`; `points`,
         `dropped`; `fits`. The intervals are of noise about the common curve that may be autocorrelated along each
-        curve, or of `sigma`; without noise of how well a polynomial follows the curve. There are none where the curves do
-        not fall on one another: where levels, slopes and bows of their own describe them far better.
+        curve, or of `sigma`; without noise of how well a polynomial follows the curve. There are none where the curves
+        do not fall on one another: where levels, slopes and bows of their own describe them far better.
 
     Raises
     ------

@@ -14,7 +14,7 @@ from sweep.laws.curves import Window, check_output, fit_lines, title
 from sweep.laws.fits import Found, fitted
 from sweep.laws.lines import rounding
 from sweep.laws.loglog import Array
-from sweep.laws.noise import BEYOND_DOUBT, runs_chance
+from sweep.laws.noise import BEYOND_DOUBT
 from sweep.laws.shapes import CORRECTION, LAWS, OFFSET
 from sweep.words import Table
 
@@ -25,7 +25,6 @@ NAMES = {
     "numbers": "numbers that are fitted",
     "scatter": "relative distance of the points from the law, root mean square",
     "residual": "largest relative distance of a point from the law",
-    "runs": "chance that independent scatter has so few runs of signs; NaN of fewer than 12 points",
     "chi_squared": "chance that noise of the given sigma has so large a chi-squared; NaN without sigma",
 }
 
@@ -49,7 +48,7 @@ def compare_laws(y: xr.DataArray, dim: str, window: Window | None = None, *, sig
     -------
     Dataset
         Along `law`, the best first: `aicc`, `bic`, `worse` (AICc or BIC above the least), `numbers`, `scatter`,
-        `residual`, `runs`, `chi_squared`, `formula`, `exponents`; `fitted` (law, point), the law at the points, whose
+        `residual`, `chi_squared`, `formula`, `exponents`; `fitted` (law, point), the law at the points, whose
         places are `x` and values `y`. Attributes `chosen`, `margin` (AICc to the next law; negative where a law with
         more numbers is nearer), `verdict`, a sentence, and `summary`, a table for printing.
 
@@ -98,7 +97,6 @@ def _table(t: Array, z: Array, tried: list[Found]) -> xr.Dataset:
         "numbers": [f.law.numbers for f in tried],
         "scatter": np.sqrt((off**2).mean(axis=1)),
         "residual": [f.residual for f in tried],
-        "runs": runs_chance(off),
         "chi_squared": [
             math.nan if f.sigma is None else float(gammaincc((t.size - f.law.numbers) / 2, f.square / 2)) for f in tried
         ],

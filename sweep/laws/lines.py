@@ -19,7 +19,7 @@ from sweep.laws.curves import (
     title,
 )
 from sweep.laws.loglog import EPSILON, FEWEST, Array, alike, slope_bounds, slopes, tends
-from sweep.laws.noise import RARE, corrected, inliers, regress, roughness, runs_chance
+from sweep.laws.noise import RARE, corrected, inliers, regress, roughness, shaped
 
 METHOD = "least squares in log-log; the interval is of what `kind` says"
 SMOOTH = 0.12
@@ -66,11 +66,11 @@ def fit_exponent(
     What the interval of the exponent is depends on what the distances of the points from the line are, `kind`:
 
     - *exact*, *bounded*: rounding, or within stated error bounds; all that such errors can do to the exponent.
-    - *weighted*: `sigma` is given; by the normal distribution, if chi-squared and the runs test allow it.
+    - *weighted*: `sigma` is given; by the normal distribution, if chi-squared allows it and distances have no shape.
     - *noise*: noise of which nothing is known. It may be autocorrelated, louder at one end, at both or in the middle,
       and have outliers; the interval is over a mixture of such noises. The price is a wider interval beside few points.
     - *even*, *uneven*, *correlated*, *outliers*: only if `noise` says so. Of *even* noise the interval is that of
-      ordinary least squares, and the runs test may deny it.
+      ordinary least squares, and distances with a shape deny it.
     - *curved*, *bent*: no power law, without and among noise. `fits` is 0 and the interval is the range of the local
       exponent in the window.
 
@@ -159,7 +159,7 @@ def fit_line(
         chance = gammaincc((n - 2) / 2, ((off / sigma) ** 2).sum(axis=1) / 2) if n > 2 else np.ones(len(z))
         fit |= {"exponent_error": error, "level_error": (sigma**-2.0).sum(axis=1) ** -0.5}
         fit |= {"exponent_low": slope - reach, "exponent_high": slope + reach}
-        fit["fits"] = (chance > RARE) & ~(runs_chance(off) < RARE)
+        fit["fits"] = (chance > RARE) & ~shaped(t, off)
     else:
         noisy = (abs(off).max(axis=1) > least) & (n > FEWEST) & (noise is None or bool(noise))
         if noise is None:

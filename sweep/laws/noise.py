@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import fdtrc, gammaincc, ndtr, stdtrit
+from scipy.special import fdtrc, gammaincc, stdtrit
 
 from sweep.laws.loglog import EPSILON, Array, alike, differences
 
@@ -56,7 +56,6 @@ class Regression(NamedTuple):
     left: int  # degrees of freedom
     share: Array  # of each phi in the level of `interval` (p,): phi = 0 counts whole, more correlation less
     deviance: Array  # -2 ln likelihood (m,), of the noise that suits best, less n ln 2 pi e; rounding is no distance
-    evidence: Array  # logarithm of the restricted likelihood of each line (m,), summed over the grid
     denied: NDArray[np.bool_]  # whether the points are not the columns and noise (m,)
 
     def mean(self) -> tuple[Array, Array]:
@@ -103,7 +102,7 @@ def regress(
     """Lines z (m, n) on the first `used` of the columns (n, k), under each noise of the word.
 
     `sigma` (n,) says all of the noise, where it is known. Points are denied by chi-squared of known noise; by columns
-    behind those that are used, which tell too much for chance; without such, of independent noise, by runs of signs.
+    behind those that are used, which tell too much for chance; without such, of independent noise, if it is `shaped`.
     """
     if sigma is not None:
         noise, columns, z = "even", columns / sigma[:, None], z / sigma
@@ -135,7 +134,7 @@ def regress(
         beyond = fdtrc(k - used, n - k, ratio * (n - k) / (k - used))
         denied = (weight * beyond).sum(axis=(0, 1)) / weight.sum(axis=(0, 1)) < UNLIKELY
     else:
-        denied = (noise == "even") & (runs_chance(off.T) < RARE)
+        denied = shaped(t, off.T) if noise == "even" else np.zeros(len(z), bool)
     # the numbers of each noise, and their mixture over sizes a, c
     square, turn = squares[:, :, used - 1] * scale**2, np.linalg.inv(back[:used, :used])
     inside = turn @ np.linalg.inv(factor[:, :, :used, :used]).transpose(0, 1, 3, 2)
@@ -143,10 +142,8 @@ def regress(
     of_point = square / max(left, 1) if sigma is None else np.ones_like(square)
     variance = (inside**2).sum(axis=3)[..., None] * of_point[:, :, None]
     log = likelihoods(used, cautious)
-    highest = log.max(axis=(0, 1))
-    weight = np.exp(log - highest)
-    total = weight.sum(axis=(0, 1))
-    weight /= total
+    weight = np.exp(log - log.max(axis=(0, 1)))
+    weight /= weight.sum(axis=(0, 1))
     of_phi = weight.sum(axis=1)
     part = weight / np.maximum(of_phi, 1e-300)[:, None]
     middle = np.einsum("psm,pskm->pkm", part, value)
@@ -154,12 +151,12 @@ def regress(
     size = 1 / np.einsum("psm,sn->mn", weight, np.exp(-log_size))
     rounding = (ROUNDING * (1 + abs(z).max(axis=1))) ** 2
     deviance = (n * np.log(square / n + rounding) + own).min(axis=(0, 1))
-    evidence, share = highest + np.log(total) - left * np.log(scale), np.sqrt(1 - np.maximum(phi, 0.0))
+    share = np.sqrt(1 - np.maximum(phi, 0.0))
     if sigma is not None:
         deviance = square[0, 0]
         denied |= gammaincc(left / 2, deviance / 2) < RARE
-        left, evidence = MANY, -0.5 * deviance
-    return Regression(of_phi, middle, error, size, left, share, deviance, evidence, denied)
+        left = MANY
+    return Regression(of_phi, middle, error, size, left, share, deviance, denied)
 
 
 def _sums(phi: Array, x: Array, y: Array) -> tuple[Array, Array, Array]:
@@ -239,6 +236,13 @@ def roughness(t: Array, z: Array) -> tuple[Array, Array]:
     return size.min(axis=0), (size / np.maximum(alone, 1e-300)).min(axis=0)
 
 
+def shaped(t: Array, off: Array) -> NDArray[np.bool_]:
+    """Whether distances (..., n), t rising, are no independent noise: neighbours say more of each other than they do in
+    all but 0.1 % of it, by trial at 12 to 200 points."""
+    found: NDArray[np.bool_] = roughness(t, off)[1] < 1 - 3.4 / math.sqrt(t.size)
+    return found
+
+
 def corrected(deviance: Any, points: int, numbers: int) -> Any:
     """AICc from minus twice the logarithm of the likelihood; inf where there are too few points for so many numbers."""
     left = points - numbers - 1
@@ -262,15 +266,3 @@ def line_deviance(t: Array, z: Array) -> float:
     outlying = 4 * np.log1p(off**2 / (3 * scale)).sum() + z.size * (math.log(scale) - constant)
     columns = np.stack([np.ones_like(t), t - t.mean()], axis=1)
     return min(float(regress(t, columns, z[None]).deviance[0]), float(outlying))
-
-
-def runs_chance(off: Array) -> Array:
-    """Chance that independent noise has so few runs of signs as distances (..., n), by Wald and Wolfowitz; NaN of fewer
-    than 12 points, or of one sign."""
-    above = (off > 0).sum(axis=-1)
-    both, runs = 2.0 * above * (off.shape[-1] - above), 1 + (np.diff(off > 0, axis=-1) != 0).sum(axis=-1)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        mean = 1 + both / off.shape[-1]
-        size = np.sqrt((mean - 1) * (mean - 2) / (off.shape[-1] - 1))
-        chance: Array = ndtr((runs + 0.5 - mean) / size)
-    return np.where((both > 0) & (off.shape[-1] >= 12), chance, np.nan)

@@ -37,8 +37,7 @@ EXPLANATION = (
 COMPARED = (
     "The smaller AICc and BIC, the better a law describes the points for the numbers that it fits. A law whose AICc "
     "and BIC are more than 10 above the least is ruled out; of the others, the one that fits the fewest numbers is "
-    "chosen. Errors of exponents hold for independent scatter. A chance of runs below 0.001 says that a law misses the "
-    "points systematically."
+    "chosen. Errors of exponents hold for independent scatter."
 )
 
 
@@ -267,10 +266,9 @@ def comparison_text(found: xr.Dataset, complete: bool = False) -> str:
     rows = []
     for one in found.drop_dims("point").to_dataframe().reset_index().to_dict("records"):
         told = "ruled out" if one["worse"] > RULED_OUT else str(one["exponents"])
-        runs = "-" if np.isnan(one["runs"]) else f"{one['runs']:.2g}" if one["runs"] >= 1e-4 else "< 1e-4"
-        more = (f"{one['bic'] - float(found.bic.min()):.4g}", str(one["numbers"]), runs) if complete else ()
+        more = (f"{one['bic'] - float(found.bic.min()):.4g}", str(one["numbers"])) if complete else ()
         rows.append((one["law"], f"{one['worse']:.4g}", *more, f"{one['residual']:.1e}", told))
-    heading = ("law", "worse by", *(("BIC", "numbers", "chance of runs") if complete else ()), "residual")
+    heading = ("law", "worse by", *(("BIC", "numbers") if complete else ()), "residual")
     title = f"{found.attrs['y']} over {found.attrs['x']}, {found.sizes['point']} points"
     notes = (f"Chosen: {found.attrs['verdict']}.", COMPARED if complete else "BIC and more, and what it means: --all.")
     return page(Table(rows, (*heading, "exponents"), title).text(), *map(paragraph, notes))
