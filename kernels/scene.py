@@ -5,13 +5,13 @@
 A scene may have several surfaces, each with its own jump; what is 0 at one of them is located as a kink is (`record`).
 The functions are plain Python of named scalars; each asks by name for the states, parameters and `side` that it needs,
 and for the time `t`, which is 0 at the start, or `start_time`, unless a state or a parameter is called t.
-They are called once, with objects that record what is done to them (`expression`), and written out as compiled
-functions for one cell and for lanes (`module`), in a file that can be read. In them are allowed + - * / ** abs,
-and sqrt, exp, log, sin, cos, tan, arcsin, arccos, arctan, sinh, cosh, tanh, hypot, power, sign, floor, mod, maximum,
-minimum and where of this module; numpy's of these names are the same, and so are math's in the module that the function
-is written in. power(abs(u), n), u a state and
-n > -1 any number, has no Taylor series at u = 0; there it is followed as `integrate.powers` says, right to the same
-tolerance. Of what is not a state, power and sqrt want something above 0 (else OUT_OF_RANGE).
+They are called once, with objects that record what is done to them (`expression`); of the record compiled functions
+are made, for one cell and for lanes (`functions`). In them are allowed + - * / ** abs, and sqrt, exp, log, sin, cos,
+tan, arcsin, arccos, arctan, sinh, cosh, tanh, hypot, power, sign, floor, mod, maximum, minimum and where of this
+module; numpy's of these names are the same, and so are math's in the module that the function is written in.
+power(abs(u), n), u a state and n > -1 any number, has no Taylor series at u = 0; there it is followed as
+`integrate.powers` says, right to the same tolerance. Of what is not a state, power and sqrt want something above 0
+(else OUT_OF_RANGE).
 
 A cell is OK where each state is within rtol of the truth, relative to the largest size that the state had on the way,
 and each time within rtol of itself. The surface and the kinks are located, or proved absent, over every step. A motion
@@ -76,7 +76,7 @@ Functions = Function | Mapping[str, Function]
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What a scene is made of; it is recorded and written out once, whatever its functions would say later.
+    """What a scene is made of; it is recorded and compiled once, whatever its functions would say later.
 
     Parameters
     ----------

@@ -99,7 +99,7 @@ def _at_stops(module, run, inputs, stops, together, tells):
 
     Those that take as many steps are side by side, for so lanes wait less for each other.
     """
-    cell = getattr(module, "M_TOLD", module.M).cell
+    cell = module.M.cell
     row, rows = first_rows(cell), len(flat(cell))
     found = [*range(row["time"], row["verdict"] + 1), *([row["errors"] + 1] if tells else [])]
     cells, places = fresh(rows, inputs), np.arange(len(inputs[0]))

@@ -14,6 +14,7 @@ import numpy as np
 
 from kernels.codegen import followed_twice, stated_error
 from kernels.codegen.accumulated import to_rest
+from kernels.codegen.functions import Functions
 from kernels.codegen.module import build, loaded
 from kernels.codegen.record import record
 from kernels.codegen.slid_along import slid_along
@@ -21,13 +22,12 @@ from kernels.codegen.sliding import made
 from kernels.codegen.stepped import stepped, twice_by
 from kernels.interface import Status
 from kernels.source_text.expression import INPUT, NUMBER, Expression, SceneError, math_recorded, needed
-from kernels.source_text.template import filled, listed
 
 FRESH = "from_start"
 RATES = '''
 """Rates of {name} in columns of states: written by kernels; do not change it here."""
 
-from {module} import *
+from kernels.codegen.module import kept
 from kernels.integrate.records import Mode
 
 
@@ -37,8 +37,9 @@ def rates_of(states, parameters, side, found):
     for i in range(states.shape[1]):
         state, given = ({states}), ({parameters})
         mode = Mode(side, (), given, False)
-        new = rates(state, Mode(side, natural_signs(state, mode), given, False))
-        {results}
+        new = M.rates(state, Mode(side, M.natural_signs(state, mode), given, False))
+        for j in range({n}):
+            found[j, i] = new[j]
 '''
 TOLERANCES = {
     "taylor": (3e-14, 4e-10, 2e-3),
@@ -211,10 +212,8 @@ def turning(scene, everywhere):
 @functools.cache
 def rating(scene):
     """The module of the scene's rates in columns."""
-    n, m = len(scene.states), len(scene.parameters)
-    text = filled(
-        RATES, name=scene.name, module=build(scene).__name__, states=listed(f"states[{j}, i]" for j in range(n)),
-        parameters=listed(f"parameters[{j}, i]" for j in range(m)),
-        results="\n".join(f"found[{j}, i] = new[{j}]" for j in range(n)),
-    )  # fmt: skip
-    return loaded("rates", scene, text.lstrip())
+    n, functions = len(scene.states), Functions(scene, record(scene))
+    states, parameters = ("".join(f"x[{j}, i], " for j in range(count)).replace("x", name)
+                          for name, count in (("states", n), ("parameters", len(scene.parameters))))  # fmt: skip
+    text = RATES.lstrip().format(name=scene.name, states=states, parameters=parameters, n=n)
+    return loaded(f"rates_{scene.name}_{functions.digest}", text, M=build(scene).M)

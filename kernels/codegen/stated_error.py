@@ -6,23 +6,16 @@ left, and all that is remarked or refused, is followed twice (`followed_twice`),
 """
 
 import functools
+from types import SimpleNamespace
 
 import numpy as np
 
 from kernels.codegen import followed_twice
 from kernels.codegen.followed_twice import ROUNDING
-from kernels.codegen.module import ORDERS, Writer, build, loaded
+from kernels.codegen.functions import Functions, cell_of
+from kernels.codegen.module import build, by_series
 from kernels.codegen.record import record
 from kernels.interface import Status
-from kernels.source_text.rounding import sizes
-
-TEXT = '''
-"""Motion of {name} with its error carried along: written by kernels; do not change it here."""
-
-from {module} import *
-
-M_TOLD = M._replace(cell=cell_of({cell}, True))
-'''
 
 STATED = 1.5
 """Stated error over the one carried along."""
@@ -43,27 +36,13 @@ def by_one(scene):
 
 @functools.cache
 def telling(scene):
-    """The module of the scene's motion with its error, written once."""
-    writer = Writer(scene, record(scene))
-    graph, of = writer.recorded.graph, writer.tangents.of
-    values = [graph.multiply(factor, u) for _, factor, u in writer.recorded.events]
-    made = "What the {} are made of, in size: an ulp of it is what rounding takes."
-    changed = (
-        ("rate_changes", "What changes of the states change of each rate.", writer.recorded.rates),
-        ("event_changes", "What changes of the states change of each event's value.", values),
-        ("jump_changes", "What changes of the states before a switch are behind it.", writer.recorded.switched),
-    )
-    cell = f"{len(writer.states)}, {len(writer.parameters)}, {writer.kinks}"
-    parts = [
-        TEXT.format(name=scene.name, module=build(scene).__name__, cell=cell).lstrip(),
-        sizes(writer, "made_of_rates", made.format("rates"), writer.recorded.rates),
-        sizes(writer, "made_of_events", made.format("events but for their offsets"), values),
-    ]
-    for name, doc, expressions in changed:
-        derivatives = [graph.of(0.0) if of(x) is None else of(x) for x in expressions]
-        parts.append(writer.function(name, doc, derivatives, ("state", "mode", "changes")))
-    parts += [writer.by_series(order, tells=True) for order in ORDERS]
-    return loaded("told", scene, "\n".join(parts))
+    """What runs the scene's motion with its error, made once."""
+    functions = Functions(scene, record(scene))
+    recorded, m = functions.recorded, build(scene).M._replace(cell=cell_of(*functions.size, True))
+    values = [recorded.graph.multiply(factor, u) for _, factor, u in recorded.events]
+    made = functions.sizes(recorded.rates), functions.sizes(values)
+    changed = map(functions.changed, (recorded.rates, values, recorded.switched))
+    return SimpleNamespace(STATES=scene.states, M=m, **by_series(functions, m, (*changed, *made)))
 
 
 def solved(module, columns, rtol, outputs, status):

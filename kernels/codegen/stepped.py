@@ -1,56 +1,23 @@
-"""The written module of a scene's Runge-Kutta methods, at a fixed step and to a tolerance.
-
-It lies beside the scene's own module (`module`), whose functions it takes. To a tolerance a cell is followed twice, as
-by the Taylor method.
-"""
+"""A scene's Runge-Kutta methods, at a fixed step and to a tolerance: a cell is then followed twice, as by series."""
 
 import functools
 from types import SimpleNamespace
 
 from kernels.codegen import followed_twice
-from kernels.codegen.module import Writer, build, loaded
+from kernels.codegen.functions import Functions
+from kernels.codegen.module import build, driven, running
 from kernels.codegen.record import record
-from kernels.integrate.events import METHODS
-from kernels.source_text.expression import INPUT
-from kernels.source_text.stiff import linear
-
-PAIRS = {"dopri5": "DOPRI5", "dop853": "DOP853", "rodas5p": "RODAS5P_PAIR"}
-FINEST = 1e-13
-"""The tightest tolerance that is tried where a wider one fails: below it rounding stops the steps."""
-
-TEXT = '''
-"""Runge-Kutta methods of {name}: written by kernels; do not change it here."""
-
-from {module} import *
 from kernels.integrate import fixed_step
 from kernels.integrate.adaptive import to_event
+from kernels.integrate.events import METHODS
 from kernels.integrate.pairs import DOP853, DOPRI5, kept_on_kink
 from kernels.integrate.rosenbrock import RODAS5P_PAIR
+from kernels.lanes.jit import jit_call
+from kernels.source_text.expression import INPUT
 
-M_FIXED = M._replace(cell=fixed_step.cell_of(M.cell))
-
-
-@jit
-def advance_fixed(memory, i):
-    """Every lane on by some steps at a fixed step; whether one has finished."""
-    return fixed_step.advance(M_FIXED, memory, i)
-
-
-@kept
-def run(cells, memory, held, together):
-    """Each cell, a row of what a lane knows, until its last switch."""
-    each_refilled(advance_fixed, cells, memory, held, together)
-'''
-
-LEG = '''
-PAIR_{method} = {pair}
-
-
-@jit_call
-def leg_{method}(state, mode, unit, h, on, tolerance, active, errors):
-    """The motion to its next event."""
-    return to_event(M_STIFF, PAIR_{method}, state, mode, unit, h, on, tolerance, active)
-'''
+PAIRS = {"dopri5": DOPRI5, "dop853": DOP853, "rodas5p": RODAS5P_PAIR}
+FINEST = 1e-13
+"""The tightest tolerance that is tried where a wider one fails: below it rounding stops the steps."""
 
 
 def _is_speed(recorded, scene, place, expression):
@@ -81,11 +48,29 @@ def twice_by(method, scene):
 
 @functools.cache
 def stepped(scene):
-    """The module of the scene's steps, written once: `run` at a fixed step, `run_{method}` for each of `PAIRS`."""
-    module, writer = build(scene), Writer(scene, record(scene))
-    parts = [TEXT.format(name=scene.name, module=module.__name__).lstrip(), linear(writer)]
-    parts.append("\nM_STIFF = M._replace(factored=factored, solved=solved)\n")
-    for method, pair in PAIRS.items():
-        parts.append(LEG.format(method=method, pair=f"kept_on_kink({pair})" if scene.slides else pair))
-        parts.append(writer.driven(method))
-    return loaded("steps", scene, "\n".join(parts))
+    """What runs the scene's steps, made once: `run` at a fixed step, `run_{method}` for each of `PAIRS`."""
+    functions, m = Functions(scene, record(scene)), build(scene).M
+    fixed = m._replace(cell=fixed_step.cell_of(m.cell))
+    stiff = m._replace(**dict(zip(("factored", "solved"), functions.linear(), strict=True)))
+
+    @jit_call
+    def of_lanes(memory, i):
+        return fixed_step.advance(fixed, memory, i)
+
+    runs = {
+        f"run_{method}": driven(functions, stiff, _leg(stiff, kept_on_kink(pair) if scene.slides else pair), method)
+        for method, pair in PAIRS.items()
+    }
+    return SimpleNamespace(
+        STATES=scene.states, M_FIXED=fixed, M_STIFF=stiff, run=running(functions, of_lanes, "fixed"), **runs
+    )
+
+
+def _leg(m, pair):
+    """The motion to its next event by a pair."""
+
+    @jit_call
+    def leg(state, mode, unit, h, on, tolerance, active, errors):
+        return to_event(m, pair, state, mode, unit, h, on, tolerance, active)
+
+    return leg

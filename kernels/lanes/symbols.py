@@ -12,10 +12,12 @@ import ast
 import functools
 import inspect
 import operator
+import sys
 import textwrap
-from types import FunctionType
+from types import FunctionType, SimpleNamespace
 
 from numba import types
+from numba.core.typing.templates import builtin_registry
 from numba.extending import lower_builtin, type_callable
 
 from kernels.lanes.jit import COMPILED
@@ -55,6 +57,22 @@ for _name in ("add", "sub", "mul", "truediv", "lt", "le", "gt", "ge", "and_", "o
     _function = getattr(operator, _name)
     setattr(_Symbol, f"__{_name.strip('_')}__", _operation(_function, turned=False))
     setattr(_Symbol, f"__r{_name.strip('_')}__", _operation(_function, turned=True))
+
+
+class _Rehearsal:
+    """In the place of a writer: it only sees what is called."""
+
+    def call(self, function, arguments):
+        return ANY
+
+
+class _Any(_Symbol):
+    def __getitem__(self, index):
+        return self
+
+
+ANY = _Any(_Rehearsal(), None)
+"""Stands for every number where only the way of a computation is wanted."""
 
 
 class _Writer:
@@ -125,23 +143,35 @@ def _for_symbols(function):
     return call
 
 
-@functools.cache
 def _scope_of(module):
     """Globals of a module, with its functions for symbols."""
-    scope = dict(_MODULES[module])
-    for name, x in scope.items():
-        if isinstance(x, FunctionType) or isinstance(getattr(x, "_numba_type_", None), types.Callable):
-            scope[name] = _for_symbols(x)
-    return scope
+    if module not in _SCOPES:
+        scope = _SCOPES[module] = dict(vars(sys.modules[module]))
+        for name, x in scope.items():
+            if isinstance(x, FunctionType) or isinstance(getattr(x, "_numba_type_", None), types.Callable):
+                scope[name] = _for_symbols(x)
+    return _SCOPES[module]
 
 
-_MODULES = {}
-"""Globals by the name of their module."""
+_SCOPES = {}
+"""Globals for symbols by the name of their module."""
+
+
+def taking_symbols(module):
+    """A module's functions, which take symbols too: for objects with which a symbolic function works."""
+    return SimpleNamespace(**_scope_of(module.__name__))
+
+
+def written(function):
+    """A function with any Python in it, of tuples, numbers or symbols, as one that compiled code can be handed."""
+    symbolic(function)
+    if COMPILED:
+        function._numba_type_ = builtin_registry.globals[-1][1]
+    return function
 
 
 def _on_symbols(function):
     """The function in the scope that is for symbols."""
-    _MODULES.setdefault(function.__module__, function.__globals__)
     scope = _scope_of(function.__module__)
     return FunctionType(function.__code__, scope, function.__name__, function.__defaults__, function.__closure__)
 

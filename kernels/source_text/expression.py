@@ -11,6 +11,7 @@ sign tells whether the integer is even.
 """
 
 import contextlib
+import functools
 import math
 import sys
 import threading
@@ -56,6 +57,11 @@ class Expression:
     args: tuple
     varies: bool
     index: int
+
+    @functools.cached_property
+    def of_numbers(self):
+        """Whether no input is in it."""
+        return self.kind != INPUT and all(a.of_numbers for a in self.args if isinstance(a, Expression))
 
     def __add__(self, other):
         return self.graph.add(self, other)

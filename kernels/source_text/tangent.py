@@ -5,33 +5,20 @@ Taylor series, of delta' = (D rates) delta, come from the recurrences of the mot
 change between events.
 """
 
-import re
 from collections import defaultdict
 
 from kernels.source_text.expression import ADD, INPUT, SCALED, needed
-from kernels.source_text.template import filled, listed
 
 SHORT, FED_BACK, LONG = {12: 4, 18: 4}, {12: 6, 18: 6}, {12: 9, 18: 12}
 """Order of the changes' series on a step of the motion's: terms fall by about a quarter each, so to some 1e-3. Those of
 exp, sin, cos, sinh, cosh and linear rates first grow, as x^k/k!; those of states that feed back on one another may."""
 
-TANGENT = '''
-@jit
-def {name}_{order}(state, mode, unit, inner, changes, cores):
-    """What a change of each state is evaluated from; `inner` are coefficients that `series_{order}` knows."""
-    {unpack}
-    {cores}
-    {inner}
-    {lines}
-    return ({result})
-'''
 
-
-def short(writer, order):
-    """Order of the changes' series beside one of the motion of that order."""
-    kinds = {x.kind for x in needed(*writer.recorded.rates) if x.varies}
+def short(rates, feeds_back, order):
+    """Order of the changes' series beside one of the motion of that order; `feeds_back` : whether a state's does."""
+    kinds = {x.kind for x in needed(*rates) if x.varies}
     grow_first = kinds & {"exp", "sin", "cos", "sinh", "cosh"} or kinds <= {INPUT, ADD, SCALED}
-    return (LONG if grow_first else FED_BACK if writer.feeds_back() else SHORT)[order]
+    return (LONG if grow_first else FED_BACK if feeds_back else SHORT)[order]
 
 
 class Tangents:
@@ -121,24 +108,3 @@ def along(graph, gradient, rates):
     """The rate of what has that gradient, a list whose entries may be None."""
     products = [slope * rate for slope, rate in zip(gradient, rates, strict=True) if slope is not None]
     return sum(products, graph.of(0.0))
-
-
-def tangent(writer, lines, order, powers, name, length):
-    """The text of a tangent of the order `length`, and what it takes of `lines`, which are the series', as text."""
-    changes = lines.branch()
-    deltas = zip(writer.states, writer.tangents.deltas.values(), strict=True)
-    named = [f"d_{s} = {in_every_lane(changes.coefficients(delta, length))}" for s, delta in deltas]
-    own = set(re.findall(r"\w+", "\n".join([*changes.text, *named])))
-    given = [known for known in (line.split(" = ")[0] for line in lines.text) if known in own]
-    text = filled(
-        TANGENT, name=name, order=order, unpack=writer.unpacked("state", "mode", "changes"),
-        cores=listed(f"core_{i}" for i in range(powers)) + " = cores" if powers else "",
-        inner=f"{listed(given)} = inner" if given else "", lines="\n".join([*changes.text, *named]),
-        result=listed(writer.curve(s, "d", "delta_{}") for s in writer.states),
-    )  # fmt: skip
-    return text, f"({listed(given)})"
-
-
-def in_every_lane(coefficients):
-    """A tuple of coefficients, as text, of one type: zeros are repeated in every lane."""
-    return re.sub(r"(?<=[ (])0\.0(?=,)", "0.0 * side", coefficients)

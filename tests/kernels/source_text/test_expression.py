@@ -1,4 +1,4 @@
-"""Recurrences written from an expression graph, against mpmath's Taylor coefficients of the same function."""
+"""Recurrences of an expression graph, against mpmath's Taylor coefficients of the same function."""
 
 import math
 
@@ -6,44 +6,27 @@ import mpmath
 import pytest
 from mpmath import mp
 
-from kernels.lanes.vectors import dot, fma, magnitude, where
-from kernels.maths import elementary
 from kernels.source_text import expression as E
-from kernels.source_text.series import Lines
+from kernels.source_text.series import Values
 from kernels.source_text.tangent import Tangents
 
 ORDER = 9
-PLAIN = {
-    "dot": dot, "fma": fma, "where": where, "magnitude": magnitude, "sqrt": math.sqrt, "exp": math.exp,
-    "log": math.log, "power": math.pow, "sincos": lambda x: (math.sin(x), math.cos(x)), "tanh": math.tanh,
-    "arctan": math.atan, "arcsin": math.asin, "arccos": math.acos, "sinh": math.sinh, "cosh": math.cosh,
-    "hypot": math.hypot, "floor": math.floor, "floor_between": elementary.floor_between,
-}  # fmt: skip
 
 
 def side(graph, kink):
     """1, as everything is above 0 here, or for the kink of a floor, sin(pi x), the sign of that."""
-    lines = Lines({"u": "u"})
-    value = lines.value(kink)
-    scope = {**PLAIN, "u": 0.7}
-    exec("\n".join(lines.text) + f"\nvalue = {value}", scope)
-    return math.copysign(1.0, scope["value"])
+    return math.copysign(1.0, Values({"u": 0.7}).value(kink))
 
 
 def coefficients(function, order=ORDER, **constants):
-    """Taylor coefficients of function(u) for u = 0.7 + t - t^2/2 + t^3/5, as the written text gives them."""
+    """Taylor coefficients of function(u) for u = 0.7 + t - t^2/2 + t^3/5."""
     graph = E.Graph()
     u, rate, inner = graph.series("u"), graph.series("r"), graph.series("s")
-    named = {name: graph.constant(name) for name in constants}
-    result = function(u, **named)
+    result = function(u, **{name: graph.constant(name) for name in constants})
     # u' = r, r' = s, s' = 6/5: a cubic
     rates = {"u": rate, "r": inner, "s": graph.of(1.2)}
-    signs = {f"sign_{j}": side(graph, kink) for j, kink in enumerate(graph.kinks)}
-    lines = Lines({name: name for name in ("u", "r", "s", *named)} | {f".{name}": name for name in signs}, rates)
-    last = lines.coefficients(result, order)
-    scope = {**PLAIN, **constants, **signs, "u": 0.7, "r": 1.0, "s": -1.0}
-    exec("\n".join(lines.text) + f"\nresult = {last}", scope)
-    return [float(x) for x in scope["result"]]
+    signs = {f".sign_{j}": side(graph, kink) for j, kink in enumerate(graph.kinks)}
+    return Values({"u": 0.7, "r": 1.0, "s": -1.0} | constants | signs, rates).coefficients(result, order)
 
 
 def true_coefficients(function, order=ORDER):
@@ -102,13 +85,9 @@ def test_a_power_of_abs_keeps_its_constant_apart_and_its_series_is_that_of_both_
         graph = E.Graph()
         u, rate, inner = graph.series("u"), graph.series("r"), graph.series("s")
         result = E.power(abs(u), 1.7)
-        lines = Lines(
-            {"u": "u", "r": "r", "s": "s", ".sign_0": "side"}, {"u": rate, "r": inner, "s": graph.of(side * 1.2)}
-        )
-        last = lines.coefficients(result, ORDER)
-        scope = {**PLAIN, "u": side * 0.7, "r": side, "s": -side, "side": side}
-        exec("\n".join(lines.text) + f"\nresult = {last}", scope)
-        assert max(abs(float(f) - t) for f, t in zip(scope["result"], true, strict=True)) < 3e-14
+        inputs = {"u": side * 0.7, "r": side, "s": -side, ".sign_0": side}
+        found = Values(inputs, {"u": rate, "r": inner, "s": graph.of(side * 1.2)}).coefficients(result, ORDER)
+        assert max(abs(float(f) - t) for f, t in zip(found, true, strict=True)) < 3e-14
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -118,11 +97,8 @@ def test_a_derivative_along_a_change_is_that_of_the_function(name):
     u = graph.series("u")
     result = ours(u)
     change = Tangents(graph, ["u"]).of(result)
-    signs = {f".sign_{j}": str(side(graph, kink)) for j, kink in enumerate(graph.kinks)}
-    lines = Lines({"u": "u", ".delta_u": "delta"} | signs)
-    value = lines.value(change)
-    scope = {**PLAIN, "u": 0.7, "delta": 0.3}
-    exec("\n".join(lines.text) + f"\nresult = {value}", scope)
+    signs = {f".sign_{j}": side(graph, kink) for j, kink in enumerate(graph.kinks)}
+    value = Values({"u": 0.7, ".delta_u": 0.3} | signs).value(change)
     with mp.workdps(40):
         true = mpmath.diff(truth, mp.mpf(0.7)) * 0.3
-    assert abs(scope["result"] - true) < 1e-14 * max(1, abs(true))
+    assert abs(value - true) < 1e-14 * max(1, abs(true))

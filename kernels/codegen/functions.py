@@ -1,0 +1,397 @@
+"""A recorded scene as functions: plain Python over its expressions, run when code is compiled (`lanes.symbols`).
+
+They are what is special of a scene: rates, series, tangents, events; what is done with them is generic
+(`kernels.integrate`). In plain Python they are functions like any other.
+"""
+
+import functools
+import hashlib
+import inspect
+
+from kernels.integrate.carried import Changes
+from kernels.integrate.driver import KINK_LIMIT, Slides
+from kernels.integrate.powers import Power, core
+from kernels.integrate.records import Cell, Errors, Mode, Pieces, Written
+from kernels.integrate.taylor import BY_SERIES, BY_SUM
+from kernels.integrate.taylor_leg import Series
+from kernels.lanes.jit import jit_call
+from kernels.lanes.symbols import ANY, written
+from kernels.lanes.vectors import where
+from kernels.source_text import stiff
+from kernels.source_text.expression import DIV, HALF_SQUARE, INPUT, MUL, NUMBER, SCALED, Expression, needed
+from kernels.source_text.hidden import Enclosures
+from kernels.source_text.rounding import Losses, Sizes
+from kernels.source_text.series import V, Values
+from kernels.source_text.tangent import SHORT, Tangents, along, short
+
+
+def cell_of(states, parameters, kinks, tells=False):
+    """A cell of zeros, as large as a scene's."""
+    u = (0.0,) * states
+    errors = Errors(0.0, 0.0, 0.0, 0.0, u, 0.0, 0.0, u, 0.0, 0.0, 0.0, u) if tells else ()
+    marks = (0.0,) * (kinks + 1)
+    wanted, so_far = (0.0, (0.0,) * parameters, 0.0, 0.0, 0.0), (0.0, 0.0, u, u, 0.0)
+    return Cell(*wanted, *so_far, u, 0.0, marks, 0.0, 0.0, marks, 0.0, 0.0, 0.0, 0.0, 0.0, errors)
+
+
+def _digest(scene, recorded):
+    """Of all that the machine code of a scene hangs on."""
+
+    def plain(x):
+        return x.index if isinstance(x, Expression) else list(map(plain, x)) if isinstance(x, tuple) else x
+
+    graph, *parts = vars(recorded).values()
+    nodes = [(x.kind, x.varies, plain(x.args)) for x in graph.nodes]
+    flags = scene.states, scene.parameters, scene.most_kinks, scene.slides, scene.exact_start
+    text = repr((nodes, plain((*graph.kinks, *graph.powers)), plain(tuple(parts)), flags))
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def entry(j):
+    """A function of tuples: their entry j."""
+    return written(lambda xs: xs[j])
+
+
+class Functions:
+    """The functions of a scene, `written` for the integrators; those of its series, powers and Jacobian."""
+
+    def __init__(self, scene, recorded):
+        self.scene, self.recorded, self.graph = scene, recorded, recorded.graph
+        self.states, self.kinks, self.digest = scene.states, list(recorded.graph.kinks), _digest(scene, recorded)
+        self.size = n, m, kinks = len(scene.states), len(scene.parameters), len(self.kinks)
+        rates = dict(zip(self.states, recorded.rates, strict=True))
+        self.summed = {s: r.args[0] for s, r in rates.items() if r.kind == INPUT and r.varies}
+        """The states whose rate is another state, and which."""
+        self.seen = [u.args[0] if u.kind == INPUT else None for _, _, u in recorded.events]
+        """For each event the state that it watches; None where it is more than one."""
+        hangs = {s: {x.args[0] for x in needed(r) if x.kind == INPUT and x.args[0] in rates} for s, r in rates.items()}
+        for _ in hangs:
+            hangs = {s: on.union(*(hangs[other] for other in on)) for s, on in hangs.items()}
+        self.feeds_back = any(other != s and s in hangs[other] for s, on in hangs.items() for other in on)
+        """Whether the rate of a state hangs on another one whose own rate, or that of a further one, hangs on it."""
+        mode, boxes = Mode(ANY, (ANY,) * (kinks + 1), (ANY,) * m, False), ((ANY, ANY),) * n
+        self.any = {"state": (ANY,) * n, "changes": (ANY,) * n, "mode": mode, "boxes": boxes}
+        self.any |= {"parameters": mode.parameters, "cores": (ANY,) * len(self.graph.powers)}
+
+    @functools.cached_property
+    def tangents(self):
+        """Derivatives along changes of the states."""
+        return Tangents(self.graph, self.states)
+
+    def inputs(self, state, mode, unit=None, changes=()):
+        """{name of an input: its value}."""
+        found = dict(zip(self.states, state, strict=False)) | {"side": mode.side, ".unit": unit}
+        found |= dict(zip(self.scene.parameters, mode.parameters, strict=True))
+        found |= dict(zip((*(f".sign_{j}" for j in range(len(self.kinks))), ".way"), mode.signs, strict=False))
+        return found | {f".delta_{s}": delta for s, delta in zip(self.states, changes, strict=False)}
+
+    def made(self, function):
+        """The function as compiled code takes it.
+
+        It is rehearsed at once: so each expression's derivatives come into the graph in the same order always.
+        """
+        function(*(self.any.get(name, ANY) for name in inspect.signature(function).parameters))
+        return written(function)
+
+    def of_inputs(self, compute):
+        """A function of state and mode."""
+        return self.made(lambda state, mode: compute(self.inputs(state, mode)))
+
+    def values(self, expressions):
+        """A function of state and mode: the values of expressions."""
+        return self.of_inputs(lambda inputs: tuple(map(Values(inputs).in_every_lane, expressions)))
+
+    def value(self, expression):
+        """A function of state and mode: the value of an expression."""
+        return self.of_inputs(lambda inputs: Values(inputs).in_every_lane(expression))
+
+    def sizes(self, expressions):
+        """A function of what expressions are made of, in size: an ulp of it is what rounding takes."""
+
+        def sizes(inputs):
+            found = Sizes(inputs)
+            return tuple(found.of(x) if x.varies else 0.0 * inputs["side"] + found.of(x) for x in expressions)
+
+        return self.of_inputs(sizes)
+
+    def changed(self, expressions):
+        """A function of what changes of the states change of expressions."""
+        derivatives = [self.graph.of(0.0) if x is None else x for x in map(self.tangents.of, expressions)]
+
+        def changed(state, mode, changes):
+            return tuple(map(Values(self.inputs(state, mode, None, changes)).in_every_lane, derivatives))
+
+        return self.made(changed)
+
+    def _started(self):
+        def started(parameters, side):
+            inputs = self.inputs((), Mode(side, (), parameters, False))
+            return tuple(map(Values(inputs).in_every_lane, self.recorded.started))
+
+        return self.made(started)
+
+    def _natural_signs(self):
+        """One kink after the other, for they may hang on signs of those before."""
+
+        def natural_signs(inputs):
+            values, signs = Values(inputs), []
+            for j, u in enumerate(self.kinks):
+                signs.append(V.where(values.value(u) < 0.0, -1.0, 1.0))
+                inputs[f".sign_{j}"] = signs[j]
+            return (*signs, 0.0 * inputs["side"] + 1.0)
+
+        return self.of_inputs(natural_signs)
+
+    def _underflows(self):
+        """Whether a product of numbers that are not 0 loses its digits."""
+        found = needed(*self.recorded.timed, self.recorded.surface)
+        products = [
+            x for x in found if x.kind in (MUL, HALF_SQUARE, SCALED, DIV) and all(a.kind != NUMBER for a in x.args)
+        ]
+
+        def underflows(state, mode, unit):
+            value, lost = Values(self.inputs(state, mode, unit)).value, unit < 0.0
+            for x in products:
+                small = V.magnitude(value(x)) < 1e-290
+                for factor in x.args:
+                    small = small & (V.magnitude(value(factor)) > 0.0)
+                lost = lost | small
+            return lost
+
+        return self.made(underflows)
+
+    def _lost(self):
+        started = dict(zip(self.states, self.recorded.started, strict=True))
+
+        def lost(inputs):
+            found = None if self.scene.exact_start else Losses(inputs, started).lost(self.recorded.surface)
+            return 0.0 * inputs["side"] if found is None else found
+
+        return self.of_inputs(lost)
+
+    def _rates_of(self, *values):
+        """The rates of expressions."""
+        gradients = [[Tangents.along(self.graph, s).of(value) for s in self.states] for value in values]
+        return [along(self.graph, gradient, self.recorded.rates) for gradient in gradients]
+
+    def _made_of(self):
+        parts = []
+        for offset, factor, u in self.recorded.events:
+            value = self.graph.multiply(factor, u)
+            parts.append((offset, value, *self._rates_of(value)))
+
+        def made(inputs):
+            found = Sizes(inputs)
+            size, value = found.of, found.values.value
+            return tuple((size(x) + V.magnitude(value(offset)), value(rate)) for offset, x, rate in parts)
+
+        return self.of_inputs(made)
+
+    def _in_boxes(self, compute):
+        """A function of state, boxes and mode, left a call."""
+
+        def in_boxes(state, boxes, mode):
+            boxes = dict(zip(self.states, boxes, strict=True))
+            found, nothing = compute(Enclosures(self.inputs(state, mode), boxes)), 0.0 * mode.side
+            return tuple(tuple(nothing if x is None else nothing + x for x in part) for part in found)
+
+        self.made(in_boxes)
+
+        @jit_call
+        def apart(state, boxes, mode):
+            return in_boxes(state, boxes, mode)
+
+        return apart
+
+    def _hidden(self):
+        """`Written.hidden`, and `Written.hiding`."""
+        hides = []
+
+        def excesses(found):
+            rates = [found.excess(rate) for rate in self.recorded.rates]
+            parts = rates, [found.excess_scaled(factor, u) for _, factor, u in self.recorded.events]
+            hides[:] = [tuple(float(x is not None) for x in part) for part in parts]
+            return parts
+
+        return self._in_boxes(excesses), tuple(hides)
+
+    def _bounds(self):
+        values = [self.graph.add(offset, self.graph.multiply(factor, u)) for offset, factor, u in self.recorded.events]
+        rates = self._rates_of(*values)
+        parts = (values, 0), (rates, 0), (rates, 1)
+        return self._in_boxes(lambda found: [[found.interval(x)[end] for x in part] for part, end in parts])
+
+    def written(self):
+        """The scene's `Written`."""
+        recorded, scene, slides = self.recorded, self.scene, None
+        hidden, hiding = self._hidden()
+        of_state = {
+            "rates": self.values(recorded.rates), "surface": self.value(recorded.surface),
+            "kinks": self.values(self.kinks), "switched": self.values(recorded.switched), "started": self._started(),
+            "natural_signs": self._natural_signs(), "underflows": self._underflows(), "jet": self.series(2)[0],
+            "lost": self._lost(), "hidden": hidden, "bounds": self._bounds(), "made": self._made_of(),
+        }  # fmt: skip
+        if scene.slides:
+            flat = [x for pair in recorded.speeds for x in pair]
+
+            def speeds(inputs):
+                found = map(Values(inputs).in_every_lane, flat)
+                return tuple(zip(found, found, strict=True))
+
+            slides = Slides(self.of_inputs(speeds), self.values(recorded.onto))
+        # on whose side a switch's result hangs, but for further surfaces and the surface's own u
+        signs = {x.args[0] for x in needed(*recorded.switched) if x.kind == INPUT}
+        deciding = tuple(
+            float(f".sign_{j}" in signs and j not in recorded.surfaces and u is not recorded.events[0][2])
+            for j, u in enumerate(self.kinks)
+        )
+        passable = tuple(
+            float(not any(x.kind == INPUT and x.args[0] == "side" for x in needed(event)))
+            for event in (recorded.surface, *self.kinks)
+        )
+        return Written(
+            **of_state, numbers=tuple(map(float, range(1 + len(self.kinks)))),
+            alternating=tuple((-1.0) ** j for j in range(len(self.states))),
+            most_kinks=KINK_LIMIT if scene.most_kinks is None else float(scene.most_kinks), cell=cell_of(*self.size),
+            slides=slides, hiding=hiding, passable=passable, deciding=deciding if any(deciding) else None,
+            factored=None, solved=None,
+        )  # fmt: skip
+
+    def linear(self):
+        """`Written.factored` and `Written.solved`: what `stiff` makes of I - h J."""
+        jacobian, n, places = {}, len(self.states), []
+        for c, state in enumerate(self.states):
+            slopes = map(Tangents.along(self.graph, state).of, self.recorded.rates)
+            jacobian |= {(r, c): slope for r, slope in enumerate(slopes) if slope is not None}
+
+        def factored(state, mode, h):
+            values, nothing = Values(self.inputs(state, mode)), 0.0 * mode.side
+            matrix = {(r, r): 1.0 + nothing for r in range(n)}
+            for place, slope in jacobian.items():
+                matrix[place] = V.fma(-h, values.value(slope), matrix.get(place, nothing))
+            parts = stiff.triangular(matrix, n, nothing)
+            places[:] = map(tuple, parts)
+            return tuple(tuple(part.values()) for part in parts)
+
+        def solved(factors, right):
+            return stiff.solution(*(dict(zip(*pair, strict=True)) for pair in zip(places, factors, strict=True)), right)
+
+        self.made(factored)
+        written(solved)
+
+        @jit_call
+        def factored_apart(state, mode, h):
+            return factored(state, mode, h)
+
+        @jit_call
+        def solved_apart(factors, right):
+            return solved(factors, right)
+
+        return factored_apart, solved_apart
+
+    def of_series(self, m, order, changes=None):
+        """`taylor_leg.Series` of an order; `changes` : of the error that is carried along, the first of `Changes`."""
+        ways = {s: BY_SUM if s in self.summed else BY_SERIES for s in self.states} | {None: BY_SERIES}
+        pieces, tangents = self.series(order, True, changes is not None)
+        return Series(
+            m, order, pieces, *self.powers, tuple(ways[s] for s in self.states), tuple(ways[s] for s in self.seen),
+            tuple(float(s in self.summed) for s in self.states), tuple(float(s is None) for s in self.seen),
+            changes and Changes(*changes, *tangents, self.feeds_back or None),
+        )  # fmt: skip
+
+    def series(self, order, powers=False, tells=False):
+        """`Series.pieces` of an order; if it tells, with `Changes.tangent` and `Changes.rough`, which go on from them.
+
+        With `powers` these are constants in their cores.
+        """
+        recorded, graph, summed = self.recorded, self.graph, self.summed
+        rates = dict(zip(self.states, recorded.timed, strict=True))
+        if tells:
+            rates |= {f".delta_{s}": self.tangents.of(x) for s, x in rates.items()}
+        lengths = {"inner": short(recorded.rates, self.feeds_back, order), "rough": SHORT[order]} if tells else {}
+        taken = {"inner": (), "rough": ()}
+
+        def curves(starts, unit, series):
+            """What each state, or its change, is evaluated from (`taylor.Way`)."""
+            start = dict(zip(self.states, starts, strict=True))
+            return {s: (start[s], unit, series[summed[s]]) if s in summed else (u,) for s, u in series.items()}
+
+        def computed(state, mode, unit, cores):
+            values = Values(self.inputs(state, mode, unit), rates, cores)
+            series, events = {s: values.coefficients(graph.series(s), order) for s in self.states}, []
+            for offset, factor, u in recorded.events:
+                found = values.coefficients(u, order)
+                events.append((values.value(offset), values.value(factor), found))
+            return values, series, tuple(events)
+
+        def pieces(state, mode, unit, cores):
+            values, series, events = computed(state, mode, unit, cores)
+            of_states = curves(state, unit, series)
+            watched = list(zip(self.seen, events, strict=True))
+            of_events = tuple((u,) if s is None else of_states[s] for s, (*_, u) in watched)
+            controlled = *series.values(), *(u for s, (*_, u) in watched if s is None)
+            inner, rough = (tuple(values.known[key] for key in keys) for keys in taken.values())
+            return Pieces(
+                tuple(series.values()), events, controlled, tuple(of_states.values()), of_events, inner, rough
+            )
+
+        def changed(values, length, changes, unit):
+            found, nothing = {}, 0.0 * values.inputs["side"]
+            for s, delta in self.tangents.deltas.items():
+                terms = (values.coefficient(delta, k) for k in range(length + 1))
+                found[s] = tuple(nothing if x is None else x for x in terms)
+            return tuple(curves(changes, unit, found).values())
+
+        def tangent(part):
+            def tangent(state, mode, unit, inner, changes, cores):
+                values = Values(self.inputs(state, mode, unit, changes), rates, cores)
+                values.known |= dict(zip(taken[part], inner, strict=True))
+                return changed(values, lengths[part], changes, unit)
+
+            return written(tangent)
+
+        state, mode, changes = (self.any[name] for name in ("state", "mode", "changes"))
+        cores = self.any["cores"] if powers else ()
+        whole, *_ = computed(state, mode, ANY, cores)
+        for part, length in lengths.items():
+            values = Values(self.inputs(state, mode, ANY, changes), rates, cores)
+            values.known = dict(whole.known)
+            changed(values, length, changes, ANY)
+            inputs = {(x.index, 0) for x in graph.nodes if x.kind == INPUT}
+            asked = values.asked - inputs
+            taken[part] = [key for key, value in whole.known.items() if key in asked and value is ANY]
+        return written(pieces), [tangent(part) for part in lengths]
+
+    @functools.cached_property
+    def powers(self):
+        """`Series.cores`, and `Series.on_kink`."""
+        powers, bases = [], {}
+        for node in self.graph.powers:
+            base = node.args[0]
+            kink, place = self.kinks.index(base.args[1]), self.states.index(base.args[1].args[0])
+            bases[place] = 1 + kink
+            of_state, entries = map(self.value, node.args), (entry(place), entry(1 + kink))
+            powers.append(Power(self._with_power(node), *of_state, *entries, self._without(place)))
+
+        def cores(state, mode, unit, tolerance, on, t, margins):
+            found = [core(p, state, mode, unit, tolerance, on, t, margins) for p in powers]
+            values, limits, coarse = (tuple(each[k] for each in found) for k in range(3))
+            return values, limits, coarse, found[-1][3] if found else None
+
+        def on_kink(state, fires):
+            return tuple(where(fires[bases[i]], 0.0 * u, u) if i in bases else u for i, u in enumerate(state))
+
+        return written(cores), written(on_kink)
+
+    def _with_power(self, node):
+        """The rates per unit of time, with a value of a power."""
+
+        def rates(state, mode, unit, power):
+            values = Values(self.inputs(state, mode, unit), precomputed={node: power})
+            return tuple(map(values.value, self.recorded.timed))
+
+        return self.made(rates)
+
+    def _without(self, place):
+        """The state with that one 0."""
+        return written(lambda state, mode: (*state[:place], 0.0 * mode.side, *state[place + 1 :]))
