@@ -175,20 +175,6 @@ class Loop:
         """How many blocks are computed at a time."""
         return self.task.cores if self._cluster is None else max(1, self._cluster.threads)
 
-    def begin(self, jobs: Sequence[int]) -> None:
-        """Begins to tell of the progress, where the blocks `jobs` are to do, and logs what is computed where."""
-        task, total, machine = self.task, self.blocks.rows.size, platform.uname()
-        done = total - sum(map(self._cells, jobs))
-        self.progress = Progress(total, task.progress, task.name, done, float(self._weights[list(jobs)].sum()))
-        versions = task.schema.attrs["versions"]
-        log(
-            f"begins: {task.name}, kernel {task.study.kernel_name}, {done:,} of {total:,} cells done before, "
-            f"{self.blocks.count:,} blocks, {task.cores} cores, process {os.getpid()} on {machine.node} "
-            f"({machine.system} {machine.machine}), {versions}",
-            "begin", kernel=task.study.kernel_name, cells=done, of=total, cores=task.cores, process=os.getpid(),
-            machine=machine.node, versions=versions,
-        )  # fmt: skip
-
     def _cells(self, job: int) -> int:
         """How many cells a block has."""
         start, stop = self.blocks.cells(job)
@@ -206,16 +192,27 @@ class Loop:
         shared: tuple[Path, bytes] | None = None,
         tick: Callable[[], None] = lambda: None,
     ) -> None:
-        """Computes blocks into a sink; workers that see the file `shared` write them there. `tick` is called often.
+        """Computes blocks into a sink, and tells of the progress; `tick` is called often.
 
+        Workers that see the file `shared` write them there.
         After a fault, Ctrl-C or SIGTERM no block is begun, and those at work are put into the sink if they end.
         Raises SweepError, TimeUp, KeyboardInterrupt, Terminated.
         """
-        cluster, known, study = self._cluster, self._reused, self.task.study
+        task, cluster, known, study = self.task, self._cluster, self._reused, self.task.study
+        total, machine, versions = self.blocks.rows.size, platform.uname(), task.schema.attrs["versions"]
+        done = total - sum(map(self._cells, jobs))
+        self.progress = Progress(total, task.progress, task.name, done, float(self._weights[list(jobs)].sum()))
+        log(
+            f"begins: {task.name}, kernel {study.kernel_name}, {done:,} of {total:,} cells done before, "
+            f"{self.blocks.count:,} blocks, {task.cores} cores, process {os.getpid()} on {machine.node} "
+            f"({machine.system} {machine.machine}), {versions}",
+            "begin", kernel=study.kernel_name, cells=done, of=total, cores=task.cores, process=os.getpid(),
+            machine=machine.node, versions=versions,
+        )  # fmt: skip
         bench = Bench(study, self.blocks, sink, None if self._processes is None else self._processes.solver)
         if cluster is not None:
             isolated = None if self._processes is None else (self._processes.limit, self._processes.cost)
-            words = study.to_json(), dict(self.task.fingerprint), self.blocks.partition
+            words = study.to_json(), dict(task.fingerprint), self.blocks.partition
             cluster.begin(*words, shared if known is None else None, isolated)
         queue, under_way = deque(from_everywhere(jobs)), set[Future[Done]]()
         try:

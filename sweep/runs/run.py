@@ -114,9 +114,8 @@ def run(
         return open_unfinished(task.output) if ending == "unfinished" else open_result(task.output)
     with contextlib.ExitStack() as stack:
         loop = Loop(task, stack)
-        sink, jobs = _Memory(loop.blocks), range(loop.blocks.count)
-        loop.begin(jobs)
-        loop.compute(jobs, sink)
+        sink = _Memory(loop.blocks)
+        loop.compute(range(loop.blocks.count), sink)
         loop.progress.end()
     found = sink.arrays if task.study.summary is None else gathered(task.study, sink.arrays)
     return in_memory(task.said({"start": loop.began, **loop.endings()}), found)

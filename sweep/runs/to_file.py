@@ -111,7 +111,6 @@ def _computed(
             known = stack.enter_context(contextlib.closing(Reused(task.output, task.study, task.retry_failed)))
         # signals are held back from here on, wherever they would leave half a file behind
         loop = Loop(task, stack, None if store.file is None else store.table.blocks, to_do, sampled, known)
-        loop.begin(range(loop.blocks.count) if store.file is None else store.missing())
         if store.file is None:
             schema = task.said({"start": loop.began, **(known.attrs if isinstance(known, Precomputed) else {})})
             cuts = cuts_of(task.study, schema, loop.blocks.partition)
@@ -123,10 +122,9 @@ def _computed(
                 )
             store.begin(schema, cuts)
         for block in damaged:
-            loop.progress.note(f"{loop.blocks.label(block)} were damaged on the disk and are computed again")
-        if missing := store.missing():
-            shared = None if task.cluster is None else store.shared()
-            loop.compute(missing, _Stored(store, loop.blocks, known), shared, store.tick)
+            task.note(f"{loop.blocks.label(block)} were damaged on the disk and are computed again")
+        shared = None if task.cluster is None else store.shared()
+        loop.compute(store.missing(), _Stored(store, loop.blocks, known), shared, store.tick)
 
         def gather(file: StoredFile, block: int) -> dict[str, Any]:
             """A block of a summary's output, from its rows."""
