@@ -27,8 +27,6 @@ from sweep.errors import SweepError
 if TYPE_CHECKING:
     from sweep.study.model import Study
 
-SolveBlock = Callable[[int, int, Mapping[str, Any], Any], None]
-
 
 class Blocks:
     """The rows of a study, cut into blocks: their `partition`, the `columns` they fill, the cells of each of `rows`."""
@@ -80,15 +78,6 @@ def cut(study: Study, workers: int, sample: Sample, block_cells: int | None = No
         block_cells = partition(sample, rows.size, row_bytes / rows.mean, workers, least).cells
         lanes = LANES if rows.mean == 1 else 1
     return boxes(shape, math.ceil(block_cells / rows.mean), lanes)
-
-
-def block_solver(study: Study, solver: SolveCells | None = None) -> SolveBlock:
-    """Computes rows into the columns of a block; of cells, only those wanted (None: all). For one thread at a time."""
-    solver = solver or Solver(study)
-    if study.summary is not None:
-        reducer = Reducer(study, solver)
-        return lambda start, stop, arrays, wanted: reducer.solve(start, stop, arrays)
-    return lambda start, stop, arrays, wanted: solver.solve(start, cells_of(arrays), wanted)
 
 
 def sampled_study(study: Study, note: Callable[[str], None] = lambda text: None) -> Sample:
@@ -218,13 +207,17 @@ class Bench:
         """Computes a block; of its cells only those wanted, by default all. Raises SweepError."""
         here, (start, stop) = self._here, self._blocks.bounds(job)
         with faults_reported(f"{self._blocks.label(job)} cannot be computed or kept"):
-            if not hasattr(here, "solve"):
+            if not hasattr(here, "guard"):
                 here.bad = []
-                here.solve = block_solver(self._study, Guard(self._solver(), here.bad.append))
+                here.guard = Guard(self._solver(), here.bad.append)
+                here.reducer = None if self._study.summary is None else Reducer(self._study, here.guard)
             here.bad.clear()
             begun = time.perf_counter()
             arrays = self._sink.room(job)
-            here.solve(start, stop, arrays, wanted)
+            if here.reducer is None:
+                here.guard.solve(start, cells_of(arrays), wanted)
+            else:
+                here.reducer.solve(start, stop, arrays)
             found = self._sink.put(job, arrays)
             return Done(job, time.perf_counter() - begun, [*here.bad], found)
 

@@ -9,7 +9,6 @@ import xarray as xr
 from xarray.backends import BackendArray, BackendEntrypoint
 from xarray.core import indexing
 
-from sweep.cells.partition import row_blocks
 from sweep.cells.reduce import gathered, pending
 from sweep.errors import SweepError
 from sweep.file.reading import Numbers, StoredFile
@@ -53,7 +52,7 @@ class Result(BackendEntrypoint):
 def _of_rows(file: StoredFile) -> dict[str, xr.Variable]:
     """The columns of an unfinished summary: of the rows that are there."""
     study = Study.from_json(file.attrs["study_json"], declared=True)
-    rows, table = pending(study, 0, row_blocks(study).count), file.tables["rows"]
+    rows, table = pending(study), file.tables["rows"]
     for block in filter(table.is_sound, range(table.blocks.count)):
         cells = slice(*table.blocks.bounds(block))
         for column in table.columns:
