@@ -33,15 +33,13 @@ SHEAR = 0.013
 them; tilted there is one, and it is alike in all boxes."""
 FLAT = 1e-9
 """Volume, in products of its edges, below which a simplex is none."""
-AROUND = {1: 4, 2: 12, 3: 20}
+AROUND = {1: 8, 2: 12, 3: 20}
 """Cells around a simplex that are taken, beside its corners; with more axes twice the unknowns."""
 SAFETY, MISFIT = 1.6, {1: 5.0}
 """Times the parabola's error; and times what the parabola leaves, 2.5 with more axes: a kink in the middle between
 cells of one axis is told at half its size from either side."""
 LEAST_BASIS, RIDGE, BATCH = 0.3, 1e-12, 2_000
 """Of the fit: a cell's weight is the inverse of (1) with all c_ij = 1, or of the first; simplices at a time."""
-NEARLY = 0.9
-"""Share of the largest bend of an edge."""
 ROUNDS, MOST = 3, 3000
 """Of a stretch: the first joins the cells of the box as it is, where simplices reach across more of the bends; and
 simplices whose mean it takes."""
@@ -87,22 +85,6 @@ def fewest(axes: int) -> int:
     return (axes + 1) * (axes + 2) // 2
 
 
-def with_beyond(corners: Indices) -> Indices:
-    """Corners of each simplex, those beyond its faces, and those beyond its neighbours' there; where there are none,
-    its first one. However thin simplices are, some lie to every side."""
-    count, size = corners.shape
-    faces = np.stack([np.delete(corners, k, axis=1) for k in range(size)], axis=1).reshape(-1, size - 1)
-    faces.sort(axis=1)
-    order = np.lexsort(faces.T)
-    same = np.flatnonzero((faces[order[1:]] == faces[order[:-1]]).all(axis=1))
-    other = np.full(count * size, -1)
-    other[order[same]], other[order[same + 1]] = order[same + 1], order[same]
-    other = other.reshape(count, size)
-    opposite = np.where(other < 0, corners[:, :1], corners.ravel()[other])
-    neighbour = np.where(other < 0, np.arange(count)[:, None], other // size)
-    return np.concatenate([corners, opposite, opposite[neighbour].reshape(count, -1)], axis=1)
-
-
 def errors_inside(points: Array, heights: Array, kind: Indices, corners: Indices) -> tuple[Array, Indices]:
     """How far straight lines between points (n, axes) of heights (n,) are off, as the points around tell.
 
@@ -127,23 +109,20 @@ def errors_inside(points: Array, heights: Array, kind: Indices, corners: Indices
         members, here = np.flatnonzero(kind == number), np.flatnonzero((kind[corners] == number).all(axis=1))
         if not len(here) or len(members) < fewest(axes):
             continue
-        around, sizes = with_beyond(np.searchsorted(members, corners[here])), []
+        around, sizes = np.searchsorted(members, corners[here]), []
         for side in (-1, 1) if axes == 1 else (0,):
             bend, misfit = _parabolas(points[members], heights[members], around, side)
-            middle = abs(bend) / 4
-            inside = abs(bend.sum(axis=1)) / (axes + 1) ** 2
+            middle, inside = abs(bend) / 4, abs(bend.sum(axis=1)) / (axes + 1) ** 2
             sizes.append(SAFETY * np.maximum(middle.max(axis=1, initial=0.0), inside) + MISFIT.get(axes, 2.5) * misfit)
         # the mean of logarithms: from one side of an interval alone a jump is seen that lies beyond it, not in it
         with np.errstate(divide="ignore"):
             size[here] = np.exp(np.nanmean(np.log(sizes), axis=0))
-        # a diagonal bends as its sides do, which lie along the axes that need a cut, and are shorter
-        nearly = middle >= NEARLY * middle.max(axis=1, keepdims=True)
-        cut[here] = largest(corners[here], np.where(nearly, -lengths[here], -np.inf))
+        cut[here] = largest(corners[here], middle)
     return size, cut
 
 
-def _parabolas(points: Array, heights: Array, around: Indices, side: int = 0) -> tuple[Array, Array]:
-    """The c_ij (m, pairs) of (1) over simplices with those beyond, and what they leave (m,), a mean square's root.
+def _parabolas(points: Array, heights: Array, corners: Indices, side: int = 0) -> tuple[Array, Array]:
+    """The c_ij (m, pairs) of (1) over simplices, and what they leave (m,), a mean square's root.
 
     They are fitted by least squares to how far the points around a simplex are off its straight continuation; of one
     axis, maybe to those on one side alone, -1 or 1, and NaN where there are none.
@@ -151,18 +130,17 @@ def _parabolas(points: Array, heights: Array, around: Indices, side: int = 0) ->
     axes = points.shape[1]
     tree, pairs = cKDTree(points), edges(axes)
     number = min(len(points), axes + 1 + AROUND.get(axes, 2 * len(pairs)))
-    bends, misfits = np.empty((len(around), len(pairs))), np.empty(len(around))
-    for start in range(0, len(around), BATCH):
+    bends, misfits = np.empty((len(corners), len(pairs))), np.empty(len(corners))
+    for start in range(0, len(corners), BATCH):
         rows = slice(start, start + BATCH)
-        corners, beyond = np.split(around[rows], [axes + 1], axis=1)
-        place = points[corners]
-        near = np.concatenate([tree.query(place.mean(axis=1), number)[1], beyond], axis=1)
+        place = points[corners[rows]]
+        near = tree.query(place.mean(axis=1), number)[1]
         rest = (points[near] - place[:, :1]) @ np.linalg.inv(place[:, 1:] - place[:, :1])
         shares = np.concatenate([1 - rest.sum(axis=2, keepdims=True), rest], axis=2)  # barycentric coordinates
-        off = heights[near] - (shares @ heights[corners][:, :, None])[:, :, 0]
+        off = heights[near] - (shares @ heights[corners[rows]][:, :, None])[:, :, 0]
         basis = shares[:, :, pairs[:, 0]] * shares[:, :, pairs[:, 1]]
         weight = 1 / np.maximum(abs(basis).sum(axis=2), LEAST_BASIS)
-        weight[(near[:, :, None] == corners[:, None, :]).any(axis=2)] = 0.0
+        weight[(near[:, :, None] == corners[rows][:, None, :]).any(axis=2)] = 0.0
         if side:
             weight[side * (shares[:, :, 0] - 0.5) > 0] = 0.0
         left, right = basis * weight[:, :, None], (off * weight)[:, :, None]
@@ -170,8 +148,8 @@ def _parabolas(points: Array, heights: Array, around: Indices, side: int = 0) ->
         square = turned @ left
         ridge = RIDGE * np.trace(square, axis1=1, axis2=2)[:, None, None] / len(pairs) + 1e-300
         bend = np.linalg.solve(square + ridge * np.eye(len(pairs)), turned @ right)
-        unexplained, count = ((right - left @ bend)[:, :, 0] ** 2).sum(axis=1), (weight > 0).sum(axis=1)
         bends[rows] = bend[:, :, 0]
+        unexplained, count = ((right - left @ bend)[:, :, 0] ** 2).sum(axis=1), (weight > 0).sum(axis=1)
         misfits[rows] = np.sqrt(unexplained / np.where(count > 0, count, np.nan))
     return bends, misfits
 
@@ -188,19 +166,19 @@ def stretch(points: Array, heights: Array) -> Array:
         corners = np.searchsorted(np.flatnonzero(valued), corners[valued[corners].all(axis=1)])
         if not len(corners):
             return np.eye(axes)
-        around = with_beyond(corners)[:: len(corners) // MOST + 1]
+        some = corners[:: len(corners) // MOST + 1]
         # second derivatives over each simplex, from c_ij = -e_ij H e_ij / 2 of its edges
         places = inside @ found
-        edge = places[around[:, pairs[:, 0]]] - places[around[:, pairs[:, 1]]]
+        edge = places[some[:, pairs[:, 0]]] - places[some[:, pairs[:, 1]]]
         products = -edge[:, :, row] * edge[:, :, column] * np.where(row == column, 0.5, 1.0)
         scale = abs(products).max(axis=(1, 2))[:, None]
-        bend = _parabolas(places, heights[valued], around)[0] / scale
-        second = np.empty((len(around), axes, axes))
+        bend = _parabolas(places, heights[valued], some)[0] / scale
+        second = np.empty((len(some), axes, axes))
         second[:, row, column] = np.linalg.solve(products / scale[:, :, None], bend[:, :, None])[:, :, 0]
         second[:, column, row] = second[:, row, column]
         sizes, directions = np.linalg.eigh(second)
         bends = (directions * abs(sizes)[:, None]) @ directions.transpose(0, 2, 1)
-        volumes = abs(np.linalg.det(inside[around[:, 1 : axes + 1]] - inside[around[:, :1]]))
+        volumes = abs(np.linalg.det(inside[some[:, 1:]] - inside[some[:, :1]]))
         # the square root of the mean, over its largest eigenvalue
         sizes, directions = np.linalg.eigh(found @ np.average(bends, axis=0, weights=volumes) @ found.T)
         if sizes.max() <= STRAIGHT:
