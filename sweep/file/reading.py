@@ -265,8 +265,8 @@ class Numbers:
             # straight to its place where all of a block is wanted and lies in one piece
             ends = [(c * m, min((c + 1) * m, n)) for c, m, n in zip(corner, box, grid, strict=True)]
             both = [(max(a, start), min(b, stop)) for (a, b), (start, stop) in zip(ends, spans, strict=True)]
-            place = (slice(a - start, b - start) for (a, b), (start, _) in zip(both, spans, strict=True))
-            view = out[(*place, ...)]
+            there: Any = [slice(a - start, b - start) for (a, b), (start, _) in zip(both, spans, strict=True)]
+            view = out[(*there, ...)]
             shape = (*(b - a for a, b in ends), *self.own)
             cells = view if view.shape == shape and view.flags.c_contiguous else np.empty(shape, self.dtype)
             self._fill(int(np.ravel_multi_index(corner, counts)) if grid else 0, cells)
