@@ -98,7 +98,8 @@ def _table(t: Array, z: Array, tried: list[Found]) -> xr.Dataset:
         "scatter": np.sqrt((off**2).mean(axis=1)),
         "residual": [f.residual for f in tried],
         "chi_squared": [
-            math.nan if f.sigma is None else float(gammaincc((t.size - f.law.numbers) / 2, f.square / 2)) for f in tried
+            math.nan if f.sigma is None else float(gammaincc((t.size - f.law.numbers) / 2, f.deviance / 2))
+            for f in tried
         ],
         "formula": [f.law.formula for f in tried],
         "exponents": [_exponents(f, span) for f in tried],

@@ -22,9 +22,9 @@ DAMPINGS = np.array([1e-7, 1e-2, 0.3, 10.0, 1e3])
 """Of Gauss-Newton steps, which are tried at once; the best is taken."""
 FURTHER = np.array([1.0, 4.0, 16.0])
 """Times the step before, which are tried beside them: along a valley, Gauss-Newton steps are short."""
-STEPS, ENOUGH = 10, 1e-3
+STEPS, ENOUGH = 10, 2e-3
 """Steps at most, three times as many of a law that is wanted; and what a step must take away of a deviance for
-another one: so much of 1 and of what the deviance is above the best, or the square for a law that is wanted."""
+another one: so much of 0.5 and of what it is above the best, or the square for a law that is wanted."""
 MOST_LINES, MOST_Q = 16, 3
 """Lines that are fitted at once, so that what is held stays below some 50 MB, and q of a law at most."""
 
@@ -53,11 +53,6 @@ class Found(NamedTuple):
     def bic(self) -> float:
         """Bayes' criterion."""
         return self.deviance + (self.law.numbers + self.more) * math.log(self.off.size)
-
-    @property
-    def square(self) -> float:
-        """Sum of squares, of what is known of the noise."""
-        return float(((self.off if self.sigma is None else self.off / self.sigma) ** 2).sum())
 
     @property
     def residual(self) -> float:
@@ -217,7 +212,7 @@ class _Search:
         self.q[taken], self.square[taken] = there[place], squares[place]
         after = self.deviance()
         above = after.reshape(len(self.laws), -1) - after.reshape(len(self.laws), -1).min(axis=0)
-        enough = np.where(self.wanted, ENOUGH**2, ENOUGH * (1 + above.reshape(-1)))
+        enough = np.where(self.wanted, ENOUGH**2, ENOUGH * (0.5 + above.reshape(-1)))
         return np.asarray(rows[(before - after >= enough)[rows]])
 
     def restart(self) -> NDArray[np.intp]:
@@ -262,9 +257,8 @@ def _columns(
             for to, parts in zip(every, laws[one].curve(q[a:b].T[:, :, None], s, span), strict=False):
                 for k, part in enumerate(parts):
                     to[k, a:b] = part
-    exist = np.isfinite(every[0].sum(axis=0)).all(axis=1, keepdims=True)
-    every[0] = np.where(exist, every[0], 0.0)
-    every[0, 0][~exist[:, 0]] = np.nan
+    none = ~np.isfinite(every[0].sum(axis=0)).all(axis=1)
+    every[0][:, none], every[0, 0, none] = 0.0, np.nan
     every *= root
     basis, back = np.linalg.qr(np.moveaxis(every[0, 1:], 0, -1))
     size = abs(np.diagonal(back, axis1=-2, axis2=-1))

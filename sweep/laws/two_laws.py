@@ -225,7 +225,7 @@ def _verdict(t: Array, z: Array, tried: dict[str, Found], noisy: bool) -> tuple[
     nearest = min((*bends, *others), key=lambda fit: fit.aicc)
     if three and three.aicc < nearest.aicc - OTHER_SHAPES and gain(line, three) > BEYOND_DOUBT:
         if not noisy:
-            better = three.square < SMALLER**2 * min(fit.square for fit in bends)
+            better = three.deviance < min(fit.deviance for fit in bends) + 2 * t.size * math.log(SMALLER)
         else:  # nor with noise of any kind beside two
             better = three.aicc < nearest.interval(t, [], "noise", 0.5)[1] - BEYOND_DOUBT
         if better:
