@@ -79,11 +79,12 @@ def join(
     if 2 * sum(dataset.nbytes for dataset in results) > memory():
         raise SweepError("the two results together do not fit into the memory")
     studies = [Study.from_json(str(dataset.attrs["study_json"]), declared=True) for dataset in results]
-    if axis is None:
-        study, whole = _along_difference(studies, results)
+    apart = _apart(*studies)
+    if axis is None and len(apart) == 1 and (apart[0] == "points" or apart[0].startswith("axes.")):
+        study, whole = _longer(studies[0], studies[1], results, apart[0].removeprefix("axes."))
     else:
-        _require_same(axis, labels, studies, results[0])
-        study, whole = _with_axis(studies[0], results, Axis(axis, frozen([0.0, 1.0]), "values", labels))
+        made = _difference(apart, studies) if axis is None else _named(axis, labels, apart, results[0])
+        study, whole = _with_axis(studies[0], results, made)
     study = replace(study, text="", title=studies[0].title)
 
     grid, arrays = Grid(study), dict[str, Any]()
@@ -114,34 +115,30 @@ def _apart(first: Study, second: Study) -> list[str]:
     return apart
 
 
-def _require_same(axis: Any, labels: tuple[Any, ...], studies: Sequence[Study], dataset: xr.Dataset) -> None:
-    """Raises SweepError where two results cannot stand along a new axis of two labels."""
-    if apart := _apart(*studies):
+def _named(axis: Any, labels: tuple[Any, ...], apart: Sequence[str], dataset: xr.Dataset) -> Axis:
+    """A new axis of two labels. Raises SweepError where two results cannot stand along it."""
+    if apart:
         raise SweepError(f"along {axis} all else is to be the same; they differ in {listed(apart, word='and')}")
     if not isinstance(axis, str) or not axis.isidentifier() or axis in (*dataset.variables, *SETTINGS, *dataset.dims):
         raise SweepError(f'"{axis}" cannot be the name of a new axis; choose another')
     if len(labels) != 2 or len(set(labels)) != 2 or not all(isinstance(label, str) and label for label in labels):
         raise SweepError("a new axis needs two labels that differ")
+    return Axis(axis, frozen([0.0, 1.0]), "values", labels)
 
 
-def _along_difference(studies: Sequence[Study], results: Sequence[xr.Dataset]) -> tuple[Study, xr.Dataset]:
-    """The study of both along the one thing that they differ in, and the numbers in its dimensions."""
-    first, second = studies
-    apart = _apart(first, second)
-    differ = f"they differ in {listed(apart, word='and')}" if apart else "they do not differ; name a new axis"
-    group, _, name = apart[0].rpartition(".") if len(apart) == 1 else ("", "", "")
-    if group == "axes" or name == "points":
-        return _longer(first, second, results, name if first.design == "product" else next(iter(first.dims)))
-    if group != "fixed" and name not in SETTINGS:
+def _difference(apart: Sequence[str], studies: Sequence[Study]) -> Axis:
+    """The one parameter or setting that two studies differ in, as an axis. Raises SweepError."""
+    kernel, name = studies[0].kernel, apart[0].removeprefix("fixed.") if len(apart) == 1 else ""
+    if name not in SETTINGS and not (apart and apart[0] == f"fixed.{name}"):
+        differ = f"they differ in {listed(apart, word='and')}" if apart else "they do not differ; name a new axis"
         raise SweepError(f"the results do not fit together: {differ}")
-    field = setting(name, first.kernel) if name in SETTINGS else first.kernel.parameter(name)
+    field = setting(name, kernel) if name in SETTINGS else kernel.parameter(name)
     values: list[Any] = [getattr(study, name) if name in SETTINGS else study.fixed.get(name) for study in studies]
     if any(value is None or np.ndim(value) for value in values):
         raise SweepError(f"the results do not fit together: they differ in {name}, which is not one number in both")
     numbers = [float(field.choices.get(value, value)) for value in values]
     words = {float(number): word for word, number in field.choices.items()}
-    said = tuple(words[number] for number in numbers) if words else None
-    return _with_axis(first, results, Axis(name, frozen(numbers), "values", said))
+    return Axis(name, frozen(numbers), "values", tuple(words[number] for number in numbers) if words else None)
 
 
 def _with_axis(study: Study, results: Sequence[xr.Dataset], axis: Axis) -> tuple[Study, xr.Dataset]:
@@ -158,10 +155,10 @@ def _with_axis(study: Study, results: Sequence[xr.Dataset], axis: Axis) -> tuple
     return joined, whole.assign_coords({axis.name: list(axis.words if axis.words is not None else axis.values)})
 
 
-def _longer(a: Study, b: Study, results: Sequence[xr.Dataset], dim: str) -> tuple[Study, xr.Dataset]:
+def _longer(a: Study, b: Study, results: Sequence[xr.Dataset], name: str) -> tuple[Study, xr.Dataset]:
     """Both, longer along an axis or by further points; what is in both has to be the same."""
     first, second = results
-    names = [dim] if a.design == "product" else list(a.axes)
+    names, dim = ([name], name) if a.design == "product" else (list(a.axes), next(iter(a.dims)))
 
     def points(study: Study) -> Iterable[tuple[Any, ...]]:
         """What tells places along the axes, which run together, from each other."""

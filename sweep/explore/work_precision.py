@@ -136,7 +136,13 @@ def work_precision(
     part = sampled(as_study(study), cells)
     able = [part.kernel.methods[number].name for number in usable_methods(part)]
     names = ["auto", *able] if methods is None else list(dict.fromkeys(methods))
-    _require(names, reference, able)
+    if not able:
+        raise SweepError("no method of the kernel can do this study")
+    if not names:
+        raise SweepError(f"methods: expected at least one of auto, {', '.join(able)}; found none")
+    for name in {*names, reference or able[0]} - {"auto", *able} | {reference} & {"auto"}:
+        hint = did_you_mean(name, able) or f"; there are auto, {', '.join(able)}"
+        raise SweepError(f"no method {name} that can do this study{hint}")
     if isolate or cell_timeout is not None:
         part = _without_failing(part, ["auto", *able], cell_timeout, note)
     against = _given(part, truth) if truth is not None else _best(part, [reference] if reference else able)
@@ -144,25 +150,15 @@ def work_precision(
     columns = {key: np.array([row[key] for row in rows]).reshape(len(names), -1) for key in rows[0]}
     columns["seconds"] = _seconds(part, names, tolerances)
     about = {key: {"units": "s" if key == "seconds" else "1", "long_name": LONG_NAMES[key]} for key in columns}
+    sound, judged = against.floor[against.sound], against.judged
+    basis = {"reference": against.source, "reference_error": float(max(sound, default=math.nan))}
+    basis |= {"cells": judged, "open_cells": len(against.floor) - judged}
     found = xr.Dataset(
         {key: (("method", "rtol"), values, about[key]) for key, values in columns.items()},
         {"method": names, "rtol": tolerances},
-        {"title": part.title, "kernel": part.kernel_name, **against.attrs},
+        {"title": part.title, "kernel": part.kernel_name, **basis},
     )
     return found.assign_attrs(omissions="; ".join(_omissions(found, part, able if methods is None else None)))
-
-
-def _require(names: Sequence[str], reference: str | None, able: Sequence[str]) -> None:
-    """Raises SweepError where a method that is asked for cannot do the study, or none is asked for."""
-    if not able:
-        raise SweepError("no method of the kernel can do this study")
-    if not names:
-        raise SweepError(f"methods: expected at least one of auto, {', '.join(able)}; found none")
-    for name in names if reference is None else [*names, reference]:
-        if name in able or (name == "auto" and name != reference):
-            continue
-        hint = did_you_mean(name, able) or f"; there are auto, {', '.join(able)}"
-        raise SweepError(f"no method {name} that can do this study{hint}")
 
 
 def _without_failing(
@@ -244,13 +240,6 @@ class _Reference(NamedTuple):
     def judged(self) -> int:
         """Number of cells in which a method can be told right or wrong."""
         return int((self.sound | self.void).sum())
-
-    @property
-    def attrs(self) -> dict[str, Any]:
-        """What a chart says of it."""
-        accurate, cells = float(max(self.floor[self.sound], default=math.nan)), self.judged
-        opened = {"cells": cells, "open_cells": len(self.floor) - cells}
-        return {**opened, "reference": self.source, "reference_error": accurate}
 
 
 def _given(study: Study, values: Mapping[str, Any]) -> _Reference:

@@ -7,6 +7,7 @@ Nothing here touches pyplot or its global state, and the same picture gives the 
 from __future__ import annotations
 
 import contextlib
+import io
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -176,6 +177,14 @@ def save(figure: Figure, path: str | os.PathLike[str]) -> Path:
         metadata = {".png": {"Software": "foliot"}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
         figure.savefig(part, format=kind[1:], metadata=metadata[kind])
     return target
+
+
+def png(figure: Figure) -> bytes:
+    """The figure as a picture for a page."""
+    store = io.BytesIO()
+    with style():
+        figure.savefig(store, format="png", dpi=220, metadata={"Software": None})
+    return store.getvalue()
 
 
 def letter(axes: Any, text: str) -> None:

@@ -91,15 +91,14 @@ def plot(
     drawn = precision_figure if "reference" in dataset.attrs else laws_figure if "chosen" in dataset.attrs else None
     if drawn and (y or x):
         raise SweepError("y and x choose what is shown of a result; this Dataset has one picture, without them")
-    figure = drawn(dataset) if drawn else result_figure(dataset, y, x)
+    figure = drawn(dataset) if drawn else view_figure(view(dataset, y, x), dataset.attrs.get("title", ""))
     if path is not None:
         save(figure, path)
     return figure
 
 
-def result_figure(dataset: xr.Dataset, y: str | None = None, x: str | None = None) -> Figure:
+def view_figure(shown: View, title: Any = "") -> Figure:
     """One output of a result: a line, a family of lines, or a map where there are two long axes."""
-    shown = view(dataset, y, x)
     with style():
         figure = new_figure(120.0, 82.0)
         axes = figure.subplots()
@@ -111,8 +110,7 @@ def result_figure(dataset: xr.Dataset, y: str | None = None, x: str | None = Non
             figure.legend(handles, names, loc="outside lower center", ncols=3) if names else None
         elif shown.across or shown.codes():
             axes.legend()
-        title = "\n".join(part for part in (_plain(dataset.attrs.get("title", "")), shown.held) if part)
-        axes.set_title(title, wrap=True)
+        axes.set_title("\n".join(part for part in (_plain(title), shown.held) if part), wrap=True)
     return figure
 
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import base64
 import hashlib
-import io
 import os
 from collections.abc import Iterator
 from html import escape
@@ -110,19 +109,15 @@ def _wide(table: Table) -> str:
 
 def _figures(dataset: xr.Dataset) -> Iterator[str]:
     """A picture of each of the first outputs that can be drawn."""
-    from sweep.show.charts import style
+    from sweep.show.charts import png
     from sweep.show.figures import plot
 
     found = []
     for name in [name for name in outputs_of(dataset) if bool(dataset[name].notnull().any())][:MOST_FIGURES]:
-        store = io.BytesIO()
         try:
-            figure = plot(dataset.assign_attrs(title=""), y=name)
+            data = base64.b64encode(png(plot(dataset.assign_attrs(title=""), y=name))).decode("ascii")
         except SweepError:
             continue  # no axis of numbers, or no number to draw
-        with style():
-            figure.savefig(store, format="png", dpi=220, metadata={"Software": None})
-        data = base64.b64encode(store.getvalue()).decode("ascii")
         caption = escape(f"{name}: {dataset[name].attrs.get('long_name', name)}")
         image = f'<img alt="{escape(name)}" src="data:image/png;base64,{data}">'
         found.append(f"<figure>{image}<figcaption>{caption}</figcaption></figure>")

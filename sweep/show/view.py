@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from sweep.cells.schema import ANCILLARY as ANCILLARY
+from sweep.cells.schema import ANCILLARY
 from sweep.errors import SweepError
 from sweep.explore.scattered import MOST_AXES, Box, axes_of, interpolated
 from sweep.laws.loglog import is_logarithmic
@@ -95,7 +95,7 @@ def view(dataset: xr.Dataset, y: str | None = None, x: str | None = None) -> Vie
     SweepError
         If there is no such output or axis.
     """
-    known = [str(n) for n, v in dataset.data_vars.items() if v.ndim and n not in ANCILLARY and v.dtype.kind in "fiu"]
+    known = outputs(dataset)
     if not known:
         raise SweepError("there is nothing to draw: no output runs along an axis")
     name = one_of(y or preferred(known), known, f"there is no output {y!r} to draw")
@@ -128,6 +128,12 @@ def view(dataset: xr.Dataset, y: str | None = None, x: str | None = None) -> Vie
     codes = status.broadcast_like(values).transpose(*values.dims).values.astype(int)
     words = ", ".join(setting(coordinate(output, dim)[index]) for dim, index in held.items())
     return View(values, codes, flag_words(status), x, along, across, words)
+
+
+def outputs(dataset: xr.Dataset) -> list[str]:
+    """The outputs that run along an axis."""
+    columns = dataset.data_vars.items()
+    return [str(name) for name, v in columns if v.ndim and name not in ANCILLARY and v.dtype.kind in "fiu"]
 
 
 def lines_of(output: xr.DataArray) -> list[str]:

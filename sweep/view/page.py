@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, Any
 from kernels.interface import Status
 from sweep.errors import SweepError, missing
 from sweep.file.open import open_result
-from sweep.show.view import coordinate, evened, preferred
+from sweep.show.view import coordinate, evened, lines_of, outputs, preferred
 from sweep.view import region
-from sweep.view.region import Choice, number_axes, other_axes, outputs, row, shown
+from sweep.view.region import Choice, number_axes, other_axes, row, shown
 from sweep.words import Table
 
 try:
@@ -101,7 +101,8 @@ class Page:
         if even is not dataset:
             title = f"{dataset.attrs.get('title') or name}: straight lines between its {dataset['status'].size:,} cells"
             even, values = even.assign_attrs(title=title), ["value"]  # straight lines have no exponent
-        self.dataset, names, select = even, outputs(even), pn.widgets.Select
+        names, select = [name for name in outputs(even) if lines_of(even[name])], pn.widgets.Select
+        self.dataset = even
         if not names:
             raise SweepError(f"{name}: there is nothing to look at: no output runs along an axis of numbers")
         self.output = select(label="output", options=names, value=preferred(names), **WIDE)

@@ -6,7 +6,7 @@ No more than that is read.
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from io import BytesIO
 from pathlib import Path
@@ -21,7 +21,7 @@ from sweep.laws.exponents import local_exponent
 from sweep.laws.loglog import is_logarithmic
 from sweep.results.export import export
 from sweep.results.statuses import flag_words
-from sweep.show.view import ANCILLARY, View, coordinate, is_number_axis, lines_of, view
+from sweep.show.view import View, coordinate, is_number_axis, lines_of, view
 from sweep.study.model import SETTINGS, Axis, Study
 from sweep.study.read import to_toml
 
@@ -53,12 +53,6 @@ class Choice:
 def number_axes(dataset: xr.Dataset, output: str) -> list[str]:
     """What a picture of the output can run along: axes first, the longest of them first."""
     return sorted(lines_of(dataset[output]), key=lambda name: (name not in dataset.dims, -dataset[name].size))
-
-
-def outputs(dataset: xr.Dataset) -> list[str]:
-    """The outputs that run along an axis of numbers."""
-    numbers = (str(n) for n, v in dataset.data_vars.items() if v.dtype.kind in "fiu" and n not in ANCILLARY)
-    return [name for name in numbers if lines_of(dataset[name])]
 
 
 def along(dataset: xr.Dataset, x: str) -> str:
@@ -123,28 +117,18 @@ def row(dataset: xr.Dataset, places: Mapping[str, int]) -> list[tuple[str, ...]]
 
 def picture(dataset: xr.Dataset, choice: Choice) -> BytesIO:
     """The shown slice as a PNG fit for print. Raises SweepError, also where matplotlib is missing."""
-    from sweep.show.figures import plot
+    from sweep.show.charts import png
+    from sweep.show.figures import view_figure
 
-    found = shown(dataset, choice)
-    name = str(found.y.name or choice.output)
-    columns = {name: found.y}
-    if STATUS in dataset:
-        columns[STATUS] = found.y.copy(data=found.status).assign_attrs(dataset[STATUS].attrs)
-    return _bytes(".png", lambda path: plot(xr.Dataset(columns, attrs=dataset.attrs), path, y=name, x=choice.x))
+    return BytesIO(png(view_figure(shown(dataset, choice), dataset.attrs.get("title", ""))))
 
 
 def table(dataset: xr.Dataset, choice: Choice) -> BytesIO:
     """All outputs of the shown cells, every one of them, as csv."""
     cells, dims = part(dataset, choice), {along(dataset, choice.x), choice.across}
     cells = cells[[name for name, column in cells.data_vars.items() if set(column.dims) <= dims]]
-    return _bytes(".csv", lambda path: export(cells, path))
-
-
-def _bytes(suffix: str, write: Callable[[Path], Any]) -> BytesIO:
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder, f"shown{suffix}")
-        write(path)
-        return BytesIO(path.read_bytes())
+        return BytesIO(export(cells, Path(folder, "shown.csv")).read_bytes())
 
 
 def study_text(dataset: xr.Dataset, choice: Choice) -> str:
