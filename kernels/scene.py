@@ -219,7 +219,17 @@ def _methods(scene: Scene, parameters: list[str], outputs: list[str]) -> tuple[M
 
     def method(name: str, doc: str, how: Function, bound: OnColumns | None = None) -> Method:
         how = how if bound else slid_along(to_rest(how), scene, name)
-        return Method(name, doc, _solve((scene.name, name), how, module, parameters, outputs), bound)
+        n = len(parameters)
+
+        def solve(*columns: Any) -> None:
+            if len(columns[0]):
+                with compiling(scene.name, name):
+                    how(module, columns[:n], columns[n], columns[n + 1 : -1], columns[-1])
+
+        return Method(name, doc, signed(solve, [*parameters, "rtol", *outputs, "status"]), bound)
+
+    def no_bound(*columns: Any) -> None:
+        columns[-1][:] = math.inf
 
     return (
         method("taylor", f"{SERIES}; the error carried along, or followed twice", stated_error.by_one(scene)),
@@ -227,7 +237,7 @@ def _methods(scene: Scene, parameters: list[str], outputs: list[str]) -> tuple[M
             "taylor_once",
             "the same, each step right to rtol, followed once",
             followed_twice.once,
-            _no_bound(parameters),
+            signed(no_bound, [*parameters, "rtol", "asked", "out"]),
         ),
         method(
             "rodas5p",
@@ -237,28 +247,6 @@ def _methods(scene: Scene, parameters: list[str], outputs: list[str]) -> tuple[M
         method("dop853", f"Dormand-Prince 8(5,3) {LOCATED}", twice_by("dop853", scene)),
         method("dopri5", f"Dormand-Prince 5(4) {LOCATED}", twice_by("dopri5", scene)),
     )
-
-
-def _solve(names: tuple[str, str], how: Function, module: Any, parameters: list[str], outputs: list[str]) -> OnColumns:
-    """A method's function of columns; `names` are those of the scene and of the method."""
-
-    def solve(*columns: Any) -> None:
-        n = len(parameters)
-        if not len(columns[0]):
-            return
-        with compiling(*names):
-            how(module, columns[:n], columns[n], columns[n + 1 : -1], columns[-1])
-
-    return signed(solve, [*parameters, "rtol", *outputs, "status"])
-
-
-def _no_bound(parameters: list[str]) -> OnColumns:
-    """Says that nothing is promised."""
-
-    def bound(*columns: Any) -> None:
-        columns[-1][:] = math.inf
-
-    return signed(bound, [*parameters, "rtol", "asked", "out"])
 
 
 def limits_check(fields: Sequence[Field]) -> OnColumns:

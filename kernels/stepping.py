@@ -41,7 +41,7 @@ COST = (
 
 def stepping_fields(flips: float = 20.0) -> tuple[Field, Field, Field]:
     """The parameters that every scene has: switches to follow, step, location."""
-    words: dict[str, Any] = {"lower": 0.0, "upper": 4.0, "choices": LOCATIONS, "integer": True}
+    words: dict[str, Any] = {"lower": 0.0, "upper": 3.0, "choices": LOCATIONS, "integer": True}
     return (
         flips_field(flips, MOST_FLIPS),
         Field("step", "s", "time step", lower=0.0, open_lower=True),

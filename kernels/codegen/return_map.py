@@ -18,10 +18,9 @@ from kernels.codegen.functions import Functions
 from kernels.codegen.module import build, loaded
 from kernels.codegen.record import record
 from kernels.codegen.slid_along import slid_along
-from kernels.codegen.sliding import made
 from kernels.codegen.stepped import stepped, twice_by
 from kernels.interface import Status
-from kernels.source_text.expression import INPUT, NUMBER, Expression, SceneError, math_recorded, needed
+from kernels.source_text.expression import INPUT, Expression, SceneError, math_recorded, needed
 
 FRESH = "from_start"
 RATES = '''
@@ -166,7 +165,7 @@ def returning(scene):
         before = {name: given[place] for name, place in zip(scene.states, places, strict=True)}
         graph = given[FRESH].graph
         values = {**given, "side": -1.0, ".way": 1.0}
-        before[scene.states[seen]] = -_again(graph, offset, values) / _again(graph, factor, values)
+        before[scene.states[seen]] = -graph.again(offset, values) / graph.again(factor, values)
         behind = tuple(before.values())
         if scene.switch is not None:
             behind = asked(scene.switch, values | before)
@@ -176,13 +175,6 @@ def returning(scene):
     parameters = (*scene.parameters, *places, FRESH)
     start = named(start, (*parameters, "side"))
     return replace(scene, name=f"{scene.name}_return", parameters=parameters, start=start, exact_start=True)
-
-
-def _again(graph, x, values):
-    """A recorded expression of other values, in a graph of theirs."""
-    if x.kind in (NUMBER, INPUT):
-        return graph.of(x.args[0] if x.kind == NUMBER else values[x.args[0]])
-    return made(graph, x.kind, [_again(graph, a, values) for a in x.args])
 
 
 def paired(scene):

@@ -10,40 +10,14 @@ Source: Filippov, Differential Equations with Discontinuous Righthand Sides (198
 
 from dataclasses import replace
 
-from kernels.source_text.expression import ADD, DIV, HALF_SQUARE, INPUT, MUL, NUMBER, SCALED
+from kernels.source_text.expression import ADD, MUL, SCALED
 from kernels.source_text.tangent import Tangents, along
 
 
-class Side:
-    """Expressions with the signs of kinks replaced.
-
-    Parameters
-    ----------
-    graph : of the expressions, which takes the new ones too
-    signs : dict from the number of a kink to what stands for its sign
-    """
-
-    def __init__(self, graph, signs):
-        self._graph = graph
-        self._reused = {_sign(graph, j).index: sign for j, sign in signs.items()}
-
-    def of(self, x):
-        """The expression on this side."""
-        if x.index not in self._reused:
-            self._reused[x.index] = self._of(x)
-        return self._reused[x.index]
-
-    def _of(self, x):
-        if x.kind in (INPUT, NUMBER):
-            return x
-        return made(self._graph, x.kind, [self.of(a) for a in x.args])
-
-
-def made(graph, kind, args):
-    """The expression of that kind."""
-    made = {ADD: graph.add, MUL: graph.multiply, SCALED: graph.multiply, DIV: graph.divide, "power": graph.power}
-    made |= {"abs": graph.magnitude, "sign": graph.sign, HALF_SQUARE: lambda u: 0.5 * u * u}
-    return made[kind](*args) if kind in made else graph.function(kind, *args)
+def _side(graph, signs):
+    """A function of expressions: with the signs of kinks replaced, a dict from the number of each."""
+    signs, done = {f".sign_{j}": sign for j, sign in signs.items()}, {}
+    return lambda x: graph.again(x, signs, done)
 
 
 def _sign(graph, j):
@@ -57,15 +31,15 @@ def _free(graph, j):
 
 def _jump(x, behind, ahead):
     """What an expression is more on one side than on the other: terms that are the same cancel before any rounding."""
-    before, after = behind.of(x), ahead.of(x)
+    before, after = behind(x), ahead(x)
     if before is after:
         return x.graph.of(0.0)
     if x.kind == ADD:
         return _jump(x.args[0], behind, ahead) + _jump(x.args[1], behind, ahead)
     if x.kind in (MUL, SCALED):
         u, w = x.args
-        by_u = ahead.of(w) * _jump(u, behind, ahead) if behind.of(u) is not ahead.of(u) else 0.0
-        by_w = behind.of(u) * _jump(w, behind, ahead) if behind.of(w) is not ahead.of(w) else 0.0
+        by_u = ahead(w) * _jump(u, behind, ahead) if behind(u) is not ahead(u) else 0.0
+        by_w = behind(u) * _jump(w, behind, ahead) if behind(w) is not ahead(w) else 0.0
         return by_u + by_w
     return after - before
 
@@ -80,9 +54,9 @@ def slid(recorded, states):
     free = [_free(graph, j) for j in range(len(kinks))]
     slides = [1.0 - f for f in free]
     behind, ahead = (
-        Side(graph, {j: _sign(graph, j) + way * slide for j, slide in enumerate(slides)}) for way in (-1.0, 1.0)
+        _side(graph, {j: _sign(graph, j) + way * slide for j, slide in enumerate(slides)}) for way in (-1.0, 1.0)
     )
-    below, jumps = [behind.of(r) for r in recorded.rates], [_jump(r, behind, ahead) for r in recorded.rates]
+    below, jumps = [behind(r) for r in recorded.rates], [_jump(r, behind, ahead) for r in recorded.rates]
     gradients = [[Tangents.along(graph, s).of(u) for s in states] for u in kinks]
     down = sum((w * along(graph, g, below) for w, g in zip(slides, gradients, strict=True)), graph.of(0.0))
     rise = sum((w * along(graph, g, jumps) for w, g in zip(slides, gradients, strict=True)), graph.of(0.0))
@@ -108,5 +82,5 @@ def slid(recorded, states):
 
 def _speeds(graph, rates, gradient, j):
     """u'(f+) and u'(f-) of a kink."""
-    sides = (Side(graph, {j: graph.of(sign)}) for sign in (1.0, -1.0))
-    return tuple(along(graph, gradient, [side.of(rate) for rate in rates]) for side in sides)
+    sides = (_side(graph, {j: graph.of(sign)}) for sign in (1.0, -1.0))
+    return tuple(along(graph, gradient, [side(rate) for rate in rates]) for side in sides)

@@ -1,20 +1,14 @@
-"""Where in a step an event fires, and the state there: five ways, generic in one cell or lanes.
+"""Where in a step an event fires, and the state there: four ways, generic in one cell or lanes.
 
 An event is known at both ends of the step [0, h] by its value (e0 > 0 >= e1) and its rate (d0, d1). `linear` and
 `hermite` find the part of the step by a line or by the cubic through all four, and take a step of just that length.
 `root` is exact to the method: each trial is a step of its own from the same start, which is the method's continuous
-extension. `henon` goes from behind the event back onto it in one step, with the event's value as the variable:
-    du/de = u'/e',  dt/de = 1/e'                                                                     (1)
-Source: Henon, Physica D 5:412 (1982). `none` takes the event to fire at the end of the step: the fault to be shown.
+extension. `none` takes the event to fire at the end of the step: the fault to be shown.
 """
 
-from typing import NamedTuple
-
-from kernels.integrate.records import Mode
-from kernels.integrate.steps import dop853, dopri5, euler, events, moreau, rk4, semi_implicit, verlet
-from kernels.lanes.jit import jit, jit_call
-from kernels.lanes.symbols import over_tuples, symbolic
-from kernels.lanes.tuples import joined
+from kernels.integrate.steps import dop853_stages, dopri5_stages, euler, events, moreau, rk4, semi_implicit, verlet
+from kernels.lanes.jit import jit_call
+from kernels.lanes.symbols import symbolic
 from kernels.lanes.vectors import any_lane, choose, fma, magnitude, not_, sqrt, where
 
 METHODS = ("euler", "semi_implicit", "verlet", "rk4", "dopri5", "dop853", "moreau")
@@ -22,14 +16,12 @@ EULER, SEMI_IMPLICIT, VERLET, RK4, DOPRI5, DOP853, MOREAU = range(7)
 ORDER = (1, 1, 2, 4, 5, 8, 1)
 CALLS = (1.0, 1.0, 2.0, 4.0, 6.0, 12.0, 2.0)
 """Calls of the rates in a step."""
-NONE, LINEAR, HERMITE, ROOT, HENON = range(5)
-LOCATIONS = {"none": NONE, "linear": LINEAR, "hermite": HERMITE, "root": ROOT, "henon": HENON}
+NONE, LINEAR, HERMITE, ROOT = range(4)
+LOCATIONS = {"none": NONE, "linear": LINEAR, "hermite": HERMITE, "root": ROOT}
 
 ROOT_LIMIT = 60
 SETTLED = 1e-11
 """Change of the part of a step after which the event is where the next trial ends."""
-CLOSE = 0.1
-"""How much of an event's value may be left behind Henon's step."""
 
 
 @jit_call
@@ -46,9 +38,9 @@ def leap(m, scheme, state, mode, h):
         elif scheme.method == RK4:
             state = rk4(m, state, mode, substep)
         elif scheme.method == DOPRI5:
-            state = dopri5(m, state, mode, substep)
+            state = dopri5_stages(m, state, mode, substep)[0]
         elif scheme.method == DOP853:
-            state = dop853(m, state, mode, substep)
+            state = dop853_stages(m, state, mode, substep)[0]
         else:
             state = moreau(m, state, mode, substep)
     return state
@@ -126,46 +118,3 @@ def shortened(m, scheme, mode, step, which, first, seeking):
         part = where(seeking, guess, part)
         new = choose(seeking, leap(m, scheme, step.state, mode, part * h), new)
     return part, new, trials, seeking
-
-
-@jit
-@over_tuples
-def rates_per_value(wide, mode):
-    """Rates of the states and of time per unit of an event's value; (1)."""
-    m, which, parameters = mode.parameters
-    inside = Mode(mode.side, mode.signs, parameters, False)
-    slope = of_event(events(m, wide[:-1], inside)[1], which)
-    return joined(tuple(rate / slope for rate in m.rates(wide[:-1], inside)), (1.0 / slope,))
-
-
-@jit
-def held_signs(state, mode):
-    """The signs as they are."""
-    return mode.signs
-
-
-class Swap(NamedTuple):
-    """In the place of a scene, one whose variable is the event's value."""
-
-    rates: object
-    natural_signs: object
-
-
-SWAP = Swap(rates_per_value, held_signs)
-
-
-@jit_call
-def swapped(m, scheme, mode, step, which, value):
-    """From behind the event, where it has that value, back onto it by (1): part of h, state, whether it is there."""
-    wide = joined(step.new, (step.h,))
-    held = Mode(mode.side, mode.signs, (m, which, mode.parameters), False)
-    if scheme.method in (DOP853, DOPRI5):
-        for _ in range(scheme.substeps):
-            wide = dop853(SWAP, wide, held, -value / scheme.substeps)
-    else:
-        for _ in range(scheme.substeps):
-            wide = rk4(SWAP, wide, held, -value / scheme.substeps)
-    time, found = wide[-1], wide[:-1]
-    left = of_event(events(m, found, mode)[0], which)
-    there = (magnitude(left) <= -CLOSE * value) & (time > -CLOSE * step.h) & (time <= step.h)
-    return time / step.h, found, there

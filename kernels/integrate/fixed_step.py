@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from kernels.integrate import events as E
 from kernels.integrate.driver import BACK, begun, settled
-from kernels.integrate.events import cubic_root, leap, lowest, of_event, shortened, swapped
+from kernels.integrate.events import cubic_root, leap, lowest, of_event, shortened
 from kernels.integrate.records import Mode, Step
 from kernels.integrate.steps import ONE, events, rate
 from kernels.lanes import codes
@@ -83,22 +83,6 @@ class Cell(NamedTuple):
     reach: tuple
 
 
-class Trial(NamedTuple):
-    """A step that is being judged.
-
-    new, taken, calls : the state that it ends in, its length, calls of the rates
-    verdict : what went wrong; 0: nothing
-    again, shorter : whether it must be tried again, with which length
-    """
-
-    new: tuple
-    taken: float
-    calls: float
-    verdict: float
-    again: bool
-    shorter: float
-
-
 def cell_of(cell):
     """A cell of zeros, as large as one of `records.Cell`."""
     u = cell.state
@@ -160,25 +144,17 @@ def finite(state):
 def located(m, scheme, mode, step, which, seeking):
     """The part of the step at which the event fires, the state there, calls of the rates, and whether it is lost."""
     e0, e1, h = of_event(step.start, which), of_event(step.end, which), step.h
-    part = where(e0 > 0.0, e0 / (e0 - e1), 0.0)
-    new, calls, lost = step.new, 0.0 * h, seeking & not_(seeking)
-    curved = seeking & (e0 > 0.0)
+    part, curved = where(e0 > 0.0, e0 / (e0 - e1), 0.0), seeking & (e0 > 0.0)
     if scheme.location in (E.HERMITE, E.ROOT):
         d0, d1 = of_event(step.start_rates, which), of_event(step.end_rates, which)
         part = where(curved, cubic_root(e0, e1, h * d0, h * d1, curved), part)
-    if scheme.location == E.HENON:
-        part, new, there = swapped(m, scheme, mode, step, which, e1)
-        lost = curved & not_(there)
-        calls = calls + where(scheme.method > 3.5, 12.0, 4.0) * scheme.substeps
-        part, new = where(curved, part, 0.0), choose(curved, new, step.state)
-    elif scheme.location == E.ROOT:
+    if scheme.location == E.ROOT:
         part, new, trials, lost = shortened(m, scheme, mode, step, which, part, curved)
-        part, new = where(curved, part, 0.0), choose(curved, new, step.state)
-        calls = trials * (E.CALLS[scheme.method] * scheme.substeps)
+        part = where(curved, part, 0.0)
     else:
-        new = choose(curved, leap(m, scheme, step.state, mode, part * h), step.state)
-        calls = calls + E.CALLS[scheme.method] * scheme.substeps
-    return part, new, where(curved, calls, 0.0), lost
+        new, trials, lost = leap(m, scheme, step.state, mode, part * h), 1.0 + 0.0 * h, seeking & not_(seeking)
+    calls = trials * (E.CALLS[scheme.method] * scheme.substeps)
+    return part, choose(curved, new, step.state), where(curved, calls, 0.0), lost
 
 
 @symbolic
@@ -195,19 +171,12 @@ def margin_behind(which, step, wide):
     return where(back, at_switch * at_switch / (2.0 * bend * where(wide > 0.0, wide, 1.0)), math.inf)
 
 
-@jit_call
+@symbolic
 def shows_all(m, state, new, mode, h):
     """Whether a step hides no more of a state than its stages tell; NaN does."""
     change = times(h, after(rate(m, new, mode), -1.0, ONE, (rate(m, state, mode),)))
-    of_rates, _ = m.hidden(state, boxes(state, new, change), mode)
-    return all_seen(of_rates, state, new, h)
-
-
-@symbolic
-def all_seen(of_rates, state, new, h):
-    """Whether what rates hide on a step is below the states' sizes."""
     seen = h <= math.inf
-    for hidden, u, w in zip(of_rates, state, new, strict=True):
+    for hidden, u, w in zip(m.hidden(state, boxes(state, new, change), mode)[0], state, new, strict=True):
         seen = seen & (h * hidden <= HIDDEN * (magnitude(u) + magnitude(w)))
     return seen
 
@@ -221,21 +190,61 @@ def uncertain(step, motion, missed):
     return missed & was_cut & close, where(missed & not_(was_cut), dip(step), 0.0)
 
 
-@jit
-def tried(m, scheme, mode, step, which, motion, active):
-    """The step, judged: ended on the event that it met, or to be cut, for it may hide a root of an event."""
-    h, on = step.h, motion.on
-    broken = active & not_(finite(step.new) & finite(step.end))
+@symbolic
+def moved_on(motion, step, new, taken, calls, verdict, which, again, shorter, below, active):
+    """The motion with one more step of the active lanes; that which must be taken again is shorter."""
+    moved = active & not_(again) & (verdict < REFUSED)
+    on = choose(moved & not_(below), marks(which, motion.on), motion.on)
+    turned = tuple(where(o > 0.5, -sign, sign) for sign, o in zip(motion.signs[:-1], on[1:], strict=True))
+    signs = (*turned, where(on[0] > 0.5, 1.0, motion.signs[-1]))
+    state, taken = choose(moved, new, motion.state), where(moved, taken, 0.0)
+    return motion._replace(
+        state=state,
+        signs=choose(moved, signs, motion.signs),
+        on=on,
+        cut=where(again, shorter, 0.0),
+        cuts=where(again, motion.cuts + 1.0, 0.0),
+        time=where(active, motion.time + taken, motion.time),
+        since=where(active, motion.since + taken, motion.since),
+        steps=where(active & not_(again), motion.steps + 1.0, motion.steps),
+        calls=where(active, motion.calls + calls, motion.calls),
+        trials=where(active, motion.trials + 1.0, motion.trials),
+        reach=choose(active, reached(motion.reach, state), motion.reach),
+        wide=where(active & (step.start[0] > motion.wide), step.start[0], motion.wide),
+        verdict=where(active & (verdict > motion.verdict), verdict, motion.verdict),
+    )
+
+
+@jit_call
+def attempt(m, scheme, motion, active):
+    """One step of the active lanes.
+
+    Returns
+    -------
+    motion : Cell
+        After the step.
+    which : the event that it ends on, -1 for none, -2 where it must be tried again
+    behind : `margin_behind`
+    """
+    natural, on = scheme.location == E.NONE, motion.on
+    mode = Mode(motion.side, motion.signs, motion.parameters, natural)
+    h = where(motion.cut > 0.0, motion.cut, motion.step)
+    start, start_rates = events(m, motion.state, mode)
+    new = leap(m, scheme, motion.state, mode, h)
+    end, end_rates = events(m, new, mode)
+    step = Step(motion.state, new, h, start, start_rates, end, end_rates)
+    which = first_event(step, on, 1.0 if natural else 0.0)
+    behind = margin_behind(which, step, where(active & (start[0] > motion.wide), start[0], motion.wide))
+    broken = active & not_(finite(new) & finite(end))
     met = active & (which > -0.5) & not_(broken)
-    new, taken, verdict = step.new, h, where(broken, OUT_OF_RANGE, 0.0)
+    verdict, taken, shorter, again = where(broken, OUT_OF_RANGE, 0.0), h, h, active & not_(active)
     calls = 0.0 * h + E.CALLS[scheme.method] * scheme.substeps
-    again, shorter = active & not_(active), h
     if scheme.method == E.MOREAU:
-        rests = (magnitude(step.state[-1]) <= 0.0) & (magnitude(new[-1]) <= 0.0) & not_(met)
+        rests = (magnitude(motion.state[-1]) <= 0.0) & (magnitude(new[-1]) <= 0.0) & not_(met)
         verdict = where(active & rests, STICKS, verdict)
-    if not mode.natural:
+    if not natural:  # ended on the event that it met, or to be cut, for it may hide a root of an event
         pressed = met & (of_event(on, which) > 0.5)
-        away = of_event(step.start_rates, which) > 0.0
+        away = of_event(start_rates, which) > 0.0
         verdict = where(pressed & not_(away), STICKS, verdict)
         turning, low = uncertain(step, motion, active & not_(met | broken))
         again = (pressed & away) | (low > 0.0)
@@ -250,75 +259,14 @@ def tried(m, scheme, mode, step, which, motion, active):
             calls = where(seeking, calls + more, calls)
             verdict = where(seeking & lost, NOT_CONVERGED, verdict)
             again, shorter = again | other, where(other, part * h, shorter)
-    return Trial(new, taken, calls, verdict, again, shorter)
-
-
-@symbolic
-def arrived(motion, trial, which, moved, on):
-    """The motion behind the step, of the lanes that have moved; the others' next trial is shorter."""
-    parts = zip(motion.signs[:-1], on[1:], strict=True)
-    signs = tuple(where(o > 0.5, -sign, sign) for sign, o in parts)
-    signs = (*signs, where(on[0] > 0.5, 1.0, motion.signs[-1]))
-    return motion._replace(
-        state=choose(moved, trial.new, motion.state),
-        signs=choose(moved, signs, motion.signs),
-        on=on,
-        cut=where(trial.again, trial.shorter, 0.0),
-        cuts=where(trial.again, motion.cuts + 1.0, 0.0),
-    )
-
-
-@symbolic
-def counted(motion, taken, calls, verdict, which, active):
-    """The motion with one more step of the active lanes counted."""
-    return motion._replace(
-        time=where(active, motion.time + taken, motion.time),
-        since=where(active, motion.since + taken, motion.since),
-        steps=where(active & (which > -1.5), motion.steps + 1.0, motion.steps),
-        calls=where(active, motion.calls + calls, motion.calls),
-        trials=where(active, motion.trials + 1.0, motion.trials),
-        reach=choose(active, reached(motion.reach, motion.state), motion.reach),
-        verdict=where(active & (verdict > motion.verdict), verdict, motion.verdict),
-    )
-
-
-@symbolic
-def widened(motion, step, active):
-    """The motion with the surface's largest value so far."""
-    return motion._replace(wide=where(active & (step.start[0] > motion.wide), step.start[0], motion.wide))
-
-
-@jit_call
-def attempt(m, scheme, motion, active):
-    """One step of the active lanes.
-
-    Returns
-    -------
-    motion : Cell
-        After the step.
-    which : the event that it ends on, -1 for none, -2 where it must be tried again
-    behind : `margin_behind`
-    """
-    mode = Mode(motion.side, motion.signs, motion.parameters, scheme.location == E.NONE)
-    h = where(motion.cut > 0.0, motion.cut, motion.step)
-    start, start_rates = events(m, motion.state, mode)
-    new = leap(m, scheme, motion.state, mode, h)
-    end, end_rates = events(m, new, mode)
-    step = Step(motion.state, new, h, start, start_rates, end, end_rates)
-    which = first_event(step, motion.on, 1.0 if mode.natural else 0.0)
-    motion = widened(motion, step, active)
-    behind = margin_behind(which, step, motion.wide)
-    trial = tried(m, scheme, mode, step, which, motion, active)
-    verdict = where(trial.again & (motion.cuts > CUTS), codes.STEP_LIMIT, trial.verdict)
-    which = where(trial.again, -2.0, which)
-    moved = active & not_(trial.again) & (verdict < REFUSED)
+    verdict = where(again & (motion.cuts > CUTS), codes.STEP_LIMIT, verdict)
+    moved = active & not_(again) & (verdict < REFUSED)
     if any_of(m_hides(m)):
-        seen = shows_all(m, motion.state, trial.new, mode, trial.taken)
+        seen = shows_all(m, motion.state, new, mode, taken)
         verdict = where(moved & not_(seen) & (verdict < INACCURATE), INACCURATE, verdict)
-    below = moved & mode.natural & (which < -0.5) & (end[0] <= 0.0)  # not yet above where it began
-    on = choose(moved & not_(below), marks(which, motion.on), motion.on)
-    motion = arrived(motion, trial, which, moved, on)
-    return counted(motion, where(moved, trial.taken, 0.0), trial.calls, verdict, which, active), which, behind
+    below = moved & natural & (which < -0.5) & (end[0] <= 0.0)  # not yet above where it began
+    motion = moved_on(motion, step, new, taken, calls, verdict, which, again, shorter, below, active)
+    return motion, where(again, -2.0, which), behind
 
 
 @symbolic
@@ -335,13 +283,11 @@ def jumped(motion, state, side, signs, on, behind, switches):
         trials=0.0, reach=reached(times(0.0, motion.reach), state), at=motion.state, reach_at=motion.reach, wide=0.0,
         slim=where(behind < motion.slim, behind, motion.slim),
     )  # fmt: skip
-    return type(motion)(*(_chosen(switches, x, y) for x, y in zip(new, motion, strict=True)))
-
-
-@symbolic
-def _chosen(switches, x, y):
-    """x of the lanes that switch, else y; of tuples each entry."""
-    return choose(switches, x, y) if isinstance(x, tuple) else where(switches, x, y)
+    chosen = (
+        choose(switches, x, y) if isinstance(x, tuple) else where(switches, x, y)
+        for x, y in zip(new, motion, strict=True)
+    )
+    return type(motion)(*chosen)
 
 
 @jit_call

@@ -15,7 +15,7 @@ from kernels.integrate.tableaux import (
     DOPRI5_ERROR,
 )
 from kernels.lanes.jit import jit, jit_call
-from kernels.lanes.symbols import symbolic
+from kernels.lanes.symbols import over_tuples, symbolic
 from kernels.lanes.tuples import after, times
 from kernels.lanes.vectors import fma, magnitude, sqrt, where
 
@@ -69,6 +69,7 @@ def dop853_tried(m, state, mode, h):
 
 
 @jit_call
+@over_tuples
 def dop853_series(m, state, trial, mode, h):
     """What the dense output is made of: seven terms."""
     k0, k5, k6, k7, k8, k9, k10, k11 = trial.stages
@@ -83,10 +84,7 @@ def dop853_series(m, state, trial, mode, h):
         change,
         after(times(-1.0, change), h, ONE, (k0,)),
         after(times(2.0, change), -h, (1.0, 1.0), (last, k0)),
-        after(nothing, h, DOP853_DENSE[0], all_stages),
-        after(nothing, h, DOP853_DENSE[1], all_stages),
-        after(nothing, h, DOP853_DENSE[2], all_stages),
-        after(nothing, h, DOP853_DENSE[3], all_stages),
+        *tuple(after(nothing, h, weights, all_stages) for weights in DOP853_DENSE),
     )
 
 
@@ -136,24 +134,11 @@ def dopri5_vague(m, state, terms, mode, h, part):
 
 
 @jit
+@over_tuples
 def dopri5_dense(m, state, terms, mode, h, part):
     """The state at that part of the step."""
-    k0, k2, k3, k4, k5, k6 = terms
-    weights = (
-        _weight(part, DOPRI5_DENSE[0]),
-        _weight(part, DOPRI5_DENSE[1]),
-        _weight(part, DOPRI5_DENSE[2]),
-        _weight(part, DOPRI5_DENSE[3]),
-        _weight(part, DOPRI5_DENSE[4]),
-        _weight(part, DOPRI5_DENSE[5]),
-    )
-    return after(state, h, weights, (k0, k2, k3, k4, k5, k6))
-
-
-@symbolic
-def _weight(part, powers):
-    a, b, c, d = powers
-    return part * fma(part, fma(part, fma(part, d, c), b), a)
+    weights = tuple(part * fma(part, fma(part, fma(part, d, c), b), a) for a, b, c, d in DOPRI5_DENSE)
+    return after(state, h, weights, terms)
 
 
 class Pair(NamedTuple):

@@ -92,12 +92,6 @@ def dopri5_stages(m, state, mode, h):
     return after(state, h, DOPRI5[5], (k0, k2, k3, k4, k5)), (k0, k2, k3, k4, k5)
 
 
-@jit_call
-def dopri5(m, state, mode, h):
-    """Dormand-Prince 5(4), the fifth order."""
-    return dopri5_stages(m, state, mode, h)[0]
-
-
 @jit
 def dop853_stages(m, state, mode, h):
     k0 = rate(m, state, mode)
@@ -114,9 +108,3 @@ def dop853_stages(m, state, mode, h):
     k11 = rate(m, after(state, h, DOP853[10], (k0, k3, k4, k5, k6, k7, k8, k9, k10)), mode)
     stages = k0, k5, k6, k7, k8, k9, k10, k11
     return after(state, h, DOP853[11], stages), stages
-
-
-@jit_call
-def dop853(m, state, mode, h):
-    """Order 8 of Dormand and Prince."""
-    return dop853_stages(m, state, mode, h)[0]

@@ -319,6 +319,25 @@ class Graph:
         """The sign of a series, constant between kinks."""
         return self.constant(f".sign_{self.kinks.setdefault(u, len(self.kinks))}")
 
+    def again(self, x, inputs, done=None):
+        """An expression, of any graph, with what is in the dict `inputs` in the place of inputs of these names.
+
+        `done` : a dict of what has been replaced already, by the node's number
+        """
+        done = {} if done is None else done
+        if x.index not in done:
+            if x.kind in (NUMBER, INPUT):
+                done[x.index] = self.of(inputs.get(x.args[0], x) if x.kind == INPUT else x.args[0])
+            else:
+                done[x.index] = self.operation(x.kind, [self.again(a, inputs, done) for a in x.args])
+        return done[x.index]
+
+    def operation(self, kind, args):
+        """The expression of that kind."""
+        made = {ADD: self.add, MUL: self.multiply, SCALED: self.multiply, DIV: self.divide, "power": self.power}
+        made |= {"abs": self.magnitude, "sign": self.sign, HALF_SQUARE: lambda u: 0.5 * u * u}
+        return made[kind](*args) if kind in made else self.function(kind, *args)
+
     def timed(self, x, unit):
         """x times a constant, which in a sum of series goes into their constants and costs nothing there."""
         if x.kind == ADD and x.varies:
@@ -355,18 +374,11 @@ def _function(name, of_number):
     return call
 
 
-sqrt = _function("sqrt", math.sqrt)
-exp = _function("exp", math.exp)
-log = _function("log", math.log)
-sin = _function("sin", math.sin)
-cos = _function("cos", math.cos)
-arcsin = _function("arcsin", math.asin)
-arccos = _function("arccos", math.acos)
-arctan = _function("arctan", math.atan)
-sinh = _function("sinh", math.sinh)
-cosh = _function("cosh", math.cosh)
-tanh = _function("tanh", math.tanh)
-hypot = _function("hypot", math.hypot)
+_OF_NUMBERS = {
+    name: getattr(math, name) for name in ("sqrt", "exp", "log", "sin", "cos", "sinh", "cosh", "tanh", "hypot")
+}
+sqrt, exp, log, sin, cos, sinh, cosh, tanh, hypot = (_function(name, of) for name, of in _OF_NUMBERS.items())
+arcsin, arccos, arctan = (_function(f"arc{name}", getattr(math, f"a{name}")) for name in ("sin", "cos", "tan"))
 pi = math.pi
 
 
