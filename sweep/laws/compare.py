@@ -16,7 +16,6 @@ from sweep.laws.lines import rounding
 from sweep.laws.loglog import Array
 from sweep.laws.noise import BEYOND_DOUBT
 from sweep.laws.shapes import CORRECTION, LAWS, OFFSET
-from sweep.words import Table
 
 NAMES = {
     "aicc": "Akaike's criterion, corrected for few points; of one law with the noise that suits it best",
@@ -77,7 +76,7 @@ def compare_laws(y: xr.DataArray, dim: str, window: Window | None = None, *, sig
     def compared(t: Array, z: Array, errors: Array | None, bounds: Array | None) -> dict[str, Any]:
         nonlocal found
         found = _table(t, z[0], sorted(fitted(LAWS, t, z, errors)[0].values(), key=lambda fit: fit.aicc))
-        return {"chosen": [found.chosen]}
+        return {"chosen": [found.attrs["chosen"]]}
 
     fit_lines(compared, y, dim, window, sigma)
     for name, of in (("x", y[dim]), ("y", y), ("fitted", y)):
@@ -114,13 +113,14 @@ def _table(t: Array, z: Array, tried: list[Found]) -> xr.Dataset:
         text += f"all others are ruled out, the next by {margin:.3g} in AICc"
     if chosen.residual > 8 * rounding(t, z) and chosen.denied(t, "even"):
         text += "; but what it leaves has a shape, so that none of them is the law"
-    rows = zip(names, (f"{one:.3g}" for one in worse), columns["exponents"], strict=True)
-    summary = Table(list(rows), ("law", "worse", "exponents")).text(indent="", wide=True)
+    rows = zip(names, worse, columns["exponents"], strict=True)
+    wide = max(map(len, names))
+    summary = [f"{'law':{wide}}     worse  exponents", *(f"{name:{wide}}  {by:8.3g}  {of}" for name, by, of in rows)]
     about = {name: {"units": "1", "long_name": words} for name, words in NAMES.items()}
     variables: dict[str, Any] = {name: ("law", column, about.get(name)) for name, column in columns.items()}
     variables |= {"fitted": (("law", "point"), np.exp(z - off))}
     variables |= {"x": ("point", np.exp(t)), "y": ("point", np.exp(z)), "law": names}
-    attrs = {"chosen": chosen.law.name, "margin": margin, "verdict": text, "summary": summary}
+    attrs = {"chosen": chosen.law.name, "margin": margin, "verdict": text, "summary": "\n".join(summary)}
     return xr.Dataset(variables, attrs=attrs)
 
 

@@ -6,6 +6,7 @@ Gauss-Newton steps of q the end. All laws of all lines are fitted at once.
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
 from collections.abc import Callable, Iterable, Sequence
@@ -25,8 +26,9 @@ FURTHER = np.array([1.0, 4.0, 16.0])
 STEPS, ENOUGH = 10, 2e-3
 """Steps at most, three times as many of a law that is wanted; and what a step must take away of a deviance for
 another one: so much of 0.5 and of what it is above the best, or the square for a law that is wanted."""
-MOST_LINES, MOST_Q = 16, 3
-"""Lines that are fitted at once, so that what is held stays below some 50 MB, and q of a law at most."""
+MOST_LINES, MOST_Q, MOST_KEPT = 16, 3, 300
+"""Lines that are fitted at once, so that what is held stays below some 50 MB; q of a law at most; and points at most
+of which the grid is kept for the next line."""
 
 
 class Found(NamedTuple):
@@ -147,11 +149,9 @@ class _Search:
         self.rounding = (ROUNDING * (1 + abs(self.z).max(axis=1))) ** 2
         # the nearest of a grid of q; of a bend with a shape that of the bend without
         own = [law for law in laws if not law.starts_as]
-        tries = [np.array(list(itertools.product(*(number.starts for number in law.q)))) for law in own]
-        edges = np.cumsum([0, *map(len, tries)])
-        grid = np.concatenate([np.pad(some, ((0, 0), (0, MOST_Q - some.shape[1]))) for some in tries])
-        every, basis, _ = _columns(own, np.repeat(np.arange(len(own)), np.diff(edges)), grid, t, self.root)
-        off = z[:, None] * self.root - every[0, 0]
+        kept = _grid if t.size <= MOST_KEPT else _grid.__wrapped__
+        edges, grid, shift, basis = kept(tuple(own), t.tobytes(), self.root.tobytes())
+        off = z[:, None] * self.root - shift
         square = (off**2).sum(axis=2) - (np.einsum("gnk,mgn->mgk", basis, off) ** 2).sum(axis=2)
         ends = zip(own, edges, edges[1:], strict=False)
         best = {law.name: grid[a + np.nanargmin(square[:, a:b], axis=1)] for law, a, b in ends}
@@ -241,6 +241,20 @@ class _Search:
             of_law = doubt[row, own], float(deviance[row]), int(self.errors is None)
             found.append(Found(law, numbers[row, own], *of_points, *of_law))
         return found
+
+
+@functools.lru_cache(4)
+def _grid(laws: tuple[Law, ...], t: bytes, root: bytes) -> tuple[Array, Array, Array, Array]:
+    """Starts of the q of all laws, law by law: first and past-the-last of each, q, and shift and Q of `_columns`. Lines
+    over the same x share them."""
+    tries = [np.array(list(itertools.product(*(number.starts for number in law.q)))) for law in laws]
+    edges = np.cumsum([0, *map(len, tries)])
+    grid = np.zeros((edges[-1], MOST_Q))
+    for first, some in zip(edges, tries, strict=False):
+        grid[first : first + len(some), : some.shape[1]] = some
+    places, weights = np.frombuffer(t), np.frombuffer(root)
+    every, basis, _ = _columns(laws, np.repeat(np.arange(len(laws)), np.diff(edges)), grid, places, weights)
+    return edges, grid, every[0, 0], basis
 
 
 def _columns(

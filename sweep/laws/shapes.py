@@ -27,7 +27,7 @@ class Number(NamedTuple):
 
     least: float
     most: float
-    starts: Any
+    starts: tuple[float, ...]
 
 
 class Law(NamedTuple):
@@ -153,8 +153,8 @@ def _three(q: Array, s: Array, span: float) -> Iterator[Parts]:
     yield 0.0, 0.0, -a, a - b, b
 
 
-PLACE = Number(-1.0, 2.0, np.linspace(0.1, 0.9, 7))
-WIDTH = Number(-7.0, 1.0, np.log((0.01, 0.04, 0.12, 0.3)))
+PLACE = Number(-1.0, 2.0, tuple(np.linspace(0.1, 0.9, 7)))
+WIDTH = Number(-7.0, 1.0, tuple(np.log((0.01, 0.04, 0.12, 0.3))))
 SKEW, SCALES = Number(-2.0, 2.0, (0.0,)), Number(0.0, 2.5, (0.8,))
 POWER = Number(-60.0, 60.0, (-12.0, -6.0, -2.5, -1.0, 1.0, 2.5, 6.0, 12.0))
 P_TWO = ("p low", "p high")
@@ -172,7 +172,7 @@ BENDS = (
         q=(*TWO.q, SCALES),
     ),
 )
-SECOND = Number(0.02, 0.9, (0.15, 0.3, 0.45, 0.6)), Number(-2.5, 0.0, np.log((0.2, 0.35, 0.5)))
+SECOND = Number(0.02, 0.9, (0.15, 0.3, 0.45, 0.6)), Number(-2.5, 0.0, tuple(np.log((0.2, 0.35, 0.5))))
 THREE_Q = (*SECOND, WIDTH._replace(starts=WIDTH.starts[:3]))
 THREE = Law("three laws", "two bends of one width", _three, 4, THREE_Q, ("p low", "p middle", "p high"))
 OFFSET = Law("offset", "A x^p + C", _offset, 1, (POWER, Number(-1.57, 1.57, (-1.2, -0.3, 0.1, 0.8, 1.4))))
