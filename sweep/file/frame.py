@@ -34,7 +34,8 @@ if TYPE_CHECKING:
 
 PAGE = 4096
 WORTH_A_PAGE = 10 * PAGE
-"""Chunks of so many bytes begin on a page of their own, at a cost of a tenth at most."""
+"""Chunks of so many bytes begin on a page of their own, at a cost of a tenth at most; where several machines write to
+the file, those of a page."""
 GATHERED_BYTES = 8 << 20
 """Bytes of the rows that are reduced to groups at a time."""
 COMPACT = 1 << 15
@@ -77,14 +78,14 @@ def expected_size(schema: Schema, cuts: Mapping[str, Cut]) -> int:
     return TEXT_BYTES + coordinates + numbers
 
 
-def create(path: Path, schema: Schema, cuts: Mapping[str, Cut]) -> StoredFile:
+def create(path: Path, schema: Schema, cuts: Mapping[str, Cut], shared: bool = False) -> StoredFile:
     """Makes a result of which nothing is computed yet, with room on the disk for all of it. Raises OSError.
 
-    Of the output's `schema`, with tables as `cuts_of` gives them.
+    Of the output's `schema`, with tables as `cuts_of` gives them; `shared`, where several machines may write.
     """
     with _Skeleton(disk.open_file(path, os.O_CREAT | os.O_TRUNC | os.O_RDWR), "r+") as skeleton:
         try:
-            _lay_out(skeleton, schema, cuts)
+            _lay_out(skeleton, schema, cuts, PAGE if shared else WORTH_A_PAGE)
         except Exception:
             if not skeleton.refused:
                 raise
@@ -122,15 +123,15 @@ class _Skeleton(io.FileIO):
         return size
 
 
-def _lay_out(skeleton: _Skeleton, schema: Schema, cuts: Mapping[str, Cut]) -> None:
-    """Has HDF5 write all that is no number, and then find a place for each."""
+def _lay_out(skeleton: _Skeleton, schema: Schema, cuts: Mapping[str, Cut], aligned: int) -> None:
+    """Has HDF5 write all that is no number, and then find a place for each; objects of so many bytes are aligned."""
     import h5py
     from h5py import h5f, h5fd, h5p
 
     access, made = h5p.create(h5p.FILE_ACCESS), h5p.create(h5p.FILE_CREATE)
     access.set_fclose_degree(h5f.CLOSE_STRONG)
     access.set_libver_bounds(h5f.LIBVER_V110, h5f.LIBVER_V110)
-    access.set_alignment(WORTH_A_PAGE, PAGE)
+    access.set_alignment(aligned, PAGE)
     access.set_fileobj_driver(h5fd.fileobj_driver, skeleton)
     # each thing behind the last one
     made.set_file_space_strategy(h5f.FSPACE_STRATEGY_NONE, False, 1)

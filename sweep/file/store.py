@@ -81,11 +81,11 @@ class Store:
             raise SweepError(f"{self.path}: damaged beside its numbers; remove it, or give it up with --force")
         return None
 
-    def begin(self, schema: Schema, cuts: Mapping[str, Cut]) -> None:
+    def begin(self, schema: Schema, cuts: Mapping[str, Cut], shared: bool = False) -> None:
         """Makes the file, with room on the disk for all of it. Raises SweepError."""
         with disk.refusing(self.path):
             try:
-                file = create(self.temporary, schema, cuts)
+                file = create(self.temporary, schema, cuts, shared)
                 disk.rename(self.temporary, self.path)
                 disk.sync_folder(self.path.parent)
             except OSError:

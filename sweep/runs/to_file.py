@@ -120,7 +120,7 @@ def _computed(
                     f"{task.output}: needs {quantity(needed)}, only {quantity(free)} are free here; free some space, "
                     "choose another folder with -o, fewer outputs, or keep a [summary] instead of every cell"
                 )
-            store.begin(schema, cuts)
+            store.begin(schema, cuts, task.cluster is not None)
         for block in damaged:
             task.note(f"{loop.blocks.label(block)} were damaged on the disk and are computed again")
         shared = None if task.cluster is None else store.shared()

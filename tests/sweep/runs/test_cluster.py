@@ -16,6 +16,7 @@ import sweep
 from sweep.cli import main
 from sweep.command.reading import explained
 from sweep.errors import INCOMPLETE, SweepError
+from sweep.file.store import Store
 from sweep.results.statuses import account
 
 # a lost connection is what some of these tests are about; dask leaves its sockets to the collector
@@ -156,3 +157,14 @@ def test_a_cluster_without_workers_is_waited_for_and_says_so(output):
     with served(workers=0) as (address, _), elsewhere(tall(30), output, cluster=address, **keys) as found:
         assert account(found).pending == 30
     assert "the cluster has no workers" in log.getvalue()
+
+
+def test_workers_that_see_the_file_write_large_blocks_themselves(client, output, monkeypatch):
+    """What the run is sent of them is digests alone."""
+    real, sent = Store.put, []
+    monkeypatch.setattr(Store, "put", lambda self, job, found: (sent.append(type(found)), real(self, job, found))[1])
+    study = tall(20_000)
+    with elsewhere(study, output, cluster=client, block_cells=5000) as found:
+        same(found, quiet(study))
+    assert sent == [bytes] * 4
+    assert sweep.verify(output).whole
