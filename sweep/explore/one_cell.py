@@ -27,42 +27,31 @@ def require_cells(name: str, dataset: xr.Dataset) -> None:
         raise SweepError(f"sweep {name}: this is a summary, which keeps no cells; run its study without [summary]")
 
 
-def study_of(cells: xr.Dataset, study: Study) -> Study:
-    """The study of cells of a result, as a zip; what is the same in all of them is fixed, as a method may do no other.
-
-    Parameters
-    ----------
-    cells : Dataset
-        One cell, without a dimension of the grid, or some along the first one; their method and rtol are the same.
-    study : Study
-        What the result came from.
+def study_of(cell: xr.Dataset, study: Study) -> Study:
+    """The study of one cell of a result, a Dataset without a dimension of the grid, and of the study it came from.
 
     Raises
     ------
     SweepError
-        A parameter's values are no longer there, or stand in another unit.
+        A parameter's value is no longer there, or stands in another unit.
     """
-    first = next(field.name for field in study.kernel.parameters if field.default is None)
-    axes, fixed = dict[str, Axis](), dict[str, Any]()
+    fixed = dict[str, Any]()
     for field in study.kernel.parameters:
         name = study.follows.get(field.name, field.name)
-        if name not in cells.coords:
+        if name not in cell.coords:
             raise SweepError(f"{name}: the dataset has lost this coordinate; take a cell of the result as it was read")
-        values = cells[name].values
-        if field.choices and values.dtype.kind not in "fiu":
-            values = np.array([float(field.choices[str(word)]) for word in values.ravel()])
-        elif cells[name].attrs.get("units", field.unit) != field.unit:
+        value: Any = cell[name].values
+        if field.choices and value.dtype.kind not in "fiu":
+            value = field.choices[str(value)]
+        elif cell[name].attrs.get("units", field.unit) != field.unit:
             raise SweepError(f"{name}: stands in another unit; take a cell of the result as it was read")
-        # those that all cells share stand there once
-        values = values.reshape(-1, *study.shape(field))
-        if field.name == first or (values != values[0]).any():
-            column = np.resize(values, (cells[STATUS].size, *values.shape[1:]))
-            axes[field.name] = Axis(field.name, frozen(column), "values")
-        else:
-            fixed[field.name] = frozen(values[0]) if field.dims else float(values[0])
+        fixed[field.name] = frozen(value) if field.dims else float(value)
+    first = next(field.name for field in study.kernel.parameters if field.default is None)
+    axes = {first: Axis(first, frozen(np.asarray(fixed.pop(first))[None]), "values")}
     plain: dict[str, Any] = {"design": "zip", "blocks": (), "where": "", "summary": None, "follows": {}}
-    asked = {name: cells[name].values.flat[0].item() for name in SETTINGS if name in study.axes}
-    return dataclasses.replace(study, axes=axes, fixed=fixed, **plain, **asked)
+    return dataclasses.replace(
+        study, axes=axes, fixed=fixed, **plain, **{name: cell[name].item() for name in SETTINGS if name in study.axes}
+    )
 
 
 @dataclass(frozen=True)

@@ -113,7 +113,12 @@ def check(dataset: xr.Dataset, study: Study, sample: int = 200, seed: int = 0) -
     cells = cells.transpose("cell", ...)
     used, methods = cells[METHOD_USED].values, [method.name for method in study.kernel.methods]
     rtol = cells["rtol"].values if "rtol" in study.axes else np.full(len(drawn), study.rtol)
-    by, error, values = _second_opinions(cells, study, rtol)
+    by, error = np.full(len(drawn), -1), np.full(len(drawn), np.nan)
+    values = {field.name: np.full(cells[field.name].shape, np.nan) for field in study.asked}
+    for i in range(len(drawn)):
+        by[i], error[i], outputs = _second_opinion(study_of(cells.isel(cell=i), study), used[i])
+        for name, value in outputs.items():
+            values[name][i] = value
 
     judged, own = by >= 0, ":" in study.kernel_name
     sizes = {field.name: float(abs(cells[field.name]).max()) if own else 0.0 for field in study.asked}
@@ -139,29 +144,22 @@ def check(dataset: xr.Dataset, study: Study, sample: int = 200, seed: int = 0) -
     return Checked(len(ok), len(drawn), number, by_another, beyond, limit, worst)
 
 
-def _second_opinions(cells: xr.Dataset, study: Study, rtol: Any) -> tuple[Any, Any, dict[str, Any]]:
-    """Of each cell the number of a method, what that is right to, and its outputs; -1 where none solves it closely.
+def _second_opinion(cell: Study, own: int) -> tuple[int, float, dict[str, Any]]:
+    """The number of a method that solves a cell closely, what it is right to, and its outputs; -1 where none does.
 
-    Where a method finds that the scene has no such answer, the outputs are NaN, and differ from any value.
+    `own` is the method that solved it. Outputs are NaN, and differ from any value, where a method finds that the scene
+    has no such answer.
     """
-    used, methods = cells[METHOD_USED].values, study.kernel.methods
-    able = np.zeros((len(used), len(methods)), bool)
-    for i, row in enumerate(able):
-        row[list(usable_methods(study_of(cells.isel(cell=i), study)))] = True
-    by, errors = np.full(len(used), -1), np.full(len(used), np.nan)
-    values = {field.name: np.full(cells[field.name].shape, np.nan) for field in study.asked}
-    # those that say what they are right to come first, and the method that solved a cell last
-    order = sorted(range(len(methods)), key=lambda k: methods[k].bound is None and not methods[k].estimates)
-    for good, last, k, asked in itertools.product((GOOD, 1.0), (False, True), order, np.unique(rtol).tolist()):
-        todo = np.flatnonzero((by < 0) & (rtol == asked) & able[:, k] & ((used == k) == last))
-        if not len(todo):
-            continue
-        some = study_of(cells.isel(cell=todo), study)
-        again = solved(with_method(some, methods[k].name, max(asked / CLOSER, SMALLEST_RTOL)))
-        none = (again.status >= FIRST_REFUSAL) & ~among(again.status, GIVEN_UP)
-        error = np.where(none, 0.0, again.error)
-        solves = none | (np.isin(again.status, (Status.OK, Status.INACCURATE)) & (error <= asked / good))
-        by[todo[solves]], errors[todo[solves]] = k, error[solves]
-        for name, column in again.outputs.items():
-            values[name][todo[solves]] = column[solves]
-    return by, errors, values
+    methods, tried = cell.kernel.methods, dict[int, Any]()
+    # the cell's own method comes last, and those that say what they are right to before the others
+    vague = [method.bound is None and not method.estimates for method in methods]
+    order = sorted(usable_methods(cell), key=lambda k: (k == own, vague[k]))
+    for good, k in itertools.product((GOOD, 1.0), order):
+        if k not in tried:
+            tried[k] = solved(with_method(cell, methods[k].name, max(cell.rtol / CLOSER, SMALLEST_RTOL)))
+        again, status = tried[k], int(tried[k].status[0])
+        none = status >= FIRST_REFUSAL and not among(again.status, GIVEN_UP)[0]
+        error = 0.0 if none else float(again.error[0])
+        if none or (status in (Status.OK, Status.INACCURATE) and error <= cell.rtol / good):
+            return k, error, {name: column[0] for name, column in again.outputs.items()}
+    return -1, np.nan, {}
