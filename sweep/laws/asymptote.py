@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from sweep.errors import SweepError
 from sweep.laws.curves import Window, check_options, described, fit_lines, title
 from sweep.laws.fits import Found, fitted, union
 from sweep.laws.lines import rounding
@@ -87,7 +88,9 @@ def fit_correction(
     >>> print(f"{float(sweep.fit_correction(ds.period, 'mu').exponent):.4f}")
     -0.3334
     """
-    check_options(confidence, noise, sigma, end=end)
+    check_options(confidence, noise, sigma)
+    if end not in ("low", "high"):
+        raise SweepError(f'end: expected "low" or "high", found {end!r}')
     sign = 1.0 if end == "high" else -1.0
 
     def each(t: Array, z: Array, errors: Array | None, bounds: Array | None) -> dict[str, Any]:

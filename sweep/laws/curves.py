@@ -33,8 +33,8 @@ def check_output(y: Any) -> None:
         raise SweepError(f"{title(y)}: expected real numbers, found {y.dtype}")
 
 
-def check_options(confidence: float, noise: bool | str | None = None, sigma: Any = None, **ends: str) -> None:
-    """Raises SweepError where confidence is no share, noise none of the words or given beside sigma, or an end none."""
+def check_options(confidence: float, noise: bool | str | None = None, sigma: Any = None) -> None:
+    """Raises SweepError where confidence is no share, or noise none of the words or given beside sigma."""
     if not 0 < confidence < 1:
         raise SweepError(f"confidence: expected a number between 0 and 1, found {confidence}")
     words = [word for word in NOISES if word != "noise"]
@@ -42,9 +42,6 @@ def check_options(confidence: float, noise: bool | str | None = None, sigma: Any
         raise SweepError(f"noise: expected True, False or one of {', '.join(words)}; found {noise!r}")
     if noise is not None and sigma is not None:
         raise SweepError("noise does not go with sigma, which says all of the noise; give one of them")
-    for name, end in ends.items():
-        if end not in ("low", "high"):
-            raise SweepError(f'{name}: expected "low" or "high", found {end!r}')
 
 
 def positive_axis(y: xr.DataArray, dim: str, repeated: bool = False) -> tuple[str, Array]:
