@@ -30,7 +30,7 @@ TOOLS = (
 
 NOTES = """\
 unevenness: standard deviation over the area, over the mean; allowed: 1e-6 of the conditions of an optimum, 1e-9 m of a
-length found by roots, 2 % of A0's slopes over 1 mm of throw, 5e-4 of the wear in all, by 60 by 60 points of a quarter
+length found by roots, 2 % of A0's slopes over 1 mm of throw, 5e-4 of the wear in all, by 24 by 24 points of a quarter
 """
 
 
@@ -79,7 +79,7 @@ def eight_tools(ds: xr.Dataset) -> list[Statement]:
     sizes = {"tool_n": n, "tool_m": m, "tool_a": 0.04 * a, "tool_b": 0.04 * b}
     wear = solved("polisher_wear", design="zip", along={"radius": radius}, rtol=1e-5, **sizes, **fixed).wear.values
     motion, work = swings(ds, [0.1]), ds.isel(w_x=3, e=[0])
-    u, weight = np.polynomial.legendre.leggauss(60)
+    u, weight = np.polynomial.legendre.leggauss(24)
     u, weight = 0.5 * (u + 1), 0.5 * weight
     for k, row in enumerate(wear):
         # a quarter of the outline, X = a x, x = u^2 (3 - 2 u), towards whose ends Gauss's points crowd
