@@ -18,12 +18,12 @@ from kernels.lanes.vectors import magnitude, sqrt
 from kernels.maths.elementary import log
 
 DONE, OUT_OF_MESH, FALLS_BACK, TOO_MANY, LANDED = 0.0, 1.0, 2.0, 3.0, 4.0
-"""How half a period ends: by the escape; the wheel is half a pitch back; an escaped tooth is met again; no end. The
-last is of a flight."""
+"""How half a period ends: by the escape; the wheel is half a pitch back; without end (TOO_MANY). A flight also: the
+pallet left before is back in front of its tooth (FALLS_BACK); the gap has closed (LANDED)."""
 STEPS = 500
 """Steps to one landing; about five are usual."""
-IMPACTS = 1000
-"""Impacts of half a period: with e = 0.95 the closing speed is 1e-12 of the first one after 540."""
+EVENTS = 3000
+"""Landings and escapes of half a period: with e = 0.95 the closing speed is 1e-12 of the first after 540 landings."""
 DIES_OUT = 1e-12
 """Share of the first closing speed at which the bodies go on together: they would part by 1e-24 of the way."""
 
@@ -86,13 +86,13 @@ def _flight(scene, y, v, w, gap, watched):
         force, speed = rub - scene.d * v, magnitude(v)
         step = _safe_step(scene, gap, v, w, force)
         stop = linear_flow.first_reversal(beta, 0.0, speed, -scene.r) if speed > 0.0 else math.inf
-        stops, escapes = stop <= step, False
+        stops, escapes, falls = stop <= step, False, False
         step = min(step, stop)
         if watched and v > 0.0 and y < -1.0:
             back = linear_flow.first_crossing(beta, 0.0, v, rub, -1.0 - y)
-            if back <= step and gap - 1.0 - y - (w + 0.5 * back / scene.kappa) * back > scene.drop:
-                return y, v, w, gap, time, way, rim, least, FALLS_BACK
-        if watched and v > 0.0:
+            falls = back <= step and gap - 1.0 - y - (w + 0.5 * back / scene.kappa) * back > scene.drop
+            step, stops = (back, False) if falls else (step, stops)
+        if watched and v > 0.0 and not falls:
             out = linear_flow.first_crossing(beta, 0.0, v, rub, 1.0 - y)
             escapes = out <= step
             step, stops = (out, False) if escapes else (step, stops)
@@ -105,6 +105,8 @@ def _flight(scene, y, v, w, gap, watched):
         v, w = (0.0 if stops else v + force * s), w + step / scene.kappa
         if escapes:
             return 1.0, v, w, gap, time, way, rim, least, DONE
+        if falls:
+            return -1.0, v, w, gap, time, way, rim, least, FALLS_BACK
         if not (gap > 0.0) or (step <= 1e-15 * time and not stops):
             return y, v, w, 0.0, time, way, rim, least, LANDED
     return y, v, w, gap, time, way, rim, least, TOO_MANY
@@ -127,31 +129,41 @@ def _contact(scene, y, v):
 
 @jit_call
 def half_period(scene, v, w, gap):
-    """From an escape with these speeds and this gap to the next one, seen from the pallet that is met."""
+    """From an escape with these speeds and this gap to the next one, seen from the pallet that is met.
+
+    Where a bounce throws the wheel so far back that the pallet left before comes back in front of its tooth, that tooth
+    is met again, and all is seen from that pallet until the tooth escapes once more: one `fallen` back, or several.
+    """
     kappa, mesh = scene.kappa, 2.0 + scene.drop
     y, v, gap = -1.0, -v, gap + scene.drop
     time, way, rim, least, swing = 0.0, 0.0, 0.0, 0.0, 1.0
-    lost, first, last = 0.0, 0.0, 0.0
-    impacts = 0
-    while impacts < IMPACTS:
+    lost, first, scale, last = 0.0, 0.0, 0.0, 0.0
+    impacts, fallen, end = 0, 0, LANDED
+    for _ in range(EVENTS):
         y, v, w, gap, t, moved, rolled, low, end = _flight(scene, y, v, w, gap, impacts > 0)
         if impacts > 0:
             least, rim = min(least, rim + low), rim + rolled
         time, way, swing = time + t, way + moved, max(swing, magnitude(y))
         if -least > mesh:
             return Half(v, w, gap, time, swing, way, -least, lost, first, 1.0 * impacts, OUT_OF_MESH)
-        if end != LANDED:
-            return Half(v, w, gap, time, swing, way, -least, lost, first, 1.0 * impacts, end)
-        impacts, last = impacts + 1, w - v
-        first = last if impacts == 1 else first
-        together, dies = (v + kappa * w) / (1.0 + kappa), not (scene.e * last > DIES_OUT * first)
-        e = 0.0 if dies else scene.e
-        lost = lost + 0.5 * kappa / (1.0 + kappa) * (1.0 - e) * (1.0 + e) * last * last
-        v, w = together + kappa * e * last / (1.0 + kappa), together - e * last / (1.0 + kappa)
-        if dies and not (together < 0.0 and kappa * (scene.r - scene.d * together) > 1.0):
+        if end == LANDED:
+            impacts, last = impacts + 1, w - v
+            first = last if impacts == 1 else first
+            scale = last if scale == 0.0 else scale
+            together, dies = (v + kappa * w) / (1.0 + kappa), not (scene.e * last > DIES_OUT * scale)
+            e = 0.0 if dies else scene.e
+            lost = lost + 0.5 * kappa / (1.0 + kappa) * (1.0 - e) * (1.0 + e) * last * last
+            v, w = together + kappa * e * last / (1.0 + kappa), together - e * last / (1.0 + kappa)
+            if not dies or (together < 0.0 and kappa * (scene.r - scene.d * together) > 1.0):
+                continue
             out, t, back = _contact(scene, y, together)
             least, swing = min(least, rim - back), max(swing, back - y)
-            end = OUT_OF_MESH if -least > mesh else DONE
-            way, time = way + 2.0 * back + 1.0 - y, time + t
-            return Half(out, out, 0.0, time, swing, way, -least, lost, first, 1.0 * impacts, end)
+            way, time, rim = way + 2.0 * back + 1.0 - y, time + t, rim + 1.0 - y
+            v, w, gap, end = out, out, 0.0, OUT_OF_MESH if -least > mesh else DONE
+        if end == FALLS_BACK:
+            fallen, y, v, gap, scale = fallen + 1, 1.0, -v, gap - scene.drop, 0.0
+        elif end == DONE and fallen > 0:
+            fallen, y, v, gap, scale = fallen - 1, -1.0, -v, gap + scene.drop, 0.0
+        else:
+            return Half(v, w, gap, time, swing, way, -least, lost, first, 1.0 * impacts, end)
     return Half(v, w, gap, time, swing, way, -least, lost, first, 1.0 * impacts, TOO_MANY)

@@ -11,9 +11,12 @@ next to come. Where the recoil exceeds that, contact ends: the pallet leaves its
 ever turned the foliot back, it coasts outwards while the wheel runs free. UNMESHES says that the clock, started from
 rest with its wheel at the drop, comes to that within its first swings or as they grow; there is no cycle then.
 
+A bounce of a heavy wheel may throw it so far back that the pallet which it left comes back in front of its tooth: it is
+pushed by that tooth once more, until this escapes again, and so on, within one half period.
+
 OK: the cycle that the clock comes to from there, one tooth a period, within the error that is stated. NOT_CONVERGED:
-it did not come to such a cycle. NO_METHOD: the wheel, thrown back by a bounce, brings a tooth that has escaped before
-its pallet again (as with e > 0 and a heavy wheel; `impact` follows such clocks without friction), or groups
+it did not come to such a cycle in 600 half periods: with e > 0 and a heavy wheel many clocks come to a cycle of several
+teeth, or to none. STEP_LIMIT: half a period has more than 3000 landings and escapes. NO_METHOD: groups
 beyond 2^+-40 or kappa above 2^13. Without friction and with e = 0 this is `impact`, without inertia of the wheel
 `foliot`. Leaves out: friction of the wheel, the shape of the pallets. Derived here.
 """
@@ -118,8 +121,7 @@ def repeated(scene):
     for _ in range(HALF_PERIODS):
         if half.end != _two_bodies.DONE:
             if not tried:
-                refusal = NO_METHOD if half.end == _two_bodies.FALLS_BACK else STEP_LIMIT
-                return half, math.nan, UNMESHES if half.end == _two_bodies.OUT_OF_MESH else refusal
+                return half, math.nan, UNMESHES if half.end == _two_bodies.OUT_OF_MESH else STEP_LIMIT
             v, w, gap, tried, ceiling = floor, floor, 0.0, False, v
             half = half_period(scene, v, w, gap)
             continue

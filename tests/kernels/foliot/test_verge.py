@@ -83,3 +83,17 @@ def test_without_inertia_of_the_wheel_it_is_the_foliot():
     assert (status == Status.OK).all()
     for name in ("period", "amplitude"):
         assert np.allclose(outputs[name], foliot[name], rtol=1e-7)
+
+
+def test_wheels_thrown_back_to_the_tooth_before_are_those_of_impact_contact_by_contact():
+    """Without friction; each of these clocks meets in each half period a tooth that had escaped before."""
+    e, kappa = np.array([(0.2, 0.8), (0.4, 0.7), (0.5, 0.55), (0.5, 0.85), (0.6, 0.35), (0.7, 0.55), (0.3, 9.0)]).T
+    teeth, I_v, n = 15.0, 1e-4, 0.2
+    h = 2 * np.pi / teeth / 4.1
+    two, status = solve(VERGE, "return_map", 1.0, I_v, kappa * I_v / n**2, n, h / n, 0.05 * h, e)
+    one, other = solve(IMPACT, "events", 1.0, kappa * I_v / n**2, I_v, 1.0, n, teeth, h, e)
+    there = (status == Status.OK) & (other == Status.OK)
+    assert there.sum() >= 5
+    assert set(status[~there]) <= {Status.NOT_CONVERGED, Status.UNMESHES}
+    assert np.allclose(two["period"][there], one["period"][there], rtol=1e-9)
+    assert np.allclose(two["amplitude"][there], one["swing"][there] / n, rtol=1e-9)
