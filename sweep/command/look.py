@@ -157,7 +157,7 @@ def report(arguments: argparse.Namespace) -> None:
         choices=("yes", "no", "even", "uneven", "correlated", "outliers"),
     ),
     switch("--compare", "which law: one, two or three power laws, an offset, a correction, an exponential ..."),
-    o.output("FILE.csv|.png", "also write the table; with --compare, .png, .svg or .pdf is a picture of all laws"),
+    o.output("FILE.csv|.png", "also write the table; with --compare a picture of all laws, .png, .svg or .pdf"),
     *(o.FORCE, o.AT, o.UNFINISHED, switch("--all", "all columns, and what they mean"), o.JSON),
 )
 def fit(arguments: argparse.Namespace) -> None:
@@ -177,9 +177,7 @@ def fit(arguments: argparse.Namespace) -> None:
             return
         compared = laws.comparison(part, arguments.y, arguments.x, windows)
     tell(arguments, compared, laws.comparison_text(compared, arguments.all))
-    if target and target.suffix.lower() == ".csv":
-        laws.write_comparison(compared, target)
-    elif target:
+    if target:
         sweep.plot(compared, target, force=True)
 
 

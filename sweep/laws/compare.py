@@ -49,7 +49,7 @@ def compare_laws(y: xr.DataArray, dim: str, window: Window | None = None, *, sig
         Along `law`, the best first: `aicc`, `bic`, `worse` (AICc or BIC above the least), `numbers`, `scatter`,
         `residual`, `chi_squared`, `formula`, `exponents`; `fitted` (law, point), the law at the points, whose
         places are `x` and values `y`. Attributes `chosen`, `margin` (AICc to the next law; negative where a law with
-        more numbers is nearer), `verdict`, a sentence, and `summary`, a table for printing.
+        more numbers is nearer), and `verdict`, a sentence.
 
     Raises
     ------
@@ -113,14 +113,11 @@ def _table(t: Array, z: Array, tried: list[Found]) -> xr.Dataset:
         text += f"all others are ruled out, the next by {margin:.3g} in AICc"
     if chosen.residual > 8 * rounding(t, z) and chosen.denied(t, "even"):
         text += "; but what it leaves has a shape, so that none of them is the law"
-    rows = zip(names, worse, columns["exponents"], strict=True)
-    wide = max(map(len, names))
-    summary = [f"{'law':{wide}}     worse  exponents", *(f"{name:{wide}}  {by:8.3g}  {of}" for name, by, of in rows)]
     about = {name: {"units": "1", "long_name": words} for name, words in NAMES.items()}
     variables: dict[str, Any] = {name: ("law", column, about.get(name)) for name, column in columns.items()}
     variables |= {"fitted": (("law", "point"), np.exp(z - off))}
     variables |= {"x": ("point", np.exp(t)), "y": ("point", np.exp(z)), "law": names}
-    attrs = {"chosen": chosen.law.name, "margin": margin, "verdict": text, "summary": "\n".join(summary)}
+    attrs = {"chosen": chosen.law.name, "margin": margin, "verdict": text}
     return xr.Dataset(variables, attrs=attrs)
 
 

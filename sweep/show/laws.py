@@ -184,20 +184,15 @@ def sensitivity_text(found: xr.Dataset) -> str:
 
 def write_laws(found: Laws, path: Path) -> None:
     """The laws as csv: a row for each line and window; of two laws a row each. Raises SweepError."""
+    from pandas import DataFrame  # type: ignore[import-untyped]
+
     parts = [(fit, "one") for fit in found.fits]
     parts += [] if found.bend is None else [(found.bend.sel(law=law), law) for law in ("low", "high")]
     parts += [] if found.meeting is None else [(found.meeting, "meeting")]
     lines = ((law, *line) for fit, law in parts for line in _lines(fit))
     rows = [{"y": found.y, "x": found.x, "law": law} | place | _numbers(one) for law, place, one in lines]
-    _write([{name: cell(value) for name, value in row.items()} for row in rows], path)
-
-
-def _write(rows: Any, path: Path) -> None:
-    """Rows, or what pandas makes a table of, as csv."""
-    from pandas import DataFrame  # type: ignore[import-untyped]
-
     with disk.replacing(path) as part:
-        DataFrame(rows).to_csv(part, index=False)
+        DataFrame([{name: cell(value) for name, value in row.items()} for row in rows]).to_csv(part, index=False)
 
 
 def _numbers(one: xr.Dataset) -> dict[str, Any]:
@@ -272,10 +267,3 @@ def comparison_text(found: xr.Dataset, complete: bool = False) -> str:
     title = f"{found.attrs['y']} over {found.attrs['x']}, {found.sizes['point']} points"
     notes = (f"Chosen: {found.attrs['verdict']}.", COMPARED if complete else "BIC and more, and what it means: --all.")
     return page(Table(rows, (*heading, "exponents"), title).text(), *map(paragraph, notes))
-
-
-def write_comparison(found: xr.Dataset, path: Path) -> None:
-    """The table as csv, a row for each law. Raises SweepError."""
-    about = {"y": found.attrs["y"], "x": found.attrs["x"]}
-    table = found.drop_dims("point").to_dataframe().reset_index().assign(**about)
-    _write(table.assign(chosen=(table["law"] == found.attrs["chosen"]).astype(int)), path)
