@@ -48,7 +48,11 @@ def record(scene):
     declared, clock = len(states) - has_clock, (graph.of(1.0),) * has_clock
     rates = _called(graph, scene, "rates", scene.rates, states | constants, declared) + clock
     surfaces = named_functions(scene.surface)
-    found = [_surface(graph, scene, name, function, states | constants) for name, function in surfaces.items()]
+    found = []
+    for name, function in surfaces.items():
+        found += _called(graph, scene, f"surface {name}".rstrip(), function, states | constants, 1)
+        if not found[-1].varies:
+            raise SceneError(f"surface of the scene {scene.name}: it does not depend on a state, so no motion meets it")
     surface, known = found[0], {graph.parts(u)[1] for u in graph.kinks}
     shared = any(graph.parts(u)[1] in known for u in found[1:])
     for u in found[1:]:
@@ -99,14 +103,6 @@ def named_functions(functions):
     return dict(functions) if isinstance(functions, Mapping) else {"": functions}
 
 
-def _surface(graph, scene, name, function, named):
-    """What falls through 0 at a switch."""
-    surface = _called(graph, scene, f"surface {name}".rstrip(), function, named, 1)[0]
-    if not surface.varies:
-        raise SceneError(f"surface of the scene {scene.name}: it does not depend on a state, so no motion meets it")
-    return surface
-
-
 def _switched(graph, scene, states, constants, met, declared):
     """The states behind a switch; where several surfaces are met at once, by the switch of one after the other."""
     switches, behind = named_functions(scene.switch), tuple(states.values())
@@ -128,27 +124,23 @@ def _switched(graph, scene, states, constants, met, declared):
 def _called(graph, scene, role, function, named, length):
     """What a function of some of the named scalars returns, as expressions."""
     try:
-        return _recorded(graph, function, named, length)
+        if not callable(function):
+            return (graph.of(function),)
+        wanted = inspect.signature(function).parameters
+        unknown = [name for name in wanted if name not in named]
+        if unknown:
+            raise SceneError(f"it asks for {unknown[0]!r}; there are {', '.join(named)}")
+        with math_recorded(function):
+            found = function(**{name: named[name] for name in wanted})
+        found = found if isinstance(found, tuple | list | np.ndarray) else (found,)
+        if len(found) != length:
+            raise SceneError(f"it returns {len(found)} values instead of {length}")
+        return tuple(graph.of(value) for value in found)
     except SceneError as error:
         raise SceneError(f"{role} of the scene {scene.name}: {error}") from None
     except Exception as error:
         said = f"{type(error).__name__}: {error}".splitlines()[0][:200]
         raise SceneError(f"{role} of the scene {scene.name} cannot be recorded: {said}; {FUNCTIONS}") from error
-
-
-def _recorded(graph, function, named, length):
-    if not callable(function):
-        return (graph.of(function),)
-    wanted = inspect.signature(function).parameters
-    unknown = [name for name in wanted if name not in named]
-    if unknown:
-        raise SceneError(f"it asks for {unknown[0]!r}; there are {', '.join(named)}")
-    with math_recorded(function):
-        found = function(**{name: named[name] for name in wanted})
-    found = found if isinstance(found, tuple | list | np.ndarray) else (found,)
-    if len(found) != length:
-        raise SceneError(f"it returns {len(found)} values instead of {length}")
-    return tuple(graph.of(value) for value in found)
 
 
 def _affine(graph, surface):

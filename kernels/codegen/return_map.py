@@ -15,31 +15,19 @@ import numpy as np
 from kernels.codegen import followed_twice, stated_error
 from kernels.codegen.accumulated import to_rest
 from kernels.codegen.functions import Functions
-from kernels.codegen.module import build, loaded
+from kernels.codegen.module import build, running
 from kernels.codegen.record import record
 from kernels.codegen.slid_along import slid_along
 from kernels.codegen.stepped import stepped, twice_by
+from kernels.integrate.records import Mode
 from kernels.interface import Status
+from kernels.lanes import refill
+from kernels.lanes.jit import jit_call
+from kernels.lanes.tuples import flat, read, write
+from kernels.lanes.vectors import where
 from kernels.source_text.expression import INPUT, Expression, SceneError, math_recorded, needed
 
 FRESH = "from_start"
-RATES = '''
-"""Rates of {name} in columns of states: written by kernels; do not change it here."""
-
-from kernels.codegen.module import kept
-from kernels.integrate.records import Mode
-
-
-@kept
-def rates_of(states, parameters, side, found):
-    """The rates of each state."""
-    for i in range(states.shape[1]):
-        state, given = ({states}), ({parameters})
-        mode = Mode(side, (), given, False)
-        new = M.rates(state, Mode(side, M.natural_signs(state, mode), given, False))
-        for j in range({n}):
-            found[j, i] = new[j]
-'''
 TOLERANCES = {
     "taylor": (3e-14, 4e-10, 2e-3),
     "rodas5p": (1e-10, 1e-7, 1e-2),
@@ -114,9 +102,10 @@ class ReturnMap:
 
     def rates(self, parameters, states, side):
         """The rates of each state, columns."""
-        found = np.empty(states.shape)
-        rating(self.scene).rates_of(np.ascontiguousarray(states), np.array(parameters), side, found)
-        return found
+        run, like = rating(self.scene)
+        cells = refill.fresh(len(flat(like)), [*parameters, np.full(states.shape[1], side), *states])
+        refill.to_the_end(run, cells)
+        return cells[:, -len(states) :].T
 
 
 def to_the_end(scene, method):
@@ -203,9 +192,16 @@ def turning(scene, everywhere):
 
 @functools.cache
 def rating(scene):
-    """The module of the scene's rates in columns."""
-    n, functions = len(scene.states), Functions(scene, record(scene))
-    states, parameters = ("".join(f"x[{j}, i], " for j in range(count)).replace("x", name)
-                          for name, count in (("states", n), ("parameters", len(scene.parameters))))  # fmt: skip
-    text = RATES.lstrip().format(name=scene.name, states=states, parameters=parameters, n=n)
-    return loaded(f"rates_{scene.name}_{functions.digest}", text, M=build(scene).M)
+    """What runs cells of parameters, a side and states, in whose place it puts the rates; and a cell of zeros."""
+    functions, m = Functions(scene, record(scene)), build(scene).M
+    like = 0.0, (0.0,) * functions.size[1], 0.0, (0.0,) * functions.size[0]
+
+    @jit_call
+    def of_lanes(memory, i):
+        stage, parameters, side, state = read(memory, i, like)
+        signs = m.natural_signs(state, Mode(side, (), parameters, False))
+        rates = m.rates(state, Mode(side, signs, parameters, False))
+        write(memory, i, (where(stage > 0.5, refill.DONE, stage), parameters, side, rates))
+        return True
+
+    return running(functions, of_lanes, "rates"), like

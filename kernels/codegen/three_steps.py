@@ -65,7 +65,14 @@ def solved(module, method, columns, step, location):
     """
     blind = (location == NONE) | (METHODS.index(method) == MOREAU)
     first = followed(module, method, columns, step, location)
-    finest, between = _again(module, method, off_by_roundings(columns), step, location, blind)
+    runs, moved = [], [np.broadcast_to(c, step.shape) for c in off_by_roundings(columns)]
+    for located, unlocated in zip(LOCATED, BLIND, strict=True):
+        runs.append(np.full((6 + 2 * len(module.STATES), len(step)), np.nan))
+        for cells, (length, substeps) in ((~blind, located), (blind, unlocated)):
+            if cells.any():
+                those = [c[cells] for c in moved]
+                runs[-1][:, cells] = followed(module, method, those, length * step[cells], location[cells], substeps)
+    finest, between = runs
     error, unsure, grows = _compared(first, finest, between, len(module.STATES))
     with np.errstate(all="ignore"):
         error = np.where(blind, np.maximum(error, step / first[1]), error)
@@ -76,19 +83,6 @@ def solved(module, method, columns, step, location):
     error = np.where(status < FIRST_REFUSAL, np.where(reliable & (error < np.inf), error, np.inf), np.nan)
     status = np.where((status == Status.OK) & np.isinf(error), Status.INACCURATE, status)
     return np.delete(first, (-4, -1), axis=0), error, status
-
-
-def _again(module, method, columns, step, location, blind):
-    """The finest run and the one between."""
-    runs = []
-    for located, unlocated in zip(LOCATED, BLIND, strict=True):
-        run = np.full((6 + 2 * len(module.STATES), len(step)), np.nan)
-        for cells, (length, substeps) in ((~blind, located), (blind, unlocated)):
-            if cells.any():
-                those = [np.broadcast_to(c, step.shape)[cells] for c in columns]
-                run[:, cells] = followed(module, method, those, length * step[cells], location[cells], substeps)
-        runs.append(run)
-    return runs
 
 
 def _compared(first, finest, between, states):

@@ -18,7 +18,7 @@ from kernels.lanes import codes
 from kernels.lanes.codes import BAD_INPUT, GRAZING, INACCURATE, NOT_CONVERGED, OUT_OF_RANGE, REFUSED, STICKS
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.symbols import fold, symbolic
-from kernels.lanes.tuples import after, any_of, boxes, joined, marks, reached, read, times, write
+from kernels.lanes.tuples import after, any_of, boxes, marks, reached, read, times, write
 from kernels.lanes.vectors import any_lane, choose, magnitude, not_, where
 
 STEP_LIMIT = 20_000
@@ -276,21 +276,6 @@ def m_hides(m):
 
 
 @symbolic
-def jumped(motion, state, side, signs, on, behind, switches):
-    """The motion of the lanes that have passed a switch, in the state behind it."""
-    new = motion._replace(
-        state=state, side=side, signs=signs, on=on, since=0.0, interval=motion.since, count=motion.count + 1.0,
-        trials=0.0, reach=reached(times(0.0, motion.reach), state), at=motion.state, reach_at=motion.reach, wide=0.0,
-        slim=where(behind < motion.slim, behind, motion.slim),
-    )  # fmt: skip
-    chosen = (
-        choose(switches, x, y) if isinstance(x, tuple) else where(switches, x, y)
-        for x, y in zip(new, motion, strict=True)
-    )
-    return type(motion)(*chosen)
-
-
-@jit_call
 def switched(m, motion, behind, switches):
     """The motion behind the switch, of the lanes that are on it."""
     mode = Mode(motion.side, motion.signs, motion.parameters, False)
@@ -299,14 +284,21 @@ def switched(m, motion, behind, switches):
     side = where(switches, -motion.side, motion.side)
     state = choose(switches, m.switched(motion.state, mode), motion.state)
     signs, kinks_on = settled(m, state, side, motion.parameters, 0.0 * side + 1.0, times(0.0, motion.signs[:-1]))
-    mode = Mode(side, signs, motion.parameters, False)
-    values, rates = events(m, state, mode)
+    values, rates = events(m, state, Mode(side, signs, motion.parameters, False))
     still = magnitude(values[0]) <= 2.0 * magnitude(before[0])
     through = m.passable[0] * rates[0] < -BACK * magnitude(falls[0])
     below = (still & through) | (not_(still) & (values[0] < 0.0))
-    signs = joined(signs[:-1], (where(below, -1.0, signs[-1]),))
-    on = joined((where(still, 1.0, 0.0),), kinks_on)
-    return refused(jumped(motion, state, side, signs, on, behind, switches), switches & faint, OUT_OF_RANGE)
+    new = motion._replace(
+        state=state, side=side, signs=(*signs[:-1], where(below, -1.0, signs[-1])),
+        on=(where(still, 1.0, 0.0), *kinks_on), since=0.0, interval=motion.since, count=motion.count + 1.0, trials=0.0,
+        reach=reached(times(0.0, motion.reach), state), at=motion.state, reach_at=motion.reach, wide=0.0,
+        slim=where(behind < motion.slim, behind, motion.slim), verdict=where(faint, OUT_OF_RANGE, motion.verdict),
+    )  # fmt: skip
+    chosen = (
+        choose(switches, x, y) if isinstance(x, tuple) else where(switches, x, y)
+        for x, y in zip(new, motion, strict=True)
+    )
+    return type(motion)(*chosen)
 
 
 @symbolic
