@@ -47,6 +47,8 @@ STRONG = 1e4
 """alpha from which (1) is held to 0.015, what is left of the drop and of a swing that is not endless."""
 MESH = 0.5
 """Recoil of the wheel, in tooth pitches, beyond which the pallet is no longer between its two teeth."""
+AT_BORDER = 0.3615
+"""The least s in mesh of kappa = .01, at the border, alpha = 26.6, by the kernel `verge` at 1500 torques."""
 LOSSES = ("viscous", "dry", "impact")
 
 NOTES = """\
@@ -140,6 +142,8 @@ def in_mesh(smooth: xr.Dataset, turn: xr.DataArray) -> list[Statement]:
         if alpha > 0 and smooth.kappa[k] < 0.05
     ] or [0.0]
     at = [f"{float(x):.3f} at alpha = {float(a):.3g}" for x, a in zip(least, smooth.alpha.isel(tau=where), strict=True)]
+    line = smooth.isel(I_c=light, tau=slice(1, int(smooth.pitches.isel(I_c=light).argmax("tau"))))
+    border = float(np.interp(MESH, line.pitches.values, line.s.values))
     end, text = float(s[first, -2]), f"{min(recoil):.2g} to {max(recoil):.2g}"
     heavy = f"kappa = {float(smooth.kappa[first]):.2g} stays in mesh at any drive: least s, strongest"
     dips = least[first] > 0.43 and abs(end - 0.5) < 0.01
@@ -147,6 +151,7 @@ def in_mesh(smooth: xr.Dataset, turn: xr.DataArray) -> list[Statement]:
     return [
         said("recoil where s rises through 5/12, kappa < .05 [pitches]", min(recoil) > MESH, text),
         said("  so in mesh s of kappa = .01 is at least", least[light] > 0.35, at[light], "> 1/3"),
+        differing("  at half a pitch itself, between cells", f"{AT_BORDER} by `verge`", border, AT_BORDER, 0.005, 4),
         said(heavy, dips, f"{at[first]}, {end:.3f}", ", 1/2"),
         said(again, back < 0.38, f"at most {back:.3f}", "< .38"),
     ]
