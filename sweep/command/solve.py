@@ -190,7 +190,7 @@ def check(arguments: argparse.Namespace) -> Outcome:
 )
 def cell(arguments: argparse.Namespace) -> None:
     """One cell: its values, the meaning of its status, and the result of each method."""
-    from sweep.explore.one_cell import report_cell
+    from sweep.explore.recheck import report_cell
 
     with opened(arguments) as dataset:
         tell(arguments, report_cell(dataset, study_from(arguments, dataset)))

@@ -7,10 +7,9 @@ Others may use
     `scattered`       values between cells that lie anywhere in a box, and those of them that lie on lines
     `join`            two results as one
     `solver`          a study's kernel as a function of its axes
-    `one_cell`        what a result and each method say of one cell
-    `recheck`         a sample of OK cells solved again, to see whether they are right to rtol
+    `recheck`         one cell solved again by each method; a sample of OK cells, to see whether they are right to rtol
     `sensitivity`     which parameters decide an output
     `scaling`         superfluous axes, outputs free of units
 
-Behind `refine` are `refiner` (rounds of cuts) and `mesh` (cells joined to simplices, how far lines in them are off).
+Behind `refine` is `mesh` (cells joined to simplices, how far lines in them are off).
 """

@@ -20,6 +20,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,8 +34,8 @@ SHEAR = 0.013
 them; tilted there is one, and it is alike in all boxes."""
 FLAT = 1e-9
 """Volume, in products of its edges, below which a simplex is none."""
-AROUND = {1: 8, 2: 12, 3: 20}
-"""Cells around a simplex that are taken, beside its corners; with more axes twice the unknowns."""
+AROUND = {1: 6, 2: 12, 3: 20}
+"""Cells around a simplex that are taken, of one axis with its two; with more axes twice the unknowns."""
 SAFETY, MISFIT = 1.6, {1: 5.0}
 """Times the parabola's error; and times what the parabola leaves, 2.5 with more axes: a kink in the middle between
 cells of one axis is told at half its size from either side."""
@@ -43,6 +44,14 @@ LEAST_BASIS, RIDGE, BATCH = 0.3, 1e-12, 2_000
 ROUNDS, MOST = 3, 3000
 """Of a stretch: the first joins the cells of the box as it is, where simplices reach across more of the bends; and
 simplices whose mean it takes."""
+LESSENING = 0.5
+"""A cut along each axis leaves a quarter of the distance from a straight line, where an output is smooth; of noise, and
+of the volume that is to be cut in it, more than this share."""
+CUTS, STAYS, JUMP = 6, 0.9, 0.2
+"""At a pole the change from cell to cell stays above a share of what it was so many cuts before, and lies on both sides
+of a new cell: at a jump one of them has less than a share of the other."""
+LATEST = 128
+"""Cells added last, which tell noise."""
 FLATTEST, STRAIGHT = 1e-5, 1e-9
 """Least share of the mean bend that a direction has: by 300 a box is stretched at most; what is taken for rounding."""
 
@@ -129,12 +138,18 @@ def _parabolas(points: Array, heights: Array, corners: Indices, side: int = 0) -
     """
     axes = points.shape[1]
     tree, pairs = cKDTree(points), edges(axes)
+    order = np.argsort(points[:, 0], kind="stable")
+    ranks = np.argsort(order)
     number = min(len(points), axes + 1 + AROUND.get(axes, 2 * len(pairs)))
     bends, misfits = np.empty((len(corners), len(pairs))), np.empty(len(corners))
     for start in range(0, len(corners), BATCH):
         rows = slice(start, start + BATCH)
         place = points[corners[rows]]
-        near = tree.query(place.mean(axis=1), number)[1]
+        if axes == 1:  # as many on both sides
+            aside = np.arange(1 - AROUND[1] // 2, AROUND[1] // 2 + 1)
+            near = order[np.clip(ranks[corners[rows, :1]] + aside, 0, len(points) - 1)]
+        else:
+            near = tree.query(place.mean(axis=1), number)[1]
         rest = (points[near] - place[:, :1]) @ np.linalg.inv(place[:, 1:] - place[:, :1])
         shares = np.concatenate([1 - rest.sum(axis=2, keepdims=True), rest], axis=2)  # barycentric coordinates
         off = heights[near] - (shares @ heights[corners[rows]][:, :, None])[:, :, 0]
@@ -189,3 +204,46 @@ def stretch(points: Array, heights: Array) -> Array:
         unit = 10.0 ** math.floor(math.log10(float(abs(found).max())) - 6)
         found = np.round(found / unit) * unit
     return found
+
+
+def _ancestors(origins: Indices, axes: int, cells: Indices) -> Indices:
+    """The younger ends of the edges that were cut for cells, as many cuts ago as there are axes."""
+    for _ in range(axes):
+        cells = origins[cells].max(axis=1)
+    return cells
+
+
+def at_pole(heights: Array, origins: Indices, axes: int) -> NDArray[np.bool_]:
+    """Whether cuts have lessened nothing on the way to a cell, although there is no jump.
+
+    The first cells, which were put between none, count as jumps: nothing is known yet. `origins` (n, 2) are the two
+    cells that each was put between; of the first ones, itself.
+    """
+    cells, found = np.arange(len(heights)), []
+    with np.errstate(invalid="ignore"):
+        halves = np.sort(abs(heights[:, None] - heights[origins]), axis=1)
+        for _ in range(CUTS):
+            found.append(halves[cells])
+            cells = _ancestors(origins, axes, cells)
+        small, large = np.moveaxis(np.array(found), 2, 0)
+        before, after = (np.median(part, axis=0) for part in (large[CUTS // 2 :], large[: CUTS // 2]))
+        stays: NDArray[np.bool_] = (after > STAYS * before) & ((small <= JUMP * large).sum(axis=0) <= 1)
+    return stays
+
+
+def scatter(heights: Array, origins: Indices, axes: int, to_cut: Sequence[tuple[int, float]]) -> float:
+    """How far the latest cells are off the line between the two that each was put between, where more cells do not
+    lessen that; `to_cut` has the number of cells, and the volume of what is too far off, of all rounds."""
+    cells, volume = to_cut[-1]
+    earlier = [v for count, v in to_cut if count * 2**axes <= cells]
+    if not earlier or volume <= LESSENING * earlier[-1]:
+        return 0.0
+    with np.errstate(invalid="ignore"):
+        off = abs(heights - heights[origins].mean(axis=1))
+    off[origins[:, 0] == origins[:, 1]] = np.nan
+    latest = np.arange(max(0, cells - LATEST), cells)
+    before = off[_ancestors(origins, axes, latest)]
+    known = np.isfinite(off[latest] + before)
+    if known.sum() <= 0.75 * LATEST or np.median((off[latest] - LESSENING * before)[known]) <= 0:
+        return 0.0
+    return float(np.median(off[latest][known]))

@@ -30,7 +30,7 @@ from scipy.spatial import cKDTree
 from kernels.interface import Status
 from sweep.cells.schema import ANCILLARY, STATUS, cell_schema
 from sweep.errors import SweepError
-from sweep.explore.mesh import Array, Indices, edges, errors_inside, largest, simplices, stretch
+from sweep.explore.mesh import Array, Indices, at_pole, edges, errors_inside, largest, scatter, simplices, stretch
 from sweep.explore.scattered import MOST_AXES, REFINED_TO, Box, axes_of, heights, kinds
 from sweep.file import disk
 from sweep.file.disk import check_target
@@ -51,14 +51,8 @@ line; across a border between statuses; and beside one, where values may go to i
 GROWTH, SETTLED = 1.5, 1.02
 """Factors of the number of cells after which boxes are stretched anew: on the way, and at the end, since those who
 read the result stretch it by all of its cells."""
-LESSENING = 0.5
-"""A cut along each axis leaves a quarter of the distance from a straight line, where an output is smooth; of noise, and
-of the volume that is to be cut in it, more than this share."""
-CUTS, STAYS, JUMP = 6, 0.9, 0.2
-"""At a pole the change from cell to cell stays above a share of what it was so many cuts before, and lies on both sides
-of a new cell: at a jump one of them has less than a share of the other."""
-LATEST, NOISE_SIZE = 128, 8.0
-"""Cells added last, which tell noise; the error of a simplex in it, as a multiple of how far they are off, at most."""
+NOISE_SIZE = 8.0
+"""The error of a simplex in noise, as a multiple of how far cells are off, at most."""
 SAME = 2.0**-40
 """Distance of places along an axis, from 0 to 1, that are the same."""
 
@@ -382,49 +376,11 @@ class Refiner:
             apart = tree.query(points * self._steps, p=math.inf)[0]
             least[alike & (apart <= border)[corners].any(axis=1)] = beside_border
         valued = alike & (of_corners[:, 0] >= 0)
-        finest = (extent(ends) <= least) | (valued & np.isfinite(size) & self._is_at_pole(height)[ends.max(axis=1)])
+        stuck = at_pole(height, self.origins, axes)[ends.max(axis=1)]
+        finest = (extent(ends) <= least) | (valued & np.isfinite(size) & stuck)
         wide = corners[valued & (size > max(self.tolerance, NOISE_SIZE * self.noise[name]))]
         volume = float(abs(np.linalg.det(points[wide[:, 1:]] - points[wide[:, :1]])).sum())
         self._to_cut[name].append((len(points), volume))
-        self.noise[name] = max(self.noise[name], self._noise(height, self._to_cut[name]))
+        self.noise[name] = max(self.noise[name], scatter(height, self.origins, axes, self._to_cut[name]))
         wanted = size > max(self.tolerance, NOISE_SIZE * self.noise[name])
         return Judged(corners, size, ends, wanted, finest, valued)
-
-    def _ancestors(self, cells: Indices) -> Indices:
-        """The younger ends of the edges that were cut for cells, as many cuts ago as there are axes."""
-        for _ in self.axes:
-            cells = self.origins[cells].max(axis=1)
-        return cells
-
-    def _is_at_pole(self, height: Array) -> NDArray[np.bool_]:
-        """Whether cuts have lessened nothing on the way to a cell, although there is no jump.
-
-        The first cells, which were put between none, count as jumps: nothing is known yet.
-        """
-        cells, found = np.arange(len(height)), []
-        with np.errstate(invalid="ignore"):
-            halves = np.sort(abs(height[:, None] - height[self.origins]), axis=1)
-            for _ in range(CUTS):
-                found.append(halves[cells])
-                cells = self._ancestors(cells)
-            small, large = np.moveaxis(np.array(found), 2, 0)
-            before, after = (np.median(part, axis=0) for part in (large[CUTS // 2 :], large[: CUTS // 2]))
-            stays: NDArray[np.bool_] = (after > STAYS * before) & ((small <= JUMP * large).sum(axis=0) <= 1)
-        return stays
-
-    def _noise(self, height: Array, to_cut: Sequence[tuple[int, float]]) -> float:
-        """How far the latest cells are off the line between the two that each was put between, where more cells do not
-        lessen that; `to_cut` has the number of cells, and the volume of what is too far off, of all rounds."""
-        cells, volume = to_cut[-1]
-        earlier = [v for count, v in to_cut if count * 2 ** len(self.axes) <= cells]
-        if not earlier or volume <= LESSENING * earlier[-1]:
-            return 0.0
-        with np.errstate(invalid="ignore"):
-            off = abs(height - height[self.origins].mean(axis=1))
-        off[self.origins[:, 0] == self.origins[:, 1]] = np.nan
-        latest = np.arange(max(0, cells - LATEST), cells)
-        before = off[self._ancestors(latest)]
-        known = np.isfinite(off[latest] + before)
-        if known.sum() <= 0.75 * LATEST or np.median((off[latest] - LESSENING * before)[known]) <= 0:
-            return 0.0
-        return float(np.median(off[latest][known]))

@@ -14,8 +14,7 @@ import xarray as xr
 from xarray.backends import BackendEntrypoint
 
 if TYPE_CHECKING:
-    from sweep.explore.one_cell import CellReport
-    from sweep.explore.recheck import Checked
+    from sweep.explore.recheck import CellReport, Checked
     from sweep.words import Table
 
 
@@ -78,7 +77,7 @@ class SweepAccessor:
 
     def cell(self, *, allow_import: bool = False, **values: float | str) -> CellReport:
         """What there is to say of one cell, named by the values of its axes: as the command `sweep cell`."""
-        from sweep.explore.one_cell import report_cell
+        from sweep.explore.recheck import report_cell
         from sweep.show.laws import pick
         from sweep.study.read import study
 
