@@ -179,11 +179,11 @@ def save(figure: Figure, path: str | os.PathLike[str]) -> Path:
     return target
 
 
-def png(figure: Figure) -> bytes:
+def png(figure: Figure, dpi: int = 300) -> bytes:
     """The figure as a picture for a page."""
     store = io.BytesIO()
     with style():
-        figure.savefig(store, format="png", dpi=220, metadata={"Software": None})
+        figure.savefig(store, format="png", dpi=dpi, metadata={"Software": None})
     return store.getvalue()
 
 

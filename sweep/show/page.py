@@ -115,7 +115,7 @@ def _figures(dataset: xr.Dataset) -> Iterator[str]:
     found = []
     for name in [name for name in outputs_of(dataset) if bool(dataset[name].notnull().any())][:MOST_FIGURES]:
         try:
-            data = base64.b64encode(png(plot(dataset.assign_attrs(title=""), y=name))).decode("ascii")
+            data = base64.b64encode(png(plot(dataset.assign_attrs(title=""), y=name), 220)).decode("ascii")
         except SweepError:
             continue  # no axis of numbers, or no number to draw
         caption = escape(f"{name}: {dataset[name].attrs.get('long_name', name)}")
