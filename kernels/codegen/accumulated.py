@@ -28,8 +28,8 @@ STILL = 1e-16
 """Of the time, an interval that does not move it any more."""
 FINE = 1e-9
 """The tolerance at most: a wide one takes bounces for grazing that are still large."""
-AWAY = 0.9
-"""Of the last switches that are right, to be away from those that are so by chance."""
+AWAY, TRIES = 0.9, 3
+"""Of the last switches that are right, to be away from those that are so by chance; how often, where some are not."""
 ROUGHLY = 1e-6
 """To what rtol the states' sizes are wanted."""
 SLOWEST = 1.0 - 1e-5
@@ -55,16 +55,20 @@ def to_rest(how):
             return rows, verdict == Status.OK
 
         last = _last_right(followed, columns[-1][cells])
-        last = np.where(last > LEAST, np.maximum(np.floor(AWAY * last), LEAST), last)
         those = np.flatnonzero(last >= LEAST)
-        if len(those):
-            early = [*(c[cells[those]] for c in columns[:-1]), np.full(len(those), 2.0)]
-            sizes = followed_twice.followed(module, early, np.full(len(those), ROUGHLY))[2 + len(module.STATES) : -1]
-            rests, values, error = _limits(followed, those, last[those], sizes[: len(outputs) - 2])
+        early = [*(c[cells[those]] for c in columns[:-1]), np.full(len(those), 2.0)]
+        sizes = followed_twice.followed(module, early, np.full(len(those), ROUGHLY))[2 + len(module.STATES) : -1]
+        for _ in range(TRIES):
+            if not len(those):
+                break
+            last[those] = np.maximum(np.floor(AWAY * last[those]), LEAST)
+            rests, values, error, left = _limits(followed, those, last[those], sizes[: len(outputs) - 2])
+            rests &= left(columns[-1][cells[those]]) <= 0.5 * rtol[cells[those]]
             good = cells[those[rests]]
             for column, row in zip(outputs, values, strict=True):
                 column[good] = row[rests]
             status[good] = np.where(error[rests] <= 0.5 * rtol[good], Status.COMES_TO_REST, Status.INACCURATE)
+            those, sizes = those[~rests], sizes[:, ~rests]
 
     return solve
 
@@ -91,7 +95,10 @@ def _last_right(followed, flips):
 
 
 def _limits(followed, those, last, sizes):
-    """Which cells come to rest; their outputs there; their error, of states relative to their sizes at the start."""
+    """Which cells come to rest; their outputs there; their error, of states relative to their sizes at the start.
+
+    And, of a number of switches, what is then left of the way to rest, as the error is.
+    """
     runs = [followed(those, last - k) for k in (0, 1, 2, 3, 4)]
     rows, good = (np.array(part) for part in zip(*runs, strict=True))  # (5, outputs, cells), (5, cells)
     with np.errstate(all="ignore"):
@@ -102,7 +109,12 @@ def _limits(followed, those, last, sizes):
         error = moved * (1.0 + LEFT * q**4 / (1.0 - q))
         shrinks = (q < SLOWEST) & (q_before < SLOWEST) & (values[0] - rows[0, 0] <= NEAR * values[0])
         settles = abs(values - rows[0]) <= abs(before - rows[1]) + 1e-9 * scale
-    return good.all(axis=0) & shrinks & settles.all(axis=0) & np.isfinite(values).all(axis=0), values, error
+        far = np.delete(abs(values - rows[0]) / np.where(scale > 0, scale, 1.0), 1, axis=0).max(axis=0)
+
+    def left(flips):
+        return far * q ** (0.5 * (flips - last))
+
+    return good.all(axis=0) & shrinks & settles.all(axis=0) & np.isfinite(values).all(axis=0), values, error, left
 
 
 def _limit(rows):

@@ -2,14 +2,13 @@
 
 import functools
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 
 from kernels.codegen import followed_twice, stated_error
 from kernels.codegen.module import build
 from kernels.codegen.return_map import asked, named, to_the_end
-from kernels.codegen.stepped import stepped
+from kernels.codegen.stepped import runs
 from kernels.interface import FIRST_REFUSAL, Status
 from kernels.source_text.expression import where
 
@@ -47,20 +46,19 @@ def _once(scene, method, columns, rtol, stops):
         module = stated_error.telling(scene)
         found = followed_twice.passages(module, columns, stated_error.OF_A_STEP * rtol, stops, tells=True)
         return found[:-1], stated_error.STATED * np.fmax.reduce(found[-1], axis=0)
-    run, n = getattr(stepped(scene), f"run_{method}"), len(scene.states)
-    runs = SimpleNamespace(STATES=scene.states, M=build(scene).M, run_18=run)
+    by_pair, n = runs(scene, method), len(scene.states)
     rough, finer, many = followed_twice.ROUGH, followed_twice.FINER, followed_twice.MANY
     ends = [*columns, np.full(len(rtol), stops[-1])]
     first, other = (
         followed_twice.passages(
-            runs, followed_twice.off_by_roundings(ends, sign * many)[:-1], rtol, stops, rough, shake=sign
+            by_pair, followed_twice.off_by_roundings(ends, sign * many)[:-1], rtol, stops, rough * finer_by, shake=sign
         )
-        for sign in (1.0, -1.0)
+        for sign, finer_by in ((1.0, 1.0), (-1.0, followed_twice.BETWEEN))
     )
-    fine = followed_twice.passages(runs, columns, rtol, stops, rough * finer)
+    fine = followed_twice.passages(by_pair, columns, rtol, stops, rough * finer)
     with np.errstate(all="ignore"):
         scale = np.concatenate([abs(fine[:2]), fine[2 + n : -1]])
-        apart = np.fmax(abs(fine - first), abs(other - first))[: 2 + n] / np.where(scale > 0.0, scale, 1.0)
+        apart = np.fmax(abs(fine - first), abs(fine - other))[: 2 + n] / np.where(scale > 0.0, scale, 1.0)
     return fine, np.fmax.reduce(apart.reshape(-1, apart.shape[-1]), axis=0)
 
 

@@ -2,9 +2,10 @@
 
 Each step is right to a tolerance; what many steps come to depends on the scene. So a cell is followed twice, the second
 time with a tolerance FINER times smaller: the first run's error is what they differ by, the second's is about FINER
-times less, and is what is given. The first run's parameters are some roundings off (`off_by_roundings`), and so are
-its start and the times of its events (`shake`); a third run is like the first with the opposite roundings: so what a
-scene makes of rounding, which two runs may share, is seen too.
+times less, and is what is given. The first run's parameters are some roundings off (`off_by_roundings`), and so are its
+start and the times of its events (`shake`); a third run has the opposite roundings, and a tolerance between the two.
+So what a scene makes of rounding, which two runs may share, is seen too, and where the error of a method, of one sign
+on wide steps and of the other on short ones, is the same in two runs by chance.
 """
 
 import math
@@ -26,16 +27,19 @@ AT_ONCE = 8192
 """Cells whose lanes' memory stays in a core's cache."""
 STOPS = 2.0, 4.0, math.inf
 """Switches behind which cells are put in the order of the steps of their last two legs, from event to event."""
-ROUGH, FINER = 2.0, 16.0
+ROUGH, BETWEEN, FINER = 2.0, 4.0, 16.0
 ROUNDINGS = 8.0
 """By how many roundings a parameter is changed at most."""
-MANY = 4.0
+MANY = 8.0
 """Times as many are the parameters of scenes changed by: beside them those of the steps of a run are few."""
-TIGHTER, TIGHT = 1e-3, 1e-13
+TIGHTER, TIGHT = 1e-4, 1e-14
 """The second tolerance, over the first one, and at most: what is stiff may come to rest only in the last digits."""
 TRIED_AGAIN = Status.INACCURATE, Status.GRAZING, Status.STEP_LIMIT, Status.OUT_OF_RANGE
 APART = 4.0
-"""How many rtol the two runs may differ by: the finer one is then right to rtol/4, as far as steps go."""
+"""How many rtol the first run may be from the finest, which is then right to rtol/4 as far as steps go."""
+CONVERGED, BY_STEPS, ROUNDED = 3.0, 0.4, 0.2
+"""How many times nearer to the finest run the one between is where both are off by their steps: it may then differ by
+BY_STEPS of rtol; else rounding is what tells them apart, of which the finest run has no less, and by ROUNDED of it."""
 
 
 def followed(module, columns, rtol, finer=1.0, together=False, shake=0.0):
@@ -105,6 +109,7 @@ def _at_stops(module, run, inputs, stops, together, tells):
     cells, places = fresh(rows, inputs), np.arange(len(inputs[0]))
     whole = np.where(inputs[-3] < math.inf, inputs[-3], math.nan)  # NaN is refused, without end not followed
     cells[:, row["interval"] : row["size"]] = np.nan
+    cells[:, row["h"]] = module.first(inputs[-2]) if hasattr(module, "first") else 1.0
     if cell.errors:
         cells[:, row["errors"]] = float(tells)
     for stop in stops:
@@ -142,24 +147,26 @@ def twice(module, columns, rtol, outputs, status, finest=0.0):
 
 
 def _compared(module, columns, rtol, wanted):
-    """The results of the finer of two runs to the tolerance `rtol`, and the status where `wanted` is to be met."""
+    """The results of the finest of three runs to the tolerance `rtol`, and the status where `wanted` is to be met."""
     rough = followed(module, off_by_roundings(columns, MANY), rtol, ROUGH, shake=1.0)
-    other = followed(module, off_by_roundings(columns, -MANY), rtol, ROUGH, shake=-1.0)
+    other = followed(module, off_by_roundings(columns, -MANY), rtol, ROUGH * BETWEEN, shake=-1.0)
     fine = followed(module, columns, rtol, ROUGH * FINER)
     states = len(module.STATES)
     status = status_of(fine, 2 + states)
     scale = np.concatenate([abs(fine[:2]), fine[2 + states : -1]])
-    near = _near(fine, rough, APART * wanted * scale) & _near(other, rough, wanted * scale)
+    near = _near(fine, rough, other, wanted * scale)
     status[((wanted < ROUNDING) | ~near) & (status == Status.OK)] = Status.INACCURATE
     worse = (rough[-1] > 0) & (status <= Status.INACCURATE)
     status[worse] = np.where(rough[-1][worse] < FIRST_REFUSAL, rough[-1][worse], Status.INACCURATE)
     return fine, status
 
 
-def _near(fine, other, allowed):
-    """Whether times and states differ by no more than that, a row for each."""
+def _near(fine, rough, other, allowed):
+    """Whether the finest run is believed, in times and states, a row for each, to be right to that."""
     with np.errstate(all="ignore"):
-        return (abs(fine[: len(allowed)] - other[: len(allowed)]) <= allowed).all(axis=0)
+        far, close = (abs(fine[: len(allowed)] - run[: len(allowed)]) for run in (rough, other))
+        by_steps = (close <= BY_STEPS * allowed) & (CONVERGED * close <= far)
+        return ((far <= APART * allowed) & (by_steps | (close <= ROUNDED * allowed))).all(axis=0)
 
 
 def off_by_roundings(columns, many=1.0):

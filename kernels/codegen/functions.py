@@ -28,7 +28,7 @@ from kernels.source_text.tangent import SHORT, Tangents, along, short
 def cell_of(states, parameters, kinks, tells=False):
     """A cell of zeros, as large as a scene's."""
     u = (0.0,) * states
-    errors = Errors(0.0, 0.0, 0.0, 0.0, u, 0.0, 0.0, u, 0.0, 0.0, 0.0, u) if tells else ()
+    errors = Errors(0.0, 0.0, 0.0, 0.0, u, 0.0, 0.0, u, 0.0, 0.0, 0.0, u, u) if tells else ()
     marks = (0.0,) * (kinks + 1)
     wanted, so_far = (0.0, (0.0,) * parameters, 0.0, 0.0, 0.0), (0.0, 0.0, u, u, 0.0)
     return Cell(*wanted, *so_far, u, 0.0, marks, 0.0, 0.0, marks, 0.0, 0.0, 0.0, 0.0, 0.0, errors)

@@ -8,7 +8,6 @@ The state that the surface watches is put onto the surface, whatever is given fo
 import functools
 import inspect
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 
@@ -18,7 +17,7 @@ from kernels.codegen.functions import Functions
 from kernels.codegen.module import build, running
 from kernels.codegen.record import record
 from kernels.codegen.slid_along import slid_along
-from kernels.codegen.stepped import stepped, twice_by
+from kernels.codegen.stepped import runs, twice_by
 from kernels.integrate.records import Mode
 from kernels.interface import Status
 from kernels.lanes import refill
@@ -85,19 +84,17 @@ class ReturnMap:
             left = np.flatnonzero(np.isnan(sizes).any(axis=0))
             if len(left):
                 some, here, steps = [c[left] for c in parameters], before[:, left], flips[left]
-                runs = [self._sizes(scene, some, here, steps, many * tight) for many in OTHERS]
-                sizes[:, left] = np.maximum.reduce(runs)
-                off[:, left] = np.where(sure[:, None], 0.0, APART * (sizes[:, left] - np.minimum.reduce(runs)))
+                others = [self._sizes(scene, some, here, steps, many * tight) for many in OTHERS]
+                sizes[:, left] = np.maximum.reduce(others)
+                off[:, left] = np.where(sure[:, None], 0.0, APART * (sizes[:, left] - np.minimum.reduce(others)))
         return sizes, np.where(np.isnan(off), np.inf, off)
 
     def _sizes(self, scene, parameters, before, flips, rtol):
         """The largest size of each state at the ends of steps."""
-        count, n, runs = len(flips), len(before), build(scene)
-        if self.method != "taylor":
-            run = getattr(stepped(scene), f"run_{self.method}")
-            runs = SimpleNamespace(STATES=scene.states, M=runs.M, run_12=run, run_18=run)
+        count, n = len(flips), len(before)
+        module = build(scene) if self.method == "taylor" else runs(scene, self.method)
         columns = [*parameters, *before, np.zeros(count), flips]
-        found = followed_twice.followed(runs, columns, np.full(count, rtol))
+        found = followed_twice.followed(module, columns, np.full(count, rtol))
         return np.where(found[-1] <= Status.INACCURATE, found[2 + n : -1], np.nan)
 
     def rates(self, parameters, states, side):

@@ -39,11 +39,24 @@ def twice_by(method, scene):
     """The function of columns (`followed_twice.twice`) that follows the scene by a method of `PAIRS`."""
 
     def twice(module, columns, rtol, outputs, status):
-        run = getattr(stepped(scene), f"run_{method}")
-        runs = SimpleNamespace(STATES=module.STATES, M=module.M, run_12=run, run_18=run)
-        followed_twice.twice(runs, columns, rtol, outputs, status, FINEST)
+        followed_twice.twice(runs(scene, method), columns, rtol, outputs, status, FINEST)
 
     return twice
+
+
+@functools.cache
+def runs(scene, method):
+    """What `followed_twice` takes of a module, by a method of `PAIRS`.
+
+    `first` is the first step by its tolerance, in units: two runs that began alike would share the steps that grow or
+    shrink by the most allowed, and their errors, of which their difference then says nothing.
+    """
+    run, order = getattr(stepped(scene), f"run_{method}"), PAIRS[method].order
+
+    def first(tolerance):
+        return tolerance ** (1.0 / order)
+
+    return SimpleNamespace(STATES=scene.states, M=build(scene).M, run_12=run, run_18=run, first=first)
 
 
 @functools.cache
@@ -57,12 +70,12 @@ def stepped(scene):
     def of_lanes(memory, i):
         return fixed_step.advance(fixed, memory, i)
 
-    runs = {
+    by_pair = {
         f"run_{method}": driven(functions, stiff, _leg(stiff, kept_on_kink(pair) if scene.slides else pair), method)
         for method, pair in PAIRS.items()
     }
     return SimpleNamespace(
-        STATES=scene.states, M_FIXED=fixed, M_STIFF=stiff, run=running(functions, of_lanes, "fixed"), **runs
+        STATES=scene.states, M_FIXED=fixed, M_STIFF=stiff, run=running(functions, of_lanes, "fixed"), **by_pair
     )
 
 

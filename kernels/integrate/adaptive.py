@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from kernels.integrate.events import cubic_root, of_event
 from kernels.integrate.fixed_step import dip, finite, first_event, passed_another
-from kernels.integrate.pairs import of_size
+from kernels.integrate.pairs import at_least, of_size
 from kernels.integrate.records import Leg, Step
 from kernels.integrate.steps import ONE, events
 from kernels.integrate.taylor import COME_UP, next_step
@@ -26,6 +26,8 @@ SAFETY = 0.25
 """Of the tolerance, for which the next step is chosen."""
 SHRINK, GROW = 0.2, 5.0
 """Least and most of the step before that the next one is."""
+FORGOTTEN = 1e-4
+"""The error of a step over the tolerance below which it says nothing of how errors grow: events have cut the step."""
 CUTS = 60
 ROOT_LIMIT = 60
 CLOSE = 30.0
@@ -45,6 +47,7 @@ class Course(NamedTuple):
     """A leg on its way.
 
     h : the next step, in units
+    last_h, last_error : length of the last step that was taken, in units; its error over the tolerance, 0 before it
     reach : the largest magnitude of each state so far
     on, fired : 1 for each event that the motion starts on, that it has met
     start, start_rates, wide : value and rate of each event; the largest value so far
@@ -56,6 +59,8 @@ class Course(NamedTuple):
     state: tuple
     t: float
     h: float
+    last_h: float
+    last_error: float
     on: tuple
     fired: tuple
     start: tuple
@@ -181,9 +186,16 @@ def margins(course, tolerance):
 
 
 @symbolic
-def next_length(pair, h, error):
-    """The next step, for an error over the tolerance."""
+def next_length(pair, course, error):
+    """The next step, for an error over the tolerance: as if that grew on as it has since the step before.
+
+    Without this a motion towards a pole has every second step refused, and those taken are as long at any tolerance.
+    Source: Gustafsson, ACM Trans. Math. Softw. 20:496 (1994).
+    """
+    h, before = course.h, course.last_error
     longer = next_step(h, error / SAFETY, pair.order)
+    foreseen = next_step(h * h / course.last_h, (error / SAFETY) * (error / before), pair.order)
+    longer = where((before > 0.0) & (error > FORGOTTEN) & (error <= 1.0) & (foreseen < longer), foreseen, longer)
     longer = where(longer < GROW * h, longer, GROW * h)
     return where(longer > SHRINK * h, longer, SHRINK * h)
 
@@ -197,7 +209,7 @@ def leaves(step, which, course, tolerance):
 
 
 @symbolic
-def moved_on(course, step, ending, which, longer, cuts, stuck, grazing):
+def moved_on(course, step, error, ending, which, longer, cuts, stuck, grazing):
     """The course behind a step, with its troubles."""
     moving = course.moving
     course = course._replace(
@@ -216,6 +228,8 @@ def moved_on(course, step, ending, which, longer, cuts, stuck, grazing):
         state=state,
         t=where(moved, course.t + ending.taken, course.t),
         h=where(ending.again, ending.shorter, where(moved & not_(done), longer, course.h)),
+        last_h=where(moved, course.h, course.last_h),
+        last_error=where(moved, at_least(error, FORGOTTEN), course.last_error),
         on=choose(moved, marks(0.0 * course.h - 1.0, course.on), course.on),
         fired=choose(done, marks(which, course.on), course.fired),
         start=start,
@@ -241,7 +255,7 @@ def one_step(m, pair, mode, unit, tolerance, course):
     box = passed_box(step, trial.stages[0], trial.last)
     of_rates, of_events = m.hidden(step.state, box, mode)
     seen = shows_all(step, of_rates, of_events, trial.stages[0], tolerance)
-    longer = where(seen | not_(fine), next_length(pair, course.h, error), COME_UP * course.h)
+    longer = where(seen | not_(fine), next_length(pair, course, error), COME_UP * course.h)
     rough = course.moving & not_(fine & seen)
     # By its events: proved to stay away, met, or to be cut, for it may hide a root
     met = course.moving & not_(rough) & (which > -0.5)
@@ -260,7 +274,7 @@ def one_step(m, pair, mode, unit, tolerance, course):
         ending = onto_event(m, pair, mode, step, trial, course, which, tolerance, seeking, ending)
     once_more = where(ending.again, course.cuts, 0.0)
     cuts = where(ending.again & not_(rough | ending.loose), course.cuts + 1.0, once_more)
-    return moved_on(course, step, ending, which, longer, cuts, pressed & not_(away), close)
+    return moved_on(course, step, error, ending, which, longer, cuts, pressed & not_(away), close)
 
 
 @jit
@@ -271,7 +285,7 @@ def to_event(m, pair, state, mode, unit, h, on, tolerance, active):
     start, start_rates = events(m, state, mode)
     wide, reach = reached(unmarked, start), reached(times(0.0, state), state)
     course = Course(
-        state, zero, h, on, unmarked, start, start_rates, wide, zero, zero, reach, active,
+        state, zero, h, h, zero, on, unmarked, start, start_rates, wide, zero, zero, reach, active,
         none, none, none, none, none, none,
     )  # fmt: skip
     for _ in range(STEP_LIMIT):

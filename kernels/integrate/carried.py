@@ -16,6 +16,9 @@ that it grows; and behind an event that rounding misplaces by dt, dt times what 
 feed back on one another, what a step leaves out is taken to its next order: with l' = f(U) - U' + Df l and
 l'' = f'(U) - U'' at the end, l = h (2 l'/(p + 2) - h l''/((p + 1) (p + 2))).
 
+A motion may forget an error that was so large on the way that the truth went elsewhere, which first order does not see.
+So where the *peak* of an error is above SMALL of the state's largest size, that is what is stated.
+
 Generic in one cell or lanes; `m` is a `taylor_leg.Series`, and where its `error` is None none is carried: all is ().
 """
 
@@ -40,6 +43,8 @@ FADES = 0.8
 """Of an error at a switch, what counts at the next one at least: where it changes its sign it is small by chance."""
 VAGUE = 0.05
 """Of what a step leaves out, what is not known of it."""
+SMALL = 0.05
+"""Of the largest size of a state, the error on the way up to which first order tells of it."""
 STRAIGHT = 20.0
 """Of the rate of an event, what it may change by within the time by which it is late: else it is no straight line."""
 
@@ -64,11 +69,12 @@ class Changes(NamedTuple):
 
 
 class Error(NamedTuple):
-    """What each state is off by, its spread; and of the last step: its polynomial's rates and their rates at its end,
-    its length over the order + 1 (0 where there was none), and what it has left out of sums."""
+    """What each state is off by, its spread, the most of both so far; and of the last step: its polynomial's rates and
+    their rates at its end, its length over the order + 1 (0 where there was none), and what it has left out of sums."""
 
     off: tuple
     spread: tuple
+    peak: tuple
     due: tuple
     bent: tuple
     weight: float
@@ -76,7 +82,7 @@ class Error(NamedTuple):
 
 
 class Late(NamedTuple):
-    """The error at the event that ends a leg: of each state, of the leg's time; the spread of both.
+    """The error at the event that ends a leg: of each state, of the leg's time; the spread of both; the peaks.
 
     noise : time by which rounding may misplace the event, by itself
     """
@@ -86,6 +92,7 @@ class Late(NamedTuple):
     spread: tuple
     spread_late: float
     noise: float
+    peak: tuple
 
 
 class Here(NamedTuple):
@@ -109,7 +116,7 @@ def begun(m, state, errors, h):
     if m.error is None:
         return ()
     nothing = tuple(0.0 * h for u in state)
-    return Error(errors.off, errors.spread, nothing, nothing, 0.0 * h, nothing)
+    return Error(errors.off, errors.spread, errors.peak, nothing, nothing, 0.0 * h, nothing)
 
 
 @symbolic
@@ -211,7 +218,9 @@ def stepped(m, error, changes, state, mode, unit, trial, steps, pieces, cores, c
     due = tuple(slope(trial, u) for u in pieces.states)
     bent = tuple(curvature(trial, u) for u in pieces.states)
     off, spread = choose(steps, new.off, error.off), choose(steps, new.spread, error.spread)
-    return new._replace(off=off, spread=spread, due=due, bent=bent)
+    parts = zip(error.peak, off, spread, strict=True)
+    peak = tuple(most(largest, magnitude(x) + magnitude(y)) for largest, x, y in parts)
+    return new._replace(off=off, spread=spread, peak=peak, due=due, bent=bent)
 
 
 @symbolic
@@ -247,7 +256,7 @@ def at_event(m, error, changes, full, state, mode, unit, ends, here, pieces, cor
     late = where(doubtful | here.others, math.inf, by)
     off = tuple(fma(unit * rate, late, x) for rate, x in zip(rates, error.off, strict=True))
     spread = tuple(fma(unit * rate, spread_late, x) for rate, x in zip(rates, error.spread, strict=True))
-    return Late(off, late, spread, spread_late, noise)
+    return Late(off, late, spread, spread_late, noise, error.peak)
 
 
 @symbolic
@@ -272,6 +281,7 @@ def later(errors, at_event, unit):
         spread_lag=fma(spread_late, unit, errors.spread_lag),
         off=at_event.off,
         spread=at_event.spread,
+        peak=at_event.peak,
         noise=at_event.noise * unit,
     )
 
@@ -303,6 +313,9 @@ def stated(errors, watched, time, since, size):
         return ()
     parts = tuple(x / where(largest > 0.0, largest, 1.0) for x, largest in zip(errors.once, size, strict=True))
     error = fold(most, most(errors.latest / time, errors.lagged / since), (), parts)
+    peaks = tuple(x / where(largest > 0.0, largest, 1.0) for x, largest in zip(errors.peak, size, strict=True))
+    peak = fold(most, peaks[0], (), peaks[1:])
+    error = where(peak <= SMALL, error, most(error, peak))
     return errors._replace(error=where(watched, error, errors.error))
 
 

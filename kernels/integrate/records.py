@@ -125,6 +125,7 @@ class Errors(NamedTuple):
     late, lag, off : of time, of time since the last switch, of each state; and the spread of each
     noise : time by which rounding may misplace the last event
     latest, lagged, once : the largest so far at a switch, fading
+    peak : the largest so far of each state
     """
 
     told: float
@@ -139,6 +140,7 @@ class Errors(NamedTuple):
     latest: float
     lagged: float
     once: tuple
+    peak: tuple
 
 
 class Step(NamedTuple):

@@ -37,3 +37,15 @@ def test_what_is_ok_is_right_and_most_of_what_can_be_solved_is_ok(name, method):
     assert (judged(kernel, truth, outputs, status, rtol) <= 1.0).all()
     solvable = (truth.condition * 1e-14 < rtol) & ~np.isnan(truth.time)
     assert (status[solvable] == Status.OK).mean() > 0.6
+
+
+@pytest.mark.skipif(not COMPILED, reason="thousands of steps")
+def test_runs_that_agree_on_what_is_wrong_are_not_believed():
+    """Towards a pole, by dop853: 4.4 rtol and more off in each of two runs, at tolerances 16 times apart."""
+    kernel, _, truth_of = FAMILIES["blow_up"]
+    random = np.random.default_rng(3)
+    rest, T = 10.0 ** random.uniform(-4, -2, 1000), random.choice([2.0, 1.0, 3.7], 1000)
+    cells, rtol = {"x0": (1.0 - rest) / T, "T": T}, 10.0 ** random.uniform(-5, -3, 1000)
+    outputs, status = solve(kernel, "dop853", rtol=rtol, flips=np.ones(1000), **cells)
+    assert (judged(kernel, truth_of(**cells), outputs, status, rtol) <= 1.0).all()
+    assert (status == Status.OK).mean() > 0.9
