@@ -8,8 +8,6 @@ bracket. A step within which the rates may hide more
 than the tolerance (`source_text.hidden`) is not taken: the points that an error is estimated from may miss it.
 """
 
-from typing import NamedTuple
-
 from kernels.integrate.events import cubic_root, of_event
 from kernels.integrate.fixed_step import dip, finite, first_event, passed_another
 from kernels.integrate.pairs import at_least, of_size
@@ -32,8 +30,6 @@ CUTS = 60
 ROOT_LIMIT = 60
 CLOSE = 30.0
 """Tolerances within which a turning point of an event is too close to 0 to be told from a crossing."""
-
-
 SUNK, ROUNDED = 0.01, 1e-11
 """How far below an event that it starts on a motion may fall within a step: of the tolerance, and by rounding."""
 BENT, NARROWED = 0.5, 8.0
@@ -43,67 +39,10 @@ HALVED = 30.0
 """Halvings after which a motion that starts on an event with no rate has not risen from it."""
 
 
-class Course(NamedTuple):
-    """A leg on its way.
-
-    h : the next step, in units
-    last_h, last_error : length of the last step that was taken, in units; its error over the tolerance, 0 before it
-    reach : the largest magnitude of each state so far
-    on, fired : 1 for each event that the motion starts on, that it has met
-    start, start_rates, wide : value and rate of each event; the largest value so far
-    cuts, tried : how often the step has been cut, how many have been tried
-    stuck, lost, broken, grazing, hangs : as of `Leg`
-    blown : a step has left the numbers
-    """
-
-    state: tuple
-    t: float
-    h: float
-    last_h: float
-    last_error: float
-    on: tuple
-    fired: tuple
-    start: tuple
-    start_rates: tuple
-    wide: tuple
-    cuts: float
-    tried: float
-    reach: tuple
-    moving: bool
-    stuck: bool
-    lost: bool
-    blown: bool
-    broken: bool
-    grazing: bool
-    hangs: bool
-
-
-class Ending(NamedTuple):
-    """How a step is to end.
-
-    new, taken : in this state, after that time
-    again, shorter : it must be tried again, with this length
-    loose : again for the dense output's sake
-    hangs : as of `Leg`
-    """
-
-    new: tuple
-    taken: float
-    again: bool
-    shorter: float
-    loose: bool
-    hangs: bool
-
-
 @symbolic
-def passed_box(step, first, last):
-    """The box of states that a step passes; `first` and `last` are the rates at its ends."""
-    return boxes(step.state, step.new, times(step.h, after(last, -1.0, ONE, (first,))))
-
-
-@symbolic
-def shows_all(step, of_rates, of_events, first, tolerance):
+def shows_all(m, step, box, mode, first, tolerance):
     """Whether what a step hides is within the tolerance of each state's size and of each event's value; NaN fails."""
+    of_rates, of_events = m.hidden(step.state, box, mode)
     seen = of_size(step.state, step.new, first, step.h, times(step.h, of_rates)) <= tolerance
     for hidden, start, end in zip(of_events, step.start, step.end, strict=True):
         seen = seen & (hidden <= tolerance * (magnitude(start) + magnitude(end)))
@@ -111,21 +50,20 @@ def shows_all(step, of_rates, of_events, first, tolerance):
 
 
 @symbolic
-def doubted(step, bounds, course, tolerance):
+def doubted(m, step, box, mode, on, cuts, margins, tolerance):
     """Where an event is not proved to stay above its margin, or to fall or rise all along; and where one is near 0.
 
     A motion that starts on an event with no rate and leaves it by its bend is believed to, on a step cut short enough.
     """
-    low, rate_low, rate_high = bounds
-    margin, doubt = margins(course, tolerance), step.h < 0.0
-    near = doubt
-    for j in range(len(low)):
+    low, rate_low, rate_high = m.bounds(step.state, box, mode)
+    near = doubt = step.h < 0.0
+    for j, margin in enumerate(margins):
         start, end, rise = step.start_rates[j], step.end[j], 0.5 * step.h * step.end_rates[j]
-        bends = (course.on[j] > 0.5) & (course.cuts > BENT) & (end > 0.0) & (rise > 0.0) & (rise <= 2.0 * end)
+        bends = (on[j] > 0.5) & (cuts > BENT) & (end > 0.0) & (rise > 0.0) & (rise <= 2.0 * end)
         bends = bends & (step.h * start <= 0.5 * end) & (-step.h * start <= fma(SUNK, tolerance, ROUNDED) * end)
-        unsure = not_((low[j] > margin[j]) | (rate_high[j] < 0.0) | (rate_low[j] > 0.0) | bends)
+        unsure = not_((low[j] > margin) | (rate_high[j] < 0.0) | (rate_low[j] > 0.0) | bends)
         doubt = doubt | unsure
-        near = near | (unsure & (course.on[j] < 0.5) & (magnitude(step.end[j]) <= margin[j]))
+        near = near | (unsure & (on[j] < 0.5) & (magnitude(step.end[j]) <= margin))
     return doubt, near
 
 
@@ -149,153 +87,96 @@ def on_dense(m, pair, mode, step, terms, which, part, seeking):
 
 
 @symbolic
-def only_just(step, which, slope, margin):
-    """Whether an event that has this rate where it fires would turn round within the margin behind it."""
-    d0, d1 = step.h * of_event(step.start_rates, which), step.h * of_event(step.end_rates, which)
-    bend = magnitude(d1 - d0) / step.h
-    return slope * slope * step.h <= 2.0 * margin * bend
-
-
-@jit
-def onto_event(m, pair, mode, step, trial, course, which, tolerance, seeking, ending):
-    """The ending of the lanes that seek an event: on it, or again where another is behind by then, or it is vague."""
-    curved = seeking & (of_event(step.start, which) > 0.0)
-    terms = pair.series(m, step.state, trial, mode, step.h)
-    e0, e1 = of_event(step.start, which), of_event(step.end, which)
-    d0, d1 = step.h * of_event(step.start_rates, which), step.h * of_event(step.end_rates, which)
-    first = where(curved, cubic_root(e0, e1, d0, d1, curved), 0.0)
-    part, found, slope = on_dense(m, pair, mode, step, terms, which, first, curved)
-    part, state = where(curved, part, 0.0), choose(curved, found, step.state)
-    vague = pair.vague(m, step.state, terms, mode, step.h, part)
-    vague = of_size(step.state, step.new, trial.stages[0], step.h, vague)
-    other = curved & (part < 0.999999) & (part > 0.0)
-    other = other & passed_another(events(m, state, mode)[0], which, course.on)
-    loose = curved & not_(other) & (vague > tolerance)
-    shorter = where(other, part * course.h, ending.shorter)
-    shorter = where(loose, course.h * where(part < 0.9, 1.05 * part, 0.5), shorter)
-    margin = of_event(margins(course, tolerance), which)
-    hangs = curved & not_(other | loose) & only_just(step, which, slope, margin)
-    new, taken = choose(seeking, state, ending.new), where(seeking, part * course.h, ending.taken)
-    return Ending(new, taken, ending.again | other | loose, shorter, loose, hangs)
-
-
-@symbolic
-def margins(course, tolerance):
-    """Within which a turning point of each event is too close to 0."""
-    return times(CLOSE * tolerance, course.wide)
-
-
-@symbolic
-def next_length(pair, course, error):
+def next_length(pair, h, last_h, error, before):
     """The next step, for an error over the tolerance: as if that grew on as it has since the step before.
 
     Without this a motion towards a pole has every second step refused, and those taken are as long at any tolerance.
     Source: Gustafsson, ACM Trans. Math. Softw. 20:496 (1994).
     """
-    h, before = course.h, course.last_error
     longer = next_step(h, error / SAFETY, pair.order)
-    foreseen = next_step(h * h / course.last_h, (error / SAFETY) * (error / before), pair.order)
+    foreseen = next_step(h * h / last_h, (error / SAFETY) * (error / before), pair.order)
     longer = where((before > 0.0) & (error > FORGOTTEN) & (error <= 1.0) & (foreseen < longer), foreseen, longer)
     longer = where(longer < GROW * h, longer, GROW * h)
     return where(longer > SHRINK * h, longer, SHRINK * h)
-
-
-@symbolic
-def leaves(step, which, course, tolerance):
-    """Whether a motion leaves the event that it starts on and has met again: also by its bend alone."""
-    rate, end = of_event(step.start_rates, which), of_event(step.end, which)
-    flat = (end < 0.0) & (-step.h * rate <= -fma(SUNK, tolerance, ROUNDED) * end)
-    return (rate > 0.0) | (flat & (course.cuts < HALVED))
-
-
-@symbolic
-def moved_on(course, step, error, ending, which, longer, cuts, stuck, grazing):
-    """The course behind a step, with its troubles."""
-    moving = course.moving
-    course = course._replace(
-        stuck=course.stuck | stuck,
-        lost=course.lost | (moving & (cuts > CUTS)),
-        blown=course.blown | (moving & not_(finite(step.new))),
-        broken=course.broken | (moving & not_(course.h > 1e-280)),
-        grazing=course.grazing | grazing,
-        hangs=course.hangs | ending.hangs,
-    )
-    given_up = course.stuck | course.grazing | course.broken | course.lost
-    moved = moving & not_(ending.again | given_up)
-    done, start = moved & (which > -0.5), choose(moved, step.end, course.start)
-    state = choose(moved, ending.new, course.state)
-    return course._replace(
-        state=state,
-        t=where(moved, course.t + ending.taken, course.t),
-        h=where(ending.again, ending.shorter, where(moved & not_(done), longer, course.h)),
-        last_h=where(moved, course.h, course.last_h),
-        last_error=where(moved, at_least(error, FORGOTTEN), course.last_error),
-        on=choose(moved, marks(0.0 * course.h - 1.0, course.on), course.on),
-        fired=choose(done, marks(which, course.on), course.fired),
-        start=start,
-        start_rates=choose(moved, step.end_rates, course.start_rates),
-        wide=reached(course.wide, start),
-        cuts=cuts,
-        tried=where(moving, course.tried + 1.0, course.tried),
-        reach=reached(course.reach, state),
-        moving=moving & not_(done | given_up),
-    )
-
-
-@jit
-def one_step(m, pair, mode, unit, tolerance, course):
-    """The course after one more step."""
-    trial = pair.tried(m, course.state, mode, course.h * unit)
-    end, end_rates = events(m, trial.new, mode)
-    step = Step(course.state, trial.new, course.h * unit, course.start, course.start_rates, end, end_rates)
-    which = first_event(step, course.on, 0.0)
-    # By its error, and by what it may hide
-    error = trial.error / tolerance
-    fine = (error <= 1.0) & finite(trial.new)
-    box = passed_box(step, trial.stages[0], trial.last)
-    of_rates, of_events = m.hidden(step.state, box, mode)
-    seen = shows_all(step, of_rates, of_events, trial.stages[0], tolerance)
-    longer = where(seen | not_(fine), next_length(pair, course, error), COME_UP * course.h)
-    rough = course.moving & not_(fine & seen)
-    # By its events: proved to stay away, met, or to be cut, for it may hide a root
-    met = course.moving & not_(rough) & (which > -0.5)
-    pressed = met & (of_event(course.on, which) > 0.5)
-    away = leaves(step, which, course, tolerance)
-    doubt, near = doubted(step, m.bounds(step.state, box, mode), course, tolerance)
-    doubt = doubt & course.moving & not_(rough | pressed)
-    low = where(doubt & not_(met | not_(course.cuts < 0.5)), dip(step), 0.0)
-    close = doubt & near & (course.cuts > NARROWED)
-    again = rough | (pressed & away) | (doubt & not_(close))
-    shorter = where(rough, longer, where(low > 0.0, low * course.h, 0.5 * course.h))
-    nothing = course.moving & not_(course.moving)
-    ending = Ending(trial.new, course.h, again, shorter, nothing, nothing)
-    seeking = met & not_(pressed | again)
-    if any_lane(seeking):
-        ending = onto_event(m, pair, mode, step, trial, course, which, tolerance, seeking, ending)
-    once_more = where(ending.again, course.cuts, 0.0)
-    cuts = where(ending.again & not_(rough | ending.loose), course.cuts + 1.0, once_more)
-    return moved_on(course, step, error, ending, which, longer, cuts, pressed & not_(away), close)
 
 
 @jit
 def to_event(m, pair, state, mode, unit, h, on, tolerance, active):
     """Follow the active lanes until an event falls through 0, and stop there; see `taylor_leg`."""
     h = pair.first(m, state, mode, unit, h)
-    none, zero, unmarked = active & not_(active), 0.0 * h, times(0.0, on)
+    moving, nothing, fired = active, active & not_(active), times(0.0, on)
+    stuck, lost, blown, broken, grazing, hangs = nothing, nothing, nothing, nothing, nothing, nothing
+    t, cuts, tried, last_h, last_error = 0.0 * h, 0.0 * h, 0.0 * h, h, 0.0 * h
     start, start_rates = events(m, state, mode)
-    wide, reach = reached(unmarked, start), reached(times(0.0, state), state)
-    course = Course(
-        state, zero, h, h, zero, on, unmarked, start, start_rates, wide, zero, zero, reach, active,
-        none, none, none, none, none, none,
-    )  # fmt: skip
+    wide, reach = reached(fired, start), reached(times(0.0, state), state)
     for _ in range(STEP_LIMIT):
-        course = one_step(m, pair, mode, unit, tolerance, course)
-        if not any_lane(course.moving):
+        length = h * unit
+        trial = pair.tried(m, state, mode, length)
+        new, first = trial.new, trial.stages[0]
+        end, end_rates = events(m, new, mode)
+        step = Step(state, new, length, start, start_rates, end, end_rates)
+        # by its error, and by what it may hide
+        error, sound = trial.error / tolerance, finite(new)
+        fine = (error <= 1.0) & sound
+        box = boxes(state, new, times(length, after(trial.last, -1.0, ONE, (first,))))
+        seen = shows_all(m, step, box, mode, first, tolerance)
+        longer = where(seen | not_(fine), next_length(pair, h, last_h, error, last_error), COME_UP * h)
+        rough = moving & not_(fine & seen)
+        # by its events: proved to stay away, met, or to be cut, for it may hide a root
+        which, margins = first_event(step, on, 0.0), times(CLOSE * tolerance, wide)
+        met = moving & not_(rough) & (which > -0.5)
+        pressed = met & (of_event(on, which) > 0.5)
+        above, below = of_event(start, which), of_event(end, which)
+        rate, last_rate = of_event(start_rates, which), of_event(end_rates, which)
+        flat = (below < 0.0) & (-length * rate <= -fma(SUNK, tolerance, ROUNDED) * below)
+        away = (rate > 0.0) | (flat & (cuts < HALVED))  # leaves the event that it starts on and has met again
+        doubt, near = doubted(m, step, box, mode, on, cuts, margins, tolerance)
+        doubt = doubt & moving & not_(rough | pressed)
+        low = where(doubt & not_(met | not_(cuts < 0.5)), dip(step), 0.0)
+        close = doubt & near & (cuts > NARROWED)
+        again = rough | (pressed & away) | (doubt & not_(close))
+        shorter = where(rough, longer, where(low > 0.0, low * h, 0.5 * h))
+        # onto the event; again where another one is behind by then, or the dense output is vague
+        taken, loose, seeking = h, nothing, met & not_(pressed | again)
+        if any_lane(seeking):
+            curved = seeking & (above > 0.0)
+            terms = pair.series(m, state, trial, mode, length)
+            part = where(curved, cubic_root(above, below, length * rate, length * last_rate, curved), 0.0)
+            part, found, slope = on_dense(m, pair, mode, step, terms, which, part, curved)
+            part, found = where(curved, part, 0.0), choose(curved, found, state)
+            vague = of_size(state, new, first, length, pair.vague(m, state, terms, mode, length, part))
+            other = curved & (part < 0.999999) & (part > 0.0)
+            other = other & passed_another(events(m, found, mode)[0], which, on)
+            loose = curved & not_(other) & (vague > tolerance)
+            shorter = where(other, part * h, shorter)
+            shorter = where(loose, h * where(part < 0.9, 1.05 * part, 0.5), shorter)
+            bend = magnitude(length * last_rate - length * rate) / length
+            turns = slope * slope * length <= 2.0 * of_event(margins, which) * bend
+            hangs = hangs | (curved & not_(other | loose) & turns)
+            new, taken = choose(seeking, found, new), where(seeking, part * h, taken)
+            again = again | other | loose
+        once_more = where(again, cuts, 0.0)
+        cuts = where(again & not_(rough | loose), cuts + 1.0, once_more)
+        # moved on, unless it comes to nothing
+        stuck, grazing, blown = stuck | (pressed & not_(away)), grazing | close, blown | (moving & not_(sound))
+        lost, broken = lost | (moving & (cuts > CUTS)), broken | (moving & not_(h > 1e-280))
+        given_up = stuck | grazing | broken | lost
+        moved = moving & not_(again | given_up)
+        done = moved & (which > -0.5)
+        t, tried = where(moved, t + taken, t), where(moving, tried + 1.0, tried)
+        last_h, last_error = where(moved, h, last_h), where(moved, at_least(error, FORGOTTEN), last_error)
+        h = where(again, shorter, where(moved & not_(done), longer, h))
+        state, start, start_rates = (
+            choose(moved, new, state),
+            choose(moved, end, start),
+            choose(moved, end_rates, start_rates),
+        )
+        on, fired = choose(moved, times(0.0, on), on), choose(done, marks(which, on), fired)
+        wide, reach = reached(wide, start), reached(reach, state)
+        moving = moving & not_(done | given_up)
+        if not any_lane(moving):
             break
-    lost = course.lost | course.moving
-    broken = course.broken | (lost & course.blown)
-    leg = Leg(
-        course.state, course.t, course.h, course.fired, course.stuck, lost & not_(course.blown), broken,
-        course.grazing, course.hangs, course.tried, course.reach,
-    )  # fmt: skip
-    return leg, ()
+    lost = lost | moving
+    return Leg(
+        state, t, h, fired, stuck, lost & not_(blown), broken | (lost & blown), grazing, hangs, tried, reach,
+    ), ()  # fmt: skip
