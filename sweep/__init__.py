@@ -20,6 +20,7 @@ _MODULES = {
     "fit_correction": "laws.asymptote",
     "fit_collapse": "laws.collapse",
     "compare_laws": "laws.compare",
+    "exponent_map": "laws.exponents",
     "local_exponent": "laws.exponents",
     "where_exponent": "laws.exponents",
     "fit_exponent": "laws.lines",

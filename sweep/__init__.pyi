@@ -15,6 +15,7 @@ from sweep.file.verify import verify as verify
 from sweep.laws.asymptote import fit_correction as fit_correction
 from sweep.laws.collapse import fit_collapse as fit_collapse
 from sweep.laws.compare import compare_laws as compare_laws
+from sweep.laws.exponents import exponent_map as exponent_map
 from sweep.laws.exponents import local_exponent as local_exponent
 from sweep.laws.exponents import where_exponent as where_exponent
 from sweep.laws.lines import fit_exponent as fit_exponent

@@ -1,7 +1,7 @@
 """Scaling laws: xarray in, xarray out. Knows neither studies nor cells nor files.
 
 Others may use
-    `exponents`  local exponents, and where curves pass a value
+    `exponents`  local exponents, where curves pass a value, exponents over two parameters
     `lines`      straight lines in log-log
     `two_laws`   two power laws with a bend, fitted at once; where two straight lines meet
     `compare`    which law of the table

@@ -1,4 +1,4 @@
-"""Local exponents, and where curves or their exponents pass a value.
+"""Local exponents, where curves or their exponents pass a value, and exponents over two parameters.
 
 Everything here works on plain `xarray` objects along one dimension and keeps all others. `dim` may also name a
 coordinate along a dimension, such as an axis of a zip design: `local_exponent(ds.period, "mu")`.
@@ -6,14 +6,16 @@ coordinate along a dimension, such as an axis of a zip design: `local_exponent(d
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, Literal, overload
 
 import numpy as np
 import xarray as xr
 
-from sweep.errors import SweepError
+from sweep.errors import SweepError, missing
 from sweep.laws.curves import (
     Window,
+    check_output,
     inside_window,
     log_of,
     missing_is_nan,
@@ -21,7 +23,10 @@ from sweep.laws.curves import (
     stated_bound,
     title,
 )
-from sweep.laws.loglog import EPSILON, Array, brackets, root, slope_errors, slopes
+from sweep.laws.loglog import EPSILON, Array, brackets, is_logarithmic, root, slope_errors, slopes
+
+BORDERS = (-1.0, -0.5, -1 / 3)
+"""Exponents of a period in the drive: weak drive, losses that scale with it, strong drive."""
 
 
 @overload
@@ -166,3 +171,72 @@ def where_exponent(
     found.abscissa.attrs = {"units": units, "long_name": f"where {what} is {value:g}"}
     found.abscissa_error.attrs = {"units": units, "long_name": "estimated error of the place"}
     return found
+
+
+def exponent_map(y: xr.DataArray, dim: str, levels: Sequence[float] = BORDERS) -> xr.Dataset:
+    """The local exponent of y in `dim` over two parameters, and the lines where it has given values.
+
+    Parameters
+    ----------
+    y : DataArray
+        Two dimensions, both with number coordinates; one of them is `dim`.
+    dim : str
+        Positive and strictly monotone.
+    levels : sequence of float
+        Exponents, with their sign: -1/3 for y ~ dim^(-1/3).
+
+    Returns
+    -------
+    Dataset
+        `exponent` and its `exponent_error`, of the shape of y, and the lines along `point`: both coordinates under the
+        names of the dimensions with `_on_border` behind, `level`, and `line`, the number of the line, from 0 on.
+
+    Raises
+    ------
+    SweepError
+        y has not two dimensions, or an axis is unfit.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import sweep
+    >>> foliot = {"kernel": "foliot", "outputs": ["period"], "fixed": {"phi0": 1.0, "a": 1.0}}
+    >>> axes = {"mu": np.geomspace(1e-2, 1e4, 25), "R": [1e-4, 1e-3, 1e-2, 1e-1]}
+    >>> ds = sweep.run(**foliot, axes=axes)
+    >>> sweep.exponent_map(ds.period, "mu").exponent.dims
+    ('mu', 'R')
+    """
+    local = local_exponent(y, dim, error=True)
+    lines = contours(local.exponent, levels).rename({str(d): f"{d}_on_border" for d in y.dims})
+    return local.assign(lines.data_vars).assign_attrs(y=title(y), x=dim)
+
+
+def contours(field: xr.DataArray, levels: Sequence[float]) -> xr.Dataset:
+    """Lines on which a field over two parameters has given values, by linear interpolation between its cells.
+
+    Along `point`: both coordinates, `level`, and `line`, the number of the line. Logarithms are taken of an axis whose
+    grid is logarithmic. Where the field is NaN no line goes.
+    """
+    check_output(field)
+    if field.ndim != 2:
+        raise SweepError(f"{title(field)} has {field.ndim} dimensions; a map needs two, choose with .sel or --at")
+    for name in field.dims:
+        if name not in field.coords or field[name].dtype.kind not in "fiu" or field.sizes[name] < 2:
+            raise SweepError(f"{name} has no two numbers to draw a map over")
+    try:
+        import contourpy
+    except ImportError:
+        raise missing("lines on maps need contourpy", "plot") from None
+    names = [str(field.dims[1]), str(field.dims[0])]  # across, down
+    logarithmic = [is_logarithmic(field[name].values) for name in names]
+    x, y = (np.log(field[n].values) if take else field[n].values for n, take in zip(names, logarithmic, strict=True))
+    generator = contourpy.contour_generator(x, y, np.ma.masked_invalid(field.values.astype(np.float64)))
+    lines = [(level, np.array(line)) for level in levels for line in generator.lines(float(level))]
+    points = np.concatenate([np.empty((0, 2)), *(line for _, line in lines)])
+    points[:, logarithmic] = np.exp(points[:, logarithmic])
+    count, units = [len(line) for _, line in lines], str(field.attrs.get("units", "1"))
+    columns = {name: (points[:, k], dict(field[name].attrs)) for k, name in enumerate(names)}
+    level = np.repeat(np.array([level for level, _ in lines], np.float64), count)
+    columns["level"] = level, {"units": units, "long_name": f"{title(field)} on the line"}
+    columns["line"] = np.repeat(np.arange(len(lines)), count), {"units": "1", "long_name": "number of the line"}
+    return xr.Dataset({name: ("point", *column) for name, column in columns.items()})

@@ -1,4 +1,4 @@
-"""What lies between cells: values inside a box of scattered cells, lines in it, and their errors."""
+"""What lies between cells: borders on maps, values inside a box of scattered cells, lines in it, and their errors."""
 
 import numpy as np
 import pytest
@@ -8,6 +8,65 @@ from scipy.interpolate import LinearNDInterpolator
 import sweep
 from sweep.explore.mesh import stretch
 from sweep.explore.scattered import axes_of, heights, on_lines
+from sweep.laws.exponents import contours
+
+MU, A = np.geomspace(1e-3, 1e3, 121), np.geomspace(0.1, 10, 41)
+
+
+def period():
+    """1/x + x^(-1/3) of x = mu/a: regimes meet along straight lines mu ~ a."""
+    x = MU[:, None] / A
+    coords = {"mu": ("mu", MU, {"units": "rad/s^2"}), "a": ("a", A, {"units": "1/s"})}
+    return xr.DataArray(1 / x + x ** (-1 / 3), coords, ("mu", "a"), name="period")
+
+
+# borders on maps
+
+
+def test_lines_of_an_exponent_are_where_theory_has_them():
+    """The exponent -(1/x + x^(-1/3)/3)/(1/x + x^(-1/3)) is -1/2 where x^(2/3) = 3; -1 and -1/3 are only tended to."""
+    found = sweep.exponent_map(period(), "mu")
+    assert found.exponent.dims == ("mu", "a")
+    np.testing.assert_allclose(np.unique(found.level), [-0.5], rtol=1e-12)
+    np.testing.assert_allclose(found.mu_on_border / found.a_on_border, 3**1.5, rtol=2e-3)
+    assert set(found.line.values) == {0}
+    assert (float(found.a_on_border.min()), float(found.a_on_border.max())) == pytest.approx((0.1, 10))
+    assert found.mu_on_border.attrs["units"] == "rad/s^2"
+
+
+@pytest.mark.parametrize("logarithmic", [(True, False), (False, False), (True, True), (False, True)])
+def test_each_axis_is_interpolated_as_its_grid_is_spaced(logarithmic):
+    grids = [np.geomspace(1, 1e4, 9) if take else np.linspace(-1, 9, 10) for take in logarithmic]
+    u, v = (np.log(g) if take else g for g, take in zip(grids, logarithmic, strict=True))
+    field = xr.DataArray(u[:, None] - 0.7 * v, dict(zip("xy", grids, strict=True)), ("x", "y"), attrs={"units": "m"})
+    found = contours(field, (0.3, -0.4, 1e9))
+    assert set(found.level.values) == {0.3, -0.4}
+    x, y = (np.log(found[n]) if take else found[n] for n, take in zip("xy", logarithmic, strict=True))
+    np.testing.assert_allclose(x - 0.7 * y, found.level, atol=1e-12)
+    np.testing.assert_array_equal(found.line == 0, found.level == 0.3)
+    assert found.level.attrs["units"] == "m"
+
+
+def test_no_line_crosses_what_has_no_value():
+    found = contours(period().where(abs(np.log(period().a)) > 0.5), (1.5,))
+    assert len(set(found.line.values)) == 2
+    assert not ((found.a > 0.7) & (found.a < 1.4)).any()
+    assert contours(period(), (1e9,)).sizes["point"] == 0
+
+
+def test_what_is_no_map_is_refused():
+    field = xr.DataArray([[0.0, 1.0], [2.0, 3.0]], {"x": [0, 1], "y": [0.0, 3.0]}, ("x", "y"), name="z")
+    contours(field, (1.5,))  # two values an axis are enough
+    for wrong, message in (
+        (field[:, 0], "1 dimensions"),
+        (field.expand_dims("t"), "3 dimensions"),
+        (field[:, :1], "y has no two numbers"),
+        (field.assign_coords(y=["a", "b"]), "y has no two numbers"),
+        (field.drop_vars("x"), "x has no two numbers"),
+    ):
+        with pytest.raises(sweep.SweepError, match=message):
+            contours(wrong, (1.0,))
+
 
 # values inside a box
 
