@@ -28,6 +28,8 @@ LARGEST = 5.0
 """log2 of the factor by which a step may change."""
 LONGEST = 8.0
 """First guess of a step, at most, over the time of the last motion between events."""
+TINY = 1e-280
+"""Size of a state of which products of its terms would underflow: what is less is not told from 0."""
 COME_UP = 0.25
 """Of a step within which something is hidden (`source_text.hidden`): the next trial. The longest grows back as fast."""
 WIDER = 5.0 / 4.0
@@ -124,7 +126,7 @@ def last_term(h, series):
 @symbolic
 def size(h, series):
     """Of a state on a step: its first terms."""
-    return fma(fma(magnitude(series[2]), h, magnitude(series[1])), h, magnitude(series[0]))
+    return fma(fma(magnitude(series[2]), h, magnitude(series[1])), h, magnitude(series[0]) + TINY)
 
 
 @symbolic
