@@ -10,5 +10,5 @@ in the same way, and its columns made from them at the end. What is not computed
 asks HDF5 for its numbers. All that reads a result compares it with its digests (`reading`).
 
 `open` gives a file as a Dataset (its arrays are `columns`), `verify` compares all of it with its digests. All calls
-that change the disk are in `disk`, which keeps files that are not ours, too.
+that change the disk are in `disk`, which also refuses to overwrite what is there already, unless that is forced.
 """

@@ -173,10 +173,12 @@ def locked(path: Path) -> Iterator[bool]:
             ours = path.stat().st_ino == os.fstat(fd).st_ino
         yield ours
     finally:
-        if ours:
-            with contextlib.suppress(OSError):
-                remove(path)
-        os.close(fd)
+        try:
+            if ours:
+                with contextlib.suppress(OSError):
+                    remove(path)
+        finally:  # also at Ctrl-C, or this process would hold the lock for ever
+            os.close(fd)
 
 
 def mark(path: Path) -> tuple[int, ...]:

@@ -128,14 +128,20 @@ class StoredFile:
             os.close(fd)
 
     def is_as_made(self) -> bool:
-        """Whether all but numbers is as it was made, and as long; HDF5 does not check all of it. Raises OSError."""
-        size = int.from_bytes(read_bytes(self.fd, *FILE_END), "little")
-        return os.fstat(self.fd).st_size == size and digest_before(self.fd, self.key_at) == self.key
+        """Whether all but numbers can be read, is as it was made, and as long; HDF5 does not check all of it."""
+        try:
+            size = int.from_bytes(read_bytes(self.fd, *FILE_END), "little")
+            return os.fstat(self.fd).st_size == size and digest_before(self.fd, self.key_at) == self.key
+        except (OSError, EOFError):
+            return False
 
     @property
     def fingerprint(self) -> dict[str, str]:
-        """Of the study."""
-        return dict(json.loads(self.attrs["fingerprint"]))
+        """Of the study and of the program that computed it. Raises Damaged where another program has changed it."""
+        try:
+            return dict(json.loads(self.attrs["fingerprint"]))
+        except DAMAGE as fault:
+            raise _refusal(self.path, fault) from fault
 
     def columns(self, name: str = "cells") -> dict[str, Numbers]:
         """The columns of a table."""

@@ -96,9 +96,10 @@ class Store:
         self.resume(file, ())
 
     def resume(self, file: StoredFile, damaged: Sequence[int] | None = None) -> Sequence[int]:
-        """Takes up what an earlier run left, but for the blocks that are damaged, which it gives: None: looks for them.
+        """Takes up what an earlier run left; its damaged blocks count as missing, and are returned.
 
-        Raises SweepError.
+        `damaged` names them where that is known; None: all blocks that are done are read and compared with their
+        digests. Raises SweepError.
         """
         if file.ending:  # it was killed just before it was renamed, or is taken up again
             file.ending = {}

@@ -83,7 +83,7 @@ def verify(path: str | os.PathLike[str]) -> Verdict:
 
 
 def _verdict(output: Path, file: StoredFile) -> Verdict:
-    """Compares all digests; HDF5 has checked texts and coordinates when it read them. Raises OSError."""
+    """Compares all digests; HDF5 has checked texts and coordinates when it read them."""
     findings: list[str] = []
     if not file.is_as_made():
         findings.append("its structure is not as it was made: damaged, or changed by another program")

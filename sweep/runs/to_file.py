@@ -104,7 +104,7 @@ def _changes(stored: Mapping[str, str], task: Task) -> str:
 def _computed(
     store: Store, task: Task, known: Reused | Precomputed | None, reused: bool, damaged: Sequence[int]
 ) -> None:
-    """Computes what is missing, which is said of blocks that are damaged, and puts the result in its place."""
+    """Computes what is missing, notes which blocks of it were `damaged`, and puts the result in its place."""
     with contextlib.ExitStack() as stack:
         to_do, sampled = store.file is None or bool(store.missing()), known is None
         if to_do and reused:

@@ -97,6 +97,22 @@ def test_a_foreign_file_is_never_overwritten(output, content, force):
     assert output.read_bytes() == before
 
 
+@pytest.mark.parametrize("change", [None, 3.0, "words"])
+@pytest.mark.parametrize("force", [False, True])
+def test_a_result_whose_fingerprint_was_changed_is_told_and_kept(output, change, force):
+    """None: it was removed. The numbers are still read."""
+    quiet(tall(3), output).close()
+    with h5py.File(output, "r+") as file:
+        del file.attrs["fingerprint"]
+        if change is not None:
+            file.attrs["fingerprint"] = change
+    before = output.read_bytes()
+    with pytest.raises(SweepError, match="damaged"):
+        quiet(tall(3), output, force=force)
+    assert output.read_bytes() == before
+    same(sweep.open_result(output), quiet(tall(3)))
+
+
 @pytest.mark.parametrize("name", ["out.h5", "out.h5.unfinished"])
 def test_a_pipe_or_a_folder_where_a_result_should_be_is_told_at_once(output, name):
     os.mkfifo(output.with_name(name))
@@ -290,6 +306,37 @@ def test_a_file_that_reads_back_wrong_is_refused(output, monkeypatch):
             quiet(tall(3003), output, block_cells=1001, workers=1)
     assert not output.exists()
     same(quiet(tall(3003), output, force=True), quiet(tall(3003)))
+
+
+def test_a_structure_that_cannot_be_read_is_damaged(output, monkeypatch):
+    """As where the disk fails below what HDF5 has no need to read; the digest of the structure is over all of it."""
+    quiet(tall(3), output).close()
+    real = disk.read_all
+
+    def failing(fd, buffers, at):
+        if at == 0:
+            raise OSError(errno.EIO, "failed")
+        real(fd, buffers, at)
+
+    monkeypatch.setattr(disk, "read_all", failing)
+    found = sweep.verify(output)
+    assert not found.whole
+    assert "structure" in found.findings[0]
+    with pytest.raises(SweepError, match="structure"):
+        quiet(tall(3), output)
+
+
+def test_ctrl_c_while_the_lock_is_given_back_does_not_keep_it(output, monkeypatch):
+    def interrupted_once(path, real=disk.remove):
+        if path.suffix == ".lock":
+            monkeypatch.setattr(disk, "remove", real)
+            raise KeyboardInterrupt
+        real(path)
+
+    monkeypatch.setattr(disk, "remove", interrupted_once)
+    with pytest.raises(KeyboardInterrupt):
+        quiet(tall(3), output)
+    same(quiet(tall(4), output, force=True), quiet(tall(4)))
 
 
 def test_a_file_too_large_for_the_system_is_one_clear_line(output):
