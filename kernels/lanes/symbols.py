@@ -166,7 +166,8 @@ def written(function):
     """A function with any Python in it, of tuples, numbers or symbols, as one that compiled code can be handed."""
     symbolic(function)
     if COMPILED:
-        function._numba_type_ = builtin_registry.globals[-1][1]
+        # not simply the last one there: other threads may have written theirs meanwhile
+        function._numba_type_ = next(kind for x, kind in reversed(builtin_registry.globals) if x is function)
     return function
 
 
