@@ -42,7 +42,7 @@ def _digest(scene, recorded):
 
     graph, *parts = vars(recorded).values()
     nodes = [(x.kind, x.varies, plain(x.args)) for x in graph.nodes]
-    flags = scene.states, scene.parameters, scene.most_kinks, scene.slides, scene.exact_start
+    flags = scene.name, scene.states, scene.parameters, scene.most_kinks, scene.slides, scene.exact_start
     text = repr((nodes, plain((*graph.kinks, *graph.powers)), plain(tuple(parts)), flags))
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 

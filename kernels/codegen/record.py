@@ -1,5 +1,7 @@
 """What a scene's functions do, recorded: the graphs of its rates, surface, switch and start."""
 
+import copy
+import functools
 import inspect
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -40,7 +42,16 @@ class Recorded:
 
 
 def record(scene):
-    """Calls each function of the scene once with recording objects. Raises SceneError."""
+    """What the scene's functions do, in a graph of the caller's own, which may go on with it. Raises SceneError.
+
+    They are called once: what they would say later, as a global that has got another value, does not count.
+    """
+    return copy.deepcopy(_once(scene))
+
+
+@functools.cache
+def _once(scene):
+    """Calls each function of the scene once with recording objects."""
     graph = Graph()
     states = {name: graph.series(name) for name in scene.states}
     constants = {name: graph.constant(name) for name in (*scene.parameters, "side")}

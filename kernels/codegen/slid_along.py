@@ -1,5 +1,7 @@
 """Columns of cells that stick on a kink, followed along it (`sliding`); what rests there for ever sticks as before."""
 
+import contextlib
+import functools
 from dataclasses import replace
 
 import numpy as np
@@ -7,6 +9,7 @@ import numpy as np
 from kernels.codegen.record import record
 from kernels.codegen.stepped import twice_by
 from kernels.interface import Status
+from kernels.source_text.expression import SceneError
 
 SLIDERS = {"taylor": ("dop853", "rodas5p")}
 """Methods by which a method follows what slides along a kink, where that is not itself."""
@@ -23,8 +26,7 @@ def slid_along(how, scene, method):
     graph = recorded.graph
     if graph.powers or recorded.shared or len(graph.kinks) == len(recorded.surfaces):
         return how
-    sliding = replace(scene, slides=True)
-    ways = [twice_by(one, sliding) for one in SLIDERS.get(method, (method,))]
+    ways = [twice_by(one, sliding(scene)) for one in SLIDERS.get(method, (method,))]
 
     def solve(module, columns, rtol, outputs, status):
         how(module, columns, rtol, outputs, status)
@@ -37,3 +39,12 @@ def slid_along(how, scene, method):
                     column[cells] = values
 
     return solve
+
+
+@functools.cache
+def sliding(scene):
+    """The scene that slides, for all methods; recorded at once as the scene is, or refused where it is asked for."""
+    scene = replace(scene, slides=True)
+    with contextlib.suppress(SceneError):
+        record(scene)
+    return scene

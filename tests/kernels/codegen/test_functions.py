@@ -154,3 +154,19 @@ def test_a_floor_jumps_where_it_should_and_a_motion_pressed_onto_the_jump_slides
 
 def test_names_of_math_are_what_they_were_once_a_scene_is_recorded():
     assert functions_scene.math is math
+
+
+def test_a_value_from_outside_is_taken_as_the_kernel_is_made_and_anew_by_another_of_that_name():
+    """Also where machine code of the first, or of both, is kept."""
+    outside = {"g": 9.81}
+    fall = {
+        "name": "fall", "doc": "from rest", "states": fields("x", "v"), "parameters": fields("height"),
+        "rates": lambda v: (v, -outside["g"]), "surface": lambda x: x, "start": lambda height: (height, 0.0),
+    }  # fmt: skip
+    here = scene_kernel(**fall)
+    outside["g"] = 1.62
+    there = scene_kernel(**fall)
+    for kernel, g in ((here, 9.81), (there, 1.62)):
+        outputs, status = solve(kernel, "taylor", [1.0], flips=1.0, rtol=1e-6)
+        assert status[0] == Status.OK
+        assert outputs["time"][0] == pytest.approx(math.sqrt(2 / g), rel=1e-6)
