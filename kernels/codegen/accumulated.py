@@ -112,7 +112,8 @@ def _limits(followed, those, last, sizes):
         far = np.delete(abs(values - rows[0]) / np.where(scale > 0, scale, 1.0), 1, axis=0).max(axis=0)
 
     def left(flips):
-        return far * q ** (0.5 * (flips - last))
+        with np.errstate(all="ignore"):
+            return far * q ** (0.5 * (flips - last))
 
     return good.all(axis=0) & shrinks & settles.all(axis=0) & np.isfinite(values).all(axis=0), values, error, left
 

@@ -1,9 +1,9 @@
 """Columns of cells followed once by the Taylor method of a scene's module, with the error carried along.
 
 The error that a cell states (`integrate.carried`) is signed and of first order; STATED times that is to be believed. A
-cell whose error that does not show to be small enough is followed again with a tolerance as much smaller; what then is
-left, and all that is remarked or refused, is followed twice (`followed_twice`), which asks for no derivatives. But
-where the error grows as large as the motion, several runs may agree by chance, so that is INACCURATE.
+cell of which that does not show that it is right is followed again with a tolerance as much smaller; what then is
+left, and all that is remarked or refused, is followed three times (`followed_twice`), which asks for no derivatives.
+But where the error grows as large as the motion, several runs may agree by chance, so that is INACCURATE.
 """
 
 import functools
@@ -17,7 +17,7 @@ from kernels.codegen.functions import Functions, cell_of
 from kernels.codegen.module import build, by_series
 from kernels.codegen.record import record
 from kernels.integrate.carried import SMALL
-from kernels.interface import Status
+from kernels.interface import FIRST_REFUSAL, Status
 
 STATED = 1.5
 """Stated error over the one carried along."""
@@ -48,7 +48,7 @@ def telling(scene):
 
 
 def solved(module, columns, rtol, outputs, status):
-    """Fills outputs and status by one run where that states an error below `rtol`, else by two."""
+    """Fills outputs and status by one run where that states an error below `rtol`, else by three."""
     results, error = followed_twice.told(module, columns, rtol, rtol * OF_A_STEP)
     found = judged(results, error, rtol, len(outputs))
     again = np.flatnonzero((found != Status.OK) & (results[-1] == Status.OK) & (error < np.inf) & (rtol >= ROUNDING))
@@ -59,9 +59,10 @@ def solved(module, columns, rtol, outputs, status):
         results[:, again], error[again] = followed_twice.told(module, some, wanted, share * wanted)
         found[again] = judged(results[:, again], np.maximum(error[again], least), wanted, len(outputs))
     followed_twice.write(results, found, outputs, status)
-    left = np.flatnonzero((found != Status.OK) & ~((error > SMALL) & (error < np.inf)))
+    by_chance = (error > SMALL) & (error < np.inf) & (results[-1] < FIRST_REFUSAL)
+    left = np.flatnonzero((found != Status.OK) & ~by_chance)
     if len(left):
-        _by_two(module, columns, rtol, outputs, status, left)
+        _by_three(module, columns, rtol, outputs, status, left)
 
 
 def judged(results, error, rtol, outputs):
@@ -71,8 +72,8 @@ def judged(results, error, rtol, outputs):
     return status
 
 
-def _by_two(module, columns, rtol, outputs, status, cells):
-    """Fills these cells by two runs."""
+def _by_three(module, columns, rtol, outputs, status, cells):
+    """Fills these cells by three runs."""
     found, verdict = [np.empty(len(cells)) for _ in outputs], np.empty(len(cells), np.int8)
     followed_twice.twice(module, [c[cells] for c in columns], rtol[cells], found, verdict)
     for column, values in zip((*outputs, status), (*found, verdict), strict=True):

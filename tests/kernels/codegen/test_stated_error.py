@@ -77,3 +77,15 @@ def test_next_to_a_turning_point_a_switch_is_not_called_ok():
     """A first swing that passes the switch by 1e-13 of itself: when it does hangs on the root of so little."""
     _, status = solve(RICH, "taylor", [1.0], 1.0, k=2.0 * (1 - 1e-13), flips=1.0, rtol=1e-9)
     assert status[0] != Status.OK
+
+
+def test_what_an_impact_leaves_at_rest_sticks_however_large_its_error_was_before():
+    """A ball whose third impact returns nothing; beside it what errors leave of two numbers that are equal."""
+    kernel = scene_kernel(
+        name="thud", doc="three impacts", states=[Field(name, "1", name) for name in "xvew"],
+        parameters=[Field("g", "1", "g")], rates=lambda x, v, g: (v, -g * (1 + x * x), 0.0, 0.0), surface=lambda x: x,
+        start=lambda: (1.0, 0.0, 1.0, 0.0),
+        switch=lambda v, e, w, g: (0.0, -e * v, e - 0.5, w + 2 * e * (e - 0.5) * (v * v - g * 8 / 3)),
+    )  # fmt: skip
+    _, status = solve(kernel, "taylor", [9.81, 1.62], flips=5.0, rtol=1e-6)
+    assert (status == Status.STICKS).all()
