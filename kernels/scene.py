@@ -67,7 +67,7 @@ __all__ = [
 
 MOST_FLIPS = 1_000_000
 SERIES = "Taylor series of order 12 or 18 in lanes, no switch passed over"
-LOCATED = "in lanes, switches on its dense output; followed twice"
+LOCATED = "in lanes, switches on its dense output; followed three times"
 Function = Callable[..., Any]
 """Of named scalars, as its author writes it."""
 Functions = Function | Mapping[str, Function]
@@ -232,7 +232,7 @@ def _methods(scene: Scene, parameters: list[str], outputs: list[str]) -> tuple[M
         columns[-1][:] = math.inf
 
     return (
-        method("taylor", f"{SERIES}; the error carried along, or followed twice", stated_error.by_one(scene)),
+        method("taylor", f"{SERIES}; the error carried along, or followed three times", stated_error.by_one(scene)),
         method(
             "taylor_once",
             "the same, each step right to rtol, followed once",

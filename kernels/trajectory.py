@@ -22,8 +22,8 @@ __all__ = ["motion_kernel", "section_kernel"]
 
 METHODS = {
     "taylor": "Taylor series, the error carried along",
-    "rodas5p": "Rosenbrock's method Rodas5P, for what is stiff, followed twice",
-    "dop853": "Dormand-Prince 8(5,3), followed twice",
+    "rodas5p": "Rosenbrock's method Rodas5P, for what is stiff, followed three times",
+    "dop853": "Dormand-Prince 8(5,3), followed three times",
 }
 MOST = 1_000_000.0
 

@@ -6,9 +6,9 @@ nice python benchmarks/honesty/stated_error.py [--cells 100000] [--seed 1] [--sc
 Scenes made to be difficult, with random parameters, up to 30 switches and an rtol from 1e-11 to 1e-4 of its own for
 each cell: drag of any power, a pulse that is narrow, a pendulum that is driven until small errors grow, a van der Pol
 relay, rates that cancel to a few digits, and a plain foliot that nearly sticks. Truth is the same scene followed
-twice at 1e-13, by other steps and from parameters that are some roundings off. "one run" counts the cells that need
-no second one; "over" those of them that are off by more than rtol, "under" those whose error is less than half of the
-true one and matters (above a tenth of rtol). Exit status 1 where any cell is over.
+three times at 1e-13, by other steps and from parameters that are some roundings off. "one run" counts the cells that
+need no second one; "over" those of them that are off by more than rtol, "under" those whose error is less than half of
+the true one and matters (above a tenth of rtol). Exit status 1 where any cell is over.
 """
 
 from __future__ import annotations

@@ -20,8 +20,8 @@ CLOCK, COUNT, MANY, UNTIL = "clock_of_motion", "count_of_switches", "switches_be
 def at_switches(scene, method, columns, rtol, stops):
     """Time, interval, states (n_rows, n_stops, n_cells), the error of each cell, relative, and its status.
 
-    Along the way the error is carried, or followed twice by a method other than "taylor". What a motion does not come
-    to is NaN; a cell's status is OK, or what was remarked, or why there is nothing at all.
+    Along the way the error is carried; by a method other than "taylor" three runs are compared. What a motion does not
+    come to is NaN; a cell's status is OK, or what was remarked, or why there is nothing at all.
     """
     n = len(scene.states)
     found, error = _once(scene, method, columns, rtol, stops)

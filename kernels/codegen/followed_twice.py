@@ -1,4 +1,4 @@
-"""Columns of cells followed by the Taylor method of a scene's module, and how far the result can be believed.
+"""Columns of cells followed more than once by a scene's module, and how far the result can be believed.
 
 Each step is right to a tolerance; what many steps come to depends on the scene. So a cell is followed twice, the second
 time with a tolerance FINER times smaller: the first run's error is what they differ by, the second's is about FINER
@@ -22,7 +22,7 @@ HIGH_BELOW = 5e-10
 """Tolerance of a step below which the higher order is the faster."""
 FINEST = 1e-25
 ROUNDING = 1e-14
-"""The least rtol that is promised, whatever the two runs agree to."""
+"""The least rtol that is promised, whatever the runs agree to."""
 AT_ONCE = 8192
 """Cells whose lanes' memory stays in a core's cache."""
 STOPS = 2.0, 4.0, math.inf
@@ -132,9 +132,10 @@ def once(module, columns, rtol, outputs, status):
 
 
 def twice(module, columns, rtol, outputs, status, finest=0.0):
-    """Fills outputs and status by two runs; INACCURATE where they differ by more than the finer one could mend.
+    """Fills outputs and status by three runs; INACCURATE where they differ by more than the finest one could mend.
 
-    Where they do, or a run breaks off, the cell is followed twice again with a tighter tolerance, of at least `finest`.
+    Where they do, or a run breaks off, the cell is followed by three again, with a tighter tolerance, of at least
+    `finest`.
     """
     results, found = _compared(module, columns, rtol, rtol)
     tighter = np.maximum(np.minimum(TIGHT, TIGHTER * rtol), finest)

@@ -1,6 +1,6 @@
 """The return map of a scene: its states just before a switch, from those just before one `flips` earlier.
 
-A run begins behind the switch. So a scene of its own is written, whose start takes the states before it as parameters,
+A run begins behind the switch. So a scene of its own is made, whose start takes the states before it as parameters,
 and which begins as the scene itself does where the parameter FRESH is 1. Its rates, surface and switch are the scene's.
 The state that the surface watches is put onto the surface, whatever is given for it.
 """

@@ -1,4 +1,4 @@
-"""A scene's Runge-Kutta methods, at a fixed step and to a tolerance: a cell is then followed twice, as by series."""
+"""A scene's Runge-Kutta methods, at a fixed step and to a tolerance: then a cell is followed three times."""
 
 import functools
 from types import SimpleNamespace
