@@ -14,6 +14,7 @@ import contextlib
 import fcntl
 import functools
 import hashlib
+import itertools
 import multiprocessing
 import os
 import pickle
@@ -28,6 +29,7 @@ from pathlib import Path
 import llvmlite
 import numba
 from llvmlite import binding
+from numba.core.bytecode import FunctionIdentity
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile, _CacheLocator
 
 PACKAGE = Path(__file__).parents[1]
@@ -35,6 +37,20 @@ OLD_SECONDS = 30 * 24 * 3600
 """Folders of other sources, versions or CPUs that were not used for so long are removed."""
 MOST_COMPILE_SECONDS = 120
 """What a process waits for another one that compiles the same."""
+
+
+def _numbered_apart():
+    """Numbers functions apart from those of other processes.
+
+    numba tells functions of one name apart by numbers, also in the machine code that it keeps. Counted from 1 in every
+    process, as it does, two functions of one name that two processes have compiled may have one number, and a third
+    process that loads both files takes one function for the other: wrong numbers, without a word.
+    """
+    FunctionIdentity._unique_ids = itertools.count(int.from_bytes(os.urandom(6)))
+
+
+_numbered_apart()
+os.register_at_fork(after_in_child=_numbered_apart)
 
 
 def _ours_alone(info, path):

@@ -76,6 +76,24 @@ def test_of_two_processes_at_a_time_one_compiles_and_the_other_waits(tmp_path):
     assert sorted(process.communicate()[0].split()[:2] for process in both) == [["0", "0"], ["0", "1"]]
 
 
+def test_functions_have_numbers_that_no_other_process_gives():
+    """They are in the names of machine code: of two processes' files one function was taken for another of its name."""
+    code = """
+import os
+from numba.core.bytecode import FunctionIdentity
+import kernels.lanes.cache
+def number():
+    print(FunctionIdentity.from_function(number).unique_id, flush=True)
+number()
+if os.fork() == 0:
+    number()
+    os._exit(0)
+os.wait()
+"""
+    numbers = sorted(int(number) for _ in range(2) for number in run(code, ROOT))
+    assert min(np.diff(numbers)) > 1e6
+
+
 def test_a_damaged_cache_is_compiled_again_and_mended(filled):
     for path in filled.rglob("*.nb?"):
         path.write_bytes(path.read_bytes()[:10])
@@ -228,9 +246,11 @@ def test_what_is_kept_is_the_users_alone_whatever_the_umask(scene_kept):
     assert not [path for path in kept if path.stat().st_mode & 0o077]
 
 
-def test_a_scenes_module_is_never_run_from_its_file(scene_kept, tmp_path):
+def test_the_text_of_a_scenes_entry_is_never_run_from_its_file(scene_kept, tmp_path):
     shutil.copytree(scene_kept, tmp_path, dirs_exist_ok=True)
-    (path,) = tmp_path.rglob("scene_*.py")
+    paths = list(tmp_path.rglob("*.py"))
+    assert paths
     assert not list(tmp_path.rglob("*.pyc"))
-    path.write_text("raise SystemExit")
+    for path in paths:
+        path.write_text("raise SystemExit")
     assert run(OWN_SCENE, tmp_path) == ["0", "0"]
