@@ -26,7 +26,7 @@ BLUR = 16.0
 BACK = 1e-9
 """Of an event's rate before a switch, that of one which rounding may be all of behind it."""
 ONE_ULP = 2.0**-52
-SHAKEN, GOLDEN = 5.0, 0.6180339887498949
+SHAKEN, GOLDEN = 3.0, 0.6180339887498949
 """Roundings that an event is missed by at most; and what the share of it goes on by from one event to the next, so that
 no two of some events one behind the other are missed alike: what is between them would not show it."""
 
