@@ -141,6 +141,7 @@ def test_what_a_function_keeps_of_an_earlier_call_is_refused():
         kept.append(x)
         return v, -kept[0]
 
+    scene(rates=rates)  # called once, so what it keeps is of this call
     with pytest.raises(SceneError, match="another call"):
         scene(rates=rates)
 
