@@ -59,6 +59,7 @@ class Processes:
         self.study, self.limit, self.cost, self.grid = study, limit, cost, Grid(study)
         self.text = study.to_json()
         self.over, self.alone, self.dearest = False, threading.Lock(), 0.0
+        self.good: int | None = None  # a cell that is known to end
         self._idle: list[Isolated] = []
         self._solvers: list[Isolated] = []
 
@@ -118,6 +119,7 @@ class Isolated:
                     raise
         self.seconds += seconds
         crew.dearest = max(crew.dearest, seconds / cells.number)
+        crew.good = start if crew.good is None else crew.good
         for column, values in zip(cells.columns, columns, strict=False):  # errors come last, and may not be wanted
             column[...] = values
 
@@ -140,14 +142,18 @@ class Isolated:
         raise Died("its process died" if code is None else f"its process ended with {code}")
 
     def _begin(self) -> Any:
-        """A process that has loaded the kernel: it is asked for no cell. Raises SweepError."""
+        """A process that has loaded the kernel, and solved a cell that is known to end, if any is. Raises SweepError.
+
+        Other cells would be blamed for what a process does before its first one.
+        """
         for _ in range(10):
             try:
                 with self._lock:
                     if self._all.over:
                         raise SweepError("the run is being stopped")
                     process = self._process = _started(self._all.text)
-                _answer(process, LOAD_SECONDS, 0, 0, None)
+                good = self._all.good
+                _answer(process, LOAD_SECONDS + DEARER * self._all.dearest, good or 0, int(good is not None), None)
                 return process
             except SweepError:
                 raise
