@@ -62,8 +62,9 @@ def to_rest(how):
             if not len(those):
                 break
             last[those] = np.maximum(np.floor(AWAY * last[those]), LEAST)
-            rests, values, error, left = _limits(followed, those, last[those], sizes[: len(outputs) - 2])
-            rests &= left(columns[-1][cells[those]]) <= 0.5 * rtol[cells[those]]
+            flips = columns[-1][cells[those]]
+            rests, values, error, left = _limits(followed, those, last[those], flips, sizes[: len(outputs) - 2])
+            rests &= left <= 0.5 * rtol[cells[those]]
             good = cells[those[rests]]
             for column, row in zip(outputs, values, strict=True):
                 column[good] = row[rests]
@@ -94,10 +95,10 @@ def _last_right(followed, flips):
         trial = np.where(right > 0, np.minimum(2.0 * right, middle), wrong)
 
 
-def _limits(followed, those, last, sizes):
+def _limits(followed, those, last, flips, sizes):
     """Which cells come to rest; their outputs there; their error, of states relative to their sizes at the start.
 
-    And, of a number of switches, what is then left of the way to rest, as the error is.
+    And what is left of the way to rest after the wanted number of switches, as the error is.
     """
     runs = [followed(those, last - k) for k in (0, 1, 2, 3, 4)]
     rows, good = (np.array(part) for part in zip(*runs, strict=True))  # (5, outputs, cells), (5, cells)
@@ -110,11 +111,7 @@ def _limits(followed, those, last, sizes):
         shrinks = (q < SLOWEST) & (q_before < SLOWEST) & (values[0] - rows[0, 0] <= NEAR * values[0])
         settles = abs(values - rows[0]) <= abs(before - rows[1]) + 1e-9 * scale
         far = np.delete(abs(values - rows[0]) / np.where(scale > 0, scale, 1.0), 1, axis=0).max(axis=0)
-
-    def left(flips):
-        with np.errstate(all="ignore"):
-            return far * q ** (0.5 * (flips - last))
-
+        left = far * q ** (0.5 * (flips - last))
     return good.all(axis=0) & shrinks & settles.all(axis=0) & np.isfinite(values).all(axis=0), values, error, left
 
 

@@ -1,11 +1,11 @@
 """Columns of cells followed more than once by a scene's module, and how far the result can be believed.
 
-Each step is right to a tolerance; what many steps come to depends on the scene. So a cell is followed twice, the second
-time with a tolerance FINER times smaller: the first run's error is what they differ by, the second's is about FINER
-times less, and is what is given. The first run's parameters are some roundings off (`off_by_roundings`), and so are its
-start and the times of its events (`shake`); a third run has the opposite roundings, and a tolerance between the two.
-So what a scene makes of rounding, which two runs may share, is seen too, and where the error of a method, of one sign
-on wide steps and of the other on short ones, is the same in two runs by chance.
+Each step is right to a tolerance; what many steps come to depends on the scene. So a cell is followed three times. The
+rough and the finest run have tolerances FINER apart: what they differ by is the rough one's error, of which the finest,
+whose results are given, has about 1/FINER. The rough run's parameters are some roundings off (`off_by_roundings`), and
+so are its start and the times of its events (`shake`); the third run has the opposite roundings, and a tolerance
+between those two. It shows what a scene makes of rounding, which two runs may share, and where two runs have the same
+error by chance.
 """
 
 import math
