@@ -8,16 +8,18 @@ multiplier and sensitivities within rtol of 1, or of themselves where they are l
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from kernels.codegen.limit_cycle import FOUND, Columns, Search, described
+from kernels.codegen.columns_algebra import most
+from kernels.codegen.limit_cycle import FOUND, RESTS, Columns, Search, described
 from kernels.codegen.module import compiling
-from kernels.codegen.return_map import TIGHT, ReturnMap, has_sides, watched
+from kernels.codegen.return_map import TIGHT, ReturnMap, has_sides
 from kernels.interface import FIRST_REFUSAL, Field, Kernel, Method, OnColumns, Status
 from kernels.lanes.wiring import signed
-from kernels.scene import Function, Scene, SceneError, bare, limits_check, scene_of
+from kernels.scene import Function, Functions, SceneError, limits_check, scene_of
 
 __all__ = ["cycle_kernel"]
 
@@ -46,10 +48,13 @@ def cycle_kernel(
     states: Sequence[Field],
     parameters: Sequence[Field],
     rates: Function,
-    surface: Function,
     start: Function,
-    switch: Function | None = None,
+    surface: Functions | None = None,
+    switch: Functions | None = None,
+    start_time: Function | float | None = None,
+    drive: Function | None = None,
     turns: Mapping[str, float] | None = None,
+    branch: str | None = None,
     source: str = "a study's own",
     example: Mapping[str, float] | None = None,
 ) -> Kernel:
@@ -57,8 +62,13 @@ def cycle_kernel(
 
     Parameters
     ----------
+    drive : (parameters) -> the period with which the rates depend on the time `t`. Then `flips` are periods of the
+        drive, a cycle's states are those at its end, and the scene need have no surface
     turns : states that need not come back to themselves but go on by a whole number of these, as {"phase": 2 * pi}
-    The others as in `kernels.scene.scene_kernel`; `start` is where the search begins.
+    branch : a parameter in which the cycle is continued: it is searched where this has the value of a further
+        parameter, NAME_from, and followed from there, also where it is not stable
+    The others as in `kernels.scene.scene_kernel`; `start` is where the search begins. Of several surfaces a cycle ends
+    at the first, and `flips` counts it alone.
 
     Returns
     -------
@@ -66,42 +76,94 @@ def cycle_kernel(
         With two further parameters: `flips`, the switches a cycle, an even number where the scene hangs on its side,
         and `settle`, the cycles that are followed before Newton's method begins. Its outputs: `period`; each state just
         before the switch that ends a cycle; `NAME_size`, the largest size of each state in the cycle; `NAME_turns` of
-        what turns; `multiplier`, that of largest modulus, by which small disturbances are multiplied each cycle;
-        `period_by_NAME`, d ln(period)/d ln(parameter), of each parameter that is no whole number.
+        what turns; `multiplier`, that of largest modulus, by which small disturbances are multiplied each cycle; where
+        there are several, `multipliers_real` and `multipliers_imaginary` along `rank`, the largest first, of a complex
+        pair both with the size of their imaginary part; `period_by_NAME`, d ln(period)/d ln(parameter), of each
+        parameter that is no whole number.
 
     Raises
     ------
     SceneError
-        As `scene_kernel`; where the surface watches more than one state, or one that turns; and where a motion passes
-        through it: neither it nor the rates depend on `side`, and there is no switch.
+        As `scene_kernel`; where the first surface watches more than one state, or one that turns; where a motion passes
+        through it: neither it nor the rates depend on `side`, and there is no switch; where something depends on `side`
+        though there is a drive or several surfaces; and where the time is asked for and there is no drive.
     """
-    scene = bare(scene_of(name, doc, states, parameters, rates, surface, start, switch))
-    turning = {scene.states.index(state): float(turn) for state, turn in (turns or {}).items()}
-    if watched(scene) in turning:
+    scene = scene_of(name, doc, states, parameters, rates, surface, start, switch, start_time)
+    if drive is None and scene.start_time is not None:
+        raise SceneError(f"{name}: a cycle of a scene that depends on the time `t` needs the period of its `drive`")
+    if drive is None and surface is None:
+        raise SceneError(f"{name}: a cycle needs a surface, or a drive")
+    names, numbers = [f.name for f in states], {f.name: k for k, f in enumerate(parameters)}
+    turning = {names.index(state): float(turn) for state, turn in (turns or {}).items()}
+    maps = {method: ReturnMap(scene, method, drive) for method in METHODS}
+    the_map = maps["taylor"]
+    if any(held in turning for held in the_map.held):
         raise SceneError(f"{name}: the state that the surface watches cannot turn; let the switch put it back")
-    if scene.switch is None and not has_sides(scene):
+    sides = has_sides(the_map.scene)
+    if sides and (drive or isinstance(surface, Mapping)):
+        raise SceneError(f"{name}: here a cycle cannot depend on `side`; take a state of rate 0 that switches set")
+    if not (sides or drive or the_map.jumps):
         raise SceneError(f"{name}: the motion passes through the surface; let it depend on `side`, as side * x does")
-    fields = (*parameters, *SEARCH)
-    swept = [k for k, field in enumerate(parameters) if not field.integer]
-    outputs = (
+    if branch is not None and branch not in numbers:
+        raise SceneError(f"{name}: there is no parameter {branch!r} to continue a cycle in")
+    begins = [replace(parameters[numbers[branch]], name=f"{branch}_from", doc=f"{branch} where the search begins",
+                      default=branch)] if branch else []  # fmt: skip
+    fields, many = (*parameters, *begins, *SEARCH), len(the_map.directions)
+    rank = Field("rank", "1", "number of the multiplier, the largest first", float(many), 1.0, many, integer=True)
+    swept = {f"period_by_{f.name}": k for k, f in enumerate(parameters) if not f.integer}
+    outputs = [
         Field("period", "s", "period of the limit cycle", gaps=True),
         *(Field(f.name, f.unit, f"{f.doc}, just before the switch that ends a cycle", gaps=True) for f in states),
         *(Field(f"{f.name}_size", f.unit, f"largest size in the cycle of: {f.doc}", gaps=True) for f in states),
-        *(Field(f"{states[j].name}_turns", "1", "whole turns a cycle", integer=True, gaps=True) for j in turning),
+        *(Field(f"{names[j]}_turns", "1", "whole turns a cycle", integer=True, gaps=True) for j in turning),
         Field("multiplier", "1", "of small disturbances, a cycle; the largest, or its modulus", gaps=True),
-        *(
-            Field(f"period_by_{parameters[k].name}", "1", f"d ln(period)/d ln({parameters[k].name})", gaps=True)
-            for k in swept
-        ),
-    )
+        *(Field(key, "1", f"d ln(period)/d ln({parameters[k].name})", gaps=True) for key, k in swept.items()),
+    ]
+    if many > 1:
+        parts = ("multipliers_real", "real part"), ("multipliers_imaginary", "size of the imaginary part")
+        outputs += [Field(key, "1", f"{part} of each multiplier", dims=("rank",), gaps=True) for key, part in parts]
+
+    def method(way: str) -> Method:
+        def solve(*columns: Any) -> None:
+            given, (*along, wanted), (*filled, error, status) = (
+                columns[: len(fields) + 1], columns[len(fields) + 1 : -len(outputs) - 2], columns[-len(outputs) - 2 :]
+            )  # fmt: skip
+            asked = {f.name for f, one in zip(outputs, wanted, strict=True) if one}
+            if not len(status):
+                return
+            *own, flips, settle, rtol = given
+            origin = (numbers[branch], own.pop()) if branch else None
+            the_map = maps[way]
+            with compiling(name, way):
+                cells = Columns(own, flips.copy(), np.clip(SHARE * rtol, the_map.fine, the_map.rough))
+                search = Search(the_map, turning, cells, settle, origin)
+                found = _described(search, names, swept, asked)
+            status[:], error[:] = search.status, 0.0
+            for field, column in zip(outputs, filled, strict=True):
+                column[:] = np.nan
+                if field.name not in found:
+                    continue
+                value, off = found[field.name]
+                if field.dims:
+                    ranks = along[0].astype(int) - 1
+                    value, off = value[ranks], most(off[ranks])
+                column[:] = np.where(status < FIRST_REFUSAL, value, np.nan).T
+                if field.name in asked:
+                    error[:] = np.maximum(error, off)
+
+        columns = [*(f.name for f in fields), "rtol", *(["rank"] if many > 1 else []), "asked"]
+        whole = signed(solve, [*columns, *(f.name for f in outputs), "error", "status"])
+        return Method(way, f"Newton's method on the return map, followed by {METHODS[way]}", whole, estimates=True)
+
     return Kernel(
         name=name,
         doc=doc,
         source=source,
         parameters=fields,
-        outputs=outputs,
-        check=_check(fields, has_sides(scene)),
-        methods=tuple(_method(scene, m, turning, swept, fields, outputs) for m in METHODS),
+        outputs=tuple(outputs),
+        check=_check(fields, sides),
+        methods=tuple(map(method, METHODS)),
+        along=(rank,) if many > 1 else (),
         example=dict(example or {}),
     )
 
@@ -118,84 +180,42 @@ def _check(fields: Sequence[Field], sides: bool) -> OnColumns:
     return signed(check, [*(f.name for f in fields), "status"])
 
 
-def _method(
-    scene: Scene,
-    name: str,
-    turns: dict[int, float],
-    swept: list[int],
-    fields: Sequence[Field],
-    outputs: Sequence[Field],
-) -> Method:
-    """The method that follows the scene by the one of that name."""
-    count = len(fields)
-
-    def solve(*columns: Any) -> None:
-        *parameters, flips, settle, rtol, wanted = columns[: count + 2]
-        *found, error, status = columns[count + 2 :]
-        if not len(status):
-            return
-        with compiling(scene.name, name):
-            the_map = ReturnMap(scene, name)
-            cells = Columns(parameters, flips.copy(), np.clip(SHARE * rtol, the_map.fine, the_map.rough))
-            values, errors = _solved(the_map, turns, swept, cells, settle, wanted, status)
-        for column, row in zip(found, values, strict=True):
-            column[:] = np.where(status < FIRST_REFUSAL, row, np.nan)
-        error[:] = 0.0
-        for row, is_wanted in zip(errors, wanted, strict=True):
-            if is_wanted:
-                error[:] = np.maximum(error, row)
-
-    names = [f.name for f in outputs]
-    whole = signed(solve, [*(f.name for f in fields), "rtol", "asked", *names, "error", "status"])
-    return Method(name, f"Newton's method on the return map, followed by {METHODS[name]}", whole, estimates=True)
-
-
-def _solved(
-    the_map: ReturnMap, turns: dict[int, float], swept: list[int], cells: Columns, settle: Any, wanted: Any, status: Any
-) -> tuple[Any, Any]:
-    """Rows of outputs and of their errors."""
-    search = Search(the_map, turns, cells, settle)
-    status[:] = search.status
-    n, count = len(search.z), len(status)
-    values, errors = np.full((len(wanted), count), np.nan), np.zeros((len(wanted), count))
-    values[1 : 1 + n] = search.z
-    there = np.flatnonzero(np.isin(status, FOUND))
+def _described(search: Search, names: list[str], swept: Mapping[str, int], asked: set[str]) -> dict[str, Any]:
+    """{output: values and errors, (n_cells,) or (n_ranks, n_cells)} of what has been found; NaN where nothing has."""
+    count = len(search.status)
+    found = {name: (row, np.full(count, RESTS)) for name, row in zip(names, search.z, strict=True)}
+    there = np.flatnonzero(np.isin(search.status, FOUND))
     if not len(there):
-        return values, errors
-    some, z, scale = cells.taken(there), search.z[:, there], search.scale[:, there]
-    sensitive = [k for k, asked in zip(swept, wanted[2 + 2 * n + len(turns) :], strict=True) if asked]
-    found = described(the_map, some, z, scale, search.shift[:, there], sensitive)
+        return found
+    the_map, cells, z, scale = search.map, search.cells.taken(there), search.z[:, there], search.scale[:, there]
+    sensitive = {k: key for key, k in swept.items() if key in asked}
+    parts = described(the_map, cells, z, scale, search.shift[:, there], list(sensitive))
+    states, off = parts.pop("states")
     with np.errstate(all="ignore"):
-        rows = {0: (found["values"][0], found["errors"][0])}
-        for j in range(n):
-            rows[1 + j] = found["states"][j], found["spread"][j] / scale[j]
-        if wanted[1 + n : 1 + 2 * n].any():
-            sizes, off = _sizes(the_map, some, found["states"], found["spread"], scale)
-            rows |= {1 + n + j: (sizes[j], off[j] / sizes[j]) for j in range(n)}
-        for i, (j, turn) in enumerate(turns.items()):
-            rows[1 + 2 * n + i] = np.round(search.shift[j, there] / turn), np.zeros(len(there))
-        for row, k in enumerate([None, *swept], start=1 + 2 * n + len(turns)):
-            if k is None or k in sensitive:
-                i = 1 if k is None else 2 + sensitive.index(k)
-                rows[row] = found["values"][i], found["errors"][i]
-    for row, (value, off) in rows.items():
-        values[row, there] = value
-        errors[row, there] = np.where(off >= 0.0, off, math.inf)
-    m = 1 + 2 * n + len(turns)
-    apart = abs(values[m, there] - 1.0) > errors[m, there]
-    status[there[~apart & (errors[m, there] < ONE)]] = Status.NO_CYCLE
-    return values, errors
+        parts = {sensitive.get(key, key): part for key, part in parts.items()}
+        parts |= {name: (states[j], off[j]) for j, name in enumerate(names)}
+        if any(f"{name}_size" in asked for name in names):
+            sizes, unsure = _sizes(the_map, cells, states, off * scale, scale)
+            parts |= {f"{name}_size": (sizes[j], unsure[j] / sizes[j]) for j, name in enumerate(names)}
+        for j, turn in search.turns.items():
+            parts[f"{names[j]}_turns"] = np.round(search.shift[j, there] / turn), np.zeros(len(there))
+    multiplier, error = parts["multiplier"]
+    search.status[there[(abs(multiplier - 1.0) <= error) & (error < ONE)]] = Status.NO_CYCLE
+    for name, (value, off) in parts.items():
+        shape = *value.shape[:-1], count
+        rows = found.setdefault(name, (np.full(shape, np.nan), np.zeros(shape)))
+        rows[0][..., there], rows[1][..., there] = value, np.where(off >= 0.0, off, math.inf)
+    return found
 
 
 def _sizes(the_map: ReturnMap, cells: Columns, z: Any, spread: Any, scale: Any) -> tuple[Any, Any]:
     """The largest size of each state in the cycle, and by how much it may be off."""
-    parameters = list(cells.parameters)
-    sizes, apart = the_map.turned(parameters, z, cells.flips)
+    sizes, apart = the_map.turned(cells.parameters, z, cells.flips)
     off = apart + TIGHT * the_map.fine * scale
     for j in the_map.directions:
         by = np.maximum(spread[j], 1e-7 * scale[j])
         moved = z.copy()
         moved[j] = moved[j] + by
-        other, _ = the_map.turned(parameters, moved, cells.flips)
+        other, _ = the_map.turned(cells.parameters, moved, cells.flips)
         off = off + 2.0 * abs(other - sizes) * (spread[j] / by)
     return sizes, off

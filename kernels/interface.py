@@ -117,7 +117,8 @@ class FillCells(Protocol):
 class Field:
     """A parameter, an output, or a coordinate that all cells share.
 
-    `default`: None makes a parameter required; a str means "as that parameter". `lower`, `upper` are inclusive
+    `default`: None makes a parameter required; a str means "as that parameter"; of a coordinate it is how many numbers
+    from `lower` on are taken where a study gives none. `lower`, `upper` are inclusive
     unless `open_lower`; the kernel's `check` enforces them cell by cell (those of `along` are checked in the study).
     `dims` names the axes of an array: coordinates of `Kernel.along` ("phase",), or what array parameters share
     ("mass",), whose length a study gives with their values; a column then has the shape `(n_cells, *dims)`.

@@ -93,6 +93,7 @@ class Scene:
     exact_start : whether what rounding takes from the surface's value at the start does not count
     start_time : a number, or (parameters) -> one: then the last state is the time `t`, of which the functions know
         nothing but that they may ask for it
+    only_first : whether switches at the first surface alone count; others may lie between, as many as kinks
 
     At a switch `side` turns from 1 to -1 or back. Where abs(u) or sign(u) occurs, u = 0 is a *kink*: the motion is
     followed up to it and begun anew behind it.
@@ -103,13 +104,14 @@ class Scene:
     states: tuple[str, ...]
     parameters: tuple[str, ...]
     rates: Function
-    surface: Functions
+    surface: Functions | None
     start: Function
     switch: Functions | None = None
     most_kinks: int | None = None
     slides: bool = False
     exact_start: bool = False
     start_time: Function | float | None = None
+    only_first: bool = False
 
     def __post_init__(self) -> None:
         names = [*self.states, *self.parameters]
@@ -185,7 +187,7 @@ def scene_of(
     states: Sequence[Field],
     parameters: Sequence[Field],
     rates: Function,
-    surface: Functions,
+    surface: Functions | None,
     start: Function,
     switch: Functions | None,
     start_time: Function | float | None = None,
@@ -198,13 +200,6 @@ def scene_of(
         return replace(scene, states=(*of_states, "t"), start_time=0.0 if start_time is None else start_time)
     if start_time is not None:
         raise SceneError(f"start_time of the scene {name}: none of its functions asks for the time t")
-    return scene
-
-
-def bare(scene: Scene) -> Scene:
-    """The scene, where it has one surface and no clock. Raises SceneError."""
-    if scene.start_time is not None or isinstance(scene.surface, Mapping):
-        raise SceneError(f"{scene.name}: here a scene has one surface, and for the time a state, such as a phase")
     return scene
 
 

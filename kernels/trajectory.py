@@ -16,7 +16,7 @@ from kernels.codegen.at_times import at_switches, at_times
 from kernels.codegen.module import compiling
 from kernels.interface import FIRST_REFUSAL, Field, Kernel, Method, Status
 from kernels.lanes.wiring import signed
-from kernels.scene import Function, Functions, Scene, bare, flips_field, limits_check, scene_of
+from kernels.scene import Function, Functions, Scene, limits_check, scene_of
 
 __all__ = ["motion_kernel", "section_kernel"]
 
@@ -69,9 +69,10 @@ def motion_kernel(
     states: Sequence[Field],
     parameters: Sequence[Field],
     rates: Function,
-    surface: Function,
+    surface: Functions,
     start: Function,
-    switch: Function | None = None,
+    switch: Functions | None = None,
+    start_time: Function | float | None = None,
     source: str = "a study's own",
     example: Mapping[str, float] | None = None,
 ) -> Kernel:
@@ -80,32 +81,26 @@ def motion_kernel(
     Returns
     -------
     Kernel
-        Along `at`, rising times after the start: each state then. Its further parameter `flips` is the number of
-        switches that are followed at most: TOO_SHORT where later times are asked for, which are NaN.
+        Along `at`, rising times after the start: each state then. TOO_SHORT where the motion does not come to all of
+        them, as where its switches accumulate: then later states are NaN.
     """
-    scene = bare(scene_of(name, doc, states, parameters, rates, surface, start, switch))
+    scene = scene_of(name, doc, states, parameters, rates, surface, start, switch, start_time)
     along = Field("at", "s", "time after the start", lower=0.0, open_lower=True)
     outputs = tuple(replace(f, dims=("at",), gaps=True) for f in states)
 
     def solved(method: str, columns: list[Any], rtol: Any, times: Any) -> Any:
-        *own, flips = columns
-        count, n = len(rtol), len(states)
-        stops = np.arange(1.0, flips.max() + 1.0)
-        (passed, *_), _, _ = at_switches(scene, method, own, rtol, stops)
-        passed = np.where(stops[:, None] <= flips, passed, np.nan)
-        before = np.array([(passed <= t).sum(axis=0) for t in times])  # (n_times, n_cells)
-        cells = [np.tile(c, len(times)) for c in own]
-        found, status = at_times(
-            scene, method, cells, np.repeat(times, count), before.ravel().astype(float), np.tile(rtol, len(times))
-        )
-        late = (before >= flips) & (passed[np.maximum(flips.astype(int) - 1, 0), np.arange(count)] < times[:, None])
-        shape = len(times), count
-        status = np.where(late, Status.TOO_SHORT, status.reshape(shape))
-        rows = np.where(late | (status >= FIRST_REFUSAL), np.nan, found.reshape(n, *shape))
+        count, many = len(rtol), len(times)
+        cells = [np.tile(c, many) for c in columns]
+        found, status = at_times(scene, method, cells, np.repeat(times, count), np.tile(rtol, many))
+        status = status.reshape(many, count)
+        rows = found.reshape(len(states), many, count)
+        missing = (status >= FIRST_REFUSAL) | np.isnan(rows).any(axis=0)
+        short = missing & ~missing.all(axis=0)
+        worst, rows = np.where(short, Status.TOO_SHORT, status).max(axis=0), np.where(missing, np.nan, rows)
         inaccurate = (status == Status.INACCURATE).any(axis=0)
-        return rows, np.where(inaccurate, math.inf, rtol), status.max(axis=0).astype(np.int8)
+        return rows, np.where(inaccurate, math.inf, rtol), worst.astype(np.int8)
 
-    return _kernel(scene, source, (*parameters, flips_field(100.0, 10_000.0)), outputs, along, solved, example)
+    return _kernel(scene, source, parameters, outputs, along, solved, example)
 
 
 def _kernel(

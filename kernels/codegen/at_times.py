@@ -1,20 +1,51 @@
-"""A scene as it is at given times, and at many of its switches in one run."""
+"""A scene as it is at given times, and at many of its switches in one run.
+
+For times a scene of its own is made, with a clock as its last state: its first surface is that the clock comes to the
+time wanted, or to the end of a drive's period, and it alone counts.
+"""
 
 import functools
+import inspect
 from dataclasses import replace
 
 import numpy as np
 
 from kernels.codegen import followed_twice, stated_error
+from kernels.codegen.accumulated import to_rest
 from kernels.codegen.module import build
-from kernels.codegen.return_map import asked, named, to_the_end
-from kernels.codegen.stepped import runs
+from kernels.codegen.record import named_functions
+from kernels.codegen.slid_along import slid_along
+from kernels.codegen.stepped import runs, twice_by
 from kernels.interface import FIRST_REFUSAL, Status
-from kernels.source_text.expression import where
+from kernels.source_text.expression import math_recorded
 
 TIGHTER = 1e-3
 """The second tolerance, over the first one, of cells that the first does not show to be right."""
-CLOCK, COUNT, MANY, UNTIL = "clock_of_motion", "count_of_switches", "switches_before", "time_wanted"
+CLOCK, UNTIL = "clock_of_motion", "time_wanted"
+MOST_SWITCHES = 100_000
+"""Before the time wanted: a motion whose switches accumulate does not come to it."""
+
+
+def to_the_end(scene, method):
+    """The function of columns that follows the scene by the method: to where switches accumulate, and along kinks."""
+    how = stated_error.by_one(scene) if method == "taylor" else twice_by(method, scene)
+    return slid_along(to_rest(how), scene, method)
+
+
+def named(function, names):
+    """A function of keywords that asks for these names."""
+    kind = inspect.Parameter.POSITIONAL_OR_KEYWORD
+    function.__signature__ = inspect.Signature([inspect.Parameter(name, kind) for name in names])
+    return function
+
+
+def asked(function, values):
+    """What a scene's function returns for those of the values that it asks for, as a tuple; a constant for itself."""
+    if not callable(function):
+        return (function,)
+    with math_recorded(function):
+        found = function(**{name: values[name] for name in inspect.signature(function).parameters})
+    return tuple(found) if isinstance(found, tuple | list | np.ndarray) else (found,)
 
 
 def at_switches(scene, method, columns, rtol, stops):
@@ -62,36 +93,38 @@ def _once(scene, method, columns, rtol, stops):
     return fine, np.fmax.reduce(apart.reshape(-1, apart.shape[-1]), axis=0)
 
 
-def at_times(scene, method, columns, times, before, rtol):
-    """The states (n_states, n_cells) at a time each, behind so many switches before it; and the status."""
-    n, ends, count = len(scene.states), timed(scene), len(rtol)
-    found, status = np.full((4 + n, count), np.nan), np.empty(count, np.int8)
-    to_the_end(ends, method)(build(ends), [*columns, before, times, before + 1.0], rtol, list(found), status)
-    return found[2 : 2 + n], status
-
-
 @functools.cache
-def timed(scene):
-    """The scene that ends at the time UNTIL, behind MANY switches: then its clock is what the surface watches."""
-    graph_names = (*scene.states, CLOCK, COUNT)
+def clocked(scene, drive=None):
+    """The scene that ends where its clock has gone on by UNTIL; or which counts its drive's periods, and begins anew.
 
-    def rates(**given):
-        return (*asked(scene.rates, given), 1.0, 0.0)
+    `drive` : the period, a number or a function of parameters; then the clock is put back at its end
+    """
+    timed = scene if scene.start_time is not None else replace(scene, states=(*scene.states, CLOCK), start_time=0.0)
+    clock, parameters = timed.states[-1], (*scene.parameters, *([UNTIL] if drive is None else []))
 
-    def surface(**given):
-        (own,) = asked(scene.surface, given)
-        return where(given[MANY] - 0.5 > given[COUNT], own, given[UNTIL] - given[CLOCK])
+    def until(**given):
+        (begin,), (long,) = asked(timed.start_time, given), asked(given.get(UNTIL, drive), given)
+        return begin + long - given[clock]
 
-    def switch(**given):
-        own = tuple(given[name] for name in scene.states) if scene.switch is None else asked(scene.switch, given)
-        return (*own, given[CLOCK], given[COUNT] + 1.0)
+    def again(**given):
+        return (*(given[name] for name in timed.states[:-1]), *asked(timed.start_time, given))
 
-    def start(**given):
-        return (*asked(scene.start, given), 0.0, 0.0)
-
-    parameters = (*scene.parameters, MANY, UNTIL)
-    everything = (*graph_names, *parameters, "side")
+    own, jumps = named_functions(scene.surface or {}), named_functions(scene.switch)
+    everywhere = jumps.pop("", None)
+    surfaces = {f"own {name}": function for name, function in own.items()}
+    switches = dict.fromkeys(surfaces, everywhere) | {f"own {name}": function for name, function in jumps.items()}
+    if drive is not None:
+        switches[f".{CLOCK}"] = named(again, (*timed.states, *parameters))
     return replace(
-        scene, name=f"{scene.name}_timed", states=graph_names, parameters=parameters, rates=named(rates, everything),
-        surface=named(surface, everything), switch=named(switch, everything), start=named(start, (*parameters, "side")),
+        timed, name=f"{scene.name}_clocked", parameters=parameters, switch=switches, only_first=True,
+        surface={f".{CLOCK}": named(until, (*parameters, clock))} | surfaces, most_kinks=MOST_SWITCHES,
     )  # fmt: skip
+
+
+def at_times(scene, method, columns, times, rtol):
+    """The states (n_states, n_cells) at a time after the start each; and the status."""
+    ends, count = clocked(scene), len(rtol)
+    n = len(ends.states) - 1
+    found, status = np.full((2 + len(ends.states), count), np.nan), np.empty(count, np.int8)
+    to_the_end(ends, method)(build(ends), [*columns, times, np.ones(count)], rtol, list(found), status)
+    return found[2 : 2 + n], status

@@ -11,8 +11,8 @@ ROUNDS = 60
 
 def times(A, B):
     """The product of matrices (n, m, cells) and (m, k, cells)."""
-    total = A[:, :1] * B[:1]
-    for j in range(1, A.shape[1]):
+    total = np.zeros((len(A), *B.shape[1:]))
+    for j in range(A.shape[1]):
         total = total + A[:, j : j + 1] * B[j : j + 1]
     return total
 
@@ -38,16 +38,42 @@ def solved(A, B):
     return B
 
 
+def most(A):
+    """The largest of each column."""
+    return np.maximum.reduce(A, axis=0, initial=0.0)
+
+
 def identity(n, cells):
     return np.broadcast_to(np.eye(n)[:, :, None], (n, n, cells)).copy()
 
 
-def eigenvalues(A):
-    """Real and imaginary parts (n, cells), in no order: roots of the characteristic polynomial.
+def eigenvalues(A, *others):
+    """Real parts and sizes of imaginary ones (n, cells), the largest first; and what they differ by from the others'.
 
-    Its coefficients are those of Faddeev and Le Verrier, c_k = -trace(A M_k)/k, M_(k+1) = A M_k + c_k, good for the few
-    states that a scene has; its roots are found at once by the corrections of Durand and Kerner.
+    Roots of the characteristic polynomial. Its coefficients are those of Faddeev and Le Verrier, c_k = -trace(A M_k)/k,
+    M_(k+1) = A M_k + c_k, good for the few states that a scene has; its roots are found at once by the corrections of
+    Durand and Kerner. The differences are sums, over other matrices, of distances to the next root of each.
     """
+    real, imaginary = _roots(A)
+    squares, unsure = real * real + imaginary * imaginary, 0.0 * real
+    for B in others:
+        x, y = _roots(B)
+        apart = (real[:, None] - x[None]) ** 2 + (imaginary[:, None] - y[None]) ** 2
+        unsure = unsure + np.sqrt(np.minimum.reduce(apart, axis=1, initial=np.inf))
+    order = np.argsort(np.where(np.isnan(squares), 0.0, -squares), axis=0, kind="stable")
+    return tuple(np.take_along_axis(part, order, 0) for part in (real, abs(imaginary), unsure))
+
+
+def largest(real, imaginary):
+    """Of those, the first: itself where it is real, else its modulus; 0 where there is none."""
+    if not len(real):
+        return np.zeros(real.shape[1])
+    modulus = np.sqrt(real[0] * real[0] + imaginary[0] * imaginary[0])
+    return np.where(imaginary[0] <= 1e-7 * modulus, real[0], modulus)
+
+
+def _roots(A):
+    """Real and imaginary parts of the eigenvalues, in no order."""
     n, cells = len(A), A.shape[-1]
     M, coefficients = identity(n, cells), [np.ones(cells)]
     for k in range(1, n + 1):
@@ -55,7 +81,8 @@ def eigenvalues(A):
         coefficients.append(-sum(AM[i, i] for i in range(n)) / k)
         M = AM + coefficients[-1] * identity(n, cells)
     size = np.maximum(np.sqrt(sum(A[i, j] * A[i, j] for i in range(n) for j in range(n))), 1e-300)
-    real, imaginary = (np.array([size * part for part in parts]) for parts in zip(*_circle(n), strict=True))
+    points = _circle(n)
+    real, imaginary = (np.array([size * x[k] for x in points]).reshape(n, cells) for k in (0, 1))
     for _ in range(ROUNDS if n > 1 else 1):
         for j in range(n):
             value = coefficients[0], 0.0 * size
@@ -72,9 +99,9 @@ def eigenvalues(A):
 def _circle(n):
     """Where the roots are looked for first: powers of a number of no symmetry."""
     points = [(1.0, 0.0)]
-    while len(points) < n:
+    for _ in range(n - 1):
         points.append(_product(*points[-1], 0.4, 0.9))
-    return points
+    return points[:n]
 
 
 def _product(a, b, c, d):

@@ -42,7 +42,8 @@ def _digest(scene, recorded):
 
     graph, *parts = vars(recorded).values()
     nodes = [(x.kind, x.varies, plain(x.args)) for x in graph.nodes]
-    flags = scene.name, scene.states, scene.parameters, scene.most_kinks, scene.slides, scene.exact_start
+    names, switches = (scene.name, scene.states, scene.parameters), (scene.exact_start, scene.only_first)
+    flags = *names, scene.most_kinks, scene.slides, *switches
     text = repr((nodes, plain((*graph.kinks, *graph.powers)), plain(tuple(parts)), flags))
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 

@@ -8,7 +8,8 @@ given, and what it differs by from the fourth, with the runs' own r/h, is its er
     dz = (I - J)^-1 (rho + r size),  dT = (dT/dz) dz + r T,                                                (2)
 and the period changes with a parameter p by dT/dp + (dT/dz) (I - J)^-1 dP/dp.
 Newton's method begins where the motion from the start is after some switches. Where it finds nothing, or a cycle that
-is not stable, it begins again after more of them.
+is not stable, it begins again after more of them. A cycle found at another value of a parameter is followed to the
+cell's own in steps that the cell chooses for itself, so that it hangs on no other cell.
 """
 
 import itertools
@@ -16,8 +17,8 @@ import math
 
 import numpy as np
 
-from kernels.codegen.columns_algebra import eigenvalues, identity, solved, times
-from kernels.interface import Status
+from kernels.codegen.columns_algebra import eigenvalues, identity, largest, most, solved, times
+from kernels.interface import FIRST_REFUSAL, Status
 
 LOOSE = 1e-7
 """The widest tolerance of runs."""
@@ -39,6 +40,17 @@ LATER = 1, 8, 64
 SAFETY = 2.0
 FOUND = Status.OK, Status.UNSTABLE, Status.PERIOD_2
 """Statuses of what has a cycle."""
+FIRST_STEP, LEAST_STEP, MOST_STEPS = 1.0 / 64.0, 1e-6, 400
+"""Of the way from one value of a parameter to another, the first step that is tried and the last; and their number."""
+STRAIGHT = 0.05
+"""Of the states' sizes, what a cycle may be away from where the two before it point to: it is of the same branch."""
+VANISHES = 0.1
+"""From 1, a multiplier of the last cycle of a branch that ends because two cycles meet."""
+RESTS = 1e-11
+"""Of the states' sizes, to what an equilibrium is known."""
+EARLIEST, TIMES, STILL = 1e-6, 22, 1e-12
+"""Seconds after the start, then four times as many, so often, at which a motion is looked at that meets no switch any
+more: where its states move by less than STILL of their sizes, it is at rest."""
 
 
 class Columns:
@@ -55,12 +67,11 @@ class Columns:
 
 
 def differences(the_map, cells, z, scale, h, levels, parameters=()):
-    """The map at z and its central differences: T, P, whether they are right; dT (moves, levels, cells), dP, right.
+    """Rows T and P at z, whether they are right, their central differences (rows, moves, levels, cells), whether right.
 
     Moves are the states that the map depends on, by h of their scale, then the parameters numbered, by h of
     themselves; derivatives by a parameter are by its logarithm.
     """
-    n, count = len(z), len(cells)
     moves = [(z, j, h * scale[j]) for j in the_map.directions]
     moves += [(cells.parameters, k, h * cells.parameters[k]) for k in parameters]
     places, settings = [z], [cells.parameters]
@@ -70,19 +81,17 @@ def differences(the_map, cells, z, scale, h, levels, parameters=()):
             moved[j] = moved[j] + sign * level * by
             places.append(moved if rows is z else z)
             settings.append(cells.parameters if rows is z else moved)
-    many = len(places)
-    T, P, status = the_map.passed(
-        list(np.concatenate(settings, axis=1)), np.concatenate(places, axis=1), np.tile(cells.flips, many),
+    many, count = len(places), len(cells)
+    found, status = the_map.passed(
+        np.concatenate(settings, axis=1), np.concatenate(places, axis=1), np.tile(cells.flips, many),
         np.tile(cells.r, many),
     )  # fmt: skip
-    T, P, fine = T.reshape(many, count), P.reshape(n, many, count), (status == Status.OK).reshape(many, count)
-    shape = len(moves), len(levels), 2
-    pairs_T, pairs_P = T[1:].reshape(*shape, count), P[:, 1:].reshape(n, *shape, count)
+    found, fine = found.reshape(-1, many, count), (status == Status.OK).reshape(many, count)
+    pairs = found[:, 1:].reshape(len(found), len(moves), len(levels), 2, count)
     over = np.array([[2.0 * level * (by if rows is z else h + 0.0 * by) for level in levels] for rows, _, by in moves])
     with np.errstate(all="ignore"):
-        dT = (pairs_T[:, :, 0] - pairs_T[:, :, 1]) / over
-        dP = (pairs_P[:, :, :, 0] - pairs_P[:, :, :, 1]) / over
-    return T[0], P[:, 0], fine[0], dT, dP, fine[1:].all(axis=0)
+        slopes = (pairs[:, :, :, 0] - pairs[:, :, :, 1]) / over.reshape(len(moves), len(levels), count)
+    return found[:, 0], fine[0], slopes, fine[1:].all(axis=0)
 
 
 def newton(the_map, cells, z, scale, shift):
@@ -92,20 +101,21 @@ def newton(the_map, cells, z, scale, shift):
     z, left, before = z.copy(), np.arange(len(cells)), np.full(len(cells), math.inf)
     for _ in range(ROUNDS):
         some, here = cells.taken(left), z[:, left]
-        _, P, right, _, dP, fine = differences(the_map, some, here, scale[:, left], STEP, (1.0,))
+        (_, *P), right, slopes, fine = differences(the_map, some, here, scale[:, left], STEP, (1.0,))
+        P, J = np.array(P), slopes[1:, :n, 0][at]
         rho = (P - here - shift[:, left])[at]
         with np.errstate(all="ignore"):
-            now = np.where(right & fine, np.maximum.reduce(abs(rho) / scale[at][:, left]), math.inf)
-            J = np.array([[dP[i, d, 0] for d in range(n)] for i in at])
+            now = np.where(right & fine, most(abs(rho) / scale[at][:, left]), math.inf)
             step = solved(identity(n, len(left)) - J, rho[:, None])[:, 0]
-            most = np.maximum.reduce(abs(step) / scale[at][:, left])
-            step = step / np.maximum(1.0, most)
+            far = most(abs(step) / scale[at][:, left])
+            step = step / np.maximum(1.0, far)
         better = now < off[left]
         improved = left[better]
         best[:, improved], off[improved] = z[:, improved], now[better]
-        best[the_map.seen, improved] = P[the_map.seen, better]
+        for held in the_map.held:
+            best[held, improved] = P[held, better]
         jacobian[:, :, improved] = J[:, :, better]
-        lost = ~(now < math.inf) | ~(most < math.inf)
+        lost = ~(now < math.inf) | ~(far < math.inf)
         cells.r[left[lost]] = np.minimum(WIDER * cells.r[left[lost]], LOOSE)
         back = 0.5 * (here + best[:, left])[at]
         z[np.ix_(at, left)] = np.where(lost, back, here[at] + step)
@@ -117,84 +127,63 @@ def newton(the_map, cells, z, scale, shift):
     return best, off, jacobian
 
 
-def largest(J):
-    """The multiplier of largest modulus: itself where it is real, else its modulus."""
-    real, imaginary = eigenvalues(J)
-    squares = real * real + imaginary * imaginary
-    first = np.argmax(np.where(np.isnan(squares), -1.0, squares), axis=0)[None]
-    one, other = (np.take_along_axis(part, first, 0)[0] for part in (real, imaginary))
-    modulus = np.sqrt(one * one + other * other)
-    return np.where(abs(other) <= 1e-7 * modulus, one, modulus)
-
-
 def described(the_map, cells, z, scale, shift, parameters):
     """Of a cycle at z: its outputs and their errors, by name."""
     found = _described(the_map, cells, z, scale, shift, parameters, the_map.step)
     with np.errstate(all="ignore"):
-        rough = np.flatnonzero(~(np.maximum.reduce(found["errors"][1:]) <= ROUGHER * cells.r / the_map.step))
+        errors = np.maximum.reduce([most(np.atleast_2d(error)) for _, error in found.values()])
+        rough = np.flatnonzero(~(errors <= ROUGHER * cells.r / the_map.step))
         if len(rough):
             some, h = cells.taken(rough), SHORTER * the_map.step
             again = _described(the_map, some, z[:, rough], scale[:, rough], shift[:, rough], parameters, h)
-            better = ~(again["errors"] >= found["errors"][:, rough])
-            for key in ("values", "errors"):
-                found[key][:, rough] = np.where(better, again[key], found[key][:, rough])
-            for key in ("spread", "states"):
-                found[key][:, rough] = again[key]
+            for name, (values, off) in found.items():
+                better = ~(again[name][1] >= off[..., rough])
+                for whole, part in zip((values, off), again[name], strict=True):
+                    whole[..., rough] = np.where(better, part, whole[..., rough])
     return found
 
 
 def _described(the_map, cells, z, scale, shift, parameters, h):
-    """By differences at h: values and errors of period, multiplier, sensitivities; the states and what they are off."""
+    """By differences at h: {name: values and their errors}, of period, states, multipliers and sensitivities."""
     at, n = the_map.directions, len(the_map.directions)
-    T, P, right, dT, dP, fine = differences(the_map, cells, z, scale, h, (1.0, 2.0, 4.0), parameters)
+    (T, *P), right, slopes, fine = differences(the_map, cells, z, scale, h, (1.0, 2.0, 4.0), parameters)
+    P, wrong = np.array(P), ~(right & fine)
     with np.errstate(all="ignore"):
         size, noise, one = scale[at], 1.5 * cells.r / h, identity(n, len(cells))
-        orders = [_extrapolated(dT, dP, at, n, high) for high in (True, False)]
-        (T_z, _, J, P_p), _ = orders
+        low, lower = ((4.0 * slopes[:, :, k] - slopes[:, :, k + 1]) / 3.0 for k in (0, 1))
+        orders = [D[[0, *(1 + j for j in at)]] for D in ((16.0 * low - lower) / 15.0, low)]
+        T_z, J, P_p = orders[0][0, :n], orders[0][1:, :n], orders[0][1:, n:]
         W = solved(one - J, one)
         rho = abs((P - z - shift)[at]) + cells.r * size
-        spread = SAFETY * times(abs(W), rho[:, None])[:, 0]
+        spread = np.zeros(z.shape)
+        spread[at] = SAFETY * times(abs(W), rho[:, None])[:, 0]
         late = times(abs(T_z)[None], abs(W))[0] if n else np.zeros((0, len(cells)))
-        period_error = SAFETY * (sum(late[i] * rho[i] for i in range(n)) / T + cells.r)
         signs = [np.array([[(-1.0) ** (i * k + j * (1 - k)) for j in range(n)] for i in range(n)]) for k in (0, 1)]
         noisy = [J + noise * s[:, :, None] * size[:, None] / size[None] for s in signs]
-        multiplier, *others = [largest(X) for X in (J, orders[1][2], *noisy)]
-        unsure = sum(abs(x - multiplier) for x in others)
-        values, errors = [T, multiplier], [period_error, SAFETY * unsure / np.maximum(1.0, abs(multiplier))]
-        for k in range(len(parameters)):
+        real, imaginary, unsure = eigenvalues(J, orders[1][1:, :n], *noisy)
+        multiplier = largest(real, imaginary)
+        found = {
+            "period": (T, SAFETY * (sum(late[i] * rho[i] for i in range(n)) / T + cells.r)),
+            "states": (P, spread / scale),
+            "multiplier": (multiplier, SAFETY * unsure[0] / np.maximum(1.0, abs(multiplier))),
+        }
+        for name, part in (("multipliers_real", real), ("multipliers_imaginary", imaginary)):
+            found[name] = part, SAFETY * unsure / np.maximum(1.0, np.sqrt(real * real + imaginary * imaginary))
+        for k, parameter in enumerate(parameters):
             high, low = (_sensitivity(o, one, k, T) for o in orders)
             pull = abs(times(W, P_p[:, k][:, None])[:, 0])
             share = 1.0 + sum(late[i] * size[i] for i in range(n)) / T
             doubt = noise * share * (1.0 + sum(pull[i] / size[i] for i in range(n)))
-            values.append(high)
-            errors.append(SAFETY * (abs(high - low) + doubt) / np.maximum(1.0, abs(high)))
-        states = P.copy()
-        errors = np.where(right & fine, np.array(errors), math.inf)
-    far = np.zeros(z.shape)
-    far[at] = spread
-    return {"values": np.array(values), "errors": np.where(np.isnan(errors), math.inf, errors),
-            "spread": far, "states": states}  # fmt: skip
-
-
-def _extrapolated(dT, dP, at, n, high):
-    """dT/dz, dT/dp, J, dP/dp from differences at h, 2 h and 4 h: of order 6, or of order 4."""
-
-    def rule(d):
-        first = (4.0 * d[0] - d[1]) / 3.0
-        return (16.0 * first - (4.0 * d[1] - d[2]) / 3.0) / 15.0 if high else first
-
-    of_T = [rule(d) for d in dT]
-    of_P = [[rule(dP[i, d]) for d in range(len(dT))] for i in at]
-    count = dT.shape[-1]
-    of_T, of_P = np.array(of_T).reshape(-1, count), np.array(of_P).reshape(n, -1, count)
-    return of_T[:n], of_T[n:], of_P[:, :n], of_P[:, n:]
+            found[parameter] = high, SAFETY * (abs(high - low) + doubt) / np.maximum(1.0, abs(high))
+    return {name: (value, np.where(wrong | np.isnan(error), math.inf, error)) for name, (value, error) in found.items()}
 
 
 def _sensitivity(order, one, k, T):
     """d ln T/d ln p of parameter k."""
-    T_z, T_p, J, P_p = order
-    dz = solved(one - J, P_p[:, k][:, None])[:, 0]
-    return (T_p[k] + sum(T_z[i] * dz[i] for i in range(len(T_z)))) / T
+    n = len(one)
+    T_z, J, P_p = order[0, :n], order[1:, :n], order[1:, n + k]
+    dz = solved(one - J, P_p[:, None])[:, 0]
+    return (order[0, n + k] + sum(T_z[i] * dz[i] for i in range(n))) / T
 
 
 class Search:
@@ -206,114 +195,137 @@ class Search:
     turns : dict from the number of a state to what it goes on by in a turn
     cells : Columns
     settle : cycles followed first, a column; 0: only to the first switch that ends one, and never again
+    branch : None, or the number of a parameter and a column of its values, at which the search is to begin
     """
 
-    def __init__(self, the_map, turns, cells, settle):
+    def __init__(self, the_map, turns, cells, settle, branch=None):
         self.map, self.turns, self.cells, self.settle = the_map, turns, cells, settle
-        shape = len(the_map.scene.states), len(cells)
-        self.z, self.scale, self.shift = np.full(shape, np.nan), np.ones(shape), np.zeros(shape)
-        self.last, self.before = np.full(shape, np.nan), np.full(shape, np.nan)
-        self.status = np.full(len(cells), Status.NOT_CONVERGED, np.int8)
-        self.multiplier = np.full(len(cells), np.nan)
-        left = np.arange(len(cells))
+        states, count = len(the_map.directions) + len(the_map.held), len(cells)
+        self.z, self.scale, self.shift = np.full((states, count), np.nan), np.ones((states, count)), None
+        self.shift, self.last = np.zeros((states, count)), np.full((states, count), np.nan)
+        self.status, self.multiplier = np.full(count, Status.NOT_CONVERGED, np.int8), np.full(count, np.nan)
+        if branch:
+            ends, cells.parameters[branch[0]] = cells.parameters[branch[0]].copy(), branch[1]
+        left = np.arange(count)
         for later in LATER:
             left = self._tried(left, later)
-            left = left[self.settle[left] > 0]
+            left = left[(self.settle[left] > 0) & ~np.isin(self.status[left], (Status.OK, Status.COMES_TO_REST))]
         self._doubled(np.flatnonzero((self.status == Status.UNSTABLE) & (self.multiplier < -1.0) & (settle > 0)))
-        self._at_rest(np.flatnonzero(~np.isin(self.status, FOUND)))
+        self._at_rest(np.flatnonzero((self.status >= FIRST_REFUSAL) & (self.status != Status.NOT_CONVERGED)))
+        if branch:
+            self._continued(*branch, ends)
+
+    def _from_start(self, cells, cycles):
+        """States so many cycles after the start, and statuses."""
+        some, nothing = self.cells.taken(cells), np.zeros((len(self.z), len(cells)))
+        rough = np.full(len(cells), self.map.rough)
+        (_, *z), status = self.map.passed(some.parameters, nothing, some.flips * cycles, rough, 1.0)
+        return np.array(z), status
 
     def _tried(self, left, later):
-        """Newton's method for these cells; which have no stable cycle yet, though there may be one."""
+        """Newton's method for these cells; gives back those whose motion goes on."""
         if not len(left):
             return left
-        some = self.cells.taken(left)
-        cycles = np.maximum(self.settle[left] * later, 1.0)
-        nothing = np.zeros((len(self.z), len(left)))
-        _, z, status = self.map.passed(
-            list(some.parameters), nothing, some.flips * cycles, np.full(len(left), self.map.rough), 1.0
-        )
+        z, status = self._from_start(left, np.maximum(self.settle[left] * later, 1.0))
         goes_on = status <= Status.INACCURATE
-        over = left[~goes_on & ~np.isin(self.status[left], FOUND)]
-        self.status[over] = status[~goes_on & ~np.isin(self.status[left], FOUND)]
+        over = ~goes_on & ~np.isin(self.status[left], FOUND)
+        self.status[left[over]] = status[over]
         left, z = left[goes_on], z[:, goes_on]
-        self.before[:, left], self.last[:, left] = self.last[:, left], z
+        self.last[:, left] = z
         self._settled(left, z)
-        return left[~np.isin(self.status[left], (Status.OK,))]
+        return left
 
-    def _settled(self, left, z, doubled=False):
-        """Takes what Newton's method makes of z, where that is a cycle."""
-        some = self.cells.taken(left)
-        _, P, _ = self.map.passed(list(some.parameters), z, some.flips, np.full(len(left), self.map.rough))
-        sizes = self.map.sizes(list(some.parameters), z, some.flips)
-        scale = np.where(sizes > 0.0, sizes, np.where(abs(P) > 0.0, abs(P), 1.0))
+    def _newton(self, some, z):
+        """From z: states of a cycle, sizes, turns, residual, multiplier, and how far it is from rest."""
+        rough = np.full(len(some), self.map.rough)
+        (T, *P), _ = self.map.passed(some.parameters, z, some.flips, rough)
+        sizes = self.map.sizes(some.parameters, z, some.flips)
+        scale = np.where(sizes > 0.0, sizes, np.where(abs(np.array(P)) > 0.0, abs(np.array(P)), 1.0))
         shift = np.zeros(z.shape)
         for j, turn in self.turns.items():
             shift[j] = turn * np.where(P[j] - z[j] < math.inf, np.round((P[j] - z[j]) / turn), 0.0)
             scale[j] = np.minimum(scale[j], turn)
         z, off, J = newton(self.map, some, z, scale, shift)
-        multiplier = largest(J)
-        moved = self._moved(some, z, scale)
-        good = (moved > NEAR) & (off <= NEAR * moved) & (abs(multiplier) < math.inf)
-        stable = abs(multiplier) <= 1.0
-        keep = good & (stable | ~np.isin(self.status[left], FOUND))
-        if doubled:
-            keep = good & stable & self._two(some, z, scale, shift)
-        those = left[keep]
-        self.z[:, those], self.scale[:, those], self.shift[:, those] = z[:, keep], scale[:, keep], shift[:, keep]
-        self.cells.r[those], self.multiplier[those] = some.r[keep], multiplier[keep]
-        self.status[those] = np.where(stable[keep], Status.OK, Status.UNSTABLE)
-        return those
-
-    def _moved(self, some, z, scale):
-        """How far apart states of a cycle are, over their sizes; 1 at most, and 0 of a point that the surface holds."""
+        multiplier = largest(*eigenvalues(J)[:2])
         half = np.maximum(np.floor(0.5 * some.flips), 1.0)
-        T, middle, _ = self.map.passed(list(some.parameters), z, half, np.full(len(half), self.map.rough))
-        apart = np.minimum(np.maximum.reduce(abs(middle - z) / scale), 1.0)
-        return np.where(half == some.flips, T > 0.0, apart)
+        (time, *middle), _ = self.map.passed(some.parameters, z, half, rough)
+        apart = np.minimum(most(abs(np.array(middle) - z) / scale), 1.0)
+        alike = (half == some.flips) | self.map.driven | (not self.map.directions)
+        moved = np.where(alike, np.where(time > NEAR * T, 1.0, 0.0), apart)
+        moved = np.where(abs(multiplier) < math.inf, moved, np.nan)
+        return z, scale, shift, off, multiplier, moved
 
-    def _two(self, some, z, scale, shift):
-        """Whether half of so many switches do not close the cycle."""
-        half = 0.5 * some.flips
-        _, middle, _ = self.map.passed(list(some.parameters), z, half, np.full(len(half), self.map.rough))
-        return np.maximum.reduce(abs(middle - z - 0.5 * shift) / scale) > NEAR
+    def _taken(self, cells, some, found, keep, status):
+        """Keeps what has been found for some of the cells."""
+        those, (z, scale, shift, _, multiplier, _) = cells[keep], found
+        self.z[:, those], self.scale[:, those], self.shift[:, those] = z[:, keep], scale[:, keep], shift[:, keep]
+        self.cells.r[those], self.multiplier[those], self.status[those] = some.r[keep], multiplier[keep], status[keep]
+
+    def _settled(self, left, z, doubled=False):
+        """Takes what Newton's method makes of z, where that is a cycle, or an equilibrium that the motion comes to."""
+        if not len(left):
+            return
+        some = self.cells.taken(left)
+        found = z, scale, shift, off, multiplier, moved = self._newton(some, z)
+        good, stable = (moved > NEAR) & (off <= NEAR * moved), abs(multiplier) <= 1.0
+        keep = good & (stable | ~np.isin(self.status[left], FOUND))
+        status = np.where(stable, Status.OK, Status.UNSTABLE)
+        if doubled:  # not where half of so many switches close the cycle
+            half, rough = 0.5 * some.flips, np.full(len(left), self.map.rough)
+            (_, *middle), _ = self.map.passed(some.parameters, z, half, rough)
+            two = most(abs(np.array(middle) - z - 0.5 * shift) / scale) > NEAR
+            keep, status = good & stable & two, np.full(len(left), Status.PERIOD_2)
+        self._taken(left, some, found, keep, status)
+        still = np.flatnonzero((moved <= NEAR) & (off <= NEAR) & (abs(multiplier) < 1.0))
+        if len(still) and not (doubled or self.map.driven):
+            first, _ = self._from_start(left[still], np.ones(len(still)))
+            far, near = (most(abs(x - z[:, still])) for x in (first, self.last[:, left[still]]))
+            left_out = most(off[still] * scale[:, still] / (1.0 - abs(multiplier[still])))
+            still = still[(near <= 0.5 * far) & (left_out <= RESTS * far)]
+            self._taken(left, some, found, still, np.full(len(left), Status.COMES_TO_REST))
 
     def _doubled(self, left):
         """Where iterates alternate about a cycle, that of twice as many switches."""
-        if len(left):
-            self.cells.flips[left] *= 2.0
-            twice = self._settled(left, self.last[:, left], doubled=True)
-            self.status[twice] = Status.PERIOD_2
-            self.cells.flips[np.setdiff1d(left, twice)] *= 0.5
+        self.cells.flips[left] *= 2.0
+        self._settled(left, self.last[:, left], doubled=True)
+        self.cells.flips[left[self.status[left] != Status.PERIOD_2]] *= 0.5
 
     def _at_rest(self, left):
-        """Where a motion comes to rest: at an equilibrium to which it has come closer from its first cycle on."""
-        some = self.cells.taken(left)
-        _, first, _ = self.map.passed(
-            list(some.parameters),
-            np.zeros((len(self.z), len(left))),
-            some.flips,
-            np.full(len(left), self.map.rough),
-            1.0,
-        )
-        for side in (1.0, -1.0) if len(left) else ():
-            z = self._equilibrium(some, self.last[:, left], side)
-            far, near = (np.maximum.reduce(abs(x - z)) for x in (first, self.last[:, left]))
-            rests = (near <= 0.5 * far) & (self.status[left] != Status.COMES_TO_REST)
-            self.z[:, left[rests]], self.status[left[rests]] = z[:, rests], Status.COMES_TO_REST
+        """Where a motion stays that meets no switch any more: at ever later times its states are the same."""
+        before, size, seconds = np.full((len(self.z), len(left)), np.nan), 0.0, EARLIEST
+        for _ in range(0 if self.map.driven else TIMES):
+            if not len(left):
+                break
+            z, status = self.map.at(self.cells.parameters[:, left], np.full(len(left), seconds))
+            size = np.fmax(size, abs(z))
+            still = (abs(z - before) <= STILL * size).all(axis=0)
+            self.z[:, left[still]], self.status[left[still]] = z[:, still], Status.COMES_TO_REST
+            on = ~still & (status <= Status.INACCURATE)
+            left, before, size, seconds = left[on], z[:, on], size[:, on], 4.0 * seconds
 
-    def _equilibrium(self, some, z, side):
-        """Where the rates are 0, by Newton's method; NaN where it is not found."""
-        n, given = len(z), np.concatenate([some.parameters, np.zeros((len(z) + 1, len(some)))])
-        with np.errstate(all="ignore"):
-            for _ in range(ROUNDS):
-                h = STEP * np.maximum(np.maximum.reduce(abs(z)), 1e-150)
-                found = self.map.rates(given, z, side)
-                J = np.empty((n, n, len(some)))
-                for j in range(n):
-                    up, down = z.copy(), z.copy()
-                    up[j], down[j] = z[j] + h, z[j] - h
-                    J[:, j] = (self.map.rates(given, up, side) - self.map.rates(given, down, side)) / (2.0 * h)
-                step = solved(J, found[:, None])[:, 0]
-                before, z = z, z - step
-            still = np.maximum.reduce(abs(z - before)) <= NEAR * np.maximum.reduce(abs(z)) + 1e-140
-        return np.where(still, z, np.nan)
+    def _continued(self, k, begin, ends):
+        """Follows cycles at the values `begin` of parameter k to those at the values `ends`."""
+        way, reached, step = ends - begin, np.zeros(len(ends)), np.full(len(ends), FIRST_STEP)
+        slope, going = np.zeros(self.z.shape), np.isin(self.status, FOUND) & (begin != ends)
+        self.status[~going & (begin != ends) & (self.status == Status.COMES_TO_REST)] = Status.NO_CYCLE
+        for _ in range(MOST_STEPS):
+            left = np.flatnonzero(going)
+            if not len(left):
+                return
+            by = np.minimum(step[left], 1.0 - reached[left])
+            last, some = reached[left] + by >= 1.0, self.cells.taken(left)
+            some.parameters[k] = np.where(last, ends[left], begin[left] + (reached[left] + by) * way[left])
+            guess = self.z[:, left] + by * slope[:, left]
+            found = z, scale, _, off, multiplier, moved = self._newton(some, guess)
+            near = (most(abs(z - guess) / scale) <= STRAIGHT) & (moved > NEAR) & (off <= NEAR * moved)
+            slope[:, left[near]] = (z - self.z[:, left])[:, near] / by[near]
+            self._taken(left, some, found, near, np.where(abs(multiplier) <= 1.0, Status.OK, Status.UNSTABLE))
+            self.cells.parameters[k, left[near]] = some.parameters[k, near]
+            reached[left[near]] += by[near]
+            step[left] = np.where(near, 2.0 * step[left], 0.25 * by)
+            going[left[near & last]] = False
+            lost = left[~near & (by <= LEAST_STEP)]
+            met = abs(self.multiplier[lost] - 1.0) <= VANISHES
+            self.status[lost] = np.where(met, Status.NO_CYCLE, Status.NOT_CONVERGED)
+            going[lost] = False
+        self.status[going] = Status.NOT_CONVERGED

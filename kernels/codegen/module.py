@@ -101,7 +101,8 @@ def by_series(functions, m, changes=None):
 def driven(functions, m, leg, kind, tells=None):
     """What runs cells, leg by leg; `tells` : `carried.Changes` where the error is carried along."""
     further, slides, kinks = functions.recorded.surfaces, m.slides, len(functions.kinks)
-    surfaces = tuple(float(j in further) for j in range(kinks)) if further else None
+    mark = 2.0 if functions.scene.only_first else 1.0
+    surfaces = tuple(mark * (j in further) for j in range(kinks)) if further else None
 
     @jit_call
     def of_lanes(memory, i):

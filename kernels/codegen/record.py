@@ -122,7 +122,8 @@ def _switched(graph, scene, states, constants, met, declared):
     for name, function in switches.items():
         if function is not None:
             role, named = f"switch {name}".rstrip(), dict(zip(states, behind, strict=True)) | constants
-            jumped = _called(graph, scene, role, function, named, declared) + behind[declared:]
+            length = len(states) if name.startswith(".") else declared  # that of a drive puts back the time
+            jumped = _called(graph, scene, role, function, named, length) + behind[length:]
             if name:
                 share = 0.5 * (1.0 + graph.constant(met[name]))
                 jumped = tuple(

@@ -1,8 +1,9 @@
-"""The return map of a scene: its states just before a switch, from those just before one `flips` earlier.
+"""The return map of a scene: its states just before the switch at its first surface, from those one cycle earlier.
 
 A run begins behind the switch. So a scene of its own is made, whose start takes the states before it as parameters,
-and which begins as the scene itself does where the parameter FRESH is 1. Its rates, surface and switch are the scene's.
-The state that the surface watches is put onto the surface, whatever is given for it.
+and which begins as the scene itself does where the parameter FRESH is 1. Its rates, surfaces and switches are the
+scene's; of several surfaces the first alone counts. The state that it watches is put onto it, whatever is given for it.
+Of a scene that is driven with a period, the switch is that one has passed: then all states are free.
 """
 
 import functools
@@ -11,20 +12,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from kernels.codegen import followed_twice, stated_error
-from kernels.codegen.accumulated import to_rest
-from kernels.codegen.functions import Functions
-from kernels.codegen.module import build, running
-from kernels.codegen.record import record
-from kernels.codegen.slid_along import slid_along
-from kernels.codegen.stepped import runs, twice_by
-from kernels.integrate.records import Mode
+from kernels.codegen import followed_twice
+from kernels.codegen.at_times import asked, at_times, clocked, named, to_the_end
+from kernels.codegen.module import build
+from kernels.codegen.record import named_functions, record
+from kernels.codegen.stepped import runs
 from kernels.interface import Status
-from kernels.lanes import refill
-from kernels.lanes.jit import jit_call
-from kernels.lanes.tuples import flat, read, write
-from kernels.lanes.vectors import where
-from kernels.source_text.expression import INPUT, Expression, SceneError, math_recorded, needed
+from kernels.source_text.expression import INPUT, Expression, SceneError, needed
 
 FRESH = "from_start"
 TOLERANCES = {
@@ -43,28 +37,42 @@ APART = 4.0
 
 
 class ReturnMap:
-    """The return map by one method, of columns of cells.
+    """The return map by one method, of columns of cells; the scene's functions are called here, and not later.
 
     Parameters
     ----------
     scene : whose cycles are wanted
     method : "taylor", "rodas5p", "dop853", "dopri5"
+    drive : the period with which the scene is driven, a function of its parameters; or None
     """
 
-    def __init__(self, scene, method):
-        self.scene, self.method, self.seen = returning(scene), method, watched(scene)
+    def __init__(self, scene, method, drive=None):
+        self.own, self.method, self.driven = scene, method, drive is not None
+        self.scene, n = returning(scene, drive), len(scene.states) - (scene.start_time is not None)
+        self.held = [] if self.driven else [watched(scene)]
+        """The state that is put onto the surface."""
+        self.directions = [j for j in range(n) if j not in self.held]
+        """Of the states, those that the map depends on."""
+        first = next(iter(named_functions(self.scene.surface)))
+        self.jumps = any(named_functions(scene.switch).get(name) for name in (first, ""))
+        """Whether the motion jumps at the first surface."""
         self.fine, self.rough, self.step = TOLERANCES[method]
         self._how = to_the_end(self.scene, method)
-        self.directions = [j for j in range(len(scene.states)) if j != self.seen]
-        """Of the states, those that the map depends on."""
+        self._turning = [(turning(self.scene, True), (1.0,)), (turning(self.scene, False), OTHERS)]
+        for recorded in (self.scene, *(scene for scene, _ in self._turning), *([] if drive else [clocked(scene)])):
+            record(recorded)
 
     def passed(self, parameters, before, flips, rtol, fresh=0.0):
-        """Time, states and statuses, columns: at the switch `flips` after the one before which the states are given."""
+        """Rows of time and states, and statuses: `flips` switches after the one before which the states are given."""
         count, n = len(flips), len(before)
-        found, status = np.full((2 + n, count), np.nan), np.empty(count, np.int8)
+        found, status = np.full((2 + len(self.scene.states), count), np.nan), np.empty(count, np.int8)
         columns = [*parameters, *before, np.full(count, fresh), flips]
         self._how(build(self.scene), columns, rtol, list(found), status)
-        return found[0], found[2:], status
+        return found[[0, *range(2, 2 + n)]], status
+
+    def at(self, parameters, times):
+        """The states, and statuses, of the motion from the start at a time each."""
+        return at_times(self.own, self.method, list(parameters), times, np.full(len(times), TIGHT * self.fine))
 
     def sizes(self, parameters, before, flips):
         """The largest size of each state on the way to some digits; NaN where the motion does not get there."""
@@ -75,58 +83,26 @@ class ReturnMap:
 
         Where a turn cannot be told, sizes are those of three runs whose steps end at other points.
         """
-        tight = TIGHT * self.fine
-        sizes, off = self._sizes(turning(self.scene, True), parameters, before, flips, tight), np.zeros(before.shape)
-        for scene, sure in (
-            (turning(self.scene, False), paired(self.scene)),
-            (self.scene, np.full(len(before), False)),
-        ):
+        sizes, off = np.full(before.shape, np.nan), np.zeros(before.shape)
+        for scene, tolerances in (*self._turning, (self.scene, OTHERS)):
             left = np.flatnonzero(np.isnan(sizes).any(axis=0))
             if len(left):
-                some, here, steps = [c[left] for c in parameters], before[:, left], flips[left]
-                others = [self._sizes(scene, some, here, steps, many * tight) for many in OTHERS]
-                sizes[:, left] = np.maximum.reduce(others)
-                off[:, left] = np.where(sure[:, None], 0.0, APART * (sizes[:, left] - np.minimum.reduce(others)))
+                some, here, steps = parameters[:, left], before[:, left], flips[left]
+                found = [self._sizes(scene, some, here, steps, many * TIGHT * self.fine) for many in tolerances]
+                sizes[:, left] = np.maximum.reduce(found)
+                off[:, left] = APART * (sizes[:, left] - np.minimum.reduce(found))
         return sizes, np.where(np.isnan(off), np.inf, off)
 
     def _sizes(self, scene, parameters, before, flips, rtol):
         """The largest size of each state at the ends of steps."""
-        count, n = len(flips), len(before)
         module = build(scene) if self.method == "taylor" else runs(scene, self.method)
-        columns = [*parameters, *before, np.zeros(count), flips]
-        found = followed_twice.followed(module, columns, np.full(count, rtol))
-        return np.where(found[-1] <= Status.INACCURATE, found[2 + n : -1], np.nan)
-
-    def rates(self, parameters, states, side):
-        """The rates of each state, columns."""
-        run, like = rating(self.scene)
-        cells = refill.fresh(len(flat(like)), [*parameters, np.full(states.shape[1], side), *states])
-        refill.to_the_end(run, cells)
-        return cells[:, -len(states) :].T
-
-
-def to_the_end(scene, method):
-    """The function of columns that follows the scene by the method: to where switches accumulate, and along kinks."""
-    how = stated_error.by_one(scene) if method == "taylor" else twice_by(method, scene)
-    return slid_along(to_rest(how), scene, method)
-
-
-def named(function, names):
-    """A function of keywords that asks for these names."""
-    kind = inspect.Parameter.POSITIONAL_OR_KEYWORD
-    function.__signature__ = inspect.Signature([inspect.Parameter(name, kind) for name in names])
-    return function
-
-
-def asked(function, values):
-    """What a scene's function returns for those of the values that it asks for, as a tuple."""
-    with math_recorded(function):
-        found = function(**{name: values[name] for name in inspect.signature(function).parameters})
-    return tuple(found) if isinstance(found, tuple | list | np.ndarray) else (found,)
+        columns = [*parameters, *before, 0.0 * flips, flips]
+        found, begin = followed_twice.followed(module, columns, np.full(len(flips), rtol)), 2 + len(scene.states)
+        return np.where(found[-1] <= Status.INACCURATE, found[begin : begin + len(before)], np.nan)
 
 
 def watched(scene):
-    """The number of the state that the surface watches. Raises SceneError where that is not one alone."""
+    """The number of the state that the first surface watches. Raises SceneError where that is not one alone."""
     u = record(scene).events[0][2]
     if u.kind != INPUT:
         raise SceneError(f"surface of the scene {scene.name}: of a cycle it has to be a state, but for constants")
@@ -134,38 +110,35 @@ def watched(scene):
 
 
 def has_sides(scene):
-    """Whether the motion or its surface hangs on the side."""
+    """Whether the motion, a surface or a switch hangs on the side."""
     recorded = record(scene)
-    parts = needed(*recorded.rates, recorded.surface, *recorded.switched)
+    parts = needed(*recorded.rates, recorded.surface, *recorded.graph.kinks, *recorded.switched)
     return any(x.kind == INPUT and x.args[0] == "side" for x in parts)
 
 
 @functools.cache
-def returning(scene):
-    """The scene that begins behind a switch at side -1, or at its start."""
-    places = [f"{name}_before" for name in scene.states]
-    seen = watched(scene)
-    offset, factor, _ = record(scene).events[0]
+def returning(scene, drive):
+    """The scene that begins behind a switch at side -1, or at its start; driven, with a period."""
+    own = replace(scene, only_first=True) if drive is None else clocked(scene, drive)
+    states = scene.states if scene.start_time is None else scene.states[:-1]
+    places = [f"{name}_before" for name in states]
+    first, switches = next(iter(named_functions(own.surface))), named_functions(scene.switch)
+    jump = switches.get(first, switches.get(""))
 
     def start(**given):
-        before = {name: given[place] for name, place in zip(scene.states, places, strict=True)}
-        graph = given[FRESH].graph
+        before = {name: given[place] for name, place in zip(states, places, strict=True)}
         values = {**given, "side": -1.0, ".way": 1.0}
-        before[scene.states[seen]] = -graph.again(offset, values) / graph.again(factor, values)
-        behind = tuple(before.values())
-        if scene.switch is not None:
-            behind = asked(scene.switch, values | before)
+        if drive is None:
+            offset, factor, _ = record(scene).events[0]
+            graph = given[FRESH].graph
+            before[states[watched(scene)]] = -graph.again(offset, values) / graph.again(factor, values)
+        behind = before.values() if drive or jump is None else asked(jump, values | before)
         fresh, begun = given[FRESH], asked(scene.start, given)
         return tuple(fresh * x + (1.0 - fresh) * y for x, y in zip(begun, behind, strict=True))
 
-    parameters = (*scene.parameters, *places, FRESH)
+    parameters = (*own.parameters, *places, FRESH)
     start = named(start, (*parameters, "side"))
-    return replace(scene, name=f"{scene.name}_return", parameters=parameters, start=start, exact_start=True)
-
-
-def paired(scene):
-    """Whether the rate of each state is another state, but for a factor."""
-    return np.array([r.varies and r.graph.parts(r)[1].kind == INPUT for r in record(scene).rates])
+    return replace(own, name=f"{scene.name}_return", parameters=parameters, start=start, exact_start=True)
 
 
 @functools.cache
@@ -174,31 +147,15 @@ def turning(scene, everywhere):
 
     If not `everywhere`, of states alone whose rate is another one: a rate may come close to 0 and stay there.
     """
-    those = np.full(len(scene.states), True) if everywhere else paired(scene)
+    rates_of = record(scene).rates
+    those = [everywhere or (r.varies and r.graph.parts(r)[1].kind == INPUT) for r in rates_of]
 
     def rates(**given):
         found = asked(scene.rates, given)
-        for rate, turns in zip(found, those, strict=True):
+        for rate, turns in zip(found, those, strict=False):  # the last state may be the time
             if turns and isinstance(rate, Expression) and rate.varies:
                 abs(rate)
         return found
 
     rates = named(rates, inspect.signature(scene.rates).parameters)
     return replace(scene, name=f"{scene.name}_turning", rates=rates)
-
-
-@functools.cache
-def rating(scene):
-    """What runs cells of parameters, a side and states, in whose place it puts the rates; and a cell of zeros."""
-    functions, m = Functions(scene, record(scene)), build(scene).M
-    like = 0.0, (0.0,) * functions.size[1], 0.0, (0.0,) * functions.size[0]
-
-    @jit_call
-    def of_lanes(memory, i):
-        stage, parameters, side, state = read(memory, i, like)
-        signs = m.natural_signs(state, Mode(side, (), parameters, False))
-        rates = m.rates(state, Mode(side, signs, parameters, False))
-        write(memory, i, (where(stage > 0.5, refill.DONE, stage), parameters, side, rates))
-        return True
-
-    return running(functions, of_lanes, "rates"), like

@@ -230,7 +230,8 @@ def advance(m, leg, memory, i, tells, slides, surfaces):
     """Every lane on from event to event, until one has finished; whether one has.
 
     `tells` : `carried.Changes` where the error is carried along, else None; `slides` : None where no motion slides;
-    `surfaces` : 1 for each kink that is a further surface, at which the motion switches too; None where there is none
+    `surfaces` : 1 for each kink that is a further surface, at which the motion switches too, 2 where such switches do
+    not count; None where there is none
     """
     cell = read(memory, i, m.cell)
     parameters, flips, tolerance, shake = cell.parameters, cell.flips, cell.tolerance, cell.shake
@@ -289,14 +290,15 @@ def advance(m, leg, memory, i, tells, slides, surfaces):
         state = tuple(where(shaken, fma(off, rate, u), u) for rate, u in zip(rates, state, strict=True))
         time = where(moving, fma(found.t, unit, time), time)
         since = where(moving, fma(found.t, unit, since), since)
-        first = switches = moving & (on[0] > 0.5) & (signs[-1] > 0.0)
+        first = counts = switches = moving & (on[0] > 0.5) & (signs[-1] > 0.0)
         if surfaces is not None:
             met = tuple(
                 moving & (o > 0.5) & (s > 0.5) & (sign > 0.0)
                 for o, s, sign in zip(on[1:], surfaces, signs[:-1], strict=True)
             )
+            counts = first | any_of(tuple(x & (s < 1.5) for x, s in zip(met, surfaces, strict=True)))
             switches = switches | any_of(met)
-        kinks_met = where(switches, 0.0, where(moving, kinks_met + 1.0, kinks_met))
+        kinks_met = where(counts, 0.0, where(moving, kinks_met + 1.0, kinks_met))
         if slides is not None:  # at the end of a slide the kink's sign is 0, and stays so
             held = tuple(moving & (magnitude(sign) < 0.5) for sign in signs[:-1])
             left = tuple(where(x & (o > 0.5), 1.0, 0.0) for x, o in zip(held, on[1:], strict=True))
@@ -305,14 +307,14 @@ def advance(m, leg, memory, i, tells, slides, surfaces):
         signs = joined(turned, (where(moving & (on[0] > 0.5), 1.0, signs[-1]),))
         if any_lane(switches):
             mode = Mode(side, signs, parameters, False)
-            count = where(switches, count + 1.0, count)
+            count = where(counts, count + 1.0, count)
             errors = carried.at_switch(errors, rates, switches)
-            watched = switches & ((count < 1.5) | (count >= flips))
+            watched = counts & ((count < 1.5) | (count >= flips))
             if any_lane(watched):
                 verdict = where(watched & m.underflows(state, mode, unit), OUT_OF_RANGE, verdict)
                 interval, at = where(watched, since, interval), choose(watched, state, at)
                 errors = carried.stated(errors, watched, time, since, size)
-            since = where(switches, 0.0, since)
+            since = where(counts, 0.0, since)
             if surfaces is not None:
                 mode = Mode(side, which_met(signs, surfaces, first, met), parameters, False)
             errors, rates = carried.behind(tells, errors, state, mode, rates, switches)

@@ -129,7 +129,9 @@ def _along(keys: Entry, kernel: Kernel, outputs: Sequence[str]) -> dict[str, Flo
     along: dict[str, Floats] = {}
     for field in kernel.along:
         entry, values = table[field.name], frozen([])
-        if field.name in table:
+        if field.name not in table and field.default is not None:
+            values = frozen(np.arange(field.lower, field.lower + float(field.default)))
+        elif field.name in table:
             said = entry.value
             if isinstance(said, Mapping) and set(said) == {"num"} and math.isfinite(field.upper - field.lower):
                 # from one limit to the other, or the first whole numbers

@@ -43,3 +43,4 @@ PARTS = {
 }
 KICKED = cycle_kernel(name="kicked", **PARTS, example={"zeta": 0.1, "kick": 1.0})
 SECTION, MOTION = section_kernel(name="kicked_section", **PARTS), motion_kernel(name="kicked_motion", **PARTS)
+BRANCHED = {name: cycle_kernel(name="kicked", **PARTS, branch=name) for name in ("gain", "kick")}

@@ -1,5 +1,6 @@
 """A scene along its way: at its switches and at given times, against closed forms."""
 
+import bounce_scene
 import numpy as np
 import pytest
 from columns import estimated, solve
@@ -7,6 +8,7 @@ from kicked_scene import MOTION, SECTION
 
 from kernels.interface import Status
 from kernels.lanes.jit import COMPILED
+from kernels.trajectory import motion_kernel
 
 pytestmark = pytest.mark.skipif(not COMPILED, reason="an order of 18 takes long as plain Python")
 
@@ -38,5 +40,15 @@ def test_a_motion_is_known_at_any_time():
     assert (status == Status.OK).all()
     true = 0.3 * gain[:, None] ** np.floor(at / np.pi) * np.sin(at)
     assert abs(found["x"] - true).max() <= 1e-9 * 0.3
-    _, status = solve(MOTION, "taylor", gain=gain, along=[at], flips=3.0)
-    assert (status == Status.TOO_SHORT).all()
+    ball = bounce_scene.KERNEL
+    scene = motion_kernel(
+        name="bounce_motion", doc="ball", states=ball.outputs[2:], parameters=ball.parameters[:-1],
+        rates=bounce_scene.rates, surface=bounce_scene.surface, switch=bounce_scene.switch, start=bounce_scene.start,
+    )  # fmt: skip
+    found, status = solve(scene, "taylor", e=[0.5], along=[np.array([0.4, 1.0, 3.0])])
+    assert status[0] == Status.TOO_SHORT
+    assert np.isnan(found["height"][0, 2])
+    fall = np.sqrt(2.0 / 9.81)
+    flight = 0.4, 1.0 - fall  # it bounces at `fall`, with half of its speed
+    assert found["height"][0, 0] == pytest.approx(1.0 - 9.81 * flight[0] ** 2 / 2.0, rel=1e-9)
+    assert found["height"][0, 1] == pytest.approx(flight[1] * (0.5 * 9.81 * fall - 9.81 * flight[1] / 2.0), rel=1e-9)

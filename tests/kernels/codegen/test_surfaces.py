@@ -5,12 +5,10 @@ import math
 import pytest
 from columns import solve
 
-from kernels.cycle import cycle_kernel
 from kernels.interface import Status
 from kernels.lanes.jit import COMPILED
 from kernels.scene import Field, SceneError, cos, scene_kernel, sin, where
 from kernels.stepping import stepped_kernel
-from kernels.trajectory import motion_kernel
 
 
 def fields(*names):
@@ -158,7 +156,6 @@ def test_surfaces_and_switches_that_do_not_fit_are_refused(changed, says):
         scene_kernel(**WALLS | changed)
 
 
-@pytest.mark.parametrize("kernel_of", [stepped_kernel, cycle_kernel, motion_kernel])
-def test_where_there_is_one_surface_more_are_refused(kernel_of):
+def test_where_there_is_one_surface_more_are_refused():
     with pytest.raises(SceneError, match="one surface"):
-        kernel_of(**WALLS)
+        stepped_kernel(**WALLS)

@@ -50,6 +50,15 @@ def test_a_coordinate_that_counts_takes_the_first_whole_numbers():
         sweep.study(**keys, along={"flip": [1, 2.5]})
 
 
+def test_a_coordinate_with_a_default_need_not_be_given():
+    keys = {"kernel": "forced_scene:FORCED", "axes": {"w": [1.0, 2.0]}, "allow_import": True}
+    assert sweep.study(**keys).along["rank"].tolist() == [1.0, 2.0]
+    assert sweep.study(**keys, along={"rank": [2.0]}).along["rank"].tolist() == [2.0]
+    assert not len(sweep.study(**keys, outputs=["period"]).along["rank"])
+    with pytest.raises(sweep.StudyError, match="<= 2"):
+        sweep.study(**keys, along={"rank": [3.0]})
+
+
 # csv files
 
 

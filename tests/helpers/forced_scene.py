@@ -1,0 +1,75 @@
+"""Scenes whose cycles need a drive, several surfaces or a mode of three values, known in closed form.
+
+FORCED : x'' = a cos(w t) - omega^2 x - 2 zeta omega x'
+TABLE : a ball on a table at A sin(w t), which gives back the share e of the closing speed
+RESTING : x'' = -x - 2 zeta x' - mu sign(x') from x = 1
+WALLS : a body between walls; it leaves the left one at kick + e u, the right one at e u, and is j times as fast in the
+    way of its mode j: 1 behind the left wall, 2 behind the right one, 3 from the middle on
+"""
+
+from kernels.cycle import cycle_kernel
+from kernels.scene import Field, cos, pi, sign, sin, where
+
+MOVING = Field("x", "m", "place"), Field("v", "m/s", "speed")
+FORCED = cycle_kernel(
+    name="forced",
+    doc="oscillator driven by a sine",
+    states=MOVING,
+    parameters=(
+        Field("zeta", "1", "damping", default=0.05),
+        Field("omega", "1/s", "its own frequency", default=1.0),
+        Field("a", "m/s^2", "drive", default=1.0),
+        Field("w", "1/s", "frequency of the drive", default=1.3),
+    ),
+    rates=lambda x, v, t, zeta, omega, a, w: (v, a * cos(w * t) - omega * omega * x - 2.0 * zeta * omega * v),
+    start=lambda: (0.0, 0.0),
+    drive=lambda w: 2.0 * pi / w,
+)
+TABLE = cycle_kernel(
+    name="table",
+    doc="ball on a table that shakes",
+    states=MOVING,
+    parameters=(
+        Field("A", "m", "amplitude", default=0.1),
+        Field("w", "1/s", "frequency of the table", default=10.0),
+        Field("e", "1", "restitution", default=0.5),
+        Field("x0", "m", "height at the start"),
+        Field("v0", "m/s", "speed at the start"),
+    ),
+    rates=lambda x, v: (v, -9.81),
+    surface={"table": lambda x, t, A, w: x - A * sin(w * t)},
+    switch={"table": lambda x, v, t, A, w, e: (x, (1.0 + e) * A * w * cos(w * t) - e * v)},
+    start=lambda x0, v0: (x0, v0),
+    drive=lambda w: 2.0 * pi / w,
+)
+RESTING = cycle_kernel(
+    name="resting",
+    doc="oscillator that only loses",
+    states=MOVING,
+    parameters=(Field("zeta", "1", "damping", default=0.0), Field("mu", "m/s^2", "dry friction", default=0.0)),
+    rates=lambda x, v, zeta, mu: (v, -x - 2.0 * zeta * v - mu * sign(v)),
+    surface=lambda x, side: side * x,
+    start=lambda: (1.0, 0.0),
+)
+WALLS = cycle_kernel(
+    name="walls",
+    doc="body between two walls",
+    states=(*MOVING, Field("mode", "1", "which way it goes")),
+    parameters=(
+        Field("kick", "m/s", "speed that the left wall adds", default=1.0),
+        Field("e", "1", "restitution", default=0.5),
+        Field("length", "m", "between the walls", default=2.0),
+    ),
+    rates=lambda v, mode: (where(mode > 2.5, 3.0, where(mode > 1.5, 2.0, 1.0)) * v, 0.0, 0.0),
+    surface={
+        "left": lambda x: x,
+        "right": lambda x, length: length - x,
+        "middle": lambda x, length: x - 0.5 * length,
+    },
+    switch={
+        "left": lambda x, v, kick, e: (x, kick - e * v, 1.0),
+        "right": lambda x, v, e: (x, -e * v, 2.0),
+        "middle": lambda x, v: (x, v, 3.0),
+    },
+    start=lambda length: (0.25 * length, 1.0, 1.0),
+)

@@ -1,0 +1,111 @@
+"""Cycles of scenes that are driven, that have several surfaces, or that are continued, against closed forms."""
+
+import numpy as np
+import pytest
+from columns import estimated, solve
+from forced_scene import FORCED, MOVING, RESTING, TABLE, WALLS
+from kicked_scene import BRANCHED
+from mpmath import mp, mpc, mpf
+
+from kernels.cycle import cycle_kernel
+from kernels.interface import Status
+from kernels.lanes.jit import COMPILED
+from kernels.scene import SceneError
+
+pytestmark = pytest.mark.skipif(not COMPILED, reason="a cycle takes minutes as plain Python")
+RANKS = [np.array([1.0, 2.0])]
+
+
+def test_a_driven_oscillator_has_the_cycle_and_both_multipliers_of_the_closed_form():
+    cells = {"zeta": np.array([0.05, 0.3, 1.0e-3, 2.0]), "omega": np.array([1.0, 3.0, 1.0, 1.0]), "w": 1.3, "a": 0.7}
+    found, status, error = estimated(FORCED, "taylor", along=RANKS, flips=1.0, **cells)
+    assert (status[:3] == Status.OK).all()
+    for cell, (zeta, omega) in enumerate(zip(cells["zeta"], cells["omega"], strict=True)):
+        with mp.workdps(40):
+            zeta, omega, w = mpf(zeta), mpf(omega), mpf(1.3)
+            swing = mpf(0.7) / mpc(omega**2 - w**2, 2 * zeta * omega * w)
+            root = mp.sqrt(mpc(zeta**2 - 1))
+            powers = [mp.exp(omega * (-zeta + s * root) * 2 * mp.pi / w) for s in (1, -1)]
+            powers.sort(key=lambda one: -abs(one))
+            true = {"period": 2 * mp.pi / w, "x": swing.real, "v": -w * swing.imag, "x_size": abs(swing)}
+            true |= {"v_size": w * abs(swing), "period_by_w": -1, "period_by_omega": 0}
+            parts = [[float(p.real) for p in powers], [float(abs(p.imag)) for p in powers]]
+        for name, value in true.items():
+            assert found[name][cell] == pytest.approx(float(value), rel=1e-9, abs=1e-9), name
+        for name, part in zip(("multipliers_real", "multipliers_imaginary"), parts, strict=True):
+            assert abs(found[name][cell] - part).max() <= max(1e-9, error[cell]), name
+    second, _ = solve(FORCED, "taylor", along=[RANKS[0][1:]], flips=1.0, **cells)
+    assert (second["multipliers_real"][:, 0] == found["multipliers_real"][:, 1]).all()
+
+
+def test_a_ball_on_a_table_is_in_step_with_it():
+    """It lands once a period where A w cos(phase) (1 + e) = (1 - e) g P/2; its two multipliers have the product e^2."""
+    e, w, A, g = np.array([0.5, 0.8, 0.5]), 10.0, np.array([0.11, 0.036, 0.16]), 9.81
+    half = 0.5 * g * 2.0 * np.pi / w
+    phase = np.arccos((1.0 - e) / (1.0 + e) * half / (A * w))
+    left = (2.0 * np.pi - phase) / w  # of a flight that begins at the phase, until the table's period is over
+    true = A * np.sin(phase) + half * left - 0.5 * g * left**2, half - g * left
+    found, status = solve(TABLE, "taylor", along=RANKS, A=A, w=w, e=e, x0=true[0], v0=true[1], flips=1.0, settle=0.0)
+    assert list(status) == [Status.OK, Status.OK, Status.UNSTABLE]
+    assert abs(found["x"] - true[0]).max() < 1e-9
+    assert abs(found["v"] - true[1]).max() < 1e-9
+    trace = (1.0 + e) ** 2 * (1.0 - A * w**2 * np.sin(phase) / g) - 2.0 * e
+    real, imaginary = found["multipliers_real"], found["multipliers_imaginary"]
+    assert abs(real.sum(axis=1) - trace).max() < 1e-8
+    product = np.where(imaginary[:, 0] > 1e-6, (real**2 + imaginary**2)[:, 0], real.prod(axis=1))
+    assert abs(product - e**2).max() < 1e-8
+
+
+def test_what_meets_no_switch_any_more_rests_where_it_stays():
+    """Creeping to 0; and by dry friction at (1 - 8 mu), when its half swings, each shorter by 2 mu, have come to mu."""
+    found, status = solve(RESTING, "taylor", zeta=[1.5, 0.0, 0.05], mu=[0.0, 0.13, 0.0])
+    assert (status == Status.COMES_TO_REST).all()
+    assert abs(found["x"] - [0.0, 1.0 - 8.0 * 0.13, 0.0]).max() < 1e-11
+    assert abs(found["v"]).max() < 1e-11
+    assert np.isnan(found["period"]).all()
+
+
+def test_a_mode_of_three_values_and_three_surfaces():
+    kick, e, length = np.array([1.0, 2.0]), np.array([0.5, 0.8]), 2.0
+    found, status = solve(WALLS, "taylor", along=RANKS, kick=kick, e=e, length=length, flips=1.0)
+    assert (status == Status.OK).all()
+    slow = e * kick / (1.0 - e * e)
+    assert abs(found["period"] / (length / (kick + e * slow) + length / slow * (1 / 4 + 1 / 6)) - 1.0).max() < 1e-9
+    assert abs(found["v"] + slow).max() < 1e-9
+    assert list(found["mode"]) == [3.0, 3.0]
+    assert abs(found["multipliers_real"] - np.transpose([e * e, 0.0 * e])).max() < 1e-9
+    assert abs(found["period_by_kick"] + 1.0).max() < 1e-9
+
+
+def test_an_unstable_cycle_is_continued_from_where_it_is_stable():
+    gain = np.array([2.8, 3.2, 3.8, 2.0])
+    found, status = solve(BRANCHED["gain"], "taylor", gain=gain, bend=1.0, gain_from=2.8, rtol=1e-8)
+    assert list(status) == [Status.OK, Status.UNSTABLE, Status.UNSTABLE, Status.OK]
+    assert abs(abs(found["v"]) - (1.0 - 1.0 / gain)).max() < 1e-9
+    assert abs(found["multiplier"] - (2.0 - gain) ** 2).max() < 1e-8
+    alone, _ = solve(BRANCHED["gain"], "taylor", gain=gain[2:3], bend=1.0, gain_from=2.8, rtol=1e-8)
+    for name, column in alone.items():
+        assert column[0] == found[name][2], name
+
+
+def test_a_branch_ends_where_two_cycles_meet():
+    """u = kick + 2 u (1 - u) has a root down to kick = -1/8."""
+    kick = np.array([-0.12, -0.1249, -0.13])
+    cells = {"kick": kick, "kick_from": 0.0, "gain": 2.0, "bend": 1.0}
+    found, status = solve(BRANCHED["kick"], "taylor", **cells, asked=("v", "period"))
+    assert list(status) == [Status.OK, Status.OK, Status.NO_CYCLE]
+    u = 0.25 + np.sqrt(1.0 / 16.0 + kick[:2] / 2.0)
+    assert abs(abs(found["v"][:2]) - u).max() < 1e-9
+    assert abs(found["multiplier"][:2] - (2.0 - 4.0 * u) ** 2).max() < 1e-6
+
+
+def test_what_cannot_be_a_cycle_is_refused():
+    own = {"name": "wrong", "doc": "", "states": MOVING, "parameters": (), "start": lambda: (1.0, 0.0)}
+    with pytest.raises(SceneError, match="drive"):
+        cycle_kernel(**own, rates=lambda x, v, t: (v, -x * t), surface=lambda x, side: side * x)
+    with pytest.raises(SceneError, match="side"):
+        cycle_kernel(**own, rates=lambda x, v, t, side: (v, side - x * t), drive=1.0)
+    with pytest.raises(SceneError, match="surface"):
+        cycle_kernel(**own, rates=lambda x, v: (v, -x))
+    with pytest.raises(SceneError, match="gain"):
+        cycle_kernel(**own, rates=lambda x, v: (v, -x), surface=lambda x, side: side * x, branch="gain")
