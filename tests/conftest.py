@@ -42,6 +42,22 @@ def pytest_xdist_auto_num_workers():
     return (os.cpu_count() or 1) + 1
 
 
+APART = ("tests/studies/test_claims.py", "tests/kernels/test_contract.py")
+"""Files that are longer than a worker's share: dealt out by the study or kernel in brackets."""
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    from xdist.scheduler import LoadFileScheduling
+
+    class Scheduling(LoadFileScheduling):
+        def _split_scope(self, nodeid):
+            file, _, which = nodeid.partition("::")[0], *nodeid.partition("[")[1:]
+            return f"{file}[{which}" if file in APART else file
+
+    return Scheduling(config, log) if config.getvalue("dist") == "loadfile" else None
+
+
 def pytest_configure(config):
     config.option.loadscopereorder = False  # xdist would take files with many tests first, not those that take long
 

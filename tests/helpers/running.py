@@ -14,7 +14,6 @@ from hypothesis import strategies as st
 
 import sweep
 from sweep.errors import SweepError
-from sweep.file import disk
 from sweep.file.reading import StoredFile
 from sweep.file.store import Store, unfinished_of
 from sweep.runs.run import run
@@ -81,20 +80,6 @@ def place(output, name, cell, table="cells"):
         block = next(number for number in range(blocks.count) if cell < blocks.bounds(number)[1])
         start = blocks.bounds(block)[0]
         return int(column.at[block]) + (cell - start) * column.empty(1).nbytes
-
-
-def fail_on(monkeypatch, name, turn, number):
-    """Lets the call number `turn` of a function of `disk` fail; returns the calls."""
-    real, calls = getattr(disk, name), []
-
-    def failing(*args):
-        calls.append(args)
-        if len(calls) == turn:
-            raise OSError(number, os.strerror(number))
-        return real(*args)
-
-    monkeypatch.setattr(disk, name, failing)
-    return calls
 
 
 def environment():

@@ -104,7 +104,7 @@ def verge(p, count):
 
 def test_the_cycle_of_a_verge_is_that_of_contact_and_flight():
     p = {"tau": 0.02, "I_v": 1e-4, "I_c": 2.5e-4, "n": 0.2, "phi0": 0.35, "drop": 0.01, "c_v": 1e-4, "R_v": 3.5e-4}
-    cell = scene("verge_scene", 1e-11, **p | {"tau": [0.02], "flips": 120}).isel(tau=0)
+    cell = scene("verge_scene", 1e-9, **p | {"tau": [0.02], "flips": 120}).isel(tau=0)
     assert (float(cell.clock), float(cell["drag"])) == pytest.approx(verge(p, 60), rel=1e-8)
 
 

@@ -89,15 +89,11 @@ def test_lanes_a_cell_alone_and_plain_python_have_the_same_bits_and_narrow_steps
     here = [values[0].hex() for values in again.values()]
     assert [values[1].hex() for values in outputs.values()] == here
     assert [values[33].hex() for values in many.values()] == here
-    command = [sys.executable, "-m", "pytest", "-q", "-s", "-n", "0", "-p", "no:cacheprovider", __file__, "-k", "lanes"]
-    plain_run = subprocess.run(
-        command,
-        cwd=Path(__file__).parents[3],
-        env=os.environ | {"NUMBA_DISABLE_JIT": "1"},
-        capture_output=True,
-        text=True,
-    )
-    assert " ".join(here) in plain_run.stdout, plain_run.stdout
+    this = test_lanes_a_cell_alone_and_plain_python_have_the_same_bits_and_narrow_steps_are_seen.__name__
+    code = f"import sys; sys.path += {[*sys.path, str(Path(__file__).parent)]}; import test_functions as f; f.{this}()"
+    environment = os.environ | {"NUMBA_DISABLE_JIT": "1"}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True)
+    assert done.stdout.split() == here, done.stderr
 
 
 def fields(*names):

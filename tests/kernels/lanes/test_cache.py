@@ -23,16 +23,15 @@ from kernels.lanes.jit import COMPILED, jit
 pytestmark = pytest.mark.skipif(not COMPILED, reason="plain Python has no machine code")
 
 ROOT = Path(__file__).parents[3]
-PERIOD = """
+CHECK = """
 import numpy as np
 from kernels.lanes import cache as _cache
-from kernels.foliot.cycle import FOLIOT
-x = [np.ones(1) for _ in range(9)]
-status = np.zeros(1, np.int8)
-x[3], x[4] = 0.5 * x[3], 0.5 * x[4]  # R, R_s
-FOLIOT.check(*x, status)
-print(status[0], sum(FOLIOT.check.compiled.stats.cache_hits.values()), _cache.FOLDER)
+from kernels.foliot.design import FOLIOT_DESIGN
+check, status = FOLIOT_DESIGN.check, np.zeros(1, np.int8)
+check(*(np.array([value]) for value in FOLIOT_DESIGN.example.values()), status)
+print(status[0], sum(check.compiled.stats.cache_hits.values()), _cache.FOLDER)
 """
+"""Of the kernel that is loaded and compiled soonest."""
 
 
 def said(code, cache, **more):
@@ -55,7 +54,7 @@ def run(code, cache, **more):
 def compiled_once(tmp_path_factory):
     """A folder in which a first process has kept what it compiled; to be copied by who changes it."""
     folder = tmp_path_factory.mktemp("kept")
-    assert run(PERIOD, folder)[:2] == ["0", "0"]
+    assert run(CHECK, folder)[:2] == ["0", "0"]
     return folder
 
 
@@ -66,13 +65,13 @@ def filled(compiled_once, tmp_path):
 
 
 def test_a_second_process_finds_what_the_first_compiled(filled):
-    assert run(PERIOD, filled)[:2] == ["0", "1"]
+    assert run(CHECK, filled)[:2] == ["0", "1"]
 
 
 def test_of_two_processes_at_a_time_one_compiles_and_the_other_waits(tmp_path):
     env = {**os.environ, "XDG_CACHE_HOME": str(tmp_path)}
     words = {"env": env, "cwd": ROOT, "stdout": subprocess.PIPE, "text": True}
-    both = [subprocess.Popen([sys.executable, "-c", PERIOD], **words) for _ in range(2)]
+    both = [subprocess.Popen([sys.executable, "-c", CHECK], **words) for _ in range(2)]
     assert sorted(process.communicate()[0].split()[:2] for process in both) == [["0", "0"], ["0", "1"]]
 
 
@@ -97,23 +96,23 @@ os.wait()
 def test_a_damaged_cache_is_compiled_again_and_mended(filled):
     for path in filled.rglob("*.nb?"):
         path.write_bytes(path.read_bytes()[:10])
-    assert run(PERIOD, filled)[:2] == ["0", "0"]
-    assert run(PERIOD, filled)[:2] == ["0", "1"]
+    assert run(CHECK, filled)[:2] == ["0", "0"]
+    assert run(CHECK, filled)[:2] == ["0", "1"]
 
 
 def test_where_there_can_be_no_cache_it_works_without(tmp_path):
     (tmp_path / "file").write_text("")
-    assert run(PERIOD, tmp_path / "file")[2] == "None"
+    assert run(CHECK, tmp_path / "file")[2] == "None"
 
 
 @pytest.mark.parametrize("variable", ["XDG_CACHE_HOME", "NUMBA_CACHE_DIR"])
 def test_an_edited_source_is_compiled_anew_wherever_the_cache_is(tmp_path, variable):
     shutil.copytree(ROOT / "kernels", tmp_path / "kernels")
     place = {variable: str(tmp_path / "cache"), "PWD": str(tmp_path), "PYTHONPATH": str(tmp_path)}
-    assert run(PERIOD, tmp_path / "cache", **place)[0] == "0"
+    assert run(CHECK, tmp_path / "cache", **place)[0] == "0"
     source = tmp_path / "kernels" / "interface.py"
     source.write_text(source.read_text().replace("OK = 0,", "OK = 5,"))
-    assert run(PERIOD, tmp_path / "cache", **place)[:2] == ["5", "0"]
+    assert run(CHECK, tmp_path / "cache", **place)[:2] == ["5", "0"]
 
 
 def test_code_of_other_sources_goes_when_it_was_not_used_for_long(tmp_path):
@@ -122,7 +121,7 @@ def test_code_of_other_sources_goes_when_it_was_not_used_for_long(tmp_path):
         folder.mkdir(parents=True, mode=0o700)
     for folder in (old, alien):
         os.utime(folder, (time.time() - 40 * 24 * 3600,) * 2)
-    run(PERIOD, tmp_path)
+    run(CHECK, tmp_path)
     assert not old.exists()
     assert young.exists()
     assert alien.exists()
@@ -198,7 +197,7 @@ def test_a_second_process_compiles_nothing_of_any_kernel_and_method(name, compil
 def test_a_folder_that_others_may_write_to_is_not_used(filled, which, others):
     (folder,) = filled.glob(which)
     folder.chmod(0o700 | others)
-    (status, hits, used), told = said(PERIOD, filled)
+    (status, hits, used), told = said(CHECK, filled)
     assert (status, hits, used) == ("0", "0", "None")
     assert str(folder) in told
     assert len(told.splitlines()) == 1
@@ -209,11 +208,11 @@ def test_a_file_that_others_may_write_to_is_not_read(filled, kind):
     (path,) = filled.rglob(kind)
     path.write_bytes(pickle.dumps(Trap(filled / "sprung")))
     path.chmod(0o620)
-    (status, hits, _), told = said(PERIOD, filled)
+    (status, hits, _), told = said(CHECK, filled)
     assert (status, hits) == ("0", "0")
     assert str(path) in told
     assert not (filled / "sprung").exists()
-    assert run(PERIOD, filled)[:2] == ["0", "1"]
+    assert run(CHECK, filled)[:2] == ["0", "1"]
 
 
 class Trap:
@@ -235,7 +234,7 @@ def test_a_folder_of_somebody_else_is_not_used(tmp_path, link):
     else:
         (tmp_path / "foliot").mkdir(mode=0o700)
     os.chown(tmp_path / "foliot", 65534, 65534, follow_symlinks=False)
-    (status, _, used), told = said(PERIOD, tmp_path)
+    (status, _, used), told = said(CHECK, tmp_path)
     assert (status, used) == ("0", "None")
     assert str(tmp_path / "foliot") in told
 

@@ -82,8 +82,9 @@ def test_a_gaussian_pulse_is_seen_wherever_it_is_and_however_narrow(method, rtol
 
 
 @pytest.mark.skipif(not COMPILED, reason="many steps")
-@pytest.mark.parametrize("rtol", [1e-6, 1e-10])
-def test_pulses_of_all_shapes_are_seen(rtol):
+def test_pulses_of_all_shapes_are_seen():
+    rtol = 1e-10
+
     def of_corner(y):
         return (y * mp.sqrt(1 + y * y) + mp.asinh(y)) / 2
 

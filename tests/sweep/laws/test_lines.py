@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-import statsmodels.api as sm
 import xarray as xr
 from scipy import stats
 from scipy.linalg import toeplitz
@@ -97,6 +96,8 @@ TRENDS, ENDS = np.linspace(-1.6, 1.6, 5), np.array([0, 1.6, 3.2])
 
 def mixture(columns, z, phis, trends, ends, confidence):
     """The slope, its error, its density over noises and the density at the ends of its interval, by dense matrices."""
+    from statsmodels.regression.linear_model import GLS  # every worker reads this file, and one of them needs it
+
     (n, k), u = columns.shape, np.interp(T, [T[0], T[-1]], [-1, 1])
     logs, values, errors = np.empty((3, len(phis), len(trends) * len(ends)))
     weight = np.gradient(phis) * (1 - phis) ** -(0.3 + 24 / n) if len(phis) > 1 else np.ones(1)
@@ -104,7 +105,7 @@ def mixture(columns, z, phis, trends, ends, confidence):
     for i, phi in enumerate(phis):
         for j, (a, c) in enumerate((a, c) for a in trends for c in ends):
             size = np.exp(a * u + c * abs(u) - np.mean(a * u + c * abs(u)))
-            fit = sm.GLS(z, columns, sigma=np.outer(size, size) * toeplitz(phi ** np.arange(n)) / (1 - phi**2)).fit()
+            fit = GLS(z, columns, sigma=np.outer(size, size) * toeplitz(phi ** np.arange(n)) / (1 - phi**2)).fit()
             log = -n / 2 * np.log(1 / (1 - phi**2)) + (n - 1) / -2 * np.log(1 - phi**2)
             log += 0.5 * np.linalg.slogdet(fit.normalized_cov_params)[1] - (n - k) / 2 * np.log(fit.scale)
             logs[i, j] = log + np.log(weight[i]) - 0.5 * (a**2 + c**2) / 1.6**2
@@ -131,7 +132,7 @@ def mixture(columns, z, phis, trends, ends, confidence):
 def test_the_interval_holds_the_densest_values_over_the_noises_that_the_word_allows(noise, phis, trends, ends):
     z = 1.0 - 0.5 * T + 0.1 * WAVE * np.exp(T - 2.0)
     found = sweep.fit_exponent(curve(z), "x", noise=noise, confidence=0.9)
-    slope, error, density, level = mixture(sm.add_constant(T), z, np.asarray(phis), trends, ends, 0.9)
+    slope, error, density, level = mixture(np.transpose([T**0, T]), z, np.asarray(phis), trends, ends, 0.9)
     assert (float(found.exponent), float(found.exponent_error)) == pytest.approx((slope, error), rel=1e-8)
     assert [density(float(end)) for end in (found.exponent_low, found.exponent_high)] == pytest.approx([level] * 2)
     assert (kind(found), found.attrs["confidence"]) == ("noise" if noise is True else noise, 0.9)

@@ -16,8 +16,6 @@ from sweep.view import region
 from sweep.view.region import Choice, shown
 
 pytestmark = pytest.mark.skipif(not find_spec("panel"), reason="the extra view is not installed")
-if find_spec("panel"):
-    from sweep.view.picture import Picture, status_colour
 
 MAP = Choice("period", "mu", "R", {"a": 2})
 
@@ -80,6 +78,8 @@ FLAGS = {"flag_values": np.array([0, 1, 64], np.int8), "flag_meanings": "OK INAC
 def test_lines_are_drawn_with_their_statuses_at_the_foot_where_they_have_no_value():
     values, status = [[1.0, 2.0, np.nan], [4.0, -5.0, 6.0]], np.array([[0, 1, 64], [0, 0, 0]], np.int8)
     columns = {"y": (("a", "x"), values, {"units": "s"}), "status": (("a", "x"), status, FLAGS)}
+    from sweep.view.picture import Picture, status_colour  # every worker reads this file, and one of them needs bokeh
+
     found = view(xr.Dataset(columns, {"x": [1.0, 2.0, 3.0], "a": [0.5, 0.7]}), x="x")
     linear = dict.fromkeys(("x", "y", "values"), "linear")
     drawn = Picture(found, linear)
