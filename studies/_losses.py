@@ -14,26 +14,36 @@ NODES = 200
 legendre = functools.cache(np.polynomial.legendre.leggauss)
 
 
-def shares(ds: xr.Dataset) -> xr.Dataset:
-    """`ds` with the shares `viscous`, `dry`, `drag` and `impacts` of the energy of half a swing, and its `deficit`."""
+def taken(mu: Any, phi0: Any, R: Any, a: Any, c: Any, n: Any, e: Any, speed: Any) -> tuple[Any, Any]:
+    """Shares, (4, ...), of dry and viscous friction, drag and impacts in the energy 2 mu phi0 of half a swing, and
+    what the quadrature over the speed has missed of it. Where the foliot goes at its final speed the integrals end at a
+    pole, but what is missed is all lost at that speed, to each friction by its force there."""
+    mu, R, a, c, n, e, top = (np.asarray(x)[..., None] for x in (mu, R, a, c, n, e, speed))
     x, w = legendre(NODES)
-    t, w = (xr.DataArray(v, dims="node") for v in (0.5 * (x + 1), 0.5 * w))
-    rise = t * t * (3 - 2 * t)  # fewer digits lost where the speed nears the final one
-    lost: dict[str, Any] = {"viscous": 0.0, "dry": 0.0, "drag": 0.0}
-    for top, sign in ((ds.e * ds.crossing_speed, 1.0), (ds.crossing_speed, -1.0)):
-        v, dv = top * rise, top * 6 * t * (1 - t) * w
-        parts = {"viscous": ds.a * v, "dry": ds.R + 0 * v, "drag": ds.c * v**ds.n}
-        left = ds.mu + sign * sum(parts.values())
-        for name, f in parts.items():
-            lost[name] = lost[name] + (f * v / left * dv).sum("node")
-    work = 2 * ds.mu * ds.phi0
-    known = {name: value / work for name, value in lost.items()}
-    known["impacts"] = 0.5 * (1 - ds.e**2) * ds.crossing_speed**2 / work
-    there = ds.sensitivity.notnull()
-    whole = sum(known.values())
-    return ds.assign(
-        {name: (value / whole).where(there) for name, value in known.items()} | {"deficit": abs(whole - 1).where(there)}
-    )
+    t = 0.5 * (x + 1.0)
+    rise, w = t * t * (3.0 - 2.0 * t), 3.0 * t * (1.0 - t) * w  # fewer digits lost near the final speed
+
+    def friction(v: Any) -> Any:
+        return np.array(np.broadcast_arrays(R + 0.0 * v, a * v, c * v**n))
+
+    lost = 0.0
+    for end, sign in ((e * top, 1.0), (top, -1.0)):
+        f = friction(end * rise)
+        lost = lost + np.sum(f * end**2 * rise * w / (mu + sign * f.sum(0)), -1)
+    work, f = 2.0 * mu[..., 0] * phi0, friction(top)[..., 0]
+    whole = np.array([*lost, (0.5 * (1.0 - e**2) * top**2)[..., 0]]) / work
+    missed, force = 1.0 - whole.sum(0), f.sum(0)
+    whole[:3] += missed * np.divide(f, force, out=np.zeros_like(f), where=force > 0.0)
+    return whole, missed
+
+
+def shares(ds: xr.Dataset) -> xr.Dataset:
+    """`ds` with the shares `dry`, `viscous`, `drag` and `impacts` of the energy of half a swing, and its `deficit`."""
+    names = ("mu", "phi0", "R", "a", "c", "n", "e", "crossing_speed")
+    speed, *_ = given = xr.broadcast(ds.crossing_speed, *(ds[name] for name in names[:-1]))
+    whole, missed = taken(*(x.values for x in given[1:]), speed.values)
+    made = dict(zip(("dry", "viscous", "drag", "impacts", "deficit"), [*whole, abs(missed)], strict=True))
+    return ds.assign({name: (speed.dims, values) for name, values in made.items()})
 
 
 def width(n: Any) -> Any:

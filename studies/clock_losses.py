@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from _losses import taken
 from scipy.optimize import brentq, least_squares
 
 import sweep
@@ -76,8 +77,8 @@ class Measured:
         e = np.sqrt(np.maximum(1.0 - lost, 0.0))
         found = _clock()(mu, self.phi0, R, a, c, e)
         shown = [found.period] if self.amplitude is None else [found.period, found.amplitude]
-        speed = found.crossing_speed[:, -1:]
-        return np.concatenate([np.log(x[:, :-1]) for x in shown], 1), taken(self.middle, R, a, c, e, speed)
+        share, _ = taken(self.middle, self.phi0, R, a, c, 2.0, e, found.crossing_speed[:, -1:])
+        return np.concatenate([np.log(x[:, :-1]) for x in shown], 1), share[..., 0].T
 
     def matrix(self, u: Any) -> tuple[Any, Any]:
         """Derivatives of both by u, (numbers, 4) over the noise and (4, 4)."""
@@ -114,19 +115,6 @@ class Measured:
 
         ends = [brentq(above, end, place, xtol=3e-3) if above(end) > 0.0 else end for end in (0.0, 1.0)]
         return ends[0], place, ends[1]
-
-
-def taken(mu: Any, R: Any, a: Any, c: Any, e: Any, speed: Any) -> Any:
-    """Shares, (k, 4), of the energy of half a swing that ends with the speed, all of shape (k, 1)."""
-    x, w = np.polynomial.legendre.leggauss(60)
-    t, w = 0.5 * (x + 1.0), 0.5 * w
-    lost = np.zeros((3, len(speed)))
-    for top, sign in ((e * speed, 1.0), (speed, -1.0)):
-        v, dv = top * t * t * (3.0 - 2.0 * t), top * 6.0 * t * (1.0 - t) * w
-        parts = R + 0.0 * v, a * v, c * v * v
-        lost += np.sum(parts * v * dv / (mu + sign * sum(parts)), axis=-1)
-    whole = np.vstack([lost, 0.5 * ((1.0 - e**2) * speed**2)[:, 0]])
-    return (whole / whole.sum(0)).T
 
 
 def forecast(J: Any, by_u: Any) -> tuple[Any, Any]:

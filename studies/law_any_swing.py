@@ -50,7 +50,7 @@ def everywhere(ds: xr.Dataset) -> list[Statement]:
     """(1) against every clock, by its swing."""
     off = abs(ds.law / ds.sensitivity - 1.0)
     half, nearly = off.quantile([0.5, 0.95]).values
-    usual, text = bool(half < 0.012 and nearly < 0.1), f"{half:.2%}, {nearly:.1%}"
+    usual, text = bool(half < 0.004 and nearly < 0.1), f"{half:.2%}, {nearly:.1%}"
     lines = [Statement("all clocks: half of them, 95 % of them within", "", text, nearly, usual)]
     for low, high, allowed in BANDS:
         part = off.where((ds.swing >= low) & (ds.swing < high))

@@ -9,7 +9,7 @@ abs(v)^n, and impacts at the switch the share lambda_e; N = sum of n lambda_n. L
 v^2/mu, so friction takes c v^(n + 2)/mu, impacts (1 - e^2) v^2/2, and P ~ v/mu. The differential of the balance, sum
 lambda_n ((n + 2) dlnv - dlnmu) + 2 lambda_e dlnv = dlnmu, gives s = (N + lambda_e)/(N + 2),
 (1) which is n/(n + 2) for one friction, 1/2 for impacts alone. Small swings (heavy losses): the foliot goes at its
-final speed, f(v) = mu, and P ~ phi0/v, so s = 1/N, 1/n for one friction, whatever the impacts.
+final speed, f(v) = mu, and P ~ phi0/v, so s = 1/(N + 2 lambda_e), 1/n for one friction; impacts take little there.
 (2) The ratio of the shares of two frictions goes as v^(n - n'), that of impacts to a friction as mu/v^n, and
 dlnv = (1 - s) dlnmu: with (1) this says how many decades of torque an exponent takes to turn into another.      (3)
 """
@@ -45,34 +45,32 @@ LOSSES = ["viscous", "dry", "drag", "impacts"]
 
 NOTES = """\
 s = -dlnP/dlnmu; deviation: the difference of exponents, others relative. Shares by quadrature of the losses over the
-speed. Allowed: 1e-6 of the energy; 0.001 of (1) at swings over 100 phi0, 0.05 of (2) at swings under 1.0003 phi0; 1e-4
+speed. Allowed: 1e-6 of the energy; 0.001 of (1) at swings over 100 phi0, 0.015 of (2) at swings under 1.0003 phi0; 1e-4
 of the best torques, which were once had to 50 digits
 """
 
 
 def prepared(ds: xr.Dataset) -> xr.Dataset:
-    """`ds` with shares, `swing` = amplitude/phi0, N, and the laws (1) and (2)."""
+    """`ds` with shares and what `any_swing` makes of them: (1) is `large`, (2) `small`."""
     order = ds.sensitivity.dims
     width = max(1, AT_ONCE * ds.sizes["mu"] // ds.sensitivity.size)
     parts = [shares(ds.isel(mu=slice(i, i + width))) for i in range(0, ds.sizes["mu"], width)]
     ds = xr.concat(parts, "mu", data_vars="minimal", coords="minimal", compat="override", join="outer")
-    N = ds.viscous + ds.n * ds.drag
-    ds = ds.assign(swing=ds.amplitude / ds.phi0, N=N, light=(N + ds.impacts) / (N + 2), heavy=1 / N)
-    return ds.transpose(*order)
+    return any_swing(ds).transpose(*order)
 
 
 def laws(ds: xr.Dataset) -> list[Statement]:
     """(1) and (2) against every cell of large and of small swings."""
-    large, small = ds.where(ds.swing > LARGE), ds.where((ds.swing < SMALL) & (ds.impacts < 0.01))
-    light, heavy = large.sensitivity - large.light, small.sensitivity / small.heavy - 1
+    large, small = ds.where(ds.swing > LARGE), ds.where(ds.swing < SMALL)
+    light, heavy = large.sensitivity - large.large, small.sensitivity / small.small - 1
     mixed = light.where(large[LOSSES].to_array().max("variable") < 0.7)
-    whole = abs(any_swing(ds).law / ds.sensitivity - 1)
+    whole = abs(ds.law / ds.sensitivity - 1)
     usual = whole.quantile(0.95)
     return [
         most("the shares are the work, swings over 2 phi0", "1", ds.deficit.where(ds.swing > 2), 1e-6),
         most(f"(1), swings over {LARGE:g} phi0", "s", light, 1e-3, count(light)),
         most("  of these no loss takes over 70 %", "s", mixed, 1e-3, count(mixed)),
-        most(f"(2), swings under {SMALL:g} phi0", "s", heavy, 0.05, count(heavy)),
+        most(f"(2), swings under {SMALL:g} phi0", "s to 1.5 %", heavy, 0.015, count(heavy)),
         most("any swing, (1) of law_any_swing.py: 95 % of all cells", "s to 5 %", usual, 0.05, f"within {usual:.2%}"),
         most(f"  all {count(whole)} that cycle", "s to 25 %", whole, 0.25, f"within {whole.max():.1%}"),
     ]
@@ -173,7 +171,7 @@ def figure(ds: xr.Dataset, pure: xr.DataArray) -> Any:
             part = ds.where((ds.swing > low) & (ds.swing <= high))
             look = {"color": colour, "markersize": 1.6, "rasterized": True}
             look["label"] = f"{low:g} to {high:g}" if math.isfinite(high) else f"over {low:g}"
-            check.plot(part.light.values.ravel(), part.sensitivity.values.ravel(), ".", **look)
+            check.plot(part.large.values.ravel(), part.sensitivity.values.ravel(), ".", **look)
         check.plot([0, 0.6], [0, 0.6], color="black", linewidth=0.8, label="theory (1)")
         check.set(xlabel=r"$(N+\lambda_e)/(N+2)$ [1]", ylabel="exponent, $s$ [1]", xlim=(0, 0.62), ylim=(0, 1.0))
         check.legend(title=r"swing, $A/\varphi_0$", loc="upper left", markerscale=5, fontsize=7)
@@ -230,7 +228,7 @@ def conclude(path: str) -> Conclusion:
     """Statements and the figure."""
     ds = prepared(read_result(path, "foliot", ["n", "e", "a", "R", "c", "mu"], "law_map.toml"))
     pure = solved("foliot", n=DEGREES, mu=[1e-30, 1e30], c=1, phi0=1, outputs=["sensitivity"]).sensitivity
-    law = "the law: s = (N + lambda_e)/(N + 2) at large swings, 1/N at small, N = sum of n lambda_n over the frictions"
+    law = "the law: s = (N + lambda_e)/(N + 2) at large swings, 1/(N + 2 lambda_e) at small, N = sum of n lambda_n"
     groups = {
         "The general law": laws(ds),
         "One loss alone": pure_laws(pure),

@@ -14,6 +14,7 @@ import stick_slip
 import stiff_lag
 import timekeeping
 import xarray as xr
+from _losses import shares
 from chain_oracles import receptance
 from mpmath import mp, mpf
 from scipy.integrate import quad, solve_ivp
@@ -176,6 +177,37 @@ def test_shares_of_the_losses_are_those_of_an_adaptive_integral():
         return half(part, -1, u) + half(part, 1, 0.99 * u)
 
     assert {n: float(cell[n]) for n in parts} == pytest.approx({n: lost(p) / (2 * mu) for n, p in parts.items()})
+
+
+@pytest.mark.parametrize("z", [2.0, 15.0, 90.0])
+def test_shares_hold_where_the_foliot_goes_at_its_final_speed(z):
+    """The speed at the switch is V (1 - exp(-z)), V the final one: 90 is beyond what a float64 can tell from it."""
+    clock = {"mu": 1.0, "R": 0.3, "a": 0.8, "c": 0.2, "n": 3.0, "e": 0.5}
+    with mp.workdps(60):
+        mu, R, a, c, n, e = map(mpf, clock.values())
+        parts = {"dry": lambda v: R, "viscous": lambda v: a * v, "drag": lambda v: c * v**n}
+        V = mpmath.findroot(lambda v: sum(f(v) for f in parts.values()) - mu, 0.6)
+        top, ends = V * (1 - mp.exp(-z)), [y for y in (0, 1, 4, 12, 30) if y < z] + [z]
+
+        def half(part):
+            """On the leg that is driven, over y with v = V (1 - exp(-y)), and on the one that is braked."""
+
+            def driven(y):
+                v = V * (1 - mp.exp(-y))
+                return part(v) * v * V * mp.exp(-y) / (mu - sum(f(v) for f in parts.values()))
+
+            braked = mp.quad(lambda v: part(v) * v / (mu + sum(f(v) for f in parts.values())), [0, e * top])
+            return mp.quad(driven, ends), braked
+
+        way, back = half(lambda v: mpf(1))
+        phi0 = (way - back) / 2
+        true = {name: float(sum(half(f)) / (2 * mu * phi0)) for name, f in parts.items()}
+        true["impacts"] = float((1 - e**2) * top**2 / (4 * mu * phi0))
+    asked = ["amplitude", "crossing_speed", "sensitivity"]
+    zipped = {name: [x] for name, x in {**clock, "phi0": float(phi0)}.items()}
+    found = shares(sweep.run(kernel="foliot", design="zip", axes=zipped, rtol=1e-10, outputs=asked))
+    assert abs(sum(true.values()) - 1) < 1e-12
+    assert {name: float(found[name][0]) for name in true} == pytest.approx(true, abs=1e-9)
 
 
 def arm_angle(t, e, b=0.6201, d=0.38, f=0.405):
