@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from kernels.codegen.columns_algebra import most
+from kernels.codegen.compiled import compiling
 from kernels.codegen.limit_cycle import FOUND, RESTS, Columns, Search, described
-from kernels.codegen.module import compiling
 from kernels.codegen.return_map import TIGHT, ReturnMap, has_sides
 from kernels.interface import FIRST_REFUSAL, Field, Kernel, Method, OnColumns, Status
 from kernels.lanes.wiring import signed

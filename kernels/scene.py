@@ -19,6 +19,7 @@ that starts behind the surface, or that a switch puts there, meets no switch bef
 that starts on the surface and falls switches at once. What rounding alone may make of a motion counts: INACCURATE.
 """
 
+import functools
 import keyword
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -27,12 +28,9 @@ from typing import Any
 
 import numpy as np
 
-from kernels.codegen import followed_twice, stated_error
-from kernels.codegen.accumulated import to_rest
-from kernels.codegen.module import build, compiling
+from kernels.codegen.compiled import compiling, runner
 from kernels.codegen.record import RESERVED, asks_for_time, named_functions
-from kernels.codegen.slid_along import slid_along
-from kernels.codegen.stepped import twice_by
+from kernels.codegen.to_tolerance import once, solver
 from kernels.interface import Field, Kernel, Method, OnColumns, Status
 from kernels.lanes.wiring import signed
 from kernels.source_text.expression import (
@@ -210,38 +208,33 @@ def flips_field(default: float, most: float) -> Field:
 
 def _methods(scene: Scene, parameters: list[str], outputs: list[str]) -> tuple[Method, ...]:
     """The methods to a tolerance."""
-    module = build(scene)
-
-    def method(name: str, doc: str, how: Function, bound: OnColumns | None = None) -> Method:
-        how = how if bound else slid_along(to_rest(how), scene, name)
-        n = len(parameters)
-
-        def solve(*columns: Any) -> None:
-            if len(columns[0]):
-                with compiling(scene.name, name):
-                    how(module, columns[:n], columns[n], columns[n + 1 : -1], columns[-1])
-
-        return Method(name, doc, signed(solve, [*parameters, "rtol", *outputs, "status"]), bound)
+    by_series, n = runner(scene, "taylor"), len(parameters)
+    docs = {
+        "taylor": f"{SERIES}; the error carried along, or followed three times",
+        "taylor_once": "the same, each step right to rtol, followed once",
+        "rodas5p": f"for what is stiff: Rosenbrock's method Rodas5P, L-stable, {LOCATED}",
+        "dop853": f"Dormand-Prince 8(5,3) {LOCATED}",
+        "dopri5": f"Dormand-Prince 5(4) {LOCATED}",
+    }
 
     def no_bound(*columns: Any) -> None:
         columns[-1][:] = math.inf
 
-    return (
-        method("taylor", f"{SERIES}; the error carried along, or followed three times", stated_error.by_one(scene)),
-        method(
-            "taylor_once",
-            "the same, each step right to rtol, followed once",
-            followed_twice.once,
-            signed(no_bound, [*parameters, "rtol", "asked", "out"]),
-        ),
-        method(
-            "rodas5p",
-            f"for what is stiff: Rosenbrock's method Rodas5P, L-stable, {LOCATED}",
-            twice_by("rodas5p", scene),
-        ),
-        method("dop853", f"Dormand-Prince 8(5,3) {LOCATED}", twice_by("dop853", scene)),
-        method("dopri5", f"Dormand-Prince 5(4) {LOCATED}", twice_by("dopri5", scene)),
-    )
+    def method(name: str) -> Method:
+        single = name == "taylor_once"
+        how = functools.partial(once, by_series) if single else solver(scene, name)
+
+        def solve(*columns: Any) -> None:
+            if len(columns[0]):
+                with compiling(scene.name, name):
+                    rows, columns[-1][:] = how(columns[:n], columns[n])
+                for column, row in zip(columns[n + 1 : -1], rows, strict=True):
+                    column[:] = row
+
+        bound = signed(no_bound, [*parameters, "rtol", "asked", "out"]) if single else None
+        return Method(name, docs[name], signed(solve, [*parameters, "rtol", *outputs, "status"]), bound)
+
+    return tuple(map(method, docs))
 
 
 def limits_check(fields: Sequence[Field]) -> OnColumns:

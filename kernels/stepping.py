@@ -13,12 +13,13 @@ from typing import Any
 import numpy as np
 
 from kernels.codegen import three_steps
-from kernels.codegen.module import compiling
-from kernels.codegen.stepped import methods_of, stepped
+from kernels.codegen.compiled import compiling, runner
+from kernels.codegen.record import record
 from kernels.integrate.events import LOCATIONS, METHODS
 from kernels.interface import Field, Kernel, Method, Status
 from kernels.lanes.wiring import signed
 from kernels.scene import TIMES, Function, Scene, SceneError, flips_field, limits_check, scene_of
+from kernels.source_text.expression import INPUT
 
 __all__ = ["METHODS", "stepped_kernel", "stepping_fields", "stepping_methods"]
 
@@ -64,7 +65,7 @@ def stepping_methods(
 
     def solved(name: str, columns: Sequence[Any]) -> Any:
         with compiling(scene.name, name):
-            return three_steps.solved(stepped(scene), name, columns[: count - 2], *columns[count - 2 : count])
+            return three_steps.solved(runner(scene, "fixed"), name, columns[: count - 2], *columns[count - 2 : count])
 
     def method(name: str) -> Method:
         def solve(*columns: Any) -> None:
@@ -82,7 +83,21 @@ def stepping_methods(
         whole = signed(solve, [*names, "rtol", *(f.name for f in outputs), "status"])
         return Method(name, DOCS[name], whole, signed(bound, [*names, "rtol", "asked", "out"]))
 
-    return tuple(method(name) for name in methods_of(scene))
+    return tuple(method(name) for name in _able(scene))
+
+
+def _able(scene: Scene) -> list[str]:
+    """The methods that can do the scene: pairs (x, v) with x' = v; for Moreau's one, kinks at v = 0."""
+    recorded, timed = record(scene), scene.start_time is not None
+    n = len(scene.states) - timed
+
+    def is_speed(place: int, u: Any) -> bool:
+        return bool(u.kind == INPUT and u.args[0] == scene.states[place + 1])
+
+    paired = n % 2 == 0 and all(is_speed(j, recorded.rates[j]) for j in range(0, n, 2))
+    dry = paired and n == 2 and not timed and all(is_speed(0, u) for u in recorded.graph.kinks)
+    wants = {"semi_implicit": paired, "verlet": paired, "moreau": dry}
+    return [name for name in METHODS if wants.get(name, True)]
 
 
 def _fill_plainly(time: Any, interval: Any, states: Any, reach: Any, columns: Any) -> None:

@@ -12,8 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from kernels.codegen.at_times import at_switches, at_times
-from kernels.codegen.module import compiling
+from kernels.codegen.at_times import at_times
+from kernels.codegen.compiled import compiling
+from kernels.codegen.to_tolerance import at_switches
 from kernels.interface import FIRST_REFUSAL, Field, Kernel, Method, Status
 from kernels.lanes.wiring import signed
 from kernels.scene import Function, Functions, Scene, limits_check, scene_of

@@ -19,8 +19,8 @@ import time
 
 import numpy as np
 
-from kernels.codegen import followed_twice, stated_error
-from kernels.codegen.module import build
+from kernels.codegen.compiled import runner
+from kernels.codegen.to_tolerance import OF_A_STEP, STATED, by_runs, told
 from kernels.integrate.carried import PART
 from kernels.interface import Status
 from kernels.scene import Scene, exp, power, sign, sin
@@ -97,17 +97,16 @@ def block(name, scene, random, n):
     """Stated and true errors over rtol of the cells that one run calls OK, and how many there are in all."""
     columns = [*DRAWN[name][2](random, n).values(), random.integers(1, 31, n).astype(float)]
     rtol = decades(random, -11, -4, n)
-    telling, states = stated_error.telling(scene), len(scene.states)
+    telling, states = runner(scene, "told"), len(scene.states)
     begin = time.thread_time()
-    results, error = followed_twice.told(telling, columns, rtol, stated_error.OF_A_STEP * rtol)
+    results, status, error = told(telling, columns, rtol, OF_A_STEP * rtol)
     spent = time.thread_time() - begin
-    ok = stated_error.judged(results, error, rtol, 2 + states) == Status.OK
-    outputs, status = [np.empty(n) for _ in range(2 + states)], np.empty(n, np.int8)
-    followed_twice.twice(build(scene), columns, np.full(n, TRUTH), outputs, status)
+    ok = status == Status.OK
+    outputs, status = by_runs(runner(scene, "taylor"), columns, np.full(n, TRUTH))
     known = ok & (status == Status.OK)
-    true = _error(results, np.array(outputs), states)
+    true = _error(results, outputs, states)
     judged = known & (rtol > FLOOR)
-    stated = stated_error.STATED * error
+    stated = STATED * error
     return (stated / rtol)[judged], (true / rtol)[judged], np.array([n, ok.sum(), (ok & ~known).sum()]), spent
 
 

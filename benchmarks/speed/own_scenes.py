@@ -18,8 +18,8 @@ import numpy as np
 from engine import speedup
 
 import sweep
-from kernels.codegen import followed_twice
-from kernels.codegen.module import build
+from kernels.codegen.compiled import runner
+from kernels.codegen.to_tolerance import once
 from kernels.scene import Field, cos, scene_kernel, scene_of, sin
 
 CELLS, THEIR_CELLS, JUDGED, FLIPS, ROUNDS = 32_000, 200, 20, 20, 3
@@ -145,10 +145,9 @@ def theirs(follower, columns, judged, n=THEIR_CELLS):
     return n / (time.thread_time() - begin), found
 
 
-def ours(module, columns, tolerance, judged):
-    outputs, status = [np.empty(CELLS) for _ in range(4)], np.empty(CELLS, np.int8)
+def ours(one, columns, tolerance, judged):
     begin = time.thread_time()
-    followed_twice.once(module, [*columns, np.full(CELLS, float(FLIPS))], np.full(CELLS, tolerance), outputs, status)
+    outputs, status = once(one, [*columns, np.full(CELLS, float(FLIPS))], np.full(CELLS, tolerance))
     rate = CELLS / (time.thread_time() - begin)
     assert not status[:JUDGED].any()
     assert (status == 0).mean() > 0.99  # the pendulum may come to rest where it is counted
@@ -161,11 +160,11 @@ def worst(found, truth):
 
 def compare(scene, judged, tolerances):
     """Prints cells per second, ratio and errors."""
-    module, columns = build(scene_of(**scene, switch=None)), cells(scene, CELLS)
+    one, columns = runner(scene_of(**scene, switch=None), "taylor"), cells(scene, CELLS)
     truth = theirs(Heyoka(scene, 1e-19, np.longdouble), columns, judged, JUDGED)[1]
     for their, our in tolerances:
         follower = Heyoka(scene, their)
-        runs = [lambda f=follower: theirs(f, columns, judged), lambda t=our: ours(module, columns, t, judged)]
+        runs = [lambda f=follower: theirs(f, columns, judged), lambda t=our: ours(one, columns, t, judged)]
         runs[1]()
         rounds = [[run() for run in runs] for _ in range(ROUNDS)]
         best = [max((each[k] for each in rounds), key=lambda found: found[0]) for k in range(2)]

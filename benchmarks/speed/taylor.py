@@ -24,8 +24,9 @@ import numpy as np
 from engine import speedup
 
 import sweep
-from kernels.codegen import followed_twice, stated_error
-from kernels.codegen.module import build
+from kernels.codegen.compiled import runner
+from kernels.codegen.followed import followed
+from kernels.codegen.to_tolerance import OF_A_STEP, by_error, once
 from kernels.scene import Field, Scene, power, scene_kernel, sign
 
 sys.path += [str(Path(__file__).parents[2] / "tests" / name) for name in ("oracles", "helpers")]
@@ -154,10 +155,9 @@ def theirs(follow):
     return THEIR_CELLS / (time.thread_time() - begin), found
 
 
-def ours(module, columns, tolerance, follow):
-    outputs, status = [np.empty(CELLS) for _ in range(4)], np.empty(CELLS, np.int8)
+def ours(subject, columns, tolerance, follow):
     begin = time.thread_time()
-    follow(module, columns, np.full(CELLS, tolerance), outputs, status)
+    outputs, status = follow(subject, columns, np.full(CELLS, tolerance))
     rate = CELLS / (time.thread_time() - begin)
     assert not status[:JUDGED].any()
     return rate, np.stack([outputs[0], abs(outputs[3])], axis=1)
@@ -183,24 +183,24 @@ def worst(found, truth):
     )
 
 
-def uneven(module, together):
+def uneven(one, together):
     """Cells per second where cells have 4 to 400 switches."""
     random = np.random.default_rng(2)
     n = CELLS // 8
     flips = np.floor(10.0 ** random.uniform(np.log10(4), np.log10(400), n))
     columns = (*(column[:n] for column in cells(CELLS)), flips)
     begin = time.thread_time()
-    followed_twice.followed(module, columns, np.full(n, 1e-8), together=together)
+    followed(one, columns, np.full(n, 1e-8), together=together)
     return n / (time.thread_time() - begin)
 
 
 def compare(title, follow, scene, columns, tolerance, truth):
     """Prints cells per second, ratios and errors."""
-    plain, telling, rtol = build(scene), stated_error.telling(scene), tolerance / stated_error.OF_A_STEP
+    plain, rtol = runner(scene, "taylor"), tolerance / OF_A_STEP
     runs = {
         "heyoka.py": lambda: theirs(follow),
-        "taylor_once": lambda: ours(plain, columns, tolerance, followed_twice.once),
-        "taylor": lambda: ours(telling, columns, rtol, stated_error.solved),
+        "taylor_once": lambda: ours(plain, columns, tolerance, once),
+        "taylor": lambda: ours(scene, columns, rtol, by_error),
     }
     runs["taylor_once, run"] = lambda: by_run(scene, columns, tolerance, "taylor_once")
     runs["taylor, run"] = lambda: by_run(scene, columns, rtol, "taylor")
@@ -237,7 +237,7 @@ def main():
     columns = (*own, np.full(CELLS, POWER), np.full(CELLS, float(POWER_FLIPS)))
     for near, their, w, our in (("1e-8", 1e-7, 8e-5, 2.5e-9), ("1e-12", 5e-12, 1e-6, 8e-13)):
         compare(f"abs(v)^{POWER}, near {near}", power_peer(their, w), GENERAL, columns, our, truth)
-    dealt, lockstep = (max(uneven(build(SCENE), together) for _ in range(3)) for together in (False, True))
+    dealt, lockstep = (max(uneven(runner(SCENE, "taylor"), together) for _ in range(3)) for together in (False, True))
     print(f"cells of 4 to 400 switches: {dealt:,.0f} cells/s refilled, {lockstep:,.0f} in lockstep;", end=" ")
     print(f"{dealt / lockstep:.1f} times")
     print("uneven log grid, {} cores against one: {:.2f} times".format(*cores()))

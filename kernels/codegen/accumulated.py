@@ -10,7 +10,8 @@ move by as much over LEFT/(1 - q) switches, as it does where intervals shrink by
 
 import numpy as np
 
-from kernels.codegen import followed_twice
+from kernels.codegen.compiled import runner
+from kernels.codegen.followed import followed
 from kernels.interface import Status
 
 ENDED = Status.STICKS, Status.OUT_OF_RANGE, Status.STEP_LIMIT
@@ -38,38 +39,37 @@ LEFT = 4.0
 """Enough where intervals shrink as n^-p, p > 4/3, where (1) misses D n/(2 p (p - 1)) and moves by D/(2 p) a switch."""
 
 
-def to_rest(how):
-    """The function of columns `how`, followed by (1) where its motion does not reach the wanted number of switches."""
+def to_rest(how, scene):
+    """The function of columns `how`, followed by (1) where the scene does not reach the wanted number of switches."""
 
-    def solve(module, columns, rtol, outputs, status):
-        how(module, columns, rtol, outputs, status)
+    def solve(columns, rtol):
+        outputs, status = how(columns, rtol)
         cells = np.flatnonzero(_may_rest(columns[-1], outputs, status))
         if not len(cells):
-            return
+            return outputs, status
 
-        def followed(those, flips):
+        def solved(those, flips):
             """Rows of outputs, and which cells are right to half of the tolerance."""
             inputs = [*(c[cells[those]] for c in columns[:-1]), flips.astype(float)]
-            rows, verdict = np.full((len(outputs), len(those)), np.nan), np.empty(len(those), np.int8)
-            how(module, inputs, np.minimum(0.5 * rtol[cells[those]], FINE), list(rows), verdict)
+            rows, verdict = how(inputs, np.minimum(0.5 * rtol[cells[those]], FINE))
             return rows, verdict == Status.OK
 
-        last = _last_right(followed, columns[-1][cells])
+        last = _last_right(solved, columns[-1][cells])
         those = np.flatnonzero(last >= LEAST)
         early = [*(c[cells[those]] for c in columns[:-1]), np.full(len(those), 2.0)]
-        sizes = followed_twice.followed(module, early, np.full(len(those), ROUGHLY))[2 + len(module.STATES) : -1]
+        sizes = followed(runner(scene, "taylor"), early, np.full(len(those), ROUGHLY))[2 + len(scene.states) : -1]
         for _ in range(TRIES):
             if not len(those):
                 break
             last[those] = np.maximum(np.floor(AWAY * last[those]), LEAST)
             flips = columns[-1][cells[those]]
-            rests, values, error, left = _limits(followed, those, last[those], flips, sizes[: len(outputs) - 2])
+            rests, values, error, left = _limits(solved, those, last[those], flips, sizes[: len(outputs) - 2])
             rests &= left <= 0.5 * rtol[cells[those]]
             good = cells[those[rests]]
-            for column, row in zip(outputs, values, strict=True):
-                column[good] = row[rests]
+            outputs[:, good] = values[:, rests]
             status[good] = np.where(error[rests] <= 0.5 * rtol[good], Status.COMES_TO_REST, Status.INACCURATE)
             those, sizes = those[~rests], sizes[:, ~rests]
+        return outputs, status
 
     return solve
 
@@ -80,7 +80,7 @@ def _may_rest(flips, outputs, status):
     return (flips >= LEAST) & (np.isin(status, ENDED) | faint)
 
 
-def _last_right(followed, flips):
+def _last_right(solved, flips):
     """The last number of switches, or nearly, that are right and move the time; 0 where it is less than `LEAST`."""
     right, wrong = np.zeros(len(flips)), flips.copy()
     trial = np.full(len(flips), float(LEAST))
@@ -88,19 +88,19 @@ def _last_right(followed, flips):
         going = np.flatnonzero((trial < wrong) & (trial - right >= np.maximum(1.0, 0.01 * right)))
         if not len(going):
             return right
-        (time, interval, *_), good = followed(going, trial[going])
+        (time, interval, *_), good = solved(going, trial[going])
         good &= interval > TINY * time
         right[going[good]], wrong[going[~good]] = trial[going[good]], trial[going[~good]]
         middle = np.floor(0.5 * (right + wrong))
         trial = np.where(right > 0, np.minimum(2.0 * right, middle), wrong)
 
 
-def _limits(followed, those, last, flips, sizes):
+def _limits(solved, those, last, flips, sizes):
     """Which cells come to rest; their outputs there; their error, of states relative to their sizes at the start.
 
     And what is left of the way to rest after the wanted number of switches, as the error is.
     """
-    runs = [followed(those, last - k) for k in (0, 1, 2, 3, 4)]
+    runs = [solved(those, last - k) for k in (0, 1, 2, 3, 4)]
     rows, good = (np.array(part) for part in zip(*runs, strict=True))  # (5, outputs, cells), (5, cells)
     with np.errstate(all="ignore"):
         (values, q), (before, q_before) = (_limit(rows[k:]) for k in (0, 1))

@@ -115,6 +115,13 @@ class Functions:
 
         return self.of_inputs(sizes)
 
+    def changes(self):
+        """The first of `Changes`: what changes of the states change, and what rates and events are made of."""
+        recorded = self.recorded
+        values = [self.graph.multiply(factor, u) for _, factor, u in recorded.events]
+        made = self.sizes(recorded.rates), self.sizes(values)
+        return (*map(self.changed, (recorded.rates, values, recorded.switched)), *made)
+
     def changed(self, expressions):
         """A function of what changes of the states change of expressions."""
         derivatives = [self.graph.of(0.0) if x is None else x for x in map(self.tangents.of, expressions)]

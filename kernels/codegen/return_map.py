@@ -12,11 +12,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from kernels.codegen import followed_twice
-from kernels.codegen.at_times import asked, at_times, clocked, named, to_the_end
-from kernels.codegen.module import build
+from kernels.codegen.at_times import asked, at_times, clocked, named
+from kernels.codegen.compiled import runner
+from kernels.codegen.followed import followed
 from kernels.codegen.record import named_functions, record
-from kernels.codegen.stepped import runs
+from kernels.codegen.to_tolerance import solver
 from kernels.interface import Status
 from kernels.source_text.expression import INPUT, Expression, SceneError, needed
 
@@ -57,18 +57,15 @@ class ReturnMap:
         self.jumps = any(named_functions(scene.switch).get(name) for name in (first, ""))
         """Whether the motion jumps at the first surface."""
         self.fine, self.rough, self.step = TOLERANCES[method]
-        self._how = to_the_end(self.scene, method)
+        self._how = solver(self.scene, method)
         self._turning = [(turning(self.scene, True), (1.0,)), (turning(self.scene, False), OTHERS)]
         for recorded in (self.scene, *(scene for scene, _ in self._turning), *([] if drive else [clocked(scene)])):
             record(recorded)
 
     def passed(self, parameters, before, flips, rtol, fresh=0.0):
         """Rows of time and states, and statuses: `flips` switches after the one before which the states are given."""
-        count, n = len(flips), len(before)
-        found, status = np.full((2 + len(self.scene.states), count), np.nan), np.empty(count, np.int8)
-        columns = [*parameters, *before, np.full(count, fresh), flips]
-        self._how(build(self.scene), columns, rtol, list(found), status)
-        return found[[0, *range(2, 2 + n)]], status
+        found, status = self._how([*parameters, *before, np.full(len(flips), fresh), flips], rtol)
+        return found[[0, *range(2, 2 + len(before))]], status
 
     def at(self, parameters, times):
         """The states, and statuses, of the motion from the start at a time each."""
@@ -95,9 +92,8 @@ class ReturnMap:
 
     def _sizes(self, scene, parameters, before, flips, rtol):
         """The largest size of each state at the ends of steps."""
-        module = build(scene) if self.method == "taylor" else runs(scene, self.method)
-        columns = [*parameters, *before, 0.0 * flips, flips]
-        found, begin = followed_twice.followed(module, columns, np.full(len(flips), rtol)), 2 + len(scene.states)
+        columns, one = [*parameters, *before, 0.0 * flips, flips], runner(scene, self.method)
+        found, begin = followed(one, columns, np.full(len(flips), rtol)), 2 + len(scene.states)
         return np.where(found[-1] <= Status.INACCURATE, found[begin : begin + len(before)], np.nan)
 
 

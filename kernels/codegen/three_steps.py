@@ -12,7 +12,7 @@ round behind a switch within the error, the switch may not be there at all: GRAZ
 
 import numpy as np
 
-from kernels.codegen.followed_twice import off_by_roundings
+from kernels.codegen.followed import off_by_roundings
 from kernels.integrate.events import METHODS, MOREAU, NONE
 from kernels.interface import FIRST_REFUSAL, Status
 from kernels.lanes.refill import fresh, to_the_end
@@ -35,7 +35,7 @@ GRAZING = 1e-9
 """Of an event's value at the start of a step: how close to 0 it may turn round in it unremarked."""
 
 
-def followed(module, method, columns, step, location, substeps=1.0):
+def followed(runner, method, columns, step, location, substeps=1.0):
     """A column per cell of: time, interval, states, their reach, margin behind a switch, steps, calls, status.
 
     Parameters
@@ -44,18 +44,18 @@ def followed(module, method, columns, step, location, substeps=1.0):
     step, location : columns
     substeps : of a step
     """
-    results = np.full((6 + 2 * len(module.STATES), len(step)), np.nan)
+    results = np.full((6 + 2 * len(runner.scene.states), len(step)), np.nan)
     for one in np.unique(location):
         cells = location == one
         extra = (step, GRAZING, METHODS.index(method), one, substeps)
         rows = [np.broadcast_to(c, step.shape)[cells] for c in (*columns, *extra)]
-        table = fresh(len(flat(module.M_FIXED.cell)), rows)
-        to_the_end(module.run, table)
+        table = fresh(len(flat(runner.m.cell)), rows)
+        to_the_end(runner.low, table)
         results[:, cells] = table[:, 1 + len(rows) : 1 + len(rows) + len(results)].T
     return results
 
 
-def solved(module, method, columns, step, location):
+def solved(runner, method, columns, step, location):
     """The first run, a row for its estimated relative error, and the status.
 
     Returns
@@ -64,16 +64,16 @@ def solved(module, method, columns, step, location):
     error, status
     """
     blind = (location == NONE) | (METHODS.index(method) == MOREAU)
-    first = followed(module, method, columns, step, location)
+    first = followed(runner, method, columns, step, location)
     runs, moved = [], [np.broadcast_to(c, step.shape) for c in off_by_roundings(columns)]
     for located, unlocated in zip(LOCATED, BLIND, strict=True):
-        runs.append(np.full((6 + 2 * len(module.STATES), len(step)), np.nan))
+        runs.append(np.full((6 + 2 * len(runner.scene.states), len(step)), np.nan))
         for cells, (length, substeps) in ((~blind, located), (blind, unlocated)):
             if cells.any():
                 those = [c[cells] for c in moved]
-                runs[-1][:, cells] = followed(module, method, those, length * step[cells], location[cells], substeps)
+                runs[-1][:, cells] = followed(runner, method, those, length * step[cells], location[cells], substeps)
     finest, between = runs
-    error, unsure, grows = _compared(first, finest, between, len(module.STATES))
+    error, unsure, grows = _compared(first, finest, between, len(runner.scene.states))
     with np.errstate(all="ignore"):
         error = np.where(blind, np.maximum(error, step / first[1]), error)
     status = _status(first, finest, between)

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kernels.codegen.followed_twice import followed
-from kernels.codegen.module import build
+from kernels.codegen.compiled import runner
+from kernels.codegen.followed import followed
 from kernels.scene import Scene
 from kernels.source_text.expression import cos, power, sign, sin
 
@@ -93,7 +93,7 @@ SEARCHED = Form("foliot_ripple_search", ("x", "v", "top"), _LINEAR, searched_rat
 
 
 @functools.cache
-def _module(form):
+def _runner(form):
     """The compiled half swing."""
 
     def surface(x):
@@ -103,9 +103,8 @@ def _module(form):
         return tuple(v0 if name == "v" else _FIRST.get(name, 0.0) for name in form.states)
 
     terms = (*form.terms, "v0")
-    return build(
-        Scene(form.name, "half swing of a foliot", form.states, terms, form.rates, surface, start, most_kinks=1)
-    )
+    scene = Scene(form.name, "half swing of a foliot", form.states, terms, form.rates, surface, start, most_kinks=1)
+    return runner(scene, "taylor")
 
 
 def half_swings(form, columns, tolerance):
@@ -114,7 +113,7 @@ def half_swings(form, columns, tolerance):
     Tangents that the form does not follow are NaN by mu, so that the sensitivity is none; by v0 they are 0, which
     takes from time and amplitude what Newton's last step would better.
     """
-    rows = followed(_module(form), columns, tolerance)
+    rows = followed(_runner(form), columns, tolerance)
     found = dict(zip(("time", "interval", *form.states), rows, strict=False))
     if "decay" not in found:
         found["decay"] = columns[form.terms.index("drag")] * found["time"]

@@ -10,12 +10,13 @@ which is what dry friction's change of sign shifts the time by. The cycle then f
 Each cell goes through four stages on its own. SEARCH: Newton's method within a bracket, at a coarse tolerance. NEAR: at
 one that follows the square of its step. ROUGH and FINE: two last half swings, whose difference tells the error. The
 rough one has a tolerance FINER times larger than the fine one, and parameters some roundings off, as in
-`followed_twice`. Where the error is too large both are followed once more at a tighter tolerance.
+`to_tolerance`. Where the error is too large both are followed once more at a tighter tolerance.
 """
 
 import numpy as np
 
-from kernels.codegen.followed_twice import FINER, off_by_roundings
+from kernels.codegen.followed import off_by_roundings
+from kernels.codegen.to_tolerance import FINER
 from kernels.foliot import _units
 from kernels.foliot._half_swing import Half, inwards, problem_of, pull, rates
 from kernels.foliot._integrated_swing import cycle_by, first_speed, held, newton

@@ -11,7 +11,7 @@ from mpmath import mp, mpf
 from stiff_scene import DRAWN
 
 import sweep
-from kernels.codegen.stepped import stepped
+from kernels.codegen.compiled import runner
 from kernels.integrate import rosenbrock
 from kernels.integrate.records import Mode
 from kernels.interface import Status
@@ -92,7 +92,7 @@ PENDULUM = Scene(
 
 
 def one_step(scene, state, h, *parameters):
-    m, mode = stepped(scene).M_STIFF, Mode(1.0, (1.0,), parameters, False)
+    m, mode = runner(scene, "rodas5p").m, Mode(1.0, (1.0,), parameters, False)
     return rosenbrock.tried(m, state, mode, h)
 
 

@@ -1,0 +1,194 @@
+"""A scene as compiled code, made once for each method.
+
+What Python calls lies as a file in the folder of the kernels' own machine code (`cache`), named by the scene and a
+digest of its graph; all else is made of its functions (`functions`) in memory.
+"""
+
+import contextlib
+import functools
+import os
+import sys
+import tempfile
+import threading
+from pathlib import Path
+from types import ModuleType
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba.core.errors import NumbaError
+
+from kernels.codegen.functions import Functions, cell_of, entry
+from kernels.codegen.record import record
+from kernels.integrate import adaptive, fixed_step, taylor_leg
+from kernels.integrate.driver import advance
+from kernels.integrate.pairs import DOP853, DOPRI5, kept_on_kink
+from kernels.integrate.records import Written
+from kernels.integrate.rosenbrock import RODAS5P_PAIR
+from kernels.lanes import cache
+from kernels.lanes.jit import COMPILED, cached, jit_call
+from kernels.source_text.expression import FUNCTIONS, SceneError
+
+PAIRS = {"dopri5": DOPRI5, "dop853": DOP853, "rodas5p": RODAS5P_PAIR}
+ORDERS = (12, 18)
+_BUILDING = threading.RLock()
+"""No thread may be given a module that another one is still making."""
+
+RUN = '''
+"""Cells of the scene {name}: written by kernels; do not change it here."""
+
+from kernels.codegen.compiled import kept
+from kernels.lanes.refill import each_refilled
+
+
+@kept
+def run(cells, memory, held, together):
+    """Each cell, a row of what a lane knows, until its last switch."""
+    each_refilled(advance, cells, memory, held, together)
+'''
+
+
+class Runner(NamedTuple):
+    """What runs cells of a scene by one method.
+
+    m : what is written of the scene; its `cell` is all that a lane knows of one
+    low, high : the compiled loops over cells (`lanes.refill`), of wide tolerances and of tight ones
+    order : of an embedded pair; None where the first step does not hang on the tolerance
+    """
+
+    scene: Any
+    m: Written
+    low: Any
+    high: Any
+    order: float | None = None
+
+    @property
+    def outputs(self):
+        """How many outputs there are: time, interval, and the states but for a clock."""
+        return 2 + len(self.scene.states) - (self.scene.start_time is not None)
+
+
+@functools.cache
+def written_of(scene):
+    """The scene's functions, and what is written of it for every method."""
+    functions = Functions(scene, record(scene))
+    return functions, functions.written()
+
+
+@functools.cache
+def runner(scene, method):
+    """What runs the scene by a method.
+
+    Parameters
+    ----------
+    method : "taylor"; "told", the same with its error carried along; one of `PAIRS`; "fixed": steps of a fixed length
+    """
+    functions, m = written_of(scene)
+    if method == "taylor":
+        return Runner(scene, m, *_by_series(functions, m))
+    functions = Functions(scene, record(scene))  # derivatives come into its graph in an order of their own
+    if method == "told":
+        m = m._replace(cell=cell_of(*functions.size, True))
+        return Runner(scene, m, *_by_series(functions, m, functions.changes()))
+    if method == "fixed":
+        m = m._replace(cell=fixed_step.cell_of(m.cell))
+
+        @jit_call
+        def of_lanes(memory, i):
+            return fixed_step.advance(m, memory, i)
+
+        run = running(functions, of_lanes, "fixed")
+        return Runner(scene, m, run, run)
+    m = m._replace(**dict(zip(("factored", "solved"), functions.linear(), strict=True)))
+    pair = kept_on_kink(PAIRS[method]) if scene.slides else PAIRS[method]
+
+    @jit_call
+    def leg(state, mode, unit, h, on, tolerance, active, errors):
+        return adaptive.to_event(m, pair, state, mode, unit, h, on, tolerance, active)
+
+    run = _driven(functions, m, leg, method)
+    return Runner(scene, m, run, run, pair.order)
+
+
+def _by_series(functions, m, changes=None):
+    """The loops of both orders; with an error that is carried along by these changes (`Functions.of_series`)."""
+    nested = functions.recorded.nested
+    at_kink, hides = entry(nested) if nested else None, any(map(any, m.hiding)) or None
+
+    def run(order):
+        series = functions.of_series(m, order, changes)
+
+        @jit_call
+        def leg(state, mode, unit, h, on, tolerance, active, errors):
+            return taylor_leg.to_event(series, state, mode, unit, h, on, tolerance, active, errors, hides, at_kink)
+
+        return _driven(functions, m, leg, f"taylor_{order}", series.error)
+
+    return map(run, ORDERS)
+
+
+def _driven(functions, m, leg, kind, tells=None):
+    """What runs cells, leg by leg; `tells` : `carried.Changes` where the error is carried along."""
+    further, slides, kinks = functions.recorded.surfaces, m.slides, len(functions.kinks)
+    mark = 2.0 if functions.scene.only_first else 1.0
+    surfaces = tuple(mark * (j in further) for j in range(kinks)) if further else None
+
+    @jit_call
+    def of_lanes(memory, i):
+        return advance(m, leg, memory, i, tells, slides, surfaces)
+
+    return running(functions, of_lanes, kind if tells is None else f"{kind}_told")
+
+
+def running(functions, of_lanes, kind):
+    """What runs cells, of which `of_lanes` takes every lane on until one has finished."""
+    name = functions.scene.name
+    module, text = f"{kind}_{name}_{functions.digest}", RUN.lstrip().format(name=name)
+    with _BUILDING:
+        if module not in sys.modules:
+            made = sys.modules[module] = ModuleType(module)
+            made.__file__, made.advance = str(_file_of(module, text)), of_lanes
+            try:
+                # not what the file says, nor Python's compiled copy of it: others may have been there
+                exec(compile(text, made.__file__, "exec"), made.__dict__)
+            except BaseException:
+                del sys.modules[module]
+                raise
+        return sys.modules[module].run
+
+
+def _file_of(name, text):
+    """The file of that text: among the kernels' machine code, or where that cannot be, a temporary one."""
+    folder = cache.FOLDER or Path(tempfile.mkdtemp(prefix="foliot_scene_"))
+    path = folder / f"{name}.py"
+    if not path.is_file() or path.read_text() != text:
+        handle, draft = tempfile.mkstemp(dir=folder, suffix=".draft")
+        with os.fdopen(handle, "w") as file:
+            file.write(text)
+        Path(draft).replace(path)
+    return path
+
+
+def kept(function):
+    """A function called from Python, whose machine code is kept: its file is named by all it was made from."""
+    if COMPILED:
+        return cached(function)
+
+    @functools.wraps(function)
+    def call(*arguments):
+        with np.errstate(all="ignore"):  # 1/0 is inf here as in compiled code
+            return function(*arguments)
+
+    return call
+
+
+@contextlib.contextmanager
+def compiling(scene, method):
+    """Where numba fails inside, a SceneError of two lines in place of its hundred."""
+    try:
+        yield
+    except NumbaError as error:
+        why = next((line.strip() for line in str(error).splitlines() if line.strip() and "Failed in" not in line), "")
+        raise SceneError(
+            f"the scene {scene} cannot be compiled for the method {method}: {why[:200]}\n"
+            f"Take another method, or say the scene in simpler terms: {FUNCTIONS}"
+        ) from None

@@ -1,0 +1,202 @@
+"""Columns of cells solved to a tolerance: followed so often that the result can be believed.
+
+Each step is right to a tolerance; what many steps come to depends on the scene. By Taylor series the error is carried
+along (`integrate.carried`), signed and of first order; STATED times that is to be believed. A cell of which that does
+not show that it is right is followed again with a tolerance as much smaller; what then is left, and every cell by
+another method, is followed three times. But where the error grows as large as the motion, several runs may agree by
+chance, so that is INACCURATE.
+
+Of three runs, the rough and the finest one have tolerances FINER apart: what they differ by is the rough one's error,
+of which the finest, whose results are given, has about 1/FINER. The rough run's parameters are some roundings off
+(`off_by_roundings`), and so are its start and the times of its events (`shake`); the third run has the opposite
+roundings, and a tolerance between those two. It shows what a scene makes of rounding, which two runs may share, and
+where two runs have the same error by chance.
+
+Cells that come to rest or stick are gone on with: `accumulated`, `sliding`.
+"""
+
+import contextlib
+import functools
+from dataclasses import replace
+
+import numpy as np
+
+from kernels.codegen.accumulated import to_rest
+from kernels.codegen.compiled import runner
+from kernels.codegen.followed import followed, off_by_roundings, passages, status_of
+from kernels.codegen.record import record
+from kernels.integrate.carried import SMALL
+from kernels.interface import FIRST_REFUSAL, Status
+from kernels.source_text.expression import SceneError
+
+ROUNDING = 1e-14
+"""The least rtol that is promised, whatever the runs agree to."""
+ROUGH, BETWEEN, FINER = 2.0, 4.0, 16.0
+MANY = 8.0
+"""By how many times as many roundings parameters are changed: beside them those of the steps of a run are few."""
+APART = 4.0
+"""How many rtol the first run may be from the finest, which is then right to rtol/4 as far as steps go."""
+CONVERGED, BY_STEPS, ROUNDED = 3.0, 0.4, 0.2
+"""How many times nearer to the finest run the one between is where both are off by their steps: it may then differ by
+BY_STEPS of rtol; else rounding is what tells them apart, of which the finest run has no less, and by ROUNDED of it."""
+TIGHTER, TIGHT = 1e-4, 1e-14
+"""The second tolerance, over the first one, and at most: what is stiff may come to rest only in the last digits."""
+TIGHTEST = 1e-13
+"""The tightest second tolerance of an embedded pair: below it rounding stops the steps."""
+TRIED_AGAIN = Status.INACCURATE, Status.GRAZING, Status.STEP_LIMIT, Status.OUT_OF_RANGE
+STATED = 1.5
+"""Stated error over the one carried along."""
+OF_A_STEP = 0.25
+"""Tolerance of a step over the one of the whole motion: errors of some steps may add up."""
+SMALLER, SMALLEST = 4.0, 1e-5
+"""By how much less than what would do a second tolerance is, and the least share of the first one that is tried."""
+AT_SWITCHES = 1e-3
+"""The second tolerance along the way, over the first one."""
+SLIDERS = {"taylor": ("dop853", "rodas5p")}
+"""Methods by which a method follows what slides along a kink, where that is not itself."""
+
+
+def solver(scene, method):
+    """The function of columns and rtol that solves cells by a method: rows of time, interval and states; the status."""
+    if method == "taylor":
+        how = to_rest(lambda columns, rtol: by_error(scene, columns, rtol), scene)
+    else:
+        how = to_rest(lambda columns, rtol: by_runs(runner(scene, method), columns, rtol, TIGHTEST), scene)
+    recorded = record(scene)
+    graph = recorded.graph
+    # powers of abs(u) are followed to u = 0 by series alone (`integrate.powers`); a kink may be a surface too
+    if graph.powers or recorded.shared or len(graph.kinks) == len(recorded.surfaces):
+        return how
+
+    def solve(columns, rtol):
+        rows, status = how(columns, rtol)
+        for slider in SLIDERS.get(method, (method,)):  # the next where one finds no end of a cell's slide
+            cells = np.flatnonzero(status == Status.STICKS)
+            if len(cells):
+                some, along = [c[cells] for c in columns], runner(sliding(scene), slider)
+                rows[:, cells], status[cells] = by_runs(along, some, rtol[cells], TIGHTEST)
+        return rows, status
+
+    return solve
+
+
+@functools.cache
+def sliding(scene):
+    """The scene that slides, for all methods; recorded at once as the scene is, or refused where it is asked for."""
+    scene = replace(scene, slides=True)
+    with contextlib.suppress(SceneError):
+        record(scene)
+    return scene
+
+
+def once(one, columns, rtol):
+    """Rows and status by one run, each step right to `rtol`."""
+    results = followed(one, columns, rtol)
+    return results[: one.outputs], status_of(results, results[-1], one.outputs)
+
+
+def by_runs(one, columns, rtol, tightest=0.0):
+    """Rows and status by three runs; INACCURATE where they differ by more than the finest one could mend.
+
+    Where they do, or a run breaks off, the cell is followed by three again, with a tighter tolerance, of at least
+    `tightest`.
+    """
+    rows, status = _compared(one, columns, rtol, rtol)
+    tighter = np.maximum(np.minimum(TIGHT, TIGHTER * rtol), tightest)
+    again = np.flatnonzero(np.isin(status, TRIED_AGAIN) & (tighter < rtol) & (rtol >= ROUNDING))
+    if len(again):
+        better, verdict = _compared(one, [c[again] for c in columns], tighter[again], rtol[again])
+        right = verdict <= Status.INACCURATE
+        rows[:, again[right]], status[again[right]] = better[:, right], verdict[right]
+    return rows, status
+
+
+def _compared(one, columns, rtol, wanted):
+    """Rows of the finest of three runs to the tolerance `rtol`, and the status where `wanted` is to be met."""
+    fine, rough, doubt = three_runs(
+        lambda columns, finer, shake: followed(one, columns, rtol, rtol / finer, shake=shake), columns
+    )
+    status = status_of(fine, fine[-1], one.outputs)
+    right = doubt.max(axis=0) <= wanted
+    status[((wanted < ROUNDING) | ~right) & (status == Status.OK)] = Status.INACCURATE
+    worse = (rough[-1] > 0) & (status <= Status.INACCURATE)
+    status[worse] = np.where(rough[-1][worse] < FIRST_REFUSAL, rough[-1][worse], Status.INACCURATE)
+    return fine[: one.outputs], status
+
+
+def three_runs(run, columns):
+    """The results of the finest and of the rough run, and how far off the finest one may be, a row each; NaN may be.
+
+    `run` : (columns, finer, shake) -> results
+    """
+    rough = run(off_by_roundings(columns, MANY), ROUGH, 1.0)
+    other = run(off_by_roundings(columns, -MANY), ROUGH * BETWEEN, -1.0)
+    fine = run(columns, ROUGH * FINER, 0.0)
+    states = (len(fine) - 3) // 2
+    scale = np.concatenate([abs(fine[:2]), fine[2 + states : -1]])
+    with np.errstate(all="ignore"):
+        apart = (abs(fine - one)[: 2 + states] for one in (rough, other))
+        far, close = (np.where(x == 0.0, 0.0, x / scale) for x in apart)
+        share = np.where(CONVERGED * close <= far, BY_STEPS, ROUNDED)
+        return fine, rough, np.maximum(far / APART, close / share)
+
+
+def by_error(scene, columns, rtol):
+    """Rows and status by one run where that states an error below `rtol`, else by three."""
+    one = runner(scene, "told")
+    results, status, error = told(one, columns, rtol, rtol * OF_A_STEP)
+    again = np.flatnonzero((status != Status.OK) & (results[-1] == Status.OK) & (error < np.inf) & (rtol >= ROUNDING))
+    if len(again):
+        share = OF_A_STEP * np.maximum(rtol[again] / (SMALLER * STATED * error[again]), SMALLEST)
+        share[error[again] > SMALL] = OF_A_STEP * SMALLEST  # first order does not say how much of it is steps'
+        some, wanted, least = [c[again] for c in columns], rtol[again], error[again] * share / OF_A_STEP
+        results[:, again], status[again], error[again] = told(one, some, wanted, share * wanted, least)
+    by_chance = (error > SMALL) & (error < np.inf) & (results[-1] < FIRST_REFUSAL)
+    left, rows = np.flatnonzero((status != Status.OK) & ~by_chance), results[: one.outputs]
+    if len(left):
+        rows[:, left], status[left] = by_runs(one, [c[left] for c in columns], rtol[left])
+    return rows, status
+
+
+def told(one, columns, rtol, of_a_step, least=0.0):
+    """Results, status and carried error; OK where the stated one is at most rtol, of which `least` is believed."""
+    found = followed(one, columns, rtol, of_a_step, told=True)
+    results, error = found[:-1], found[-1]
+    status = status_of(results, results[-1], one.outputs)
+    status[~(STATED * np.maximum(error, least) <= rtol) | (rtol < ROUNDING)] = Status.INACCURATE
+    return results, status, error
+
+
+def at_switches(scene, method, columns, rtol, stops):
+    """Time, interval, states (n_rows, n_stops, n_cells), the error of each cell, relative, and its status.
+
+    Along the way the error is carried; by a method other than "taylor" three runs are compared. What a motion does not
+    come to is NaN; a cell's status is OK, or what was remarked, or why there is nothing at all.
+    """
+    n = len(scene.states)
+    found, error = _along(scene, method, columns, rtol, stops)
+    again = np.flatnonzero(~(error <= rtol))
+    if len(again):
+        better, less = _along(scene, method, [c[again] for c in columns], AT_SWITCHES * rtol[again], stops)
+        mended = ~(less >= error[again])
+        found[:, :, again[mended]], error[again[mended]] = better[:, :, mended], less[mended]
+    verdict = found[-1]
+    ended = (verdict >= FIRST_REFUSAL) | np.isnan(verdict)
+    rows = np.where(ended, np.nan, found[: 2 + n])
+    worst = np.fmax.reduce(np.where(ended, 0.0, verdict), axis=0)
+    why = np.fmax.reduce(verdict, axis=0)
+    short = np.where(why == Status.STICKS, Status.COMES_TO_REST, Status.TOO_SHORT)
+    status = np.where(ended.all(axis=0), why, np.where(ended.any(axis=0), short, worst))
+    return rows, error, status.astype(np.int8)
+
+
+def _along(scene, method, columns, rtol, stops):
+    """Results of one tolerance and their error."""
+    if method == "taylor":
+        found = passages(runner(scene, "told"), columns, OF_A_STEP * rtol, stops, told=True)
+        return found[:-1], STATED * np.fmax.reduce(found[-1], axis=0)
+    one, ends = runner(scene, method), [*columns, np.full(len(rtol), stops[-1])]
+    fine, _, doubt = three_runs(
+        lambda columns, finer, shake: passages(one, columns[:-1], rtol / finer, stops, shake=shake), ends
+    )
+    return fine, np.fmax.reduce(doubt.reshape(-1, doubt.shape[-1]), axis=0)
