@@ -90,7 +90,7 @@ def runner(scene, method):
         m = m._replace(cell=cell_of(*functions.size, True))
         return Runner(scene, m, *_by_series(functions, m, functions.changes()))
     if method == "fixed":
-        m = m._replace(cell=fixed_step.cell_of(m.cell))
+        m = m._replace(cell=m.cell._replace(own=fixed_step.nothing_yet(m.cell.state)))
 
         @jit_call
         def of_lanes(memory, i):
@@ -128,13 +128,10 @@ def _by_series(functions, m, changes=None):
 
 def _driven(functions, m, leg, kind, tells=None):
     """What runs cells, leg by leg; `tells` : `carried.Changes` where the error is carried along."""
-    further, slides, kinks = functions.recorded.surfaces, m.slides, len(functions.kinks)
-    mark = 2.0 if functions.scene.only_first else 1.0
-    surfaces = tuple(mark * (j in further) for j in range(kinks)) if further else None
 
     @jit_call
     def of_lanes(memory, i):
-        return advance(m, leg, memory, i, tells, slides, surfaces)
+        return advance(m, leg, memory, i, tells)
 
     return running(functions, of_lanes, kind if tells is None else f"{kind}_told")
 

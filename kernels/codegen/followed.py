@@ -66,7 +66,7 @@ def _at_stops(runner, run, columns, of_a_step, stops, together, shake, told):
     """
     cell, flips = runner.m.cell, columns[-1]
     row, rows = first_rows(cell), len(flat(cell))
-    shown = [*range(row["time"], row["verdict"] + 1), *([row["errors"] + 1] if told else [])]
+    shown = [*range(row["time"], row["verdict"] + 1), *([row["own"] + 1] if told else [])]
     tolerance = np.maximum(of_a_step, FINEST)
     inputs = [*columns, tolerance, np.full(len(flips), shake)]
     for begin in range(0, len(flips), AT_ONCE):
@@ -77,8 +77,8 @@ def _at_stops(runner, run, columns, of_a_step, stops, together, shake, told):
         cells[:, row["interval"] : row["size"]] = np.nan
         # two runs by a pair that began alike would share the steps that grow by the most allowed, and their errors
         cells[:, row["h"]] = 1.0 if runner.order is None else tolerance[part] ** (1.0 / runner.order)
-        if cell.errors:
-            cells[:, row["errors"]] = float(told)
+        if cell.own:
+            cells[:, row["own"]] = float(told)
         for k, stop in enumerate(stops):
             cells[:, row["flips"]] = np.minimum(whole, stop)
             to_the_end(run, cells, together)

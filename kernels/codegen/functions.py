@@ -253,6 +253,9 @@ class Functions:
             float(f".sign_{j}" in signs and j not in recorded.surfaces and u is not recorded.events[0][2])
             for j, u in enumerate(self.kinks)
         )
+        further = recorded.surfaces
+        mark = 2.0 if scene.only_first else 1.0
+        surfaces = tuple(mark * (j in further) for j in range(len(self.kinks))) if further else None
         passable = tuple(
             float(not any(x.kind == INPUT and x.args[0] == "side" for x in needed(event)))
             for event in (recorded.surface, *self.kinks)
@@ -261,8 +264,8 @@ class Functions:
             **of_state, numbers=tuple(map(float, range(1 + len(self.kinks)))),
             alternating=tuple((-1.0) ** j for j in range(len(self.states))),
             most_kinks=KINK_LIMIT if scene.most_kinks is None else float(scene.most_kinks), cell=cell_of(*self.size),
-            slides=slides, hiding=hiding, passable=passable, deciding=deciding if any(deciding) else None,
-            factored=None, solved=None,
+            slides=slides, surfaces=surfaces, hiding=hiding, passable=passable,
+            deciding=deciding if any(deciding) else None, factored=None, solved=None,
         )  # fmt: skip
 
     def linear(self):

@@ -14,9 +14,10 @@ import numpy as np
 
 from kernels.codegen.followed import off_by_roundings
 from kernels.integrate.events import METHODS, MOREAU, NONE
+from kernels.integrate.fixed_step import TOLERANCE
 from kernels.interface import FIRST_REFUSAL, Status
 from kernels.lanes.refill import fresh, to_the_end
-from kernels.lanes.tuples import flat
+from kernels.lanes.tuples import first_rows, flat
 from kernels.maths.elementary import NORMAL_HIGH, NORMAL_LOW
 
 LOCATED, BLIND = ((0.37, 2.0), (0.77, 1.0)), ((0.23, 1.0), (0.61, 1.0))
@@ -44,14 +45,17 @@ def followed(runner, method, columns, step, location, substeps=1.0):
     step, location : columns
     substeps : of a step
     """
-    results = np.full((6 + 2 * len(runner.scene.states), len(step)), np.nan)
+    cell, states = runner.m.cell, len(runner.scene.states)
+    row = first_rows(cell)
+    shown = [*range(row["time"], row["size"]), *range(row["own"], row["own"] + states + 3), row["verdict"]]
+    results = np.full((6 + 2 * states, len(step)), np.nan)
     for one in np.unique(location):
         cells = location == one
-        extra = (step, GRAZING, METHODS.index(method), one, substeps)
-        rows = [np.broadcast_to(c, step.shape)[cells] for c in (*columns, *extra)]
-        table = fresh(len(flat(runner.m.cell)), rows)
+        table = fresh(len(flat(cell)), [np.broadcast_to(c, step.shape)[cells] for c in (*columns, TOLERANCE)])
+        table[:, row["h"]] = step[cells]
+        table[:, -4:] = GRAZING, METHODS.index(method), one, substeps
         to_the_end(runner.low, table)
-        results[:, cells] = table[:, 1 + len(rows) : 1 + len(rows) + len(results)].T
+        results[:, cells] = table[:, shown].T
     return results
 
 

@@ -260,19 +260,16 @@ def at_event(m, error, changes, full, state, mode, unit, ends, here, pieces, cor
 
 
 @symbolic
-def started(errors, state, fresh):
-    """The errors of fresh lanes: a start is rounded."""
-    if not errors:
-        return ()
-    parts = zip(state, errors.spread, strict=True)
-    return errors._replace(spread=tuple(where(fresh, ULP * magnitude(u), x) for u, x in parts))
+def started(tells, errors, state):
+    """The errors at the start, which is rounded."""
+    return errors if tells is None else errors._replace(spread=tuple(ULP * magnitude(u) for u in state))
 
 
 @symbolic
-def later(errors, at_event, unit):
+def later(tells, errors, at_event, unit):
     """The errors at the end of a leg."""
-    if not errors:
-        return ()
+    if tells is None:
+        return errors
     late, spread_late = at_event.late, at_event.spread_late
     return errors._replace(
         late=fma(late, unit, errors.late),
@@ -294,10 +291,10 @@ def faded(largest, new, spread, noise, switches):
 
 
 @symbolic
-def at_switch(errors, rates, switches):
+def at_switch(tells, errors, rates, switches):
     """The errors of the lanes that switch; `rates` are those before."""
-    if not errors:
-        return ()
+    if tells is None:
+        return errors
     parts = zip(errors.once, errors.off, errors.spread, rates, strict=True)
     return errors._replace(
         latest=faded(errors.latest, errors.late, errors.spread_late, errors.noise, switches),
@@ -307,10 +304,10 @@ def at_switch(errors, rates, switches):
 
 
 @symbolic
-def stated(errors, watched, time, since, size):
+def stated(tells, errors, watched, time, since, size):
     """The errors with the largest one, relative, of the lanes at a switch that is watched."""
-    if not errors:
-        return ()
+    if tells is None:
+        return errors
     parts = tuple(x / where(largest > 0.0, largest, 1.0) for x, largest in zip(errors.once, size, strict=True))
     error = fold(most, most(errors.latest / time, errors.lagged / since), (), parts)
     peaks = tuple(x / where(largest > 0.0, largest, 1.0) for x, largest in zip(errors.peak, size, strict=True))
@@ -320,20 +317,20 @@ def stated(errors, watched, time, since, size):
 
 
 @symbolic
-def behind(m, errors, state, mode, rates, switches):
+def behind(tells, errors, state, mode, rates, switches):
     """The errors behind a switch, and what it makes of the rates before it, as of changes of the states."""
-    if not errors:
-        return (), rates
+    if tells is None:
+        return errors, rates
     lag, spread_lag = where(switches, 0.0, errors.lag), where(switches, errors.noise, errors.spread_lag)
-    off, spread, rates = (choose(switches, m.behind(state, mode, x), x) for x in (errors.off, errors.spread, rates))
+    off, spread, rates = (choose(switches, tells.behind(state, mode, x), x) for x in (errors.off, errors.spread, rates))
     return errors._replace(off=off, lag=lag, spread=spread, spread_lag=spread_lag), rates
 
 
 @symbolic
-def misplaced(m, errors, rates, state, mode, lanes):
+def misplaced(tells, m, errors, rates, state, mode, lanes):
     """The errors behind an event that is misplaced by itself: for that time the rates were those before it."""
-    if not errors:
-        return ()
+    if tells is None:
+        return errors
     parts = zip(errors.spread, rates, m.rates(state, mode), strict=True)
     return errors._replace(
         spread=tuple(where(lanes, further(x, magnitude(f - g) * errors.noise), x) for x, f, g in parts)

@@ -10,7 +10,7 @@ import math
 from typing import NamedTuple
 
 from kernels.integrate import carried
-from kernels.integrate.records import Cell, Mode
+from kernels.integrate.records import Mode
 from kernels.lanes.codes import BAD_INPUT, GRAZING, INACCURATE, OUT_OF_RANGE, REFUSED, STEP_LIMIT, STICKS
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.symbols import fold, over_tuples, symbolic
@@ -204,7 +204,7 @@ def which_met(signs, surfaces, first, met):
 
 
 @symbolic
-def held_by(m, state, side, signs, parameters, unit, surfaces, on, falls):
+def held_by(m, state, side, signs, parameters, unit, on, falls):
     """The signs behind a switch: 1 for a surface that the motion is on and does not leave, which holds it.
 
     `falls` : the rates of the events before the switch
@@ -212,7 +212,7 @@ def held_by(m, state, side, signs, parameters, unit, surfaces, on, falls):
     rates = rates_of_events(m, state, Mode(side, signs, parameters, False), unit)
     held = tuple(
         (s > 0.5) & (o > 0.5) & ((magnitude(rate) <= BACK * magnitude(fall)) | ((1.0 - passable) * rate < 0.0))
-        for s, o, rate, fall, passable in zip(surfaces, on, rates[1:], falls[1:], m.passable[1:], strict=True)
+        for s, o, rate, fall, passable in zip(m.surfaces, on, rates[1:], falls[1:], m.passable[1:], strict=True)
     )
     return joined(tuple(where(x, 1.0, sign) for x, sign in zip(held, signs[:-1], strict=True)), signs[-1:])
 
@@ -224,147 +224,203 @@ def rates_of_events(m, state, mode, unit):
     return tuple(factor * u[1] for offset, factor, u in m.jet(state, mode, unit, ()).events)
 
 
+@symbolic
+def mode_of(cell):
+    """The smooth piece of the motion that the cell is on."""
+    return Mode(cell.side, cell.signs, cell.parameters, False)
+
+
+@symbolic
+def first_of(sign, on):
+    """Whether a surface is met where its event fires: where its sign is -1 the motion comes up from behind it."""
+    return (on > 0.5) & (sign > 0.0)
+
+
+@symbolic
+def raised(verdict, lanes, least):
+    """The verdict, at least that one in the lanes."""
+    return where(lanes & (verdict < least), least, verdict)
+
+
+@symbolic
+def started(m, cell, tells):
+    """The cell at its start; a further surface that it starts on and falls through is met at once."""
+    start = begun(m, cell.flips, cell.parameters)
+    endless = not_((cell.flips >= 1.0) & (cell.flips < math.inf))
+    unsure = where(start.blur <= BLUR * cell.tolerance, 0.0, INACCURATE)
+    off = missed_by(cell.shake)
+    cell = cell._replace(
+        state=tuple(fma(ONE_ULP * odd * off, u, u) for odd, u in zip(m.alternating, start.state, strict=True)),
+        side=start.side, signs=start.signs, unit=start.unit, on=start.on,
+        verdict=where(start.beyond | endless, BAD_INPUT, unsure), own=carried.started(tells, cell.own, start.state),
+    )  # fmt: skip
+    if m.slides is not None:
+        cell = onto_kinks(m, cell, tuple(0.0 * cell.side for sign in cell.signs[:-1]), cell.side < math.inf)
+    if m.surfaces is None:
+        return cell
+    signs, on = cell.signs, cell.on
+    falls = tuple(
+        (o > 0.5) & (s > 0.5) & (sign < 0.0) for o, s, sign in zip(on[1:], m.surfaces, signs[:-1], strict=True)
+    )
+    return cell._replace(
+        signs=joined(tuple(where(x, 1.0, sign) for x, sign in zip(falls, signs[:-1], strict=True)), signs[-1:]),
+        on=joined(on[:1], tuple(where(x, 0.0, o) for x, o in zip(falls, on[1:], strict=True))),
+    )
+
+
+@symbolic
+def onto_kinks(m, cell, left, lanes):
+    """The cell, which slides where it is pressed onto a kink; `left` : 1 for the kink slid along to its end."""
+    signs, on, faint = pressed(m, cell.state, mode_of(cell), cell.on, left, BLUR * cell.tolerance, lanes)
+    return cell._replace(signs=signs, on=on, verdict=raised(cell.verdict, faint, GRAZING))
+
+
+@symbolic
+def arrived(m, cell, found, late, active, tells):
+    """The cell at the end of a leg; which lanes are on an event; the rates there, before rounding misses it."""
+    verdict = raised(cell.verdict, found.hangs | found.grazing, GRAZING)
+    refused = where(found.stuck, STICKS, where(found.broken, OUT_OF_RANGE, verdict))
+    verdict = where(found.lost, STEP_LIMIT, refused)
+    if m.slides is not None:  # lanes whose slide has no end rest, as far as can be told
+        sliding = fold(plus, 0.0, (), tuple(magnitude(sign) for sign in cell.signs[:-1])) < len(cell.signs) - 1.5
+        verdict = where(active & sliding & (found.lost | found.broken), STICKS, verdict)
+    moving = active & (cell.verdict < REFUSED) & (verdict < REFUSED) & not_(found.grazing)
+    state, mode = choose(moving, found.state, cell.state), mode_of(cell)
+    place, rates = open_for(m, state, mode, found.on), m.rates(state, mode)
+    shaken, shake = moving & (magnitude(cell.shake) > 0.0), shaken_on(cell.shake)
+    off = missed_by(shake) * place
+    return cell._replace(
+        shake=shake, verdict=verdict, h=found.h, on=found.on, size=reached(cell.size, found.reach),
+        state=tuple(where(shaken, fma(off, rate, u), u) for rate, u in zip(rates, state, strict=True)),
+        time=where(moving, fma(found.t, cell.unit, cell.time), cell.time),
+        since=where(moving, fma(found.t, cell.unit, cell.since), cell.since),
+        steps=where(active, found.tried, cell.steps), before=where(active, cell.steps, cell.before),
+        own=carried.later(tells, cell.own, late, cell.unit),
+    ), moving, rates  # fmt: skip
+
+
+@symbolic
+def meets(m, cell, moving):
+    """The lanes that switch; whose switch counts; those at the first surface, at each further one (() for none)."""
+    first = moving & first_of(cell.signs[-1], cell.on[0])
+    if m.surfaces is None:
+        return first, first, first, ()
+    parts = zip(cell.on[1:], m.surfaces, cell.signs[:-1], strict=True)
+    met = tuple(moving & (s > 0.5) & first_of(sign, o) for o, s, sign in parts)
+    counts = first | any_of(tuple(x & (s < 1.5) for x, s in zip(met, m.surfaces, strict=True)))
+    return first | any_of(met), counts, first, met
+
+
+@symbolic
+def turned(m, cell, moving, switches, counts):
+    """The cell with the signs behind what it has met; 1 for the kink that it has slid along to its end."""
+    on, signs, left = cell.on, cell.signs, ()
+    if m.slides is not None:  # at the end of a slide the kink's sign is 0, and stays so
+        held = tuple(moving & (magnitude(sign) < 0.5) for sign in signs[:-1])
+        left = tuple(where(x & (o > 0.5) & not_(switches), 1.0, 0.0) for x, o in zip(held, on[1:], strict=True))
+        on = joined(on[:1], tuple(where(x, 1.0, o) for x, o in zip(held, on[1:], strict=True)))
+    turned = tuple(where(moving & (o > 0.5), -sign, sign) for sign, o in zip(signs[:-1], on[1:], strict=True))
+    kinks_met = where(counts, 0.0, where(moving, cell.kinks_met + 1.0, cell.kinks_met))
+    signs = joined(turned, (where(moving & (on[0] > 0.5), 1.0, signs[-1]),))
+    return cell._replace(on=on, signs=signs, kinks_met=kinks_met), left
+
+
+@symbolic
+def at_switch(m, cell, rates, switches, counts, tells):
+    """The cell with what is told of the switch that it is on, where that is the first or the last one."""
+    count = where(counts, cell.count + 1.0, cell.count)
+    watched = counts & ((count < 1.5) | (count >= cell.flips))
+    own = carried.at_switch(tells, cell.own, rates, switches)
+    return cell._replace(
+        count=count, own=carried.stated(tells, own, watched, cell.time, cell.since, cell.size),
+        verdict=where(watched & m.underflows(cell.state, mode_of(cell), cell.unit), OUT_OF_RANGE, cell.verdict),
+        interval=where(watched, cell.since, cell.interval), at=choose(watched, cell.state, cell.at),
+        since=where(counts, 0.0, cell.since),
+    )  # fmt: skip
+
+
+@symbolic
+def behind_switch(m, cell, rates, switches, first, met, tells):
+    """The cell behind the switch that it is on, and what that makes of the rates before it."""
+    side, parameters, unit, old, signs = -cell.side, cell.parameters, cell.unit, cell.state, cell.signs
+    which = signs if m.surfaces is None else which_met(signs, m.surfaces, first, met)
+    old_mode = Mode(cell.side, which, parameters, False)
+    own, rates = carried.behind(tells, cell.own, old, old_mode, rates, switches)
+    before, gaps = m.surface(old, old_mode), m.kinks(old, old_mode)
+    verdict = undecided(m, old, old_mode, gaps, BLUR * cell.tolerance, switches, cell.verdict)
+    state = m.switched(old, old_mode)
+    gaps_behind = m.kinks(state, Mode(side, signs, parameters, False))
+    near = tuple(
+        where(magnitude(x) <= 2.0 * magnitude(y), o, 0.0)
+        for x, y, o in zip(gaps_behind, gaps, cell.on[1:], strict=True)
+    )
+    signs, kinks_on = settled(m, state, side, parameters, unit, near)
+    falls = rates_of_events(m, old, old_mode, unit)
+    if m.surfaces is not None:
+        signs = held_by(m, state, side, signs, parameters, unit, kinks_on, falls)
+    mode = Mode(side, signs, parameters, False)
+    after, extent = m.surface(state, mode), m.made(state, mode)[0][0]
+    still = magnitude(after) <= fma(1e-12, extent, 2.0 * magnitude(before))
+    rate = m.passable[0] * rates_of_events(m, state, mode, unit)[0]
+    through = first & still & (rate < -BACK * magnitude(falls[0]))
+    stays = still & first
+    way = where(through | ((after < 0.0) & not_(stays)), -1.0, signs[-1])
+    on = joined((where(stays, 1.0, 0.0),), kinks_on)
+    new = cell._replace(state=state, side=side, signs=joined(signs[:-1], (way,)), on=on, verdict=verdict, own=own)
+    return new, rates
+
+
+@symbolic
+def gone_on(m, cell, rates, left, moving, tells):
+    """The cell on its way to the next event; `rates` : those before the last one, `left` as of `onto_kinks`."""
+    if m.slides is not None:
+        cell = onto_kinks(m, cell, left, moving)
+    own = carried.misplaced(tells, m, cell.own, rates, cell.state, mode_of(cell), moving)
+    verdict = where(moving & (cell.kinks_met > m.most_kinks), STEP_LIMIT, cell.verdict)
+    return cell._replace(own=own, verdict=verdict)
+
+
+@symbolic
+def without_values(cell):
+    """The cell of a motion that may have met an event or not."""
+    at = tuple(math.nan + 0.0 * u for u in cell.at)
+    return cell._replace(time=math.nan, interval=math.nan, at=at)
+
+
+@symbolic
+def staged(cell, stage):
+    """The cell at that stage."""
+    return cell._replace(stage=stage)
+
+
 @jit
-@over_tuples
-def advance(m, leg, memory, i, tells, slides, surfaces):
+def advance(m, leg, memory, i, tells):
     """Every lane on from event to event, until one has finished; whether one has.
 
-    `tells` : `carried.Changes` where the error is carried along, else None; `slides` : None where no motion slides;
-    `surfaces` : 1 for each kink that is a further surface, at which the motion switches too, 2 where such switches do
-    not count; None where there is none
+    `tells` : `carried.Changes` where the error is carried along, else None
     """
     cell = read(memory, i, m.cell)
-    parameters, flips, tolerance, shake = cell.parameters, cell.flips, cell.tolerance, cell.shake
-    state, side, signs, unit, h, on = cell.state, cell.side, cell.signs, cell.unit, cell.h, cell.on
-    time, interval, at, size, verdict = cell.time, cell.interval, cell.at, cell.size, cell.verdict
-    count, since, kinks_met, steps, before = cell.count, cell.since, cell.kinks_met, cell.steps, cell.before
-    errors = cell.errors
-    fresh = (cell.stage > 0.5) & (cell.stage < 1.5)
-    active = fresh | ((cell.stage > 1.5) & (cell.stage < 2.5))
+    stage = cell.stage
+    fresh = (stage > 0.5) & (stage < 1.5)
+    active = fresh | ((stage > 1.5) & (stage < 2.5))
     if any_lane(fresh):
-        start = begun(m, flips, parameters)
-        state, signs, on = (
-            choose(fresh, start.state, state),
-            choose(fresh, start.signs, signs),
-            choose(fresh, start.on, on),
-        )
-        side, unit = where(fresh, start.side, side), where(fresh, start.unit, unit)
-        endless = not_((flips >= 1.0) & (flips < math.inf))
-        unsure = where(start.blur <= BLUR * tolerance, 0.0, INACCURATE)
-        verdict = where(fresh, where(start.beyond | endless, BAD_INPUT, unsure), verdict)
-        errors = carried.started(errors, state, fresh)
-    state = tuple(
-        where(fresh, fma(ONE_ULP * odd * missed_by(shake), u, u), u)
-        for odd, u in zip(m.alternating, state, strict=True)
-    )
-    if slides is not None:
-        left = tuple(0.0 * side for sign in signs[:-1])
-        mode = Mode(side, signs, parameters, False)
-        if any_lane(fresh):
-            signs, on, faint = pressed(m, state, mode, on, left, BLUR * tolerance, fresh)
-            verdict = where(faint & (verdict < GRAZING), GRAZING, verdict)
-    if surfaces is not None:  # what starts on a surface and falls switches at once
-        falls = tuple(
-            fresh & (o > 0.5) & (s > 0.5) & (sign < 0.0)
-            for o, s, sign in zip(on[1:], surfaces, signs[:-1], strict=True)
-        )
-        signs = joined(tuple(where(x, 1.0, sign) for x, sign in zip(falls, signs[:-1], strict=True)), signs[-1:])
-        on = joined(on[:1], tuple(where(x, 0.0, o) for x, o in zip(falls, on[1:], strict=True)))
+        cell = choose(fresh, started(m, cell, tells), cell)
     done = active & not_(active)
     for _ in range(EVENTS):
-        moving = active & (verdict < REFUSED)
-        found, late = leg(state, Mode(side, signs, parameters, False), unit, h, on, tolerance, moving, errors)
-        errors = carried.later(errors, late, unit)
-        verdict = where((found.hangs | found.grazing) & (verdict < GRAZING), GRAZING, verdict)
-        refused = where(found.stuck, STICKS, where(found.broken, OUT_OF_RANGE, verdict))
-        verdict = where(found.lost, STEP_LIMIT, refused)
-        if slides is not None:  # lanes whose slide has no end rest, as far as can be told
-            sliding = fold(plus, 0.0, (), tuple(magnitude(sign) for sign in signs[:-1])) < len(signs) - 1.5
-            verdict = where(active & sliding & (found.lost | found.broken), STICKS, verdict)
-        moving = moving & (verdict < REFUSED) & not_(found.grazing)
-        state, size, h, on = choose(moving, found.state, state), reached(size, found.reach), found.h, found.on
-        mode = Mode(side, signs, parameters, False)
-        place = open_for(m, state, mode, on)
-        shaken, shake = moving & (magnitude(shake) > 0.0), shaken_on(shake)
-        rates, off = m.rates(state, mode), missed_by(shake) * place
-        state = tuple(where(shaken, fma(off, rate, u), u) for rate, u in zip(rates, state, strict=True))
-        time = where(moving, fma(found.t, unit, time), time)
-        since = where(moving, fma(found.t, unit, since), since)
-        first = counts = switches = moving & (on[0] > 0.5) & (signs[-1] > 0.0)
-        if surfaces is not None:
-            met = tuple(
-                moving & (o > 0.5) & (s > 0.5) & (sign > 0.0)
-                for o, s, sign in zip(on[1:], surfaces, signs[:-1], strict=True)
-            )
-            counts = first | any_of(tuple(x & (s < 1.5) for x, s in zip(met, surfaces, strict=True)))
-            switches = switches | any_of(met)
-        kinks_met = where(counts, 0.0, where(moving, kinks_met + 1.0, kinks_met))
-        if slides is not None:  # at the end of a slide the kink's sign is 0, and stays so
-            held = tuple(moving & (magnitude(sign) < 0.5) for sign in signs[:-1])
-            left = tuple(where(x & (o > 0.5), 1.0, 0.0) for x, o in zip(held, on[1:], strict=True))
-            on = joined(on[:1], tuple(where(x, 1.0, o) for x, o in zip(held, on[1:], strict=True)))
-        turned = tuple(where(moving & (o > 0.5), -sign, sign) for sign, o in zip(signs[:-1], on[1:], strict=True))
-        signs = joined(turned, (where(moving & (on[0] > 0.5), 1.0, signs[-1]),))
+        moving = active & (cell.verdict < REFUSED)
+        found, late = leg(cell.state, mode_of(cell), cell.unit, cell.h, cell.on, cell.tolerance, moving, cell.own)
+        cell, moving, rates = arrived(m, cell, found, late, active, tells)
+        switches, counts, first, met = meets(m, cell, moving)
+        cell, left = turned(m, cell, moving, switches, counts)
         if any_lane(switches):
-            mode = Mode(side, signs, parameters, False)
-            count = where(counts, count + 1.0, count)
-            errors = carried.at_switch(errors, rates, switches)
-            watched = counts & ((count < 1.5) | (count >= flips))
-            if any_lane(watched):
-                verdict = where(watched & m.underflows(state, mode, unit), OUT_OF_RANGE, verdict)
-                interval, at = where(watched, since, interval), choose(watched, state, at)
-                errors = carried.stated(errors, watched, time, since, size)
-            since = where(counts, 0.0, since)
-            if surfaces is not None:
-                mode = Mode(side, which_met(signs, surfaces, first, met), parameters, False)
-            errors, rates = carried.behind(tells, errors, state, mode, rates, switches)
-            before_it, old, old_mode = m.surface(state, mode), state, mode
-            gaps = m.kinks(state, mode)
-            verdict = undecided(m, state, mode, gaps, BLUR * tolerance, switches, verdict)
-            jumped = m.switched(state, mode)
-            mode, side = Mode(side, signs, parameters, False), where(switches, -side, side)
-            gaps_behind = m.kinks(jumped, Mode(side, signs, parameters, False))
-            near = tuple(
-                where(magnitude(x) <= 2.0 * magnitude(y), o, 0.0)
-                for x, y, o in zip(gaps_behind, gaps, on[1:], strict=True)
-            )
-            new_signs, kinks_on = settled(m, jumped, side, parameters, unit, near)
-            if surfaces is not None:
-                falls = rates_of_events(m, old, old_mode, unit)
-                new_signs = held_by(m, jumped, side, new_signs, parameters, unit, surfaces, kinks_on, falls)
-            state, signs = choose(switches, jumped, state), choose(switches, new_signs, signs)
-            mode = Mode(side, signs, parameters, False)
-            after, extent = m.surface(state, mode), m.made(state, mode)[0][0]
-            still = magnitude(after) <= fma(1e-12, extent, 2.0 * magnitude(before_it))
-            if m.passable[0] > 0.5:
-                fall, rate = rates_of_events(m, old, old_mode, unit)[0], rates_of_events(m, state, mode, unit)[0]
-                through = first & still & (rate < -BACK * magnitude(fall))
-                signs = joined(signs[:-1], (where(through, -1.0, signs[-1]),))
-            if surfaces is not None:
-                still = still & first
-            on = choose(switches, joined((where(still, 1.0, 0.0),), kinks_on), on)
-            way = where(switches & (after < 0.0) & not_(still), -1.0, signs[-1])
-            signs = joined(signs[:-1], (way,))
-        if slides is not None:
-            left = tuple(where(switches, 0.0, x) for x in left)
-            mode = Mode(side, signs, parameters, False)
-            signs, on, faint = pressed(m, state, mode, on, left, BLUR * tolerance, moving)
-            verdict = where(faint & (verdict < GRAZING), GRAZING, verdict)
-        errors = carried.misplaced(m, errors, rates, state, Mode(side, signs, parameters, False), moving)
-        steps, before = where(active, found.tried, steps), where(active, steps, before)
-        verdict = where(moving & (kinks_met > m.most_kinks), STEP_LIMIT, verdict)
-        done = active & (found.grazing | (verdict >= REFUSED) | (count >= flips))
+            cell = at_switch(m, cell, rates, switches, counts, tells)
+            there, rates = behind_switch(m, cell, rates, switches, first, met, tells)
+            cell = choose(switches, there, cell)
+        cell = gone_on(m, cell, rates, left, moving, tells)
+        done = active & (found.grazing | (cell.verdict >= REFUSED) | (cell.count >= cell.flips))
         if any_lane(found.grazing):
-            time, interval = where(found.grazing, math.nan, time), where(found.grazing, math.nan, interval)
-            at = tuple(where(found.grazing, math.nan, u) for u in at)
+            cell = choose(found.grazing, without_values(cell), cell)
         if any_lane(done):
             break
-    stage = where(done, 3.0, where(active, 2.0, cell.stage))
-    write(
-        memory, i,
-        Cell(
-            stage, parameters, flips, tolerance, shake, time, interval, at, size, verdict,
-            state, side, signs, unit, h, on, count, since, kinks_met, steps, before, errors,
-        ),
-    )  # fmt: skip
+    write(memory, i, staged(cell, where(done, 3.0, where(active, 2.0, stage))))
     return any_lane(done)

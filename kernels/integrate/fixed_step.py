@@ -10,12 +10,12 @@ import math
 from typing import NamedTuple
 
 from kernels.integrate import events as E
-from kernels.integrate.driver import BACK, begun, settled
+from kernels.integrate.driver import BLUR, at_switch, behind_switch, staged, started
 from kernels.integrate.events import cubic_root, leap, lowest, of_event, shortened
 from kernels.integrate.records import Mode, Step
 from kernels.integrate.steps import ONE, events, rate
 from kernels.lanes import codes
-from kernels.lanes.codes import BAD_INPUT, GRAZING, INACCURATE, NOT_CONVERGED, OUT_OF_RANGE, REFUSED, STICKS
+from kernels.lanes.codes import GRAZING, INACCURATE, NOT_CONVERGED, OUT_OF_RANGE, REFUSED, STICKS
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.symbols import fold, symbolic
 from kernels.lanes.tuples import after, any_of, boxes, marks, reached, read, times, write
@@ -31,8 +31,8 @@ HIDDEN = 1e-13
 """Of a state's size, what the rates may hide in a step (`source_text.hidden`) unremarked."""
 LOW = 0.25
 """Of the smaller end: an event that the cubic takes below this share of it is looked at where it is lowest."""
-BLUR = 1e-14
-"""Of the surface's value at the start, what rounding may take from it unremarked."""
+TOLERANCE = 1e-14 / BLUR
+"""As of a motion to a tolerance, so that rounding may take 1e-14 of the surface's value at the start unremarked."""
 
 
 class Scheme(NamedTuple):
@@ -43,51 +43,35 @@ class Scheme(NamedTuple):
     substeps: int
 
 
-class Cell(NamedTuple):
-    """All that a lane knows of its cell; the first entry is the lane's stage, inputs and results follow.
+class Fixed(NamedTuple):
+    """What a lane knows of steps of a fixed length, beside what it does of any motion.
 
-    flips, step, graze : switches to follow; the step; margin of grazing over an event's value at the start of a step
-    time, interval, at, reach_at : of the last switch; states there, and their reach before it
+    reach_at, reach : largest size of each state between the last two switches, and since the last one
     slim : least margin behind a switch
-    on : 1 for the event that the motion starts on
     cut, cuts : length of the step that is tried next (0: a whole one), and how often that has been cut
-    since, trials, reach, wide : since the last switch: time, trials, largest of each state, of the surface's value
+    trials, wide : since the last switch: trials, largest of the surface's value
+    graze : margin of grazing over an event's value at the start of a step
+    method, location, substeps : the `Scheme`
     """
 
-    stage: float
-    parameters: tuple
-    flips: float
-    step: float
-    graze: float
-    method: float
-    location: float
-    substeps: float
-    time: float
-    interval: float
-    at: tuple
     reach_at: tuple
     slim: float
     steps: float
     calls: float
-    verdict: float
-    state: tuple
-    side: float
-    signs: tuple
-    on: tuple
+    reach: tuple
     cut: float
     cuts: float
-    since: float
-    count: float
     trials: float
     wide: float
-    reach: tuple
+    graze: float
+    method: float
+    location: float
+    substeps: float
 
 
-def cell_of(cell):
-    """A cell of zeros, as large as one of `records.Cell`."""
-    u = cell.state
-    motion = u, 0.0, cell.signs, cell.on
-    return Cell(0.0, cell.parameters, *[0.0] * 8, u, u, *[0.0] * 4, *motion, *[0.0] * 6, u)
+def nothing_yet(state):
+    """As zeros, for so many states."""
+    return Fixed(state, 0.0, 0.0, 0.0, state, *[0.0] * 8)
 
 
 @symbolic
@@ -182,71 +166,70 @@ def shows_all(m, state, new, mode, h):
 
 
 @symbolic
-def uncertain(step, motion, missed):
+def uncertain(step, cell, missed):
     """Of a step that is not ended by an event: whether it turns close to one; where it may have been below one."""
-    was_cut, margins = motion.cuts > 0.5, times(motion.graze, reached(times(0.0, motion.on), step.start))
-    parts = zip(step.end, margins, motion.on, strict=True)
+    was_cut, margins = cell.own.cuts > 0.5, times(cell.own.graze, reached(times(0.0, cell.on), step.start))
+    parts = zip(step.end, margins, cell.on, strict=True)
     close = any_of(tuple((magnitude(value) < margin) & (on < 0.5) for value, margin, on in parts))
     return missed & was_cut & close, where(missed & not_(was_cut), dip(step), 0.0)
 
 
 @symbolic
-def moved_on(motion, step, new, taken, calls, verdict, which, again, shorter, below, active):
-    """The motion with one more step of the active lanes; that which must be taken again is shorter."""
-    moved = active & not_(again) & (verdict < REFUSED)
-    on = choose(moved & not_(below), marks(which, motion.on), motion.on)
-    turned = tuple(where(o > 0.5, -sign, sign) for sign, o in zip(motion.signs[:-1], on[1:], strict=True))
-    signs = (*turned, where(on[0] > 0.5, 1.0, motion.signs[-1]))
-    state, taken = choose(moved, new, motion.state), where(moved, taken, 0.0)
-    return motion._replace(
-        state=state,
-        signs=choose(moved, signs, motion.signs),
-        on=on,
+def moved_on(cell, step, new, taken, calls, verdict, which, again, shorter, below, active):
+    """The cell with one more step of the active lanes; that which must be taken again is shorter."""
+    own, moved = cell.own, active & not_(again) & (verdict < REFUSED)
+    on = choose(moved & not_(below), marks(which, cell.on), cell.on)
+    turned = tuple(where(o > 0.5, -sign, sign) for sign, o in zip(cell.signs[:-1], on[1:], strict=True))
+    signs = (*turned, where(on[0] > 0.5, 1.0, cell.signs[-1]))
+    state, taken = choose(moved, new, cell.state), where(moved, taken, 0.0)
+    own = own._replace(
         cut=where(again, shorter, 0.0),
-        cuts=where(again, motion.cuts + 1.0, 0.0),
-        time=where(active, motion.time + taken, motion.time),
-        since=where(active, motion.since + taken, motion.since),
-        steps=where(active & not_(again), motion.steps + 1.0, motion.steps),
-        calls=where(active, motion.calls + calls, motion.calls),
-        trials=where(active, motion.trials + 1.0, motion.trials),
-        reach=choose(active, reached(motion.reach, state), motion.reach),
-        wide=where(active & (step.start[0] > motion.wide), step.start[0], motion.wide),
-        verdict=where(active & (verdict > motion.verdict), verdict, motion.verdict),
+        cuts=where(again, own.cuts + 1.0, 0.0),
+        steps=where(active & not_(again), own.steps + 1.0, own.steps),
+        calls=where(active, own.calls + calls, own.calls),
+        trials=where(active, own.trials + 1.0, own.trials),
+        reach=choose(active, reached(own.reach, state), own.reach),
+        wide=where(active & (step.start[0] > own.wide), step.start[0], own.wide),
     )
+    return cell._replace(
+        state=state, on=on, own=own, signs=choose(moved, signs, cell.signs),
+        time=where(active, cell.time + taken, cell.time), since=where(active, cell.since + taken, cell.since),
+        verdict=where(active & (verdict > cell.verdict), verdict, cell.verdict),
+    )  # fmt: skip
 
 
 @jit_call
-def attempt(m, scheme, motion, active):
+def attempt(m, scheme, cell, active):
     """One step of the active lanes.
 
     Returns
     -------
-    motion : Cell
+    cell : Cell
         After the step.
     which : the event that it ends on, -1 for none, -2 where it must be tried again
     behind : `margin_behind`
     """
-    natural, on = scheme.location == E.NONE, motion.on
-    mode = Mode(motion.side, motion.signs, motion.parameters, natural)
-    h = where(motion.cut > 0.0, motion.cut, motion.step)
-    start, start_rates = events(m, motion.state, mode)
-    new = leap(m, scheme, motion.state, mode, h)
+    natural, on, own = scheme.location == E.NONE, cell.on, cell.own
+    mode = Mode(cell.side, cell.signs, cell.parameters, natural)
+    h = where(own.cut > 0.0, own.cut, cell.h)
+    start, start_rates = events(m, cell.state, mode)
+    new = leap(m, scheme, cell.state, mode, h)
     end, end_rates = events(m, new, mode)
-    step = Step(motion.state, new, h, start, start_rates, end, end_rates)
+    step = Step(cell.state, new, h, start, start_rates, end, end_rates)
     which = first_event(step, on, 1.0 if natural else 0.0)
-    behind = margin_behind(which, step, where(active & (start[0] > motion.wide), start[0], motion.wide))
+    behind = margin_behind(which, step, where(active & (start[0] > own.wide), start[0], own.wide))
     broken = active & not_(finite(new) & finite(end))
     met = active & (which > -0.5) & not_(broken)
     verdict, taken, shorter, again = where(broken, OUT_OF_RANGE, 0.0), h, h, active & not_(active)
     calls = 0.0 * h + E.CALLS[scheme.method] * scheme.substeps
     if scheme.method == E.MOREAU:
-        rests = (magnitude(motion.state[-1]) <= 0.0) & (magnitude(new[-1]) <= 0.0) & not_(met)
+        rests = (magnitude(cell.state[-1]) <= 0.0) & (magnitude(new[-1]) <= 0.0) & not_(met)
         verdict = where(active & rests, STICKS, verdict)
     if not natural:  # ended on the event that it met, or to be cut, for it may hide a root of an event
         pressed = met & (of_event(on, which) > 0.5)
         away = of_event(start_rates, which) > 0.0
         verdict = where(pressed & not_(away), STICKS, verdict)
-        turning, low = uncertain(step, motion, active & not_(met | broken))
+        turning, low = uncertain(step, cell, active & not_(met | broken))
         again = (pressed & away) | (low > 0.0)
         shorter = where(low > 0.0, low * h, 0.5 * h)
         verdict = where(turning & (verdict < GRAZING), GRAZING, verdict)
@@ -259,14 +242,14 @@ def attempt(m, scheme, motion, active):
             calls = where(seeking, calls + more, calls)
             verdict = where(seeking & lost, NOT_CONVERGED, verdict)
             again, shorter = again | other, where(other, part * h, shorter)
-    verdict = where(again & (motion.cuts > CUTS), codes.STEP_LIMIT, verdict)
+    verdict = where(again & (own.cuts > CUTS), codes.STEP_LIMIT, verdict)
     moved = active & not_(again) & (verdict < REFUSED)
     if any_of(m_hides(m)):
-        seen = shows_all(m, motion.state, new, mode, taken)
+        seen = shows_all(m, cell.state, new, mode, taken)
         verdict = where(moved & not_(seen) & (verdict < INACCURATE), INACCURATE, verdict)
     below = moved & natural & (which < -0.5) & (end[0] <= 0.0)  # not yet above where it began
-    motion = moved_on(motion, step, new, taken, calls, verdict, which, again, shorter, below, active)
-    return motion, where(again, -2.0, which), behind
+    cell = moved_on(cell, step, new, taken, calls, verdict, which, again, shorter, below, active)
+    return cell, where(again, -2.0, which), behind
 
 
 @symbolic
@@ -276,84 +259,52 @@ def m_hides(m):
 
 
 @symbolic
-def switched(m, motion, behind, switches):
-    """The motion behind the switch, of the lanes that are on it."""
-    mode = Mode(motion.side, motion.signs, motion.parameters, False)
-    before, falls = events(m, motion.state, mode)
-    faint = m.underflows(motion.state, mode, motion.step)
-    side = where(switches, -motion.side, motion.side)
-    state = choose(switches, m.switched(motion.state, mode), motion.state)
-    signs, kinks_on = settled(m, state, side, motion.parameters, 0.0 * side + 1.0, times(0.0, motion.signs[:-1]))
-    values, rates = events(m, state, Mode(side, signs, motion.parameters, False))
-    still = magnitude(values[0]) <= 2.0 * magnitude(before[0])
-    through = m.passable[0] * rates[0] < -BACK * magnitude(falls[0])
-    below = (still & through) | (not_(still) & (values[0] < 0.0))
-    new = motion._replace(
-        state=state, side=side, signs=(*signs[:-1], where(below, -1.0, signs[-1])),
-        on=(where(still, 1.0, 0.0), *kinks_on), since=0.0, interval=motion.since, count=motion.count + 1.0, trials=0.0,
-        reach=reached(times(0.0, motion.reach), state), at=motion.state, reach_at=motion.reach, wide=0.0,
-        slim=where(behind < motion.slim, behind, motion.slim), verdict=where(faint, OUT_OF_RANGE, motion.verdict),
-    )  # fmt: skip
-    chosen = (
-        choose(switches, x, y) if isinstance(x, tuple) else where(switches, x, y)
-        for x, y in zip(new, motion, strict=True)
-    )
-    return type(motion)(*chosen)
-
-
-@symbolic
-def refused(motion, lanes, verdict):
-    """The motion with that verdict in the lanes."""
-    return motion._replace(verdict=where(lanes, verdict, motion.verdict))
-
-
-@symbolic
-def started(motion, start, fresh):
-    """The motion of the fresh lanes at its start."""
-    endless = not_((motion.flips >= 1.0) & (motion.flips < math.inf))
-    unsure = where(start.blur <= BLUR, 0.0, INACCURATE)
-    state = choose(fresh, start.state, motion.state)
-    return motion._replace(
-        state=state,
-        side=where(fresh, start.side, motion.side),
-        signs=choose(fresh, start.signs, motion.signs),
-        on=choose(fresh, start.on, motion.on),
-        slim=where(fresh, math.inf, motion.slim),
-        reach=choose(fresh, tuple(magnitude(u) for u in state), motion.reach),
-        verdict=where(fresh, where(start.beyond | endless, BAD_INPUT, unsure), motion.verdict),
+def fresh_start(m, cell):
+    """The cell at its start."""
+    cell = started(m, cell, None)
+    return cell._replace(
+        unit=cell.h, own=cell.own._replace(slim=math.inf, reach=tuple(magnitude(u) for u in cell.state))
     )
 
 
 @symbolic
-def put_down(motion, stage):
-    """The motion with the lanes' stages."""
-    return motion._replace(stage=stage)
+def switched(m, cell, behind, switches):
+    """The cell behind the switch that it is on."""
+    own = cell.own
+    own = own._replace(reach_at=own.reach, slim=where(behind < own.slim, behind, own.slim), trials=0.0, wide=0.0)
+    cell, _ = behind_switch(m, at_switch(m, cell, (), switches, switches, None), (), switches, switches, (), None)
+    return cell._replace(own=own._replace(reach=tuple(magnitude(u) for u in cell.state)))
+
+
+@symbolic
+def refused(cell, lanes, verdict):
+    """The cell with that verdict in the lanes."""
+    return cell._replace(verdict=where(lanes, verdict, cell.verdict))
 
 
 @jit
 def advance(m, memory, i):
     """Every lane on by some steps; whether one has finished."""
-    motion = read(memory, i, m.cell)
-    stage = motion.stage
+    cell = read(memory, i, m.cell)
+    stage = cell.stage
     fresh = (stage > 0.5) & (stage < 1.5)
     active = fresh | ((stage > 1.5) & (stage < 2.5))
     if any_lane(fresh):
-        motion = started(motion, begun(m, motion.flips, motion.parameters), fresh)
-    row = 4 + len(motion.parameters)  # behind the stage and three limits
-    scheme = Scheme(int(memory[row][0]), int(memory[row + 1][0]), int(memory[row + 2][0]))
-    moving = active & (motion.verdict < REFUSED)
-    done = active & (motion.verdict >= REFUSED)
+        cell = choose(fresh, fresh_start(m, cell), cell)
+    scheme = Scheme(int(memory[-3][0]), int(memory[-2][0]), int(memory[-1][0]))
+    moving = active & (cell.verdict < REFUSED)
+    done = active & (cell.verdict >= REFUSED)
     for _ in range(TOGETHER):
-        rises = motion.signs[-1] < 0.0
-        motion, which, behind = attempt(m, scheme, motion, moving)
-        switches = moving & (which > -0.5) & (which < 0.5) & not_(rises) & (motion.verdict < REFUSED)
+        rises = cell.signs[-1] < 0.0
+        cell, which, behind = attempt(m, scheme, cell, moving)
+        switches = moving & (which > -0.5) & (which < 0.5) & not_(rises) & (cell.verdict < REFUSED)
         if any_lane(switches):
-            motion = switched(m, motion, behind, switches)
-        late = moving & (motion.trials > STEP_LIMIT) & (motion.verdict < REFUSED)
-        motion = refused(motion, late, codes.STEP_LIMIT)
-        ended = moving & ((motion.verdict >= REFUSED) | (motion.count >= motion.flips))
+            cell = choose(switches, switched(m, cell, behind, switches), cell)
+        late = moving & (cell.own.trials > STEP_LIMIT) & (cell.verdict < REFUSED)
+        cell = refused(cell, late, codes.STEP_LIMIT)
+        ended = moving & ((cell.verdict >= REFUSED) | (cell.count >= cell.flips))
         done, moving = done | ended, moving & not_(ended)
         if any_lane(ended):
             break
-    write(memory, i, put_down(motion, where(done, 3.0, where(active, 2.0, stage))))
+    write(memory, i, staged(cell, where(done, 3.0, where(active, 2.0, stage))))
     return any_lane(done)

@@ -35,6 +35,8 @@ class Written(NamedTuple):
     most_kinks : between two switches, after which a cell is given up
     cell : a `Cell` of zeros
     slides : None, or the functions of a scene that slides (`driver.Slides`)
+    surfaces : 1 for each kink that is a further surface, at which the motion switches too, 2 where such switches do
+        not count; None where there is none
     hiding : 1 for each rate, and for each event, that can hide something
     passable : 1 for the surface, and for each kink, that does not depend on the side: a motion may pass through it
     deciding : 1 for each kink whose side decides what a switch does; None where there is none
@@ -58,6 +60,7 @@ class Written(NamedTuple):
     most_kinks: float
     cell: object
     slides: object
+    surfaces: object
     hiding: tuple
     passable: tuple
     deciding: object
@@ -91,7 +94,7 @@ class Cell(NamedTuple):
     unit, h : of time, in seconds; the next step, in units
     count, since, kinks_met : switches; time and kinks since the last one
     steps, before : of the last leg, of the one before
-    errors : `Errors`, or () where no error is carried along
+    own : what the method carries along: `Errors`, `fixed_step.Fixed`, or ()
     """
 
     stage: float
@@ -115,7 +118,7 @@ class Cell(NamedTuple):
     kinks_met: float
     steps: float
     before: float
-    errors: tuple
+    own: tuple
 
 
 class Errors(NamedTuple):

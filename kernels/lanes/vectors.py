@@ -281,8 +281,10 @@ def where(condition, x, y):
 
 @symbolic
 def choose(condition, xs, ys):
-    """`where` for each pair of two tuples; a record, if the first is one."""
-    chosen = tuple(where(condition, x, y) for x, y in zip(xs, ys, strict=True))
+    """`where` for each pair of numbers in two tuples of tuples; a record, if the first is one."""
+    chosen = tuple(
+        choose(condition, x, y) if isinstance(x, tuple) else where(condition, x, y) for x, y in zip(xs, ys, strict=True)
+    )
     return type(xs)(*chosen) if hasattr(xs, "_fields") else chosen
 
 
