@@ -9,7 +9,7 @@ import hashlib
 import inspect
 
 from kernels.integrate.carried import Changes
-from kernels.integrate.driver import KINK_LIMIT, Slides
+from kernels.integrate.driver import KINK_LIMIT
 from kernels.integrate.powers import Power, core
 from kernels.integrate.records import Cell, Errors, Mode, Pieces, Written
 from kernels.integrate.taylor import BY_SERIES, BY_SUM
@@ -231,7 +231,7 @@ class Functions:
 
     def written(self):
         """The scene's `Written`."""
-        recorded, scene, slides = self.recorded, self.scene, None
+        recorded, scene, speeds, onto = self.recorded, self.scene, None, None
         hidden, hiding = self._hidden()
         of_state = {
             "rates": self.values(recorded.rates), "surface": self.value(recorded.surface),
@@ -242,11 +242,11 @@ class Functions:
         if scene.slides:
             flat = [x for pair in recorded.speeds for x in pair]
 
-            def speeds(inputs):
+            def both(inputs):
                 found = map(Values(inputs).in_every_lane, flat)
                 return tuple(zip(found, found, strict=True))
 
-            slides = Slides(self.of_inputs(speeds), self.values(recorded.onto))
+            speeds, onto = self.of_inputs(both), self.values(recorded.onto)
         # on whose side a switch's result hangs, but for further surfaces and the surface's own u
         signs = {x.args[0] for x in needed(*recorded.switched) if x.kind == INPUT}
         deciding = tuple(
@@ -264,7 +264,7 @@ class Functions:
             **of_state, numbers=tuple(map(float, range(1 + len(self.kinks)))),
             alternating=tuple((-1.0) ** j for j in range(len(self.states))),
             most_kinks=KINK_LIMIT if scene.most_kinks is None else float(scene.most_kinks), cell=cell_of(*self.size),
-            slides=slides, surfaces=surfaces, hiding=hiding, passable=passable,
+            speeds=speeds, onto=onto, surfaces=surfaces, hiding=hiding, passable=passable,
             deciding=deciding if any(deciding) else None, factored=None, solved=None,
         )  # fmt: skip
 

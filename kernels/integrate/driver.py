@@ -7,14 +7,13 @@ leg to stick or to go on.
 """
 
 import math
-from typing import NamedTuple
 
 from kernels.integrate import carried
 from kernels.integrate.records import Mode
 from kernels.lanes.codes import BAD_INPUT, GRAZING, INACCURATE, OUT_OF_RANGE, REFUSED, STEP_LIMIT, STICKS
 from kernels.lanes.jit import jit, jit_call
-from kernels.lanes.symbols import fold, over_tuples, symbolic
-from kernels.lanes.tuples import any_of, joined, reached, read, write
+from kernels.lanes.symbols import over_tuples, symbolic
+from kernels.lanes.tuples import any_of, joined, reached, read, total, write
 from kernels.lanes.vectors import any_lane, choose, exponent, fma, magnitude, not_, pow2, sqrt, where
 
 KINK_LIMIT = 1000
@@ -29,29 +28,6 @@ ONE_ULP = 2.0**-52
 SHAKEN, GOLDEN = 3.0, 0.6180339887498949
 """Roundings that an event is missed by at most; and what the share of it goes on by from one event to the next, so that
 no two of some events one behind the other are missed alike: what is between them would not show it."""
-
-
-class Start(NamedTuple):
-    """Of a motion: `beyond` the surface or not, and what rounding may take (`blur`) from its value, relative to it."""
-
-    state: tuple
-    side: float
-    signs: tuple
-    unit: float
-    on: tuple
-    beyond: bool
-    blur: float
-
-
-class Slides(NamedTuple):
-    """What is written of a scene that slides; functions of (state, mode).
-
-    speeds : of each kink's u ahead of it and behind it, the other signs as they are
-    onto : the state put back onto the kink that it slides along
-    """
-
-    speeds: object
-    onto: object
 
 
 @jit
@@ -89,33 +65,16 @@ def settled(m, state, side, parameters, unit, near):
 
 
 @symbolic
-def begun(m, flips, parameters):
-    """The start of a motion. Of what rounding takes from the surface's value, nothing of nothing is nothing."""
-    side = 0.0 * flips + 1.0
-    one = 0.0 * side + 1.0
-    state = tuple(u + 0.0 * side for u in m.started(parameters, side))
-    signs, on = settled(m, state, side, parameters, one, tuple(0.0 * side for j in m.numbers[1:]))
-    mode = Mode(side, signs, parameters, False)
-    offset, factor, u = m.jet(state, mode, one, ()).events[0]
-    e, d, dd = fma(factor, u[0], offset), factor * u[1], factor * u[2]
-    way = where(e < 0.0, -1.0, signs[-1])
-    away = (d > 0.0) | ((d >= 0.0) & (dd > 0.0))
-    at = where((e <= 0.0) & (e >= 0.0) & away, 1.0, 0.0)
-    lost = m.lost(state, mode)
-    blur = where(lost > 0.0, lost / magnitude(e), 0.0)
-    return Start(
-        state, side, joined(signs[:-1], (way,)), time_unit(e, d, dd), joined((at,), on), not_(magnitude(e) >= 0.0), blur
-    )
-
-
-@symbolic
 def open_for(m, state, mode, on):
     """For how long, in seconds, rounding may keep the events open that fire."""
     blurs = tuple(
         where(o > 0.5, ONE_ULP * size / magnitude(rate), 0.0)
         for o, (size, rate) in zip(on, m.made(state, mode), strict=True)
     )
-    return fold(longer, 0.0 * mode.side, (), blurs)
+    longest = 0.0 * mode.side
+    for blur in blurs:
+        longest = where(blur > longest, blur, longest)
+    return longest
 
 
 @symbolic
@@ -131,18 +90,6 @@ def shaken_on(shake):
     part = magnitude(shake) + GOLDEN
     part = where(part < 2.0, part, part - 1.0)
     return where(magnitude(shake) > 0.5, where(shake < 0.0, -part, part), 0.0)
-
-
-@symbolic
-def longer(x, y):
-    """The longer of two times."""
-    return where(y > x, y, x)
-
-
-@symbolic
-def plus(x, y):
-    """The sum."""
-    return x + y
 
 
 @symbolic
@@ -165,21 +112,15 @@ def pressed(m, state, mode, on, left, margin, lanes):
 
     `left` : 1 for the kink that the state has just slid along to its end
     """
-    among = fold(plus, 0.0, (), on[1:])
+    among = total(on[1:])
     judged = tuple(
         judged_side(sign, o, gone, speeds, among, margin)
-        for sign, o, gone, speeds in zip(mode.signs[:-1], on[1:], left, m.slides.speeds(state, mode), strict=True)
+        for sign, o, gone, speeds in zip(mode.signs[:-1], on[1:], left, m.speeds(state, mode), strict=True)
     )
     signs = tuple(where(lanes, new, sign) for (new, unsure), sign in zip(judged, mode.signs[:-1], strict=True))
     marks = tuple(where(lanes & (magnitude(sign) < 0.5), 0.0, o) for sign, o in zip(signs, on[1:], strict=True))
-    unsure = fold(either_unsure, margin < 0.0, (), judged)
+    unsure = any_of(tuple(faint for new, faint in judged))
     return joined(signs, mode.signs[-1:]), joined(on[:1], marks), lanes & unsure
-
-
-@symbolic
-def either_unsure(unsure, judged):
-    """Whether one of them is."""
-    return unsure | judged[1]
 
 
 @symbolic
@@ -245,16 +186,25 @@ def raised(verdict, lanes, least):
 @symbolic
 def started(m, cell, tells):
     """The cell at its start; a further surface that it starts on and falls through is met at once."""
-    start = begun(m, cell.flips, cell.parameters)
-    endless = not_((cell.flips >= 1.0) & (cell.flips < math.inf))
-    unsure = where(start.blur <= BLUR * cell.tolerance, 0.0, INACCURATE)
-    off = missed_by(cell.shake)
+    side = 0.0 * cell.flips + 1.0
+    one, parameters, off = 0.0 * side + 1.0, cell.parameters, missed_by(cell.shake)
+    state = tuple(u + 0.0 * side for u in m.started(parameters, side))
+    signs, on = settled(m, state, side, parameters, one, tuple(0.0 * side for j in m.numbers[1:]))
+    mode = Mode(side, signs, parameters, False)
+    offset, factor, u = m.jet(state, mode, one, ()).events[0]
+    e, d, dd = fma(factor, u[0], offset), factor * u[1], factor * u[2]
+    away = (d > 0.0) | ((d >= 0.0) & (dd > 0.0))
+    at = where((e <= 0.0) & (e >= 0.0) & away, 1.0, 0.0)
+    lost = m.lost(state, mode)
+    blur = where(lost > 0.0, lost / magnitude(e), 0.0)  # nothing of nothing is nothing
+    wrong = not_(magnitude(e) >= 0.0) | not_((cell.flips >= 1.0) & (cell.flips < math.inf))
     cell = cell._replace(
-        state=tuple(fma(ONE_ULP * odd * off, u, u) for odd, u in zip(m.alternating, start.state, strict=True)),
-        side=start.side, signs=start.signs, unit=start.unit, on=start.on,
-        verdict=where(start.beyond | endless, BAD_INPUT, unsure), own=carried.started(tells, cell.own, start.state),
+        state=tuple(fma(ONE_ULP * odd * off, u, u) for odd, u in zip(m.alternating, state, strict=True)),
+        side=side, signs=joined(signs[:-1], (where(e < 0.0, -1.0, signs[-1]),)), on=joined((at,), on),
+        unit=time_unit(e, d, dd), own=carried.started(tells, cell.own, state),
+        verdict=where(wrong, BAD_INPUT, where(blur <= BLUR * cell.tolerance, 0.0, INACCURATE)),
     )  # fmt: skip
-    if m.slides is not None:
+    if m.speeds is not None:
         cell = onto_kinks(m, cell, tuple(0.0 * cell.side for sign in cell.signs[:-1]), cell.side < math.inf)
     if m.surfaces is None:
         return cell
@@ -281,8 +231,8 @@ def arrived(m, cell, found, late, active, tells):
     verdict = raised(cell.verdict, found.hangs | found.grazing, GRAZING)
     refused = where(found.stuck, STICKS, where(found.broken, OUT_OF_RANGE, verdict))
     verdict = where(found.lost, STEP_LIMIT, refused)
-    if m.slides is not None:  # lanes whose slide has no end rest, as far as can be told
-        sliding = fold(plus, 0.0, (), tuple(magnitude(sign) for sign in cell.signs[:-1])) < len(cell.signs) - 1.5
+    if m.speeds is not None:  # lanes whose slide has no end rest, as far as can be told
+        sliding = total(tuple(magnitude(sign) for sign in cell.signs[:-1])) < len(cell.signs) - 1.5
         verdict = where(active & sliding & (found.lost | found.broken), STICKS, verdict)
     moving = active & (cell.verdict < REFUSED) & (verdict < REFUSED) & not_(found.grazing)
     state, mode = choose(moving, found.state, cell.state), mode_of(cell)
@@ -315,7 +265,7 @@ def meets(m, cell, moving):
 def turned(m, cell, moving, switches, counts):
     """The cell with the signs behind what it has met; 1 for the kink that it has slid along to its end."""
     on, signs, left = cell.on, cell.signs, ()
-    if m.slides is not None:  # at the end of a slide the kink's sign is 0, and stays so
+    if m.speeds is not None:  # at the end of a slide the kink's sign is 0, and stays so
         held = tuple(moving & (magnitude(sign) < 0.5) for sign in signs[:-1])
         left = tuple(where(x & (o > 0.5) & not_(switches), 1.0, 0.0) for x, o in zip(held, on[1:], strict=True))
         on = joined(on[:1], tuple(where(x, 1.0, o) for x, o in zip(held, on[1:], strict=True)))
@@ -373,7 +323,7 @@ def behind_switch(m, cell, rates, switches, first, met, tells):
 @symbolic
 def gone_on(m, cell, rates, left, moving, tells):
     """The cell on its way to the next event; `rates` : those before the last one, `left` as of `onto_kinks`."""
-    if m.slides is not None:
+    if m.speeds is not None:
         cell = onto_kinks(m, cell, left, moving)
     own = carried.misplaced(tells, m, cell.own, rates, cell.state, mode_of(cell), moving)
     verdict = where(moving & (cell.kinks_met > m.most_kinks), STEP_LIMIT, cell.verdict)

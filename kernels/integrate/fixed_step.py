@@ -17,8 +17,8 @@ from kernels.integrate.steps import ONE, events, rate
 from kernels.lanes import codes
 from kernels.lanes.codes import GRAZING, INACCURATE, NOT_CONVERGED, OUT_OF_RANGE, REFUSED, STICKS
 from kernels.lanes.jit import jit, jit_call
-from kernels.lanes.symbols import fold, symbolic
-from kernels.lanes.tuples import after, any_of, boxes, marks, reached, read, times, write
+from kernels.lanes.symbols import symbolic
+from kernels.lanes.tuples import after, any_of, boxes, marks, reached, read, times, total, write
 from kernels.lanes.vectors import any_lane, choose, magnitude, not_, where
 
 STEP_LIMIT = 20_000
@@ -113,15 +113,9 @@ def passed_another(values, which, on):
 
 
 @symbolic
-def plus_size(total, x):
-    """The sum of magnitudes."""
-    return total + magnitude(x)
-
-
-@symbolic
 def finite(state):
     """Whether every entry is a number."""
-    return fold(plus_size, magnitude(state[0]), (), state[1:]) < math.inf
+    return total(tuple(magnitude(u) for u in state)) < math.inf
 
 
 @jit_call

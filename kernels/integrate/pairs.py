@@ -176,13 +176,13 @@ def kept_on_kink(pair):
     @jit_call
     def tried(m, state, mode, h):
         trial = free_tried(m, state, mode, h)
-        new = m.slides.onto(trial.new, mode)
-        off = after(new, -1.0, (1.0, 1.0, -1.0), (trial.new, m.slides.onto(state, mode), state))
+        new = m.onto(trial.new, mode)
+        off = after(new, -1.0, (1.0, 1.0, -1.0), (trial.new, m.onto(state, mode), state))
         error = of_size(state, new, trial.stages[0], h, off)
         return Trial(new, trial.stages, trial.last, at_least(trial.error, error))
 
     @jit_call
     def dense(m, state, terms, mode, h, part):
-        return m.slides.onto(free_dense(m, state, terms, mode, h, part), mode)
+        return m.onto(free_dense(m, state, terms, mode, h, part), mode)
 
     return pair._replace(tried=tried, dense=dense)

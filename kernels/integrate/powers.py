@@ -90,12 +90,8 @@ def core(p, state, mode, unit, tolerance, on, t, margins):
     if any_lane(leaves):
         bare, whole = p.rates(state, mode, unit, nothing), p.rates(state, mode, unit, nothing + 1.0)
         by_power = tuple(magnitude(x - y) for x, y in zip(whole, bare, strict=True))
-        capacity = fold(
-            least_share,
-            nothing + FAR,
-            (),
-            tuple(size_in_unit(u, y) / z for u, y, z in zip(state, bare, by_power, strict=True)),
-        )
+        shares = tuple(size_in_unit(u, y) / z for u, y, z in zip(state, bare, by_power, strict=True))
+        capacity = fold(least_share, nothing + FAR, (), shares)
         speed, of_base = magnitude(p.of_base(bare)), p.of_base(by_power)
         reach = core_time(capacity, speed, of_base, n, tolerance)
         mean = mean_power(power(speed * reach, n), n)
@@ -108,7 +104,7 @@ def core(p, state, mode, unit, tolerance, on, t, margins):
 
 @symbolic
 def least_share(x, share):
-    """The smaller one."""
+    """The smaller one; x beside NaN."""
     return where(share < x, share, x)
 
 

@@ -34,7 +34,8 @@ class Written(NamedTuple):
     alternating : 1.0, -1.0 ... for each state
     most_kinks : between two switches, after which a cell is given up
     cell : a `Cell` of zeros
-    slides : None, or the functions of a scene that slides (`driver.Slides`)
+    speeds : of each kink's u ahead of it and behind it, the other signs as they are; None where no motion slides
+    onto : the state put back onto the kink that it slides along, or None
     surfaces : 1 for each kink that is a further surface, at which the motion switches too, 2 where such switches do
         not count; None where there is none
     hiding : 1 for each rate, and for each event, that can hide something
@@ -59,7 +60,8 @@ class Written(NamedTuple):
     alternating: tuple
     most_kinks: float
     cell: object
-    slides: object
+    speeds: object
+    onto: object
     surfaces: object
     hiding: tuple
     passable: tuple

@@ -34,7 +34,7 @@ from kernels.integrate.taylor import (
 )
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.symbols import fold, over_tuples, symbolic
-from kernels.lanes.tuples import all_of, any_of, joined, reached
+from kernels.lanes.tuples import all_of, any_of, joined, reached, total
 from kernels.lanes.vectors import any_lane, choose, fma, magnitude, not_, where
 from kernels.maths.intervals import most
 
@@ -153,7 +153,7 @@ def first_root(found, number, way, curve, event, facts, passed, met, span, toler
 
 @symbolic
 def shorter(h, limit):
-    """The step, no longer than a limit."""
+    """The step, no longer than a limit; NaN of that stays."""
     return where(h < limit, h, limit)
 
 
@@ -201,8 +201,7 @@ def to_event(m, state, mode, unit, h, on, tolerance, active, errors, hides, at_k
         fine = all_of(tuple(keeps(h, power_h, u, allowed) for u in pieces.controlled))
         trial = h
         if step == 0:
-            sizes = tuple(magnitude(u[-1]) for u in pieces.states)
-            broken = active & not_(fold(plus, sizes[0], (), sizes[1:]) < math.inf)
+            broken = active & not_(total(tuple(magnitude(u[-1]) for u in pieces.states)) < math.inf)
             now = tuple((o < 0.5) & (fact[0] <= 0.0) for o, fact in zip(on, facts, strict=True))
             pressed = tuple((o > 0.5) & not_(rises(fact[1], fact[2])) for o, fact in zip(on, facts, strict=True))
             stuck = active & any_of(pressed)
@@ -279,9 +278,3 @@ def to_event(m, state, mode, unit, h, on, tolerance, active, errors, hides, at_k
     reach = choose(met, reached(reach, ends), reach)
     fired = tuple(where(x, 1.0, 0.0) for x in fires)
     return Leg(ends, t, h, fired, stuck, lost, broken, grazing, hangs, tried, reach), late
-
-
-@symbolic
-def plus(x, y):
-    """The sum."""
-    return x + y

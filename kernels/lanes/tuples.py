@@ -59,6 +59,15 @@ def boxes(state, new, change):
 
 
 @symbolic
+def total(xs):
+    """The sum of a tuple, from left to right."""
+    result = xs[0]
+    for x in xs[1:]:
+        result = result + x
+    return result
+
+
+@symbolic
 def either(x, y):
     """Whether one of two conditions holds."""
     return x | y
