@@ -95,15 +95,6 @@ class Late(NamedTuple):
     peak: tuple
 
 
-class Here(NamedTuple):
-    """Where a leg ends: in its last step, since its start; by which event, and whether others fire with it."""
-
-    end: float
-    t: float
-    which: float
-    others: bool
-
-
 @symbolic
 def further(x, by):
     """x, further from 0 by something that is not below 0."""
@@ -224,11 +215,13 @@ def stepped(m, error, changes, state, mode, unit, trial, steps, pieces, cores, c
 
 
 @symbolic
-def at_event(m, error, changes, full, state, mode, unit, ends, here, pieces, cores, coarse):
-    """The error at the event that ends a leg in the states `ends`, by (1)."""
+def at_event(m, error, changes, full, state, mode, unit, ends, end, t, which, others, pieces, cores, coarse):
+    """The error at the event that ends a leg in the states `ends`, by (1).
+
+    `end`, `t` : time in the last step, and since the start; `which`, `others` : the event, whether more fire with it
+    """
     if m.error is None:
         return ()
-    end, which = here.end, here.which
     rates = m.scene.rates(ends, mode)
     error = moved(m, error, changes, state, mode, unit, end, pieces, coarse)
     error = weighed(m, error, end <= math.inf, cores, end)
@@ -252,8 +245,8 @@ def at_event(m, error, changes, full, state, mode, unit, ends, here, pieces, cor
     per_time = unit * per_unit
     by, spread_late, noise = -change / per_time, -vague / per_time, magnitude(noise / per_time)
     most_by = magnitude(by) + magnitude(spread_late) + noise
-    doubtful = (magnitude(bend) * most_by * STRAIGHT > magnitude(per_time)) | (most_by * ORDERLY > here.t)
-    late = where(doubtful | here.others, math.inf, by)
+    doubtful = (magnitude(bend) * most_by * STRAIGHT > magnitude(per_time)) | (most_by * ORDERLY > t)
+    late = where(doubtful | others, math.inf, by)
     off = tuple(fma(unit * rate, late, x) for rate, x in zip(rates, error.off, strict=True))
     spread = tuple(fma(unit * rate, spread_late, x) for rate, x in zip(rates, error.spread, strict=True))
     return Late(off, late, spread, spread_late, noise, error.peak)

@@ -12,10 +12,11 @@ from kernels.integrate import carried
 from kernels.integrate.records import Mode
 from kernels.lanes.codes import BAD_INPUT, GRAZING, INACCURATE, OUT_OF_RANGE, REFUSED, STEP_LIMIT, STICKS
 from kernels.lanes.jit import jit, jit_call
-from kernels.lanes.symbols import over_tuples, symbolic
+from kernels.lanes.symbols import over_tuples, symbolic, taking_symbols
 from kernels.lanes.tuples import any_of, joined, reached, read, total, write
 from kernels.lanes.vectors import any_lane, choose, exponent, fma, magnitude, not_, pow2, sqrt, where
 
+ERRORS = taking_symbols(carried)
 KINK_LIMIT = 1000
 """Kinks between two switches after which a cell is given up."""
 EVENTS = 1_000_000
@@ -201,7 +202,7 @@ def started(m, cell, tells):
     cell = cell._replace(
         state=tuple(fma(ONE_ULP * odd * off, u, u) for odd, u in zip(m.alternating, state, strict=True)),
         side=side, signs=joined(signs[:-1], (where(e < 0.0, -1.0, signs[-1]),)), on=joined((at,), on),
-        unit=time_unit(e, d, dd), own=carried.started(tells, cell.own, state),
+        unit=time_unit(e, d, dd), own=ERRORS.started(tells, cell.own, state),
         verdict=where(wrong, BAD_INPUT, where(blur <= BLUR * cell.tolerance, 0.0, INACCURATE)),
     )  # fmt: skip
     if m.speeds is not None:
@@ -245,7 +246,7 @@ def arrived(m, cell, found, late, active, tells):
         time=where(moving, fma(found.t, cell.unit, cell.time), cell.time),
         since=where(moving, fma(found.t, cell.unit, cell.since), cell.since),
         steps=where(active, found.tried, cell.steps), before=where(active, cell.steps, cell.before),
-        own=carried.later(tells, cell.own, late, cell.unit),
+        own=ERRORS.later(tells, cell.own, late, cell.unit),
     ), moving, rates  # fmt: skip
 
 
@@ -280,9 +281,9 @@ def at_switch(m, cell, rates, switches, counts, tells):
     """The cell with what is told of the switch that it is on, where that is the first or the last one."""
     count = where(counts, cell.count + 1.0, cell.count)
     watched = counts & ((count < 1.5) | (count >= cell.flips))
-    own = carried.at_switch(tells, cell.own, rates, switches)
+    own = ERRORS.at_switch(tells, cell.own, rates, switches)
     return cell._replace(
-        count=count, own=carried.stated(tells, own, watched, cell.time, cell.since, cell.size),
+        count=count, own=ERRORS.stated(tells, own, watched, cell.time, cell.since, cell.size),
         verdict=where(watched & m.underflows(cell.state, mode_of(cell), cell.unit), OUT_OF_RANGE, cell.verdict),
         interval=where(watched, cell.since, cell.interval), at=choose(watched, cell.state, cell.at),
         since=where(counts, 0.0, cell.since),
@@ -295,7 +296,7 @@ def behind_switch(m, cell, rates, switches, first, met, tells):
     side, parameters, unit, old, signs = -cell.side, cell.parameters, cell.unit, cell.state, cell.signs
     which = signs if m.surfaces is None else which_met(signs, m.surfaces, first, met)
     old_mode = Mode(cell.side, which, parameters, False)
-    own, rates = carried.behind(tells, cell.own, old, old_mode, rates, switches)
+    own, rates = ERRORS.behind(tells, cell.own, old, old_mode, rates, switches)
     before, gaps = m.surface(old, old_mode), m.kinks(old, old_mode)
     verdict = undecided(m, old, old_mode, gaps, BLUR * cell.tolerance, switches, cell.verdict)
     state = m.switched(old, old_mode)
@@ -325,7 +326,7 @@ def gone_on(m, cell, rates, left, moving, tells):
     """The cell on its way to the next event; `rates` : those before the last one, `left` as of `onto_kinks`."""
     if m.speeds is not None:
         cell = onto_kinks(m, cell, left, moving)
-    own = carried.misplaced(tells, m, cell.own, rates, cell.state, mode_of(cell), moving)
+    own = ERRORS.misplaced(tells, m, cell.own, rates, cell.state, mode_of(cell), moving)
     verdict = where(moving & (cell.kinks_met > m.most_kinks), STEP_LIMIT, cell.verdict)
     return cell._replace(own=own, verdict=verdict)
 

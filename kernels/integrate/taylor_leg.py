@@ -152,6 +152,32 @@ def first_root(found, number, way, curve, event, facts, passed, met, span, toler
 
 
 @symbolic
+def ended(m, pieces, facts, passed, met, span, tolerance, state):
+    """The end of a leg in its last step, by which event, whether only just; what fires, and others too; the states."""
+    end, which, hangs = fold(
+        first_root, (span, -1.0 - 0.0 * span, met & not_(met)), (met, span, tolerance),
+        m.scene.numbers, m.watched, pieces.of_events, pieces.events, facts, passed,
+    )  # fmt: skip
+    own = tuple(met & (which > j - 0.5) & (which < j + 0.5) for j in m.scene.numbers)
+    near = fma(SAME, tolerance, ROUNDING)
+    beside = tuple(
+        met
+        & before
+        & (
+            magnitude(fma(factor, way.value(end, curve), offset))
+            <= near * (magnitude(offset) + magnitude(factor * u[0]))
+        )
+        for before, way, curve, (offset, factor, u) in zip(
+            passed, m.watched, pieces.of_events, pieces.events, strict=True
+        )
+    )
+    fires = tuple(x | y for x, y in zip(beside, own, strict=True))
+    others = any_of(tuple(x & not_(y) for x, y in zip(beside, own, strict=True)))
+    at_root = tuple(way.value(end, curve) for way, curve in zip(m.ways, pieces.of_states, strict=True))
+    return end, which, hangs, fires, others, m.on_kink(choose(met, at_root, state), fires)
+
+
+@symbolic
 def shorter(h, limit):
     """The step, no longer than a limit; NaN of that stays."""
     return where(h < limit, h, limit)
@@ -251,30 +277,12 @@ def to_event(m, state, mode, unit, h, on, tolerance, active, errors, hides, at_k
             break
     lost = moving
     met = active & not_(lost | stuck | broken | grazing)
-    end, which, hangs = fold(
-        first_root, (span, -1.0 - 0.0 * h, nothing), (met, span, tolerance),
-        m.scene.numbers, m.watched, pieces.of_events, pieces.events, facts, passed,
-    )  # fmt: skip
-    own = tuple(met & (which > j - 0.5) & (which < j + 0.5) for j in m.scene.numbers)
-    beside = tuple(
-        met
-        & before
-        & (
-            magnitude(fma(factor, way.value(end, curve), offset))
-            <= fma(SAME, tolerance, ROUNDING) * (magnitude(offset) + magnitude(factor * u[0]))
-        )
-        for before, way, curve, (offset, factor, u) in zip(
-            passed, m.watched, pieces.of_events, pieces.events, strict=True
-        )
-    )
-    fires = tuple(x | y for x, y in zip(beside, own, strict=True))
-    at_root = tuple(way.value(end, curve) for way, curve in zip(m.ways, pieces.of_states, strict=True))
-    ends = m.on_kink(choose(met, at_root, state), fires)
+    end, which, hangs, fires, others, ends = ended(m, pieces, facts, passed, met, span, tolerance, state)
     t = where(met, t + end, t)
     h = where(met & (t > 0.0) & (h > LONGEST * t), LONGEST * t, h)
-    others = any_of(tuple(x & not_(y) for x, y in zip(beside, own, strict=True)))
-    here = carried.Here(end, t, which, others)
-    late = carried.at_event(m, error, changes, full, state, mode, unit, ends, here, pieces, cores, coarse)
+    late = carried.at_event(
+        m, error, changes, full, state, mode, unit, ends, end, t, which, others, pieces, cores, coarse
+    )
     reach = choose(met, reached(reach, ends), reach)
     fired = tuple(where(x, 1.0, 0.0) for x in fires)
     return Leg(ends, t, h, fired, stuck, lost, broken, grazing, hangs, tried, reach), late

@@ -14,7 +14,7 @@ import inspect
 import operator
 import sys
 import textwrap
-from types import FunctionType, ModuleType, SimpleNamespace
+from types import FunctionType, SimpleNamespace
 
 from numba import types
 from numba.core.typing.templates import builtin_registry
@@ -150,15 +150,11 @@ def _scope_of(module):
         for name, x in scope.items():
             if isinstance(x, FunctionType) or isinstance(getattr(x, "_numba_type_", None), types.Callable):
                 scope[name] = _for_symbols(x)
-            elif isinstance(x, ModuleType) and x.__name__.startswith(PACKAGE):
-                scope[name] = taking_symbols(x)
     return _SCOPES[module]
 
 
 _SCOPES = {}
 """Globals for symbols by the name of their module."""
-PACKAGE = __name__.partition(".")[0] + "."
-"""Of modules whose functions take symbols, too."""
 
 
 def taking_symbols(module):

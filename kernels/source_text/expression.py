@@ -249,19 +249,31 @@ class Graph:
             return self.power(args[0], 0.5)
         return self._node(name, args, name != "floor" and any(x.varies for x in args))
 
-    def slopes(self, x):
-        """The arguments of a function without a recurrence of its own, each with its partial derivative."""
-        u, *others = x.args
+    def partials(self, x):
+        """The derivative of an operation: each argument with a factor, None for 1; and what their sum is divided by."""
+        u, w = (*x.args, None)[:2]
         found = {
-            "tanh": lambda: (1.0 - x * x,),
-            "arctan": lambda: (1.0 / (1.0 + u * u),),
-            "arcsin": lambda: (1.0 / self.function("sqrt", (1.0 - u) * (1.0 + u)),),
-            "arccos": lambda: (-1.0 / self.function("sqrt", (1.0 - u) * (1.0 + u)),),
-            "sinh": lambda: (self.function("cosh", u),),
-            "cosh": lambda: (self.function("sinh", u),),
-            "hypot": lambda: (u / x, others[0] / x),
-        }[x.kind]()
-        return list(zip(x.args, found, strict=True))
+            ADD: lambda: ([(u, None), (w, None)], None),
+            SCALED: lambda: ([(w, u)], None),
+            MUL: lambda: ([(u, w), (w, u)], None),
+            HALF_SQUARE: lambda: ([(u, u)], None),
+            DIV: lambda: ([(u, None), (w, -x)], w),
+            "sqrt": lambda: ([(u, None)], 2.0 * x),
+            "exp": lambda: ([(u, x)], None),
+            "log": lambda: ([(u, None)], u),
+            "sin": lambda: ([(u, self.function("cos", u))], None),
+            "cos": lambda: ([(u, -self.function("sin", u))], None),
+            "power": lambda: ([(u, w * (x / u))], None),
+            "power_of_side": lambda: ([(u.args[1], w * self.over_base(x))], None),
+            "tanh": lambda: ([(u, 1.0 - x * x)], None),
+            "arctan": lambda: ([(u, 1.0 / (1.0 + u * u))], None),
+            "arcsin": lambda: ([(u, 1.0 / self.function("sqrt", (1.0 - u) * (1.0 + u)))], None),
+            "arccos": lambda: ([(u, -1.0 / self.function("sqrt", (1.0 - u) * (1.0 + u)))], None),
+            "sinh": lambda: ([(u, self.function("cosh", u))], None),
+            "cosh": lambda: ([(u, self.function("sinh", u))], None),
+            "hypot": lambda: ([(u, u / x), (w, w / x)], None),
+        }
+        return found[x.kind]()
 
     def floor(self, x):
         """The largest integer not above x: between two kinks a constant."""

@@ -111,7 +111,7 @@ class Enclosures:
         else:
             kind = "arcsin" if x.kind == "arccos" else x.kind
             own = getattr(OF, f"hidden_by_{kind}")(value, inside, self._once(x, self._plain))
-        slopes = x.graph.slopes(x)
+        slopes = x.graph.partials(x)[0]
         return added(
             own, *(self._passed_on(u, self._largest(slope)) for u, slope in slopes if self.excess(u) is not None)
         )

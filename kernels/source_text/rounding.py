@@ -28,7 +28,7 @@ def slopes(values, x):
         return [(u, 1.0 / V.magnitude(values.value(u)))]
     if x.kind in ("power", "power_of_side"):
         return [(u, V.magnitude(values.value(x.args[1]) * V.magnitude(values.value(x)) / values.value(u)))]
-    return [(u, V.magnitude(values.value(slope))) for u, slope in x.graph.slopes(x)]
+    return [(u, V.magnitude(values.value(slope))) for u, slope in x.graph.partials(x)[0]]
 
 
 class Losses:

@@ -7,7 +7,7 @@ With u = sum u_k t^k, and u' = (k + 1) u_{k+1}:
     e = exp(u):   k e_k = sum_{j>0} j u_j e_{k-j}
     l = ln(u):    u_0 l_k = u_k - (1/k) sum_{0<j<k} j l_j u_{k-j}
     k sin(u)_k = sum_{j>0} j u_j cos(u)_{k-j},  k cos(u)_k = -sum_{j>0} j u_j sin(u)_{k-j}
-    f(u, ...):    k f_k = sum over the arguments of sum_{j>0} j u_j g_{k-j},  g the derivative of f by u (`slopes`)
+    f(u, ...):    k f_k = sum over the arguments of sum_{j>0} j u_j g_{k-j},  g the derivative of f by u (`partials`)
     b = u^n:      k u_0 b_k = sum_{j>0} ((n + 1) j - k) u_j b_{k-j}                                      (1)
 and of a state, whose rate is r: u_{k+1} = r_k/(k + 1).
 Source: Jorba & Zou, Exp. Math. 14:99 (2005), proposition 2.1. Sums are chains of multiply-adds (`dot`).
@@ -145,7 +145,7 @@ class Values:
     def _of_slopes(self, x, k):
         if k == 0:
             return getattr(F, x.kind)(*map(self.value, x.args))
-        sums = [self._rate_sum(u, slope, k) for u, slope in x.graph.slopes(x) if u.varies]
+        sums = [self._rate_sum(u, slope, k) for u, slope in x.graph.partials(x)[0] if u.varies]
         return product(added(*sums), 1.0 / k)
 
     _tanh = _arctan = _arcsin = _arccos = _sinh = _cosh = _hypot = _of_slopes

@@ -46,62 +46,17 @@ class Tangents:
         if not x.varies:
             return None
         if x.index not in self._reused:
-            plain = x.kind == INPUT
-            self._reused[x.index] = self.deltas[x.args[0]] if plain else getattr(self, f"_{x.kind}")(x, *x.args)
+            self._reused[x.index] = self.deltas[x.args[0]] if x.kind == INPUT else self._of_operation(x)
         return self._reused[x.index]
 
-    def _by(self, factor, u):
-        """A factor times the derivative of u."""
-        delta = self.of(u)
-        return None if delta is None else self._graph.multiply(factor, delta)
-
-    def _sum(self, *terms):
-        present = [x for x in terms if x is not None]
-        return self._graph.add(*present) if len(present) == 2 else next(iter(present), None)
-
-    def _over(self, x, divisor):
-        return None if x is None else self._graph.divide(x, divisor)
-
-    def _add(self, x, u, w):
-        return self._sum(self.of(u), self.of(w))
-
-    def _scaled(self, x, constant, u):
-        return self._by(constant, u)
-
-    def _mul(self, x, u, w):
-        return self._sum(self._by(w, u), self._by(u, w))
-
-    def _half_square(self, x, u):
-        return self._by(u, u)
-
-    def _div(self, x, u, w):
-        return self._over(self._sum(self.of(u), self._by(-x, w)), w)
-
-    def _sqrt(self, x, u):
-        return self._over(self.of(u), 2.0 * x)
-
-    def _exp(self, x, u):
-        return self._by(x, u)
-
-    def _log(self, x, u):
-        return self._over(self.of(u), u)
-
-    def _sin(self, x, u):
-        return self._by(self._graph.function("cos", u), u)
-
-    def _cos(self, x, u):
-        return self._by(-self._graph.function("sin", u), u)
-
-    def _of_slopes(self, x, *_):
-        return self._sum(*(self._by(slope, u) for u, slope in self._graph.slopes(x)))
-
-    _tanh = _arctan = _arcsin = _arccos = _sinh = _cosh = _hypot = _of_slopes
-
-    def _power(self, x, u, n):
-        return self._by(n * (x / u), u)
-
-    def _power_of_side(self, x, base, n):
-        return self._by(n * self._graph.over_base(x), base.args[1])
+    def _of_operation(self, x):
+        parts, divisor = self._graph.partials(x)
+        deltas = [(self.of(u), factor) for u, factor in parts]
+        terms = [d if factor is None else self._graph.multiply(factor, d) for d, factor in deltas if d is not None]
+        if not terms:
+            return None
+        total = sum(terms[1:], terms[0])
+        return total if divisor is None else self._graph.divide(total, divisor)
 
 
 def along(graph, gradient, rates):
