@@ -33,6 +33,8 @@ ROUGHER = 20.0
 ROUNDS = 14
 CLOSED = 4.0
 """Tolerances of the runs within which a cycle is closed."""
+FAR = 1e-4
+"""Residual over the size, above which the next one need not be known better than roughly."""
 NEAR = 1e-6
 """Of the states' sizes: within this a cycle is one, and what does not move by more over it is no cycle but at rest."""
 LATER = 1, 8, 64
@@ -101,11 +103,13 @@ def newton(the_map, cells, z, scale, shift):
     z, left, before = z.copy(), np.arange(len(cells)), np.full(len(cells), math.inf)
     for _ in range(ROUNDS):
         some, here = cells.taken(left), z[:, left]
+        some.r = np.where(before[left] > FAR, np.maximum(some.r, the_map.rough), some.r)
         (_, *P), right, slopes, fine = differences(the_map, some, here, scale[:, left], STEP, (1.0,))
         P, J = np.array(P), slopes[1:, :n, 0][at]
         rho = (P - here - shift[:, left])[at]
         with np.errstate(all="ignore"):
-            now = np.where(right & fine, most(abs(rho) / scale[at][:, left]), math.inf)
+            now = np.maximum(most(abs(rho) / scale[at][:, left]), CLOSED * some.r)
+            now = np.where(right & fine, now, math.inf)
             step = solved(identity(n, len(left)) - J, rho[:, None])[:, 0]
             far = most(abs(step) / scale[at][:, left])
             step = step / np.maximum(1.0, far)
@@ -307,7 +311,8 @@ class Search:
         """Follows cycles at the values `begin` of parameter k to those at the values `ends`."""
         way, reached, step = ends - begin, np.zeros(len(ends)), np.full(len(ends), FIRST_STEP)
         slope, going = np.zeros(self.z.shape), np.isin(self.status, FOUND) & (begin != ends)
-        self.status[~going & (begin != ends) & (self.status == Status.COMES_TO_REST)] = Status.NO_CYCLE
+        self.status[(begin != ends) & (self.status == Status.COMES_TO_REST)] = Status.NO_CYCLE
+        stable = np.where(self.status == Status.PERIOD_2, self.status, Status.OK)
         for _ in range(MOST_STEPS):
             left = np.flatnonzero(going)
             if not len(left):
@@ -319,7 +324,7 @@ class Search:
             found = z, scale, _, off, multiplier, moved = self._newton(some, guess)
             near = (most(abs(z - guess) / scale) <= STRAIGHT) & (moved > NEAR) & (off <= NEAR * moved)
             slope[:, left[near]] = (z - self.z[:, left])[:, near] / by[near]
-            self._taken(left, some, found, near, np.where(abs(multiplier) <= 1.0, Status.OK, Status.UNSTABLE))
+            self._taken(left, some, found, near, np.where(abs(multiplier) <= 1.0, stable[left], Status.UNSTABLE))
             self.cells.parameters[k, left[near]] = some.parameters[k, near]
             reached[left[near]] += by[near]
             step[left] = np.where(near, 2.0 * step[left], 0.25 * by)

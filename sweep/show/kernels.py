@@ -159,7 +159,7 @@ def starter(name: str, kernel: Kernel | None = None) -> str:
         text = f"[{', '.join(f'{v:g}' for v in np.atleast_1d(value))}]" if field.dims else f"{value:g}"
         entry = f'"{next(iter(field.choices))}"' if field.choices else f'{{ value = {text}, unit = "{field.unit}" }}'
         lines.append(f"{field.name} = {entry}")
-    for field in kernel.along:
+    for field in (field for field in kernel.along if field.default is None):
         lines += ["", f"[along.{field.name}]", *_spacing(field)]
     return "\n".join(lines) + "\n"
 
