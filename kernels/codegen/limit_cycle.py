@@ -50,9 +50,10 @@ VANISHES = 0.1
 """From 1, a multiplier of the last cycle of a branch that ends because two cycles meet."""
 RESTS = 1e-11
 """Of the states' sizes, to what an equilibrium is known."""
-EARLIEST, TIMES, STILL = 1e-6, 22, 1e-12
+EARLIEST, TIMES, STILL, LASTS = 1e-6, 22, 1e-12, 3
 """Seconds after the start, then four times as many, so often, at which a motion is looked at that meets no switch any
-more: where its states move by less than STILL of their sizes, it is at rest."""
+more: where its states move by less than STILL of their sizes, so many times or to where it cannot be followed, it is at
+rest."""
 
 
 class Columns:
@@ -295,17 +296,25 @@ class Search:
         self.cells.flips[left[self.status[left] != Status.PERIOD_2]] *= 0.5
 
     def _at_rest(self, left):
-        """Where a motion stays that meets no switch any more: at ever later times its states are the same."""
+        """Where a motion stays that meets no switch any more: its states have moved, and at ever later times do not.
+
+        What sticks need not have moved. A creeping motion is still at first too, but has not moved before that.
+        """
         before, size, seconds = np.full((len(self.z), len(left)), np.nan), 0.0, EARLIEST
+        moved, lasted = self.status[left] == Status.STICKS, np.zeros(len(left))
         for _ in range(0 if self.map.driven else TIMES):
             if not len(left):
                 break
             z, status = self.map.at(self.cells.parameters[:, left], np.full(len(left), seconds))
-            size = np.fmax(size, abs(z))
+            ended, size = status > Status.INACCURATE, np.fmax(size, abs(z))
             still = (abs(z - before) <= STILL * size).all(axis=0)
-            self.z[:, left[still]], self.status[left[still]] = z[:, still], Status.COMES_TO_REST
-            on = ~still & (status <= Status.INACCURATE)
-            left, before, size, seconds = left[on], z[:, on], size[:, on], 4.0 * seconds
+            moved = moved | ~(still | ended | np.isnan(before).any(axis=0))
+            lasted, z = np.where(ended, lasted, np.where(still, lasted + 1.0, 0.0)), np.where(ended, before, z)
+            rests = moved & ((lasted >= LASTS) | (ended & (lasted > 0.0)))
+            self.z[:, left[rests]], self.status[left[rests]] = z[:, rests], Status.COMES_TO_REST
+            on = ~rests & ~ended
+            left, before, size, moved, lasted = left[on], z[:, on], size[:, on], moved[on], lasted[on]
+            seconds = 4.0 * seconds
 
     def _continued(self, k, begin, ends):
         """Follows cycles at the values `begin` of parameter k to those at the values `ends`."""
