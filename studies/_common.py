@@ -4,13 +4,11 @@ A script `<question>.py` stands beside its `<question>.toml`, reads the dataset 
 theory says beside what comes out, and draws `<question>.png` beside the dataset.
 """
 
-from __future__ import annotations
-
 import re
 import sys
 import textwrap
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -57,10 +55,15 @@ class Statement:
         return "NO" if self.failed else "no, known" if self.refuted else "yes"
 
 
-Groups = dict[str, list[Statement]]
+Claims = Iterator[Statement]
+"""What a part of a script says, statement after statement: it works out numbers and yields what they are held to."""
+Groups = dict[str, Iterable[Statement]]
 """Statements by heading."""
 Conclusion = tuple[Groups, list[str], Callable[[], Any]]
-"""What a script concludes: statements, further lines of text, and what draws the figure."""
+"""What a script concludes: statements; how their table is to be read, and further results as lines of text; and what
+draws the figure."""
+OPTIONS = ("--all", "--force")
+"""Of every script."""
 
 
 def compared(what: str, theory: str, here: Any, value: float, allowed: float, digits: int = 8) -> Statement:
@@ -124,14 +127,12 @@ def power(y: xr.DataArray) -> float:
     return float(np.polyfit(np.log(y[y.dims[0]]), np.log(abs(y)), 1)[0])
 
 
-def cheapest(found: dict[str, xr.Dataset]) -> list[Statement]:
+def cheapest(found: dict[str, xr.Dataset]) -> Claims:
     """Time per cell for a worst cell right to 1e-4, 1e-7, 1e-9."""
-    lines = []
     for name, row in found.items():
         enough = [row.seconds.where(row.worst <= wanted) for wanted in (1e-4, 1e-7, 1e-9)]
         texts = ["-" if bool(s.isnull().all()) else f"{1e6 * float(s.min()):.3g}" for s in enough]
-        lines.append(Statement(f"{name}: us a cell, worst right to 1e-4, 1e-7, 1e-9", "", ", ".join(texts)))
-    return lines
+        yield Statement(f"{name}: us a cell, worst right to 1e-4, 1e-7, 1e-9", "", ", ".join(texts))
 
 
 def measured(off: Callable[[float], Any], tolerances: Sequence[float]) -> xr.Dataset:
@@ -159,12 +160,29 @@ def solved_by(kernel: Any, method: str, rtol: float, **given: Any) -> tuple[Any,
 
 
 def table(groups: Groups, source: str = "paper") -> list[str]:
-    """Lines of the table "`source` | here"."""
+    """Every statement with its numbers, "`source` | here"."""
     rows: list[tuple[str, ...]] = [("", source, "here", "deviation", "holds")]
     for heading, lines in groups.items():
         rows += [("",), (heading.upper(),)]
         rows += [(s.what, s.paper, s.here, _number(s.off), s.verdict) for s in lines]
     return columns(rows, " | ")
+
+
+def summary(groups: Groups, source: str = "paper") -> list[str]:
+    """How many claims hold, part by part, and those that do not hold, in 79 columns."""
+    rows, others, subject = [(f"claims held to {source}", "hold")], [], ""
+    for heading, lines in groups.items():
+        checked = [s for s in lines if s.holds is not None]
+        rows += [(heading, f"{sum(s.verdict == 'yes' for s in checked)} of {len(checked)}")] if checked else []
+        for s in lines:
+            subject = s.what if s.what[:1] != " " else subject
+            if s.verdict in ("NO", "no, known"):
+                what = s.what if s.what is subject else f"{subject}, {s.what.strip()}"
+                which = "does not hold" if s.failed else "known not to hold"
+                words = f"{which}: {what}; {source}: {s.paper or '-'}; here: {s.here}"
+                off = "" if s.off is None else f", deviation {_number(s.off)}"
+                others += textwrap.wrap(words + off, 79, subsequent_indent="    ")
+    return [*columns(rows, "  "), *([""] * bool(others)), *others]
 
 
 def columns(rows: Sequence[Sequence[str]], between: str) -> list[str]:
@@ -197,7 +215,8 @@ def report(
 ) -> int:
     """Prints what a study concludes from the results named, and saves its figure beside the first of them.
 
-    A figure that is there is replaced with `--force` alone.
+    How many claims hold, and which do not, is printed by default; with `--all` each with its numbers. A figure that is
+    there is replaced with `--force` alone.
 
     Parameters
     ----------
@@ -211,16 +230,12 @@ def report(
     int
         Exit status: 1 if a statement does not hold, 2 if the results are not there or not of this study.
     """
-    force, arguments = "--force" in arguments, [argument for argument in arguments if argument != "--force"]
-    if len(arguments) != len(inputs):
-        print(f"use: python {Path(script).name} {' '.join(inputs)} [--force]", file=sys.stderr)
+    paths = [argument for argument in arguments if argument not in OPTIONS]
+    if len(paths) != len(inputs):
+        print(f"use: python {Path(script).name} {' '.join(inputs)} [{'] ['.join(OPTIONS)}]", file=sys.stderr)
         return 2
-
-    def concluded() -> Conclusion:
-        groups, notes, draw = conclude(*arguments)
-        return groups, [*notes, "", *what_came_out(Path(script).stem)], draw
-
-    return shown(Path(arguments[0]).with_suffix(".png"), concluded, force, source)
+    target = Path(paths[0]).with_suffix(".png")
+    return shown(Path(script).stem, target, lambda: conclude(*paths), arguments, source)
 
 
 def what_came_out(name: str) -> list[str]:
@@ -242,14 +257,20 @@ def script(name: str, inputs: str, conclude: Callable[..., Conclusion], source: 
     return main
 
 
-def shown(target: Path, conclude: Callable[[], Conclusion], force: bool, source: str = "theory") -> int:
-    """Prints what is concluded and saves its figure; the exit status of `report`."""
+def shown(
+    name: str, target: Path, conclude: Callable[[], Conclusion], arguments: Sequence[str], source: str = "theory"
+) -> int:
+    """Prints what the study of this name concludes and saves its figure; the exit status of `report`."""
+    complete = "--all" in arguments
     try:
-        check_target(target, force=force)
-        groups, notes, draw = conclude()
+        check_target(target, force="--force" in arguments)
+        found, notes, draw = conclude()
+        groups = {heading: list(lines) for heading, lines in found.items()}
         page = draw()
-        print("\n".join([*table(groups, source), "", *notes, ""]))
-        print(f"figure: {charts.save(page, target)}")
+        claims = table(groups, source) if complete else summary(groups, source)
+        parts = ("\n".join(lines).strip("\n") for lines in (claims, notes[not complete :], what_came_out(name)))
+        print("\n\n".join(filter(None, parts)), end="\n\n")
+        print(f"figure: {charts.save(page, target)}" + "; every claim with its numbers: --all" * (not complete))
     except sweep.SweepError as error:
         print(error, file=sys.stderr)
         return 2
@@ -257,5 +278,5 @@ def shown(target: Path, conclude: Callable[[], Conclusion], force: bool, source:
 
 
 def paragraph(text: str) -> list[str]:
-    """Running text as lines of 118 characters."""
-    return textwrap.wrap(" ".join(text.split()), 118)
+    """Running text as lines of 79 characters."""
+    return textwrap.wrap(" ".join(text.split()), 79)

@@ -1,7 +1,5 @@
 """What the figures of the studies share: the page, maps and their bars, labels, ticks."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager

@@ -4,12 +4,10 @@ J in 1e-3 kgf m s^2, e in 1e-3 rad/(kgf m), k in kgf m/rad, h in kgf m s/rad, J 
 is a 0 is text. Only what can be read in the scan is here.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from _common import Statement
+from _common import Claims, Statement
 
 KGF = 9.80665
 Printed = float | str
@@ -77,9 +75,8 @@ def in_source_units(chain: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     return {"J": 1e3 / KGF * chain["J"], "k": chain["k"] / KGF, "h": chain["h"] / KGF}
 
 
-def tables_2_to_4(chains: Mapping[int, Mapping[str, np.ndarray]]) -> list[Statement]:
+def tables_2_to_4(chains: Mapping[int, Mapping[str, np.ndarray]]) -> Claims:
     """Every number that can be read, beside the partial systems of each chain by (26), (27), masses counted from 1."""
-    lines = []
     for n, rows in PARTIAL.items():
         J, k = chains[n]["J"], chains[n]["k"]
         e = 1e3 / k
@@ -93,20 +90,17 @@ def tables_2_to_4(chains: Mapping[int, Mapping[str, np.ndarray]]) -> list[Statem
                 what = f"Table {10 - n}, {row}, {j}"
                 expected = ("slip",) if printed in SLIPS else ("reproduced", "near")
                 expected = (CARRIED[what],) if what in CARRIED else expected
-                lines.append(judged(what, printed, here[row][j], expected))
-    return lines
+                yield judged(what, printed, here[row][j], expected)
 
 
-def tables_3_to_5(chains: Mapping[int, Mapping[str, np.ndarray]]) -> list[Statement]:
+def tables_3_to_5(chains: Mapping[int, Mapping[str, np.ndarray]]) -> Claims:
     """Every number of the reduced chains."""
-    lines = []
     for n, (table, rows) in CHAINS.items():
         for name, values in rows.items():
             for i, printed in enumerate(values):
                 what = f"{table}, {name}{i + 1}"
                 expected = (CARRIED[what],) if what in CARRIED else ("reproduced", "near")
-                lines.append(judged(what, printed, chains[n][name][i], expected))
-    return lines
+                yield judged(what, printed, chains[n][name][i], expected)
 
 
 def holzer(J: np.ndarray, e: Sequence[float]) -> np.ndarray:

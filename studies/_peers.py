@@ -5,8 +5,6 @@ so many half swings. A half swing is two legs, out to the turning point and back
 terminal events. `FOLLOWERS` has those that are installed by their names.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from functools import cache

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
-from _common import Statement, compared, solved
+from _common import Claims, Statement, compared, solved
 from scipy.optimize import nnls
 
 import sweep
@@ -128,7 +128,7 @@ def _around(wear: Callable[[Any, Any], Any], place: float, rim: float, best: Set
     return float(unevenness(profiles, weight)[least(profiles, weight, radius) >= KEPT].min())
 
 
-def one_setting(ds: xr.Dataset) -> list[Statement]:
+def one_setting(ds: xr.Dataset) -> Claims:
     """What one setting of a disc can do at best, with and without a hole, and the most even of the grid solved again.
 
     Parameters
@@ -144,14 +144,14 @@ def one_setting(ds: xr.Dataset) -> list[Statement]:
     profile = np.asarray(wear(float(ds.e[e]), float(ds.w_x[w_x])))[:: (POINTS - 1) // (ds.radius.size - 1)]
     again = float(unevenness(profile, weight))
     there = bool(bored.uneven < best.uneven < 1.1 * bored.uneven)
-    return [
-        Statement("disc, one setting, optimised: the most even has a hole", "", str(bored), None, bored.least < KEPT),
-        Statement("disc, one setting, optimised, without a hole", "", str(best), None, there),
-        Statement("  best of 231 settings around it on a grid, over that", "1", f"{1 + off:.4f}", off, 0 <= off < 0.01),
-        compared(
-            "disc, most even setting of the grid, solved again", f"{again:.5f}", float(here.min()), again, 1e-4, 5
-        ),
-    ]
+    yield Statement("disc, one setting, optimised: the most even has a hole", "", str(bored), None, bored.least < KEPT)
+    yield Statement("disc, one setting, optimised, without a hole", "", str(best), None, there)
+    yield Statement(
+        "  best of 231 settings around it on a grid, over that", "1", f"{1 + off:.4f}", off, 0 <= off < 0.01
+    )
+    yield compared(
+        "disc, most even setting of the grid, solved again", f"{again:.5f}", float(here.min()), again, 1e-4, 5
+    )
 
 
 class Profiles(NamedTuple):

@@ -4,8 +4,6 @@ Each follower gives the places of cells at given times, at one tolerance; NaN wh
 `modes` is scipy's DOP853 as an expert would use it: stick and slip apart, each up to an event.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from typing import Any

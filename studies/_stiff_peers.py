@@ -3,8 +3,6 @@
 Each follower gives the times of the first switch of cells mu, at one tolerance, a = b = 0.5/s and phi0 = 1 rad.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from typing import Any

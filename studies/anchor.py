@@ -93,7 +93,7 @@ def figure(ds: xr.Dataset) -> Any:
 def conclude(path: str) -> Conclusion:
     """Statements and the figure."""
     ds = with_theory(read_result(path, "anchor_scene:KERNEL", ["phi0", "mu"], "anchor.toml"))
-    return statements(ds), NOTES.splitlines(), lambda: figure(ds)
+    return statements(ds), [NOTES], lambda: figure(ds)
 
 
 main = script(__name__, "anchor.h5", conclude)

@@ -17,14 +17,12 @@ which falls with the amplitude for any other `at`. What is out of poise adds dP/
 the sign of `at` or the drive in it, and vanishes where J1 does, at a = 3.832 rad, 220 degree.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Conclusion, Statement, compared, differing, most, read_result, said, script
+from _common import Claims, Conclusion, compared, differing, most, read_result, said, script
 from _figures import direct_label, page_of, plain_ticks
 from matplotlib.colors import SymLogNorm
 from scipy.special import j1, jn_zeros
@@ -71,7 +69,7 @@ def theory(ds: xr.Dataset) -> xr.DataArray:
     return DAY * (ds.r + ds["at"]) * (2 * ds.r / (math.pi * ds.a) + ds.zeta) / ds.a
 
 
-def impulses(ds: xr.Dataset) -> list[Statement]:
+def impulses(ds: xr.Dataset) -> Claims:
     """Where impulses do not touch the rate, by how much they do elsewhere, and `balance_driven` at the centre."""
     there = abs(ds["at"] + ds.r) < 1e-12
     still, span = float(abs(ds.loss).where(there).max()), ds.a.where(there & ds.loss.notnull())
@@ -87,15 +85,13 @@ def impulses(ds: xr.Dataset) -> list[Statement]:
     losses = (DAY * (driven({"r": [0.001, 0.01]}, light, 1e-12).period / (2 * math.pi) - 1)).values
     what = f"at = -r: loss at every drive, a = {float(span.min()):.2f} to {float(span.max()):.2f} rad [s/day]"
     cells = f"elsewhere (1), a > 20 r, 20 abs(at): {int(ratio.notnull().sum())} cells"
-    return [
-        most(what, "0", still, FLAT, "at most"),
-        most(cells, "1", abs(ratio - 1).max(), FIRST),
-        said("  amplitudes at which the loss is stationary", turns == 0, f"{turns} of the grid", "none"),
-        said("  largest loss or gain on the grid [s/day]", worst > 100, f"{worst:.0f}", "-"),
-        most("at = 0: period and amplitude by `balance_driven`", "the same", off, 1e-6, "largest"),
-        differing("  zeta = .005, w = .01, r = .001: loss by solve_ivp [s/day]", "1.77", losses[0], 1.77, 0.01, 4),
-        differing("  r = .01", "49.7", losses[1], 49.7, 0.1, 4),
-    ]
+    yield most(what, "0", still, FLAT, "at most")
+    yield most(cells, "1", abs(ratio - 1).max(), FIRST)
+    yield said("  amplitudes at which the loss is stationary", turns == 0, f"{turns} of the grid", "none")
+    yield said("  largest loss or gain on the grid [s/day]", worst > 100, f"{worst:.0f}", "-")
+    yield most("at = 0: period and amplitude by `balance_driven`", "the same", off, 1e-6, "largest")
+    yield differing("  zeta = .005, w = .01, r = .001: loss by solve_ivp [s/day]", "1.77", losses[0], 1.77, 0.01, 4)
+    yield differing("  r = .01", "49.7", losses[1], 49.7, 0.1, 4)
 
 
 def driven(axes: dict[str, Any], fixed: dict[str, float], rtol: float) -> xr.Dataset:
@@ -103,9 +99,8 @@ def driven(axes: dict[str, Any], fixed: dict[str, float], rtol: float) -> xr.Dat
     return sweep.run(kernel="balance_driven", axes=axes, fixed=fixed, rtol=rtol)
 
 
-def lifts(ds: xr.Dataset) -> list[Statement]:
+def lifts(ds: xr.Dataset) -> Claims:
     """Where the rate of a balance on a lift does not depend on the torque: at its greatest loss."""
-    lines = []
     for beta in ds.beta.values:
         line = ds.sel(beta=beta).isel(r=-1)
         k = int(line.loss.fillna(-1.0).argmax("m"))
@@ -113,27 +108,25 @@ def lifts(ds: xr.Dataset) -> list[Statement]:
         here = f"{float(line.loss[k]):.0f} at {math.degrees(a):.0f} degree = {a / beta:.2f} lifts"
         what = f"lift +-{math.degrees(beta):.0f} degree: greatest loss [s/day] at amplitude"
         holds = 0 < k < line.m.size - 1 and 1.1 * beta < a < 2.0 * beta
-        lines.append(said(what, holds, f"{here}, m {float(line.m[k]) / least:.2f} times the least", "1 to 2 lifts"))
+        yield said(what, holds, f"{here}, m {float(line.m[k]) / least:.2f} times the least", "1 to 2 lifts")
     free = ds.sel(r=0).loss
     gains = (free.where(free.notnull(), -1.0) < 0).all()
     here = f"{float(free.min()):.2f} at most [s/day]"
-    return [*lines, said("no solid friction: a lift gains, at every torque", gains, here, "< 0")]
+    yield said("no solid friction: a lift gains, at every torque", gains, here, "< 0")
 
 
-def positions(ds: xr.Dataset) -> list[Statement]:
+def positions(ds: xr.Dataset) -> Claims:
     """The amplitude at which positions agree, and what poise does elsewhere."""
     spread, a, first = ds.loss.isel(hang=0) - ds.loss.isel(hang=2), ds.a.isel(hang=0), jn_zeros(1, 1)[0]
     zero = float(sweep.where_exponent(spread.swap_dims(w="a0"), "a0", 0.0, values=True).abscissa)
     rate = -2 * DAY * float(ds.poise) * j1(a) / a
     off, level = (abs(x).max() / abs(spread).max() for x in (spread - rate, ds.loss.isel(hang=1)))
-    return [
-        differing("positions agree at the amplitude [rad]", f"{first:.4f}", zero, first, 5e-3, 5),
-        most("top heavy against bottom heavy, by J1(a)/a", "the same", off, 5e-3, "of the largest"),
-        most("heavy at the side: of that", "0", level, 5e-3, ""),
-    ]
+    yield differing("positions agree at the amplitude [rad]", f"{first:.4f}", zero, first, 5e-3, 5)
+    yield most("top heavy against bottom heavy, by J1(a)/a", "the same", off, 5e-3, "of the largest")
+    yield most("heavy at the side: of that", "0", level, 5e-3, "")
 
 
-def pivots() -> list[Statement]:
+def pivots() -> Claims:
     """From the page's mu, m, g and radius to r, and what the position does to amplitude and rate of a watch.
 
     On its side a pivot climbs its hole by arctan(mu), so that R = mu m g r/sqrt(1 + mu^2), the page's R to first order
@@ -146,12 +139,10 @@ def pivots() -> list[Statement]:
     work = (2 * ds.r * ds.amplitude + math.pi / 600 * ds.amplitude**2).values
     close = abs(upright - 0.025) < 5e-4 and abs(flat - 0.0125) < 5e-4
     amplitudes = "same drive, w = 0.2: amplitude hanging, lying [degree]"
-    return [
-        compared("R = mu m g r/sqrt(1 + mu^2), r = 50 um [N m]", "mu m g r = 7.36e-09", upright * k, 7.36e-9, 0.02, 4),
-        said("r = R/k, hanging and lying [rad]", close, f"{upright:.4f}, {flat:.4f}", "0.025, 0.0125"),
-        most(amplitudes, "by the work", abs(work / 0.2 - 1).max(), 0.02, f"{a[1]:.0f}, {a[0]:.0f}"),
-        said("  loss hanging, lying [s/day]", loss[1] > loss[0], f"{loss[1]:.2f}, {loss[0]:.2f}", "-"),
-    ]
+    yield compared("R = mu m g r/sqrt(1 + mu^2), r = 50 um [N m]", "mu m g r = 7.36e-09", upright * k, 7.36e-9, 0.02, 4)
+    yield said("r = R/k, hanging and lying [rad]", close, f"{upright:.4f}, {flat:.4f}", "0.025, 0.0125")
+    yield most(amplitudes, "by the work", abs(work / 0.2 - 1).max(), 0.02, f"{a[1]:.0f}, {a[0]:.0f}")
+    yield said("  loss hanging, lying [s/day]", loss[1] > loss[0], f"{loss[1]:.2f}, {loss[0]:.2f}", "-")
 
 
 def draw_lines(axes: Any, ds: xr.Dataset) -> None:

@@ -10,14 +10,12 @@ otherwise; the time of a half swing and the motion are therefore measured by DOP
 the period is so of the free balance alone: driven, it loses (study `balance_isochronism`).
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Conclusion, Statement, compared, differing, most, read_result, said, script
+from _common import Claims, Conclusion, compared, differing, most, read_result, said, script
 from _figures import columns_of, direct_label, hatch
 from matplotlib.colors import LogNorm
 from scipy.integrate import solve_ivp
@@ -86,7 +84,7 @@ def scaled(ds: xr.Dataset) -> xr.Dataset:
     return ds.assign(law=np.log1p(ds.x) / (math.pi * ds.zeta))
 
 
-def counts(ds: xr.Dataset) -> list[Statement]:
+def counts(ds: xr.Dataset) -> Claims:
     """How many half swings, in the two limits and between."""
     light = ds.where((ds.zeta <= LIGHT) & (ds.N > 0))
     off = abs(light.N - light.law)
@@ -97,14 +95,12 @@ def counts(ds: xr.Dataset) -> list[Statement]:
     steep = sweep.fit_exponent(many.N, "zeta").exponent
     slope = float((1 / np.log1p(many.x) - 1).mean())  # dln(ln(1 + x)/zeta)/dlnzeta for x >> 1
     most = f"off by {float(off.max()):.2f} at most"
-    return [
-        said(f"N = ln(1 + x)/(pi zeta), zeta <= {LIGHT:g}", (off / allowed).max() < 1, most, "all cells"),
-        differing("exponent of N in r, x < 0.1", "-1", float(few), -1.0, 0.1, 5),
-        differing("exponent of N in zeta, x > 100", f"{slope:.3f}", float(steep), slope, 0.05, 5),
-    ]
+    yield said(f"N = ln(1 + x)/(pi zeta), zeta <= {LIGHT:g}", (off / allowed).max() < 1, most, "all cells")
+    yield differing("exponent of N in r, x < 0.1", "-1", float(few), -1.0, 0.1, 5)
+    yield differing("exponent of N in zeta, x > 100", f"{slope:.3f}", float(steep), slope, 0.05, 5)
 
 
-def rest(ds: xr.Dataset) -> list[Statement]:
+def rest(ds: xr.Dataset) -> Claims:
     """Where and when it rests, also by the page's rule as it stands: at the first rest with abs(theta) - r < r."""
     far = float((abs(ds.stop_angle) / ds.r).max())
     creeping = ds.where(~ds.swings, drop=True)
@@ -119,17 +115,19 @@ def rest(ds: xr.Dataset) -> list[Statement]:
     zeta, r = CELLS[-1]
     third, fourth = abs(turning_points(zeta, r, 1.0, 4)[1][3:])
     words = f"rests at {fourth:.3f} rad, after 4; by the page at {third:.3f} > r, after 3"
-    return [
-        said("it rests within r of the spring's zero", far <= 1, f"largest abs(theta)/r {far:.6f}", "yes"),
-        said("zeta >= 1: creeps to r, never to 0", creeps, f"{creeping.status.size} cells", "yes"),
-        said("counts that the last digits decide", near < 1e-3 * cells, f"{near} of {cells} cells", "few"),
-        said("the page's rule stops too early", 0.2 < share < 0.8 and most == 1,
-             f"{share:.0%} of cells, by {most:.0f} half swing", "-"),
-        said(f"  zeta = {zeta:g}, r = {r:g} rad, DOP853", fourth <= r < third < 2 * r, words, "abs(theta) <= r"),
-    ]  # fmt: skip
+    yield said("it rests within r of the spring's zero", far <= 1, f"largest abs(theta)/r {far:.6f}", "yes")
+    yield said("zeta >= 1: creeps to r, never to 0", creeps, f"{creeping.status.size} cells", "yes")
+    yield said("counts that the last digits decide", near < 1e-3 * cells, f"{near} of {cells} cells", "few")
+    yield said(
+        "the page's rule stops too early",
+        0.2 < share < 0.8 and most == 1,
+        f"{share:.0%} of cells, by {most:.0f} half swing",
+        "-",
+    )
+    yield said(f"  zeta = {zeta:g}, r = {r:g} rad, DOP853", fourth <= r < third < 2 * r, words, "abs(theta) <= r")
 
 
-def isochronism(ds: xr.Dataset) -> list[Statement]:
+def isochronism(ds: xr.Dataset) -> Claims:
     """What friction does to the period of the free balance, followed by integration, and by the kernel."""
     half, reach = 0.0, 0.0
     for zeta, r in CELLS:
@@ -145,15 +143,13 @@ def isochronism(ds: xr.Dataset) -> list[Statement]:
     first, light = ds.isel(zeta=0, r=0), ds.sel(zeta=LIGHT, method="nearest").isel(r=0)
     zeta, damped = float(first.zeta), float(light.zeta)
     slower, loses = f"period omega_n/(2 pi) - 1 at zeta = {zeta:g}", "viscous damping loses, zeta = "
-    return [
-        most(free, "pi/omega_d at any r", half, 1e-8),
-        most("turning points by (10) and DOP853", "the same", reach, 1e-8, "largest difference"),
-        most("period = 2 pi/(omega_n sqrt(1 - zeta^2))", "yes", off, 1e-13),
-        compared(slower, "zeta^2/2", float(first.slow), zeta**2 / 2, 1e-6, 4),
-        compared(
-            f"{loses}{damped:.3g} [s/day]", "86400 zeta^2/2", 86400 * float(light.slow), 43200 * damped**2, 1e-3, 4
-        ),
-    ]
+    yield most(free, "pi/omega_d at any r", half, 1e-8)
+    yield most("turning points by (10) and DOP853", "the same", reach, 1e-8, "largest difference")
+    yield most("period = 2 pi/(omega_n sqrt(1 - zeta^2))", "yes", off, 1e-13)
+    yield compared(slower, "zeta^2/2", float(first.slow), zeta**2 / 2, 1e-6, 4)
+    yield compared(
+        f"{loses}{damped:.3g} [s/day]", "86400 zeta^2/2", 86400 * float(light.slow), 43200 * damped**2, 1e-3, 4
+    )
 
 
 def figure(ds: xr.Dataset) -> Any:

@@ -89,7 +89,7 @@ def figure(ds: xr.Dataset) -> Any:
 def conclude(path: str) -> Conclusion:
     """Statements and the figure."""
     ds = read_result(path, "ball_scene:KERNEL", ["push"], "bouncing_ball.toml")
-    return {"Bounces": statements(ds)}, NOTES.splitlines(), lambda: figure(ds)
+    return {"Bounces": statements(ds)}, [NOTES], lambda: figure(ds)
 
 
 main = script(__name__, "bouncing_ball.h5", conclude)

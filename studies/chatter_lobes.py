@@ -13,14 +13,12 @@ is the border of stability. With Tobias and Tlusty: K = -1/(2 Re H), wherever Re
 mode of stiffness c and damping zeta alone the least K is 2 c zeta (1 + zeta).
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Conclusion, Statement, compared, most, read_result, said, script
+from _common import Claims, Conclusion, Statement, compared, most, read_result, said, script
 from _figures import direct_label, page_of, plain_ticks
 from fula_milling_machine import SPAN, chain, response
 
@@ -110,7 +108,7 @@ def least(ds: xr.Dataset, n: int, mode: str) -> tuple[float, float]:
     return float(there.f[i]), float(there[i])
 
 
-def lobes(ds: xr.Dataset) -> list[Statement]:
+def lobes(ds: xr.Dataset) -> Claims:
     """The least K, and whether the lobes are the border of stability."""
     breach, below, above = 0.0, 0, 99
     for n in ds.n_keep.values:
@@ -129,21 +127,25 @@ def lobes(ds: xr.Dataset) -> list[Statement]:
     squares, shapes = np.linalg.eigh(springs / np.sqrt(np.outer(J, J)))
     rule = 2 * float(squares[1] / (shapes[0, 1] ** 2 / J[0])) * zeta * (1 + zeta)
     main, off = LEAST[8][0], rule / LEAST[8][0] - 1
-    return [
-        *(
-            compared(f"least K, {n} masses: {mode}", f"{K:.6g}", least(ds, n, mode)[1], K, 1e-5, 7)
-            for n, known in LEAST.items() for mode, K in zip(BANDS, known, strict=True)
-        ),
-        Statement("  main mode alone, 2 c zeta (1 + zeta)", f"beyond 5 % of {main:.6g}", f"{rule:.4g}", off,
-                  abs(off) > 0.05),
-        most("(1) on the lobes, H by the script", "0", breach, 1e-9, "largest breach"),
-        said("roots to the right, 1 % below the border", below == 0,
-             f"{below}; {ds.n_keep.size} chains, {len(COUNTED)} tooth frequencies", "none"),
-        said("  1 % above it", above >= 2, f"{above} at least", "2 or more"),
-    ]  # fmt: skip
+    yield from (
+        compared(f"least K, {n} masses: {mode}", f"{K:.6g}", least(ds, n, mode)[1], K, 1e-5, 7)
+        for n, known in LEAST.items()
+        for mode, K in zip(BANDS, known, strict=True)
+    )
+    yield Statement(
+        "  main mode alone, 2 c zeta (1 + zeta)", f"beyond 5 % of {main:.6g}", f"{rule:.4g}", off, abs(off) > 0.05
+    )
+    yield most("(1) on the lobes, H by the script", "0", breach, 1e-9, "largest breach")
+    yield said(
+        "roots to the right, 1 % below the border",
+        below == 0,
+        f"{below}; {ds.n_keep.size} chains, {len(COUNTED)} tooth frequencies",
+        "none",
+    )
+    yield said("  1 % above it", above >= 2, f"{above} at least", "2 or more")
 
 
-def moved(ds: xr.Dataset) -> list[Statement]:
+def moved(ds: xr.Dataset) -> Claims:
     """What five masses make of the lobes of eight."""
     (f8, K8), (f5, K5) = (least(ds, n, "main mode") for n in (8, 5))
     (g8, M8), (g5, M5) = (least(ds, n, "fifth mode") for n in (8, 5))
@@ -156,18 +158,30 @@ def moved(ds: xr.Dataset) -> list[Statement]:
         lost = np.flatnonzero(abs(off.sel(n_keep=n)) > HELD)
         reach.append(float(TEETH[lost[0] - 1] if lost.size and lost[0] else 0.0 if lost.size else TEETH[-1]))
     by_masses = ", ".join(f"{n}: {x:.0f} Hz" for n, x in zip((7, 6, 5, 4), reach, strict=True))
-    return [
-        said("least K: five masses against eight", abs(K5 / K8 - 1) < 0.01, f"{K5 / K8 - 1:+.2%}", "< 1 %"),
-        said("  tooth frequencies of the lobes", abs(f5 / f8 - 1) < 0.01, f"{f5 / f8 - 1:+.2%}", "< 1 %"),
-        said(f"border at 180 rev/min, {CUTTER} teeth", abs(here) < 0.01, f"{here:+.2%}", "< 1 %"),
-        said("border, tooth frequencies of 2 to 159 Hz", abs(worst) < HELD,
-             f"{float(worst):+.1%} at most, at {float(worst.tooth):.1f} Hz", "< 5 %"),
-        said("lobes of the fifth mode: K, frequency", abs(M5 / M8 - 1) > HELD,
-             f"{M5 / M8 - 1:+.1%}, {g5 / g8 - 1:+.1%}", "> 5 %"),
-        said("  of which tooth frequencies below these see nothing", reached > 2 * SPAN, f"{reached:.0f} Hz", "159 Hz"),
-        said("border held to 5 % up to a tooth frequency of, by masses", np.all(np.diff(reach) < 0), by_masses,
-             "more with more"),
-    ]  # fmt: skip
+    yield said("least K: five masses against eight", abs(K5 / K8 - 1) < 0.01, f"{K5 / K8 - 1:+.2%}", "< 1 %")
+    yield said("  tooth frequencies of the lobes", abs(f5 / f8 - 1) < 0.01, f"{f5 / f8 - 1:+.2%}", "< 1 %")
+    yield said(f"border at 180 rev/min, {CUTTER} teeth", abs(here) < 0.01, f"{here:+.2%}", "< 1 %")
+    yield said(
+        "border, tooth frequencies of 2 to 159 Hz",
+        abs(worst) < HELD,
+        f"{float(worst):+.1%} at most, at {float(worst.tooth):.1f} Hz",
+        "< 5 %",
+    )
+    yield said(
+        "lobes of the fifth mode: K, frequency",
+        abs(M5 / M8 - 1) > HELD,
+        f"{M5 / M8 - 1:+.1%}, {g5 / g8 - 1:+.1%}",
+        "> 5 %",
+    )
+    yield said(
+        "  of which tooth frequencies below these see nothing", reached > 2 * SPAN, f"{reached:.0f} Hz", "159 Hz"
+    )
+    yield said(
+        "border held to 5 % up to a tooth frequency of, by masses",
+        np.all(np.diff(reach) < 0),
+        by_masses,
+        "more with more",
+    )
 
 
 def figure(ds: xr.Dataset) -> Any:

@@ -18,14 +18,12 @@ A case that turns with the acceleration w pushes the two against each other: -(I
 shakes one foliot, nothing if they are equal.                                                            (3)
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Conclusion, Statement, compared, count, differing, most, power, read_result, said, script, solved
+from _common import Claims, Conclusion, compared, count, differing, most, power, read_result, said, script, solved
 from _figures import page_of, plain_ticks
 
 from sweep.show.charts import COLOURS, MARKS
@@ -76,7 +74,7 @@ def pair(ds: xr.Dataset, **changed: Any) -> xr.Dataset:
     return solved("cross_beat_scene:KERNEL", **(known | changed), **study)
 
 
-def as_one(ds: xr.Dataset) -> list[Statement]:
+def as_one(ds: xr.Dataset) -> Claims:
     """The pair beside one foliot of the sums, and beside one of the two alone.
 
     A second foliot like the first halves alpha at the same torque, so P grows by 2^s, s between both.
@@ -88,15 +86,13 @@ def as_one(ds: xr.Dataset) -> list[Statement]:
     grown = np.log2(stiff.period / ds.alone)
     inside = ((grown > ds.s_alone - 5e-3) & (grown < ds.s + 5e-3)).all()
     text, detail = f"2^{grown[0]:.3f} to 2^{grown[-1]:.3f}", "exponents, gear of 1 N m/rad, alpha .3 to 300"
-    return [
-        most(f"(2), wind-up < {SMALL:g}: {count(first)}", "1", first - 1, FIRST),
-        differing("  power of the stiffness in it", "-1", power(usual), -1, 0.01, 5),
-        most(detail, "a detail (paper)", turned, 5e-3, "largest difference from (1)"),
-        said("a second foliot like the first: P grows by", inside, text, "2^s"),
-    ]
+    yield most(f"(2), wind-up < {SMALL:g}: {count(first)}", "1", first - 1, FIRST)
+    yield differing("  power of the stiffness in it", "-1", power(usual), -1, 0.01, 5)
+    yield most(detail, "a detail (paper)", turned, 5e-3, "largest difference from (1)")
+    yield said("a second foliot like the first: P grows by", inside, text, "2^s")
 
 
-def sums(ds: xr.Dataset) -> list[Statement]:
+def sums(ds: xr.Dataset) -> Claims:
     """Only the sums count: friction of one or of both, weights moved on one."""
     inertia, c, phi0 = float(ds.I_l + ds.I_r), float(ds.c_l + ds.c_r), float(ds.phi0)
     tau = ALPHA * c**2 * phi0 / inertia
@@ -108,12 +104,10 @@ def sums(ds: xr.Dataset) -> list[Statement]:
     moved = pair(ds, I_l=[inertia / 2 * math.exp(x) for x in (-h, h)])
     rise = np.log(moved.interval[1] / moved.interval[0]) / (2 * h)
     smooth, rough = float(one.period), float(rubbed.period)
-    return [
-        compared("viscous friction of one alone: P [s]", f"{smooth:.5f}", P[0], smooth, 1e-3, 6),
-        compared("dry friction of one, a fifth of the torque", f"{rough:.5f}", P[1], rough, 1e-3, 6),
-        compared("  half of it of each", f"{rough:.5f}", P[2], rough, 1e-3, 6),
-        differing("weights moved on one: dlnP/dlnI_l", f"(1 - s)/2 = {(1 - s) / 2:.4f}", rise, (1 - s) / 2, 1e-3, 4),
-    ]
+    yield compared("viscous friction of one alone: P [s]", f"{smooth:.5f}", P[0], smooth, 1e-3, 6)
+    yield compared("dry friction of one, a fifth of the torque", f"{rough:.5f}", P[1], rough, 1e-3, 6)
+    yield compared("  half of it of each", f"{rough:.5f}", P[2], rough, 1e-3, 6)
+    yield differing("weights moved on one: dlnP/dlnI_l", f"(1 - s)/2 = {(1 - s) / 2:.4f}", rise, (1 - s) / 2, 1e-3, 4)
 
 
 def shaken(ds: xr.Dataset) -> xr.DataArray:
@@ -124,15 +118,13 @@ def shaken(ds: xr.Dataset) -> xr.DataArray:
     return xr.DataArray(rows, {"share": list(SHARES), "swing": swings}, ("share", "swing"))
 
 
-def steadied(halves: xr.DataArray) -> list[Statement]:
+def steadied(halves: xr.DataArray) -> Claims:
     """(3): scatter of the half swings."""
     scatter = halves.std("swing")
     unit = scatter[1:] / scatter.share[1:]
     what = "scatter of half swings over (I_l - I_r)/(I_l + I_r) [s]"
-    return [
-        most(what, "one number, (3)", unit / unit.mean() - 1, 0.01, f"{unit.mean():.3e}"),
-        most("  of equal foliots, over that", "0", scatter[0] / unit.mean(), 1e-3, f"{scatter[0]:.1e} s"),
-    ]
+    yield most(what, "one number, (3)", unit / unit.mean() - 1, 0.01, f"{unit.mean():.3e}")
+    yield most("  of equal foliots, over that", "0", scatter[0] / unit.mean(), 1e-3, f"{scatter[0]:.1e} s")
 
 
 def figure(ds: xr.Dataset, halves: xr.DataArray) -> Any:

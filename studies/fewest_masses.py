@@ -15,8 +15,6 @@ fewest_masses.png here. What comes out:
   times as long as the full chain of ten alone with its poles; to find the fewest takes 0.2 to 0.3 ms.
 """
 
-from __future__ import annotations
-
 import sys
 import time
 from collections.abc import Sequence
@@ -25,7 +23,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Groups, columns, said, shown, what_came_out
+from _common import OPTIONS, Groups, columns, said, shown
 from _figures import page_of
 
 import sweep
@@ -189,8 +187,7 @@ def conclusions(count: int) -> Any:
     """Statements, tables and the figure of so many drivetrains."""
     chains = drivetrains(count)
     ds, times = needed(chains), cost(chains)
-    closing = ["", *what_came_out("fewest_masses")]
-    return statements(ds), [*notes(ds, times), *closing], lambda: figure(ds, times)
+    return statements(ds), ["", *notes(ds, times)], lambda: figure(ds, times)
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -198,12 +195,12 @@ def main(arguments: Sequence[str]) -> int:
     if list(arguments) == ["points"]:
         write_points(Path(__file__).with_suffix(".csv"))
         return 0
-    counts = [argument for argument in arguments if argument != "--force"]
+    counts = [argument for argument in arguments if argument not in OPTIONS]
     if len(counts) > 1 or not all(a.isdigit() and int(a) > 0 for a in counts):
-        print("use: python fewest_masses.py [drivetrains] [--force]", file=sys.stderr)
+        print("use: python fewest_masses.py [drivetrains] [--all] [--force]", file=sys.stderr)
         return 2
     count = int(counts[0]) if counts else DRIVETRAINS
-    return shown(Path("fewest_masses.png"), lambda: conclusions(count), "--force" in arguments, "expected")
+    return shown("fewest_masses", Path("fewest_masses.png"), lambda: conclusions(count), arguments, "expected")
 
 
 if __name__ == "__main__":

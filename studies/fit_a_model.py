@@ -6,8 +6,6 @@ A worked example of fits with the libraries of the field: a power law by xarray'
 `sweep.solver`, as a model of lmfit, with intervals of both parameters.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import lmfit

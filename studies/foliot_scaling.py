@@ -7,14 +7,12 @@ draws foliot_scaling.png and prints what Hoyng & Nieuwenhuizen ("the paper", arX
 out here. Only alpha = mu/(a^2 phi0) counts: a P and A = phi_max/phi0 are functions of it alone.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Conclusion, Statement, compared, most, read_result, said, script, solved
+from _common import Claims, Conclusion, Statement, compared, most, read_result, said, script, solved
 
 import sweep
 from sweep.show import charts
@@ -67,27 +65,24 @@ def half_point(ds: xr.Dataset) -> xr.Dataset:
     return sweep_of_alpha(ds, [float(found.abscissa)]).isel(mu=0)
 
 
-def limits(ds: xr.Dataset) -> list[Statement]:
+def limits(ds: xr.Dataset) -> Claims:
     """Leading terms, at the two ends of the sweep."""
     first, last = ds.isel(mu=0), ds.isel(mu=-1)
     weak, strong = float(first.alpha), float(last.alpha)
     b2 = (3 / strong) ** (2 / 3)  # square of the strong drive's small parameter
     at_weak, at_strong = f"alpha = {weak:.2g}", f"alpha = {strong:.2g}"
     third, period, swing = strong ** (1 / 3), f"4 3^(1/3) = {STRONG_P:.5f} *", f"3^(2/3)/2 = {STRONG_A:.5f} *"
-    return [
-        compared(f"weak drive: a P alpha at {at_weak}", "4 *", first.aP * weak, 4.0, 1.01 * weak),
-        compared(f"weak drive: A at {at_weak}", "1 *", first.A, 1.0, 0.31 * weak),
-        compared(f"strong drive: a P alpha^(1/3) at {at_strong}", period, last.aP * third, STRONG_P, 0.14 * b2),
-        compared(f"strong drive: A alpha^(-1/3) at {at_strong}", swing, last.A / third, STRONG_A, 0.11 * b2),
-    ]
+    yield compared(f"weak drive: a P alpha at {at_weak}", "4 *", first.aP * weak, 4.0, 1.01 * weak)
+    yield compared(f"weak drive: A at {at_weak}", "1 *", first.A, 1.0, 0.31 * weak)
+    yield compared(f"strong drive: a P alpha^(1/3) at {at_strong}", period, last.aP * third, STRONG_P, 0.14 * b2)
+    yield compared(f"strong drive: A alpha^(-1/3) at {at_strong}", swing, last.A / third, STRONG_A, 0.11 * b2)
 
 
-def straight_lines(ds: xr.Dataset) -> list[Statement]:
+def straight_lines(ds: xr.Dataset) -> Claims:
     """Exponents over the two windows, and where the two laws of the period meet.
 
     A limit is allowed the distance of the local exponent at the inner end of its window, by the series' next term.
     """
-    lines = []
     for name, y, window, paper, limit in (
         ("a P", ds.aP, WEAK, "-1 *", -1.0),
         ("a P", ds.aP, STRONG, "-1/3 *", -1 / 3),
@@ -98,14 +93,14 @@ def straight_lines(ds: xr.Dataset) -> list[Statement]:
         off, next_term = fit.exponent - limit, fit.high if window == WEAK else 4 / 45 * (3 / fit.low) ** (2 / 3)
         here = f"{fit.exponent:.7f} ± {fit.exponent_error:.1g}, prefactor {fit.prefactor:.5f}"
         what = f"exponent of {name}, alpha = {fit.low:.1e} to {fit.high:.1e} ({fit.points:d} points)"
-        lines.append(most(what, paper, off, next_term, here))
+        yield most(what, paper, off, next_term, here)
     meet = sweep.fit_two_laws(ds.aP, "alpha", windows=(WEAK, STRONG))
     here = f"alpha = {meet.crossover:.5f} ± {meet.crossover_error:.1g}, a P = {meet.level:.4f}"
     off, exact = meet.crossover * math.sqrt(3) - 1, "(3^(-1/2) = 0.57735, 6.9282)"
-    return [*lines, most("the two laws of a P meet at", exact, off, 0.01, here)]
+    yield most("the two laws of a P meet at", exact, off, 0.01, here)
 
 
-def sliding(ds: xr.Dataset, half: xr.Dataset) -> list[Statement]:
+def sliding(ds: xr.Dataset, half: xr.Dataset) -> Claims:
     """What becomes of the exponent in between."""
     slope = sweep.local_exponent(ds.aP, "alpha")
     rough = float(np.diff(np.log(ds.alpha)).max() ** 4)  # differences are of fourth order
@@ -116,19 +111,16 @@ def sliding(ds: xr.Dataset, half: xr.Dataset) -> list[Statement]:
     place, error = float(by_period.abscissa), float(by_period.abscissa_error)
     read, roup = "read off a figure", "exponent -1/2 (Roup et al. and Denny: at all torques)"
     far, differences = "largest distance", "  at alpha, from differences of ln P"
-    lines = [
-        said("exponent of P changes gradually", slides, f"{low:.7f} to {high:.7f}", "-1 to -1/3 *"),
-        most("  differences of ln P against the exact -s", "(0)", slope + ds.s, rough, far),
-        said(roup, near < 0.02, f"{near:.1%} of alpha within 0.01", "at one alpha"),
-        most(differences, read, place / HALF[0] - 1, error / HALF[0], f"{place:.10f} ± {error:.0e}"),
-    ]
+    yield said("exponent of P changes gradually", slides, f"{low:.7f} to {high:.7f}", "-1 to -1/3 *")
+    yield most("  differences of ln P against the exact -s", "(0)", slope + ds.s, rough, far)
+    yield said(roup, near < 0.02, f"{near:.1%} of alpha within 0.01", "at one alpha")
+    yield most(differences, read, place / HALF[0] - 1, error / HALF[0], f"{place:.10f} ± {error:.0e}")
     names = ("at alpha, from the exact s", "a P there", "A there")
     for name, here, true in zip(names, (half.alpha, half.aP, half.A), HALF, strict=True):
-        lines.append(compared(f"  {name}", read, here, true, 1e-12, 14))
-    return lines
+        yield compared(f"  {name}", read, here, true, 1e-12, 14)
 
 
-def general(ds: xr.Dataset, half: xr.Dataset) -> list[Statement]:
+def general(ds: xr.Dataset, half: xr.Dataset) -> Claims:
     """Statements about all drives: a weak one is followed from rest in SI units, swing by swing.
 
     Weaker ones take steps in proportion to 1/alpha.
@@ -142,36 +134,31 @@ def general(ds: xr.Dataset, half: xr.Dataset) -> list[Statement]:
     near = solved("foliot", method="closed", outputs=["period"], a=friction, mu=mu, phi0=ds.phi0)
     blind, least = sweep.local_exponent(near.period, "a")[4], ds.A.min() - 1
     followed = f"from rest to 4 switches at alpha = {weak.alpha:.1e}: P"
-    return [
-        most("no least torque", "yes", 2 * rest.interval[0] / weak.period - 1, 1e-8, followed),
-        most("self-starting", "yes", from_rest.aP / cycle.aP - 1, 1e-8, "from rest to the cycle"),
-        said("A is always larger than 1", least > 0, f"smallest A - 1 = {least:.2g}", "yes"),
-        most("a P and A depend on alpha alone", "yes *", apart, 1e-12, "same with other a, phi0"),
-        most("at exponent -1/2 friction does not count", "yes *", blind, 1e-8, "dlnP/dlna = 0"),
-    ]
+    yield most("no least torque", "yes", 2 * rest.interval[0] / weak.period - 1, 1e-8, followed)
+    yield most("self-starting", "yes", from_rest.aP / cycle.aP - 1, 1e-8, "from rest to the cycle")
+    yield said("A is always larger than 1", least > 0, f"smallest A - 1 = {least:.2g}", "yes")
+    yield most("a P and A depend on alpha alone", "yes *", apart, 1e-12, "same with other a, phi0")
+    yield most("at exponent -1/2 friction does not count", "yes *", blind, 1e-8, "dlnP/dlna = 0")
 
 
-def torque(ds: xr.Dataset) -> list[Statement]:
+def torque(ds: xr.Dataset) -> Claims:
     """What a change of the torque does."""
     last = float(ds.alpha[-1])
     once, tenfold = (sweep_of_alpha(ds, [alpha]).isel(mu=0) for alpha in (last / 10, last))
     factor, allowed = 10 ** (1 / 3), 0.14 * (30 / last) ** (2 / 3)
     cube, strong = f"10^(1/3) = {factor:.5f} *", "tenfold torque at strong drive:"
-    rows = [
-        compared(f"{strong} P falls by", cube, once.period / tenfold.period, factor, allowed),
-        compared(f"{strong} phi_max grows by", cube, tenfold.amplitude / once.amplitude, factor, allowed),
-    ]
+    yield compared(f"{strong} P falls by", cube, once.period / tenfold.period, factor, allowed)
+    yield compared(f"{strong} phi_max grows by", cube, tenfold.amplitude / once.amplitude, factor, allowed)
     for drive, alpha, percent in (("weak", float(ds.alpha[0]), 1), ("strong", last, 3)):
         part = 15 / DAY / float(sweep_of_alpha(ds, [alpha]).s[0])
         changed = sweep_of_alpha(ds, [alpha * math.exp(-part / 2), alpha * math.exp(part / 2)]).period.values
         off = float(math.log(changed[0] / changed[1])) * DAY / 15 - 1
         holds = abs(off) < 1e-3 and round(100 * part) == percent
         what = f"change of the torque for 15 min/day, {drive} drive"
-        rows.append(Statement(what, f"{percent} % *", f"{100 * part:.4g} %", off, holds))
-    return rows
+        yield Statement(what, f"{percent} % *", f"{100 * part:.4g} %", off, holds)
 
 
-def shape(motion: xr.Dataset) -> list[Statement]:
+def shape(motion: xr.Dataset) -> Claims:
     """The peaks recline, and at strong drive they are rounder than a sine's."""
     phase, half = motion.phase.values, motion.sizes["phase"] // 2 + 1
     faster, out, back = [], [], []
@@ -186,14 +173,12 @@ def shape(motion: xr.Dataset) -> list[Statement]:
     times = ", ".join(f"{x:.4f}" for x in faster) + " times"
     sooner = ", ".join(f"{x:.3f} and {y:.3f} P" for x, y in zip(out, back, strict=True))
     rounder = "strong drive: rounder than a sine, time over A/2"
-    return [
-        said(f"faster at the switch A than at C, {', '.join(SHOWN)}", min(faster) > 1, times, "yes"),
-        said("time from the switch to the peak, shorter than back", np.all(np.less(out, back)), sooner, "yes"),
-        said(rounder, high > 2 / 3 + 0.01, f"{high:.3f} P, sine 0.667", "yes"),
-    ]
+    yield said(f"faster at the switch A than at C, {', '.join(SHOWN)}", min(faster) > 1, times, "yes")
+    yield said("time from the switch to the peak, shorter than back", np.all(np.less(out, back)), sooner, "yes")
+    yield said(rounder, high > 2 / 3 + 0.01, f"{high:.3f} P, sine 0.667", "yes")
 
 
-def energy(ds: xr.Dataset, motion: xr.Dataset) -> list[Statement]:
+def energy(ds: xr.Dataset, motion: xr.Dataset) -> Claims:
     """The drive's work 2 mu phi0 a half swing is what friction takes, a integral v^2 dt; why -1 and why -1/3.
 
     The speed at the switch is the final one at weak drive, and follows from the work and the loss at strong.
@@ -203,15 +188,13 @@ def energy(ds: xr.Dataset, motion: xr.Dataset) -> list[Statement]:
     cube = strong.crossing_speed**3 * strong.a / (strong.mu**2 * strong.phi0)
     b2, final = (3 / float(strong.alpha)) ** (2 / 3), weak.crossing_speed * weak.a / weak.mu
     taken = ds.a * squares / (4 * motion.mu * ds.phi0) - 1
-    return [
-        most("friction takes 2 mu phi0 in half a period", "yes *", taken, 1e-5),
-        said("a swing forgets the one before it at weak drive", kept < 1e-8, f"kept: {kept:.0e}"),
-        taken_out(ds, motion),
-        compared("why -1: v a/mu, v at the switch, weak drive", "1 *", final, 1.0, 1e-6),
-        compared("why -1/3: v^3 a/(mu^2 phi0), strong drive", "(3) order 1", cube, 3.0, b2),
-        moved_weights(ds, motion),
-        wanted(),
-    ]
+    yield most("friction takes 2 mu phi0 in half a period", "yes *", taken, 1e-5)
+    yield said("a swing forgets the one before it at weak drive", kept < 1e-8, f"kept: {kept:.0e}")
+    yield taken_out(ds, motion)
+    yield compared("why -1: v a/mu, v at the switch, weak drive", "1 *", final, 1.0, 1e-6)
+    yield compared("why -1/3: v^3 a/(mu^2 phi0), strong drive", "(3) order 1", cube, 3.0, b2)
+    yield moved_weights(ds, motion)
+    yield wanted()
 
 
 def taken_out(ds: xr.Dataset, motion: xr.Dataset) -> Statement:
@@ -341,7 +324,7 @@ def conclude(path: str) -> Conclusion:
     ds = scaled(read_result(path, "foliot", ["mu"], "foliot_scaling.toml"))
     half, motion = half_point(ds), trajectories(ds)
     groups = {
-        "Limits": limits(ds) + straight_lines(ds),
+        "Limits": [*limits(ds), *straight_lines(ds)],
         "In between": sliding(ds, half),
         "At every drive": general(ds, half),
         "Torque": torque(ds),

@@ -13,13 +13,11 @@ With a v + R at strong drive, x = v0/mu obeys R x^2 + (2/3) a mu x^3 = 2 phi0, P
 there s = (3 a^2 phi0/(2 R))^(1/3). As mu grows without end, s - 1/3 goes as 4/45 - R/(9 a^2 phi0).  Derived here.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Conclusion, Statement, compared, differing, most, read_result, said, script, solved
+from _common import Claims, Conclusion, Statement, compared, differing, most, read_result, said, script, solved
 from _figures import direct_label, hatch, page_of
 
 import sweep
@@ -38,12 +36,11 @@ paper: Hoyng & Nieuwenhuizen, arXiv:1604.06681, has n = 1 and says that strong d
 """
 
 
-def ends(laws: xr.Dataset) -> list[Statement]:
+def ends(laws: xr.Dataset) -> Claims:
     """Exponents of the period over the outermost three decades, slow swings at small mu for n < 2, at large for n > 2.
 
     Allowed is the distance of s from its limit at the inner end: alpha_n, or 2n/(n+2) powers of (n+2)/alpha_n.
     """
-    found = []
     for n in laws.n.values[laws.n.values > 0]:
         free = "-1/2" if n == 2 else f"-{n:g}/{n + 2:g}"
         limits = ((1 / n, f"-1/{n:g}"), (n / (n + 2), free))[:: 1 if n <= 2 else -1]
@@ -55,11 +52,10 @@ def ends(laws: xr.Dataset) -> list[Statement]:
             next_term = alpha if alpha < 1 else ((n + 2) / alpha) ** (2 * n / (n + 2)) if alpha > 1 else 0.0
             exponent = sweep.fit_exponent(laws.period.sel(n=n), "mu", window).exponent
             what = f"n = {n:g}: exponent of P, {drive} mu"
-            found.append(differing(what, text, exponent, -limit, 1e-9 + next_term, 9))
-    return found
+            yield differing(what, text, exponent, -limit, 1e-9 + next_term, 9)
 
 
-def exact(laws: xr.Dataset) -> list[Statement]:
+def exact(laws: xr.Dataset) -> Claims:
     """What holds at every drive; n = 1 by the integrals of any n, against the closed form of viscous friction.
 
     Steps in ln alpha_n are 2/n - 1 times those in ln mu, so differences of ln P are of n >= 1.
@@ -72,26 +68,22 @@ def exact(laws: xr.Dataset) -> list[Statement]:
     rough = float(np.diff(np.log(laws.mu)).max()) ** 4 / 4
     apart, far = sweep.local_exponent(some.period, "mu") + some.sensitivity, "largest distance"
     coulomb, form = dry.sensitivity / (rho2 / (1 - rho2)) - 1, "n = 1: P, amplitude, s against the viscous closed form"
-    return [
-        most("n = 0: s at every mu > R", "rho^2/(1 - rho^2)", coulomb, 1e-10),
-        said("n = 0: no cycle for mu <= R", silent == held, f"{silent} cells", f"{held} cells"),
-        most("n = 2: s at every mu", "1/2", air.sensitivity - 0.5, 1e-10),
-        most(form, "0", off, 1e-11, "largest deviation"),
-        most("differences of ln P against the exact s", "0", apart, rough, far),
-        *by_friction(),
-    ]
+    yield most("n = 0: s at every mu > R", "rho^2/(1 - rho^2)", coulomb, 1e-10)
+    yield said("n = 0: no cycle for mu <= R", silent == held, f"{silent} cells", f"{held} cells")
+    yield most("n = 2: s at every mu", "1/2", air.sensitivity - 0.5, 1e-10)
+    yield most(form, "0", off, 1e-11, "largest deviation")
+    yield most("differences of ln P against the exact s", "0", apart, rough, far)
+    yield from by_friction()
 
 
-def by_friction() -> list[Statement]:
+def by_friction() -> Claims:
     """dlnP/dlnc, by differences over a sweep of the friction alone."""
     ds = solved("foliot", n=[0.5, 1.0, 3.0], c=np.geomspace(0.9, 1.1, 9), mu=1.5, phi0=1, rtol=1e-11)
     ds = ds.assign(slope=sweep.local_exponent(ds.period, "c"), theory=(2 * ds.sensitivity - 1) / (2 - ds.n))
-    lines = []
     for n in ds.n.values:
         here = ds.sel(n=n).isel(c=4)
         what, theory = f"n = {n:g}: dlnP/dlnc at s = {here.sensitivity:.4f}", float(here.theory)
-        lines.append(differing(what, f"(2s-1)/(2-n) = {theory:.6f}", here.slope, theory, 1e-6))
-    return lines
+        yield differing(what, f"(2s-1)/(2-n) = {theory:.6f}", here.slope, theory, 1e-6)
 
 
 def valley(grid: xr.Dataset) -> xr.Dataset:
@@ -101,8 +93,11 @@ def valley(grid: xr.Dataset) -> xr.Dataset:
     return solved("foliot", design="zip", mu=place, R=place.R, a=1, phi0=1)
 
 
-def best(grid: xr.Dataset, line: xr.Dataset) -> list[Statement]:
-    """Where strong drive is best, and where it is not: R at which s leaves 1/3 upwards and downwards alike."""
+def best(grid: xr.Dataset, line: xr.Dataset) -> Claims:
+    """Where strong drive is best, and where it is not: R at which s leaves 1/3 upwards and downwards alike.
+
+    And the power laws of the valley at large R.
+    """
     third, first = 1 / 3, grid.R[grid.R > 0.8].min()
     below = grid.R.where((grid.sensitivity < third - 1e-9).any("mu")).min()
     low = grid.R < 0.79
@@ -111,21 +106,14 @@ def best(grid: xr.Dataset, line: xr.Dataset) -> list[Statement]:
     s = solved("foliot", mu=1e8, R=np.linspace(0.7, 0.9, 9), a=1, phi0=1).sensitivity
     threshold = sweep.where_exponent(s, "R", third, values=True).abscissa
     sign = "R at which s - 1/3 changes sign, mu = 1e8"
-    found = [
-        said(least, weak > 0, f"{weak:.2g}", "> 0"),
-        said("smallest R of the map with s < 1/3", below == first, f"{below:.4f}", f"{first:.4f}"),
-        compared(sign, "0.8", threshold, 0.8, 3 * (3 / 1e8) ** (2 / 3)),
-    ]
+    yield said(least, weak > 0, f"{weak:.2g}", "> 0")
+    yield said("smallest R of the map with s < 1/3", below == first, f"{below:.4f}", f"{first:.4f}")
+    yield compared(sign, "0.8", threshold, 0.8, 3 * (3 / 1e8) ** (2 / 3))
     for R, (drive, s) in KNOWN.items():
         cell = line.isel(cell=int(abs(line.R / R - 1).argmin("cell")))
-        found.append(compared(f"R = {R:g}: best torque mu/R", f"{drive}", cell.mu / cell.R, drive, 2e-4, 4))
-        found.append(compared("  s there", f"{s}", cell.sensitivity, s, 2e-5, 5))
-    return found + far(line)
-
-
-def far(line: xr.Dataset) -> list[Statement]:
-    """Power laws of the valley at large R."""
-    drive, R, found = (line.mu / line.R).rename("mu/R"), float(line.R[-1]), []
+        yield compared(f"R = {R:g}: best torque mu/R", f"{drive}", cell.mu / cell.R, drive, 2e-4, 4)
+        yield compared("  s there", f"{s}", cell.sensitivity, s, 2e-5, 5)
+    drive, R = (line.mu / line.R).rename("mu/R"), float(line.R[-1])
     for name, y, text, power, prefactor in (
         ("s", line.sensitivity, "-1/3, (3/2)^(1/3) = 1.1447", -1 / 3, 1.5 ** (1 / 3)),
         ("mu/R", drive, "1/6, 18^(1/6) = 1.6189", 1 / 6, 18 ** (1 / 6)),
@@ -134,8 +122,7 @@ def far(line: xr.Dataset) -> list[Statement]:
         off, last = exponent - power, float(y[-1]) / R**power
         fits = abs(off) < 0.01 and abs(last / prefactor - 1) < 0.01
         what = f"valley: {name} ~ R^x, R > 1e7; prefactor at R = {R:.0e}"
-        found.append(Statement(what, text, f"{exponent:.4f}, {last:.4f}", off, fits))
-    return found
+        yield Statement(what, text, f"{exponent:.4f}, {last:.4f}", off, fits)
 
 
 def figure(laws: xr.Dataset, grid: xr.Dataset, line: xr.Dataset) -> Any:

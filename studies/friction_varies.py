@@ -18,14 +18,12 @@ noise from swing to swing: sigma of the torque scatters the rate as s sigma, of 
 both by sqrt(T/tau), and the two at once, of one noise, as (1 - s) sigma (`shared` = 0: as two of their own). (4)
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Conclusion, Statement, compared, most, read_result, said, script, solved
+from _common import Claims, Conclusion, compared, most, read_result, said, script, solved
 from _figures import page_of
 from scipy.optimize import brentq
 
@@ -92,23 +90,19 @@ def averages(ds: xr.Dataset) -> xr.Dataset:
     return xr.Dataset({"effect": effect.reset_coords(drop=True), **found})
 
 
-def over_the_swing(ds: xr.Dataset, means: xr.Dataset) -> list[Statement]:
+def over_the_swing(ds: xr.Dataset, means: xr.Dataset) -> Claims:
     """Half periods against known ones, and what average of a(phi) would give them."""
-    lines = []
     for mu, known in KNOWN.items():
         here = ds.interval.sel(mu=mu, harmonic=1).sel(depth=[-0.5, 0.0, 0.5], method="nearest").values
         what, text = f"half period at depth -.5, 0, .5, alpha = {mu:.3g}", ", ".join(f"{x:.4g}" for x in here)
-        lines.append(most(what, f"{known}", here / known - 1, 3e-4, text))
+        yield most(what, f"{known}", here / known - 1, 3e-4, text)
     weak, strong = ds.sel(mu=0.04, harmonic=1), means.sel(mu=100.0, harmonic=1)
     off = (weak.interval / (2 / 0.04 + 2 / (1 - weak.depth)) - 1).where(abs(weak.depth) < 0.6)
     energy, worst = float(strong.energy), float(DAY * SMALL * abs(means.effect).max())
     by_energy, here = "strong drive: mean by the energy, (2): effect of depth", f"up to {worst:.0f} s/day at depth"
-    return [
-        *lines,
-        most("weak drive: the mean and the turn, (1), alpha = .04", "1e-2", off, 1e-2),
-        compared(by_energy, f"{energy:.5f}", strong.effect, energy, 0.05, 4),
-        said("the paper: only the mean over a period counts", worst < 1.0, f"{here} {SMALL:g}", "0", True),
-    ]
+    yield most("weak drive: the mean and the turn, (1), alpha = .04", "1e-2", off, 1e-2)
+    yield compared(by_energy, f"{energy:.5f}", strong.effect, energy, 0.05, 4)
+    yield said("the paper: only the mean over a period counts", worst < 1.0, f"{here} {SMALL:g}", "0", True)
 
 
 def gain(mu: float, a: Any) -> np.ndarray:
@@ -138,9 +132,8 @@ def year_by_slopes(mu: float, x: np.ndarray) -> float:
     return DAY * float(np.mean(np.exp(rate)) - 1)
 
 
-def by_season() -> list[Statement]:
+def by_season() -> Claims:
     """Rates over a year, and their mean from the sensitivity and its slopes."""
-    lines = []
     for mu in SEASONS:
         s = float(cycles(mu).sensitivity[0])
         (andrade, _), (rate, oil) = (seasons(mu, law) for law in ("Andrade", "Vogel"))
@@ -150,12 +143,9 @@ def by_season() -> list[Statement]:
         theory, power = year_by_slopes(mu, np.log(oil)), DAY * float(np.mean(oil ** (1 - 2 * s)) - 1)
         slopes, mean = "  mean rate of the year by s and three slopes of it, (3)", "  the same by a power mean of a"
         near = abs(power - year) < 0.1 * abs(year)
-        lines += [
-            said(what, 0.5 * widest < span < widest, text, f"0.5 to 1 times {widest:.4g}"),
-            compared(slopes, f"{theory:.1f}", year, theory, 0.01, 5),
-            said(f"{mean}, exponent {1 - 2 * s:+.2f}", near, f"{year:.1f}", f"{power:.1f}", True),
-        ]
-    return lines
+        yield said(what, 0.5 * widest < span < widest, text, f"0.5 to 1 times {widest:.4g}")
+        yield compared(slopes, f"{theory:.1f}", year, theory, 0.01, 5)
+        yield said(f"{mean}, exponent {1 - 2 * s:+.2f}", near, f"{year:.1f}", f"{power:.1f}", True)
 
 
 def scatters(noisy: xr.Dataset) -> xr.Dataset:
@@ -170,9 +160,8 @@ def scatters(noisy: xr.Dataset) -> xr.Dataset:
     return xr.Dataset({name: y.reset_coords(drop=True) for name, y in found.items()}).assign(s=s, T=T)
 
 
-def by_noise(scatter: xr.Dataset) -> list[Statement]:
+def by_noise(scatter: xr.Dataset) -> Claims:
     """(4), clock by clock."""
-    lines = []
     for mu in scatter.mu.values:
         clock = scatter.sel(mu=mu)
         hours = 20000 * float(clock["T"]) / 3600
@@ -181,10 +170,9 @@ def by_noise(scatter: xr.Dataset) -> list[Statement]:
             share, here = float(law(clock.s)), float(clock[name])
             what = f"alpha = {mu:.3g}: scatter by 5 % noise of {name}, over unit"
             if share < 1e-3:
-                lines.append(said(what, here < 0.1, f"{here:.4f}", "0 to first order"))
+                yield said(what, here < 0.1, f"{here:.4f}", "0 to first order")
             else:
-                lines.append(compared(what, f"(4) {share:.4f} +- {allowed:.0%}", here, share, allowed, 4))
-    return lines
+                yield compared(what, f"(4) {share:.4f} +- {allowed:.0%}", here, share, allowed, 4)
 
 
 def figure(ds: xr.Dataset, means: xr.Dataset, scatter: xr.Dataset) -> Any:

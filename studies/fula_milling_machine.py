@@ -14,14 +14,12 @@ whether it holds. Conclusions:
 - At the same size Guyan is 8 times, IRS 50 times, Craig-Bampton 1400 times better at the fifth frequency.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Conclusion, Statement, differing, read_result, said, script
+from _common import Claims, Conclusion, differing, read_result, said, script
 from _figures import page_of
 from _fula_source import KGF, TABLE_2_E, TABLE_6, holzer, in_source_units, judged, tables_2_to_4, tables_3_to_5
 
@@ -79,36 +77,34 @@ def error_of_five(ds: xr.Dataset, f: np.ndarray, how: str = "source") -> Any:
     return abs(receptance(J, K, w) / response(full, f) - 1)
 
 
-def frequencies(ds: xr.Dataset) -> list[Statement]:
+def frequencies(ds: xr.Dataset) -> Claims:
     """Table 6, with what does not belong there."""
     here = ds.isel(reduction=0)
     f = {n: here.frequency.sel(n_keep=n).values for n in TABLE_6}
     rounded = holzer(in_source_units(chain(ds, 8))["J"], TABLE_2_E)
     fifth = float(here.frequency_error.sel(n_keep=5)[4])
-    return [
-        *(
-            judged(f"Table 6, {n} masses, f{i + 1} [Hz]", printed, f[n][i])
-            for n, row in TABLE_6.items() for i, printed in enumerate(row[:n])
-        ),
-        judged('  "f6" of 5 masses is f7 of the 8', 387.6, f[8][6]),
-        judged("  f4 of 8 masses with the e of Table 2", 102.6, rounded[3], ("near",)),
-        judged("  f5 of 8 masses with the e of Table 2", 227.2, rounded[4], ("near",)),
-        differing("f5 of 5 masses against that of 8, as printed", "-0.1761", fifth, 187.2 / 227.2 - 1, 2e-3, 4),
-    ]  # fmt: skip
+    yield from (
+        judged(f"Table 6, {n} masses, f{i + 1} [Hz]", printed, f[n][i])
+        for n, row in TABLE_6.items()
+        for i, printed in enumerate(row[:n])
+    )
+    yield judged('  "f6" of 5 masses is f7 of the 8', 387.6, f[8][6])
+    yield judged("  f4 of 8 masses with the e of Table 2", 102.6, rounded[3], ("near",))
+    yield judged("  f5 of 8 masses with the e of Table 2", 227.2, rounded[4], ("near",))
+    yield differing("f5 of 5 masses against that of 8, as printed", "-0.1761", fifth, 187.2 / 227.2 - 1, 2e-3, 4)
 
 
-def cause(ds: xr.Dataset) -> list[Statement]:
+def cause(ds: xr.Dataset) -> Claims:
     """Which neglect makes the five masses wrong."""
-    f, lines = np.array([187.3, 200.0, 226.9]), []
+    f = np.array([187.3, 200.0, 226.9])
     errors = (error_of_five(ds, f, how) for how in ("source", "dampers", "mu"))
     for at, real, dampers, mu in zip(f, *errors, strict=True):
         here = f"{real:.4f} -> {dampers:.4f}"
-        lines.append(said(f"error at {at:g} Hz: dampers exact", dampers < 0.1 * real, here, "would vanish", True))
-        lines.append(said("  with mu = 1 - (w/w0)^2", mu < 1e-12, f"{mu:.0e}"))
-    return lines
+        yield said(f"error at {at:g} Hz: dampers exact", dampers < 0.1 * real, here, "would vanish", True)
+        yield said("  with mu = 1 - (w/w0)^2", mu < 1e-12, f"{mu:.0e}")
 
 
-def conclusions(ds: xr.Dataset) -> list[Statement]:
+def conclusions(ds: xr.Dataset) -> Claims:
     """The source's four conclusions, each with its numbers."""
     f, five = np.linspace(0.5, 400, 4000), ds.sel(n_keep=5).isel(reduction=0)
     H8, H5, short = response(chain(ds, 8), f), response(chain(ds, 5), f), response(chain(ds, 8), f, np.float32)
@@ -128,31 +124,47 @@ def conclusions(ds: xr.Dataset) -> list[Statement]:
     off = zeta / true - 1
     merged, free = abs(off[:4]).max(), math.sqrt(1 - zeta[1] ** 2) / (2 * zeta[1])
     valid = float(five.valid_to)
-    return [
-        said("1. below 1000 rad/s: largest error of the receptance", worst < 0.05, f"{worst:.1%}", "good"),
-        said("   the same, of f1 to f4", first < 2.5e-3, f"{first:.2%}", "good"),
-        said("   above: the dampers merged, which hold to w h e = 0.1 at", valid < 1.5 * SPAN, f"{valid:.0f} Hz",
-             "159 Hz", True),
-        said("2. amplitudes differ more at higher f, by", np.all(np.diff(growth) > 0), by_band, "grows"),
-        said("   that is the computer: eight masses in 24 bits", lost > 0.1 * growth[-1], f"off by {lost:.0e}",
-             "the cause", True),
-        said("3. high resonances against the main one", min(lower.values()) > 100, peaks, "to some 1/100"),
-        said("4. dampers merged by (34): error of the damping of f1 to f4", merged < 0.011,
-             f"{merged:.1%}, of f5 {off[4]:.0%}", "matters"),
-        said("   without dampers resonances are infinite; of the main one", np.all(true > 0),
-             f"1/(2 zeta) = {free:.1f}", "finite"),
-    ]  # fmt: skip
+    yield said("1. below 1000 rad/s: largest error of the receptance", worst < 0.05, f"{worst:.1%}", "good")
+    yield said("   the same, of f1 to f4", first < 2.5e-3, f"{first:.2%}", "good")
+    yield said(
+        "   above: the dampers merged, which hold to w h e = 0.1 at",
+        valid < 1.5 * SPAN,
+        f"{valid:.0f} Hz",
+        "159 Hz",
+        True,
+    )
+    yield said("2. amplitudes differ more at higher f, by", np.all(np.diff(growth) > 0), by_band, "grows")
+    yield said(
+        "   that is the computer: eight masses in 24 bits",
+        lost > 0.1 * growth[-1],
+        f"off by {lost:.0e}",
+        "the cause",
+        True,
+    )
+    yield said("3. high resonances against the main one", min(lower.values()) > 100, peaks, "to some 1/100")
+    yield said(
+        "4. dampers merged by (34): error of the damping of f1 to f4",
+        merged < 0.011,
+        f"{merged:.1%}, of f5 {off[4]:.0%}",
+        "matters",
+    )
+    yield said(
+        "   without dampers resonances are infinite; of the main one",
+        np.all(true > 0),
+        f"1/(2 zeta) = {free:.1f}",
+        "finite",
+    )
 
 
-def others(ds: xr.Dataset) -> list[Statement]:
+def others(ds: xr.Dataset) -> Claims:
     """Five modes by every method."""
-    five, lines = ds.sel(n_keep=5), []
+    five = ds.sel(n_keep=5)
     off = 100 * abs(five.frequency_error.values[:, :5])
     for (name, (first, fifth)), row, frf in zip(FIVE.items(), off, five.frf_error.values, strict=True):
         close = np.isclose([row[:4].max(), row[4]], [first, fifth], rtol=0.05, atol=1e-3).all()
         here = f"{row[:4].max():.2g} %, {row[4]:.2g} %; receptance {frf:.1e}"
-        lines.append(said(f"{name}: largest error of f1-f4, of f5", close, here, f"{first} %, {fifth} %"))
-    return [*lines, said("each method better at f5 than the one before", np.all(np.diff(off[:5, 4]) < 0))]
+        yield said(f"{name}: largest error of f1-f4, of f5", close, here, f"{first} %, {fifth} %")
+    yield said("each method better at f5 than the one before", np.all(np.diff(off[:5, 4]) < 0))
 
 
 def figure(ds: xr.Dataset) -> Any:

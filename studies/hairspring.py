@@ -13,14 +13,12 @@ against the displacement with first harmonic (4 mu/pi) cos(asin(phi0/A)), while 
 At given drive and friction (1) is least at y = 3/4; at given Q it is least at y = 1/2; y = 1 is the end. Derived here.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Conclusion, Statement, columns, compared, differing, most, read_result, said, script
+from _common import Claims, Conclusion, columns, compared, differing, most, read_result, said, script
 from _figures import direct_label, hatch, page_of
 from matplotlib.colors import LogNorm
 
@@ -74,7 +72,7 @@ def best_springs(ds: xr.Dataset) -> xr.Dataset:
     return found.assign(blur=("cell", (place.abscissa_error / place.abscissa).values))
 
 
-def laws(ds: xr.Dataset) -> list[Statement]:
+def laws(ds: xr.Dataset) -> Claims:
     """How the sensitivity falls with the spring, from that of the foliot to the line of (1)."""
     strong = line_of(ds, ds.alpha.max())
     alpha, bare = float(strong.alpha), at(strong.alpha.values, 0.0).s.item()
@@ -90,18 +88,15 @@ def laws(ds: xr.Dataset) -> list[Statement]:
     off = abs(0.5 + by_a / 2 + by_k - inner.s).max()
     rough = float(np.diff(np.log(ds.k)).max() ** 4) / 4  # differences are of fourth order
     weak, steep = f"s at kappa = {ds.kappa[0]:.0e}: still", f"exponent of s in kappa, 10 to 1000, alpha = {alpha:.0e}"
-    return [
-        compared(f"{weak} the foliot's", f"{bare:.6f}", float(strong.s[0]), bare, 1e-2, 6),
-        differing(steep, "-3/4", fall, -0.75, slack),
-        differing("exponent of s in alpha at kappa = 100", "-1/4", by_drive, -0.25, 0.02),
-        compared(f"s at kappa = {middle.kappa:.4g}", f"(1) = {theory:.6g}", middle.s.item(), theory, 1e-3, 6),
-        most("differences of ln P against the exact s", "0", off, rough, "largest distance"),
-    ]
+    yield compared(f"{weak} the foliot's", f"{bare:.6f}", float(strong.s[0]), bare, 1e-2, 6)
+    yield differing(steep, "-3/4", fall, -0.75, slack)
+    yield differing("exponent of s in alpha at kappa = 100", "-1/4", by_drive, -0.25, 0.02)
+    yield compared(f"s at kappa = {middle.kappa:.4g}", f"(1) = {theory:.6g}", middle.s.item(), theory, 1e-3, 6)
+    yield most("differences of ln P against the exact s", "0", off, rough, "largest distance")
 
 
-def optimum(ds: xr.Dataset, springs: xr.Dataset) -> list[Statement]:
+def optimum(ds: xr.Dataset, springs: xr.Dataset) -> Claims:
     """The best spring, by drive and at a given Q; where there is no cycle any more; and what is told from rest."""
-    found = []
     for alpha in (1e6, 1e4, 1e2):
         best, line = line_of(springs, alpha), line_of(ds, alpha)
         last = int(np.flatnonzero(line.s.notnull())[-1])  # the strongest spring with a cycle, to one part in 2000
@@ -109,14 +104,12 @@ def optimum(ds: xr.Dataset, springs: xr.Dataset) -> list[Statement]:
         end = float(fine.kappa[fine.s.notnull()][-1]) / alpha
         near, place = 1e-4 + 1 / alpha + float(best.blur), float(best.kappa / best.alpha)
         what = f"alpha = {alpha:.0e}: best spring, kappa/alpha"
-        found += [
-            compared(what, "9/pi^2 = 0.91189", place, 9 / math.pi**2, near, 6),
-            compared(
-                "  s alpha there", "pi/27^(1/2) = 0.60460", float(best.s * best.alpha), math.pi / 27**0.5, near, 6
-            ),
-            compared("  A/phi0 there", "2/3^(1/2) = 1.15470", float(best.A), 2 / 3**0.5, near, 6),
-            compared("  strongest with a cycle", "16/pi^2 = 1.6211", end, 16 / math.pi**2, 1e-3 + 4 / alpha, 5),
-        ]
+        yield compared(what, "9/pi^2 = 0.91189", place, 9 / math.pi**2, near, 6)
+        yield compared(
+            "  s alpha there", "pi/27^(1/2) = 0.60460", float(best.s * best.alpha), math.pi / 27**0.5, near, 6
+        )
+        yield compared("  A/phi0 there", "2/3^(1/2) = 1.15470", float(best.A), 2 / 3**0.5, near, 6)
+        yield compared("  strongest with a cycle", "16/pi^2 = 1.6211", end, 16 / math.pi**2, 1e-3 + 4 / alpha, 5)
     Q = 1000.0
     kappa = np.geomspace(Q / 10, Q, 61)
     place = sweep.where_exponent(at(Q**2 / kappa, kappa, "zip").s, "kappa", 0.0).abscissa.item()
@@ -128,20 +121,15 @@ def optimum(ds: xr.Dataset, springs: xr.Dataset) -> list[Statement]:
     cells = ds.s.notnull()
     wrong = int((((ds.status == Status.NOT_SELF_STARTING) != (reach < 1)) & cells).sum())
     rule = "not self-starting unless kappa < 1 + e^(-pi zeta/(1-zeta^2)^(1/2))"
-    return [
-        *found,
-        compared(what, "1/2", float(cell.s * cell.Q), 0.5, 3 / Q, 6),
-        said(rule, not wrong, f"{wrong} of {int(cells.sum())} cells", "0 cells"),
-    ]
+    yield compared(what, "1/2", float(cell.s * cell.Q), 0.5, 3 / Q, 6)
+    yield said(rule, not wrong, f"{wrong} of {int(cells.sum())} cells", "0 cells")
 
 
-def improvement(ds: xr.Dataset) -> list[Statement]:
+def improvement(ds: xr.Dataset) -> Claims:
     """What the paper expects of a spring: by what factor the sensitivity falls at best."""
-    found = []
     for alpha, least, word in ((1e4, 10, "dramatically"), (1e2, 10, "dramatically"), (1.0, 1, ""), (1e-2, 1, "")):
         gain = at(alpha, 0.0).s.item() / float(line_of(ds, alpha).s.min())
-        found.append(said(f"best spring, s of alpha = {alpha:g} falls by", gain > least, f"{gain:.4g}", word))
-    return found
+        yield said(f"best spring, s of alpha = {alpha:g} falls by", gain > least, f"{gain:.4g}", word)
 
 
 def clock(ds: xr.Dataset, springs: xr.Dataset) -> list[str]:

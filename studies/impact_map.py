@@ -11,14 +11,12 @@ where no tooth is met in between; stable for kappa > 1. The models of Lepschy an
 Denny's loses is not known here. Only their abstracts were at hand, and no number here is theirs.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Conclusion, Statement, count, most, paragraph, read_result, said, script, solved
+from _common import Claims, Conclusion, Statement, count, most, paragraph, read_result, said, script, solved
 from _figures import colour_map, direct_label, hatch, page_of
 from matplotlib.colors import ListedColormap
 from matplotlib.lines import Line2D
@@ -56,20 +54,18 @@ def exceptions(what: str, wrong: xr.DataArray) -> Statement:
     return said(what, not wrong.any(), count(wrong, "exceptions"), "no exception")
 
 
-def cycle(closed: xr.Dataset) -> list[Statement]:
+def cycle(closed: xr.Dataset) -> Claims:
     """The symmetric cycle where it exists; e = 0 is another one, with the tooth resting on the pallet."""
     free = closed.where(closed.status.isin(EXISTS) & (closed.e > 0))
     here = free.period.notnull() & (free.status != Status.GRAZING) & (abs(free.kappa - 1) > 1e-12)
-    return [
-        exceptions("stable for kappa > 1 and no other", here & ((free.multiplier < 1) != (free.kappa > 1))),
-        exceptions(
-            "recoil for kappa < 2e/(1 - e)", here & ((free.recoil > 0) != (free.kappa < 2 * free.e / (1 - free.e)))
-        ),
-        *plastic(closed),
-    ]
+    yield exceptions("stable for kappa > 1 and no other", here & ((free.multiplier < 1) != (free.kappa > 1)))
+    yield exceptions(
+        "recoil for kappa < 2e/(1 - e)", here & ((free.recoil > 0) != (free.kappa < 2 * free.e / (1 - free.e)))
+    )
+    yield from plastic(closed)
 
 
-def plastic(closed: xr.Dataset) -> list[Statement]:
+def plastic(closed: xr.Dataset) -> Claims:
     """e = 0, the tooth on the pallet until it escapes: the kernel beside the scene `verge_scene` in SI units."""
     stuck = closed.isel(e=0).isel(I_c=slice(None, None, max(1, closed.sizes["I_c"] // 8)))
     n, phi0 = float(stuck.r_v / stuck.r_c), float(stuck.h / stuck.r_v)
@@ -78,10 +74,8 @@ def plastic(closed: xr.Dataset) -> list[Statement]:
     flips = (3000, 3002)  # an even number: the last event is a landing
     first, later = (2 * solved("verge_scene:KERNEL", **clock, flips=k, rtol=1e-10).clock.values for k in flips)
     off = stuck.period / first - 1
-    return [
-        most("e = 0: period of the kernel and in SI units", "the same", off, 1e-8, count(stuck.period)),
-        most("e = 0: from rest to a steady beat at every kappa", "yes", later / first - 1, 1e-10, "last change"),
-    ]
+    yield most("e = 0: period of the kernel and in SI units", "the same", off, 1e-8, count(stuck.period))
+    yield most("e = 0: from rest to a steady beat at every kappa", "yes", later / first - 1, 1e-10, "last change")
 
 
 def words(closed: xr.Dataset) -> list[str]:
@@ -119,7 +113,7 @@ def kinds(motion: xr.Dataset) -> xr.DataArray:
     return kind
 
 
-def motions(closed: xr.Dataset, motion: xr.Dataset) -> list[Statement]:
+def motions(closed: xr.Dataset, motion: xr.Dataset) -> Claims:
     """What the clock does, followed contact by contact."""
     both = (closed.status == Status.OK) & (motion.status == Status.OK) & (motion.impacts == 1)
     same = motion.where(both & (closed.e > 0))
@@ -130,13 +124,11 @@ def motions(closed: xr.Dataset, motion: xr.Dataset) -> list[Statement]:
     kind = kinds(motion)
     census = {name: count(kind == i) for i, name in enumerate(KINDS)}
     few = (kind == list(KINDS).index("open")).mean() < 0.02
-    return [
-        most("period by events = 2T", "1e-9", same.period / twice - 1, 1e-9, count(both)),
-        most("swing by events = Y, whatever the torque", "1e-9", same.Y / way - 1, 1e-9, count(both)),
-        said("stable cycles that events does not settle on", lost.mean() < 0.01, count(lost), "1 %"),
-        *[Statement(f"  {name}", "", cells) for name, cells in census.items() if name != "open"],
-        said("  none of these", few, census["open"], "2 %"),
-    ]
+    yield most("period by events = 2T", "1e-9", same.period / twice - 1, 1e-9, count(both))
+    yield most("swing by events = Y, whatever the torque", "1e-9", same.Y / way - 1, 1e-9, count(both))
+    yield said("stable cycles that events does not settle on", lost.mean() < 0.01, count(lost), "1 %")
+    yield from (Statement(f"  {name}", "", cells) for name, cells in census.items() if name != "open")
+    yield said("  none of these", few, census["open"], "2 %")
 
 
 def flip_border(kappa: Any, e: float) -> Any:
@@ -144,7 +136,7 @@ def flip_border(kappa: Any, e: float) -> Any:
     return -4 * (1 + e) ** 2 / ((1 - e) ** 2 * kappa + 2 * (1 + e * e))
 
 
-def lever(bent: xr.Dataset) -> list[Statement]:
+def lever(bent: xr.Dataset) -> Claims:
     """A curved lever can steady a heavy foliot."""
     exists = bent.status.isin((Status.OK, Status.UNSTABLE))
     k, flip, held = bent.kappa, flip_border(bent.kappa, LEVER_E), bent.multiplier < 1
@@ -154,11 +146,9 @@ def lever(bent: xr.Dataset) -> list[Statement]:
     heavy = exists & (k < 1)
     steadied = f"{int((heavy & held).sum())} of {count(heavy)}"
     flat = heavy & (abs(bent.nu) < 1e-9) & held
-    return [
-        exceptions("stability between the two borders in nu", exists & (steady != held)),
-        said("heavy foliots steadied by a lever that yields", (heavy & held).any(), steadied, "some"),
-        said("heavy foliots steady with a flat lever", not flat.any(), count(flat), "none"),
-    ]
+    yield exceptions("stability between the two borders in nu", exists & (steady != held))
+    yield said("heavy foliots steadied by a lever that yields", (heavy & held).any(), steadied, "some")
+    yield said("heavy foliots steady with a flat lever", not flat.any(), count(flat), "none")
 
 
 def figure(closed: xr.Dataset, motion: xr.Dataset, bent: xr.Dataset) -> Any:

@@ -5,8 +5,6 @@
 A worked example of `sweep.solver`: the kernel as a function of the crank and the coupler, found by scipy's optimisers.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -14,14 +14,12 @@ final speed, f(v) = mu, and P ~ phi0/v, so s = 1/(N + 2 lambda_e), 1/n for one f
 dlnv = (1 - s) dlnmu: with (1) this says how many decades of torque an exponent takes to turn into another.      (3)
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Conclusion, Statement, compared, count, differing, last_passage, most, read_result, script, solved
+from _common import Claims, Conclusion, compared, count, differing, last_passage, most, read_result, script, solved
 from _figures import colour_map, direct_label, hatch, page_of
 from _losses import any_swing, shares
 from scipy.optimize import brentq
@@ -59,46 +57,40 @@ def prepared(ds: xr.Dataset) -> xr.Dataset:
     return any_swing(ds).transpose(*order)
 
 
-def laws(ds: xr.Dataset) -> list[Statement]:
+def laws(ds: xr.Dataset) -> Claims:
     """(1) and (2) against every cell of large and of small swings."""
     large, small = ds.where(ds.swing > LARGE), ds.where(ds.swing < SMALL)
     light, heavy = large.sensitivity - large.large, small.sensitivity / small.small - 1
     mixed = light.where(large[LOSSES].to_array().max("variable") < 0.7)
     whole = abs(ds.law / ds.sensitivity - 1)
     usual = whole.quantile(0.95)
-    return [
-        most("the shares are the work, swings over 2 phi0", "1", ds.deficit.where(ds.swing > 2), 1e-6),
-        most(f"(1), swings over {LARGE:g} phi0", "s", light, 1e-3, count(light)),
-        most("  of these no loss takes over 70 %", "s", mixed, 1e-3, count(mixed)),
-        most(f"(2), swings under {SMALL:g} phi0", "s to 1.5 %", heavy, 0.015, count(heavy)),
-        most("any swing, (1) of law_any_swing.py: 95 % of all cells", "s to 5 %", usual, 0.05, f"within {usual:.2%}"),
-        most(f"  all {count(whole)} that cycle", "s to 25 %", whole, 0.25, f"within {whole.max():.1%}"),
-    ]
+    yield most("the shares are the work, swings over 2 phi0", "1", ds.deficit.where(ds.swing > 2), 1e-6)
+    yield most(f"(1), swings over {LARGE:g} phi0", "s", light, 1e-3, count(light))
+    yield most("  of these no loss takes over 70 %", "s", mixed, 1e-3, count(mixed))
+    yield most(f"(2), swings under {SMALL:g} phi0", "s to 1.5 %", heavy, 0.015, count(heavy))
+    yield most("any swing, (1) of law_any_swing.py: 95 % of all cells", "s to 5 %", usual, 0.05, f"within {usual:.2%}")
+    yield most(f"  all {count(whole)} that cycle", "s to 25 %", whole, 0.25, f"within {whole.max():.1%}")
 
 
-def pure_laws(pure: xr.DataArray) -> list[Statement]:
+def pure_laws(pure: xr.DataArray) -> Claims:
     """n/(n + 2) and 1/n of one friction alone."""
-    lines = []
     for n in (0.25, 1.5, 2.0, 4.0):
         weak, strong = pure.sel(n=n).values[:: 1 if n < 2 else -1]
         off, theory = max(abs(weak - 1 / n), abs(strong - n / (n + 2))), f"{1 / n:.4f}, {n / (n + 2):.4f}"
         here = f"{weak:.4f}, {strong:.4f}"
-        lines.append(most(f"drag of degree {n:g} alone: 1/n, n/(n + 2)", theory, off, 1e-6, here))
-    return lines
+        yield most(f"drag of degree {n:g} alone: 1/n, n/(n + 2)", theory, off, 1e-6, here)
 
 
-def best_torques() -> list[Statement]:
+def best_torques() -> Claims:
     """The torque of least s where viscous and dry friction act."""
-    lines = []
     for R, (least, place) in BEST.items():
         s = solved("foliot", mu=R * np.geomspace(1.5, 60, 400), a=1, R=R, phi0=1, rtol=1e-12).sensitivity
         top = sweep.where_exponent(s, "mu", 0.0).abscissa / R
-        lines.append(differing(f"R = {R:g} a^2 phi0: least s", f"{least}", s.min(), least, 1e-4, 5))
-        lines.append(compared("  at mu/R", f"{place}", top, place, 1e-3, 4))
-    return lines
+        yield differing(f"R = {R:g} a^2 phi0: least s", f"{least}", s.min(), least, 1e-4, 5)
+        yield compared("  at mu/R", f"{place}", top, place, 1e-3, 4)
 
 
-def widths(ds: xr.Dataset) -> list[Statement]:
+def widths(ds: xr.Dataset) -> Claims:
     """How many decades of torque the exponent takes for the middle half of its way from law to law, a = 1/s."""
     smooth = ds.sensitivity.sel(n=3, a=1, R=0)
     known = (
@@ -106,12 +98,10 @@ def widths(ds: xr.Dataset) -> list[Statement]:
         ("1/3 to 1/2, viscous to impacts (e = .99)", smooth.sel(c=0, e=0.99), (1 / 3, 1 / 2), by_shares(1, None)),
         ("1/3 to 3/5, viscous to drag of degree 3", smooth.sel(c=1e-6, e=1), (1 / 3, 3 / 5), by_shares(1, 3)),
     )
-    lines = []
     for what, s, (start, end), theory in known:
         places = [last_passage(s.mu, s, start + part * (end - start)) for part in (0.25, 0.75)]
         width = abs(np.log10(places[1] / places[0]))
-        lines.append(compared(f"{what}: decades", f"{theory:.3f}", width, theory, 0.03, 4))
-    return lines
+        yield compared(f"{what}: decades", f"{theory:.3f}", width, theory, 0.03, 4)
 
 
 def by_q() -> float:
@@ -235,7 +225,7 @@ def conclude(path: str) -> Conclusion:
         "Best torque, viscous and dry": best_torques(),
         "Width of the crossovers (25 to 75 %)": widths(ds),
     }
-    return groups, [law, "", NOTES], lambda: figure(ds, pure)
+    return groups, [NOTES, law], lambda: figure(ds, pure)
 
 
 main = script(__name__, "law_map.h5", conclude)

@@ -18,14 +18,12 @@ mu = R (18 R/(a^2 phi0))^(1/6), and
     s = 3 (18 R/(a^2 phi0))^(-1/3).                                                                      (2)
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Conclusion, Statement, compared, count, differing, most, paragraph, power, said, script, solved
+from _common import Claims, Conclusion, compared, count, differing, most, paragraph, power, said, script, solved
 from _figures import colour_map, direct_label, page_of, plain_ticks
 from scipy.optimize.elementwise import find_root
 
@@ -71,7 +69,7 @@ def balanced(clocks: xr.Dataset, mu: xr.DataArray) -> xr.Dataset:
     return xr.Dataset({"s": s, "mu": mu.drop_vars("mu"), "beyond": beyond}).isel(mu=best)
 
 
-def best_torques(ds: xr.Dataset) -> list[Statement]:
+def best_torques(ds: xr.Dataset) -> Claims:
     """Where s is least, against (1), (2) and what the paper says of strong drive."""
     some = {name: slice(None, None, k) for name, k in (("R", 3), ("c", 4)) if ds.sizes[name] > 40}
     clocks = ds[["sensitivity_min", "sensitivity_argmin_mu"]].isel(some).load()
@@ -87,13 +85,11 @@ def best_torques(ds: xr.Dataset) -> list[Statement]:
     limit, light = 3 * (18 * float(high.R[-1])) ** (-1 / 3), f"light viscous friction, R = {high.R[-1]:g}: least s"
     beyond, missed = f"least s by (1), {LARGE:g} phi0 beyond the switch", f"{1 - inside:.0%} of {least.size}"
     paper = "strong drive is best (paper, of viscous friction)"
-    return [
-        most(beyond, "s", off, CLOSE, count(far, "clocks")),
-        said("  the torque where it is", steps < STEPS + 0.5, f"within {steps:.0f} steps", "(1)"),
-        compared(light, f"(2) {limit:.4f}", high[-1], limit, 0.08, 4),
-        differing("  its power of R, R > 1000", "-1/3", power(high), -1 / 3, 0.06, 4),
-        said(paper, inside < 0.01, missed, "every clock", True),
-    ]
+    yield most(beyond, "s", off, CLOSE, count(far, "clocks"))
+    yield said("  the torque where it is", steps < STEPS + 0.5, f"within {steps:.0f} steps", "(1)")
+    yield compared(light, f"(2) {limit:.4f}", high[-1], limit, 0.08, 4)
+    yield differing("  its power of R, R > 1000", "-1/3", power(high), -1 / 3, 0.06, 4)
+    yield said(paper, inside < 0.01, missed, "every clock", True)
 
 
 def within_decades(ds: xr.Dataset) -> xr.DataArray:
@@ -102,7 +98,7 @@ def within_decades(ds: xr.Dataset) -> xr.DataArray:
     return (at > ds.mu[0]) & (at < ds.mu[-1])
 
 
-def borders(fine: xr.Dataset) -> list[Statement]:
+def borders(fine: xr.Dataset) -> Claims:
     """What refinement along the borders is worth: s between its cells, against the kernel there.
 
     Near a border s is farther than 0.01 from 1, 1/3, 1/2 and 3/5.
@@ -117,10 +113,8 @@ def borders(fine: xr.Dataset) -> list[Statement]:
     laws = np.array([1, 1 / 3, 1 / 2, 3 / 5])
     near = float((abs(fine.sensitivity.values[..., None] - laws) > 0.01).all(axis=-1).mean())
     what = f"s between {fine.sensitivity.size} cells, {here.size} places"
-    return [
-        most(what, "2 %", here / true.values - 1, 0.02, "largest error"),
-        said("  of the cells near a border, s changing", near > 0.5, f"{near:.0%}", "most"),
-    ]
+    yield most(what, "2 %", here / true.values - 1, 0.02, "largest error")
+    yield said("  of the cells near a border, s changing", near > 0.5, f"{near:.0%}", "most")
 
 
 def answer(ds: xr.Dataset) -> list[str]:

@@ -14,8 +14,6 @@ needs (i) to (iii) is not claimed. The kernel solves such a foliot in units of i
 the exponents and prefactors of these mixtures are measured on `foliot_scene`, followed from rest in SI units.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from dataclasses import dataclass
@@ -23,7 +21,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Conclusion, Statement, compared, differing, most, read_result, said, script, solved
+from _common import Claims, Conclusion, Statement, compared, differing, most, read_result, said, script, solved
 from _figures import direct_label, page_of
 
 import sweep
@@ -116,24 +114,21 @@ def followed() -> dict[Mixture, xr.Dataset]:
     return found
 
 
-def always_half(found: dict[Mixture, xr.Dataset]) -> list[Statement]:
+def always_half(found: dict[Mixture, xr.Dataset]) -> Claims:
     """The mixtures that meet (i) to (iii): exponent and, by the speed at the switch, amplitude at all torques."""
-    lines = []
     for mixture, line in found.items():
         slopes = np.diff(np.log(line.period)) / np.diff(np.log(line.mu))
         off, energy = float(abs(slopes + 0.5).max()), line.speed**2 / line.mu
         spread = float(energy.max() / energy.min() - 1)
         here = f"-1/2 off by at most; A's spread {spread:.0e}"
-        lines.append(Statement(f"{mixture}", "-1/2, A constant", here, off, off < 1e-8 and spread < 1e-8))
-    return lines
+        yield Statement(f"{mixture}", "-1/2, A constant", here, off, off < 1e-8 and spread < 1e-8)
 
 
-def prefactors(found: dict[Mixture, xr.Dataset]) -> list[Statement]:
+def prefactors(found: dict[Mixture, xr.Dataset]) -> Claims:
     """C of P = C (phi0/mu)^(1/2) and the speed at the switch where one loss of degree two acts alone."""
     flat = (1 - math.exp(-4)) ** 0.25  # c phi0 = 1
     drag = 2 * (math.atanh(flat) + math.atan(flat))
     impact, dry = 4 * math.sqrt((1 + E) / (1 - E)), 8 / math.sqrt(0.75)
-    lines = []
     for mixture, text, value, square in (
         (Mixture(restitution=True), "4 (1+e)^(1/2)/(1-e)^(1/2)", impact, 4 / (1 - E**2)),
         (Mixture(drag=True), "2 (artanh l + arctan l), l^4 = 1 - e^-4", drag, flat**2),
@@ -141,12 +136,11 @@ def prefactors(found: dict[Mixture, xr.Dataset]) -> list[Statement]:
     ):
         line = found[mixture].isel(mu=0)
         period, energy = line.period * np.sqrt(line.mu), line.speed**2 / line.mu
-        lines.append(compared(f"{mixture}: P (mu/phi0)^(1/2)", f"{text} = {value:.8g}", period, value, 1e-8))
-        lines.append(compared(f"{mixture}: v0^2/(mu phi0)", f"{square:.8g}", energy, square, 1e-8))
-    return lines
+        yield compared(f"{mixture}: P (mu/phi0)^(1/2)", f"{text} = {value:.8g}", period, value, 1e-8)
+        yield compared(f"{mixture}: v0^2/(mu phi0)", f"{square:.8g}", energy, square, 1e-8)
 
 
-def never_half(ds: xr.Dataset) -> list[Statement]:
+def never_half(ds: xr.Dataset) -> Claims:
     """All others: how far from -1/2 their exponent comes, and where it tends to; the exact s against differences."""
     others = {str(m): part(ds, m) for m in MIXTURES if not m.of_degree_two}
     greatest = {name: float(abs(line.slope + 0.5).max()) for name, line in others.items()}
@@ -159,16 +153,14 @@ def never_half(ds: xr.Dataset) -> list[Statement]:
     rough = float(np.diff(np.log(ds.mu)).max() ** 4) / 4
     dry = -1 / ((float(others["Coulomb"].mu[-1]) / FIXED) ** 2 - 1)
     every = f"all {len(of_two)} with a loss of degree two: largest mu, farthest {farthest}"
-    return [
-        said(f"least of the greatest distances from -1/2: {nearest}", least > 0.1, f"{least:.3f}", "> 0"),
-        differing("viscous: smallest mu", "-1", others["viscous"].slope[0], -1, 0.01, 6),
-        differing("viscous: largest mu", "-1/3", last["viscous"], -1 / 3, 0.01, 6),
-        compared("Coulomb: largest mu", "-1/((mu/R)^2 - 1)", last["Coulomb"], dry, 1e-6, 3),
-        differing("viscous + Coulomb: largest mu", "-1/3", last["viscous + Coulomb"], -1 / 3, 0.01, 6),
-        differing(every, "-1/2", last[farthest], -0.5, 0.02, 6),
-        most("differences of ln P against the exact s", "0", off, rough, "largest distance"),
-        slight_impacts(),
-    ]
+    yield said(f"least of the greatest distances from -1/2: {nearest}", least > 0.1, f"{least:.3f}", "> 0")
+    yield differing("viscous: smallest mu", "-1", others["viscous"].slope[0], -1, 0.01, 6)
+    yield differing("viscous: largest mu", "-1/3", last["viscous"], -1 / 3, 0.01, 6)
+    yield compared("Coulomb: largest mu", "-1/((mu/R)^2 - 1)", last["Coulomb"], dry, 1e-6, 3)
+    yield differing("viscous + Coulomb: largest mu", "-1/3", last["viscous + Coulomb"], -1 / 3, 0.01, 6)
+    yield differing(every, "-1/2", last[farthest], -0.5, 0.02, 6)
+    yield most("differences of ln P against the exact s", "0", off, rough, "largest distance")
+    yield slight_impacts()
 
 
 def slight_impacts() -> Statement:

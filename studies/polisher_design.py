@@ -9,15 +9,13 @@ the border eta_minus = 0 or eta_plus = 180 degree, so that sin^2 A1 = e f/(b d) 
 figure the crank is the root of an equation of second degree in e^2, so that no grid of cranks is seen in it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Conclusion, Statement, compared, differing, read_result, said, script, solved
+from _common import Claims, Conclusion, Statement, compared, differing, read_result, said, script, solved
 from _figures import columns_of, direct_label, hatch, plain_ticks, quality_bar
 from matplotlib.colors import LogNorm
 from matplotlib.lines import Line2D
@@ -91,20 +89,18 @@ def best(machines: xr.Dataset) -> xr.Dataset:
     return machines.isel(f=machines.thd.fillna(math.inf).argmin("f")).where(known)
 
 
-def existence(machines: xr.Dataset) -> list[Statement]:
+def existence(machines: xr.Dataset) -> Claims:
     """Which machines of the amplitude there are."""
     longest, there = to_spare(machines.b, machines.d, machines.f)
     within, found = there.transpose("d", "b", "f"), machines.thd.notnull()
     strangers, share = int((found & ~within).sum()), float(found.sum() / within.sum())
     spare = float((longest / machines.crank - 1).min())
-    return [
-        said("machines beyond the border", strangers == 0, f"{strangers} of {int(found.sum())}", "none"),
-        said("of those within it, in the sweep's cranks", share > 0.5, f"{share:.1%}", "most"),
-        said("crank to spare before it locks, least", spare > 0, f"{spare:.2%}", "> 0"),
-    ]
+    yield said("machines beyond the border", strangers == 0, f"{strangers} of {int(found.sum())}", "none")
+    yield said("of those within it, in the sweep's cranks", share > 0.5, f"{share:.1%}", "most")
+    yield said("crank to spare before it locks, least", spare > 0, f"{spare:.2%}", "> 0")
 
 
-def quality(machines: xr.Dataset) -> list[Statement]:
+def quality(machines: xr.Dataset) -> Claims:
     """How harmonic, and at what price: distortion, transmission angle and crank."""
     arm = machines.sel(d=ARM, method="nearest")
     top, paper = best(arm), arm.interp(b=PAPER["b"], f=PAPER["f"])
@@ -122,16 +118,14 @@ def quality(machines: xr.Dataset) -> list[Statement]:
         return said(what, holds, f"{float(machine.thd):.2%}, {angle:.0f} degree, e = {crank:.1f} mm")
 
     far = f"best of the sweep, b = {1e3 * float(widest.b):.0f}, f = {1e3 * float(widest.f):.0f} mm"
-    return [
-        described("the paper's machine", paper, np.degrees(paper.transmission_angle) > 40),
-        described("best coupler for its motor's place", same, same.thd < paper.thd),
-        differing("distortion of a machine 0.789 times as large", f"{one:.6f}", float(other), float(one), 1e-12, 6),
-        said("the farther the motor, in arms, the less distortion", falls,
-             f"falls to the edge, b/d = {reach:.3g}: no best", "-"),
-        described(far, widest, widest.thd < same.thd),
-        compared("its amplitude, degree", "15", math.degrees(exact.A1), 15.0, 1e-4, 6),
-        compared("its distortion, once more", f"{float(widest.thd):.5f}", float(exact.thd), float(widest.thd), 1e-3, 5),
-    ]  # fmt: skip
+    to_edge, again = f"falls to the edge, b/d = {reach:.3g}: no best", f"{float(widest.thd):.5f}"
+    yield described("the paper's machine", paper, np.degrees(paper.transmission_angle) > 40)
+    yield described("best coupler for its motor's place", same, same.thd < paper.thd)
+    yield differing("distortion of a machine 0.789 times as large", f"{one:.6f}", float(other), float(one), 1e-12, 6)
+    yield said("the farther the motor, in arms, the less distortion", falls, to_edge, "-")
+    yield described(far, widest, widest.thd < same.thd)
+    yield compared("its amplitude, degree", "15", math.degrees(exact.A1), 15.0, 1e-4, 6)
+    yield compared("its distortion, once more", again, float(exact.thd), float(widest.thd), 1e-3, 5)
 
 
 def draw_map(page: Any, axes: Any, arm: xr.Dataset) -> None:

@@ -7,14 +7,12 @@ draws polisher_extrema.png, the paper's figures 4, 6 and 7 in one, and prints it
 b = (49, -38) cm has the length and makes the range of angles of the paper's figure 4, which does not give it.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Conclusion, Statement, compared, differing, most, read_result, said, script, solved
+from _common import Claims, Conclusion, compared, differing, most, read_result, said, script, solved
 from _figures import columns_of, direct_label
 from scipy.optimize import minimize_scalar
 
@@ -69,7 +67,7 @@ def aligned(ds: xr.Dataset) -> Any:
     return xr.concat(found, "extreme")
 
 
-def size(ds: xr.Dataset) -> list[Statement]:
+def size(ds: xr.Dataset) -> Claims:
     """Amplitude and middle against e."""
     last, start, b, d, f = at(ds, LAST), ds.isel(e=0), float(ds.b), float(ds.d), float(ds.f)
     slope = f / (b * d * math.sin(float(start.A0)))
@@ -80,19 +78,17 @@ def size(ds: xr.Dataset) -> list[Statement]:
     full = ds.where(ds.status == Status.OK, drop=True)
     closure = float(abs(np.sin(full.A0) * np.sin(full.A1) * b * d - full.e * f).max()) / (b * d)
     beyond = 0.4 < A1 < 0.6 < 2 * half
-    return [
-        compared(first, "-", float(start.A1_e) / 100, slope / 100, 1e-12),
-        said("A1 is proportional to e", 0.05 < grown < 0.2, f"{grown:+.1%} at 15 cm", "only nearly"),
-        differing("A1 at e = 15 cm by the motion's own extremes, rad", "-", A1, half, 1e-10, 5),
-        said("  beyond the last tick, below the next", beyond, f"whole difference {2 * half:.3f}", "0.4"),
-        said("A0 is constant", fall > 1, f"falls {fall:.2f} degree to 15 cm", "only nearly"),
-        differing("A0 at e -> 0 by (39), degree", "-", degrees(start.A0), degrees(middle), 1e-8, 6),
-        most("alignment: the extremes have e x f = 0, over e f", "0", aligned(full), 1e-9, "largest of both"),
-        said("sin A0 sin A1 = e f/(b d)", closure < 1e-14, f"off by {closure:.0e} at most", "-"),
-    ]
+    yield compared(first, "-", float(start.A1_e) / 100, slope / 100, 1e-12)
+    yield said("A1 is proportional to e", 0.05 < grown < 0.2, f"{grown:+.1%} at 15 cm", "only nearly")
+    yield differing("A1 at e = 15 cm by the motion's own extremes, rad", "-", A1, half, 1e-10, 5)
+    yield said("  beyond the last tick, below the next", beyond, f"whole difference {2 * half:.3f}", "0.4")
+    yield said("A0 is constant", fall > 1, f"falls {fall:.2f} degree to 15 cm", "only nearly")
+    yield differing("A0 at e -> 0 by (39), degree", "-", degrees(start.A0), degrees(middle), 1e-8, 6)
+    yield most("alignment: the extremes have e x f = 0, over e f", "0", aligned(full), 1e-9, "largest of both")
+    yield said("sin A0 sin A1 = e f/(b d)", closure < 1e-14, f"off by {closure:.0e} at most", "-")
 
 
-def times(ds: xr.Dataset) -> list[Statement]:
+def times(ds: xr.Dataset) -> Claims:
     """When the extremes come, as crank angles."""
     paper, last, start = ds.sel(e=slice(0, LAST + 1e-6)), at(ds, LAST), ds.isel(e=0)
     plus = degrees(paper.theta_plus.max() - paper.theta_plus.min())
@@ -101,16 +97,14 @@ def times(ds: xr.Dataset) -> list[Statement]:
     up, down = degrees(last.eta_plus - start.eta_plus), degrees(start.eta_minus - last.eta_minus)
     maxima, here = degrees(last.theta_plus - start.theta_plus), f"{up:+.1f} and {-down:+.1f} degree"
     clockwise = "with alpha counted clockwise: maxima, the minima here"
-    return [
-        said("figure 4: maxima move to the right as e grows", maxima > 10, f"by {maxima:.1f} degree", "yes", True),
-        said("figure 4: minima do not move", minus < 1.5, f"by {minus:.1f} degree", "yes", True),
-        said(clockwise, later and minus > 10, f"{minus:.1f} degree", "yes"),
-        said("  minima, the maxima here, do not move", plus < 1.5, f"within {plus:.2f} degree", "yes"),
-        said("  in value both move", min(up, down) > 20, here, "-"),
-    ]
+    yield said("figure 4: maxima move to the right as e grows", maxima > 10, f"by {maxima:.1f} degree", "yes", True)
+    yield said("figure 4: minima do not move", minus < 1.5, f"by {minus:.1f} degree", "yes", True)
+    yield said(clockwise, later and minus > 10, f"{minus:.1f} degree", "yes")
+    yield said("  minima, the maxima here, do not move", plus < 1.5, f"within {plus:.2f} degree", "yes")
+    yield said("  in value both move", min(up, down) > 20, here, "-")
 
 
-def border(ds: xr.Dataset) -> list[Statement]:
+def border(ds: xr.Dataset) -> Claims:
     """Up to which eccentricity the motor turns."""
     limit, last = float(ds.d + ds.f - ds.b), at(ds, LAST)
     turns, flat, locked = (
@@ -122,13 +116,11 @@ def border(ds: xr.Dataset) -> list[Statement]:
     text = f"{degrees(angle):.1f} at 15 cm, {degrees(near.transmission_angle):.2f} degree "
     text += f"{1e3 * (limit - float(near.e)):.1f} mm before"
     thd, what = float(last.thd), "angle of coupler and arm falls to 0 at the border"
-    return [
-        compared("largest e of a motor that turns, cm", "-", 100 * float(flat.e[0]), 100 * limit, 1e-12, 6),
-        said("all smaller turn, all larger lock", sharp, cases, "-"),
-        differing("A0 = A1 there, degree", "-", degrees(there.A1), degrees(there.A0), 1e-5, 6),
-        said(what, near.transmission_angle < 0.3 * angle, text, "-"),
-        said("harmonic motion", thd < 0.01, f"distortion {100 * thd:.1f} % at 15 cm", "held so elsewhere", True),
-    ]
+    yield compared("largest e of a motor that turns, cm", "-", 100 * float(flat.e[0]), 100 * limit, 1e-12, 6)
+    yield said("all smaller turn, all larger lock", sharp, cases, "-")
+    yield differing("A0 = A1 there, degree", "-", degrees(there.A1), degrees(there.A0), 1e-5, 6)
+    yield said(what, near.transmission_angle < 0.3 * angle, text, "-")
+    yield said("harmonic motion", thd < 0.01, f"distortion {100 * thd:.1f} % at 15 cm", "held so elsewhere", True)
 
 
 def figure(ds: xr.Dataset) -> Any:

@@ -8,14 +8,12 @@ sweep wears the sum of t_i h_i(r); the most even sum of given mean is a least-sq
 0.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Conclusion, Statement, compared, most, read_result, said, script, solved
+from _common import Claims, Conclusion, Statement, compared, most, read_result, said, script, solved
 from _figures import page_of
 from _polishing import KEPT, POINTS, area, best_settings, disc, least, one_setting, swings, tool_wear, unevenness
 from scipy.optimize import brentq, nnls
@@ -45,7 +43,7 @@ def mixture(ds: xr.Dataset) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return rows, shares, shares @ rows
 
 
-def optimum(ds: xr.Dataset) -> list[Statement]:
+def optimum(ds: xr.Dataset) -> Claims:
     """What a sequence gains over one setting, and whether it is the best."""
     weight, (rows, shares, mixed) = area(ds.radius), mixture(ds)
     scale = float((mixed * weight).sum() / (mixed**2 * weight).sum())
@@ -56,24 +54,22 @@ def optimum(ds: xr.Dataset) -> list[Statement]:
     holds = best < single / 35 and least(mixed, weight, ds.radius.values) > KEPT
     places = [(100 * e, 100 * (w - float(ds.L))) for e in ds.e.values for w in ds.w_x.values]
     order = [i for i in np.argsort(-shares) if shares[i] > 0.01]
-    return [
-        *one_setting(ds),
-        said("best sequence", holds, f"{best:.1%}, centre {mixed[0]:.2f}, {used.sum()} settings", "-"),
-        most("  conditions of an optimum", "0", worst, 1e-6, "largest breach"),
-        *(
-            Statement(f"  {shares[i]:.0%} of the wear at", "", "e = {:g} cm, offset {:.0f} cm".format(*places[i]))
-            for i in order
-        ),
-    ]
+    yield from one_setting(ds)
+    yield said("best sequence", holds, f"{best:.1%}, centre {mixed[0]:.2f}, {used.sum()} settings", "-")
+    yield most("  conditions of an optimum", "0", worst, 1e-6, "largest breach")
+    yield from (
+        Statement(f"  {shares[i]:.0%} of the wear at", "", "e = {:g} cm, offset {:.0f} cm".format(*places[i]))
+        for i in order
+    )
 
 
-def eight_tools(ds: xr.Dataset) -> list[Statement]:
+def eight_tools(ds: xr.Dataset) -> Claims:
     """Wear by each tool of the paper's figure 5, its half widths 4 cm times a and b, and the same in all by its points.
 
     What the work loses, 2 pi times the integral of the wear over r dr, follows from the mean speed of its points.
     """
     names = ("b", "d", "f", "L", "preston", "pressure", "omega", "b_angle", "Omega")
-    fixed, lines = {name: float(ds[name]) for name in names} | {"e": 0.1, "w_x": float(ds.w_x[3])}, []
+    fixed = {name: float(ds[name]) for name in names} | {"e": 0.1, "w_x": float(ds.w_x[3])}
     n, m, a, b = np.array(TOOLS).T
     radius = np.linspace(0.0, 0.4, 401)
     sizes = {"tool_n": n, "tool_m": m, "tool_a": 0.04 * a, "tool_b": 0.04 * b}
@@ -92,8 +88,7 @@ def eight_tools(ds: xr.Dataset) -> list[Statement]:
         here, inner = 2 * np.pi * np.trapezoid(row * radius, radius), radius <= float(ds.radius[-1]) + 1e-9
         uneven = float(unevenness(row[inner], area(radius[inner])))
         what = f"n, m = {n[k]:g}, {m[k]:g}, b = {b[k]:g} a: uneven by {uneven:.0%}, wear in all [m^3/s]"
-        lines.append(compared(what, f"{theory:.4g}", here, theory, 5e-4, 4))
-    return lines
+        yield compared(what, f"{theory:.4g}", here, theory, 5e-4, 4)
 
 
 def middle(d: float, e: float, b: float, f: float) -> float:
@@ -101,7 +96,7 @@ def middle(d: float, e: float, b: float, f: float) -> float:
     return 0.5 * sum(math.acos((b * b + d * d - (f + s * e) ** 2) / (2 * b * d)) for s in (1, -1))
 
 
-def correction(ds: xr.Dataset) -> list[Statement]:
+def correction(ds: xr.Dataset) -> Claims:
     """How far O_DH moves on the arm so that the middle stays when the throw goes from 10 to 15 cm."""
     b, d, f = (float(ds[name]) for name in "bdf")
     kept = middle(d, 0.10, b, f)
@@ -110,15 +105,14 @@ def correction(ds: xr.Dataset) -> list[Statement]:
     cells = solved("polisher", design="zip", d=[d, exact, d], e=[0.10, 0.15, 0.15], b=b, f=f)
     slope = -float(cells.A0_e[0] / cells.A0_d[0]) * 1e-3
     kept_by, shift = float(cells.A0[1] - cells.A0[0]), math.degrees(float(cells.A0[2] - cells.A0[0]))
-    return [
-        said("throw 10 to 15 cm, same arm: the middle moves by [degree]", shift < -1, f"{shift:.3f}", "-"),
-        most("  O_DH moved to keep it: arm [cm]", "-", kept_by, 1e-9, f"{100 * d:g} to {100 * exact:.3f}"),
-        compared("  for 1 mm of throw, by A0_e/A0_d [um]", f"{1e6 * (small - d):.2f}", 1e6 * slope, 1e6 * (small - d),
-                 0.02, 5),
-    ]  # fmt: skip
+    yield said("throw 10 to 15 cm, same arm: the middle moves by [degree]", shift < -1, f"{shift:.3f}", "-")
+    yield most("  O_DH moved to keep it: arm [cm]", "-", kept_by, 1e-9, f"{100 * d:g} to {100 * exact:.3f}")
+    yield compared(
+        "  for 1 mm of throw, by A0_e/A0_d [um]", f"{1e6 * (small - d):.2f}", 1e6 * slope, 1e6 * (small - d), 0.02, 5
+    )
 
 
-def turning(ds: xr.Dataset) -> list[Statement]:
+def turning(ds: xr.Dataset) -> Claims:
     """What it matters which way the work turns, on type A; type B is type A in a mirror, which is no finding."""
     names = ("b", "d", "f", "L", "tool_a", "tool_b", "preston", "pressure", "omega", "b_angle")
     fixed, spin = {name: float(ds[name]) for name in names} | {"e": 0.1, "w_x": 0.53}, float(ds.Omega)
@@ -129,10 +123,8 @@ def turning(ds: xr.Dataset) -> list[Statement]:
     dead = [math.acos((b * b + (f + s * e) ** 2 - d * d) / (2 * b * (f + s * e))) for s in (1, -1)]
     out = 0.5 + (dead[1] - dead[0]) / (2 * math.pi)
     changes = "  so the wear changes where the work turns the other way"
-    return [
-        said("share of the crank's turn in which the arm goes out", abs(out - 0.5) > 1e-3, f"{out:.3f}"),
-        said(changes, 1e-3 < off < 0.05, f"{off:.2%}", "> 0.1 %"),
-    ]
+    yield said("share of the crank's turn in which the arm goes out", abs(out - 0.5) > 1e-3, f"{out:.3f}")
+    yield said(changes, 1e-3 < off < 0.05, f"{off:.2%}", "> 0.1 %")
 
 
 def figure(ds: xr.Dataset) -> Any:

@@ -10,13 +10,11 @@ reaches: the least wear of the inner half of the radius over the mean is told be
 the workpiece is said to have a hole.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Conclusion, Statement, compared, most, read_result, said, script
+from _common import Claims, Conclusion, compared, most, read_result, said, script
 from _figures import hatch, page_of, quality_bar
 from _polishing import KEPT, area, least, one_setting, unevenness
 from matplotlib.patches import Patch
@@ -59,7 +57,7 @@ def tool(ds: xr.Dataset, name: str) -> xr.Dataset:
     return ds.sel(tool_n=n).sel(tool_b=b, method="nearest")
 
 
-def numbers(ds: xr.Dataset) -> list[Statement]:
+def numbers(ds: xr.Dataset) -> Claims:
     """The way of the arm over a middle that the tool never leaves, times pressure; and how far numbers may be off."""
     b, d, f = float(ds.b), float(ds.d), float(ds.f)
     far, near = (np.arccos((b * b + d * d - c * c) / (2 * b * d)) for c in (f + ds.e, abs(f - ds.e)))
@@ -69,13 +67,11 @@ def numbers(ds: xr.Dataset) -> list[Statement]:
     way = 4 * float(small.swing) * float(small.w_x) * float(ds.omega) / (2 * np.pi)
     theory, here = (UM_PER_HOUR * x for x in (float(ds.preston) * float(ds.pressure) * way, float(small.wear)))
     worst = (ds.wear_error / ds.wear.max("radius")).max()
-    return [
-        compared(f"wear of the centre, e = {CM * float(small.e):g} cm [um/h]", f"{theory:.5g}", here, theory, 1e-2, 5),
-        most("error of every profile, over its largest wear", "", worst, 1e-4, "at most"),
-    ]
+    yield compared(f"wear of the centre, e = {CM * float(small.e):g} cm [um/h]", f"{theory:.5g}", here, theory, 1e-2, 5)
+    yield most("error of every profile, over its largest wear", "", worst, 1e-4, "at most")
 
 
-def edge(ds: xr.Dataset, load: xr.Dataset) -> list[Statement]:
+def edge(ds: xr.Dataset, load: xr.Dataset) -> Claims:
     """What a constant load does where the tool hangs over the edge, 2 mm inside it.
 
     The load is that of the constant pressure on the whole tool: where the tool lies on the work wholly the two are one,
@@ -86,10 +82,8 @@ def edge(ds: xr.Dataset, load: xr.Dataset) -> list[Statement]:
     middle = load.wear.isel(radius=0) / pressed.isel(radius=0).sel(w_x=load.w_x, method="nearest")
     here = ", ".join(f"{float(r):.3g} at {MM * float(r.w_x - ds.L):.0f} mm" for r in ratio)
     within, off = ((ratio > 3) & (ratio < 5)).all(), float(middle.isel(w_x=0) - 1)
-    return [
-        said("disc: wear by load over that by pressure, 2 mm from the edge", within, here, "3 to 5"),
-        most("disc, no offset: the same at the centre", "1", off, 1e-4, f"{1 + off:.6f}"),
-    ]
+    yield said("disc: wear by load over that by pressure, 2 mm from the edge", within, here, "3 to 5")
+    yield most("disc, no offset: the same at the centre", "1", off, 1e-4, f"{1 + off:.6f}")
 
 
 def least_uneven(ds: xr.Dataset, *over: str, hole: bool = False) -> xr.Dataset:
@@ -104,22 +98,18 @@ def described(cell: xr.Dataset) -> str:
     return f"{place}offset {CM * float(cell.w_x - cell.L):.3g} cm, least {float(cell.least):.2f}"
 
 
-def offsets(ds: xr.Dataset) -> list[Statement]:
+def offsets(ds: xr.Dataset) -> Claims:
     """What moving the workpiece does, tool by tool: the least uneven profile has a hole, so holes are left out."""
-    lines = []
     for name in SHAPES:
         usual = tool(ds, name).sel(e=USUAL, method="nearest")
         aligned = float(usual.uneven.sel(w_x=float(ds.L), method="nearest"))
         bored, best = least_uneven(usual, "w_x", hole=True), least_uneven(usual, "w_x")
         here = f"{described(best)}; no offset {100 * aligned:.0f} %"
-        lines += [
-            said(f"{name}, e = 10 cm: the least uneven has a hole", bored.least < KEPT, described(bored)),
-            said("  without a hole an offset evens by a third at least", best.uneven / aligned < 2 / 3, here),
-        ]
-    return lines
+        yield said(f"{name}, e = 10 cm: the least uneven has a hole", bored.least < KEPT, described(bored))
+        yield said("  without a hole an offset evens by a third at least", best.uneven / aligned < 2 / 3, here)
 
 
-def eccentricities(ds: xr.Dataset) -> list[Statement]:
+def eccentricities(ds: xr.Dataset) -> Claims:
     """What the eccentricity does."""
     disc = ds.sel(tool_n=2).isel(tool_b=0)
     aligned, lost = (disc[name].isel(w_x=0) for name in ("uneven", "average"))
@@ -127,11 +117,9 @@ def eccentricities(ds: xr.Dataset) -> list[Statement]:
     here = f"{100 * float(aligned[0]):.0f} % at 2 cm, least {100 * float(even):.0f} % at {CM * float(even.e):g} cm"
     text = f"{UM_PER_HOUR * float(lost[0]):.3g} at 2 cm, at most {UM_PER_HOUR * float(lost.max()):.3g}"
     grows = "disc, no offset: mean wear more than doubles with throw [um/h]"
-    return [
-        said("disc, no offset: throw halves the unevenness", even < 0.5 * aligned[0], here),
-        *one_setting(disc),
-        said(grows, lost.max() > 2 * lost[0], text),
-    ]
+    yield said("disc, no offset: throw halves the unevenness", even < 0.5 * aligned[0], here)
+    yield from one_setting(disc)
+    yield said(grows, lost.max() > 2 * lost[0], text)
 
 
 def figure(ds: xr.Dataset, load: xr.Dataset) -> Any:

@@ -16,14 +16,12 @@ mean speed, and all that the tool loses the work loses too,
     integral of the wear over the tool = 2 pi integral of the wear over r dr.                            (2)
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Conclusion, Statement, differing, most, read_result, said, script, solved
+from _common import Claims, Conclusion, differing, most, read_result, said, script, solved
 from _figures import page_of
 from _polishing import swings, tool_wear
 
@@ -61,7 +59,7 @@ def prepared(ds: xr.Dataset) -> xr.Dataset:
     )  # fmt: skip
 
 
-def zones(ds: xr.Dataset) -> list[Statement]:
+def zones(ds: xr.Dataset) -> Claims:
     """Where the work wears, by beta; O_DH turned so that the middle stays when the throw goes from 10 to 15 cm."""
     q = 2 * math.asin(float(ds.tool_a) / (2 * float(ds.L)))
     theory = (ds.low - q <= -ds.beta) & (-ds.beta <= ds.high + q)
@@ -75,27 +73,25 @@ def zones(ds: xr.Dataset) -> list[Statement]:
     shift = 100 * float(line.interp(beta=0.0) - line.interp(beta=math.radians(beta)))
     low, high = float(zone.min()), float(zone.max())
     alone = "e = 4 cm: zones by O_DH alone, 15 degree to each side"
-    return [
-        said("the centre wears where (1) says", wrong == 0, f"{wrong} of {worn.size} not", "all cells"),
-        said(alone, high > 3 * low, f"{low:.1f} to {high:.1f} cm", "-"),
-        differing("middle A0, e = 10 cm [degree]", f"{A0[10.0]}", A0s[0], A0[10.0], 5e-5, 6),
-        differing("middle A0, e = 15 cm", f"{A0[15.0]}", A0s[1], A0[15.0], 5e-5, 6),
-        most("  O_DH turned by that keeps the middle [degree]", "0", middle[1] - middle[0], 2e-3, f"beta = {beta:.3f}"),
-        said("  zone with and without it, e = 15 cm", abs(shift) > 0.1, f"by {10 * shift:.1f} mm", "moves"),
-    ]
+    yield said("the centre wears where (1) says", wrong == 0, f"{wrong} of {worn.size} not", "all cells")
+    yield said(alone, high > 3 * low, f"{low:.1f} to {high:.1f} cm", "-")
+    yield differing("middle A0, e = 10 cm [degree]", f"{A0[10.0]}", A0s[0], A0[10.0], 5e-5, 6)
+    yield differing("middle A0, e = 15 cm", f"{A0[15.0]}", A0s[1], A0[15.0], 5e-5, 6)
+    yield most(
+        "  O_DH turned by that keeps the middle [degree]", "0", middle[1] - middle[0], 2e-3, f"beta = {beta:.3f}"
+    )
+    yield said("  zone with and without it, e = 15 cm", abs(shift) > 0.1, f"by {10 * shift:.1f} mm", "moves")
 
 
-def tools(ds: xr.Dataset) -> list[Statement]:
+def tools(ds: xr.Dataset) -> Claims:
     """What the tool loses."""
     usual = ds.sel(e=0.10, method="nearest").sel(beta=0, method="nearest")
     ratio = float(usual.tool) / (math.pi * float(ds.tool_a) ** 2) / float(usual.wear.isel(radius=0))
     uneven = ds.across.isel(X=-1) / ds.across.isel(X=0)
     here = ", ".join(f"{float(x):.3f} at e = {100 * float(x.e):.0f} cm" for x in uneven)
-    return [
-        most("(2) over all cells", "1", abs(ds.tool / ds.volume - 1).max(), 2e-3),
-        said("mean wear of the tool over the work's centre, e = 10 cm", ratio > 1, f"{ratio:.2f}", "> 1"),
-        said("outer rim over inner rim", (uneven > 1).all(), here, "> 1 at every throw"),
-    ]
+    yield most("(2) over all cells", "1", abs(ds.tool / ds.volume - 1).max(), 2e-3)
+    yield said("mean wear of the tool over the work's centre, e = 10 cm", ratio > 1, f"{ratio:.2f}", "> 1")
+    yield said("outer rim over inner rim", (uneven > 1).all(), here, "> 1 at every throw")
 
 
 def figure(ds: xr.Dataset) -> Any:

@@ -9,8 +9,6 @@ P = F(alpha)/a with alpha = mu/(a^2 phi0), so with s = -d ln P/d ln mu the expon
 2 s - 1 for a. Where all are known equally well, the shares of the variance are their squares over the sum of these.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -108,7 +106,7 @@ def figure(found: xr.Dataset) -> Any:
 def conclude(path: str) -> Conclusion:
     """Table, notes and figure of a result."""
     ds = read_result(path, "foliot", ["cell"], TOML)
-    return statements(ds), NOTES.splitlines(), lambda: figure(against_drive())
+    return statements(ds), [NOTES], lambda: figure(against_drive())
 
 
 main = script(__name__, "rate_parameters.h5", conclude)

@@ -83,7 +83,7 @@ def conclude(path: str) -> Conclusion:
     near = float(ds.period.sel(mu=1.0, method="nearest"))
     cells = [all_ok(ds), compared("T at mu = 1", "6.66328686", near, AT_ONE, 1e-8)]
     groups = {"Cells": cells, "Weak friction": weak(ds), "Strong friction": strong(ds)}
-    return groups, NOTES.splitlines(), lambda: figure(ds)
+    return groups, [NOTES], lambda: figure(ds)
 
 
 main = script(__name__, "relaxation.h5", conclude)

@@ -11,8 +11,6 @@ beats stiction and spring, mu > R_s + k phi_s, and without viscous friction come
 viscous friction takes more, at most so much that the foliot must be able to rest at the switch, mu > R + k phi0.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

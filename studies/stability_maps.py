@@ -14,13 +14,11 @@ matrix. The others are of a foliot's first flips from rest: a step h against its
 sticking, and against a hairspring that it hardly overcomes; truth is the kernel foliot_start.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Conclusion, Statement, read_result, said, script, solved
+from _common import Claims, Conclusion, Statement, read_result, said, script, solved
 from _figures import direct_label, page_of
 from scipy.integrate import DOP853, RK45
 
@@ -152,27 +150,24 @@ def with_truth(ds: xr.Dataset, axis: str) -> xr.Dataset:
     return ds.assign(off=off, told=told, wrong=told & (off > WRONG)).transpose("method", "step", axis)
 
 
-def foliots(ds: xr.Dataset) -> list[Statement]:
+def foliots(ds: xr.Dataset) -> Claims:
     """What becomes of a foliot's cells."""
     silent = ds.told & (ds.off > 10 * np.maximum(1e-9, ds.error))
     here, what = f"{int(silent.sum())} of {ds.status.size}", "values off by more than ten times what is stated"
-    lines = [said(what, not silent.any(), here, "none")]
+    yield said(what, not silent.any(), here, "none")
     for method in map(str, ds["method"].values):
         one = ds.sel({"method": method})
         here = f"{one.wrong.mean():.1%}; {1 - one.told.mean():.1%}"
-        lines.append(Statement(f"{method}: off by {WRONG:.0%} and more, told; refused", "", here))
-    return lines
+        yield Statement(f"{method}: off by {WRONG:.0%} and more, told; refused", "", here)
 
 
-def oscillators(ds: xr.Dataset) -> list[Statement]:
+def oscillators(ds: xr.Dataset) -> Claims:
     """Growth against theory, well away from the border."""
-    lines = []
     for method, growth in zip(map(str, ds["method"].values), grown(ds), strict=True):
         theory = by_theory(ds, method).values
         clear = abs(theory - 1) > 0.1
         agrees = ((growth.values > 1) == (theory > 1))[clear].mean()
-        lines.append(said(f"{method} grows where abs(R) > 1", agrees == 1, f"{agrees:.4f} of them", "all cells"))
-    return lines
+        yield said(f"{method} grows where abs(R) > 1", agrees == 1, f"{agrees:.4f} of them", "all cells")
 
 
 def hard(method: str, step: float = 0.02) -> list[str]:

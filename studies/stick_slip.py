@@ -9,8 +9,6 @@ each method; others, which know nothing of the kink, are mapped over two cycles,
 that locates no kink. Last, the cost of a digit. Times are noisy and only told.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -161,7 +159,7 @@ def conclude(path: str, tell: bool = True) -> Conclusion:
     unslid, found = others(ds), all_costs(tell)
     cycles, failures = statements(ds, unslid)
     groups = {"Twenty cycles": cycles, f"Two cycles without sliding, rtol {LOOSE:g}": failures}
-    return groups | {"Cost of two cycles": cheapest(found)}, NOTES.splitlines(), lambda: figure(ds, unslid, found)
+    return groups | {"Cost of two cycles": cheapest(found)}, [NOTES], lambda: figure(ds, unslid, found)
 
 
 main = script(__name__, "stick_slip.h5", conclude)

@@ -10,14 +10,12 @@ carried to rest, whose time is sqrt(2 h/g) (1 + e)/(1 - e) without drag. Last, t
 and BDF, and diffrax's Kvaerno5 where it is installed (the extra `peers`). Times are noisy and only told.
 """
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Conclusion, Statement, cheapest, measured, read_result, said, script, solved_by
+from _common import Claims, Conclusion, Statement, cheapest, measured, read_result, said, script, solved_by
 from _figures import direct_label, draw_costs, page_of
 from _stiff_peers import FOLLOWERS, FRICTION
 from lag_scene import KERNEL
@@ -78,35 +76,30 @@ def costs(tell: bool) -> dict[str, xr.Dataset]:
     return found
 
 
-def maps(ds: xr.Dataset) -> list[Statement]:
+def maps(ds: xr.Dataset) -> Claims:
     """What each method does over the lag."""
-    lines, ok = [], ds.status == Status.OK
+    ok = ds.status == Status.OK
     for method in map(str, ds["method"].values):
         here = ds.sel({"method": method})
         given = here.status < FIRST_REFUSAL
         least = float(here.eps.where(given.all("mu")).min())
         reached = f"unsolved {float((~given).mean()):.0%}; least lag done {least:.1e} s"
-        lines.append(Statement(f"{method}: unsolved, and down to which lag it does all", "", reached))
+        yield Statement(f"{method}: unsolved, and down to which lag it does all", "", reached)
     worst, share = float(ds.off.where(ok).max()), float(ok.sel({"method": "rodas5p"}).mean())
-    return [
-        *lines,
-        said("worst error of what is OK", worst <= 1e-9, f"{worst:.1e}", "<= 1e-9"),
-        said("rodas5p is OK for every lag", share == 1.0, f"{share:.1%}", "all cells"),
-    ]
+    yield said("worst error of what is OK", worst <= 1e-9, f"{worst:.1e}", "<= 1e-9")
+    yield said("rodas5p is OK for every lag", share == 1.0, f"{share:.1%}", "all cells")
 
 
-def rests(ds: xr.Dataset) -> list[Statement]:
+def rests(ds: xr.Dataset) -> Claims:
     """The ball at rest, and when that is without drag."""
     last = ds.isel(flips=-1)
     came = last.status == Status.COMES_TO_REST
     at_rest = np.sqrt(2.0 * ds.above / ds.g) * (1.0 + ds.e) / (1.0 - ds.e)
     worst = float(abs(last.time / at_rest - 1.0).where(came).sel(d=0.0).max())
     later = (last.time >= ds.isel(flips=1).time * (1 - 1e-9)).where(came, True).all()
-    return [
-        Statement("balls carried to rest", "", f"{int(came.sum())} of {came.size}; others INACCURATE"),
-        said("worst error of the time of rest, without drag", worst <= 1e-9, f"{worst:.1e}", "<= 1e-9"),
-        said("rest is later than the 100th bounce", later, "", "always"),
-    ]
+    yield Statement("balls carried to rest", "", f"{int(came.sum())} of {came.size}; others INACCURATE")
+    yield said("worst error of the time of rest, without drag", worst <= 1e-9, f"{worst:.1e}", "<= 1e-9")
+    yield said("rest is later than the 100th bounce", later, "", "always")
 
 
 def figure(lag: xr.Dataset, bounce: xr.Dataset, found: dict[str, xr.Dataset]) -> Any:
@@ -144,7 +137,7 @@ def conclude(path: str, bounces: str, tell: bool = True) -> Conclusion:
     bounce = read_result(bounces, "bounce_scene:KERNEL", ["d", "flips", "e"], "stiff_lag_bounce.toml")
     found = costs(tell)
     groups = {"Lag": maps(lag), "Bounces": rests(bounce), f"Cost at a lag of {EPS:g} s": cheapest(found)}
-    return groups, NOTES.splitlines(), lambda: figure(lag, bounce, found)
+    return groups, [NOTES], lambda: figure(lag, bounce, found)
 
 
 main = script(__name__, "stiff_lag.h5 stiff_lag_bounce.h5", conclude)

@@ -14,15 +14,13 @@ are those of the scenes `verge_scene` and `foliot_scene`, followed from rest in 
 only the abstracts were at hand: the models are of their kind, no number is theirs.
 """
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Conclusion, Statement, compared, differing, most, read_result, script, solved
+from _common import Claims, Conclusion, Statement, compared, differing, most, read_result, script, solved
 from _figures import direct_label, page_of, plain_ticks
 
 import sweep
@@ -91,32 +89,27 @@ def in_si(impact: xr.Dataset, denny: xr.Dataset) -> dict[str, xr.Dataset]:
     }
 
 
-def laws(ds: xr.Dataset, followed: dict[str, xr.Dataset]) -> list[Statement]:
+def laws(ds: xr.Dataset, followed: dict[str, xr.Dataset]) -> Claims:
     """Exponents of the three models; the kernels beside what was followed."""
-    found = []
     for name, one in followed.items():
         fit = sweep.fit_exponent(one.period, "torque")
         kernel = np.exp(np.interp(np.log(IN_SI), np.log(ds.torque), np.log(ds.period.sel(model=name))))
-        found.append(differing(f"exponent, {name}, in SI units", "-1/2", fit.exponent, -0.5, 1e-8))
-        found.append(most("  period of the kernel beside it", "the same", one.period / kernel - 1, 1e-8, "largest"))
+        yield differing(f"exponent, {name}, in SI units", "-1/2", fit.exponent, -0.5, 1e-8)
+        yield most("  period of the kernel beside it", "the same", one.period / kernel - 1, 1e-8, "largest")
     viscous = ds.sel(model="viscous")
     half = sweep.where_exponent(viscous.period, "torque", -0.5).abscissa
     theory = HALF * float(ds.viscous_unit)
     text = f"alpha = {HALF:.5f}: {theory:.5g}"
-    return [
-        *found,
-        differing("exponent, viscous, weakest drive", "-1", viscous.exponent[0], -1.0, 0.01, 5),
-        differing("exponent, viscous, strongest drive", "-1/3", viscous.exponent[-1], -1 / 3, 0.01, 5),
-        compared("torque of exponent -1/2, viscous [N m]", text, half, theory, 1e-3, 5),
-    ]
+    yield differing("exponent, viscous, weakest drive", "-1", viscous.exponent[0], -1.0, 0.01, 5)
+    yield differing("exponent, viscous, strongest drive", "-1/3", viscous.exponent[-1], -1 / 3, 0.01, 5)
+    yield compared("torque of exponent -1/2, viscous [N m]", text, half, theory, 1e-3, 5)
 
 
-def swings(ds: xr.Dataset, followed: dict[str, xr.Dataset]) -> list[Statement]:
+def swings(ds: xr.Dataset, followed: dict[str, xr.Dataset]) -> Claims:
     """Whether the swing depends on the torque; of restitution and a hairspring, no friction, by energy too."""
-    found = []
     for name, one in followed.items():
         reach = one.speed**2 / one.torque  # the swing past the switch goes with it
-        found.append(most(f"spread of the swing, {name}, in SI units", "0", reach.max() / reach.min() - 1, 1e-8, ""))
+        yield most(f"spread of the swing, {name}, in SI units", "0", reach.max() / reach.min() - 1, 1e-8, "")
     viscous = ds.amplitude.sel(model="viscous")
     growth = 3 ** (2 / 3) / 2 * float(ds.torque[-1] / ds.viscous_unit) ** (1 / 3)  # A at strong drive, A = 1 at weak
     text, grown = f"3^(2/3)/2 alpha^(1/3) = {growth:.4g}", viscous[-1] / viscous[0]
@@ -127,26 +120,21 @@ def swings(ds: xr.Dataset, followed: dict[str, xr.Dataset]) -> list[Statement]:
     off = float(abs(kernel / energy - 1).max())
     grows, more = f"{kernel[0]:.4g} to {kernel[-1]:.4g} phi0", bool(kernel[-1] > 1.5 * kernel[0])
     what = f"no friction but a hairspring, k = {SPRING:g}/s^2: swing for mu = 0.6 to 60 rad/s^2"
-    return [
-        *found,
-        compared("growth of the swing, viscous", text, grown, growth, 0.01, 4),
-        Statement(what, "grows too, by energy", grows, off, off < 1e-9 and more),
-    ]
+    yield compared("growth of the swing, viscous", text, grown, growth, 0.01, 4)
+    yield Statement(what, "grows too, by energy", grows, off, off < 1e-9 and more)
 
 
-def identity(ds: xr.Dataset, impact: xr.Dataset) -> list[Statement]:
+def identity(ds: xr.Dataset, impact: xr.Dataset) -> Claims:
     """How near the two-body clock is to one body that keeps (m - M)/(m + M) of its speed."""
     e = float((1 - impact.kappa) / (1 + impact.kappa))
     drop = 0.5 - 2 * float(impact.h / impact.pitch)
     two, one = (ds.sel(model=name).isel(torque=0) for name in MODELS[:2])
     period = 4 * math.sqrt(impact.phi0 / (impact.drive * impact.torque[0]) * (1 + e) / (1 - e))
     ratio, bodies = f"period, two bodies over one, drop {drop:.4f} pitch", f"e = (m - M)/(m + M) = {e:.4g}"
-    return [
-        compared("period of one body, formula", "4 sqrt(phi0 (1 + e)/(mu (1 - e)))", one.period, period, 1e-12),
-        compared(ratio, "1 without drop", two.period / one.period, 1.0, 2 * drop, 6),
-        differing(f"multiplier, two bodies, {bodies}", "e^2", two.multiplier, e * e, 1e-12),
-        differing("multiplier, one body", "e^2", one.multiplier, e * e, 1e-12),
-    ]
+    yield compared("period of one body, formula", "4 sqrt(phi0 (1 + e)/(mu (1 - e)))", one.period, period, 1e-12)
+    yield compared(ratio, "1 without drop", two.period / one.period, 1.0, 2 * drop, 6)
+    yield differing(f"multiplier, two bodies, {bodies}", "e^2", two.multiplier, e * e, 1e-12)
+    yield differing("multiplier, one body", "e^2", one.multiplier, e * e, 1e-12)
 
 
 def figure(ds: xr.Dataset) -> Any:

@@ -22,8 +22,6 @@ m that begins with the speed u, and derivatives as indices, on the cycle,
 Derived here.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from itertools import product
@@ -31,7 +29,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Conclusion, Statement, columns, compared, differing, power, read_result, script, solved
+from _common import Claims, Conclusion, columns, compared, differing, power, read_result, script, solved
 from _figures import page_of
 
 from sweep.show.charts import COLOURS
@@ -117,7 +115,7 @@ def second_order(ds: xr.Dataset, tau_c: float) -> float:
     return DAY * float(longer + d["u"][0] * faster / (1 - kept)) / time
 
 
-def clock_statements(name: str, ds: xr.Dataset) -> list[Statement]:
+def clock_statements(name: str, ds: xr.Dataset) -> Claims:
     """What theory says of one clock's runs.
 
     The power of sigma has no error of sampling: the same noise at every sigma. The mean rate at the largest noise is
@@ -125,24 +123,23 @@ def clock_statements(name: str, ds: xr.Dataset) -> list[Statement]:
     """
     (time, _), d = slopes(ds)
     s, known = -(d["m"][0] + d["u"][0] * d["m"][1] / (1 - d["u"][1])) / time, float(ds.s)
-    lines = [compared(f"{name}: s from the half-swing map", f"{known:.6f} +- 1e-4", s, known, 1e-4, 6)]
+    yield compared(f"{name}: s from the half-swing map", f"{known:.6f} +- 1e-4", s, known, 1e-4, 6)
     allowed = 3 * float(ds.blur)
     for j, time_name in enumerate(TIMES):
         theory, what = float(law(ds, ds.tau_c[j])), f"  scatter over sigma, {time_name} [s/day]"
-        lines.append(compared(what, f"(1) = {theory:.4g} +- {allowed:.0%}", ds.per_sigma[j], theory, allowed, 4))
+        yield compared(what, f"(1) = {theory:.4g} +- {allowed:.0%}", ds.per_sigma[j], theory, allowed, 4)
     by_sigma = power(ds.scatter.isel(tau_c=0).sel(sigma=slice(None, 0.03)))
-    lines.append(differing("  power of sigma in the scatter, white", "1 +- 0.01", by_sigma, 1, 0.01, 4))
+    yield differing("  power of sigma in the scatter, white", "1 +- 0.01", by_sigma, 1, 0.01, 4)
     for j in (0, 1):
         part, sigma = ds.isel(tau_c=j, sigma=-1), float(ds.sigma[-1])
         theory = sigma**2 * second_order(ds, float(ds.tau_c[j]))
         error, what = float(part.gain_error) / theory, f"  loss at sigma = {sigma:g}, {TIMES[j]} [s/day]"
         allowed = 4 * error + 5 * sigma**2
         line = compared(what, f"(2) = {theory:.4g} +- {allowed:.0%}", -part.gain, theory, allowed, 4)
-        lines.append(line if error < 0.1 else replace(line, here=f"{line.here} +- {part.gain_error:.1g}", holds=None))
-    return lines
+        yield line if error < 0.1 else replace(line, here=f"{line.here} +- {part.gain_error:.1g}", holds=None)
 
 
-def lasting(clocks: Clocks) -> list[Statement]:
+def lasting(clocks: Clocks) -> Claims:
     """eps/s of a lasting change, by the series of s at weak and at strong drive."""
     verge, buergi = clocks["verge"], clocks["Bürgi"]
     alpha, strong = (float(ds.mu / (ds.a**2 * ds.phi0)) for ds in (verge, buergi))
@@ -151,10 +148,8 @@ def lasting(clocks: Clocks) -> list[Statement]:
     series = minute / (1 / 3 + 4 * b2 / 45 + 52 * b2**2 / 4725)
     per_cent = f"verge, 1 % of rate: lasting change of torque [%], +- {1e-6:g}"
     by_series, by_minute = f"1/s by its series = {series:.4g}", "Bürgi, 1 min/day: lasting change [%], +- 1e-3"
-    return [
-        compared(per_cent, f"1 + alpha = {1 + alpha:.5g}", 1 / verge.s, 1 + alpha, 1e-6, 5),
-        compared(by_minute, by_series, minute / buergi.s, series, 1e-3, 4),
-    ]
+    yield compared(per_cent, f"1 + alpha = {1 + alpha:.5g}", 1 / verge.s, 1 + alpha, 1e-6, 5)
+    yield compared(by_minute, by_series, minute / buergi.s, series, 1e-3, 4)
 
 
 def table(clocks: Clocks) -> list[str]:
@@ -234,7 +229,7 @@ def conclude(*paths: str) -> Conclusion:
     clocks = {name: read(path, study) for (name, study), path in zip(CLOCKS.items(), paths, strict=True)}
     groups = {name: clock_statements(name, ds) for name, ds in clocks.items()}
     groups["Lasting changes, eps/s"] = lasting(clocks)
-    return groups, [*table(clocks), "", *in_words(clocks)], lambda: figure(clocks)
+    return groups, ["", *table(clocks), "", *in_words(clocks)], lambda: figure(clocks)
 
 
 main = script(__name__, "timekeeping.h5 timekeeping_buergi.h5 timekeeping_spring.h5", conclude)

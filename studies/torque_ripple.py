@@ -19,14 +19,12 @@ h inertia alone shifts the period, in the layers behind the switches: K = -(5/24
 Derived here.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Conclusion, Statement, compared, differing, most, power, read_result, script
+from _common import Claims, Conclusion, compared, differing, most, power, read_result, script
 from _figures import direct_label, page_of
 from matplotlib.lines import Line2D
 from scipy.optimize import brentq
@@ -101,30 +99,25 @@ def degree(line: xr.Dataset, harmonic: int) -> float:
     return power(line.change.sel(harmonic=harmonic, depth=slice(0.01, 0.05)))
 
 
-def linear(ds: xr.Dataset) -> list[Statement]:
+def linear(ds: xr.Dataset) -> Claims:
     """First order in the depth: the coefficients against (1), and how far the period really is linear in the depth."""
-    lines = []
     for i, name in enumerate(DRIVES):
         line, h = ds.isel(a=i), ds.harmonic.values
         alpha, text = float(line.alpha), f"{h.size} harmonics"
         expected = first_order_sensitivity(alpha, h)
         off = (line.L - expected) / np.maximum(abs(expected), 1)
-        lines.append(
-            most(f"{name}, alpha = {alpha:.4g}: worst of K", "(1)", line.K - first_order(alpha, h), SLACK, text)
-        )
-        lines.append(most("  worst of ds/ddepth, over 1 or itself", "(1)", off, 10 * SLACK, text))
+        yield most(f"{name}, alpha = {alpha:.4g}: worst of K", "(1)", line.K - first_order(alpha, h), SLACK, text)
+        yield most("  worst of ds/ddepth, over 1 or itself", "(1)", off, 10 * SLACK, text)
     for i in (1, 2):
-        lines.append(differing(f"{DRIVES[i]}: power of the depth, h = 1", "1", degree(ds.isel(a=i), 1), 1, 0.05, 4))
-    return lines
+        yield differing(f"{DRIVES[i]}: power of the depth, h = 1", "1", degree(ds.isel(a=i), 1), 1, 0.05, 4)
 
 
-def falls(ds: xr.Dataset) -> list[Statement]:
+def falls(ds: xr.Dataset) -> Claims:
     """High harmonics: amplitudes, freed of their phases, against (2) and its slope in alpha.
 
     They are K and ds/ddepth over cosine and sine of the phase in (2), from harmonic 16 on and away from zeros. The
     power is NaN if signs differ.
     """
-    lines = []
     for i in (1, 2):
         line, h = ds.isel(a=i), ds.harmonic
         alpha = float(line.alpha)
@@ -137,24 +130,19 @@ def falls(ds: xr.Dataset) -> list[Statement]:
             exponent = power(size) if abs(np.sign(size).sum()) == size.size else math.nan
             what = f"{DRIVES[i]}: power" if name == "K" else "  power"
             theory = "-1/2" if name == "K" else "+1/2"
-            lines += [
-                differing(f"{what} of the harmonic in {name}", theory, exponent, expected, 0.05, 4),
-                compared(f"  {name} over its envelope", "1", (size / envelope).mean(), 1, 0.05, 4),
-            ]
-    return lines
+            yield differing(f"{what} of the harmonic in {name}", theory, exponent, expected, 0.05, 4)
+            yield compared(f"  {name} over its envelope", "1", (size / envelope).mean(), 1, 0.05, 4)
 
 
-def weak(line: xr.Dataset) -> list[Statement]:
+def weak(line: xr.Dataset) -> Claims:
     """Weak drive: the mean of 1/torque, quadratic and the same for all harmonics that inertia does not blur."""
     alpha, even, whole = float(line.alpha), line.sel(harmonic=2), 1 / 0.75**0.5 - 1
     layers = -5 / 24 * (2 * math.pi * alpha) ** 2
-    return [
-        differing("power of the depth, h = 2", "2", degree(line, 2), 2, 0.1, 4),
-        compared("P/P0 - 1 over depth^2, h = 2", "1/2", even.curvature, 0.5, 2 * alpha, 4),
-        compared("P/P0 - 1 at depth 0.5, h = 2", f"{whole:.4f}", even.change.sel(depth=0.5), whole, 3 * alpha, 4),
-        compared("K/alpha, h = 1", "-2", line.K.sel(harmonic=1) / alpha, -2, 2 * alpha, 4),
-        compared("K/alpha, h = 2", f"-5/24 (2 pi alpha)^2 = {layers:.4f}", even.K / alpha, layers, 0.1, 4),
-    ]
+    yield differing("power of the depth, h = 2", "2", degree(line, 2), 2, 0.1, 4)
+    yield compared("P/P0 - 1 over depth^2, h = 2", "1/2", even.curvature, 0.5, 2 * alpha, 4)
+    yield compared("P/P0 - 1 at depth 0.5, h = 2", f"{whole:.4f}", even.change.sel(depth=0.5), whole, 3 * alpha, 4)
+    yield compared("K/alpha, h = 1", "-2", line.K.sel(harmonic=1) / alpha, -2, 2 * alpha, 4)
+    yield compared("K/alpha, h = 2", f"-5/24 (2 pi alpha)^2 = {layers:.4f}", even.K / alpha, layers, 0.1, 4)
 
 
 def in_words(ds: xr.Dataset) -> list[str]:
@@ -226,7 +214,7 @@ def conclude(path: str) -> Conclusion:
     """Statements, the answer in words, and the figure."""
     ds = scaled(read_result(path, "foliot_ripple", ["a", "harmonic", "depth"], "torque_ripple.toml"))
     groups = {"First order in the depth": linear(ds), "High harmonics": falls(ds), "Weak drive": weak(ds.isel(a=0))}
-    return groups, in_words(ds), lambda: figure(ds)
+    return groups, ["", *in_words(ds)], lambda: figure(ds)
 
 
 main = script(__name__, "torque_ripple.h5", conclude)

@@ -7,15 +7,13 @@ what_auto_saves.png. The best single method at an rtol is the fastest of those t
 against the best reference among the methods. Times are noisy and only told; what is right is checked.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Conclusion, Statement, said, script
+from _common import Claims, Conclusion, Statement, said, script
 from _figures import page_of
 
 import sweep
@@ -59,23 +57,20 @@ def savings(found: xr.Dataset) -> xr.Dataset:
     return xr.concat(rows, found.rtol)
 
 
-def statements(found: xr.Dataset) -> list[Statement]:
+def statements(found: xr.Dataset) -> Claims:
     """What is checked of one kernel, and what is told of its times."""
     made, auto = savings(found), found.sel({"method": "auto"})
     silent, cells = float(auto.silent.max()), found.attrs["cells"]
     over = float((auto.error_worst / (auto.rtol + found.attrs["reference_error"])).max())
     as_many = (made.auto_gives >= made.single_gives - AS_MANY).all()
     shares = f"{100 * float(made.auto_gives.min()):.4g} % beside {100 * float(made.single_gives.min()):.4g} %"
-    lines = [
-        said("auto is silently wrong", silent == 0, f"{100 * silent:g} % of {cells} cells", "nowhere"),
-        said("auto, worst error over rtol", over <= 1, f"{over:.2g}", "<= 1"),
-        said("auto gives the cells that the best single method does", as_many, shares, "all, or more"),
-    ]
+    yield said("auto is silently wrong", silent == 0, f"{100 * silent:g} % of {cells} cells", "nowhere")
+    yield said("auto, worst error over rtol", over <= 1, f"{over:.2g}", "<= 1")
+    yield said("auto gives the cells that the best single method does", as_many, shares, "all, or more")
     for rtol in made.rtol.values:
         row = made.sel({"rtol": rtol})
         text = f"{float(row.saved):.2f} of {row.single.item()}, which gives {100 * float(row.single_gives):.4g} %"
-        lines.append(Statement(f"saved at {rtol:.0e}", "", f"{text}; auto by {row.used.item()}"))
-    return lines
+        yield Statement(f"saved at {rtol:.0e}", "", f"{text}; auto by {row.used.item()}")
 
 
 def figure(parts: Sequence[xr.Dataset]) -> Any:

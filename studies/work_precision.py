@@ -9,8 +9,6 @@ where mpmath is installed, else against the best method. Two tables are printed 
 order of integrators at a fixed step. Timings are noisy and for information only; errors and counts are checked.
 """
 
-from __future__ import annotations
-
 import sys
 import time
 from collections.abc import Sequence
@@ -22,7 +20,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Conclusion, Statement, cheapest, differing, measured, said, script
+from _common import Claims, Conclusion, Statement, cheapest, differing, measured, said, script
 from _figures import direct_label, page_of
 from _peers import FOLLOWERS, swings
 
@@ -112,11 +110,11 @@ def errors_of(made: Any, rows: Any, rtol: float) -> Any:
     return abs(found / np.transpose(true) - 1).max(axis=1)
 
 
-def orders(path: Path) -> list[Statement]:
+def orders(path: Path) -> Claims:
     """The exponent in the step of the error of the third switch, and what order 1 and 4 cost in calls of the rates."""
-    truth, lines = oracle("scene_oracles"), []
+    truth = oracle("scene_oracles")
     if truth is None:
-        return []
+        return
     ds = sweep.run(sweep.study(path))
     fixed = [float(ds[name]) for name in ("phi0", "a", "c")]
     true = [float(truth.quadratic_foliot(float(mu), *fixed, int(ds.flips))[0]) for mu in ds.mu]
@@ -125,26 +123,23 @@ def orders(path: Path) -> list[Statement]:
         row = error.median("mu").sel({"method": name}).where((ds.step > 0.01) & (ds.step < 0.1), drop=True)
         slope = float(np.polyfit(np.log(row.step), np.log(row), 1)[0])
         what = f"{name}: exponent of the error in the step"
-        lines.append(differing(what, str(order), slope, order, allowed * order * 5))
+        yield differing(what, str(order), slope, order, allowed * order * 5)
     for name in ("verlet", "rk4", "dopri5", "dop853"):
         worst, calls = (x.sel({"method": name}) for x in (error.max("mu"), ds.rate_calls.mean("mu")))
         calls = calls.where(worst <= 1e-7)
         text = "-" if bool(calls.isnull().all()) else f"{float(calls.min()):.4g}"
-        lines.append(Statement(f"{name}: calls of the rates for 1e-7", "", text))
-    return lines
+        yield Statement(f"{name}: calls of the rates for 1e-7", "", text)
 
 
-def honesty(title: str, found: xr.Dataset) -> list[Statement]:
+def honesty(title: str, found: xr.Dataset) -> Claims:
     """What is checked of a chart: no method is silently wrong, and `auto` is right wherever it says so."""
     auto = found.sel({"method": "auto"})
     over = float((auto.error_worst / (auto.rtol + found.attrs["reference_error"])).max())
     silent, unsolved = float(found.silent.max()), float(auto.unsolved.max())
     cells = f"{found.attrs['cells']} cells, {len(found.rtol)} tolerances"
-    return [
-        said(f"{title}: silently wrong", silent == 0, f"{100 * silent:g} % of {cells}", "none"),
-        said(f"{title}: auto, worst error over rtol", over <= 1, f"{over:.2g}", "<= 1"),
-        said(f"{title}: auto leaves unsolved", unsolved == 0, f"{100 * unsolved:g} %", "none"),
-    ]
+    yield said(f"{title}: silently wrong", silent == 0, f"{100 * silent:g} % of {cells}", "none")
+    yield said(f"{title}: auto, worst error over rtol", over <= 1, f"{over:.2g}", "<= 1")
+    yield said(f"{title}: auto leaves unsolved", unsolved == 0, f"{100 * unsolved:g} %", "none")
 
 
 def whole(found: xr.Dataset) -> dict[str, xr.Dataset]:
@@ -182,7 +177,7 @@ def conclude(path: str, cells: int = 400, tolerances: Sequence[float] = TOLERANC
     true, keys = cycles(study, cells), {"cells": cells, "tolerances": tolerances}
     coulomb = work_precision(study, truth=true, **keys)
     dragged = work_precision(drag, truth=cycles(drag, cells), **keys)
-    steps = orders(Path(path).with_name("work_precision_steps.toml"))
+    steps = list(orders(Path(path).with_name("work_precision_steps.toml")))
     coulomb, others = swept(study, coulomb), peers(study, true, cells, tolerances)
     missing = [Statement(name, "", "not installed") for name in PEER_CELLS if name not in others]
     groups = {

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 import xarray as xr
-from _common import report, what_came_out
+from _common import Statement, report, summary, what_came_out
 
 import sweep
 from kernels.lanes.jit import COMPILED
@@ -205,8 +205,9 @@ class Told:
         return self.lie.get("inner", xr.Dataset.copy)(self.inner[text])
 
     def conclude(self):
-        """All that `conclude` of the script gives."""
-        return self.script.conclude(*self.paths, **self.options)
+        """All statements of the script, by heading."""
+        groups = self.script.conclude(*self.paths, **self.options)[0]
+        return {heading: list(lines) for heading, lines in groups.items()}
 
     def failing(self, **lie):
         """Numbers of the checked statements that fail, all of them where the script ends with one clear line."""
@@ -214,7 +215,7 @@ class Told:
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
-                groups = self.conclude()[0]
+                groups = self.conclude()
         except (sweep.SweepError, ValueError, IndexError):  # nothing to fit or to interpolate
             return {-1}
         finally:
@@ -235,7 +236,7 @@ def told(request, tmp_path_factory):
 def test_the_script_draws_its_figure_and_every_statement_holds(told, capsys):
     conclude = partial(told.script.conclude, **told.options)
     short = partial(report, told.script.__file__, told.paths, conclude=conclude)
-    assert (short if told.options else told.script.main)(told.paths) == 0
+    assert (short if told.options else told.script.main)([*told.paths, "--all"]) == 0
     assert re.search(r"\| (yes|no, known)$", printed := capsys.readouterr().out, re.MULTILINE)
     picture = Path(told.paths[0]).with_suffix(".png")
     assert printed.rstrip().endswith(f"figure: {picture}")
@@ -284,7 +285,7 @@ def lies(told, how):
 def test_false_numbers_are_noticed_in_each_output_and_move_the_statements(told, monkeypatch):
     """A second and a third kind of falsehood are tried until each is noticed and every statement has been moved."""
     monkeypatch.setattr(sweep, "open_result", told.open)
-    checked = [s.what for lines in told.conclude()[0].values() for s in lines if s.holds is not None]
+    checked = [s.what for lines in told.conclude().values() for s in lines if s.holds is not None]
     found = {output: set() for output, _ in lies(told, OFF[0])}
     for output, lie in chain.from_iterable(lies(told, how) for how in OFF):
         found[output] |= told.failing(**lie)
@@ -295,6 +296,22 @@ def test_false_numbers_are_noticed_in_each_output_and_move_the_statements(told, 
     assert any(found.values())
     assert unnoticed == []
     assert len(still) <= told.claims.still, still
+
+
+def test_a_script_counts_what_holds_and_tells_in_full_what_does_not():
+    found = {
+        "Part": [
+            Statement("period", "1", "1.0", 0.0, True),
+            Statement("swing", "2", "3.0", 0.5, False),
+            Statement("  at rest", "yes", "no", None, False, True),
+            Statement("seconds", "", "5"),
+        ]
+    }
+    words = "\n".join(summary(found, "theory"))
+    assert re.search(r"^Part +1 of 3$", words, re.MULTILINE)
+    assert "does not hold: swing; theory: 2; here: 3.0, deviation +5.0e-01" in words
+    assert "known not to hold: swing, at rest; theory: yes; here: no" in words
+    assert "period" not in words
 
 
 SCRIPTS = sorted(p.stem for p in STUDIES.glob("[!_]*.py") if "def conclude(" in p.read_text(encoding="utf-8"))
@@ -316,7 +333,7 @@ def other(tmp_path_factory):
 def test_a_script_is_used_as_its_head_and_its_study_say(name, other, tmp_path, capsys):
     module = import_module(name)
     assert module.main([]) == 2
-    words = capsys.readouterr().err.removeprefix("use: python ").removesuffix(" [--force]\n").split()[1:]
+    words = capsys.readouterr().err.removeprefix("use: python ").removesuffix(" [--all] [--force]\n").split()[1:]
     for text in (module.__doc__, (STUDIES / f"{name}.toml").read_text(encoding="utf-8").replace("#", "")):
         used = re.search(rf"python studies/{name}\.py((?:\s+[\w./\\]+\.(?:h5|toml)|\s+\\\n)+)", text)
         assert [Path(word).name for word in used[1].replace("\\", "").split()] == words
