@@ -87,7 +87,7 @@ def _kernel_page(name: str, chart: Path | None) -> Iterator[str]:
         "From the cheapest to the dearest; `auto` takes the first whose error bound meets `rtol`.",
         "",
     )
-    yield from _table(("method", "how", "right to", "cannot do"), map(_method, kernel.methods))
+    yield from _table(("method", "how", "error", "cannot do"), map(_method, kernel.methods))
     yield from _picture(name, chart) if chart else ()
     yield from ("## A study to begin with", "", "```toml", *starter(name).splitlines(), "```")
 

@@ -20,7 +20,7 @@ from sweep.errors import COMPLETE, SweepError
 @command(
     "sweep kernels foliot --study foliot.toml",
     option("name", "describe this one", metavar="NAME", nargs="?"),
-    option("--study", "write a study of it to begin with", metavar="FILE.toml", type=Path),
+    option("--study", "write a study of this kernel to start from", metavar="FILE.toml", type=Path),
     *(o.FORCE, o.ALLOW_IMPORT, switch("--all", "parameters, outputs and methods of all kernels, and all statuses")),
 )
 def kernels(arguments: argparse.Namespace) -> None:
@@ -35,7 +35,11 @@ def kernels(arguments: argparse.Namespace) -> None:
     say(path or (sweep.kernels(name, arguments.allow_import) if name else catalogue_text(arguments.all)))
 
 
-@command("sweep studies foliot_scaling", option("name", "of the study to copy", metavar="NAME", nargs="?"), o.FORCE)
+@command(
+    "sweep studies foliot_scaling",
+    option("name", "the study to copy; default: list all", metavar="NAME", nargs="?"),
+    o.FORCE,
+)
 def studies(arguments: argparse.Namespace) -> None:
     """The studies that come with foliot; with a name: copy it here to work on."""
     from sweep.show.studies import copy_study, studies_text
@@ -62,7 +66,7 @@ def show(arguments: argparse.Namespace) -> None:
 
 @command("sweep verify foliot.h5", o.RESULT, o.JSON)
 def verify(arguments: argparse.Namespace) -> None:
-    """Check a result's checksums, whether it is finished or not."""
+    """Check a result's checksums, finished or not."""
     verdict = sweep.verify(arguments.result)
     if not verdict.whole:
         raise SweepError(str(verdict))
@@ -140,7 +144,7 @@ def report(arguments: argparse.Namespace) -> None:
     "sweep fit foliot.h5 --x mu --y period --window 1e-3 1e-1",
     o.RESULT,
     o.OUTPUT_Y,
-    option("--x", metavar="AXIS", required=True),
+    option("--x", "the axis of the power law", metavar="AXIS", required=True),
     option(
         "--window",
         "part of the axis to fit over; if given twice, also where the two laws meet",
@@ -183,7 +187,7 @@ def fit(arguments: argparse.Namespace) -> None:
 
 @command(
     "sweep exponent foliot.h5 --x mu --y period",
-    *(o.RESULT, o.OUTPUT_Y, option("--x", metavar="AXIS", required=True)),
+    *(o.RESULT, o.OUTPUT_Y, option("--x", "the axis of the power law", metavar="AXIS", required=True)),
     o.output("FILE.png", "also a picture; or .svg, .pdf"),
     *(o.FORCE, o.AT, o.UNFINISHED, switch("--all", "every point, not a dozen of each line"), o.JSON),
 )

@@ -78,9 +78,9 @@ OTHER = option("other", metavar="OTHER.h5", type=Path)
 OUTPUT_Y = option("--y", "default: the first output; of a scene of one's own its interval", metavar="OUTPUT")
 ALLOW_IMPORT = switch("--allow-import", 'allow a kernel "module:NAME" of your own')
 FORCE = switch("--force", "overwrite what is there")
-UNFINISHED = switch("--unfinished", "take what there is of a result that is not complete yet")
+UNFINISHED = switch("--unfinished", "accept a result that is not complete yet")
 ALL = switch("--all", "all columns of the table")
-JSON = switch("--json", "as JSON, for programs; a number that is none is null")
+JSON = switch("--json", "as JSON, for programs; NaN is null")
 SEVERAL: dict[str, Any] = {"nargs": "+", "action": "extend", "default": []}
 AT = option("--at", "pick one value of another axis", metavar="AXIS=VALUE", **SEVERAL)
 UNIT_TEXT = "give a variable in another unit, e.g. A0=degree e=mm wear=mm/hour"
@@ -90,7 +90,7 @@ SOLVING = (
     ALLOW_IMPORT,
     option(
         "--isolate",
-        "solve cells in processes of their own, so that one that crashes or never ends costs only itself; "
+        "solve cells in separate processes, so that one that crashes or never ends is lost alone; "
         'default: for a kernel "module:NAME"',
         action=argparse.BooleanOptionalAction,
     ),

@@ -125,7 +125,7 @@ def notify(arguments: argparse.Namespace, ended: Outcome) -> None:
     option("--tolerance", "relative, e.g. 1e-3", metavar="SHARE", type=float, required=True),
     o.output("REFINED.h5", checked=False, required=True),
     o.FORCE,
-    option("--most-cells", "altogether; default: 1000000", metavar="N", type=int, default=1_000_000),
+    option("--most-cells", "largest number of cells; default: 1000000", metavar="N", type=int, default=1_000_000),
     *o.SOLVING,
 )
 def refine(arguments: argparse.Namespace) -> None:
@@ -170,7 +170,7 @@ def chart(arguments: argparse.Namespace) -> None:
     "sweep check foliot.h5 --sample 200",
     o.RESULT,
     option("--sample", "cells at most; default: 200", metavar="N", type=int, default=200),
-    option("--seed", "draws other cells; default: 0", metavar="N", type=int, default=0),
+    option("--seed", "another number draws other cells; default: 0", metavar="N", type=int, default=0),
     *(o.UNFINISHED, o.ALLOW_IMPORT, o.JSON),
 )
 def check(arguments: argparse.Namespace) -> Outcome:

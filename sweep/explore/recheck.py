@@ -176,12 +176,12 @@ class Checked:
     def __str__(self) -> str:
         same = self.judged - self.by_another
         lines = [
-            f"{self.sample:,} of {self.cells:,} OK cells solved again, up to {CLOSER:g} times as closely: "
+            f"{self.sample:,} of {self.cells:,} OK cells solved again, to a tolerance down to rtol/{CLOSER:g}: "
             f"{self.by_another:,} by another method, {same:,} by the same"
-            + (" (which does not see a fault that both runs have)" if same else "")
+            + (" (which cannot find an error that both have in common)" if same else "")
         ]
         if self.judged < self.sample:
-            lines.append(f"not judged: {self.sample - self.judged:,}, which no method solves to rtol once more")
+            lines.append(f"not judged: {self.sample - self.judged:,}, which no method solves to rtol again")
         if self.judged:
             found = f"{self.beyond:,} of {self.judged:,}" if self.beyond else "none"
             share = f"; of all OK cells at most {100 * self.limit:.2g} %, with {100 * CONFIDENCE:g} % confidence"
@@ -190,7 +190,7 @@ class Checked:
             place = ", ".join(f"{name} = {value}" for name, value in self.worst["cell"].items())
             (name, value), (other, again) = self.worst["values"]
             lines.append(
-                f"farthest off: {self.worst['output']} by {self.worst['off']:.2g} rtol at {place}: "
+                f"largest deviation: {self.worst['output']} by {self.worst['off']:.2g} rtol at {place}: "
                 f"{value:.12g} by {name}, {again:.12g} by {other}"
             )
         return "\n".join(lines)

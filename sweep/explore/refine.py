@@ -70,8 +70,8 @@ class Refinement:
     uniform : int
         Cells of an even grid as fine as the finest step.
     error : float
-        Largest error left of straight lines between cells, relative, as the cells around tell it; not across borders
-        of statuses, nor in `jumps`.
+        Largest error left of straight lines between cells, relative, estimated from the cells around; not across
+        borders of statuses, nor in `jumps`.
     tolerance : float
     complete : bool
         Whether the tolerance is met; not so where `most_cells` ran out, an output jumps, goes to infinity or is noisy.
@@ -98,7 +98,7 @@ class Refinement:
         text = f"{self.dataset[STATUS].size:,} cells, {self.added:,} of them added"
         if len(self.unseen) == 1:
             text += f"; an even grid as fine has {self.uniform:,}"
-        text += f"\ninterpolation error left: {self.error:.2g}, as the cells around tell"
+        text += f"\nlargest interpolation error: {self.error:.2g}, estimated from neighbouring cells"
         if self.noise:
             text += f"; values scatter by {self.noise:.1g} of their size from cell to cell, or bend within less than "
             text += "the distance of cells, and more cells do not lessen that"

@@ -1,7 +1,7 @@
 """Speed against accuracy: every method of a kernel on the same cells, in one run.
 
 Errors are against values that are given, or against a reference: the method that leaves the fewest cells open, of those
-that state a bound before those that do not. What the reference is right to itself is the floor below which no error
+that state a bound before those that do not. The error of the reference itself is the floor below which no error
 here means anything; cells that it has solved itself, by name or by `auto`, are told to be that much off. Times are what
 one core spends on it, not what it spends on others, the least of a few rounds over all methods; they are noisy, errors,
 shares of cells and counts of work are not.
@@ -38,7 +38,7 @@ ROUNDS, LEAST_SECONDS = 5, 0.01
 FINE = tuple(10.0**-k for k in range(14, 5, -1))
 """Values of rtol that a reference is tried at: in each cell the least at which it says OK counts."""
 GIVEN, ROUNDING = "the truth given", 2.0**-53
-"""The name of a reference that is given, and what it is right to."""
+"""The name of a reference that is given, and its own error."""
 UNSURE = (Status.INACCURATE, Status.GRAZING)
 """What says of itself that digits, or a count, may be wrong."""
 NAMES = {int(status): status.name for status in Status}
@@ -55,9 +55,9 @@ LONG_NAMES = {
     "seconds": "time per cell on one core",
     "ok": "share of cells that the method calls right",
     "remarked": "share of cells with another remark",
-    "inaccurate": "share of cells that it says are not right to rtol",
+    "inaccurate": "share of cells that it says are not accurate to rtol",
     "unsolved": "share of cells that it gives no values for though there are some",
-    "silent": "share of cells wrong by more than rtol, and what the truth is right to, without a status that says so",
+    "silent": "share of cells off by more than rtol and the error of the reference, without a status that says so",
     "worst_cell": "where the largest error is",
     "unsolved_as": "the status of the first of these cells, and where it is",
     "silent_at": "the first cell that is silently wrong",
@@ -197,7 +197,7 @@ def precision_text(found: xr.Dataset, complete: bool = False) -> str:
         rows.append((*row, cell.worst_cell) if complete else row)
     headings = ("method", "rtol", "median", "worst", "time", *work, "ok", "unsolved", "silent", *more, "worst cell")
     basis = f"errors against {found.attrs['reference']}, in {found.attrs['cells']} cells"
-    basis += f", itself right to {found.attrs['reference_error']:.1e}"
+    basis += f"; its own error is at most {found.attrs['reference_error']:.1e}"
     if found.attrs["open_cells"]:
         basis += f"; {found.attrs['open_cells']} cells left aside, of which it is not sure"
     left_out = f"Omissions: {found.attrs['omissions']}" if found.attrs["omissions"] else ""
@@ -233,7 +233,7 @@ class _Reference(NamedTuple):
 
     @property
     def sound(self) -> Any:
-        """Cells that have values which are right to `floor`."""
+        """Cells that have values accurate to `floor`."""
         return np.isfinite(self.floor)
 
     @property

@@ -43,8 +43,10 @@ class Verdict:
 
     def __str__(self) -> str:
         if self.whole:
-            return f"{self.path}: whole; {self.checked}"
-        return "\n".join([f"{self.path}: not whole; {self.checked}", *(f"  {text}" for text in self.findings)])
+            return f"{self.path}: undamaged; {self.checked}"
+        return "\n".join(
+            [f"{self.path}: damaged or not complete; {self.checked}", *(f"  {text}" for text in self.findings)]
+        )
 
     def require_whole(self) -> None:
         """Raises SweepError where anything is wrong."""

@@ -14,7 +14,7 @@ from sweep.words import Table, as_path
 
 UNFINISHED = re.compile(r"(.+\.(?:h5|nc))\.unfinished")
 """What a sweep that still runs has beside its output."""
-HEADINGS = ("result", "cells", "done", "account", "when", "version", "question")
+HEADINGS = ("result", "cells", "done", "statuses", "when", "version", "question")
 LATER = ("when", "version")
 """Of these, what is printed by `sweep list --all` only."""
 

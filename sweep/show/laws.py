@@ -29,9 +29,9 @@ RULED_OUT = 10.0
 REST = "Points, drift, residual, prefactor, and what the columns mean: --all; other laws: --compare."
 EXPLANATION = (
     "If the values scatter, the interval contains the exponent with {confidence:g} % confidence, and is never "
-    "narrower than for autocorrelated scatter; if they do not, it is what their stated error bounds allow. Where p "
-    "runs from one value to another, one power law does not fit, and these are the ends of the local exponent in the "
-    "window. A second law is reported if AICc and BIC prefer it by more than 10. Drift is the change of the exponent "
+    "narrower than for autocorrelated scatter; if they do not, it is what their stated error bounds allow. Where it "
+    "is marked bent, one power law does not fit, and it is the range of the local exponent in the window. A second law "
+    "is reported if AICc and BIC prefer it by more than 10. Drift is the change of the exponent "
     "across the window; residual is the largest relative distance of a point from the law."
 )
 COMPARED = (
@@ -49,14 +49,14 @@ def pick(dataset: xr.Dataset, choices: Sequence[str]) -> xr.Dataset:
     for choice in choices:
         name, equals, value = choice.partition("=")
         if not equals:
-            raise SweepError(f'--at {choice}: expected axis=value, e.g. "mu=0.1"')
-        one_of(name, [str(n) for n, c in dataset.coords.items() if c.ndim == 1], f"--at {choice}: no axis {name}")
+            raise SweepError(f'{choice}: expected axis=value, e.g. "mu=0.1"')
+        one_of(name, [str(n) for n, c in dataset.coords.items() if c.ndim == 1], f"{choice}: no axis {name}")
         values, dim = dataset[name].values, str(dataset[name].dims[0])
         if values.dtype.kind in "fiu":
             try:
                 off = abs(values - float(value))
             except ValueError:
-                raise SweepError(f"--at {choice}: expected a number after =") from None
+                raise SweepError(f"{choice}: expected a number after =") from None
             # six digits are what `sweep show` and `sweep run` print
             order = np.argsort(off, kind="stable")
             found = order[np.isclose(values[order], float(value), rtol=1e-5, atol=0, equal_nan=True)]
@@ -65,7 +65,7 @@ def pick(dataset: xr.Dataset, choices: Sequence[str]) -> xr.Dataset:
             found = np.flatnonzero(values.astype(str) == value)
             nearest = listed(dict.fromkeys(map(str, values)), quote=True)
         if not len(found):
-            raise SweepError(f"--at {choice}: {name} has no such value; nearest is {nearest}")
+            raise SweepError(f"{choice}: {name} has no such value; nearest is {nearest}")
         dataset = dataset.isel({dim: found[0] if dim == name else found})
     return dataset
 
@@ -213,7 +213,7 @@ def _fit_cells(fit: xr.Dataset) -> tuple[str, ...]:
     low, high = v["exponent_low"], v["exponent_high"]
     # of an exponent that does not fit, as many digits as the range of the local one has in common
     digits = 8 if v["fits"] == 1 else 3 if abs(high - low) < 0.1 * abs(v["exponent"]) else 2
-    interval = ("" if v["fits"] == 1 else "runs from ") + _interval(low, high)
+    interval = _interval(low, high) + ("" if v["fits"] == 1 else ", bent")
     window, rest = f"{v['low']:.4g} to {v['high']:.4g}", (f"{v['drift']:.1e}", f"{v['residual']:.1e}")
     return window, f"{v['exponent']:.{digits}g}", interval, f"{v['points']}", *rest, f"{v['prefactor']:.6g}"
 
