@@ -156,8 +156,8 @@ def test_fit_writes_its_table_by_what_the_reader_says(done, call):
     ("options", "message"),
     [
         (("--y", "fal_time"), "did you mean fall_time?"),
-        (("--at", "v0"), "--at v0"),
-        (("--at", "v0=x"), "--at v0=x"),
+        (("--at", "v0"), "v0: expected"),
+        (("--at", "v0=x"), "v0=x: expected"),
         (("--window", "10", "1", "--at", "v0=0"), "window"),
         (("--compare",), "--at v0=value"),
         (("--confidence", "95"), "confidence"),
