@@ -32,9 +32,11 @@ class SweepAccessor:
     >>> ds.sweep.where("mu > 0.7").sizes["cell"]
     2
     >>> figure = ds.sweep.plot(y="amplitude")
-    >>> print(ds.sweep.statuses())
+    >>> ds.sweep
       cells  status  kind  meaning, and where
       3      OK      ok    right to the wanted rtol
+    <BLANKLINE>
+    ds.sweep has: plot, in_units, where, fit, statuses, cell, check
     >>> ds.sweep.check().beyond
     0
     >>> ds.sweep.cell(mu=2.0).method
@@ -43,6 +45,11 @@ class SweepAccessor:
 
     def __init__(self, dataset: xr.Dataset) -> None:
         self._dataset = dataset
+
+    def __repr__(self) -> str:
+        """What `ds.sweep` prints: the table of statuses, and what else can be asked."""
+        names = ", ".join(name for name in vars(type(self)) if not name.startswith("_"))
+        return f"{self.statuses()}\n\nds.sweep has: {names}"
 
     def plot(self, path: str | os.PathLike[str] | None = None, **keys: Any) -> Any:
         """The figure of one output: as `sweep.plot`, logarithmic along axes whose grid is."""

@@ -51,7 +51,7 @@ class KernelPage:
             cannot = f"; cannot do {listed(method.excludes)}" if method.excludes else ""
             lacks = f"; does not give {listed(method.lacks)}" if method.lacks else ""
             methods.append(
-                (method.name, "states its error" if method.bound else "keeps rtol", method.doc + cannot + lacks)
+                (method.name, "stated per cell" if method.bound else "within rtol", method.doc + cannot + lacks)
             )
         parameters, outputs, along = (
             [(f.name, f"[{f.unit}]", *more(f)) for f in fields]
