@@ -9,8 +9,10 @@ chance, so that is INACCURATE.
 Of three runs, the rough and the finest one have tolerances FINER apart: what they differ by is the rough one's error,
 of which the finest, whose results are given, has about 1/FINER. The rough run's parameters are some roundings off
 (`off_by_roundings`), and so are its start and the times of its events (`shake`); the third run has the opposite
-roundings, and a tolerance between those two. It shows what a scene makes of rounding, which two runs may share, and
-where two runs have the same error by chance.
+roundings, and a tolerance between those two. It shows what a scene makes of rounding, which two runs may share. Where
+that is all that tells them apart, these two are on both sides of the truth, and the finest may be as far from it as the
+third one, and agree with that: then it is off by half of what it differs from the rough one by. So that may be no more
+than what is wanted, and a tolerance for the steps.
 
 Cells that come to rest or stick are gone on with: `accumulated`, `sliding`.
 """
@@ -34,8 +36,6 @@ ROUNDING = 1e-14
 ROUGH, BETWEEN, FINER = 2.0, 4.0, 16.0
 MANY = 8.0
 """By how many times as many roundings parameters are changed: beside them those of the steps of a run are few."""
-APART = 4.0
-"""How many rtol the first run may be from the finest, which is then right to rtol/4 as far as steps go."""
 CONVERGED, BY_STEPS, ROUNDED = 3.0, 0.4, 0.2
 """How many times nearer to the finest run the one between is where both are off by their steps: it may then differ by
 BY_STEPS of rtol; else rounding is what tells them apart, of which the finest run has no less, and by ROUNDED of it."""
@@ -114,7 +114,7 @@ def by_runs(one, columns, rtol, tightest=0.0):
 def _compared(one, columns, rtol, wanted):
     """Rows of the finest of three runs to the tolerance `rtol`, and the status where `wanted` is to be met."""
     fine, rough, doubt = three_runs(
-        lambda columns, finer, shake: followed(one, columns, rtol, rtol / finer, shake=shake), columns
+        lambda columns, finer, shake: followed(one, columns, rtol, rtol / finer, shake=shake), columns, rtol
     )
     status = status_of(fine, fine[-1], one.outputs)
     right = doubt.max(axis=0) <= wanted
@@ -124,10 +124,13 @@ def _compared(one, columns, rtol, wanted):
     return fine[: one.outputs], status
 
 
-def three_runs(run, columns):
+def three_runs(run, columns, rtol):
     """The results of the finest and of the rough run, and how far off the finest one may be, a row each; NaN may be.
 
-    `run` : (columns, finer, shake) -> results
+    Parameters
+    ----------
+    run : (columns, finer, shake) -> results
+    rtol : tolerance of the steps, but for `finer`
     """
     rough = run(off_by_roundings(columns, MANY), ROUGH, 1.0)
     other = run(off_by_roundings(columns, -MANY), ROUGH * BETWEEN, -1.0)
@@ -138,7 +141,7 @@ def three_runs(run, columns):
         apart = (abs(fine - one)[: 2 + states] for one in (rough, other))
         far, close = (np.where(x == 0.0, 0.0, x / scale) for x in apart)
         share = np.where(CONVERGED * close <= far, BY_STEPS, ROUNDED)
-        return fine, rough, np.maximum(far / APART, close / share)
+        return fine, rough, np.maximum(far - rtol, close / share)
 
 
 def by_error(scene, columns, rtol):
@@ -197,6 +200,6 @@ def _along(scene, method, columns, rtol, stops):
         return found[:-1], STATED * np.fmax.reduce(found[-1], axis=0)
     one, ends = runner(scene, method), [*columns, np.full(len(rtol), stops[-1])]
     fine, _, doubt = three_runs(
-        lambda columns, finer, shake: passages(one, columns[:-1], rtol / finer, stops, shake=shake), ends
+        lambda columns, finer, shake: passages(one, columns[:-1], rtol / finer, stops, shake=shake), ends, rtol
     )
     return fine, np.fmax.reduce(doubt.reshape(-1, doubt.shape[-1]), axis=0)
