@@ -98,8 +98,9 @@ def runner(scene, method):
 
         run = running(functions, of_lanes, "fixed")
         return Runner(scene, m, run, run)
-    m = m._replace(**dict(zip(("factored", "solved"), functions.linear(), strict=True)))
     pair = kept_on_kink(PAIRS[method]) if scene.slides else PAIRS[method]
+    factored, solved = functions.linear()
+    m = m._replace(factored=factored, solved=solved, roundings=pair.roundings)
 
     @jit_call
     def leg(state, mode, unit, h, on, tolerance, active, errors):

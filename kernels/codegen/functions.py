@@ -10,6 +10,7 @@ import inspect
 
 from kernels.integrate.carried import Changes
 from kernels.integrate.driver import KINK_LIMIT
+from kernels.integrate.pairs import ROUNDINGS
 from kernels.integrate.powers import Power, core
 from kernels.integrate.records import Cell, Errors, Mode, Pieces, Written
 from kernels.integrate.taylor import BY_SERIES, BY_SUM
@@ -264,6 +265,7 @@ class Functions:
             **of_state, numbers=tuple(map(float, range(1 + len(self.kinks)))),
             alternating=tuple((-1.0) ** j for j in range(len(self.states))),
             most_kinks=KINK_LIMIT if scene.most_kinks is None else float(scene.most_kinks), cell=cell_of(*self.size),
+            roundings=ROUNDINGS,
             speeds=speeds, onto=onto, surfaces=surfaces, hiding=hiding, passable=passable,
             deciding=deciding if any(deciding) else None, factored=None, solved=None,
         )  # fmt: skip

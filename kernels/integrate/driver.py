@@ -26,9 +26,9 @@ BLUR = 16.0
 BACK = 1e-9
 """Of an event's rate before a switch, that of one which rounding may be all of behind it."""
 ONE_ULP = 2.0**-52
-SHAKEN, GOLDEN = 3.0, 0.6180339887498949
-"""Roundings that an event is missed by at most; and what the share of it goes on by from one event to the next, so that
-no two of some events one behind the other are missed alike: what is between them would not show it."""
+GOLDEN = 0.6180339887498949
+"""What the share of the roundings that an event is missed by goes on by from one event to the next, so that no two of
+some events one behind the other are missed alike: what is between them would not show it."""
 
 
 @jit
@@ -79,9 +79,9 @@ def open_for(m, state, mode, on):
 
 
 @symbolic
-def missed_by(shake):
+def missed_by(m, shake):
     """Roundings that an event is missed by; `shake` is 0 for none, else a sign, and 1 and the part of all of it."""
-    by = SHAKEN * (2.0 * magnitude(shake) - 3.0)
+    by = m.roundings * (2.0 * magnitude(shake) - 3.0)
     return where(magnitude(shake) > 0.5, where(shake < 0.0, -by, by), 0.0)
 
 
@@ -188,7 +188,7 @@ def raised(verdict, lanes, least):
 def started(m, cell, tells):
     """The cell at its start; a further surface that it starts on and falls through is met at once."""
     side = 0.0 * cell.flips + 1.0
-    one, parameters, off = 0.0 * side + 1.0, cell.parameters, missed_by(cell.shake)
+    one, parameters, off = 0.0 * side + 1.0, cell.parameters, missed_by(m, cell.shake)
     state = tuple(u + 0.0 * side for u in m.started(parameters, side))
     signs, on = settled(m, state, side, parameters, one, tuple(0.0 * side for j in m.numbers[1:]))
     mode = Mode(side, signs, parameters, False)
@@ -239,7 +239,7 @@ def arrived(m, cell, found, late, active, tells):
     state, mode = choose(moving, found.state, cell.state), mode_of(cell)
     place, rates = open_for(m, state, mode, found.on), m.rates(state, mode)
     shaken, shake = moving & (magnitude(cell.shake) > 0.0), shaken_on(cell.shake)
-    off = missed_by(shake) * place
+    off = missed_by(m, shake) * place
     return cell._replace(
         shake=shake, verdict=verdict, h=found.h, on=found.on, size=reached(cell.size, found.reach),
         state=tuple(where(shaken, fma(off, rate, u), u) for rate, u in zip(rates, state, strict=True)),

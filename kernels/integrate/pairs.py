@@ -14,6 +14,7 @@ from kernels.integrate.tableaux import (
     DOPRI5_DENSE,
     DOPRI5_ERROR,
 )
+from kernels.integrate.taylor import TINY
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.symbols import over_tuples, symbolic
 from kernels.lanes.tuples import after, times
@@ -29,6 +30,10 @@ where the tolerance limits the step, up to 130 times as much where friction does
 step that ends nearer to the event is taken."""
 
 
+ROUNDINGS = 3.0
+"""Of a state, that an explicit step makes at most."""
+
+
 class Trial(NamedTuple):
     """A step that is tried: the state after it, its stages, the last rates, the error over the states' sizes."""
 
@@ -40,12 +45,12 @@ class Trial(NamedTuple):
 
 @symbolic
 def of_size(state, new, first, h, error):
-    """The largest error of a state over its own size on the step."""
+    """The largest error of a state over its own size on the step; what has faded to next to nothing has none."""
     worst = 0.0 * h
     for i in range(len(state)):
         start, end = magnitude(state[i]), magnitude(new[i])
         size = fma(magnitude(h), magnitude(first[i]), where(start > end, start, end))
-        part = magnitude(error[i]) / where(size > 0.0, size, 1.0)
+        part = magnitude(error[i]) / where(size > TINY, size, 1.0)
         worst = where(part <= worst, worst, part)  # NaN stays
     return worst
 
@@ -144,7 +149,7 @@ def dopri5_dense(m, state, terms, mode, h, part):
 class Pair(NamedTuple):
     """An embedded pair of methods, as functions: a step with its error, its dense output, how far that may be off.
 
-    `first` is the first step of a leg, in units.
+    `first` is the first step of a leg, in units; a step makes as many `roundings` of its own length at most.
     """
 
     tried: object
@@ -153,6 +158,7 @@ class Pair(NamedTuple):
     vague: object
     first: object
     order: float
+    roundings: float
 
 
 @jit
@@ -161,8 +167,8 @@ def as_it_is(m, state, mode, unit, h):
     return h
 
 
-DOPRI5 = Pair(dopri5_tried, dopri5_series, dopri5_dense, dopri5_vague, as_it_is, 5.0)
-DOP853 = Pair(dop853_tried, dop853_series, dop853_dense, dop853_vague, as_it_is, 8.0)
+DOPRI5 = Pair(dopri5_tried, dopri5_series, dopri5_dense, dopri5_vague, as_it_is, 5.0, ROUNDINGS)
+DOP853 = Pair(dop853_tried, dop853_series, dop853_dense, dop853_vague, as_it_is, 8.0, ROUNDINGS)
 
 
 def kept_on_kink(pair):
