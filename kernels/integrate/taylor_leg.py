@@ -38,6 +38,10 @@ from kernels.lanes.tuples import all_of, any_of, joined, reached, total
 from kernels.lanes.vectors import any_lane, choose, fma, magnitude, not_, where
 from kernels.maths.intervals import most
 
+BEYOND = 1e6
+"""Times the step before, that one is at most: of a motion that is a polynomial, series would let it grow so far that
+halving it no more comes back to what an event next to 0 asks for."""
+
 
 class Series(NamedTuple):
     """What is written of a scene for the series of one order.
@@ -209,7 +213,7 @@ def to_event(m, state, mode, unit, h, on, tolerance, active, errors, hides, at_k
     now, margins = passed, tuple(0.0 * h for _ in on)
     stuck, lost, broken, grazing = nothing, nothing, nothing, nothing
     power_h, allowed = natural_power(h, m.order - 1), SLACK * tolerance
-    longest, reach = 0.0 * h + FAR, tuple(magnitude(u) for u in state)
+    longest, furthest, reach = 0.0 * h + FAR, 0.0 * h + FAR, tuple(magnitude(u) for u in state)
     error = carried.begun(m, state, errors, h)
     for step in range(STEP_LIMIT):
         cores, limits, coarse, full = m.cores(state, mode, unit, tolerance, on, t, margins)
@@ -220,6 +224,7 @@ def to_event(m, state, mode, unit, h, on, tolerance, active, errors, hides, at_k
         left_out, over = fold(worse, left[0], (), left[1:])
         ratio = where(left_out <= 0.0, 0.0, left_out * power_h / (tolerance * over))
         h = where(moving, next_step(h, ratio, m.order), h)
+        h = where(h < furthest, h, furthest)
         h = fold(shorter, h, (), limits)
         if hides is not None:
             h = where(h < longest, h, longest)
@@ -250,6 +255,7 @@ def to_event(m, state, mode, unit, h, on, tolerance, active, errors, hides, at_k
         unsure = steps & not_(all_of(tuple(x | y for x, y in zip(clears, fallings, strict=True))))
         if any_lane(unsure):
             trial, unsure, fallings = doubted(m, pieces, facts, margins, now, trial, unsure, fallings)
+        furthest = where(trial > 0.0, BEYOND * trial, furthest)
         broken = broken | (unsure & not_(power_h < FAR))  # it goes off to where no event is
         grazing = grazing | (unsure & not_(broken))
         moving = moving & not_(unsure)
