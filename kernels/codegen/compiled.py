@@ -41,9 +41,9 @@ from kernels.lanes.refill import each_refilled
 
 
 @kept
-def run(cells, memory, held, together):
+def run(cells, memory, held):
     """Each cell, a row of what a lane knows, until its last switch."""
-    each_refilled(advance, cells, memory, held, together)
+    each_refilled(advance, cells, memory, held)
 '''
 
 

@@ -25,7 +25,7 @@ ROUNDINGS = 8.0
 """By how many roundings a parameter is changed at most."""
 
 
-def followed(runner, columns, rtol, of_a_step=None, together=False, shake=0.0, told=False):
+def followed(runner, columns, rtol, of_a_step=None, shake=0.0, told=False):
     """The results of a cell a column.
 
     Parameters
@@ -33,16 +33,15 @@ def followed(runner, columns, rtol, of_a_step=None, together=False, shake=0.0, t
     columns : the parameters and the number of switches
     rtol : a column, which chooses the order
     of_a_step : tolerance of each step, a column; None: rtol
-    together : lanes in lockstep, in the order of the cells
     shake : 1 or -1 where each event is missed by some roundings, and each state at the start (`driver.missed_by`)
     told : whether the error is
     """
     steps = rtol if of_a_step is None else of_a_step
     results, high = np.empty((3 + 2 * len(runner.scene.states) + told, len(rtol))), rtol < HIGH_BELOW
     for run, chosen in ((runner.low, ~high), (runner.high, high)):
-        cells, stops = np.flatnonzero(chosen), (math.inf,) if together else STOPS
+        cells = np.flatnonzero(chosen)
         those = [column[cells] for column in columns]
-        for _, places, found in _at_stops(runner, run, those, steps[cells], stops, together, shake, told):
+        for _, places, found in _at_stops(runner, run, those, steps[cells], STOPS, shake, told):
             results[:, cells[places]] = found
     return results
 
@@ -54,12 +53,12 @@ def passages(runner, columns, of_a_step, stops, shake=0.0, told=False):
     """
     results = np.full((3 + 2 * len(runner.scene.states) + told, len(stops), len(of_a_step)), np.nan)
     inputs = [*columns, np.full(len(of_a_step), stops[-1])]
-    for k, places, found in _at_stops(runner, runner.high, inputs, of_a_step, stops, False, shake, told):
+    for k, places, found in _at_stops(runner, runner.high, inputs, of_a_step, stops, shake, told):
         results[:, k, places] = found
     return results
 
 
-def _at_stops(runner, run, columns, of_a_step, stops, together, shake, told):
+def _at_stops(runner, run, columns, of_a_step, stops, shake, told):
     """Number of a stop, a number of switches, places and results of cells that go on from there, or are at their last.
 
     Those that take as many steps are side by side, for so lanes wait less for each other.
@@ -81,7 +80,7 @@ def _at_stops(runner, run, columns, of_a_step, stops, together, shake, told):
             cells[:, row["own"]] = float(told)
         for k, stop in enumerate(stops):
             cells[:, row["flips"]] = np.minimum(whole, stop)
-            to_the_end(run, cells, together)
+            to_the_end(run, cells)
             yield k, places, cells[:, shown].T
             count, verdict, steps, before = (cells[:, row[name]] for name in ("count", "verdict", "steps", "before"))
             going = np.flatnonzero((count >= stop) & (count < whole) & (verdict < FIRST_REFUSAL))

@@ -262,8 +262,7 @@ class Functions:
             for event in (recorded.surface, *self.kinks)
         )
         return Written(
-            **of_state, numbers=tuple(map(float, range(1 + len(self.kinks)))),
-            alternating=tuple((-1.0) ** j for j in range(len(self.states))),
+            **of_state,
             most_kinks=KINK_LIMIT if scene.most_kinks is None else float(scene.most_kinks), cell=cell_of(*self.size),
             roundings=ROUNDINGS,
             speeds=speeds, onto=onto, surfaces=surfaces, hiding=hiding, passable=passable,

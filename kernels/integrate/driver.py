@@ -66,19 +66,6 @@ def settled(m, state, side, parameters, unit, near):
 
 
 @symbolic
-def open_for(m, state, mode, on):
-    """For how long, in seconds, rounding may keep the events open that fire."""
-    blurs = tuple(
-        where(o > 0.5, ONE_ULP * size / magnitude(rate), 0.0)
-        for o, (size, rate) in zip(on, m.made(state, mode), strict=True)
-    )
-    longest = 0.0 * mode.side
-    for blur in blurs:
-        longest = where(blur > longest, blur, longest)
-    return longest
-
-
-@symbolic
 def missed_by(m, shake):
     """Roundings that an event is missed by; `shake` is 0 for none, else a sign, and 1 and the part of all of it."""
     by = m.roundings * (2.0 * magnitude(shake) - 3.0)
@@ -137,15 +124,6 @@ def undecided(m, state, mode, gaps, margin, switches, verdict):
 
 
 @symbolic
-def which_met(signs, surfaces, first, met):
-    """The signs, of surfaces 1 where they are met and else -1."""
-    further = tuple(
-        where(s > 0.5, where(x, 1.0, -1.0), sign) for sign, s, x in zip(signs[:-1], surfaces, met, strict=True)
-    )
-    return joined(further, (where(first, 1.0, -1.0),))
-
-
-@symbolic
 def held_by(m, state, side, signs, parameters, unit, on, falls):
     """The signs behind a switch: 1 for a surface that the motion is on and does not leave, which holds it.
 
@@ -190,7 +168,7 @@ def started(m, cell, tells):
     side = 0.0 * cell.flips + 1.0
     one, parameters, off = 0.0 * side + 1.0, cell.parameters, missed_by(m, cell.shake)
     state = tuple(u + 0.0 * side for u in m.started(parameters, side))
-    signs, on = settled(m, state, side, parameters, one, tuple(0.0 * side for j in m.numbers[1:]))
+    signs, on = settled(m, state, side, parameters, one, tuple(0.0 * side for sign in cell.signs[:-1]))
     mode = Mode(side, signs, parameters, False)
     offset, factor, u = m.jet(state, mode, one, ()).events[0]
     e, d, dd = fma(factor, u[0], offset), factor * u[1], factor * u[2]
@@ -200,7 +178,7 @@ def started(m, cell, tells):
     blur = where(lost > 0.0, lost / magnitude(e), 0.0)  # nothing of nothing is nothing
     wrong = not_(magnitude(e) >= 0.0) | not_((cell.flips >= 1.0) & (cell.flips < math.inf))
     cell = cell._replace(
-        state=tuple(fma(ONE_ULP * odd * off, u, u) for odd, u in zip(m.alternating, state, strict=True)),
+        state=tuple(fma(ONE_ULP * (-1.0) ** j * off, u, u) for j, u in enumerate(state)),
         side=side, signs=joined(signs[:-1], (where(e < 0.0, -1.0, signs[-1]),)), on=joined((at,), on),
         unit=time_unit(e, d, dd), own=ERRORS.started(tells, cell.own, state),
         verdict=where(wrong, BAD_INPUT, where(blur <= BLUR * cell.tolerance, 0.0, INACCURATE)),
@@ -237,9 +215,12 @@ def arrived(m, cell, found, late, active, tells):
         verdict = where(active & sliding & (found.lost | found.broken), STICKS, verdict)
     moving = active & (cell.verdict < REFUSED) & (verdict < REFUSED) & not_(found.grazing)
     state, mode = choose(moving, found.state, cell.state), mode_of(cell)
-    place, rates = open_for(m, state, mode, found.on), m.rates(state, mode)
+    longest, rates = 0.0 * mode.side, m.rates(state, mode)  # for how long rounding may keep open what fires
+    for o, (extent, rate) in zip(found.on, m.made(state, mode), strict=True):
+        blur = where(o > 0.5, ONE_ULP * extent / magnitude(rate), 0.0)
+        longest = where(blur > longest, blur, longest)
     shaken, shake = moving & (magnitude(cell.shake) > 0.0), shaken_on(cell.shake)
-    off = missed_by(m, shake) * place
+    off = missed_by(m, shake) * longest
     return cell._replace(
         shake=shake, verdict=verdict, h=found.h, on=found.on, size=reached(cell.size, found.reach),
         state=tuple(where(shaken, fma(off, rate, u), u) for rate, u in zip(rates, state, strict=True)),
@@ -294,7 +275,10 @@ def at_switch(m, cell, rates, switches, counts, tells):
 def behind_switch(m, cell, rates, switches, first, met, tells):
     """The cell behind the switch that it is on, and what that makes of the rates before it."""
     side, parameters, unit, old, signs = -cell.side, cell.parameters, cell.unit, cell.state, cell.signs
-    which = signs if m.surfaces is None else which_met(signs, m.surfaces, first, met)
+    which = signs  # where one of several surfaces is met, their signs say which: 1, or else -1
+    if m.surfaces is not None:
+        parts = zip(signs[:-1], m.surfaces, met, strict=True)
+        which = (*(where(s > 0.5, where(x, 1.0, -1.0), sign) for sign, s, x in parts), where(first, 1.0, -1.0))
     old_mode = Mode(cell.side, which, parameters, False)
     own, rates = ERRORS.behind(tells, cell.own, old, old_mode, rates, switches)
     before, gaps = m.surface(old, old_mode), m.kinks(old, old_mode)

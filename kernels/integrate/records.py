@@ -30,8 +30,6 @@ class Written(NamedTuple):
     lost : what rounding takes from the surface's value at the start
     hidden, bounds : (state, boxes, mode) -> what a box hides of rates and events; the events' values and rates in it
     made : what each event's value is made of, in size, and its rate
-    numbers : 0.0, 1.0 ... for each event
-    alternating : 1.0, -1.0 ... for each state
     most_kinks : between two switches, after which a cell is given up
     cell : a `Cell` of zeros
     roundings : that an event is missed by at most, by the method
@@ -57,8 +55,6 @@ class Written(NamedTuple):
     hidden: object
     bounds: object
     made: object
-    numbers: tuple
-    alternating: tuple
     most_kinks: float
     cell: object
     roundings: float

@@ -15,7 +15,7 @@ from numba import types
 from numba.extending import lower_builtin, type_callable
 
 from kernels.lanes.jit import jit, jit_call
-from kernels.lanes.symbols import symbolic
+from kernels.lanes.symbols import symbolic, written
 from kernels.lanes.vectors import any_lane, exponent, fma, horner, magnitude, nearest, not_, pow2, sqrt, where
 
 STEP_LIMIT = 2000
@@ -36,27 +36,6 @@ WIDER = 5.0 / 4.0
 GRAZING = 16.0
 SAME, ROUNDING = 0.04, 1e-15
 """Tolerances, and besides of its size, within which an event is 0 where another one fires: they fire together."""
-
-
-@symbolic
-def tail(h, series):
-    """A bound on A of (1) for u: sum over k > 3 of k abs(u_k) h^(k-2), with 4 (5/4)^(k-4) >= k for k."""
-    total, wide = magnitude(series[-1]), WIDER * h
-    for term in series[-2:3:-1]:
-        total = fma(total, wide, magnitude(term))
-    return 4.0 * (total * (h * h))
-
-
-@symbolic
-def bend(h, series):
-    """Sum over k > 1 of abs(u_k) h^k: how far u may be from its tangent on [0, h]."""
-    return _sizes(h, series[2:]) * (h * h)
-
-
-@symbolic
-def tail_of_sum(h, series):
-    """A of (1) for the integral of w, from the series of w: the sum over k > 2 of abs(w_k) h^(k-1), as in `mean`."""
-    return _sizes(h, series[3:-1]) * (h * h)
 
 
 @symbolic
@@ -164,7 +143,7 @@ def keeps(h, power_h, series, allowed):
 @symbolic
 def box(h, series):
     """An interval that u does not leave on [0, h]."""
-    along, aside = h * series[1], bend(h, series)
+    along, aside = h * series[1], _sizes(h, series[2:]) * (h * h)
     return series[0] + where(along < 0.0, along, 0.0) - aside, series[0] + where(along > 0.0, along, 0.0) + aside
 
 
@@ -237,16 +216,21 @@ def value_of_sum(t, curve):
     return fma(unit * t, mean(t, w), start)
 
 
-@jit
-def tail_of_series(t, curve):
-    """A of (1)."""
-    return tail(t, curve[0])
+@written
+def tail_of_series(h, curve):
+    """A bound on A of (1): sum over k > 3 of k abs(u_k) h^(k-2), with 4 (5/4)^(k-4) >= k for k."""
+    (series,) = curve
+    total, wide = magnitude(series[-1]), WIDER * h
+    for term in series[-2:3:-1]:
+        total = fma(total, wide, magnitude(term))
+    return 4.0 * (total * (h * h))
 
 
-@jit
-def tail_of_integral(t, curve):
-    """A of (1)."""
-    return curve[1] * tail_of_sum(t, curve[2])
+@written
+def tail_of_sum(h, curve):
+    """A of (1), from the series of w: the sum over k > 2 of abs(w_k) h^(k-1), as in `mean`."""
+    _, unit, w = curve
+    return unit * (_sizes(h, w[3:-1]) * (h * h))
 
 
 class Way(NamedTuple):
@@ -258,7 +242,7 @@ class Way(NamedTuple):
 
 
 BY_SERIES = Way(value_of_series, of_series, tail_of_series)
-BY_SUM = Way(value_of_sum, of_sum, tail_of_integral)
+BY_SUM = Way(value_of_sum, of_sum, tail_of_sum)
 
 
 @symbolic

@@ -158,11 +158,12 @@ def first_root(found, number, way, curve, event, facts, passed, met, span, toler
 @symbolic
 def ended(m, pieces, facts, passed, met, span, tolerance, state):
     """The end of a leg in its last step, by which event, whether only just; what fires, and others too; the states."""
+    numbers = tuple(map(float, range(len(passed))))
     end, which, hangs = fold(
         first_root, (span, -1.0 - 0.0 * span, met & not_(met)), (met, span, tolerance),
-        m.scene.numbers, m.watched, pieces.of_events, pieces.events, facts, passed,
+        numbers, m.watched, pieces.of_events, pieces.events, facts, passed,
     )  # fmt: skip
-    own = tuple(met & (which > j - 0.5) & (which < j + 0.5) for j in m.scene.numbers)
+    own = tuple(met & (which > j - 0.5) & (which < j + 0.5) for j in numbers)
     near = fma(SAME, tolerance, ROUNDING)
     beside = tuple(
         met

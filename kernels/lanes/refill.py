@@ -42,28 +42,19 @@ def _take(memory, lane, cells, cell):
         cells[cell, row] = memory[row, lane]
 
 
-@jit
-def _busy(memory):
-    busy = False
-    for lane in range(LANES):
-        busy = busy or memory[0, lane] == MOVING or memory[0, lane] == FRESH
-    return busy
-
-
-def to_the_end(run, cells, together=False):
+def to_the_end(run, cells):
     """Runs every cell, (n_cells, numbers that a lane knows), by a compiled `each_refilled`."""
-    run(cells, np.zeros((cells.shape[1], LANES)), np.zeros(LANES, np.int64), together)
+    run(cells, np.zeros((cells.shape[1], LANES)), np.zeros(LANES, np.int64))
 
 
 @jit
-def each_refilled(advance, cells, memory, held, together):
+def each_refilled(advance, cells, memory, held):
     """Every cell to its end.
 
     Parameters
     ----------
     cells : (n_cells, numbers that a lane knows), fresh or moving; in the end all are done
     memory, held : zeros, a row for each number, and the lanes' cells; numba takes long to compile what makes arrays
-    together : refill no lane before all have finished, as lanes in lockstep do; the rival that this is measured against
     """
     n = cells.shape[0]
     for lane in range(LANES):
@@ -72,8 +63,7 @@ def each_refilled(advance, cells, memory, held, together):
         memory[0, lane] = memory[0, lane] if lane < n else IDLE
     handed, left = LANES, n
     while left > 0:  # every lane ends: cells have a limit of events and each event one of steps
-        finished = advance(memory, _index_of_all(0))
-        if not finished or (together and _busy(memory)):
+        if not advance(memory, _index_of_all(0)):
             continue
         for lane in range(LANES):
             if memory[0, lane] == DONE:
