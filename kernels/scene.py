@@ -5,7 +5,7 @@
 A scene may have several surfaces, each with its own jump; what is 0 at one of them is located as a kink is (`record`).
 The functions are plain Python of named scalars; each asks by name for the states, parameters and `side` that it needs,
 and for the time `t`, which is 0 at the start, or `start_time`, unless a state or a parameter is called t.
-They are called once, with objects that record what is done to them (`expression`); of the record compiled functions
+They are called once, with objects that record what is done to them (`expression.graph`); of that compiled functions
 are made, for one cell and for lanes (`functions`). In them are allowed + - * / ** abs, and sqrt, exp, log, sin, cos,
 tan, arcsin, arccos, arctan, sinh, cosh, tanh, hypot, power, sign, floor, mod, maximum, minimum and where of this
 module; numpy's of these names are the same, and so are math's in the module that the function is written in.
@@ -31,9 +31,7 @@ import numpy as np
 from kernels.codegen.compiled import compiling, runner
 from kernels.codegen.record import RESERVED, asks_for_time, named_functions
 from kernels.codegen.to_tolerance import once, solver
-from kernels.interface import Field, Kernel, Method, OnColumns, Status
-from kernels.lanes.wiring import signed
-from kernels.source_text.expression import (
+from kernels.expression.graph import (
     SceneError,
     arccos,
     arcsin,
@@ -57,6 +55,8 @@ from kernels.source_text.expression import (
     tanh,
     where,
 )
+from kernels.interface import Field, Kernel, Method, OnColumns, Status
+from kernels.lanes.wiring import signed
 
 __all__ = [
     "Field", "Scene", "SceneError", "arccos", "arcsin", "arctan", "cos", "cosh", "exp", "floor", "hypot", "log",

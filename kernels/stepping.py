@@ -15,11 +15,11 @@ import numpy as np
 from kernels.codegen import three_steps
 from kernels.codegen.compiled import compiling, runner
 from kernels.codegen.record import record
+from kernels.expression.graph import INPUT
 from kernels.integrate.events import LOCATIONS, METHODS
 from kernels.interface import Field, Kernel, Method, Status
 from kernels.lanes.wiring import signed
 from kernels.scene import TIMES, Function, Scene, SceneError, flips_field, limits_check, scene_of
-from kernels.source_text.expression import INPUT
 
 __all__ = ["METHODS", "stepped_kernel", "stepping_fields", "stepping_methods"]
 

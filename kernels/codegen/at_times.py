@@ -12,7 +12,7 @@ import numpy as np
 
 from kernels.codegen.record import named_functions
 from kernels.codegen.to_tolerance import solver
-from kernels.source_text.expression import math_recorded
+from kernels.expression.graph import math_recorded
 
 CLOCK, UNTIL = "clock_of_motion", "time_wanted"
 MOST_SWITCHES = 100_000

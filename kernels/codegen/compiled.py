@@ -19,6 +19,7 @@ from numba.core.errors import NumbaError
 
 from kernels.codegen.functions import Functions, cell_of, entry
 from kernels.codegen.record import record
+from kernels.expression.graph import FUNCTIONS, SceneError
 from kernels.integrate import adaptive, fixed_step, taylor_leg
 from kernels.integrate.driver import advance
 from kernels.integrate.pairs import DOP853, DOPRI5, kept_on_kink
@@ -26,7 +27,6 @@ from kernels.integrate.records import Written
 from kernels.integrate.rosenbrock import RODAS5P_PAIR
 from kernels.lanes import cache
 from kernels.lanes.jit import COMPILED, cached, jit_call
-from kernels.source_text.expression import FUNCTIONS, SceneError
 
 PAIRS = {"dopri5": DOPRI5, "dop853": DOP853, "rodas5p": RODAS5P_PAIR}
 ORDERS = (12, 18)

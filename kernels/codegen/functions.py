@@ -8,6 +8,12 @@ import functools
 import hashlib
 import inspect
 
+from kernels.expression import stiff
+from kernels.expression.graph import DIV, HALF_SQUARE, INPUT, MUL, NUMBER, SCALED, Expression, needed
+from kernels.expression.hidden import Enclosures
+from kernels.expression.rounding import Losses, Sizes
+from kernels.expression.series import V, Values
+from kernels.expression.tangent import SHORT, Tangents, along, short
 from kernels.integrate.carried import Changes
 from kernels.integrate.driver import KINK_LIMIT
 from kernels.integrate.pairs import ROUNDINGS
@@ -18,12 +24,6 @@ from kernels.integrate.taylor_leg import Series
 from kernels.lanes.jit import jit_call
 from kernels.lanes.symbols import ANY, written
 from kernels.lanes.vectors import where
-from kernels.source_text import stiff
-from kernels.source_text.expression import DIV, HALF_SQUARE, INPUT, MUL, NUMBER, SCALED, Expression, needed
-from kernels.source_text.hidden import Enclosures
-from kernels.source_text.rounding import Losses, Sizes
-from kernels.source_text.series import V, Values
-from kernels.source_text.tangent import SHORT, Tangents, along, short
 
 
 def cell_of(states, parameters, kinks, tells=False):

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kernels.codegen.sliding import slid
-from kernels.source_text.expression import ADD, FUNCTIONS, NUMBER, SCALED, Expression, Graph, SceneError, math_recorded
+from kernels.expression.graph import ADD, FUNCTIONS, NUMBER, SCALED, Expression, Graph, SceneError, math_recorded
 
 RESERVED = ("side", "flips", "time", "interval", "rtol", "status")
 """Names that a scene's states and parameters cannot have."""

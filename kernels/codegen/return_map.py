@@ -17,8 +17,8 @@ from kernels.codegen.compiled import runner
 from kernels.codegen.followed import followed
 from kernels.codegen.record import named_functions, record
 from kernels.codegen.to_tolerance import solver
+from kernels.expression.graph import INPUT, Expression, SceneError, needed
 from kernels.interface import Status
-from kernels.source_text.expression import INPUT, Expression, SceneError, needed
 
 FRESH = "from_start"
 TOLERANCES = {

@@ -10,8 +10,8 @@ Source: Filippov, Differential Equations with Discontinuous Righthand Sides (198
 
 from dataclasses import replace
 
-from kernels.source_text.expression import ADD, MUL, SCALED
-from kernels.source_text.tangent import Tangents, along
+from kernels.expression.graph import ADD, MUL, SCALED
+from kernels.expression.tangent import Tangents, along
 
 
 def _side(graph, signs):

@@ -27,9 +27,9 @@ from kernels.codegen.accumulated import to_rest
 from kernels.codegen.compiled import runner
 from kernels.codegen.followed import followed, off_by_roundings, passages, status_of
 from kernels.codegen.record import record
+from kernels.expression.graph import SceneError
 from kernels.integrate.carried import SMALL
 from kernels.interface import FIRST_REFUSAL, Status
-from kernels.source_text.expression import SceneError
 
 ROUNDING = 1e-14
 """The least rtol that is promised, whatever the runs agree to."""

@@ -12,8 +12,8 @@ import numpy as np
 
 from kernels.codegen.compiled import runner
 from kernels.codegen.followed import followed
+from kernels.expression.graph import cos, power, sign, sin
 from kernels.scene import Scene
-from kernels.source_text.expression import cos, power, sign, sin
 
 
 class Swung(NamedTuple):

@@ -1,11 +1,11 @@
 """Legs from event to event by an embedded pair of methods (`pairs`) to a tolerance; generic in one cell or lanes.
 
 A leg has the form of the Taylor method's (`taylor_leg`) and drops into the same driver. Of each step the
-events are known at both ends by value and rate, and between them by intervals (`source_text.hidden`): each must be
+events are known at both ends by value and rate, and between them by intervals (`expression.hidden`): each must be
 proved to stay above 0, to fall or to rise all along, or the step is halved; an event that comes so close to 0 that no
 short step proves it is called grazing. One that ends below 0 is located on the dense output by Newton's method in a
 bracket. A step within which the rates may hide more
-than the tolerance (`source_text.hidden`) is not taken: the points that an error is estimated from may miss it.
+than the tolerance (`expression.hidden`) is not taken: the points that an error is estimated from may miss it.
 """
 
 from kernels.integrate.events import cubic_root, of_event

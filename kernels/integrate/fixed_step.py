@@ -28,7 +28,7 @@ CUTS = 60
 TOGETHER = 32
 """Steps that lanes take before those that have finished are given new cells."""
 HIDDEN = 1e-13
-"""Of a state's size, what the rates may hide in a step (`source_text.hidden`) unremarked."""
+"""Of a state's size, what the rates may hide in a step (`expression.hidden`) unremarked."""
 LOW = 0.25
 """Of the smaller end: an event that the cubic takes below this share of it is looked at where it is lowest."""
 TOLERANCE = 1e-14 / BLUR

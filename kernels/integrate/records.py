@@ -40,7 +40,7 @@ class Written(NamedTuple):
     hiding : 1 for each rate, and for each event, that can hide something
     passable : 1 for the surface, and for each kink, that does not depend on the side: a motion may pass through it
     deciding : 1 for each kink whose side decides what a switch does; None where there is none
-    factored, solved : None, or of a scene that may be stiff (`source_text.stiff`)
+    factored, solved : None, or of a scene that may be stiff (`expression.stiff`)
     """
 
     rates: object

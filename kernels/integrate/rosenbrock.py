@@ -3,7 +3,7 @@
 With the exact Jacobian J of the rates f at the start u of a step h, every increment solves one linear system,
     (I - gamma h J) w_i = gamma h f(u + sum_j a_ij w_j) + gamma sum_j c_ij w_j,  j < i                     (1)
 and the result is the last stage's place and its increment, which tells the error. What relaxes within much less than h
-is damped away. `m` and `mode` as in `steps`; m.factored and m.solved (`source_text.stiff`) solve (1).
+is damped away. `m` and `mode` as in `steps`; m.factored and m.solved (`expression.stiff`) solve (1).
 Source: Steinebach, BIT Numer. Math. 63:27 (2023); Hairer & Wanner, Solving ODEs II, section IV.7.
 """
 

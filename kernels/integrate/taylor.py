@@ -31,7 +31,7 @@ LONGEST = 8.0
 TINY = 1e-280
 """Size of a state of which products of its terms would underflow: what is less is not told from 0."""
 COME_UP = 0.25
-"""Of a step within which something is hidden (`source_text.hidden`): the next trial. The longest grows back as fast."""
+"""Of a step within which something is hidden (`expression.hidden`): the next trial. The longest grows back as fast."""
 WIDER = 5.0 / 4.0
 GRAZING = 16.0
 SAME, ROUNDING = 0.04, 1e-15

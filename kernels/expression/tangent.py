@@ -7,7 +7,7 @@ change between events.
 
 from collections import defaultdict
 
-from kernels.source_text.expression import ADD, INPUT, SCALED, needed
+from kernels.expression.graph import ADD, INPUT, SCALED, needed
 
 SHORT, FED_BACK, LONG = {12: 4, 18: 4}, {12: 6, 18: 6}, {12: 9, 18: 12}
 """Order of the changes' series on a step of the motion's: terms fall by about a quarter each, so to some 1e-3. Those of

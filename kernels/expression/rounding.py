@@ -5,10 +5,10 @@ rounding loses nothing, and a start on the surface lies there for sure. Of a fun
 losses go on as errors do. Along a motion it is enough to know them roughly, an ulp of the terms of every sum.
 """
 
+from kernels.expression.graph import ADD, DIV, HALF_SQUARE, INPUT, MUL, NUMBER, SCALED, needed
+from kernels.expression.series import V, Values, added, product
 from kernels.lanes.symbols import taking_symbols
 from kernels.maths import pairs
-from kernels.source_text.expression import ADD, DIV, HALF_SQUARE, INPUT, MUL, NUMBER, SCALED, needed
-from kernels.source_text.series import V, Values, added, product
 
 P = taking_symbols(pairs)
 ULP = 2.0**-52

@@ -6,9 +6,9 @@ import mpmath
 import pytest
 from mpmath import mp
 
-from kernels.source_text import expression as E
-from kernels.source_text.series import Values
-from kernels.source_text.tangent import Tangents
+from kernels.expression import graph as E
+from kernels.expression.series import Values
+from kernels.expression.tangent import Tangents
 
 ORDER = 9
 

@@ -6,7 +6,7 @@ pivoting), so that no factor exceeds 1.
 Source of the pivoting: Sorensen, IEEE Trans. Comput. C-34:274 (1985).
 """
 
-from kernels.source_text.series import V
+from kernels.expression.series import V
 
 
 def triangular(matrix, n, zero):

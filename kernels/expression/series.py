@@ -13,10 +13,10 @@ and of a state, whose rate is r: u_{k+1} = r_k/(k + 1).
 Source: Jorba & Zou, Exp. Math. 14:99 (2005), proposition 2.1. Sums are chains of multiply-adds (`dot`).
 """
 
+from kernels.expression.graph import INPUT, NUMBER, SCALED
 from kernels.lanes import vectors
 from kernels.lanes.symbols import taking_symbols
 from kernels.maths import elementary
-from kernels.source_text.expression import INPUT, NUMBER, SCALED
 
 V, F = taking_symbols(vectors), taking_symbols(elementary)
 

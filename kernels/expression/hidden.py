@@ -10,10 +10,10 @@ over the box. So what is small enough may stay hidden, and what is large is come
 
 import math
 
+from kernels.expression.graph import ADD, DIV, HALF_SQUARE, INPUT, MUL, SCALED
+from kernels.expression.series import F, V, Values, added
 from kernels.lanes.symbols import taking_symbols
 from kernels.maths import intervals
-from kernels.source_text.expression import ADD, DIV, HALF_SQUARE, INPUT, MUL, SCALED
-from kernels.source_text.series import F, V, Values, added
 
 OF = taking_symbols(intervals)
 BY_ENDS = "tanh", "arctan", "sinh"
