@@ -25,7 +25,7 @@ __all__ = ["cycle_kernel"]
 
 METHODS = {
     "taylor": "Taylor series",
-    "rodas5p": "Rosenbrock's method Rodas5P, for what is stiff",
+    "rodas5p": "Rosenbrock's method Rodas5P, for stiff equations",
     "dop853": "Dormand-Prince 8(5,3)",
 }
 SHARE = 3e-6

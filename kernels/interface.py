@@ -23,14 +23,14 @@ class Status(IntEnum):
     Numbers are stored in files and never reused.
     """
 
-    OK = 0, "right to the wanted rtol"
+    OK = 0, "accurate to rtol"
     INACCURATE = 1, "the method's error bound exceeds rtol; values are given"
-    NOT_SELF_STARTING = 2, "a limit cycle exists, but from rest at the centre the scene does not come to it"
-    COMES_TO_REST = 3, "the motion ends within the time followed; what would come after is NaN"
+    NOT_SELF_STARTING = 2, "a limit cycle exists, but the motion from rest at the centre does not reach it"
+    COMES_TO_REST = 3, "the motion ends within the time followed; outputs after its end are NaN"
     GRAZING = 4, "the last digits of the input decide whether there is one more swing"
-    OVERDAMPED = 5, "damping beyond critical: what moves creeps, and never turns nor ends"
+    OVERDAMPED = 5, "damping beyond critical: the motion creeps, without a turning point or an end"
     TOO_SHORT = 6, "too short a run for some outputs, which are NaN"
-    NEVER_ENDS = 7, "the motion fades but never ends; what would come at its end is NaN"
+    NEVER_ENDS = 7, "the motion fades without an end; outputs at its end are NaN"
     UNSTABLE = 8, "the cycle exists, but small disturbances of it grow"
     PERIOD_2 = 9, "the motion repeats only after two cycles; the values are of both together"
     NOT_PERIODIC = 10, "the motion never settles; the values are means over the time followed"
@@ -39,21 +39,24 @@ class Status(IntEnum):
     CHANGE_POINT = 13, "the linkage can be folded flat, where its arm may leave its branch"
     DOUBLE_CRANK = 14, "the arm turns fully with the crank and has no extreme angles"
     DAMPERS_OUT_OF_RANGE = 15, "merged dampers hold only up to valid_to, which is below f_max"
-    PARTLY_OUT_OF_RANGE = 16, "some outputs, or entries of them, are no normal float64, and NaN; the others are right"
+    PARTLY_OUT_OF_RANGE = (
+        16,
+        "some outputs, or entries of them, are outside the range of float64 and NaN; others are accurate",
+    )
     BAD_INPUT = 64, "a parameter is NaN, infinite or outside its limits, or two contradict each other"
-    NEVER_STARTS = 65, "the drive cannot set the scene in motion"
+    NEVER_STARTS = 65, "the drive does not overcome friction"
     NO_LIMIT_CYCLE = 66, "nothing dissipates energy, so no limit cycle exists"
-    OUT_OF_RANGE = 67, "a result, or a dimensionless group it hangs on, is no normal float64"
+    OUT_OF_RANGE = 67, "a result, or a quantity that it depends on, is outside the range of float64"
     NOT_CONVERGED = 68, "the iteration limit was reached before the stated convergence"
     STEP_LIMIT = 69, "the integrator reached its limit of steps"
-    NO_METHOD = 70, "no method of the kernel promises the wanted rtol here"
-    STICKS = 71, "the scene comes to rest before the next switch"
+    NO_METHOD = 70, "no method of the kernel can reach this rtol here"
+    STICKS = 71, "the motion comes to rest before the next switch"
     NO_CYCLE = 72, "a cycle of this kind does not exist here"
     NEVER_MEETS = 73, "the pallets never meet a tooth"
     NO_ASSEMBLY = 74, "the links are too short or too long to be joined"
     UNMESHES = 75, "the recoil throws the crown wheel out of mesh, and the clock stops"
     NOT_ASKED = 125, "the study's condition leaves the cell out"
-    FAILED = 126, "the kernel gave no number and no reason"
+    FAILED = 126, "the kernel raised an exception, crashed, took too long, or gave no number or status"
     PENDING = 127, "not computed yet"
 
     doc: str
@@ -82,11 +85,11 @@ UNSOLVED = (Status.NOT_CONVERGED, Status.STEP_LIMIT, Status.NO_METHOD)
 The others from `FIRST_REFUSAL` on are findings: by any method the scene has no such answer, or none in float64.
 """
 KINDS = {
-    "ok": "accurate to the wanted rtol",
+    "ok": "accurate to rtol",
     "remarked": "values are given, and the status says what is special about them",
-    "refused": "the scene has no such answer, or none in float64; every output is NaN",
-    "unsolved": "no method got there, though there may be an answer; every output is NaN",
-    "FAILED": "the kernel raised, died, took too long, or gave no number or no status; every output is NaN",
+    "refused": "the model has no such answer, or none that float64 can represent; every output is NaN",
+    "unsolved": "no method found an answer, though there may be one; every output is NaN",
+    "FAILED": "the kernel raised an exception, crashed, took too long, or gave no number or status; outputs are NaN",
     "pending": "not computed yet",
     "not asked": "left out by the study's condition",
 }

@@ -64,8 +64,8 @@ __all__ = [
 ]  # fmt: skip
 
 MOST_FLIPS = 1_000_000
-SERIES = "Taylor series of order 12 or 18 in lanes, no switch passed over"
-LOCATED = "in lanes, switches on its dense output; followed three times"
+SERIES = "Taylor series of order 12 or 18, every switch located or excluded"
+LOCATED = "with switches located on its dense output; three runs compared"
 Function = Callable[..., Any]
 """Of named scalars, as its author writes it."""
 Functions = Function | Mapping[str, Function]
@@ -210,9 +210,9 @@ def _methods(scene: Scene, parameters: list[str], outputs: list[str]) -> tuple[M
     """The methods to a tolerance."""
     by_series, n = runner(scene, "taylor"), len(parameters)
     docs = {
-        "taylor": f"{SERIES}; the error carried along, or followed three times",
-        "taylor_once": "the same, each step right to rtol, followed once",
-        "rodas5p": f"for what is stiff: Rosenbrock's method Rodas5P, L-stable, {LOCATED}",
+        "taylor": f"{SERIES}; the error propagated, or three runs compared",
+        "taylor_once": "the same in one run, each step accurate to rtol; the total error is not known",
+        "rodas5p": f"for stiff equations: Rosenbrock's method Rodas5P, L-stable, {LOCATED}",
         "dop853": f"Dormand-Prince 8(5,3) {LOCATED}",
         "dopri5": f"Dormand-Prince 5(4) {LOCATED}",
     }

@@ -22,8 +22,8 @@ from kernels.scene import Function, Functions, Scene, limits_check, scene_of
 __all__ = ["motion_kernel", "section_kernel"]
 
 METHODS = {
-    "taylor": "Taylor series, the error carried along",
-    "rodas5p": "Rosenbrock's method Rodas5P, for what is stiff, followed three times",
+    "taylor": "Taylor series, the error propagated",
+    "rodas5p": "Rosenbrock's method Rodas5P, for stiff equations; three runs compared",
     "dop853": "Dormand-Prince 8(5,3), followed three times",
 }
 MOST = 1_000_000.0

@@ -90,7 +90,7 @@ PARAMETERS = (
     Field("k", "N m/rad", "springs behind each inertia; 0 of the last one: no ground", lower=0.0, dims=("mass",)),
     Field("h", "N m s/rad", "dampers beside the springs", lower=0.0, dims=("mass",)),
     Field("drive_mass", "1", "number of the inertia with the torque", 1.0, lower=1.0, upper=64.0, integer=True),
-    Field("read_mass", "1", "number of the inertia whose angle is told", "drive_mass", 1.0, 64.0, integer=True),
+    Field("read_mass", "1", "number of the inertia whose angle is given", "drive_mass", 1.0, 64.0, integer=True),
 )  # fmt: skip
 """The chain, and the numbers of the inertias with the torque and with the angle."""
 

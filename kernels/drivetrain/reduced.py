@@ -193,7 +193,7 @@ PARAMETERS = (
     Field("k", "N m/rad", "stiffness of the spring behind each; only the last, to ground, may be 0", lower=0.0,
           dims=("mass",)),
     Field("h", "N m s/rad", "damping beside each spring", default=0.0, lower=0.0, dims=("mass",)),
-    Field("reduction", "1", "how masses are saved", default=0.0, lower=0.0, upper=6.0, choices=REDUCTIONS,
+    Field("reduction", "1", "how the chain is reduced", default=0.0, lower=0.0, upper=6.0, choices=REDUCTIONS,
           integer=True),
     Field("n_keep", "1", "masses (or modes) that stay; 0: as many as `tol` needs", default=0.0, lower=0.0,
           upper=float(MASS_LIMIT), integer=True),

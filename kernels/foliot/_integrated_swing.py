@@ -197,7 +197,7 @@ def sdirk4(rippled, rtol):
 def by_steps(units, sooner=None):
     """Both as methods of a kernel, `sooner` of the first."""
     explicit = "adaptive Runge-Kutta of order 5, Newton on the half-swing map"
-    implicit = "implicit Runge-Kutta of order 4, L-stable, for what is stiff"
+    implicit = "implicit Runge-Kutta of order 4, L-stable, for stiff cells"
     return (
         method("dopri5", explicit, dopri5, units=units, sooner=sooner),
         method("sdirk4", implicit, sdirk4, units=units),

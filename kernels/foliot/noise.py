@@ -209,7 +209,7 @@ def _uniforms():
 
 PARAMETERS = (
     Field("sigma", "1", "standard deviation of the torque of a half swing over mu", lower=0.0),
-    Field("tau_c", "1", "half swings over which the noise forgets all but 1/e; 0: white", default=0.0, lower=0.0),
+    Field("tau_c", "1", "correlation time of the noise in half swings (to 1/e); 0: white", default=0.0, lower=0.0),
     Field("half_swings", "1", "length of the run", lower=1.0, upper=HALF_SWING_LIMIT, integer=True),
     Field("seed", "1", "names the noise; cells of equal seed share it", default=0.0, lower=0.0,
           upper=philox.SEED_LIMIT, integer=True),

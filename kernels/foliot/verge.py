@@ -191,7 +191,7 @@ VERGE = kernel(
     ),
     check=check,
     methods=(
-        method("return_map", "closed pieces from event to event, and secants on what repeats", return_map,
+        method("return_map", "closed pieces from event to event, secant method on the return map", return_map,
                units=(without_dimensions, given), loop=cell_by_cell, estimates=True),
     ),
     example={"tau": 1e-3, "I_v": 1e-4, "I_c": 2.5e-5, "n": 0.2, "phi0": 0.35, "drop": 0.0035, "e": 0.3, "c_v": 1e-4},

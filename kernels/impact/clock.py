@@ -83,7 +83,7 @@ IMPACT = kernel(
         # rounding; where two multipliers nearly meet and lose more, the status says so
         method("closed", "formula of the symmetric cycle, where it exists and is stable",
                _closed_cycle.closed, _closed_cycle.ROUNDING, units=_units.UNITS),
-        method("events", "whatever the clock does, contact by contact, and Newton on what repeats",
+        method("events", "any motion, contact by contact, and Newton's method on a periodic one",
                _followed.events, units=_units.UNITS, buffers=_followed.workspace, loop=cell_by_cell),
     ),
     example={"torque": 1e-3, "I_c": 4e-5, "I_v": 1e-5, "r_c": 0.03, "r_v": 0.03, "teeth": 31, "h": 0.0, "e": 0.2},

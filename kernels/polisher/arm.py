@@ -117,7 +117,7 @@ POLISHER = kernel(
     outputs=OUTPUTS,
     record=Linkage,
     methods=(
-        method("stable", "half-angle forms of sums without error", stable, ROUNDING, lacks=RATES),
+        method("stable", "half-angle forms of error-free sums", stable, ROUNDING, lacks=RATES),
         tracing(
             "waveform",
             "stable, and integrals and extremes of the rate over a turn",

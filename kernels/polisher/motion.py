@@ -107,6 +107,6 @@ POLISHER_MOTION = kernel(
     ),
     record=Machine,
     # over the largest value of the trace, of x and y over L; close to a lock the status says more
-    methods=(tracing("closed", "closed forms of sums without error", _follow, ROUNDING, buffers=one_row),),
+    methods=(tracing("closed", "closed forms of error-free sums", _follow, ROUNDING, buffers=one_row),),
     example=EXAMPLE | {"omega": 6.0},
 )

@@ -199,7 +199,7 @@ POLISHER_WEAR_POINT = kernel(
     ),
     outputs=(
         Field("wear", "m", "depth worn away"),
-        Field("wear_error", "m", "what it may be wrong by", of_method=True),
+        Field("wear_error", "m", "error bound of the wear", of_method=True),
     ),
     check=_scene.check,
     methods=(

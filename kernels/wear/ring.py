@@ -92,7 +92,7 @@ POLISHER_WEAR = kernel(
     parameters=_scene.PARAMETERS,
     outputs=(
         Field("wear", "m/s", "depth worn away per time, mean of the ring", dims=("radius",)),
-        Field("wear_error", "m/s", "what it may be wrong by", dims=("radius",), of_method=True),
+        Field("wear_error", "m/s", "error bound of the wear", dims=("radius",), of_method=True),
     ),
     along=(Field("radius", "m", "distance from the workpiece's centre", lower=0.0),),
     record=Machine,

@@ -34,7 +34,7 @@ class SweepAccessor:
     >>> figure = ds.sweep.plot(y="amplitude")
     >>> ds.sweep
       cells  status  kind  meaning, and where
-      3      OK      ok    right to the wanted rtol
+      3      OK      ok    accurate to rtol
     <BLANKLINE>
     ds.sweep has: plot, in_units, where, fit, statuses, cell, check
     >>> ds.sweep.check().beyond
