@@ -25,8 +25,7 @@ from scipy.linalg import lapack
 from kernels.drivetrain._frequencies import frequencies as frequencies_of_group
 from kernels.drivetrain._frequencies import row_at
 from kernels.drivetrain.receptance import DRIVETRAIN_FRF
-from kernels.lanes.columns import entry, in_groups
-from kernels.lanes.groups import GROUP, cells_at, room
+from kernels.lanes.columns import GROUP, cells_at, entry, in_groups, room
 from kernels.lanes.jit import jit
 
 sys.path += [str(Path(__file__).parents[2] / "tests" / folder) for folder in ("oracles", "helpers")]

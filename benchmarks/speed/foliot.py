@@ -29,8 +29,7 @@ from kernels.foliot.noise import FOLIOT_NOISE
 from kernels.foliot.ripple import FOLIOT_RIPPLE
 from kernels.foliot.start import FOLIOT_START
 from kernels.interface import Status
-from kernels.lanes.columns import entry
-from kernels.lanes.groups import GROUP, cells_at
+from kernels.lanes.columns import GROUP, cells_at, entry
 from kernels.lanes.jit import jit
 from kernels.maths import philox
 

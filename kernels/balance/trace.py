@@ -12,7 +12,7 @@ from kernels.balance import _ringdown
 from kernels.balance.release import EXAMPLE, PARAMETERS, Balance, side
 from kernels.interface import Field
 from kernels.lanes.codes import BAD_INPUT, GRAZING, NOT_CONVERGED, OK, OUT_OF_RANGE, OVERDAMPED
-from kernels.lanes.groups import cells_at, one_row, write_row
+from kernels.lanes.columns import cells_at, one_row, write_row
 from kernels.lanes.jit import jit
 from kernels.lanes.records import read
 from kernels.lanes.vectors import where

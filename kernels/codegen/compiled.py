@@ -37,7 +37,7 @@ RUN = '''
 """Cells of the scene {name}: written by kernels; do not change it here."""
 
 from kernels.codegen.compiled import kept
-from kernels.lanes.refill import each_refilled
+from kernels.lanes.columns import each_refilled
 
 
 @kept
@@ -51,7 +51,7 @@ class Runner(NamedTuple):
     """What runs cells of a scene by one method.
 
     m : what is written of the scene; its `cell` is all that a lane knows of one
-    low, high : the compiled loops over cells (`lanes.refill`), of wide tolerances and of tight ones
+    low, high : the compiled loops over cells (`lanes.columns`), of wide tolerances and of tight ones
     order : of an embedded pair; None where the first step does not hang on the tolerance
     """
 

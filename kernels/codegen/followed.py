@@ -10,7 +10,7 @@ import numpy as np
 
 from kernels.integrate.driver import GOLDEN
 from kernels.interface import FIRST_REFUSAL, Status
-from kernels.lanes.refill import MOVING, fresh, to_the_end
+from kernels.lanes.columns import MOVING, fresh, to_the_end
 from kernels.lanes.tuples import first_rows, flat
 from kernels.maths.elementary import NORMAL_HIGH, NORMAL_LOW
 

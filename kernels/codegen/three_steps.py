@@ -16,7 +16,7 @@ from kernels.codegen.followed import off_by_roundings
 from kernels.integrate.events import METHODS, MOREAU, NONE
 from kernels.integrate.fixed_step import TOLERANCE
 from kernels.interface import FIRST_REFUSAL, Status
-from kernels.lanes.refill import fresh, to_the_end
+from kernels.lanes.columns import fresh, to_the_end
 from kernels.lanes.tuples import first_rows, flat
 from kernels.maths.elementary import NORMAL_HIGH, NORMAL_LOW
 

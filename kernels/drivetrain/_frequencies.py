@@ -27,7 +27,7 @@ import math
 
 from kernels.drivetrain._chain import spread_is_normal
 from kernels.lanes.codes import NOT_CONVERGED, OK, OUT_OF_RANGE
-from kernels.lanes.groups import GROUP, cells_at
+from kernels.lanes.columns import GROUP, cells_at
 from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.vectors import any_lane, choose, fma, magnitude, nearest, not_, sqrt, where
 

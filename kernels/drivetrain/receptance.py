@@ -22,8 +22,7 @@ from kernels.drivetrain._frequencies import row_at
 from kernels.drivetrain._receptance import receptance
 from kernels.interface import Field
 from kernels.lanes.codes import BAD_INPUT, INACCURATE, OK, OUT_OF_RANGE, PARTLY_OUT_OF_RANGE
-from kernels.lanes.columns import cell_by_cell
-from kernels.lanes.groups import GROUP
+from kernels.lanes.columns import GROUP, cell_by_cell
 from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.records import read
 from kernels.lanes.vectors import where

@@ -31,7 +31,7 @@ from kernels.foliot.cycle import FOLIOT, check
 from kernels.integrate import linear_flow
 from kernels.interface import FIRST_REFUSAL, Field
 from kernels.lanes.codes import INACCURATE, NOT_SELF_STARTING, OK, OUT_OF_RANGE, STICKS, TOO_SHORT
-from kernels.lanes.groups import GROUP, cells_at
+from kernels.lanes.columns import GROUP, cells_at
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.records import read
 from kernels.lanes.vectors import any_lane, choose, fma, magnitude, nearest, not_, sqrt, where

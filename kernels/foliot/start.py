@@ -20,7 +20,7 @@ from kernels.foliot.cycle import FOLIOT
 from kernels.integrate import linear_flow
 from kernels.interface import Field
 from kernels.lanes.codes import BAD_INPUT, COMES_TO_REST, GRAZING, INACCURATE, NEVER_STARTS, OK, OUT_OF_RANGE, STICKS
-from kernels.lanes.groups import cells_at, one_row, write_row
+from kernels.lanes.columns import cells_at, one_row, write_row
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.ranges import partly
 from kernels.lanes.records import read

@@ -1,12 +1,34 @@
-"""Loops over columns of cells, and the entry functions that the engine calls."""
+"""Loops over columns of cells, alone, in groups or refilled, and the entry functions that the engine calls.
+
+A *group* is of cells that share buffers, for traces and noise, which no column of one value a cell can hold. A body of
+`in_groups` gets the number of its first cell; `cells_at(first)` is the index of the group's cells in a column, and
+`cells_at(j * GROUP)` of the j-th row of a buffer. Compiled, a group is WIDTH lanes; in plain Python it is one cell.
+
+Cells of very different length are *refilled*: a lane that has finished its cell is given the next one. A *memory* has a
+row for each number that a lane knows between two events, and a column for each lane. The first row is the lane's stage;
+then come its cell's inputs. `advance(memory, i)` takes every lane on until one has finished, or for a limited number of
+events or steps, and returns whether one has; i is the index of all lanes.
+"""
 
 import functools
 import inspect
+import operator
 
 import numpy as np
 
+from kernels.lanes.inlining import LINE
 from kernels.lanes.jit import COMPILED, cached, jit, jit_entry
 from kernels.lanes.vectors import WIDTH, lanes_at
+
+GROUP = WIDTH if COMPILED else 1
+"""Cells of a group, and lanes that are refilled."""
+IDLE, FRESH, MOVING, DONE = 0.0, 1.0, 2.0, 3.0
+"""Stages of a lane that is refilled; `advance` begins a fresh one and says when it is done."""
+
+cells_at = lanes_at if COMPILED else operator.index
+
+_ROWS = np.minimum.outer(np.arange(WIDTH), np.arange(WIDTH))
+"""Of so many cells and one more, the cell in each lane."""
 
 
 def entry(*shared):
@@ -23,18 +45,30 @@ def entry(*shared):
     return decorate
 
 
-_ROWS = np.minimum.outer(np.arange(WIDTH), np.arange(WIDTH))
-"""Of so many cells and one more, the cell in each lane."""
+def entry_of(function, per_cell, kept, read=0):
+    """An entry of columns. `per_cell` says which hold one cell a row (None: few cells need no filling up).
 
+    The first `read` columns are only read.
+    """
+    if not COMPILED:
+        return function
+    compiled = cached(function) if kept else jit_entry(function)
 
-def _filled_up(compiled, columns, per_cell, read):
-    n = len(columns[0])
-    rows = _ROWS[n - 1]
-    full = [c[rows] if cells else c for c, cells in zip(columns, per_cell, strict=True)]
-    compiled(*full)
-    for column, result in zip(columns[read:], full[read:], strict=True):
-        if column is not result and column.flags.writeable:
-            column[...] = result[:n]
+    def call(*columns):
+        n = len(columns[0])
+        if per_cell is None:
+            compiled(*(c if c.flags.writeable else c.copy() for c in columns))
+        elif n >= WIDTH:
+            compiled(*columns)
+        elif n:
+            full = [c[_ROWS[n - 1]] if cells else c for c, cells in zip(columns, per_cell, strict=True)]
+            compiled(*full)
+            for column, result in zip(columns[read:], full[read:], strict=True):
+                if column is not result and column.flags.writeable:
+                    column[...] = result[:n]
+
+    call.compiled = compiled
+    return call
 
 
 def _looped(index, width):
@@ -60,22 +94,75 @@ cell_by_cell = _looped(np.int64, 1) if COMPILED else _plain
 in_groups = _looped(np.int64, WIDTH) if COMPILED else _plain
 
 
-def entry_of(function, per_cell, kept, read=0):
-    """An entry of columns. `per_cell` says which hold one cell a row (None: few cells need no filling up).
+@jit
+def room(rows):
+    """Space for that many rows of a group, from the border of a cache line on: no register straddles two of them."""
+    spare = LINE // 8
+    space = np.empty(rows * GROUP + spare)
+    first = (spare - np.int64(space.ctypes.data) // 8 % spare) % spare
+    return space[first : first + rows * GROUP]
 
-    The first `read` columns are only read.
+
+@jit
+def one_row():
+    """The buffer of one row."""
+    return (np.empty(GROUP),)
+
+
+@jit
+def write_row(first, j, values, row, trace):
+    """trace[first + cell, j] = values[cell] for the cells of a group, through `row`, a buffer of one row."""
+    row[cells_at(0)] = values
+    for cell in range(GROUP):
+        trace[first + cell, j] = row[cell]
+
+
+def fresh(numbers, inputs):
+    """Cells before anything runs: of so many numbers each, of which the first behind the stage are the inputs."""
+    cells = np.zeros((len(inputs[0]), numbers))
+    cells[:, 0] = FRESH
+    cells[:, 1 : 1 + len(inputs)] = np.transpose(inputs)
+    return cells
+
+
+def to_the_end(run, cells):
+    """Runs every cell, (n_cells, numbers that a lane knows), by a compiled `each_refilled`."""
+    run(cells, np.zeros((cells.shape[1], GROUP)), np.zeros(GROUP, np.int64))
+
+
+@jit
+def each_refilled(advance, cells, memory, held):
+    """Every cell to its end.
+
+    Parameters
+    ----------
+    cells : (n_cells, numbers that a lane knows), fresh or moving; in the end all are done
+    memory, held : zeros, a row for each number, and the lanes' cells; numba takes long to compile what makes arrays
     """
-    if not COMPILED:
-        return function
-    compiled = cached(function) if kept else jit_entry(function)
+    n = cells.shape[0]
+    for lane in range(GROUP):
+        held[lane] = lane if lane < n else n - 1
+        _give(memory, lane, cells, held[lane])
+        memory[0, lane] = memory[0, lane] if lane < n else IDLE
+    handed, left = GROUP, n
+    while left > 0:  # every lane ends: cells have a limit of events and each event one of steps
+        if not advance(memory, cells_at(0)):
+            continue
+        for lane in range(GROUP):
+            if memory[0, lane] == DONE:
+                for row in range(cells.shape[1]):
+                    cells[held[lane], row] = memory[row, lane]
+                left -= 1
+                held[lane] = handed
+                _give(memory, lane, cells, handed)
+                handed += 1
 
-    def call(*columns):
-        if per_cell is None:
-            compiled(*(c if c.flags.writeable else c.copy() for c in columns))
-        elif 0 < len(columns[0]) < WIDTH:
-            _filled_up(compiled, columns, per_cell, read)
-        elif len(columns[0]):
-            compiled(*columns)
 
-    call.compiled = compiled
-    return call
+@jit
+def _give(memory, lane, cells, cell):
+    """Puts a cell into a lane; with none left the lane keeps its last one, idle."""
+    if cell < cells.shape[0]:
+        for row in range(cells.shape[1]):
+            memory[row, lane] = cells[cell, row]
+    else:
+        memory[0, lane] = IDLE

@@ -3,7 +3,8 @@
 numba compiles no comprehension over a tuple, and takes some hundredths of a second for each small function. A
 `symbolic` function is plain Python without loops over steps and without branches on values. Where compiled code calls
 it, it is run once with symbols of its arguments to know the result's type, and once more to write the LLVM code; so
-tuples of any length, records and their `_replace`, and branches on what is None or how long it is, cost nothing.
+tuples of any length, records and their `_replace`, and branches on what is None or how long it is, cost nothing. It
+makes no array.
 `over_tuples` does the same for the comprehensions of a function that has loops and branches. In plain Python they are
 functions like any other, of the same bits.
 """
@@ -17,10 +18,11 @@ import textwrap
 from types import FunctionType, SimpleNamespace
 
 from numba import types
+from numba.core.imputils import impl_ret_borrowed
 from numba.core.typing.templates import builtin_registry
 from numba.extending import lower_builtin, type_callable
 
-from kernels.lanes.jit import COMPILED
+from kernels.lanes.jit import COMPILED, F
 
 _SIGNATURES = {}
 """Of calls that have been typed."""
@@ -38,6 +40,12 @@ class _Symbol:
 
     def __call__(self, *arguments):
         return self._writer.call(self._kind, arguments)
+
+    def __getitem__(self, index):
+        return self._writer.call(operator.getitem, (self, index))
+
+    def __setitem__(self, index, value):
+        self._writer.call(operator.setitem, (self, index, value))
 
     def __neg__(self):
         return self._writer.call(operator.neg, (self,))
@@ -66,12 +74,7 @@ class _Rehearsal:
         return ANY
 
 
-class _Any(_Symbol):
-    def __getitem__(self, index):
-        return self
-
-
-ANY = _Any(_Rehearsal(), None)
+ANY = _Symbol(_Rehearsal(), None)
 """Stands for every number where only the way of a computation is wanted."""
 
 
@@ -82,9 +85,14 @@ class _Writer:
         self.typing_context, self.context, self.builder = typing_context, context, builder
 
     def opened(self, kind, write=None):
-        """The symbol of what `write` writes; of a tuple or a record such a one of symbols, and None of nothing."""
+        """The symbol of what `write` writes; of a tuple or a record such a one of symbols, and None of nothing.
+
+        Of the class of a record it is that class.
+        """
         if isinstance(kind, types.NoneType):
             return None
+        if isinstance(kind, types.NamedTupleClass):
+            return kind.instance_class
         if not isinstance(kind, types.BaseTuple):
             return _Symbol(self, kind, write)
         whole = functools.cache(lambda: write())
@@ -118,6 +126,8 @@ class _Writer:
         values = [self.context.cast(self.builder, value, of_one, want) for (of_one, value), want in wanted]
         called = self.context.get_function(kind, signature)
         value = called(self.builder, values)
+        if self.context.enable_nrt:  # arrays are their caller's, and counted again only where they are handed back
+            self.context.nrt.decref(self.builder, signature.return_type, value)
         self.context.add_linking_libs(getattr(called, "libs", ()))
         return self.opened(signature.return_type, lambda: value)
 
@@ -177,7 +187,7 @@ def _on_symbols(function):
     return FunctionType(function.__code__, scope, function.__name__, function.__defaults__, function.__closure__)
 
 
-def symbolic(function):
+def symbolic(function: F) -> F:
     """Gives a function of plain Python its meaning in compiled code: what it does is written where it is called."""
     if not COMPILED:
         return function
@@ -199,7 +209,8 @@ def symbolic(function):
             writer.opened(kind, lambda value=value: value) for kind, value in zip(signature.args, values, strict=True)
         ]
         kind, value = writer.closed(function.on_symbols()(*arguments))
-        return context.cast(builder, value, kind, signature.return_type)
+        value = context.cast(builder, value, kind, signature.return_type)
+        return impl_ret_borrowed(context, builder, signature.return_type, value)
 
     return function
 

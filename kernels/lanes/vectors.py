@@ -281,10 +281,10 @@ def where(condition, x, y):
 
 @symbolic
 def choose(condition, xs, ys):
-    """`where` for each pair of numbers in two tuples of tuples; a record, if the first is one."""
-    chosen = tuple(
-        choose(condition, x, y) if isinstance(x, tuple) else where(condition, x, y) for x, y in zip(xs, ys, strict=True)
-    )
+    """`where` for each pair of numbers in two tuples of tuples, or records; shaped as the first."""
+    if not isinstance(xs, tuple):
+        return where(condition, xs, ys)
+    chosen = tuple(choose(condition, x, y) for x, y in zip(xs, ys, strict=True))
     return type(xs)(*chosen) if hasattr(xs, "_fields") else chosen
 
 
@@ -334,53 +334,54 @@ def lanes_at(i):
 _function(lanes_at, 1, lambda i: _lane_index, lambda context, builder, signature, values: values[0])
 
 
+def _is_column(array, i):
+    """Whether lanes can be loaded at i: cells side by side, in one dimension, or a row of a memory of lanes.
+
+    Anything else is a TypingError.
+    """
+    if not isinstance(array, types.Array) or array.layout != "C" or array.dtype not in (types.float64, types.int8):
+        return False
+    if array.ndim == 2 and isinstance(i, types.BaseTuple) and len(i) == 2:
+        return isinstance(i[1], LaneIndexType)
+    return array.ndim == 1 and isinstance(i, LaneIndexType)
+
+
 def _cells_pointer(context, builder, array_type, array, i):
+    """Where lanes are, their type, and the bytes of one: a column's cells need not lie on a register's border."""
     element = context.get_data_type(array_type.dtype)
+    if array_type.ndim == 2:
+        row, first = cgutils.unpack_tuple(builder, i)
+        i = builder.add(builder.mul(row, _I64(WIDTH)), first)
     first = builder.gep(context.make_array(array_type)(context, builder, array).data, [i])
-    return builder.bitcast(first, ir.VectorType(element, WIDTH).as_pointer()), element
-
-
-def _align(element):
-    """Bytes of one cell: a column's cells need not lie on a register's border."""
-    return element.width // 8 if isinstance(element, ir.IntType) else 8
-
-
-def _is_column(numba_type):
-    """Whether lanes can be loaded from it: cells side by side, in one dimension. Anything else is a TypingError."""
-    return (
-        isinstance(numba_type, types.Array)
-        and numba_type.ndim == 1
-        and numba_type.layout == "C"
-        and numba_type.dtype in (types.float64, types.int8)
-    )
+    align = element.width // 8 if isinstance(element, ir.IntType) else 8
+    return builder.bitcast(first, ir.VectorType(element, WIDTH).as_pointer()), element, align
 
 
 @type_callable(operator.getitem)
 def _type_load(context):
-    return lambda column, i: _lanes if _is_column(column) and isinstance(i, LaneIndexType) else None
+    return lambda column, i: _lanes if _is_column(column, i) else None
 
 
-@lower_builtin(operator.getitem, types.Array, LaneIndexType)
 def _lower_load(context, builder, signature, values):
-    pointer, element = _cells_pointer(context, builder, signature.args[0], *values)
-    cells = builder.load(pointer, align=_align(element))
+    pointer, element, align = _cells_pointer(context, builder, signature.args[0], *values)
+    cells = builder.load(pointer, align=align)
     return builder.sitofp(cells, ir.VectorType(_F64, WIDTH)) if isinstance(element, ir.IntType) else cells
 
 
 @type_callable(operator.setitem)
 def _type_store(context):
-    def typer(column, i, value):
-        wide = _is_column(column) and isinstance(i, LaneIndexType)
-        return types.void(column, i, _lanes) if wide else None
-
-    return typer
+    return lambda column, i, value: types.void(column, i, _lanes) if _is_column(column, i) else None
 
 
-@lower_builtin(operator.setitem, types.Array, LaneIndexType, LanesType)
 def _lower_store(context, builder, signature, values):
-    pointer, element = _cells_pointer(context, builder, signature.args[0], *values[:2])
+    pointer, element, align = _cells_pointer(context, builder, signature.args[0], *values[:2])
     cells = values[2]
     if isinstance(element, ir.IntType):
         cells = builder.fptosi(cells, ir.VectorType(element, WIDTH))
-    builder.store(cells, pointer, align=_align(element))
+    builder.store(cells, pointer, align=align)
     return context.get_dummy_value()
+
+
+for _index in (LaneIndexType, types.Tuple((types.int64, _lane_index))):
+    lower_builtin(operator.getitem, types.Array, _index)(_lower_load)
+    lower_builtin(operator.setitem, types.Array, _index, LanesType)(_lower_store)

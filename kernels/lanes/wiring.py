@@ -18,7 +18,8 @@ import inspect
 import math
 from collections import namedtuple
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import KW_ONLY, dataclass, fields
+from functools import partial
 from types import FunctionType
 from typing import Any
 
@@ -49,7 +50,7 @@ class method(Method):
 
     Parameters
     ----------
-    solve : `solve(p, rtol, *buffers())`
+    solve : `solve(p, rtol, *buffers())`; `fill(i, columns, *buffers())` where `fills`
     bound : what `solve` is right to: a number, or `bound(p)`; None where its status says so
     sooner : `sooner(p, rtol)` of columns, uncompiled
     name, doc, excludes, lacks, estimates : as in `kernels.interface.Method`
@@ -57,22 +58,20 @@ class method(Method):
     loop : `in_lanes`; `cell_by_cell`, where every search goes its own way
     units : (take, put_back) of a method whose scene has no units. `scene, units = take(p)` is what `solve` and `bound`
         get in place of p, and `put_back(units, outputs, status)` makes outputs and status of what is solved.
+    fills : whether it writes the rows of its cells itself
     """
 
-    solve: SolveCell  # type: ignore[assignment]
+    solve: SolveCell | FillCells  # type: ignore[assignment]
     bound: BoundCell | float | None = None  # type: ignore[assignment]
     _: KW_ONLY
     buffers: Callable[..., tuple[Any, ...]] = nothing
     loop: Loop = loops.in_lanes
     units: tuple[Callable[..., Any], Callable[..., Any]] | None = None
+    fills: bool = False
 
 
-@dataclass(frozen=True)
-class tracing(method):
-    """A method by `fill(i, columns, *buffers())`: `i` is a cell, or by `in_groups` the first of a group."""
-
-    solve: FillCells  # type: ignore[assignment]
-    loop: Loop = loops.in_groups
+tracing = partial(method, fills=True, loop=loops.in_groups)
+"""A method by `fill(i, columns, *buffers())`: `i` is the first cell of a group, or by `cell_by_cell` a cell."""
 
 
 @dataclass(frozen=True)
@@ -121,10 +120,9 @@ def kernel(
         Where the record's fields are not the parameters, or a method lacks what is no output.
     """
     names = [field.name for field in parameters]
-    fields = names if record is None else list(getattr(record, "_fields", ()))
-    if fields != names:
-        raise TypeError(f"{name}: the record has {fields}, the parameters are {names}")
-    record = record or _record("Parameters", names)
+    record = record or namedtuple("Parameters", names)
+    if (found := list(getattr(record, "_fields", ()))) != names:
+        raise TypeError(f"{name}: the record has {found}, the parameters are {names}")
     wiring = _Wiring(name, record, names, [f.name for f in along], [f.name for f in outputs], loop)
     first = methods[0] if methods else None
     owner = check or (next(iter(first.solvers.values())) if isinstance(first, split) else first).solve  # type: ignore[union-attr]
@@ -171,10 +169,6 @@ def within(fields: Sequence[Field]) -> Callable[[Any], Any]:
     return made
 
 
-def _record(name: str, fields: Sequence[str]) -> Record:
-    return namedtuple(name, fields)
-
-
 def _every(test: Any) -> Any:
     """Whether a test of a number holds for each of a row."""
 
@@ -204,16 +198,10 @@ class _Wiring:
         record = self.record
 
         @jit
-        def in_lanes(i: Any, columns: Any) -> None:
+        def body(i: Any, columns: Any) -> None:
             p = read(record, columns, i)
             columns.status[i] = where(allowed(p), special(p), BAD_INPUT)
 
-        @jit
-        def of_a_cell(i: Any, columns: Any) -> None:
-            p = read(record, columns, i)
-            columns.status[i] = special(p) if allowed(p) else BAD_INPUT
-
-        body = of_a_cell if self.loop is loops.cell_by_cell else in_lanes
         return self._entry("check", owner, body, [*self.parameters, "status"], self.loop)
 
     def solved_by(self, solver: split | Method) -> Method:
@@ -226,14 +214,12 @@ class _Wiring:
         strange = set(solver.lacks) - set(self.outputs) | set(solver.excludes) - set(self.parameters)
         if strange:
             raise TypeError(f"{self.name}.{solver.name} lacks or excludes what there is not: {sorted(strange)}")
-        body = solver.solve if isinstance(solver, tracing) else self._body(solver)
+        body = solver.solve if solver.fills else self._body(solver)
         names, sooner = self._names(solver.estimates), solver.sooner
         solve = self._entry(solver.name, solver.solve, body, names, solver.loop, solver.buffers)
-        of_record = None if sooner is None else lambda *columns: sooner(self.record(*columns[:-1]), columns[-1])
-        return Method(
-            solver.name, solver.doc, solve, self._bound(solver),
-            solver.excludes, solver.lacks, solver.estimates, of_record,
-        )  # fmt: skip
+        of_record = sooner and (lambda *columns: sooner(self.record(*columns[:-1]), columns[-1]))
+        of_columns = {"solve": solve, "bound": self._bound(solver), "sooner": of_record}
+        return Method(**{field.name: getattr(solver, field.name) for field in fields(Method)} | of_columns)
 
     def _names(self, estimates: bool) -> list[str]:
         """Of the columns that a method is called with."""
@@ -257,37 +243,31 @@ class _Wiring:
 
         return signed(solve, names)
 
-    def _given(self, solver: method) -> Record:
-        """A record of the outputs that the method gives."""
-        return namedtuple("Given", [name for name in self.outputs if name not in solver.lacks])
+    def _given(self, solver: method, gives: bool = True) -> Record:
+        """A record of the outputs that the method gives, or of those that it does not."""
+        return namedtuple("Given", [name for name in self.outputs if (name in solver.lacks) != gives])
 
     def _body(self, solver: method) -> FillCells:
         """The work of a method on cell i, or on WIDTH of them."""
         record, given, order = self.record, self._given(solver), namedtuple("Order", self.outputs)
-        none = _record("Lacking", solver.lacks)(*(math.nan for _ in solver.lacks))
+        none = self._given(solver, False)(*(math.nan for _ in solver.lacks))
         inner: Any = solver.solve
         take, put_back = solver.units or (_as_it_is, _with_none)
+
+        estimates = solver.estimates
 
         @jit
         def body(i: Any, columns: Any, *buffers: Any) -> None:
             scene, units = take(read(record, columns, i))
-            solved, verdict = inner(scene, columns.rtol[i], *buffers)
-            outputs, status = put_back(units, solved, verdict)
+            found = inner(scene, columns.rtol[i], *buffers)  # outputs, errors if it estimates, status
+            outputs, status = put_back(units, found[0], found[-1])
             write(columns, i, named(given, outputs))
             write(columns, i, none)
+            if estimates:
+                columns.error[i] = largest(found[1], columns.asked, order, given)
             columns.status[i] = status
 
-        @jit
-        def estimating(i: Any, columns: Any, *buffers: Any) -> None:
-            scene, units = take(read(record, columns, i))
-            solved, errors, verdict = inner(scene, columns.rtol[i], *buffers)
-            outputs, status = put_back(units, solved, verdict)
-            write(columns, i, named(given, outputs))
-            write(columns, i, none)
-            columns.error[i] = largest(errors, columns.asked, order, given)
-            columns.status[i] = status
-
-        return estimating if solver.estimates else body
+        return body
 
     def _bound(self, solver: method) -> OnColumns | None:
         if solver.bound is None:

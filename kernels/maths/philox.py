@@ -4,7 +4,7 @@ Philox-4x32-10 of Salmon, Moraes, Dror & Shaw, "Parallel random numbers: as easy
 that multiply, swap and mix four words of 32 bits. Integers only, so the bits are the same everywhere.
 """
 
-from kernels.lanes.groups import GROUP
+from kernels.lanes.columns import GROUP
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.vectors import sqrt
 from kernels.maths.elementary import log, sincos

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kernels.lanes.groups import GROUP
+from kernels.lanes.columns import GROUP
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.vectors import magnitude
 

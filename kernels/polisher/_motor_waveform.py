@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kernels.lanes.groups import GROUP, cells_at, room
+from kernels.lanes.columns import GROUP, cells_at, room
 from kernels.lanes.jit import jit, jit_call, jit_inline
 from kernels.lanes.vectors import any_lane, choose, fma, magnitude, not_, sqrt, where
 from kernels.maths.decimals import PI, cosine, multiples, precise

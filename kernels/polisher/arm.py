@@ -20,7 +20,7 @@ from collections import namedtuple
 
 from kernels.interface import FIRST_REFUSAL, Field
 from kernels.lanes.codes import CHANGE_POINT, DOUBLE_CRANK, INACCURATE, LOCK_UP, OK
-from kernels.lanes.groups import cells_at
+from kernels.lanes.columns import cells_at
 from kernels.lanes.jit import jit
 from kernels.lanes.ranges import or_none
 from kernels.lanes.records import named, read, write

@@ -19,7 +19,7 @@ from collections import namedtuple
 
 from kernels.interface import Field
 from kernels.lanes.codes import BAD_INPUT, CHANGE_POINT, INACCURATE, LOCK_UP
-from kernels.lanes.groups import cells_at, one_row, write_row
+from kernels.lanes.columns import cells_at, one_row, write_row
 from kernels.lanes.jit import jit
 from kernels.lanes.ranges import or_none, partly
 from kernels.lanes.records import read

@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kernels.lanes.groups import GROUP, cells_at
+from kernels.lanes.columns import GROUP, cells_at
 from kernels.lanes.jit import jit, jit_apart, jit_call
 from kernels.lanes.vectors import magnitude, sqrt, where
 from kernels.maths.elementary import smaller
