@@ -3,11 +3,9 @@
 Products and quotients are right to 4 roundings of the modulus.
 """
 
-import math
-
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.vectors import exponent, fma, magnitude, sqrt, where
-from kernels.maths.elementary import arctan, is_normal, scale
+from kernels.maths.elementary import arctan2, is_normal, scale
 
 
 @jit
@@ -53,9 +51,4 @@ def modulus(re, im):
 @jit_call
 def argument(re, im):
     """The angle of re + i im in [-pi, pi), for re + i im not 0."""
-    steep = magnitude(im) > magnitude(re)
-    low, high = where(steep, re, im), where(steep, im, re)
-    angle = arctan(low / where(magnitude(high) > 0.0, high, 1.0))
-    turned = where(im < 0.0, -0.5 * math.pi, 0.5 * math.pi) - angle
-    flat = where(re < 0.0, where(im > 0.0, angle + math.pi, angle - math.pi), angle)
-    return where(steep, turned, flat)
+    return -arctan2(-im, re)

@@ -250,6 +250,16 @@ def arctan(x):
 
 
 @jit
+def arctan2(y, x):
+    """The angle of the point (x, y) within 2 ulp, in [-pi, pi]; 0 of (0, 0)."""
+    steep = magnitude(y) > magnitude(x)
+    low, high = where(steep, x, y), where(steep, y, x)
+    angle = arctan(low / where(magnitude(high) > 0.0, high, 1.0))
+    flat = where(x < 0.0, where(y >= 0.0, angle + math.pi, angle - math.pi), angle)
+    return where(steep, where(y > 0.0, 0.5 * math.pi, -0.5 * math.pi) - angle, flat)
+
+
+@jit
 def tanh(x):
     """Hyperbolic tangent within 3 ulp: of t = e^(-2 abs(x)) - 1 it is -t/(2 + t)."""
     t = expm1(-2.0 * magnitude(x))

@@ -17,11 +17,14 @@ import numpy as np
 
 from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.vectors import magnitude, where
-from kernels.maths.elementary import arctan, expm1, log1p
-from kernels.maths.elementary import power as inlined_power
-from kernels.maths.elementary import sincos as inlined_sincos
+from kernels.maths import elementary
+from kernels.maths.elementary import expm1, log1p
 from kernels.maths.small_dense import sort
 
+power, sincos, arctan2 = (
+    jit_apart(getattr(f, "py_func", f)) for f in (elementary.power, elementary.sincos, elementary.arctan2)
+)
+"""As calls: inlined wherever they are used they would take long to compile."""
 PIECES = 4
 CROSSING_LIMIT = 32
 """Crossings that a circle may have with one piece; more are one where circle and outline coincide."""
@@ -88,18 +91,6 @@ class End(NamedTuple):
     steep: float
     bent: float
     excess: float
-
-
-@jit_apart
-def power(x, y):
-    """x^y."""
-    return inlined_power(x, y)
-
-
-@jit_apart
-def sincos(x):
-    """Sine and cosine."""
-    return inlined_sincos(x)
 
 
 @jit_apart
@@ -273,18 +264,6 @@ def excess(tool, x, y):
     """abs(X/a)^n + abs(Y/b)^m - 1 of a point of the tool's frame, limited; negative where it is in contact."""
     u, v = min(magnitude(x) / tool.a, 8.0), min(magnitude(y) / tool.b, 8.0)
     return power(u, tool.n) + power(v, tool.m) - 1.0
-
-
-@jit_apart
-def arctan2(y, x):
-    """The angle of the point (x, y), in [-pi, pi]."""
-    if magnitude(y) <= magnitude(x):
-        if x > 0.0:
-            return arctan(y / x)
-        if x < 0.0:
-            return arctan(y / x) + (math.pi if y >= 0.0 else -math.pi)
-        return 0.0
-    return (0.5 * math.pi if y > 0.0 else -0.5 * math.pi) - arctan(x / y)
 
 
 @jit_apart
