@@ -24,6 +24,7 @@ from kernels.lanes.codes import NO_METHOD, NOT_CONVERGED, OK, OUT_OF_RANGE
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.vectors import any_lane, choose, fma, magnitude, not_, sqrt, where
 from kernels.maths.elementary import arctan, cbrt, exp, expm1, log1p, log_remainder, log_remainder3
+from kernels.maths.roots import by_steps
 
 HALLEY_LIMIT = 40
 PURE_ROUNDING, ROUNDING = 2e-15, 4e-15
@@ -100,6 +101,20 @@ def _parts(z, rho, slack):
     return u, x, m3, log_remainder3(x)
 
 
+@jit
+def _halley(z, scene):
+    """Halley's step on (7), and whether it is the last: its error is the cube."""
+    rho, slack, double_k = scene
+    u, _, m3, l3 = _parts(z, rho, slack)
+    miss = rho * u * u / (slack * (1.0 + rho)) + slack * m3 + (1.0 + rho) * l3 - double_k
+    below = 1.0 / (1.0 + rho + u)
+    slope = 2.0 * (rho + u) * u * below
+    bend = (2.0 * (rho + 2.0 * u) - slope) * below * (slack - u)
+    step = 2.0 * miss * slope / (2.0 * slope * slope - miss * bend)
+    step = where(step < 0.9 * z, step, 0.9 * z)
+    return step, not_(magnitude(step) > 1e-8 * (z - step))
+
+
 @jit_call
 def coulomb(scene, rtol):
     """The cycle by Halley's steps on (7), and its verdict; without viscous friction that of dry friction alone.
@@ -115,19 +130,7 @@ def coulomb(scene, rtol):
     by_square = sqrt(double_k / where(square > 1e-200, square, 1e-200))
     strong = where(by_square < by_cube, by_square, by_cube)
     z = where(strong < 1.5, strong, double_k / slack + 1.0)
-    active = z > 0.0
-    for _ in range(HALLEY_LIMIT):
-        if not any_lane(active):
-            break
-        u, _, m3, l3 = _parts(z, rho, slack)
-        miss = rho * u * u / (slack * (1.0 + rho)) + slack * m3 + (1.0 + rho) * l3 - double_k
-        below = 1.0 / (1.0 + rho + u)
-        slope = 2.0 * (rho + u) * u * below
-        bend = (2.0 * (rho + 2.0 * u) - slope) * below * (slack - u)
-        step = 2.0 * miss * slope / (2.0 * slope * slope - miss * bend)
-        step = where(step < 0.9 * z, step, 0.9 * z)
-        z = where(active, z - step, z)
-        active = active & (magnitude(step) > 1e-8 * z)  # cubic: the step just made was the last
+    z, active = by_steps(_halley, z, z > 0.0, (rho, slack, double_k), HALLEY_LIMIT)
 
     u, x, m3, l3 = _parts(z, rho, slack)
     tau = z + log1p(x)

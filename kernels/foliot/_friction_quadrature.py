@@ -26,6 +26,7 @@ from kernels.lanes.codes import NOT_CONVERGED, OK, OUT_OF_RANGE
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.vectors import any_lane, fma, magnitude, not_, sqrt, where
 from kernels.maths.elementary import exp, expm1, is_normal, log, log1p
+from kernels.maths.roots import by_steps, in_bracket
 
 NEWTON_LIMIT = 60
 """Newton steps or bisections for (2), and Newton steps for V; about five are usual."""
@@ -91,6 +92,15 @@ class Speeds(NamedTuple):
     power: float
 
 
+@jit
+def _terminal_step(u, scene):
+    """Newton's step for ln(D + G) in u = ln V, and whether it is the last."""
+    log_d, log_gamma, n, left = scene
+    D, G = exp(u + log_d), exp(fma(n, u, log_gamma))
+    step = (log(D + G) - left) * (D + G) / fma(n, G, D)
+    return step, not_(magnitude(step) > 1e-9)
+
+
 @jit_call
 def _terminal(scene):
     """The terminal speed.
@@ -104,14 +114,7 @@ def _terminal(scene):
     u = where(by_d < by_gamma, by_d, by_gamma)
     drag = u < _FAR
     u = where(drag, u, 0.0)
-    active = drag & (d > 0.0) & (gamma > 0.0)
-    for _ in range(NEWTON_LIMIT):
-        if not any_lane(active):
-            break
-        D, G = exp(u + log_d), exp(fma(n, u, log_gamma))
-        step = (log(D + G) - left) * (D + G) / fma(n, G, D)
-        u = where(active, u - step, u)
-        active = active & (magnitude(step) > 1e-9)
+    u, _ = by_steps(_terminal_step, u, drag & (d > 0.0) & (gamma > 0.0), (log_d, log_gamma, n, left), NEWTON_LIMIT)
     D, G = exp(u + log_d), exp(fma(n, u, log_gamma))
     share = where(drag, D / (D + G), 0.0)
     rest = where(drag, G / (D + G), 1.0)
@@ -176,7 +179,7 @@ def _solve(scene, terminal):
     bracket that every evaluation narrows; it begins with all float64 and is halved where a step leaves it. The start is
     from the strong limit of each friction term alone and from the weak limit V z = 2 V f'(V)/V.
     """
-    d, gamma, n, e, slack, (log_V, D, G) = scene.d, scene.gamma, scene.n, scene.e, scene.slack, terminal
+    d, gamma, n, slack, (log_V, D, G) = scene.d, scene.gamma, scene.n, scene.slack, terminal
     lost, m0, m1, m2 = _leg(scene, d, gamma)
     product = slack * (slack + m0)
     steady = 0.5 * log(4.0 * product / fma(lost, slack, m0))
@@ -187,36 +190,29 @@ def _solve(scene, terminal):
     y = log(exp(strong) + 2.0 * fma(n, G, D) * exp(-log_V))
     y = where((y > -_WIDEST) & (y < _WIDEST), y, 0.0)
     low, high = 0.0 * y - _WIDEST, 0.0 * y + _WIDEST
-    active = y > low
-    for _ in range(NEWTON_LIMIT):
-        if not any_lane(active):
-            break
+    return in_bracket(_way, y, low, high, y > low, (scene, terminal), NEWTON_LIMIT)
 
-        # ln of the right side of (2) over its left, and its slope in y
-        _, log_v1, z, far, near, F1, v_slope, a, b, _, _ = _speeds(scene, terminal, y)
-        lost, m0, m1, m2 = _leg(scene, a, b)
-        total, rule = 0.0 * y, 0.0 * y
-        for j in range(_NODES):
-            q = -expm1(n * _LOG_S[j])
-            F = fma(a, _REST[j], fma(b, q, F1))
-            M = fma(m1, _S[j], fma(m2, 1.0 - q, m0))
-            total = fma(_WEIGHT[j] * _S[j], fma(lost, F, M) / (F * (F + M)), total)
-            rule = fma(_WEIGHT[j], _pole(e, far, near, _REST[j], _S[j]), rule)
-        total = total + _defect(z, rule, e, far, near) / (where(z > _NEAR, far, 1.0) * fma(n, G, D))
-        M1 = m0 + m1 + m2
-        rate = fma(lost, F1, M1) / (v_slope * (F1 + M1))
-        stretch = where(z > 1e-300, z / where(z > 1e-300, far, 1.0), 1.0)
-        excess, slope = fma(2.0, log_v1, log(0.5 * total)), stretch * rate / total
 
-        # Newton's step, or where it leaves the bracket a bisection
-        low, high = where(excess < 0.0, y, low), where(excess < 0.0, high, y)
-        step = -excess / slope
-        settled = magnitude(step) <= SETTLED
-        new = y + step
-        new = where(settled | ((new > low) & (new < high)), new, 0.5 * (low + high))
-        y = where(active, new, y)
-        active = active & not_(settled)
-    return y, active
+@jit
+def _way(y, scene):
+    """Whether the right side of (2) is below its left at y; Newton's step by logarithms; which one is the last."""
+    scene, terminal = scene
+    n, e, (_, D, G) = scene.n, scene.e, terminal
+    _, log_v1, z, far, near, F1, v_slope, a, b, _, _ = _speeds(scene, terminal, y)
+    lost, m0, m1, m2 = _leg(scene, a, b)
+    total, rule = 0.0 * y, 0.0 * y
+    for j in range(_NODES):
+        q = -expm1(n * _LOG_S[j])
+        F = fma(a, _REST[j], fma(b, q, F1))
+        M = fma(m1, _S[j], fma(m2, 1.0 - q, m0))
+        total = fma(_WEIGHT[j] * _S[j], fma(lost, F, M) / (F * (F + M)), total)
+        rule = fma(_WEIGHT[j], _pole(e, far, near, _REST[j], _S[j]), rule)
+    total = total + _defect(z, rule, e, far, near) / (where(z > _NEAR, far, 1.0) * fma(n, G, D))
+    M1 = m0 + m1 + m2
+    rate = fma(lost, F1, M1) / (v_slope * (F1 + M1))
+    stretch = where(z > 1e-300, z / where(z > 1e-300, far, 1.0), 1.0)
+    excess, slope = fma(2.0, log_v1, log(0.5 * total)), stretch * rate / total
+    return excess < 0.0, -excess / slope, SETTLED
 
 
 @jit_call

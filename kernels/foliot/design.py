@@ -11,11 +11,21 @@ from kernels.interface import Field
 from kernels.lanes.codes import BAD_INPUT, NOT_CONVERGED, OK
 from kernels.lanes.jit import jit
 from kernels.lanes.ranges import judged
-from kernels.lanes.vectors import any_lane, magnitude, where
+from kernels.lanes.vectors import magnitude, where
 from kernels.lanes.wiring import kernel, method
 from kernels.maths.elementary import is_normal, mantissa_exponent, measured
+from kernels.maths.roots import by_steps
 
 _NEWTON_LIMIT = 20
+
+
+@jit
+def _step(k, overshoot):
+    """Newton's step of k from that of ln k, and whether it is the last: its error is the square."""
+    gap, now = _viscous.gap_and_overshoot(k)
+    step = (overshoot - now) / (now - gap / (1.0 - gap))  # A - 1/lambda without its two ones
+    step = where(step < 0.5, step, 0.5)
+    return k * step, magnitude(step) <= 1e-9
 
 
 @jit
@@ -27,15 +37,7 @@ def newton(p, rtol):
     (period, e_p), (phi0, e_f) = mantissa_exponent(p.period), mantissa_exponent(p.phi0)
     overshoot = (p.amplitude - p.phi0) / p.phi0
     k = 1.125 / (overshoot * (overshoot * overshoot + 3.0 * overshoot + 3.666))
-    active = k > 0.0
-    for _ in range(_NEWTON_LIMIT):
-        if not any_lane(active):
-            break
-        gap, now = _viscous.gap_and_overshoot(k)
-        step = (now - overshoot) / (now - gap / (1.0 - gap))  # A - 1/lambda without its two ones
-        step = where(step > -0.5, step, -0.5)
-        k = where(active, k + k * step, k)
-        active = active & (magnitude(step) > 1e-9)  # quadratic: the step just made was the last
+    k, active = by_steps(_step, k, k > 0.0, overshoot, _NEWTON_LIMIT)
     unit_a = 4.0 * _viscous.cycle_of((k, 0.0 * k)).q / period
     unit_k, e_k = mantissa_exponent(k)
     a, mu = measured(unit_a, -e_p), measured(unit_a * unit_a * phi0 / unit_k, e_f - 2.0 * e_p - e_k)

@@ -1,5 +1,5 @@
 """Mathematics without a scene: the same source for one cell and for lanes, the same bits in both.
 
 Faces: `elementary` (exp, log, sin, power ... as polynomials), `pairs` (32-digit arithmetic), `complex`, `cubic`,
-`quadrature`, `philox` (random numbers by counter), `decimals` (exact tables).
+`roots` (of any equation), `quadrature`, `philox` (random numbers by counter), `decimals` (exact tables).
 """

@@ -1,0 +1,52 @@
+"""Roots of an equation in one unknown, of one cell or lanes: each cell's search ends by itself, and then it is frozen.
+
+What is solved is `trial`, a compiled function of the unknown and of whatever record or tuple it needs. It judges a step
+by itself, as it alone knows what its rounding is; a step that it calls the last is still made.
+"""
+
+from kernels.lanes.jit import jit
+from kernels.lanes.vectors import any_lane, magnitude, not_, where
+
+
+@jit
+def by_steps(trial, x, active, scene, limit):
+    """The root by Newton's or Halley's steps from x in the active cells, and in which the limit was reached.
+
+    trial(x, scene) -> step, last : x - step comes next; whether it is near enough
+    """
+    for _ in range(limit):
+        if not any_lane(active):
+            break
+        step, last = trial(x, scene)
+        x, active = where(active, x - step, x), active & not_(last)
+    return x, active
+
+
+@jit
+def in_bracket(trial, x, low, high, active, scene, limit):
+    """The root between `low` and `high` by Newton's steps from x, bisections where they leave the bracket; as above.
+
+    trial(x, scene) -> below, step, near : whether the root is above x; x + step comes next, if in the bracket or nearer
+        than `near`; the search ends with a step as near
+    """
+    for _ in range(limit):
+        if not any_lane(active):
+            break
+        below, step, near = trial(x, scene)
+        low, high = where(below, x, low), where(below, high, x)
+        new = x + step
+        own = (magnitude(step) < near) | ((new >= low) & (new <= high))
+        new = where(own, new, 0.5 * (low + high))
+        last = magnitude(new - x) <= near
+        x, active = where(active, new, x), active & not_(last)
+    return x, active
+
+
+@jit
+def bisected(holds, low, high, scene, count):
+    """The upper end of what is left after so many bisections, where holds(x, scene) is true of it and not of `low`."""
+    for _ in range(count):
+        middle = 0.5 * (low + high)
+        there = holds(middle, scene)
+        low, high = where(there, low, middle), where(there, middle, high)
+    return high
