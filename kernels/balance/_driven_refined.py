@@ -150,8 +150,7 @@ def refined(scene, p, guess, wanted):
         if not any_lane(active):
             break
         new, settled, there = _step(scene, legs)
-        f, t1 = choose(active, new.f, legs.f), choose(active, new.t1, legs.t1)
-        legs = Legs(f, t1, choose(active, new.t2, legs.t2), choose(active, new.t3, legs.t3))
+        legs = choose(active, new, legs)
         found = found | (active & settled & there)
         active = active & not_(settled)
     time = add(add(legs.t1, legs.t2), legs.t3)

@@ -72,7 +72,7 @@ def largest_modulus(a2, a1, a0):
     b_far = pairs.over(pairs.add(c_far, pairs.negative(a1)), divisor)
     b_near = pairs.add(a2, root)
     c_near = pairs.add(a1, pairs.times(root, b_near))
-    b, c = choose(far, b_far, b_near), choose(far, c_far, c_near)
+    b, c = choose(far, (b_far, c_far), (b_near, c_near))
 
     # the larger modulus of its roots, and what the error of the first leaves of it
     half = (0.5 * b[0], 0.5 * b[1])

@@ -85,23 +85,36 @@ def above(u):
 
 
 @jit
-def of_sqrt(u):
-    """sqrt(u)."""
-    low, high = above(u)
-    return sqrt(low), sqrt(high)
+def within_one(u):
+    """The part of an interval in [-1, 1]; NaN stays."""
+    return where(u[0] < -1.0, -1.0, u[0]), where(u[1] > 1.0, 1.0, u[1])
 
 
 @jit
-def of_exp(u):
-    """e^u."""
-    return exp(u[0]), exp(u[1])
+def _all(u):
+    return u
+
+
+def _rising(function, part=_all):
+    """A rising function of the part of an interval where it is defined."""
+
+    @jit
+    def of_interval(u):
+        low, high = part(u)
+        return function(low), function(high)
+
+    return of_interval
+
+
+of_sqrt, of_log = _rising(sqrt, above), _rising(log, above)
+of_exp, of_arcsin = _rising(exp), _rising(arcsin, within_one)
 
 
 @jit
-def of_log(u):
-    """ln u."""
-    low, high = above(u)
-    return log(low), log(high)
+def of_arccos(u):
+    """arccos u."""
+    low, high = within_one(u)
+    return arccos(high), arccos(low)
 
 
 @jit
@@ -126,26 +139,6 @@ def _of_wave(wide, low, high, low_slope, high_slope):
     bottom = (low_slope <= 0.0) & (high_slope >= 0.0)
     least_of, most_of = least(low, high), most(low, high)
     return where(bottom | not_(short), 0.0 * wide - 1.0, least_of), where(top | not_(short), 0.0 * wide + 1.0, most_of)
-
-
-@jit
-def within_one(u):
-    """The part of an interval in [-1, 1]; NaN stays."""
-    return where(u[0] < -1.0, -1.0, u[0]), where(u[1] > 1.0, 1.0, u[1])
-
-
-@jit
-def of_arcsin(u):
-    """arcsin u."""
-    low, high = within_one(u)
-    return arcsin(low), arcsin(high)
-
-
-@jit
-def of_arccos(u):
-    """arccos u."""
-    low, high = within_one(u)
-    return arccos(high), arccos(low)
 
 
 @jit

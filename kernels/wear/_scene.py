@@ -132,19 +132,7 @@ PARAMETERS = (
 Machine = namedtuple("Machine", [field.name for field in PARAMETERS])
 
 EXAMPLE = linkage.EXAMPLE | {
-    "omega": 2.0,
-    "b_angle": -0.66,
-    "L": 0.5,
-    "beta": 0.0,
-    "w_x": 0.5,
-    "w_y": 0.0,
-    "Omega": 0.8,
-    "tool_a": 0.06,
-    "tool_b": 0.06,
-    "tool_n": 2.0,
-    "tool_m": 2.0,
-    "preston": 1e-13,
-    "pressure": 7000.0,
-    "load": 0.0,
+    "omega": 2.0, "b_angle": -0.66, "L": 0.5, "beta": 0.0, "w_x": 0.5, "w_y": 0.0, "Omega": 0.8, "tool_a": 0.06,
+    "tool_b": 0.06, "tool_n": 2.0, "tool_m": 2.0, "preston": 1e-13, "pressure": 7000.0, "load": 0.0,
     "workpiece_radius": 0.0,
-}
+}  # fmt: skip
