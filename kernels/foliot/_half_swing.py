@@ -22,9 +22,11 @@ from typing import NamedTuple
 
 from kernels.integrate.tableaux import DOPRI5, DOPRI5_ERROR
 from kernels.lanes.jit import jit, jit_call, jit_inline
-from kernels.lanes.tuples import after
+from kernels.lanes.symbols import symbolic
+from kernels.lanes.tuples import after, joined, times
 from kernels.lanes.vectors import any_lane, choose, exponent, fma, magnitude, nearest, not_, pow2, sqrt, where
 from kernels.maths.elementary import LN2, exp, larger, power, sincos, smaller
+from kernels.maths.roots import bisected
 
 SDIRK4 = (
     (1 / 2,),
@@ -94,17 +96,15 @@ class Problem(NamedTuple):
 
 
 class Law(NamedTuple):
-    """The right-hand side of (1) from a reversal to the next: sign of the speed, constant force, and terms."""
+    """The right-hand side of (1) from a reversal to the next: sign of the speed, constant force, floor, and terms.
+
+    Below the speed `floor` power-law friction is constant.
+    """
 
     side: float
     steady: float
-    d: float
-    gamma: float
-    n: float
     floor: float
-    kappa: float
-    depth: float
-    wave: float
+    problem: Problem
 
 
 class Leg(NamedTuple):
@@ -176,15 +176,6 @@ def _ripple(x, depth, wave):
     return depth * cosine, depth * wave * sine
 
 
-@jit_call
-def _drag(speed, gamma, n, floor):
-    """gamma speed^n and its slope, n > 0, taken as constant below the speed `floor`."""
-    within = speed > floor
-    speed = where(within, speed, floor)
-    slope = gamma * power(speed, n - 1.0)
-    return slope * speed, where(within, n * slope, 0.0)
-
-
 @jit
 def pull(x, problem):
     """Force of torque and spring towards the switch, tau + kappa x, less 1."""
@@ -206,13 +197,15 @@ def _held_at(problem, speed):
 @jit
 def _force(x, v, law):
     """Force towards the switch with that of friction; tau - 1; the slopes of the force by x and by v."""
-    extra, by_x, lost, by_v = 0.0 * x, 0.0 * x, 0.0 * x, 0.0 * x
-    if any_lane(law.depth > 0.0):
-        extra, by_x = _ripple(x, law.depth, law.wave)
-    if any_lane(law.gamma > 0.0):
-        lost, by_v = _drag(magnitude(v), law.gamma, law.n, law.floor)
-    force = fma(law.kappa, x, law.steady + extra) + fma(law.d, v, law.side * lost)
-    return force, extra, law.kappa + by_x, law.d + by_v
+    problem, (extra, by_x, lost, by_v) = law.problem, (0.0 * x, 0.0 * x, 0.0 * x, 0.0 * x)
+    if any_lane(problem.depth > 0.0):
+        extra, by_x = _ripple(x, problem.depth, problem.wave)
+    if any_lane(problem.gamma > 0.0):
+        within, speed = magnitude(v) > law.floor, larger(magnitude(v), law.floor)
+        slope = problem.gamma * power(speed, problem.n - 1.0)
+        lost, by_v = slope * speed, where(within, problem.n * slope, 0.0)
+    force = fma(problem.kappa, x, law.steady + extra) + fma(problem.d, v, law.side * lost)
+    return force, extra, problem.kappa + by_x, problem.d + by_v
 
 
 @jit
@@ -227,8 +220,7 @@ def rates(state, law):
 @jit
 def inwards(problem, floor):
     """The law of the leg behind the turning point."""
-    d, gamma, n, kappa, depth, wave = problem.d, problem.gamma, problem.n, problem.kappa, problem.depth, problem.wave
-    return Law(0.0 * d - 1.0, problem.inwards, d, gamma, n, floor, kappa, depth, wave)
+    return Law(0.0 * floor - 1.0, problem.inwards, floor, problem)
 
 
 @jit
@@ -256,9 +248,8 @@ def dopri5_step(state, first, law, h, scales):
     k4 = rates(after(state, h, DOPRI5[3], (first, k1, k2, k3)), law)
     k5 = rates(after(state, h, DOPRI5[4], (first, k1, k2, k3, k4)), law)
     new = after(state, h, DOPRI5[5], (first, k2, k3, k4, k5))
-    last, nothing = rates(new, law), 0.0 * h
-    zeros = (nothing, nothing, nothing, nothing, nothing, nothing, nothing)
-    errors = after(zeros, h, DOPRI5_ERROR, (first, k2, k3, k4, k5, last))
+    last = rates(new, law)
+    errors = after(times(0.0, state), h, DOPRI5_ERROR, (first, k2, k3, k4, k5, last))
     return new, last, _worst(state, errors, scales)
 
 
@@ -298,11 +289,10 @@ def sdirk4_step(state, first, law, h, scales):
     k3, c3 = _stage(after(state, h, SDIRK4[2], (k0, k1, k2)), k2[0], law, g)
     base = after(state, h, SDIRK4[3], (k0, k1, k2, k3))
     k4, c4 = _stage(base, k3[0], law, g)
-    new, nothing = after(base, g, (1.0,), (k4,)), 0.0 * h
+    new = after(base, g, (1.0,), (k4,))
     left = larger(larger(magnitude(c0), magnitude(c1)), larger(larger(magnitude(c2), magnitude(c3)), magnitude(c4)))
-    zeros = (nothing, nothing, nothing, nothing, nothing, nothing, nothing)
-    e_x, e_v, e_mu, e_v_mu, e_start, e_v_start, e_decay = after(zeros, h, SDIRK4_ERROR, (k0, k1, k2, k4))
-    errors = (e_x, magnitude(e_v) + left, e_mu, e_v_mu, e_start, e_v_start, e_decay)
+    errors = after(times(0.0, state), h, SDIRK4_ERROR, (k0, k1, k2, k4))
+    errors = joined((errors[0], magnitude(errors[1]) + left), errors[2:])
     return new, k4, _worst(state, errors, scales)
 
 
@@ -350,8 +340,7 @@ def _to_end(step, state, law, leg, h, tolerance, active):
         passed = accepted & (_left(new, 0.0, law, leg)[0] <= 0.0)
         moving = moving & not_(passed)
         accepted = accepted & moving
-        state, first = choose(accepted, new, state), choose(accepted, last, first)
-        t = where(accepted, t + h, t)
+        state, first, t = choose(accepted, (new, last, t + h), (state, first, t))
         most = where(accepted, _longest(new[1], last[1], leg), h)
 
         # the next step: 0.9 ratio^(-1/5) of this one, from 0.2 to 5
@@ -376,27 +365,20 @@ def _to_end(step, state, law, leg, h, tolerance, active):
         guess = where(settled | ((guess > low) & (guess < high)), guess, 0.5 * (low + high))
         shorter = where(searching, guess, shorter)
         trial, rates_there, _ = step(state, first, law, shorter, leg.scales)
-        new, last = choose(searching, trial, new), choose(searching, rates_there, last)
+        new, last = choose(searching, (trial, rates_there), (new, last))
         searching = searching & not_(settled)
     return choose(active, new, state), t + where(active, shorter, 0.0), h, moving
 
 
-@jit
+@symbolic
 def _moved(state, law, steady, time):
     """The state after a time over which accelerations are constant, under the constant force `steady`, without drag."""
-    x, v, x_mu, v_mu, x_start, v_start, decay = state
-    bare = Law(law.side, steady, law.d, 0.0 * x, law.n, law.floor, law.kappa, law.depth, law.wave)
-    _, force, _, by_mu, _, by_start, slope = rates(state, bare)
-    half = 0.5 * time
-    return (
-        fma(time, fma(half, force, v), x),
-        fma(time, force, v),
-        fma(time, fma(half, by_mu, v_mu), x_mu),
-        fma(time, by_mu, v_mu),
-        fma(time, fma(half, by_start, v_start), x_start),
-        fma(time, by_start, v_start),
-        fma(time, slope, decay),
-    )
+    bare = law.problem._replace(gamma=0.0 * law.problem.gamma)
+    rate, half = rates(state, law._replace(steady=steady, problem=bare)), 0.5 * time
+    ways = (fma(time, fma(half, rate[j + 1], state[j + 1]), state[j]) for j in (0, 2, 4))
+    speeds = (fma(time, rate[j], state[j]) for j in (1, 3, 5))
+    (x, x_mu, x_start), (v, v_mu, v_start) = ways, speeds
+    return x, v, x_mu, v_mu, x_start, v_start, fma(time, rate[6], state[6])
 
 
 @jit
@@ -435,15 +417,18 @@ def _released(x, slack, problem):
         if not any_lane(searching):
             break
         there = x - (i + 1.0) * step
-        found = searching & (slack + pull(there, problem) > 0.0)
+        found = searching & _wins(there, (slack, problem))
         held = where(searching & not_(found), there, held)
         free = where(found & (there > -1.0), there, free)
         searching = searching & not_(found)
-    for _ in range(_BISECTIONS):
-        middle = 0.5 * (held + free)
-        wins = slack + pull(middle, problem) > 0.0
-        held, free = where(wins, held, middle), where(wins, middle, free)
-    return free
+    return bisected(_wins, held, free, (slack, problem), _BISECTIONS)
+
+
+@jit
+def _wins(x, scene):
+    """Whether the drive wins over dry friction at x."""
+    slack, problem = scene
+    return slack + pull(x, problem) > 0.0
 
 
 @jit_inline
@@ -477,12 +462,11 @@ def half_swing(step, start, problem, tolerance, active):
             break
         behind, jumped, there, there_by_start, spent = _turned(state, falling, slow, problem)
         forgotten = where(turning & not_(varied), state[6] + _FORGOTTEN, forgotten)
-        state, jump = choose(turning, behind, state), where(turning, jumped, jump)
-        top, top_by_start = where(turning, there, top), where(turning, there_by_start, top_by_start)
-        time = where(turning, time + spent, time)
+        turned, old = (behind, jumped, there, there_by_start, time + spent), (state, jump, top, top_by_start, time)
+        state, jump, top, top_by_start, time = choose(turning, turned, old)
 
         side, steady = where(rising, 1.0, falling.side), where(rising, problem.outwards, problem.inwards)
-        law = Law(side, steady, problem.d, problem.gamma, problem.n, floor, problem.kappa, problem.depth, problem.wave)
+        law = Law(side, steady, floor, problem)
         stop = where(rising, smaller(slow, 0.5 * start), zero)
         leg = Leg(stop, forgotten, problem.stiffness, slow, scales)
         state, spent, h, late = _to_end(step, state, law, leg, h, tolerance, moving)
@@ -498,7 +482,7 @@ def half_swing(step, start, problem, tolerance, active):
             coast = -(x + 1.0) / v
             moved = (fma(coast, v_mu, x_mu), v_mu, fma(coast, v_start, x_start), v_start, fma(coast, slope, decay))
             at_switch = (zero - 1.0, v, *moved)
-            state, time = choose(uniform, at_switch, state), where(uniform, time + coast, time)
+            state, time = choose(uniform, (at_switch, time + coast), (state, time))
         stopped = inward & (state[0] + 1.0 > _ARRIVED + _ROUNDED * top)
         if any_lane(stopped):
             free = _released(state[0], problem.inwards - _held_at(problem, floor), problem)

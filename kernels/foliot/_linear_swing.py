@@ -22,8 +22,9 @@ from kernels.foliot._units import Cycle, errors
 from kernels.integrate import linear_flow
 from kernels.lanes.codes import NO_METHOD, NOT_CONVERGED, NOT_SELF_STARTING, OK, STICKS
 from kernels.lanes.jit import jit, jit_call
-from kernels.lanes.vectors import any_lane, fma, magnitude, not_, sqrt, where
-from kernels.maths.elementary import exp, expm1
+from kernels.lanes.vectors import fma, magnitude, sqrt, where
+from kernels.maths.elementary import exp, expm1, larger
+from kernels.maths.roots import in_bracket
 
 NEWTON_LIMIT = 100
 """Newton steps or bisections on the map of E; about eight are usual."""
@@ -94,11 +95,18 @@ def _end(scene, legs):
 
 @jit_call
 def slopes(scene, start, legs):
-    """dE_1/dE_0 and dT/dv_0 of (5), of a half swing that began with the speed `start` after the switch."""
-    rises, back = start > 0.0, _back(scene, legs)
+    """dE_1/dE_0 of a half swing that began with the speed `start`; dT by abs(start), and the size of its terms.
+
+    By (3), and for e > 0 by (2), with d for a change by that of the speed:
+        dA = S1,  dt1 = S1'/back,  dg2 = kappa dA,  dt2 = (dA - C2 dg2)/v.
+    """
+    rises, back = scene.e > 0.0, _back(scene, legs)
     kept = exp(-scene.d * legs.time) * where(rises, legs.g2 / back, 1.0)
-    rising = legs.slope1 / back + legs.s1 * (1.0 - scene.kappa * legs.c2) / legs.speed
-    return kept, where(rises, rising, legs.s2 / legs.speed)
+    push = scene.kappa * legs.s1
+    longer = where(rises, legs.slope1 / back + (legs.s1 - legs.c2 * push) / legs.speed, -legs.s2 / legs.speed)
+    of_push = scene.kappa * magnitude(legs.s1)
+    rising = magnitude(legs.slope1) / back + (magnitude(legs.s1) + magnitude(legs.c2) * of_push) / legs.speed
+    return kept, longer, where(rises, rising, magnitude(legs.s2) / legs.speed)
 
 
 @jit
@@ -110,16 +118,12 @@ def own_noise(scene, start, legs):
 
 
 @jit
-def _area(scene, legs):
-    """dE_1/dE_0 by (3), and 1 minus e^2 times it, with its digits where that is small."""
-    d, e, back = scene.d, scene.e, _back(scene, legs)
-    rises = e > 0.0
-    ratio = where(rises, legs.g2 / back, 1.0)
-    shrink = where(rises, 2.0 * scene.rho / back, 0.0)  # 1 - ratio
-    lost = (1.0 - e) * (1.0 + e)
-    kept = -expm1(-d * legs.time)
-    rest = lost + e * e * (kept + (1.0 - kept) * shrink)
-    return exp(-d * legs.time) * ratio, rest
+def _lost(scene, legs):
+    """1 minus e^2 times dE_1/dE_0, with its digits where that is small."""
+    e, back = scene.e, _back(scene, legs)
+    shrink = where(e > 0.0, 2.0 * scene.rho / back, 0.0)  # 1 - g2/back
+    kept = -expm1(-scene.d * legs.time)
+    return (1.0 - e) * (1.0 + e) + e * e * (kept + (1.0 - kept) * shrink)
 
 
 @jit_call
@@ -142,68 +146,56 @@ def _turn(scene, energy):
 
 
 @jit_call
-def _variation(scene, balanced, legs, start, dstart, dmu):
-    """Changes of E_1 and of the time, (dE_1, dT), by those of the speed after the switch and of the torque; and sizes.
+def _by_torque(scene, balanced, legs, start):
+    """Changes of E_1 and of the time by that of the torque alone, and the sizes of their terms.
 
-    By (2), with E_1 = v^2/2 or by (4), and d for a change, g for the push behind the turning point:
-        dA = S1 du - C1 dmu,  dt1 = (S1' du - S1 dmu)/back,  dg = kappa dA + dmu,
-        dt2 = (dA - C2 dg - S2 ddown)/v,  dv = S2' ddown + S2 dg + v' dt2,
-        dJ1 = 2 back (J1/back^2) dg + u^2 dt1,  dJ2 = 2 g2 (J2/g2^2) dg + v^2 dt2.
-    The sizes, of dE_1 and of dT, are the sums of the magnitudes of the terms in these: the changes round so.
+    By (2), with E_1 = v^2/2 or by (4), and d for a change by that of mu, g for the push behind the turning point:
+        dA = -C1,  dt1 = -S1/back,  dg = kappa dA + 1,  dt2 = (dA - C2 dg)/v,  dv = S2 dg + v' dt2,
+        dJ1 = 2 back (J1/back^2) dg + u^2 dt1,  dJ2 = 2 g2 (J2/g2^2) dg + v^2 dt2,
+    where dA = dt1 = 0 for e < 0. The sizes are the sums of the magnitudes of the terms: the changes round so.
     """
     d, rho, kappa = scene.d, scene.rho, scene.kappa
-    s1, c1, slope1, s2, c2, slope2 = legs.s1, legs.c1, legs.slope1, legs.s2, legs.c2, legs.slope2
     rises, back, speed, end = scene.e > 0.0, _back(scene, legs), legs.speed, _end(scene, legs)
-    by_mu, ddown = magnitude(dmu), where(rises, 0.0, dstart)
-    dtop = where(rises, fma(s1, dstart, -c1 * dmu), 0.0)
-    of_top = where(rises, magnitude(s1 * dstart) + magnitude(c1 * dmu), 0.0)
-    dt1 = where(rises, fma(slope1, dstart, -s1 * dmu) / back, 0.0)
-    of_t1 = where(rises, (magnitude(slope1 * dstart) + magnitude(s1 * dmu)) / back, 0.0)
-    dg, of_g = fma(kappa, dtop, dmu), fma(kappa, of_top, by_mu)
-    dt2 = (dtop - c2 * dg - s2 * ddown) / speed
-    of_t2 = (of_top + magnitude(c2) * of_g + magnitude(s2 * ddown)) / speed
-    dspeed = fma(slope2, ddown, fma(s2, dg, end * dt2))
-    of_speed = magnitude(slope2 * ddown) + magnitude(s2) * of_g + magnitude(end) * of_t2
+    dtop, dt1 = where(rises, -legs.c1, 0.0), where(rises, -legs.s1 / back, 0.0)
+    of_top, of_t1 = magnitude(dtop), magnitude(dt1)
+    dg, of_g = fma(kappa, dtop, 1.0), fma(kappa, of_top, 1.0)
+    dt2, of_t2 = (dtop - legs.c2 * dg) / speed, (of_top + magnitude(legs.c2) * of_g) / speed
+    dspeed, of_speed = fma(legs.s2, dg, end * dt2), magnitude(legs.s2) * of_g + magnitude(end) * of_t2
 
-    loss1, loss2 = linear_flow.loss(-0.5 * d, kappa, legs.t1), linear_flow.loss(0.5 * d, kappa, legs.t2)
-    by_g1, by_g2 = 2.0 * back * loss1, 2.0 * legs.g2 * loss2
-    dloss1, dloss2 = by_g1 * dg + start * start * dt1, by_g2 * dg + speed * speed * dt2
-    of_loss = magnitude(by_g1 + by_g2) * of_g + start * start * of_t1 + speed * speed * of_t2
-    work = start * dstart + 2.0 * dmu - 2.0 * rho * dtop - d * (dloss1 + dloss2)
-    of_work = start * magnitude(dstart) + 2.0 * by_mu + 2.0 * rho * of_top + d * of_loss
+    by_g1 = 2.0 * back * linear_flow.loss(-0.5 * d, kappa, legs.t1)
+    by_g2 = 2.0 * legs.g2 * linear_flow.loss(0.5 * d, kappa, legs.t2)
+    losses = by_g1 * dg + start * start * dt1 + (by_g2 * dg + speed * speed * dt2)
+    of_losses = magnitude(by_g1 + by_g2) * of_g + start * start * of_t1 + speed * speed * of_t2
+    work, of_work = 2.0 - 2.0 * rho * dtop - d * losses, 2.0 + 2.0 * rho * of_top + d * of_losses
     gain, of_gain = where(balanced, work, speed * dspeed), where(balanced, of_work, speed * of_speed)
-    return (gain, dt1 + dt2), (of_gain, of_t1 + of_t2)
+    return gain, dt1 + dt2, of_gain, of_t1 + of_t2
+
+
+@jit
+def _gain(energy, scene):
+    """Whether a half swing gains energy, Newton's step to where it repeats, and the one that is the last.
+
+    Where it sticks the search ends.
+    """
+    gain, noise, _, legs = _turn(scene, energy)
+    lost = _lost(scene, legs)
+    step, near = where(legs.comes, gain / lost, 0.0), larger(1e-10 * energy, noise / lost)
+    return gain > 0.0, step, where(legs.comes, near, math.inf)
 
 
 @jit_call
 def segments(scene, rtol):
     """The cycle, the relative errors of its outputs whatever rtol, and its verdict."""
     # the energy before the switch, by Newton from rest: a half swing's gain falls with E, which makes a bracket
-    energy = 0.0 * scene.d
-    low, high = energy, energy + 1e308
-    active = energy < 1.0
-    comes = active
-    for _ in range(NEWTON_LIMIT):
-        if not any_lane(active):
-            break
-        gain, noise, _, legs = _turn(scene, energy)
-        comes = comes & (legs.comes | not_(active))
-        active = active & legs.comes
-        _, rest = _area(scene, legs)
-        low, high = where(gain > 0.0, energy, low), where(gain > 0.0, high, energy)
-        guess = energy + gain / rest
-        guess = where((guess >= low) & (guess <= high), guess, 0.5 * (low + high))
-        change = magnitude(guess - energy)
-        settled = (change <= 1e-10 * energy) | (change * rest <= noise)
-        energy = where(active, guess, energy)
-        active = active & not_(settled)
+    rest = 0.0 * scene.d
+    energy, active = in_bracket(_gain, rest, rest, rest + 1e308, rest < 1.0, scene, NEWTON_LIMIT)
     _, noise, balanced, legs = _turn(scene, energy)
-    area, rest = _area(scene, legs)
+    rest = _lost(scene, legs)
 
     # s = -dlnP/dlnmu of the fixed point E_1(E, mu) = E; the sizes of its terms, and of the terms of those; dlnT/dlnE
     start, time = magnitude(scene.e) * sqrt(2.0 * energy), legs.time
-    (gain, longer), (of_gain, of_longer) = _variation(scene, balanced, legs, start, 0.0 * start, 0.0 * start + 1.0)
-    (_, by_start), (_, of_start) = _variation(scene, balanced, legs, start, 0.0 * start + 1.0, 0.0 * start)
+    gain, longer, of_gain, of_longer = _by_torque(scene, balanced, legs, start)
+    area, by_start, of_start = slopes(scene, start, legs)
     by_gain = magnitude(scene.e) / sqrt(2.0 * energy) / rest
     chain = by_start * (by_gain * gain)
     of_chain = magnitude(by_start) * (by_gain * of_gain)
@@ -225,7 +217,7 @@ def segments(scene, rtol):
     verdict = where((scene.rho_s < 1.0) & starts, OK, NOT_SELF_STARTING)
     verdict = where(active, NOT_CONVERGED, verdict)
     passes = (scene.e < 0.0) | (1.0 + scene.kappa * legs.top > scene.rho_s)  # nothing rests where e < 0
-    verdict = where(comes & (energy > 0.0) & passes, verdict, STICKS)
+    verdict = where(legs.comes & (energy > 0.0) & passes, verdict, STICKS)
     verdict = where(scene.d < _STIFFEST, verdict, NO_METHOD)
     cycle = Cycle(time, legs.top, sqrt(2.0 * energy), s, scene.e * scene.e * area)
     return cycle, errors(loose_cycle, loose_s, loose_m), verdict

@@ -148,7 +148,7 @@ def _run(first, seed, half_swings, clock, speed, active, radii, turns, radii_apa
                 new, newer, goes_on = _beat(run, averages, z, z_apart, clock)
                 stopped = stopped | (active & not_(goes_on))
                 active = active & goes_on
-                run, averages = choose(active, new, run), choose(active, newer, averages)
+                run, averages = choose(active, (new, newer), (run, averages))
     return run, averages, stopped
 
 
@@ -188,7 +188,7 @@ def segments(first, columns, radii, turns, radii_apart, turns_apart):
     # error of the rate as a fraction: of each half swing, and of all that they pass on
     start = e * cycle.speed
     legs = _linear_swing.half_swing(1.0, scene, start)
-    kept, longer = _linear_swing.slopes(scene, start, legs)
+    kept, longer, _ = _linear_swing.slopes(scene, start, legs)
     energy, late = _linear_swing.own_noise(scene, start, legs)
     passed_on = energy / (cycle.speed * cycle.speed * (1.0 - e * e * kept))
     accurate = (late + magnitude(longer * start) * passed_on) / cycle.half_period <= columns.rtol[i]

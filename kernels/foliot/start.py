@@ -99,7 +99,7 @@ def _next(scene, flip):
     legs = _linear_swing.half_swing(1.0, scene, start)
     held, unsure = _held(scene, legs.top)
     turns = not_(start < 0.0)
-    kept, longer = _linear_swing.slopes(scene, start, legs)
+    kept, longer, _ = _linear_swing.slopes(scene, start, legs)
     energy_noise, time_noise = _linear_swing.own_noise(scene, start, legs)
     wrong = fma(kept * start * start, flip.wrong, energy_noise) / (legs.speed * legs.speed)
     late = flip.late + magnitude(longer * start) * flip.wrong + time_noise
