@@ -212,7 +212,8 @@ def _way(y, scene):
     rate = fma(lost, F1, M1) / (v_slope * (F1 + M1))
     stretch = where(z > 1e-300, z / where(z > 1e-300, far, 1.0), 1.0)
     excess, slope = fma(2.0, log_v1, log(0.5 * total)), stretch * rate / total
-    return excess < 0.0, -excess / slope, SETTLED
+    step = -excess / slope
+    return excess < 0.0, step, fma(0.0, step, SETTLED)  # no step is near that is no number
 
 
 @jit_call

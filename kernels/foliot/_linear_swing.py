@@ -175,11 +175,11 @@ def _by_torque(scene, balanced, legs, start):
 def _gain(energy, scene):
     """Whether a half swing gains energy, Newton's step to where it repeats, and the one that is the last.
 
-    Where it sticks the search ends.
+    Where it sticks the search ends at 0.
     """
     gain, noise, _, legs = _turn(scene, energy)
     lost = _lost(scene, legs)
-    step, near = where(legs.comes, gain / lost, 0.0), larger(1e-10 * energy, noise / lost)
+    step, near = where(legs.comes, gain / lost, -energy), larger(1e-10 * energy, noise / lost)
     return gain > 0.0, step, where(legs.comes, near, math.inf)
 
 
@@ -217,7 +217,7 @@ def segments(scene, rtol):
     verdict = where((scene.rho_s < 1.0) & starts, OK, NOT_SELF_STARTING)
     verdict = where(active, NOT_CONVERGED, verdict)
     passes = (scene.e < 0.0) | (1.0 + scene.kappa * legs.top > scene.rho_s)  # nothing rests where e < 0
-    verdict = where(legs.comes & (energy > 0.0) & passes, verdict, STICKS)
+    verdict = where((energy > 0.0) & passes, verdict, STICKS)
     verdict = where(scene.d < _STIFFEST, verdict, NO_METHOD)
     cycle = Cycle(time, legs.top, sqrt(2.0 * energy), s, scene.e * scene.e * area)
     return cycle, errors(loose_cycle, loose_s, loose_m), verdict
