@@ -51,4 +51,4 @@ def modulus(re, im):
 @jit_call
 def argument(re, im):
     """The angle of re + i im in [-pi, pi), for re + i im not 0."""
-    return -arctan2(-im, re)
+    return 0.0 - arctan2(-im, re)
