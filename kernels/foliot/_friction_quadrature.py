@@ -190,7 +190,7 @@ def _solve(scene, terminal):
     y = log(exp(strong) + 2.0 * fma(n, G, D) * exp(-log_V))
     y = where((y > -_WIDEST) & (y < _WIDEST), y, 0.0)
     low, high = 0.0 * y - _WIDEST, 0.0 * y + _WIDEST
-    return in_bracket(_way, y, low, high, y > low, (scene, terminal), NEWTON_LIMIT)
+    return in_bracket(_way, y, low, high, y > low, (scene, terminal), NEWTON_LIMIT, SETTLED)
 
 
 @jit

@@ -175,12 +175,12 @@ def _by_torque(scene, balanced, legs, start):
 def _gain(energy, scene):
     """Whether a half swing gains energy, Newton's step to where it repeats, and the one that is the last.
 
-    Where it sticks the search ends at 0.
+    Where it sticks the search ends.
     """
     gain, noise, _, legs = _turn(scene, energy)
     lost = _lost(scene, legs)
-    step, near = where(legs.comes, gain / lost, -energy), larger(1e-10 * energy, noise / lost)
-    return gain > 0.0, step, where(legs.comes, near, math.inf)
+    near = larger(1e-10 * energy, noise / lost)
+    return gain > 0.0, gain / lost, where(legs.comes, near, -1.0)
 
 
 @jit_call
@@ -188,7 +188,7 @@ def segments(scene, rtol):
     """The cycle, the relative errors of its outputs whatever rtol, and its verdict."""
     # the energy before the switch, by Newton from rest: a half swing's gain falls with E, which makes a bracket
     rest = 0.0 * scene.d
-    energy, active = in_bracket(_gain, rest, rest, rest + 1e308, rest < 1.0, scene, NEWTON_LIMIT)
+    energy, active = in_bracket(_gain, rest, rest, rest + 1e308, rest < 1.0, scene, NEWTON_LIMIT, -1.0)
     _, noise, balanced, legs = _turn(scene, energy)
     rest = _lost(scene, legs)
 
@@ -217,7 +217,7 @@ def segments(scene, rtol):
     verdict = where((scene.rho_s < 1.0) & starts, OK, NOT_SELF_STARTING)
     verdict = where(active, NOT_CONVERGED, verdict)
     passes = (scene.e < 0.0) | (1.0 + scene.kappa * legs.top > scene.rho_s)  # nothing rests where e < 0
-    verdict = where((energy > 0.0) & passes, verdict, STICKS)
+    verdict = where(legs.comes & (energy > 0.0) & passes, verdict, STICKS)
     verdict = where(scene.d < _STIFFEST, verdict, NO_METHOD)
     cycle = Cycle(time, legs.top, sqrt(2.0 * energy), s, scene.e * scene.e * area)
     return cycle, errors(loose_cycle, loose_s, loose_m), verdict

@@ -23,11 +23,11 @@ def by_steps(trial, x, active, scene, limit):
 
 
 @jit
-def in_bracket(trial, x, low, high, active, scene, limit):
+def in_bracket(trial, x, low, high, active, scene, limit, beyond):
     """The root between `low` and `high` by Newton's steps from x, bisections where they leave the bracket; as above.
 
-    trial(x, scene) -> below, step, near : whether the root is above x; x + step comes next, if in the bracket or nearer
-        than `near`; the search ends with a step as near
+    trial(x, scene) -> below, step, near : whether the root is above x; x + step comes next, if it is in the bracket, or
+        no longer than `beyond`; the search ends with a step as short as `near`, and where it is for one below 0
     """
     for _ in range(limit):
         if not any_lane(active):
@@ -35,9 +35,9 @@ def in_bracket(trial, x, low, high, active, scene, limit):
         below, step, near = trial(x, scene)
         low, high = where(below, x, low), where(below, high, x)
         new = x + step
-        own = (magnitude(step) < near) | ((new >= low) & (new <= high))
+        own = (magnitude(step) <= beyond) | ((new >= low) & (new <= high))
         new = where(own, new, 0.5 * (low + high))
-        last = magnitude(new - x) <= near
+        last, active = magnitude(new - x) <= near, active & not_(near < 0.0)
         x, active = where(active, new, x), active & not_(last)
     return x, active
 
