@@ -21,7 +21,7 @@ from typing import NamedTuple
 from kernels.foliot._units import Cycle, errors
 from kernels.integrate import linear_flow
 from kernels.lanes.codes import NO_METHOD, NOT_CONVERGED, NOT_SELF_STARTING, OK, STICKS
-from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.jit import jit, jit_apart, jit_call
 from kernels.lanes.vectors import fma, magnitude, sqrt, where
 from kernels.maths.elementary import exp, expm1, larger
 from kernels.maths.roots import in_bracket
@@ -93,7 +93,7 @@ def _end(scene, legs):
     return fma(legs.g2, legs.slope2, -legs.down * fma(scene.d, legs.slope2, scene.kappa * legs.s2))
 
 
-@jit_call
+@jit_apart
 def slopes(scene, start, legs):
     """dE_1/dE_0 of a half swing that began with the speed `start`; dT by abs(start), and the size of its terms.
 
@@ -126,7 +126,7 @@ def _lost(scene, legs):
     return (1.0 - e) * (1.0 + e) + e * e * (kept + (1.0 - kept) * shrink)
 
 
-@jit_call
+@jit_apart
 def _turn(scene, energy):
     """E_1 - E of a half swing from the energy E before the switch, its noise, if by (4), and the half swing.
 
@@ -145,7 +145,7 @@ def _turn(scene, energy):
     return where(balanced, work, after - energy), noise, balanced, legs
 
 
-@jit_call
+@jit_apart
 def _by_torque(scene, balanced, legs, start):
     """Changes of E_1 and of the time by that of the torque alone, and the sizes of their terms.
 
@@ -183,7 +183,7 @@ def _gain(energy, scene):
     return gain > 0.0, gain / lost, where(legs.comes, near, -1.0)
 
 
-@jit_call
+@jit_apart
 def segments(scene, rtol):
     """The cycle, the relative errors of its outputs whatever rtol, and its verdict."""
     # the energy before the switch, by Newton from rest: a half swing's gain falls with E, which makes a bracket
