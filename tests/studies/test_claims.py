@@ -80,7 +80,7 @@ TABLE = {
     "law_any_swing": Claims({"law_any_swing": {}}, "status", 1),
     "law_map": Claims({"law_map": {"e": [1, 0.99, 0.5], "R": [0, 1, 100], "c": [0, 1e-6, 1], "mu": 2}}, "status"),
     "law_map_overnight": Claims({
-        "law_map_overnight": {"n": [0.25, 1.5, 3.0], "e": [1, 0.99, 0.97, 0.5], "R": 3, "c": 10},
+        "law_map_overnight": {"n": [0.25, 1.5, 3.0], "e": [1, 0.99, 0.97, 0.5], "R": 3, "c": 20},
         "law_map_borders": {},
     }, "sensitivity_max law_map_borders.amplitude law_map_borders.crossing_speed", 2),
     "losses_from_periods": Claims({"losses_from_periods": {}}, "", 7, tell=False),

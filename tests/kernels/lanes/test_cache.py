@@ -180,11 +180,15 @@ def test_what_is_written_for_a_scene_of_ones_own_is_compiled_once(scene_kept):
 
 @pytest.fixture(scope="module")
 def compiled_again():
-    """For each kernel what a second process compiles."""
+    """For each kernel what a process compiles, or a second one where the first had to."""
     command = [sys.executable, "-W", "error", ROOT / "tests" / "helpers" / "compiling.py", *KERNELS, "own_scene:KERNEL"]
-    first, second = (subprocess.run(command, cwd=ROOT, capture_output=True, text=True) for _ in range(2))
-    assert first.returncode == second.returncode == 0, first.stderr + second.stderr
-    return json.loads(second.stdout)
+    for _ in range(2):
+        done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        found = json.loads(done.stdout)
+        if not any(found.values()):
+            break
+    return found
 
 
 @pytest.mark.skipif(FOLDER is None, reason="no folder for compiled code")
