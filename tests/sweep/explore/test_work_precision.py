@@ -122,7 +122,7 @@ def test_methods_that_cannot_do_the_study_are_named_as_omitted():
     found = chart(replace(still, outputs=("drop",)))
     assert found.attrs["omissions"] == "narrow does not give drop"
     assert found.method.values.tolist() == ["auto", "exact"]
-    with pytest.raises(sweep.SweepError, match="no method of the kernel"):
+    with pytest.raises(sweep.SweepError, match="no method"):
         chart(stones(narrow))
 
 
@@ -237,7 +237,7 @@ def test_mistakes_are_told(options, word):
 
 
 def test_a_reference_that_solves_nothing_is_told():
-    with pytest.raises(sweep.SweepError, match="none of the cells"):
+    with pytest.raises(sweep.SweepError, match="none of"):
         chart(stones(heights=-HEIGHTS))
 
 

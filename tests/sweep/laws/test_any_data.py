@@ -128,7 +128,7 @@ OF_AN_OUTPUT = (
 )
 def test_what_is_no_output_no_dataset_or_no_study_is_refused(given):
     for fit in OF_AN_OUTPUT:
-        with pytest.raises(sweep.SweepError, match=r"expected one output|expected real numbers"):
+        with pytest.raises(sweep.SweepError, match=r"one output|real numbers"):
             fit(given)
     if not isinstance(given, xr.Dataset):
         for use in (lambda ds: sweep.interpolated(ds, {"x": [1.0]}), lambda ds: sweep.refine(ds, "y", 0.1)):
@@ -139,12 +139,12 @@ def test_what_is_no_output_no_dataset_or_no_study_is_refused(given):
 
 
 def test_a_bound_of_a_result_without_the_output_is_refused():
-    with pytest.raises(sweep.SweepError, match="this Dataset has no "):
+    with pytest.raises(sweep.SweepError, match="Dataset has no "):
         sweep.fit_exponent(LINE, "x", bound=LINE.rename("other").to_dataset())
 
 
 @pytest.mark.parametrize("sigma", [0.0, 1e-20, 1e9, LINE * 0])
 def test_standard_errors_of_nothing_or_beyond_all_sense_are_refused(sigma):
     for fit in (sweep.fit_exponent, sweep.compare_laws):
-        with pytest.raises(sweep.SweepError, match="sigma: expected standard errors"):
+        with pytest.raises(sweep.SweepError, match=r"sigma: .*standard errors"):
             fit(LINE, "x", sigma=sigma)

@@ -94,7 +94,7 @@ def test_an_axis_that_has_no_logarithms_is_refused_with_the_reason(x, dim, messa
 def test_a_fixed_parameter_and_a_dimension_without_values_are_no_axes():
     with pytest.raises(sweep.SweepError, match="one value"):
         sweep.local_exponent(curve(grid(0, 1), grid(0, 1)).assign_coords(a=1.0), "a")
-    with pytest.raises(sweep.SweepError, match="no axis with values"):
+    with pytest.raises(sweep.SweepError, match="no axis"):
         sweep.local_exponent(xr.DataArray(np.ones(5), dims="cell", name="period"), "cell")
 
 

@@ -111,7 +111,7 @@ def test_what_another_program_changed_is_told_and_what_is_left_can_be_read(copy,
         assert changed["drop"].load().attrs["units"] == "m"
         assert changed.attrs.get("comment") == ("mine" if what == "comment" else None)
         if what == "status":
-            with pytest.raises(sweep.SweepError, match="changed by another program"):
+            with pytest.raises(sweep.SweepError, match="another program"):
                 changed.status.load()
 
 
@@ -183,7 +183,7 @@ def test_any_piece_is_right_or_refused(whole, tmp_path, key, cell):
         key.pop("phase", None)
         numbers = plain.fall_time.copy(data=np.arange(CELLS).reshape(3, 11)).isel(key).values
         if cell // BLOCK in np.ravel(numbers) // BLOCK:
-            with pytest.raises(sweep.SweepError, match="fall_time is damaged between"):
+            with pytest.raises(sweep.SweepError, match="fall_time is damaged"):
                 found.fall_time.isel(key).load()
         else:
             assert found.fall_time.isel(key).values.tobytes() == plain.fall_time.isel(key).values.tobytes()

@@ -76,16 +76,16 @@ def test_points_are_compared_by_number():
     a = sweep.run(build(**points))
     assert sweep.diff(a, a.copy()).same
     b = sweep.run(build(design="zip", axes={"height": [1.0, 3.0], "v0": [0.0, 1.0]}))
-    with pytest.raises(sweep.SweepError, match="points along cell are not the same"):
+    with pytest.raises(sweep.SweepError, match="points along cell"):
         sweep.diff(a, b)
 
 
 def test_what_cannot_be_compared_is_refused(result):
-    with pytest.raises(sweep.SweepError, match="summary keeps no cells"):
+    with pytest.raises(sweep.SweepError, match="keeps no cells"):
         sweep.diff(result, sweep.run(build(axes=AXES, summary={})))
     with pytest.raises(sweep.SweepError, match="different kernels"):
         sweep.diff(result, result.assign_attrs(kernel="foliot"))
-    with pytest.raises(sweep.SweepError, match="run along height and v0 in one result and along height in the other"):
+    with pytest.raises(sweep.SweepError, match="height and v0"):
         sweep.diff(result, sweep.run(build(axes={"height": [1.0]})))
 
 

@@ -68,7 +68,7 @@ def test_the_file_alone_suffices_to_run_it_again(stored, tmp_path):
 
 
 def test_an_unfinished_result_is_not_taken_for_a_finished_one_where_that_is_asked(unfinished, stored):
-    with pytest.raises(SweepError, match=r"[12] of 4 blocks"):
+    with pytest.raises(SweepError, match=r"[12] of 4"):
         open_result(unfinished, strict=True)
     open_result(stored, strict=True).close()
 
@@ -152,7 +152,7 @@ def test_what_is_no_path_is_named(given):
 def test_a_name_too_long_for_the_system_is_one_clear_line(tmp_path, letters):
     path = tmp_path / ("a" * letters)
     for action in (open_result, sweep.verify, lambda path: run(stone(), path, progress=False)):
-        with pytest.raises(SweepError, match=r"no such file|File name too long") as told:
+        with pytest.raises(SweepError, match=r"no such|too long") as told:
             action(path)
         assert "\n" not in str(told.value)
     assert not any(tmp_path.iterdir())
@@ -167,7 +167,7 @@ def test_what_is_no_result_is_one_clear_line(tmp_path, name, content, capsys):
     elif content is not None:
         path.write_bytes(content)
     if name == "open_result" or not isinstance(content, bytes):
-        with pytest.raises(SweepError, match=r"foreign\.h5: .*(no such file|folder|damaged)") as told:
+        with pytest.raises(SweepError, match=r"foreign\.h5: .*(no such|folder|damaged)") as told:
             getattr(sweep, name)(path)
         assert "\n" not in str(told.value)
     assert main(["verify", str(path)]) == 2

@@ -166,9 +166,9 @@ def test_where_no_process_can_be_started_the_run_ends_and_no_cell_is_blamed(run_
 
 
 def test_a_kernel_of_which_every_cell_is_bad_is_told_at_once():
-    with pytest.raises(SweepError, match=r"bad:HOPELESS: the kernel failed \(ZeroDivisionError: at"):
+    with pytest.raises(SweepError, match=r"bad:HOPELESS: .*ZeroDivisionError"):
         quiet(tall(50, "bad:HOPELESS"))
-    with pytest.raises(SweepError, match=r"bad:HOPELESS: the kernel failed \(ZeroDivisionError: at"):
+    with pytest.raises(SweepError, match=r"bad:HOPELESS: .*ZeroDivisionError"):
         quiet(tall(50, "bad:HOPELESS"), isolate=True)
 
 

@@ -88,7 +88,7 @@ def test_nothing_is_asked_of_a_cluster_where_nothing_is_left_to_compute(output):
 def test_a_lost_scheduler_is_one_line_and_the_run_continues(output):
     study = tall(1000, "slow:SLOW")
     with served(workers=2) as (address, process):
-        lost = pytest.raises(SweepError, match=r"the scheduler is lost.*run the same command again")
+        lost = pytest.raises(SweepError, match=r"scheduler is lost.*same.command")
         with after_blocks(output, 5, lambda: os.killpg(process.pid, signal.SIGKILL)), lost as told:
             elsewhere(study, output, cluster=address, block_cells=4)
     assert "\n" not in str(told.value)
@@ -126,7 +126,7 @@ def test_an_address_where_nobody_answers_is_one_clear_line(output, where):
 def test_a_worker_with_another_version_refuses(client, output, monkeypatch):
     real = sweep.runs.loop.fingerprint
     monkeypatch.setattr("sweep.runs.loop.fingerprint", lambda study: {**real(study), "source toy": "other"})
-    with pytest.raises(SweepError, match=r"worker on .*versions(.|\n)*source toy"):
+    with pytest.raises(SweepError, match=r"worker.*versions(.|\n)*source toy"):
         elsewhere(tall(3), output, cluster=client)
 
 
@@ -146,7 +146,7 @@ def test_workers_killed_in_the_middle_cost_nothing_but_time(client, output, monk
 
 def test_a_block_of_which_every_worker_dies_ends_the_run_and_is_named(client, output):
     study = tall(60, "slow:LETHAL")
-    with pytest.raises(SweepError, match=r"cells 12 to 13 .*KilledWorker.*isolated"):
+    with pytest.raises(SweepError, match=r"12 to 13.*KilledWorker.*isolated"):
         elsewhere(study, output, cluster=client, block_cells=1, until=datetime.now() + timedelta(seconds=300))
     same(quiet(study, output), quiet(study))  # nobody dies of it here
 

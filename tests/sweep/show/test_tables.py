@@ -69,7 +69,7 @@ def test_laws_of_one_line_are_compared_in_one_window():
 def test_a_number_is_found_to_its_sixth_digit(value):
     dataset = xr.Dataset({"y": ("a", [5.0, 6.0, 7.0])}, {"a": [1.0, 2.0, np.nan]})
     if value in ("1.0000101", "0.999989"):
-        with pytest.raises(SweepError, match="nearest is 1 or 2"):
+        with pytest.raises(SweepError, match="1 or 2"):
             pick(dataset, [f"a={value}"])
     else:
         assert pick(dataset, [f"a={value}"]).y.item() == (7.0 if value == "nan" else 5.0)
@@ -125,6 +125,6 @@ def test_a_log_is_told_line_by_line_until_its_run_ends_or_is_silent_for_ten_minu
     assert len(pauses) == 4
     log.write_text(logged(0))
     pauses.clear()
-    with pytest.raises(SweepError, match="nothing new for 600 s"):
+    with pytest.raises(SweepError, match="for 600 s"):
         list(follow(log.with_suffix(""), sleep))
     assert sum(pauses) == 600

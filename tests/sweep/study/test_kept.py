@@ -139,5 +139,5 @@ def test_json_suffices_to_read_a_study_whose_kernel_is_gone():
 
 @pytest.mark.parametrize("text", ["", "{}", "[]", "null", '{"format": 2}', '{"format": 2, "axes": [{}]}', "\x00"])
 def test_other_json_is_refused(text):
-    with pytest.raises(sweep.SweepError, match="not the JSON of a study"):
+    with pytest.raises(sweep.SweepError, match="not the JSON"):
         Study.from_json(text)

@@ -46,7 +46,7 @@ def test_python_and_toml_give_the_same_study_with_numbers_of_its_own(read):
 def test_a_coordinate_that_counts_takes_the_first_whole_numbers():
     keys = {"kernel": "foliot_start", "axes": {"mu": [1.0]}, "fixed": {"phi0": 1, "a": 1}}
     assert sweep.study(**keys, along={"flip": {"num": 4}}).along["flip"].tolist() == [1.0, 2.0, 3.0, 4.0]
-    with pytest.raises(sweep.StudyError, match="a whole number >= 1"):
+    with pytest.raises(sweep.StudyError, match="whole number >="):
         sweep.study(**keys, along={"flip": [1, 2.5]})
 
 
@@ -217,5 +217,5 @@ def test_a_kernel_beside_the_study_is_found(read, tmp_path):
 
 def test_the_text_of_a_study_is_no_path():
     study = sweep.study(kernel="foliot", outputs=["period"], fixed={"phi0": 1.0, "a": 1.0}, axes={"mu": [0.1, 1.0]})
-    with pytest.raises(sweep.SweepError, match=r"the text of a study, not its path; write .*tomllib\.loads"):
+    with pytest.raises(sweep.SweepError, match=r"not its path.*tomllib\.loads"):
         sweep.study(sweep.to_toml(study))

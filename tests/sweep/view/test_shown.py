@@ -66,7 +66,7 @@ def test_what_is_no_axis_has_no_exponent():
     )
     dataset = sweep.run(study, progress=False)
     assert shown(dataset, Choice("period", "mu")).y.size == 3
-    with pytest.raises(sweep.SweepError, match="mu is no axis"):
+    with pytest.raises(sweep.SweepError, match="mu is no"):
         shown(dataset, Choice("period", "mu", exponent=True))
 
 
