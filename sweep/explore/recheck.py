@@ -73,7 +73,7 @@ class CellReport:
     method : str
         That solved the cell, or "none".
     error_bound, rtol : float
-        What the values are right to, and what was asked for.
+        Error of the values, and the accuracy that the study asks for.
     methods : dict of str to tuple
         Status, error bound and outputs by each method that can do the cell, at the same rtol.
     """
@@ -90,10 +90,10 @@ class CellReport:
     def __str__(self) -> str:
         outputs = ((name, f"{value:.10g}", self.units[name]) for name, value in self.values.items())
         asked = (
-            (name, status.name, f"{error:.2g}", *(f"{values[output]:.10g}" for output in self.values))
+            (name, status.name, f"{error:.2g}", f"{self._apart(values):.2g}")
             for name, (status, error, values) in self.methods.items()
         )
-        headings = ("method", "status", "error", *self.values)
+        headings = ("method", "status", "error", "differs by")
         return page(
             paragraph("cell: " + ", ".join(f"{name} = {value}" for name, value in self.place.items())),
             paragraph(
@@ -101,8 +101,16 @@ class CellReport:
                 f"solved by {self.method}; error bound {self.error_bound:.2g}, asked for rtol {self.rtol:g}"
             ),
             Table(outputs, ("output", "value", "unit")).text(),
-            Table(asked, headings, "Each method of the kernel, asked now at the same rtol:").text(),
+            Table(asked, headings, "Each method of the kernel at the same rtol, computed now:").text(),
         )
+
+    def _apart(self, values: dict[str, float]) -> float:
+        """The largest relative difference of a method's outputs from those above; NaN where only one is NaN."""
+        off = [0.0]
+        for name, value in self.values.items():
+            same = value == values[name] or (np.isnan(value) and np.isnan(values[name]))
+            off.append(0.0 if same else abs(values[name] / value - 1.0) if value else np.inf)
+        return float(np.max(off))
 
 
 def report_cell(dataset: xr.Dataset, study: Study) -> CellReport:
@@ -122,12 +130,13 @@ def report_cell(dataset: xr.Dataset, study: Study) -> CellReport:
     alone = study_of(dataset, study)
     numbers = [name for name in study.outputs if not dataset[name].dims]
     words, again = {int(status): status for status in Status}, {}
+    required = [field.name for field in study.kernel.parameters if field.default is None]
     for method in (study.kernel.methods[k].name for k in usable_methods(alone)):
         cells = solved(with_method(alone, method, alone.rtol))
         outputs = {name: float(cells.outputs[name][0]) for name in numbers}
         again[method] = words[int(cells.status[0])], float(cells.error[0]), outputs
     return CellReport(
-        {name: _label(dataset[name]) for name in dataset.coords if name in alone.terms or name in study.axes},
+        {name: _label(dataset[name]) for name in dataset.coords if name in {*alone.terms, *required, *study.axes}},
         {name: dataset[name].item() for name in numbers},
         {name: dataset[name].attrs.get("units", "") for name in numbers},
         words[dataset[STATUS].item()],

@@ -181,13 +181,15 @@ def _without_failing(
 
 
 def precision_text(found: xr.Dataset, complete: bool = False) -> str:
-    """The table that `sweep chart` prints, by wish with all columns.
+    """The table that `sweep chart` prints: of more than three tolerances a line a method, at the middle one; or all.
 
-    Without them, cells that are neither OK nor unsolved carry a remark, INACCURATE among them.
+    Without the further columns, cells that are neither OK nor unsolved carry a remark, INACCURATE among them.
     """
+    few = complete or found.rtol.size <= 3
+    shown = found if few else found.isel(rtol=[found.rtol.size // 2])
     work, more = ([name for name in WORK if name in found], ["inaccurate"]) if complete else ([], [])
     rows = []
-    for cell in found.to_dataframe().reset_index().itertuples():
+    for cell in shown.to_dataframe().reset_index().itertuples():
         # of the reference itself nothing can be said but that it is below its floor
         floor = found.attrs["reference_error"] if cell.method == found.attrs["reference"] else -1.0
         off = ("reference" if error <= floor else f"{error:.1e}" for error in (cell.error_median, cell.error_worst))
@@ -202,7 +204,8 @@ def precision_text(found: xr.Dataset, complete: bool = False) -> str:
         basis += f"; {found.attrs['open_cells']} cells left aside, of which it is not sure"
     left_out = f"Omissions: {found.attrs['omissions']}" if found.attrs["omissions"] else ""
     columns = [name.replace("_", " ") for name in headings[: None if complete else -1]]
-    return page(Table(rows, columns).text(wide=complete), paragraph(basis), paragraph(left_out))
+    rest = "" if complete else "Every tolerance, inaccurate cells, and where the worst cell is: --all."
+    return page(Table(rows, columns).text(wide=complete), paragraph(basis), paragraph(left_out), rest)
 
 
 def _omissions(found: xr.Dataset, study: Study, able: Sequence[str] | None) -> list[str]:
@@ -216,9 +219,14 @@ def _omissions(found: xr.Dataset, study: Study, able: Sequence[str] | None) -> l
     for name, (key, verb, where) in itertools.product(found["method"].values, faults):
         row = found.sel({"method": name})
         if row[key].any():
-            shares = zip(row[key].values, row.rtol.values, strict=True)
-            at = ", ".join(f"{100 * share:.3g} % at {rtol:.0e}" for share, rtol in shares if share)
-            lines.append(f"{name} {verb} {at}, first {next(place for place in row[where].values if place)}")
+            at = {
+                f"{rtol:.0e}": f"{100 * share:.3g} %"
+                for share, rtol in zip(row[key].values, row.rtol.values, strict=True)
+            }
+            alike = len(at) > 1 and len(set(at.values())) == 1
+            places = {"every rtol": next(iter(at.values()))} if alike else at
+            shares = ", ".join(f"{share} at {place}" for place, share in places.items() if share != "0 %")
+            lines.append(f"{name} {verb} {shares}, first {next(place for place in row[where].values if place)}")
     return lines
 
 

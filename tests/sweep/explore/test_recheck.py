@@ -1,5 +1,7 @@
 """`sweep check` finds what is beyond rtol, and nothing else; `sweep cell` says of a cell what the result says."""
 
+import dataclasses
+import re
 import subprocess
 import sys
 
@@ -70,6 +72,9 @@ def test_a_cell_is_what_the_result_and_each_method_say(clocks):
     status, error, values = report.methods[report.method]
     assert (status, values) == (report.status, report.values)
     assert error == np.float32(report.error_bound)
+    other = dict(zip(("period", "amplitude"), (1.5 * values["period"], 0.75 * values["amplitude"]), strict=True))
+    told = str(dataclasses.replace(report, methods={"other": (status, error, values | other)}))
+    assert re.search(r"^  other +OK +\S+ +0\.5$", told, re.MULTILINE)
     refused = sweep.run(FOLIOT | {"axes": {"mu": [1e-3], "R": [0.1]}}).sweep.cell()
     assert refused.status == Status.NEVER_STARTS
     assert {status for status, *_ in refused.methods.values()} == {Status.NEVER_STARTS}

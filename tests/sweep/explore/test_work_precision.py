@@ -1,5 +1,6 @@
 """Errors and times of methods on the same cells: what is right, what is silently wrong, what fails, and who says so."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -206,6 +207,15 @@ def test_counts_of_work_and_estimates_of_error_are_not_compared():
     assert found.steps.sel({"method": "counted"}).values == pytest.approx([3.25, 6.25])
     assert float(found.error_worst.max()) == found.attrs["reference_error"]
     assert "  steps  " in precision_text(found, complete=True)
+
+
+def test_of_many_tolerances_the_middle_one_is_printed_and_all_of_them_by_wish():
+    tolerances = (1e-3, 1e-6, 1e-9, 1e-12)
+    found = chart(stones(saying(Status.STEP_LIMIT), EXACT), reference="exact", tolerances=tolerances)
+    short, complete = precision_text(found), precision_text(found, complete=True)
+    assert re.findall(r"^  it +(\S+)", short, re.MULTILINE) == ["1e-09"]
+    assert len(re.findall(r"^  it +(\S+)", complete, re.MULTILINE)) == 4
+    assert "at every rtol, first STEP_LIMIT" in " ".join(short.split())
 
 
 def test_no_more_cells_are_taken_than_are_wanted():
