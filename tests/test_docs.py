@@ -42,6 +42,19 @@ def test_its_python_parses(page):
             ast.parse("\n".join(line for line in code.splitlines() if not line.startswith(("%", ":"))))
 
 
+THEORY = [page for page in PAGES if page.parent.name == "theory" and "code-cell" in page.read_text(encoding="utf-8")]
+
+
+@pytest.mark.parametrize("page", THEORY, ids=lambda path: path.stem)
+def test_formulas_of_a_page_of_theory_agree_with_the_kernels(page, monkeypatch):
+    """Its cells are evaluated, and say so by assertions of their own."""
+    monkeypatch.chdir(page.parent)
+    cells = re.findall(r"```\{code-cell\} python\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
+    code = "\n".join(line for cell in cells for line in cell.splitlines() if not line.startswith(("%", ":")))
+    assert "assert " in code
+    exec(compile(code, page, "exec"), {"__name__": page.stem})
+
+
 def test_pages_of_kernels_say_what_the_kernels_declare():
     make_pages = pytest.importorskip("make_pages")
     page = "\n".join(make_pages._kernel_page("foliot", None))

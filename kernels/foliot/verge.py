@@ -14,18 +14,20 @@ rest with its wheel at the drop, comes to that within its first swings or as the
 A bounce of a heavy wheel may throw it so far back that the pallet which it left comes back in front of its tooth: it is
 pushed by that tooth once more, until this escapes again, and so on, within one half period.
 
-OK: the cycle that the clock comes to from there, one tooth a period, within the error that is stated. NOT_CONVERGED:
-it did not come to such a cycle in 600 half periods: with e > 0 and a heavy wheel many clocks come to a cycle of several
-teeth, or to none. STEP_LIMIT: half a period has more than 3000 landings and escapes. NO_METHOD: groups
-beyond 2^+-40 or kappa above 2^13. Without friction and with e = 0 this is `impact`, without inertia of the wheel
-`foliot`. Leaves out: friction of the wheel, the shape of the pallets. Derived here.
+OK: the cycle that the clock comes to from there, one tooth a period, within the error that is stated. Its halves are
+alike, or the clock limps: with e > 0 and a heavy wheel one half may last longer, and have more landings, than the
+other. Then amplitude and recoil are the larger ones, speed and shares the means. NOT_CONVERGED: it did not come to such
+a cycle in 600 half periods; some clocks come to a cycle of several teeth, or to none. STEP_LIMIT: half a period has
+more than 3000 landings and escapes. NO_METHOD: groups beyond 2^+-40 or kappa above 2^13. Without friction and with
+e = 0 this is `impact`, without inertia of the wheel `foliot`. Leaves out: friction of the wheel, the shape of the
+pallets. Derived here.
 """
 
 import math
 from typing import NamedTuple
 
 from kernels.foliot import _two_bodies
-from kernels.foliot._two_bodies import Scene, half_period
+from kernels.foliot._two_bodies import Half, Scene, half_period
 from kernels.interface import Field
 from kernels.lanes.codes import NEVER_STARTS, NO_METHOD, NOT_CONVERGED, OK, STEP_LIMIT, UNMESHES
 from kernels.lanes.columns import cell_by_cell
@@ -107,9 +109,28 @@ def given(units, answer, verdict):
     return cycle, judged(sound, sound and speed > 0.0 and recoil >= 0.0, verdict)
 
 
+@jit
+def distance(half, v, w, gap):
+    """Between the end of half a period and another state at an escape, over the speeds."""
+    apart = (magnitude(half.v - v) + magnitude(half.w - w)) / (half.v + magnitude(half.w))
+    return apart + magnitude(half.gap - gap) / (1.0 + half.gap)
+
+
+@jit
+def of_both(one, other):
+    """Two unlike halves as one: the larger of what is largest, the means of all else."""
+    return Half(
+        0.5 * (one.v + other.v), 0.5 * (one.w + other.w), one.gap, 0.5 * (one.time + other.time),
+        max(one.swing, other.swing), 0.5 * (one.way + other.way), max(one.back, other.back),
+        0.5 * (one.lost + other.lost), min(one.closing, other.closing), one.impacts + other.impacts, one.end,
+    )  # fmt: skip
+
+
 @jit_call
 def repeated(scene):
     """The half period that repeats, the clock started from rest; its relative error; the status.
+
+    Where it repeats only after the one between, the clock limps, and the answer is of both.
 
     Where bounces die out before the escape the next half period depends on one speed alone, and secants lead to the
     speed that repeats. A speed tried by a secant may unmesh where the clock itself does not come to it: then it is a
@@ -118,6 +139,8 @@ def repeated(scene):
     v, w, gap, tried, floor, ceiling = 0.0, 0.0, 0.0, False, 0.0, math.inf
     old_v, old_image, slope, before = -1.0, 0.0, 0.0, math.inf
     half = half_period(scene, v, w, gap)
+    one, first_v, first_w, first_gap = half, -1.0, 0.0, 0.0
+    limped, earlier, pace = math.inf, math.inf, 0.0
     for _ in range(HALF_PERIODS):
         if half.end != _two_bodies.DONE:
             if not tried:
@@ -126,14 +149,20 @@ def repeated(scene):
             half = half_period(scene, v, w, gap)
             continue
         alone = max(gap, half.gap) == 0.0 and w == v and half.w == half.v
-        change = (magnitude(half.v - v) + magnitude(half.w - w)) / (half.v + magnitude(half.w))
-        change = change + magnitude(half.gap - gap) / (1.0 + half.gap)
+        change, twice = distance(half, v, w, gap), math.inf
         if alone and old_v >= 0.0 and magnitude(v - old_v) > 1e-7 * v:
             slope = (half.v - old_image) / (v - old_v)
         elif not alone and change > 1e-9:
             slope = change / before
         if slope < 1.0 and change <= 1e-13 and (change <= 2e-16 or change >= 0.5 * before):
             return half, (change + ROUNDING) / (1.0 - max(slope, 0.0)), OK
+        if not alone and first_v >= 0.0:
+            twice = distance(half, first_v, first_w, first_gap)
+            if twice > 1e-9:
+                pace = twice / earlier
+            if pace < 1.0 and change > 1e-6 and twice <= 1e-13 and (twice <= 2e-16 or twice >= 0.5 * earlier):
+                return of_both(one, half), (twice + ROUNDING) / (1.0 - pace), OK
+        limped, earlier, one, first_v, first_w, first_gap = twice, limped, half, -1.0 if alone else v, w, gap
         before, floor, image = change, half.v, half.v
         if alone and slope < 1.0:
             image = min(v + (half.v - v) / (1.0 - slope), 4.0 * half.v)

@@ -83,7 +83,7 @@ TABLE = {
         "law_map_overnight": {"n": [0.25, 1.5, 3.0], "e": [1, 0.99, 0.97, 0.5], "R": 3, "c": 20},
         "law_map_borders": {},
     }, "sensitivity_max law_map_borders.amplitude law_map_borders.crossing_speed", 2),
-    "losses_from_periods": Claims({"losses_from_periods": {}}, "", 7, tell=False),
+    "losses_from_periods": Claims({"losses_from_periods": {}}, "", 11, tell=False),
     "origin_of_half": Claims({"origin_of_half": {"mu": 2}}, "amplitude status", 3),
     "polisher_design": Claims({
         "polisher_design": {"d": [0.3, 0.38], "b": 3, "f": 2, "e": 2},

@@ -2,6 +2,7 @@
 
 import numpy as np
 from columns import solve
+from verge_event_oracles import followed
 from verge_oracles import cycle
 
 from kernels.foliot.cycle import FOLIOT
@@ -97,3 +98,30 @@ def test_wheels_thrown_back_to_the_tooth_before_are_those_of_impact_contact_by_c
     assert set(status[~there]) <= {Status.NOT_CONVERGED, Status.UNMESHES}
     assert np.allclose(two["period"][there], one["period"][there], rtol=1e-9)
     assert np.allclose(two["amplitude"][there], one["swing"][there] / n, rtol=1e-9)
+
+
+def test_wheels_thrown_back_to_the_tooth_before_with_friction_are_those_of_an_event_simulation():
+    """Of viscous and dry friction, as often as four times in half a period; the last three clocks limp."""
+    again = [
+        clock(2.2, 0.513, 0.721, 0.4, 0.05), clock(52.0, 0.983, 0.771, 0.05), clock(2500.0, 0.655, 0.512, 0.05),
+        clock(7200.0, 0.861, 0.594, 0.2, 0.2), clock(1200.0, 0.918, 0.565, 0.05, 0.05),
+        clock(3.2, 0.567, 0.52, 0.05, 0.2), clock(180.0, 0.66, 0.598, 0.4),
+    ]  # fmt: skip
+    limping = [clock(300.0, 3.0, 0.6, 0.05), clock(20.0, 6.0, 0.4), clock(56.0, 10.0, 0.6)]
+    outputs, status = found(again + limping)
+    true = np.array([followed(c, 60) for c in again + limping]).T
+    assert (status == Status.OK).all()
+    assert (true[4, :7] >= 2).all()
+    assert true[4].max() >= 4
+    assert (abs(true[5, :7] - 0.5) < 1e-9).all()
+    assert (abs(true[5, 7:] - 0.5) > 0.01).all()
+    for name, values in zip(("period", "amplitude", "impact_share"), true[[0, 2, 3]], strict=True):
+        assert np.allclose(outputs[name], values, rtol=1e-9, atol=1e-9), name
+    assert np.allclose(true[0], true[1], rtol=1e-9)
+
+
+def test_where_it_says_so_a_clock_comes_to_no_cycle_of_one_tooth():
+    never = [clock(50.0, 0.133, 0.9), clock(100.0, 7.5, 0.9), clock(20.0, 2.4, 0.9)]
+    _, status = found(never)
+    assert (status == Status.NOT_CONVERGED).all()
+    assert all(abs(last / first - 1) > 1e-4 for last, first, *_ in (followed(c, 60) for c in never))
