@@ -33,56 +33,46 @@ _I64, _F64 = ir.IntType(64), ir.DoubleType()
 _MAGIC = 6755399441055744.0  # 1.5 * 2^52: adding it leaves the nearest integer in the low bits
 
 
-class LanesType(types.Type):
-    """WIDTH float64 cells; a float64 beside them is repeated in every lane."""
+class _Primitive(types.Type):
+    """A type with a model of its own; one of another type, `one`, beside it is repeated in every lane."""
 
-    wide = True
-
-    def __init__(self):
-        super().__init__("Lanes")
-
-    def can_convert_from(self, typing_context, other):
-        return Conversion.promote if isinstance(other, types.Number) else None
-
-    def unify(self, typing_context, other):
-        return self if isinstance(other, types.Number) else None
-
-
-class MaskType(types.Type):
-    """One bit a lane; a boolean beside it is repeated."""
-
-    wide = True
+    one, llvm = None, None
 
     def __init__(self):
-        super().__init__("Mask")
+        super().__init__(type(self).__name__)
+
+    def __init_subclass__(cls):
+        @register_model(cls)
+        class Model(models.PrimitiveModel):
+            def __init__(self, manager, fe_type):
+                super().__init__(manager, fe_type, cls.llvm)
 
     def can_convert_from(self, typing_context, other):
-        return Conversion.promote if isinstance(other, types.Boolean) else None
+        return Conversion.promote if self.one and isinstance(other, self.one) else None
 
     def unify(self, typing_context, other):
-        return self if isinstance(other, types.Boolean) else None
+        return self if self.one and isinstance(other, self.one) else None
 
 
-class LaneIndexType(types.Type):
+class LanesType(_Primitive):
+    """WIDTH float64 cells."""
+
+    one, llvm = types.Number, ir.VectorType(_F64, WIDTH)
+
+
+class MaskType(_Primitive):
+    """One bit a lane."""
+
+    one, llvm = types.Boolean, ir.VectorType(ir.IntType(1), WIDTH)
+
+
+class LaneIndexType(_Primitive):
     """Cells i .. i + WIDTH - 1 of a column."""
 
-    def __init__(self):
-        super().__init__("LaneIndex")
+    llvm = _I64
 
 
 _lanes, _mask, _lane_index = LanesType(), MaskType(), LaneIndexType()
-
-
-def _primitive(numba_type, llvm_type):
-    @register_model(numba_type)
-    class Model(models.PrimitiveModel):
-        def __init__(self, manager, fe_type):
-            super().__init__(manager, fe_type, llvm_type)
-
-
-_primitive(LanesType, ir.VectorType(_F64, WIDTH))
-_primitive(MaskType, ir.VectorType(ir.IntType(1), WIDTH))
-_primitive(LaneIndexType, _I64)
 
 
 def _repeat(builder, value, like):
@@ -94,15 +84,14 @@ def _repeat(builder, value, like):
 
 @lower_cast(types.Number, LanesType)
 def _number_to_lanes(context, builder, source, target, value):
-    value = context.cast(builder, value, source, types.float64)
-    return _repeat(builder, value, ir.VectorType(_F64, WIDTH))
+    return _repeat(builder, context.cast(builder, value, source, types.float64), LanesType.llvm)
 
 
 @lower_cast(types.Boolean, MaskType)
 def _boolean_to_mask(context, builder, source, target, value):
     bit = context.cast(builder, value, source, types.boolean)
     bit = builder.icmp_unsigned("!=", bit, ir.Constant(bit.type, 0))
-    return _repeat(builder, bit, ir.VectorType(ir.IntType(1), WIDTH))
+    return _repeat(builder, bit, MaskType.llvm)
 
 
 def _is_wide(*numba_types):
@@ -317,13 +306,9 @@ def not_(condition):
     return not condition
 
 
-def _lower_isnt(context, builder, signature, values):
-    return builder.not_(values[0])
-
-
 _function(where, 3, lambda condition, x, y: _number(condition, x, y), _lower_where)
 _function(any_lane, 1, lambda condition: types.boolean, _lower_any_lane)
-_function(not_, 1, lambda condition: condition, _lower_isnt)
+_function(not_, 1, lambda condition: condition, lambda context, builder, signature, values: builder.not_(values[0]))
 
 
 def lanes_at(i):
