@@ -61,6 +61,8 @@ _FORGOTTEN = 40.0
 _SCAN, _BISECTIONS = 32, 40
 _ARRIVED, _ROUNDED = 1e-12, 4e-15
 """How far x may be from the switch for having reached it: so much, and so much of the largest x."""
+_CLEARLY = 0.01
+"""Of the hairspring, what is missing at the switch so that no rounding and no tolerance brings the motion there."""
 _NEARER, _FARTHER = 0.8, 3.0
 """Of the time to rest, and of that since rest, which a step may be long: its error is then at most 3 and 8 times the
 estimate, in quadrature of a power of the time with exponents from -0.9 to 3."""
@@ -312,6 +314,17 @@ def _left(state, acceleration, law, leg):
 
 
 @jit
+def _held_back(state, law):
+    """Whether a hairspring takes more than there is on the way to the switch, so that what creeps need not be followed.
+
+    Without a ripple the work of torque, dry friction and spring on that way is (x + 1)(1 - rho + kappa (x - 1)/2).
+    """
+    x, v, problem = state[0], state[1], law.problem
+    energy = fma(0.5 * v, v, (x + 1.0) * fma(0.5 * problem.kappa, x - 1.0, law.steady))
+    return (law.side < 0.0) & not_(problem.depth > 0.0) & (energy < -_CLEARLY * problem.kappa)
+
+
+@jit
 def _longest(v, acceleration, leg):
     """The longest step, where friction is not smooth at rest: by the time to rest, or since."""
     most = 0.0 * v + math.inf
@@ -337,7 +350,7 @@ def _to_end(step, state, law, leg, h, tolerance, active):
         new, last, error = step(state, first, law, h, leg.scales)
         ratio = error / tolerance
         accepted = moving & (ratio <= 1.0)
-        passed = accepted & (_left(new, 0.0, law, leg)[0] <= 0.0)
+        passed = accepted & ((_left(new, 0.0, law, leg)[0] <= 0.0) | _held_back(new, law))
         moving = moving & not_(passed)
         accepted = accepted & moving
         state, first, t = choose(accepted, (new, last, t + h), (state, first, t))

@@ -113,6 +113,18 @@ def test_where_a_swing_from_rest_cannot_reach_the_switch_it_sticks():
     assert solve(FOLIOT, "dopri5", rtol=rtol, **as_columns([{"a": 0.5, "k": 6.0}]))[1][0] == Status.OK
 
 
+def test_what_a_spring_keeps_from_the_switch_is_not_followed_to_its_rest():
+    """Drag of a degree next to 1 has it creep there for more steps than there may be."""
+    cells = [
+        {"mu": 3.19, "phi0": 0.1008, "n": 1.309, "c": 121.7, "R": 2.835, "a": 41.29, "k": 5.979, "e": 0.8766},
+        {"mu": 1.3, "phi0": 5.033, "n": 1.205, "c": 402.0, "R": 1.025, "k": 0.2704},
+        {"mu": 5.582, "phi0": 0.3175, "n": 1.105, "c": 2972.0, "R": 0.4907, "a": 0.2102, "k": 84.28, "e": -0.5012},
+        {"mu": 0.5726, "phi0": 0.262, "n": 1.261, "c": 0.001389, "a": 9.228, "k": 3.972},
+    ]
+    rtol = 3e-9 if COMPILED else 1e-3
+    assert (solve(FOLIOT, "sdirk4", rtol=rtol, **as_columns(cells))[1] == Status.STICKS).all()
+
+
 def test_stiction_holds_a_turning_point_that_the_spring_does_not_free():
     cells = {"R": 0.5, "R_s": [0.9, 1.5, 1.5, 1.5], "k": [0.0, 0.0, 10.0, 0.0], "e": [1.0, 1.0, 1.0, -0.5]}
     _, status = solve(FOLIOT, "dopri5", **UNIT, **cells, rtol=1e-6)
