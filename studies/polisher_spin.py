@@ -71,8 +71,10 @@ def wear(ds: xr.Dataset, e: float, w: float, k: float | None, radius: Any) -> An
     with np.errstate(divide="ignore", invalid="ignore"):
         cosine = (radius**2 + way**2 - a * a) / (2 * radius * way)
     half = np.where(radius > 0, np.arccos(np.clip(cosine, -1, 1)), np.where(way < a, np.pi, 0.0))
-    around = ((turn - work)[:, None] * radius)[..., None] * np.exp(1j * half[..., None] * NODES)
-    speed = (abs(ahead[:, None, None] + around) * WEIGHTS).sum(-1)
+    touched, speed = half > 0.0, np.zeros(half.shape)
+    around = ((turn - work)[:, None] * radius)[touched][:, None] * np.exp(1j * half[touched][:, None] * NODES)
+    met = ahead[np.nonzero(touched)[0]][:, None] + around
+    speed[touched] = np.sqrt(met.real**2 + met.imag**2) @ WEIGHTS
     return float(ds.preston * ds.pressure) * (speed * half).mean(0) / (2 * np.pi)
 
 

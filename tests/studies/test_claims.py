@@ -110,7 +110,7 @@ TABLE = {
         "stability_maps_spring": {"k": [1.5, 1.999], "step": 12},
     }, "amplitude crossing_speed rate_calls steps time status stability_maps_oscillator.clock "
         "stability_maps_oscillator.error stability_maps_oscillator.interval stability_maps_oscillator.pace", 1),
-    "relaxation": Claims({"relaxation": {"mu": [0.01, 1.0, 1e3, 10**3.5, 1e4]}}, "", 1),
+    "relaxation": Claims({"relaxation": {"mu": [0.01, 10**-1.75, 1.0, 1e3, 10**3.5, 1e4]}}, "", 1),
     "stribeck": Claims({
         "stribeck": {"belt": [0.05, 0.5, 1.0, 1.8, 1.85, 2.2]}, "stribeck_unstable": {},
     }, "stribeck.multiplier", 2),
