@@ -79,11 +79,25 @@ def wear(ds: xr.Dataset, e: float, w: float, k: float | None, radius: Any) -> An
 
 
 _KNOWN: dict[Any, Profiles] = {}
+_SETS: dict[Any, dict[int, list[int]]] = {}
+
+
+def key_of(ds: xr.Dataset, k: float | None) -> tuple[Any, ...]:
+    """What the wear by a tool that spins so hangs on."""
+    return k, *(float(ds[name]) for name in ("L", "tool_a", "Omega", "omega", "b", "d", "f", "b_angle"))
+
+
+def sets_of(ds: xr.Dataset, k: float) -> dict[int, list[int]]:
+    """Its best sets of settings (`fewest`)."""
+    key = key_of(ds, k)
+    if key not in _SETS:
+        _SETS[key] = fewest(spun(ds, k))
+    return _SETS[key]
 
 
 def spun(ds: xr.Dataset, k: float | None) -> Profiles:
     """Profiles of all settings by a tool that spins so."""
-    key = (k, *(float(ds[name]) for name in ("L", "tool_a", "Omega", "omega", "b", "d", "f", "b_angle")))
+    key = key_of(ds, k)
     if key not in _KNOWN:
         rows = [[wear(ds, e, w, k, ds.radius.values) for w in ds.w_x.values] for e in ds.e.values]
         _KNOWN[key] = profiles(ds.assign(wear=(("e", "w_x", "radius"), np.array(rows))))
@@ -174,7 +188,7 @@ def conclude(path: str) -> Conclusion:
     """Statements and the figure."""
     ds = read_result(path, "polisher_wear", ["e", "w_x"], "polisher_spin.toml")
     tools = {"rigid": profiles(ds)} | {name: spun(ds, k) for name, k in SPINS.items()}
-    sets = {name: fewest(p) for name, p in tools.items()}
+    sets = {"rigid": fewest(tools["rigid"])} | {name: sets_of(ds, k) for name, k in SPINS.items()}
     groups = {"A tool that spins": physics(ds, tools["rigid"]), "Few settings": evenness(tools, sets)}
     return groups, [NOTES], lambda: figure(ds, tools, sets)
 
