@@ -69,7 +69,7 @@ def pallets(axes: Any) -> None:
     tooth = np.array([(-1.6, 0.0), (-0.62, 0.36), (-0.85, 0.0)])
     axes.fill(*tooth.T, color=WHEEL, alpha=0.6)
     axes.fill(*(tooth * np.array([-1.0, 1.0])).T, color=WHEEL, alpha=0.25)
-    arrow(axes, (-1.5, -0.15), (-0.9, -0.15), "upper teeth", WHEEL)
+    arrow(axes, (-1.5, -0.3), (-0.9, -0.3), "upper teeth", WHEEL)
     arrow(axes, (1.5, -0.3), (0.9, -0.3), "lower teeth", WHEEL)
     turn = np.linspace(math.pi / 2 + 0.5, math.pi / 2 - 0.5, 50)
     axes.plot(0.55 * np.cos(turn), 0.55 * np.sin(turn), color=INK, linewidth=0.8)
@@ -111,17 +111,22 @@ def cross_beat(axes: Any) -> None:
 
 
 def pivot(axes: Any) -> None:
-    """The balance's pivot in its hole: weight, force of the bearing, its moment."""
+    """The balance's pivot in its hole: weight, the forces N and F of the bearing, their moment."""
     ring = np.linspace(0, 2 * math.pi, 200)
-    axes.plot(np.cos(ring), np.sin(ring), color=INK, linewidth=1.2)
+    axes.plot(np.cos(ring), np.sin(ring), color=INK, linewidth=1.2, solid_capstyle="round")
     centre, at = np.array([0.11, -0.19]), -math.pi / 2 + 0.52
     axes.fill(centre[0] + 0.78 * np.cos(ring), centre[1] + 0.78 * np.sin(ring), color=BEAM, alpha=0.3)
     touch = centre + 0.78 * np.array([math.cos(at), math.sin(at)])
     arrow(axes, centre, centre + np.array([0.0, -1.0]), "$mg$", charts.COLOURS[1])
-    arrow(axes, touch, touch + np.array([0.0, 0.95]), "", charts.COLOURS[2])
-    axes.text(touch[0] - 0.06, 0.35, "force of the\nbearing, $mg$", fontsize=7, color=charts.COLOURS[2], ha="right")
-    axes.plot([centre[0], touch[0]], [centre[1], touch[1]], color=INK, linewidth=0.6, linestyle=(0, (4, 3)))
-    axes.text(*(0.5 * (centre + touch) + np.array([0.05, 0.08])), "$r$", fontsize=8)
+    inwards, green = (centre - touch) / 0.78, charts.COLOURS[2]
+    along = np.array([inwards[1], -inwards[0]])
+    arrow(axes, touch, touch + math.cos(0.52) * inwards, "", green)
+    arrow(axes, touch, touch + math.sin(0.52) * along, "$F$", green)
+    arrow(axes, touch, touch + np.array([0.0, 1.0]), "", "0.5", linestyle=(0, (4, 3)))
+    axes.text(*(touch + 0.5 * inwards + np.array([0.07, 0.0])), "$N$", fontsize=8, color=green)
+    axes.plot([centre[0] - 0.78, centre[0]], [centre[1], centre[1]], color=INK, linewidth=0.6, linestyle=(0, (4, 3)))
+    axes.text(centre[0] - 0.45, centre[1] + 0.04, "$r$", fontsize=8)
+    axes.text(centre[0], 0.38, r"$\dot\theta$", fontsize=8, color=BEAM, ha="center")
     turn = np.linspace(2.4, 0.7, 40)
     tip, before = (centre + 0.5 * np.array([math.cos(t), math.sin(t)]) for t in (0.62, 0.75))
     arrow(axes, before, tip, "", BEAM)
@@ -129,7 +134,8 @@ def pivot(axes: Any) -> None:
     axes.text(
         0,
         -1.35,
-        r"the pivot climbs to where friction holds it:" "\n" r"$R = m g\,r\,\mu/\sqrt{1+\mu^2}$ against the motion",
+        "the pivot climbs until $N$ and $F = \\mu N$ carry $mg$ (dashed):\n"
+        r"$R = F r = m g\,r\,\mu/\sqrt{1+\mu^2}$ against the motion",
         fontsize=7,
         ha="center",
         va="top",
@@ -154,19 +160,20 @@ def linkage(axes: Any, kind: str) -> None:
     axes.plot(*np.array([joint, (0, 0), centre]).T, color=BEAM, linewidth=2.5)
     axes.fill(centre[0] + 0.04 * np.cos(ring), centre[1] + 0.04 * np.sin(ring), color=WHEEL, alpha=0.7)
     places = {"BH": (0, 0), "ME": (b, 0), "EH": pin, "DH": joint, "CH": centre}
+    beside = {"CH": (10, -4), **({"DH": (-26, 4)} if kind == "A" else {"BH": (-26, -4)})}
     for name, place in places.items():
         axes.plot(*place, "o", color=INK, markersize=3)
-        axes.annotate(rf"O$_\mathrm{{{name}}}$", place, (4, -9), textcoords="offset points", fontsize=8)
-    for text, place in (
-        ("$b$", (b / 2, -0.035)),
-        ("$d$", joint / 2 - np.array([0.04, 0.0])),
-        ("$f$", (joint + pin) / 2 + np.array([0.0, 0.015])),
-        ("$e$", (b + 0.01, 0.05)),
-    ):
-        axes.text(*place, text, fontsize=8)
+        where = beside.get(name, (4, -9))
+        axes.annotate(rf"O$_\mathrm{{{name}}}$", place, where, textcoords="offset points", fontsize=8)
+    for text, start, end, side in (
+        ("$b$", (0, 0), (b, 0), -1), ("$d$", (0, 0), joint, sign), ("$f$", joint, pin, 1), ("$e$", (b, 0), pin, -1),
+    ):  # fmt: skip
+        way = np.subtract(end, start)
+        normal = side * np.array([-way[1], way[0]]) / math.hypot(*way)
+        axes.text(*(start + 0.5 * way + 0.028 * normal), text, fontsize=8, ha="center", va="center")
     axes.plot([0, b], [0, 0], color=PALE, linewidth=0.8, linestyle=(0, (4, 3)))
     panel(axes, kind.lower(), f"type {kind}: {'straight' if kind == 'A' else 'bent'} arm", 0.8, -0.25, 0.55)
-    axes.set_xlim(-0.1, 0.85)
+    axes.set_xlim(-0.13, 0.85)
 
 
 def chain(axes: Any, J: list[float], k: list[float], letter: str, text: str, level: float) -> None:
