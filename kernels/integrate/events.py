@@ -6,7 +6,7 @@ An event is known at both ends of the step [0, h] by its value (e0 > 0 >= e1) an
 extension. `none` takes the event to fire at the end of the step: the fault to be shown.
 """
 
-from kernels.integrate.steps import dop853_stages, dopri5_stages, euler, events, moreau, rk4, semi_implicit, verlet
+from kernels.integrate.steps import dop853, dopri5, euler, events, moreau, rk4, semi_implicit, verlet
 from kernels.lanes.jit import jit_call
 from kernels.lanes.symbols import symbolic
 from kernels.lanes.vectors import any_lane, choose, fma, magnitude, not_, sqrt, where
@@ -30,17 +30,17 @@ def leap(m, scheme, state, mode, h):
     substep = h / scheme.substeps
     for _ in range(scheme.substeps):
         if scheme.method == EULER:
-            state = euler(m, state, mode, substep)
+            state = euler(m, state, mode, substep)[0]
         elif scheme.method == SEMI_IMPLICIT:
             state = semi_implicit(m, state, mode, substep)
         elif scheme.method == VERLET:
             state = verlet(m, state, mode, substep)
         elif scheme.method == RK4:
-            state = rk4(m, state, mode, substep)
+            state = rk4(m, state, mode, substep)[0]
         elif scheme.method == DOPRI5:
-            state = dopri5_stages(m, state, mode, substep)[0]
+            state = dopri5(m, state, mode, substep)[0]
         elif scheme.method == DOP853:
-            state = dop853_stages(m, state, mode, substep)[0]
+            state = dop853(m, state, mode, substep)[0]
         else:
             state = moreau(m, state, mode, substep)
     return state

@@ -5,7 +5,7 @@ Generic in one cell or lanes; `m` and `mode` as in `steps`.
 
 from typing import NamedTuple
 
-from kernels.integrate.steps import ONE, dop853_stages, dopri5_stages, rate
+from kernels.integrate.steps import ONE, dop853, dopri5, rate
 from kernels.integrate.tableaux import (
     DOP853_DENSE,
     DOP853_ERROR_3,
@@ -64,7 +64,7 @@ def at_least(error, least):
 @jit_call
 def dop853_tried(m, state, mode, h):
     """A step with its estimated error."""
-    new, stages = dop853_stages(m, state, mode, h)
+    new, stages = dop853(m, state, mode, h)
     nothing = times(0.0, state)
     fifth, third = after(nothing, h, DOP853_ERROR_5, stages), after(nothing, h, DOP853_ERROR_3, stages)
     worst_5, worst_3 = of_size(state, new, stages[0], h, fifth), of_size(state, new, stages[0], h, third)
@@ -118,7 +118,7 @@ def dop853_vague(m, state, terms, mode, h, part):
 @jit_call
 def dopri5_tried(m, state, mode, h):
     """A step with its estimated error."""
-    new, stages = dopri5_stages(m, state, mode, h)
+    new, stages = dopri5(m, state, mode, h)
     last = rate(m, new, mode)
     error = after(times(0.0, state), h, DOPRI5_ERROR, (*stages, last))
     bend = of_size(state, new, stages[0], h, times(h, after(last, -1.0, ONE, (stages[4],))))

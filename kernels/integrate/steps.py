@@ -4,7 +4,7 @@
 """
 
 from kernels.integrate.records import Mode
-from kernels.integrate.tableaux import DOP853, DOPRI5, RK4
+from kernels.integrate.tableaux import DOP853, DOP853_OF, DOPRI5, DOPRI5_OF, RK4, RK4_OF
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.symbols import over_tuples, symbolic
 from kernels.lanes.tuples import after, joined, paired, times
@@ -30,10 +30,27 @@ def events(m, state, mode):
     return values, tuple(factor * u[1] for offset, factor, u in found)
 
 
-@jit_call
-def euler(m, state, mode, h):
-    """Explicit Euler: u + h f(u)."""
-    return after(state, h, ONE, (rate(m, state, mode),))
+def explicit(tableau, counting):
+    """A step of an explicit method, (m, state, mode, h) -> the state after it, and the rates that it is made of.
+
+    Parameters
+    ----------
+    tableau : for each stage but the first, and for the result, the weights of the rates that count for it
+    counting : the numbers of these
+    """
+
+    def step(m, state, mode, h):
+        rates = [rate(m, state, mode)]
+        for weights, those in zip(tableau[:-1], counting[:-1], strict=True):
+            rates.append(rate(m, after(state, h, weights, tuple(rates[j] for j in those)), mode))
+        stages = tuple(rates[j] for j in counting[-1])
+        return after(state, h, tableau[-1], stages), stages
+
+    return symbolic(step)
+
+
+euler, rk4 = explicit((ONE,), ((0,),)), explicit(RK4, RK4_OF)
+dopri5, dop853 = explicit(DOPRI5, DOPRI5_OF), explicit(DOP853, DOP853_OF)
 
 
 @jit_call
@@ -69,42 +86,3 @@ def moreau(m, state, mode, h):
     slid = choose(forward[-1] > 0.0, forward, choose(backward[-1] < 0.0, backward, times(0.0, state)))
     kicked = paired(state, slid)
     return paired(after(middle, 0.5 * h, ONE, (rate(m, kicked, mode),)), kicked)
-
-
-@jit_call
-def rk4(m, state, mode, h):
-    """The classical Runge-Kutta method."""
-    k0 = rate(m, state, mode)
-    k1 = rate(m, after(state, h, RK4[0], (k0,)), mode)
-    k2 = rate(m, after(state, h, RK4[1], (k1,)), mode)
-    k3 = rate(m, after(state, h, RK4[2], (k2,)), mode)
-    return after(state, h, RK4[3], (k0, k1, k2, k3))
-
-
-@jit
-def dopri5_stages(m, state, mode, h):
-    k0 = rate(m, state, mode)
-    k1 = rate(m, after(state, h, DOPRI5[0], (k0,)), mode)
-    k2 = rate(m, after(state, h, DOPRI5[1], (k0, k1)), mode)
-    k3 = rate(m, after(state, h, DOPRI5[2], (k0, k1, k2)), mode)
-    k4 = rate(m, after(state, h, DOPRI5[3], (k0, k1, k2, k3)), mode)
-    k5 = rate(m, after(state, h, DOPRI5[4], (k0, k1, k2, k3, k4)), mode)
-    return after(state, h, DOPRI5[5], (k0, k2, k3, k4, k5)), (k0, k2, k3, k4, k5)
-
-
-@jit
-def dop853_stages(m, state, mode, h):
-    k0 = rate(m, state, mode)
-    k1 = rate(m, after(state, h, DOP853[0], (k0,)), mode)
-    k2 = rate(m, after(state, h, DOP853[1], (k0, k1)), mode)
-    k3 = rate(m, after(state, h, DOP853[2], (k0, k2)), mode)
-    k4 = rate(m, after(state, h, DOP853[3], (k0, k2, k3)), mode)
-    k5 = rate(m, after(state, h, DOP853[4], (k0, k3, k4)), mode)
-    k6 = rate(m, after(state, h, DOP853[5], (k0, k3, k4, k5)), mode)
-    k7 = rate(m, after(state, h, DOP853[6], (k0, k3, k4, k5, k6)), mode)
-    k8 = rate(m, after(state, h, DOP853[7], (k0, k3, k4, k5, k6, k7)), mode)
-    k9 = rate(m, after(state, h, DOP853[8], (k0, k3, k4, k5, k6, k7, k8)), mode)
-    k10 = rate(m, after(state, h, DOP853[9], (k0, k3, k4, k5, k6, k7, k8, k9)), mode)
-    k11 = rate(m, after(state, h, DOP853[10], (k0, k3, k4, k5, k6, k7, k8, k9, k10)), mode)
-    stages = k0, k5, k6, k7, k8, k9, k10, k11
-    return after(state, h, DOP853[11], stages), stages

@@ -6,6 +6,7 @@ A stage's rates are those at state + h sum_j weight_j rates_j. Sources: Dormand 
 """
 
 RK4 = ((0.5,), (0.5,), (1.0,), (1 / 6, 1 / 3, 1 / 3, 1 / 6))
+RK4_OF = ((0,), (1,), (2,), (0, 1, 2, 3))
 """The classical one: each stage from the one before; then the result from all four."""
 
 DOPRI5 = (
@@ -16,6 +17,7 @@ DOPRI5 = (
     (9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656),
     (35 / 384, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84),
 )
+DOPRI5_OF = (*(tuple(range(k)) for k in range(1, 6)), (0, 2, 3, 4, 5))
 """Stages 1 to 5 from all before; the result from stages 0, 2, 3, 4, 5."""
 DOPRI5_ERROR = (71 / 57600, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40)
 """Of stages 0, 2, 3, 4, 5 and of the rates at the result."""
@@ -58,7 +60,8 @@ DOP853 = (
         -0.1521609496625161, 0.20136540080403034, 0.04471061572777259,
     ),
 )  # fmt: skip
-"""Stages 1 to 11 and the result; from which stages, the code says."""
+DOP853_OF = ((0,), (0, 1), (0, 2), (0, 2, 3), *((0, *range(3, k)) for k in range(5, 12)), (0, *range(5, 12)))
+"""Stages 1 to 11 and the result, and from which."""
 DOP853_ERROR_5 = (
     0.01312004499419488, -1.2251564463762044, -0.4957589496572502, 1.6643771824549864, -0.35032884874997366,
     0.3341791187130175, 0.08192320648511571, -0.022355307863886294,
