@@ -76,6 +76,8 @@ class CellReport:
         Error of the values, and the accuracy that the study asks for.
     methods : dict of str to tuple
         Status, error bound and outputs by each method that can do the cell, at the same rtol.
+    of_method : tuple of str
+        Outputs that say how a cell was solved, such as a number of steps, in which methods differ anyway.
     """
 
     place: dict[str, str]
@@ -86,6 +88,7 @@ class CellReport:
     error_bound: float
     rtol: float
     methods: dict[str, tuple[Status, float, dict[str, float]]]
+    of_method: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         outputs = ((name, f"{value:.10g}", self.units[name]) for name, value in self.values.items())
@@ -107,9 +110,9 @@ class CellReport:
     def _apart(self, values: dict[str, float]) -> float:
         """The largest relative difference of a method's outputs from those above; NaN where only one is NaN."""
         off = [0.0]
-        for name, value in self.values.items():
-            same = value == values[name] or (np.isnan(value) and np.isnan(values[name]))
-            off.append(0.0 if same else abs(values[name] / value - 1.0) if value else np.inf)
+        for name in self.values.keys() - set(self.of_method):
+            pair = np.array([values[name], self.values[name]])
+            off.append(np.nan if np.isnan(pair).sum() == 1 else float(relative_error(pair[:1], pair[1:])[0]))
         return float(np.max(off))
 
 
@@ -144,6 +147,7 @@ def report_cell(dataset: xr.Dataset, study: Study) -> CellReport:
         float(dataset[ERROR_BOUND]) if ERROR_BOUND in dataset else np.nan,
         alone.rtol,
         again,
+        tuple(field.name for field in study.asked if field.of_method),
     )
 
 

@@ -75,9 +75,21 @@ def test_a_cell_is_what_the_result_and_each_method_say(clocks):
     other = dict(zip(("period", "amplitude"), (1.5 * values["period"], 0.75 * values["amplitude"]), strict=True))
     told = str(dataclasses.replace(report, methods={"other": (status, error, values | other)}))
     assert re.search(r"^  other +OK +\S+ +0\.5$", told, re.MULTILINE)
+    none = str(dataclasses.replace(report, methods={"none": (status, error, dict.fromkeys(values, np.nan))}))
+    assert re.search(r"^  none +OK +\S+ +nan$", none, re.MULTILINE)
     refused = sweep.run(FOLIOT | {"axes": {"mu": [1e-3], "R": [0.1]}}).sweep.cell()
     assert refused.status == Status.NEVER_STARTS
     assert {status for status, *_ in refused.methods.values()} == {Status.NEVER_STARTS}
+
+
+def test_a_count_of_steps_is_no_difference_of_methods():
+    keys = {"kernel": "foliot_steps", "method": "rk4", "outputs": ["period", "steps"], "axes": {"mu": [1.0]}}
+    report = sweep.run(keys | {"fixed": {"phi0": 1.0, "a": 1.0, "step": 0.05}}).sweep.cell()
+    others = [values for status, _, values in report.methods.values() if values["steps"] != report.values["steps"]]
+    assert others
+    shown = [float(row) for row in re.findall(r"^  \w+ +(?:OK|INACCURATE) +\S+ +(\S+)$", str(report), re.MULTILINE)]
+    assert len(shown) == len(report.methods)
+    assert max(shown) < 0.1
 
 
 def test_what_is_no_cell_is_refused(clocks):
@@ -95,6 +107,12 @@ def test_what_is_no_cell_is_refused(clocks):
     for look in (summary.sweep.check, summary.sweep.cell):
         with pytest.raises(sweep.SweepError, match="summary"):
             look(allow_import=True)
+
+
+def test_a_dataset_without_statuses_says_what_can_be_done_with_it():
+    assert "in_units" in repr(xr.Dataset({"y": ("x", [1.0])}).sweep)
+    summary = sweep.run(build(axes={"height": [1.0, 2.0]}, summary={}))
+    assert re.search(r"^  2 +OK ", repr(summary.sweep), re.MULTILINE)
 
 
 def test_words_traces_and_arrays_are_given_back_as_the_kernel_had_them():
