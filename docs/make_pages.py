@@ -102,7 +102,8 @@ def _output(field: Field) -> tuple[str, ...]:
 
 def _method(method: Method) -> tuple[str, ...]:
     right = "`rtol`, or says by a status that it is not"
-    right = "a bound, told per cell" if method.bound else "an estimate, told per cell" if method.estimates else right
+    stated = "a bound" if method.bound else "an estimate" if method.estimates else ""
+    right = f"{stated}, stated per cell" if stated else right
     cannot = [*(f"`{name}`" for name in method.excludes), *(f"output `{name}`" for name in method.lacks)]
     return f"`{method.name}`", _plain(method.doc), right, ", ".join(cannot)
 

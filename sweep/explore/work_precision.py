@@ -185,8 +185,8 @@ def precision_text(found: xr.Dataset, complete: bool = False) -> str:
 
     Without the further columns, cells that are neither OK nor unsolved carry a remark, INACCURATE among them.
     """
-    few = complete or found.rtol.size <= 3
-    shown = found if few else found.isel(rtol=[found.rtol.size // 2])
+    every = complete or found.rtol.size <= 3
+    shown = found if every else found.isel(rtol=[found.rtol.size // 2])
     work, more = ([name for name in WORK if name in found], ["inaccurate"]) if complete else ([], [])
     rows = []
     for cell in shown.to_dataframe().reset_index().itertuples():
@@ -219,13 +219,11 @@ def _omissions(found: xr.Dataset, study: Study, able: Sequence[str] | None) -> l
     for name, (key, verb, where) in itertools.product(found["method"].values, faults):
         row = found.sel({"method": name})
         if row[key].any():
-            at = {
-                f"{rtol:.0e}": f"{100 * share:.3g} %"
-                for share, rtol in zip(row[key].values, row.rtol.values, strict=True)
-            }
-            alike = len(at) > 1 and len(set(at.values())) == 1
-            places = {"every rtol": next(iter(at.values()))} if alike else at
-            shares = ", ".join(f"{share} at {place}" for place, share in places.items() if share != "0 %")
+            parts = [f"{100 * share:.3g} %" for share in row[key].values]
+            at = [(part, f"{rtol:.0e}") for part, rtol in zip(parts, row.rtol.values, strict=True) if part != "0 %"]
+            if len(parts) > 1 == len(set(parts)):
+                at = [(parts[0], "every rtol")]
+            shares = ", ".join(f"{part} at {rtol}" for part, rtol in at)
             lines.append(f"{name} {verb} {shares}, first {next(place for place in row[where].values if place)}")
     return lines
 

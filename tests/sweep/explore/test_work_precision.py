@@ -218,6 +218,12 @@ def test_of_many_tolerances_the_middle_one_is_printed_and_all_of_them_by_wish():
     assert "at every rtol, first STEP_LIMIT" in " ".join(short.split())
 
 
+def test_a_share_is_told_where_two_tolerances_have_the_same_first_digit():
+    loose = Method("it", "", bad(0.0, lambda rtol: Status.STEP_LIMIT if rtol > 1.1e-3 else Status.OK))
+    found = chart(stones(loose, EXACT), reference="exact", tolerances=(1.2e-3, 1e-3))
+    assert "it does not solve 25 % at 1e-03" in found.attrs["omissions"]
+
+
 def test_no_more_cells_are_taken_than_are_wanted():
     study = build(axes={"height": np.linspace(1, 10, 100)}, outputs=["impact_speed"])
     cells = precision_cells(study, 20)["height"]
