@@ -1,7 +1,7 @@
 """What the scripts of the studies share: opening a result, and the table of statements; `_figures` has their figures.
 
-A script `<question>.py` stands beside its `<question>.toml`, reads the dataset that `sweep run` made of it, prints what
-theory says beside what comes out, and draws `<question>.png` beside the dataset.
+A script `<question>.py` stands beside its `<question>.toml`, reads the dataset that `sweep run` made of it, compares
+theory with what comes out, and draws `<question>.png` beside the dataset.
 """
 
 import re

@@ -6,7 +6,7 @@
     python studies/balance_isochronism.py balance_isochronism.h5 balance_isochronism_lift.h5 \\
         balance_isochronism_positions.h5
 
-draws balance_isochronism.png and prints theory beside what comes out. Theory, derived here: on its way to the right
+draws balance_isochronism.png and compares theory with what comes out. Theory, derived here: on its way to the right
 solid friction shifts the centre of the swing to -r, and about it the motion is linear. An impulse there changes the
 speed and not the phase (Airy's condition), so the period is 2 pi/omega_d whatever drive, amplitude and friction.
 Elsewhere, the impulse being w = 2 r a + pi zeta a^2 and turning the phase by -(at + r) w/(a^2 v), light losses lose

@@ -3,7 +3,7 @@
     sweep run studies/balance_ringdown.toml
     python studies/balance_ringdown.py balance_ringdown.h5
 
-draws balance_ringdown.png and prints theory beside what comes out. For light damping theory is one function: with
+draws balance_ringdown.png and compares theory with what comes out. For light damping theory is one function: with
 x = pi zeta theta0/(2 r), what viscous friction takes from the first half swing over what solid friction takes,
 N = ln(1 + x)/(pi zeta). The kernel counts half swings of pi/omega_d each, as the page has it, and cannot say
 otherwise; the time of a half swing and the motion are therefore measured by DOP853 on the page's (3). What is said of

@@ -3,7 +3,7 @@
     sweep run studies/chatter_lobes.toml
     python studies/chatter_lobes.py chatter_lobes.h5
 
-draws chatter_lobes.png and prints theory beside what comes out. A tooth cuts what the tooth before it left, a time tau
+draws chatter_lobes.png and compares theory with what comes out. A tooth cuts what the tooth before it left, a time tau
 ago, so the cut's torque at the spindle is -K (theta(t) - theta(t - tau)), and with the spindle's receptance H
 
     1 + K (1 - exp(-i w tau)) H(w) = 0                                                                  (1)

@@ -3,7 +3,7 @@
     sweep run studies/cross_beat.toml --allow-import
     python studies/cross_beat.py cross_beat.h5
 
-draws cross_beat.png and prints theory beside what comes out. Hoyng & Nieuwenhuizen ("the paper") call it a detail.
+draws cross_beat.png and compares theory with what comes out. Hoyng & Nieuwenhuizen ("the paper") call it a detail.
 Theory, derived here: rigid gears leave one angle, and (1) + (2) of `cross_beat_scene` is a single foliot with
 
     I = I_l + I_r,  c = c_l + c_r,  R = R_l + R_r,  the torque of one,                                   (1)

@@ -3,7 +3,7 @@
     sweep run studies/foliot_scaling.toml
     python studies/foliot_scaling.py foliot_scaling.h5
 
-draws foliot_scaling.png and prints what Hoyng & Nieuwenhuizen ("the paper", arXiv:1604.06681) say beside what comes
+draws foliot_scaling.png and compares what Hoyng & Nieuwenhuizen ("the paper", arXiv:1604.06681) say with what comes
 out here. Only alpha = mu/(a^2 phi0) counts: a P and A = phi_max/phi0 are functions of it alone.
 """
 

@@ -4,7 +4,7 @@
     sweep run studies/friction_laws_map.toml
     python studies/friction_laws.py friction_laws.h5 friction_laws_map.h5
 
-draws friction_laws.png and prints theory beside what comes out, s = -dlnP/dlnmu. Friction c |v|^n alone leaves one
+draws friction_laws.png and compares theory with what comes out, s = -dlnP/dlnmu. Friction c |v|^n alone leaves one
 group, alpha_n = mu^(2/n-1) c^(-2/n)/phi0, so that dlnP/dlnc = (2s - 1)/(2 - n), and
     slow swings, which friction holds at its terminal speed:  s = 1/n,      at small mu for n < 2, at large for n > 2;
     free swings, which friction hardly slows:                 s = n/(n+2),  the other way round.             (1)

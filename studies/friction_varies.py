@@ -4,7 +4,7 @@
     sweep run studies/friction_varies_noise.toml
     python studies/friction_varies.py friction_varies.h5 friction_varies_noise.h5
 
-draws friction_varies.png and prints theory beside what comes out. The paper supposes that only the averages of torque
+draws friction_varies.png and compares theory with what comes out. The paper supposes that only the averages of torque
 and friction over a period count. Theory, derived here, with s = -dlnP/dlnmu and dlnP/dlna = 2s - 1:
 
 weak drive: the way takes its mean over the angle, the turn the friction at the switch,

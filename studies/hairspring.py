@@ -3,7 +3,7 @@
     sweep run studies/hairspring.toml
     python studies/hairspring.py hairspring.h5
 
-draws hairspring.png and prints theory beside what comes out. kappa = k phi0/mu is the spring's torque at the switching
+draws hairspring.png and compares theory with what comes out. kappa = k phi0/mu is the spring's torque at the switching
 angle over the drive, alpha = mu/(a^2 phi0) the drive as Hoyng & Nieuwenhuizen have it, Q = sqrt(k)/a.
 
 Theory, to first order in the torque: phi = A sin wt, w = sqrt(k), and the torque, which lags by asin(phi0/A), pushes

@@ -3,7 +3,7 @@
     sweep run studies/law_any_swing.toml
     python studies/law_any_swing.py law_any_swing.h5
 
-draws law_any_swing.png and prints theory beside what comes out. Let friction of degree n (0 dry, 1 viscous, n drag)
+draws law_any_swing.png and compares theory with what comes out. Let friction of degree n (0 dry, 1 viscous, n drag)
 take the share lambda_n of the energy of half a swing, impacts the share lambda_e; N = sum of n lambda_n, and A is the
 amplitude over phi0. At large swings s = L = (N + lambda_e)/(N + 2). At small ones the foliot goes at its final speed,
 or starts from rest after an impact, and s = 1/M, M = N + 2 lambda_e. Between them, with x = k (A^2 - 1),

@@ -3,7 +3,7 @@
     sweep run studies/law_map.toml
     python studies/law_map.py law_map.h5
 
-draws law_map.png and prints theory beside what comes out. The general law, derived here by dominant balance: let
+draws law_map.png and compares theory with what comes out. The general law, derived here by dominant balance: let
 friction of degree n take the share lambda_n of the energy 2 mu phi0 of half a swing, n = 0 dry, 1 viscous, n drag c
 abs(v)^n, and impacts at the switch the share lambda_e; N = sum of n lambda_n. Large swings (light losses): the way is
 v^2/mu, so friction takes c v^(n + 2)/mu, impacts (1 - e^2) v^2/2, and P ~ v/mu. The differential of the balance, sum

@@ -5,7 +5,7 @@
     sweep refine law_map_borders.h5 --y sensitivity --tolerance 0.02 -o law_map_borders_fine.h5
     python studies/law_map_overnight.py law_map_overnight.h5 law_map_borders_fine.h5
 
-draws law_map_overnight.png and prints theory beside what comes out, of 1e8 clocks and torques. At large swings the
+draws law_map_overnight.png and compares theory with what comes out, of 1e8 clocks and torques. At large swings the
 speed v at the switch follows from the energy of half a swing,
 
     2 mu phi0 = R v^2/mu + 2 a v^3/(3 mu) + 2 c v^(n+2)/((n+2) mu) + (1 - e^2) v^2/2,                    (1)

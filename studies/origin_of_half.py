@@ -3,7 +3,7 @@
     sweep run studies/origin_of_half.toml
     python studies/origin_of_half.py origin_of_half.h5
 
-draws origin_of_half.png and prints theory beside what comes out. Theory: where
+draws origin_of_half.png and compares theory with what comes out. Theory: where
     (i)   every torque of the model is proportional to the drive,
     (ii)  every reset of speeds is of degree 1 in them (restitution, ratios of inertias), and
     (iii) every other force that depends on speed is of degree 2 in it (or there is none),

@@ -3,7 +3,7 @@
     sweep run studies/polisher_extrema.toml
     python studies/polisher_extrema.py polisher_extrema.h5
 
-draws polisher_extrema.png, the paper's figures 4, 6 and 7 in one, and prints its statements beside what comes out.
+draws polisher_extrema.png, the paper's figures 4, 6 and 7 in one, and compares its statements with what comes out.
 b = (49, -38) cm has the length and makes the range of angles of the paper's figure 4, which does not give it.
 """
 

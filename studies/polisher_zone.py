@@ -3,7 +3,7 @@
     sweep run studies/polisher_zone.toml
     python studies/polisher_zone.py polisher_zone.h5
 
-draws polisher_zone.png and prints theory beside what comes out. O_DH on its arc turns the tool's centre by beta, to
+draws polisher_zone.png and compares theory with what comes out. O_DH on its arc turns the tool's centre by beta, to
 L (cos(alpha + beta), sin(alpha + beta)); so the tool, of half width a, covers the work's centre, at distance L, in some
 part of the swing if
 

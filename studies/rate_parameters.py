@@ -2,8 +2,8 @@
 
     python studies/rate_parameters.py rate_parameters.h5
 
-prints Sobol' indices and Morris' effects of torque, friction, switching angle and restitution on ln(period), by SALib
-on designs of ours, beside what the exponents say, and draws the indices against the drive: rate_parameters.png.
+compares Sobol' indices and Morris' effects of torque, friction, switching angle and restitution on ln(period), by SALib
+on designs of ours, with what the exponents say, and draws the indices against the drive: rate_parameters.png.
 
 P = F(alpha)/a with alpha = mu/(a^2 phi0), so with s = -d ln P/d ln mu the exponents are -s for mu, s for phi0 and
 2 s - 1 for a. Where all are known equally well, the shares of the variance are their squares over the sum of these.

@@ -3,7 +3,7 @@
     sweep run studies/self_starting.toml
     python studies/self_starting.py self_starting.h5
 
-draws self_starting.png and prints theory beside what comes out. Released at phi_s < phi0 the foliot moves if the torque
+draws self_starting.png and compares theory with what comes out. Released at phi_s < phi0 the foliot moves if the torque
 beats stiction and spring, mu > R_s + k phi_s, and without viscous friction comes to the switch if the energy is enough,
 
     mu > max(R_s + k phi_s, R + k (phi0 + phi_s)/2);                                                     (1)

@@ -5,7 +5,7 @@
     sweep run studies/three_models_viscous.toml
     python studies/three_models.py three_models.h5 three_models_denny.h5 three_models_viscous.h5
 
-draws three_models.png, prints theory beside what comes out, and writes the three models as one dataset,
+draws three_models.png, compares theory with what comes out, and writes the three models as one dataset,
 three_models_all.nc. Where every loss is a share of the motion (restitution, inertias) and nothing but the drive exerts
 a torque, time has no other unit than the one the torque gives, so P ~ torque^(-1/2) and the amplitude does not depend
 on it; viscous friction brings in a time 1/a, and with it P ~ torque^(-1) at weak and torque^(-1/3) at strong drive. The

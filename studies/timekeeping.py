@@ -5,7 +5,7 @@
     sweep run studies/timekeeping_spring.toml     a foliot with a balance spring
     python studies/timekeeping.py timekeeping.h5 timekeeping_buergi.h5 timekeeping_spring.h5
 
-draws timekeeping.png and prints theory beside what comes out. The torque of half swing i is mu (1 + sigma x_i), x of
+draws timekeeping.png and compares theory with what comes out. The torque of half swing i is mu (1 + sigma x_i), x of
 variance 1, white or forgotten as r^i, r = exp(-1/tau_c). s = -dlnP/dlnmu, T = P/2, m = day/T half swings a day.
 
 Theory, to first order: sigma x_i shifts the clock by s T sigma x_i in all, now and in the swings that remember it. The

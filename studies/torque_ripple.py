@@ -3,7 +3,7 @@
     sweep run studies/torque_ripple.toml
     python studies/torque_ripple.py torque_ripple.h5
 
-draws torque_ripple.png and prints theory beside what comes out. The torque is mu (1 + depth f), f = cos(h pi s), s the
+draws torque_ripple.png and compares theory with what comes out. The torque is mu (1 + depth f), f = cos(h pi s), s the
 way along the drive over 2 phi0 (0 at the last switch, 1 at the next, below 0 on the recoil), h the harmonic; it does
 the same work at any depth. alpha = mu/(a^2 phi0), A = phi_max/phi0 and q = a P/4 as in Hoyng & Nieuwenhuizen.
 

@@ -4,7 +4,7 @@
     sweep run studies/verge_losses_wheel.toml --allow-import
     python studies/verge_losses.py verge_losses.h5 verge_losses_wheel.h5
 
-draws verge_losses.png and prints theory beside what comes out, P ~ torque^(-s). kappa = n^2 I_c/I_v is the wheel's
+draws verge_losses.png and compares theory with what comes out, P ~ torque^(-s). kappa = n^2 I_c/I_v is the wheel's
 inertia over the foliot's, alpha = n tau/(I_v a^2 phi0) the drive over viscous friction, lambda the share of a loss in
 the energy of half a period: viscous, dry, and impact. Theory, derived here: where the swing is large the speed at the
 switch follows from the balance of energy, friction of degree n taking abs(v)^(n + 2)/torque and impacts v^2, so that

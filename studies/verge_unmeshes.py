@@ -3,7 +3,7 @@
     sweep run studies/verge_unmeshes.toml
     python studies/verge_unmeshes.py verge_unmeshes.h5
 
-draws verge_unmeshes.png and prints theory beside what comes out, P ~ torque^(-s). kappa = n^2 I_c/I_v is the wheel's
+draws verge_unmeshes.png and compares theory with what comes out, P ~ torque^(-s). kappa = n^2 I_c/I_v is the wheel's
 inertia over the foliot's, alpha = n tau/(I_v a^2 phi0) the drive over viscous friction, a = c_v/I_v. A wheel that is
 thrown back by more than half a pitch, 2 n phi0 + drop, is out of mesh. Theory, derived here for no drop and e = 0:
 

@@ -3,7 +3,7 @@
     sweep run studies/which_average.toml
     python studies/which_average.py which_average.h5
 
-draws which_average.png and prints theory beside what comes out. m = ln(mu/mu0) and x = ln(a/a0) change over the season
+draws which_average.png and compares theory with what comes out. m = ln(mu/mu0) and x = ln(a/a0) change over the season
 or from swing to swing; P = F(alpha)/a, alpha = mu/(a^2 phi0), s = -dlnP/dlnmu, s' = ds/dln alpha. Derived here:
 
 seasons: ln<P0/P> = s <m> + (1 - 2s) <x> + s' var(m - 2x)/2 + var(s m + (1 - 2s) x)/2 + ...,             (1)
