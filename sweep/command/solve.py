@@ -146,7 +146,7 @@ def refine(arguments: argparse.Namespace) -> None:
     option("--rtol", "default: 1e-3 to 1e-13", metavar="RTOL", nargs="+", type=float),
     option("--cells", "of the study at most; default: 1024", metavar="N", type=int, default=1024),
     option("--reference", "method taken as true; default: the one with the smallest bound", metavar="METHOD"),
-    *(o.ALL, o.JSON),
+    *(switch("--all", "every tolerance, and all columns of the table"), o.JSON),
     *o.SOLVING[1:],
 )
 def chart(arguments: argparse.Namespace) -> None:

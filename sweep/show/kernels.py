@@ -58,7 +58,7 @@ class KernelPage:
             for fields, more in (
                 (kernel.parameters, lambda f: (limits(f), _default(f), f.doc + _along(f, ", one for each "))),
                 (kernel.outputs, lambda f: (_along(f, "along "), f.doc)),
-                (kernel.along, lambda f: (limits(f), f.doc)),
+                (kernel.along, lambda f: (limits(f), f.doc + _counted(f))),
             )
         )
         cheapest = 'methods, cheapest first; "auto" takes the first whose error bound meets rtol'
@@ -190,6 +190,10 @@ def _first(kernel: Kernel) -> str:
 
 def _along(field: Field, words: str) -> str:
     return f"{words}{listed(field.dims, word='and')}" if field.dims else ""
+
+
+def _counted(field: Field) -> str:
+    return "" if field.default is None else f"; default: {field.default:g} values from {field.lower:g} on"
 
 
 def _default(field: Field) -> str:

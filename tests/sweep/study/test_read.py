@@ -55,6 +55,7 @@ def test_a_coordinate_with_a_default_need_not_be_given():
     assert sweep.study(**keys).along["rank"].tolist() == [1.0, 2.0]
     assert sweep.study(**keys, along={"rank": [2.0]}).along["rank"].tolist() == [2.0]
     assert not len(sweep.study(**keys, outputs=["period"]).along["rank"])
+    assert "default: 2 values" in " ".join(str(sweep.kernels("forced_scene:FORCED", allow_import=True)).split())
     with pytest.raises(sweep.StudyError, match="<= 2"):
         sweep.study(**keys, along={"rank": [3.0]})
 
