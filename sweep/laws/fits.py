@@ -119,7 +119,7 @@ def fitted(
     for first in range(0, len(z) if laws else 0, most):
         part = z[first : first + most]
         search = _Search(laws, t, part, None if errors is None else errors[first], wanted)
-        moving = np.arange(len(search.q))
+        moving = np.flatnonzero(search.high[:, 0] > search.low[:, 0])
         while moving.size:
             for _ in range(STEPS if wanted is None else 3 * STEPS):
                 if moving.size:

@@ -259,7 +259,7 @@ def line_deviance(t: Array, z: Array) -> float:
         off = off - (share * u) @ off / ((share * u) @ u) * u
         scale = max(float(np.mean(weights * off**2)), 1e-300)
         weights = 4 / (3 + off**2 / scale)
-        if abs(scale - before) <= 1e-6 * scale:  # its square counts
+        if abs(scale - before) <= 1e-4 * scale:  # its square counts
             break
     scale = max(scale, float((ROUNDING * (1 + abs(z).max())) ** 2))
     constant = 2 * math.log(2 / (math.pi * math.sqrt(3))) + 1 + math.log(2 * math.pi)
