@@ -14,14 +14,12 @@ every second bounce begins to differ, at (push sin t) (1 + e)^2 = 2 (1 + e^2). B
 bounces, and the push at which they double; from there on the two differ as the square root of what goes beyond it.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Conclusion, Statement, compared, most, read_result, said, script
+from _common import Claims, Conclusion, compared, most, read_result, said, script
 from _figures import direct_label, page_of
 
 from kernels.interface import Status
@@ -45,7 +43,7 @@ def heights(x: Any) -> int:
     return 1 + int((np.diff(np.sort(x)) > SAME).sum())
 
 
-def statements(ds: xr.Dataset) -> list[Statement]:
+def statements(ds: xr.Dataset) -> Claims:
     """Even bounces, and where they double."""
     least, doubles = borders(float(ds.e))
     ok = ds.where(ds.status == Status.OK, drop=True)
@@ -61,11 +59,9 @@ def statements(ds: xr.Dataset) -> list[Statement]:
         "even bounces come every 2 pi": even.time.diff("passage") / (2.0 * math.pi),
     }
     counted = ", ".join(map(str, sorted(found)))
-    return [
-        *(most(what, "", abs(ratio - 1.0).max(), 1e-6, "") for what, ratio in off.items()),
-        compared("push at which bounces double", f"{doubles:.6f}", float(begins), doubles, 1e-4, 6),
-        said("heights beyond it, to 1.7", {2, 4} <= found <= {2, 4, 8}, counted, "2, 4, 8"),
-    ]
+    yield from (most(what, "", abs(ratio - 1.0).max(), 1e-6, "") for what, ratio in off.items())
+    yield compared("push at which bounces double", f"{doubles:.6f}", float(begins), doubles, 1e-4, 6)
+    yield said("heights beyond it, to 1.7", {2, 4} <= found <= {2, 4, 8}, counted, "2, 4, 8")
 
 
 def figure(ds: xr.Dataset) -> Any:

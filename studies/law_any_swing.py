@@ -15,14 +15,12 @@ Exact for every clock, since no other quantity has a time in it: with p_n = dlnP
     s = 1/2 + 1/2 sum of (2 - n) p_n.                                                                            (2)
 """
 
-from __future__ import annotations
-
 import itertools
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Conclusion, Statement, count, most, read_result, said, script, solved
+from _common import Claims, Conclusion, Statement, count, most, read_result, said, script, solved
 from _figures import page_of
 from _losses import any_swing, shares
 
@@ -46,20 +44,20 @@ LOSSES: dict[str, tuple[dict[str, float], float]] = {
 """Clocks of one loss, and the most that (1) may be off."""
 
 
-def everywhere(ds: xr.Dataset) -> list[Statement]:
+def everywhere(ds: xr.Dataset) -> Claims:
     """(1) against every clock, by its swing."""
     off = abs(ds.law / ds.sensitivity - 1.0)
     half, nearly = off.quantile([0.5, 0.95]).values
     usual, text = bool(half < 0.004 and nearly < 0.1), f"{half:.2%}, {nearly:.1%}"
-    lines = [Statement("all clocks: half of them, 95 % of them within", "", text, nearly, usual)]
+    yield Statement("all clocks: half of them, 95 % of them within", "", text, nearly, usual)
     for low, high, allowed in BANDS:
         part = off.where((ds.swing >= low) & (ds.swing < high))
         text = f"{count(part, 'clocks')} within {part.max():.2%}"
         what = f"swings from {low:g} phi0" + (f" to {high:g}" if np.isfinite(high) else "")
-        lines.append(most(what, f"(1) to {allowed:.1%}", part, allowed, text))
+        yield most(what, f"(1) to {allowed:.1%}", part, allowed, text)
     near = [float((abs(ds[name] / ds.sensitivity - 1.0) < 0.1).mean()) for name in ("law", "large", "small")]
     text, better = ", ".join(f"{share:.0%}" for share in near), near[0] > 0.9 > 0.75 > max(near[1:])
-    return [*lines, said("within 10 %: by (1), by large swings, by small", better, text)]
+    yield said("within 10 %: by (1), by large swings, by small", better, text)
 
 
 def alone(name: str) -> xr.Dataset:
@@ -70,14 +68,12 @@ def alone(name: str) -> xr.Dataset:
     return any_swing(shares(solved("foliot", mu=mu, **clock, outputs=outputs, rtol=1e-10)))
 
 
-def one_loss(single: dict[str, xr.Dataset]) -> list[Statement]:
+def one_loss(single: dict[str, xr.Dataset]) -> Claims:
     """(1) where it is exact, and of two losses where it is not."""
-    lines = []
     for name, ds in single.items():
         allowed = LOSSES[name][1]
         text = f"s from {ds.sensitivity.max():.4g} to {ds.sensitivity.min():.4g}"
-        lines.append(most(f"{name} alone", f"(1) to {allowed:g}", ds.law / ds.sensitivity - 1, allowed, text))
-    return lines
+        yield most(f"{name} alone", f"(1) to {allowed:g}", ds.law / ds.sensitivity - 1, allowed, text)
 
 
 def by_periods(ds: xr.Dataset) -> list[Statement]:

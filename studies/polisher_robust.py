@@ -12,13 +12,11 @@ linear in t, so the t >= 0 that make U least are found by non-negative least squ
 is that of all pairs and threes, and of more it is looked for by exchanging one setting at a time, from 25 starts.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Conclusion, Statement, compared, most, read_result, said, script
+from _common import Claims, Conclusion, Statement, compared, most, read_result, said, script
 from _figures import page_of
 from _polishing import DWELL, KEPT, POINTS, WANTED, Profiles, disc, enough, fewest, least, of_sets, profiles
 
@@ -33,7 +31,7 @@ unevenness: standard deviation over the area, over the mean; expected: root of i
 """
 
 
-def optimum(p: Profiles) -> list[Statement]:
+def optimum(p: Profiles) -> Claims:
     """The best of all settings, beside the best with exact times."""
     everything = range(len(p.rows))
     exact, robust = p.times(everything, 0.0), p.times(everything)
@@ -41,29 +39,26 @@ def optimum(p: Profiles) -> list[Statement]:
     scale = 1.0 / float(p.weight @ mixed**2 + DWELL**2 * robust**2 @ p.rough**2)  # the least squares' own size
     slope = p.rows @ ((scale * mixed - 1.0) * p.weight) + DWELL**2 * p.rough**2 * scale * robust
     breach = max(abs(slope[robust > 1e-9]).max(), -slope[robust <= 1e-9].min())
-    lines = [most("  conditions of an optimum of (1)", "0", breach, 1e-6, "largest breach")]
+    yield most("  conditions of an optimum of (1)", "0", breach, 1e-6, "largest breach")
     for name, times in (("exact times", exact), ("expected", robust)):
         theory, (here, below) = p.expected(everything, times), p.drawn(everything, times)
         nominal = p.nominal(everything, times)
         what = f"least {name}, {np.sum(times > 1e-9)} settings: {nominal:.2%} with exact times, with errors"
-        lines.append(compared(what, f"(1) {theory:.3%}", here, theory, 0.03, 4))
-        lines.append(Statement("  19 of 20 pieces below", "", f"{below:.2%}"))
+        yield compared(what, f"(1) {theory:.3%}", here, theory, 0.03, 4)
+        yield Statement("  19 of 20 pieces below", "", f"{below:.2%}")
     gain = p.expected(everything, exact) / p.expected(everything, robust)
     kept = float(least(mixed, p.weight, p.radius))
-    return [
-        *lines,
-        Statement("  the one over the other", "> 1.2", f"{gain:.3f}", gain, gain > 1.2),
-        Statement("  least wear of the inner half over the mean", f"> {KEPT}", f"{kept:.2f}", kept, kept > KEPT),
-    ]
+    yield Statement("  the one over the other", "> 1.2", f"{gain:.3f}", gain, gain > 1.2)
+    yield Statement("  least wear of the inner half over the mean", f"> {KEPT}", f"{kept:.2f}", kept, kept > KEPT)
 
 
-def few(ds: xr.Dataset, p: Profiles, sets: dict[int, list[int]]) -> list[Statement]:
+def few(ds: xr.Dataset, p: Profiles, sets: dict[int, list[int]]) -> Claims:
     """What a few settings reach, three of them solved once more."""
-    everything, lines, drawn = range(len(p.rows)), [], []
+    everything, drawn = range(len(p.rows)), []
     for n, chosen in sets.items():
         times = p.times(chosen)
         text = f"{p.nominal(chosen, times):.2%}, {p.expected(chosen, times):.3%}"
-        lines.append(Statement(f"{n} settings: with exact times, with errors", "", text))
+        yield Statement(f"{n} settings: with exact times, with errors", "", text)
         drawn.append(p.drawn(chosen, times)[0] / p.expected(chosen, times) - 1.0)
     exact = p.expected(everything, p.times(everything, 0.0))
     equal = min(n for n, chosen in sets.items() if p.best(chosen) < exact)
@@ -75,16 +70,13 @@ def few(ds: xr.Dataset, p: Profiles, sets: dict[int, list[int]]) -> list[Stateme
     solved = ds.wear.stack(setting=("e", "w_x")).transpose("setting", "radius").values[sets[3]]
     again = np.asarray(disc(ds)(throw, float(ds.L) + offset))[:, :: (POINTS - 1) // (ds.radius.size - 1)]
     moved = abs(solved - again).max() / again.max()
-    return [
-        *lines,
-        most("  errors drawn: largest deviation from (1)", "3 %", max(drawn, key=abs), 0.03),
-        said("  fewest that are as good as the best for exact times", equal < 11, f"{equal}"),
-        said(f"  fewest for {wanted} % with errors", needed == FEWEST, ", ".join(map(str, needed)), f"{FEWEST}"),
-        said("  least wear of the inner half of each", kept > KEPT, f"{kept:.2f} or more", f"> {KEPT}"),
-        Statement("  no set is better than all settings", ">= 1", f"{worst:.3f}", worst - 1, worst >= 1),
-        most("  the least square of each set, by non-negative least squares", "0", off, 1e-9),
-        most("  profiles of the three settings, solved again", "1e-4", moved, 1e-4),
-    ]
+    yield most("  errors drawn: largest deviation from (1)", "3 %", max(drawn, key=abs), 0.03)
+    yield said("  fewest that are as good as the best for exact times", equal < 11, f"{equal}")
+    yield said(f"  fewest for {wanted} % with errors", needed == FEWEST, ", ".join(map(str, needed)), f"{FEWEST}")
+    yield said("  least wear of the inner half of each", kept > KEPT, f"{kept:.2f} or more", f"> {KEPT}")
+    yield Statement("  no set is better than all settings", ">= 1", f"{worst:.3f}", worst - 1, worst >= 1)
+    yield most("  the least square of each set, by non-negative least squares", "0", off, 1e-9)
+    yield most("  profiles of the three settings, solved again", "1e-4", moved, 1e-4)
 
 
 def figure(p: Profiles, sets: dict[int, list[int]]) -> Any:

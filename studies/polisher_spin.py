@@ -16,15 +16,13 @@ times as fast as the work six or five. With all settings and errors of 5 % the l
 it hangs over the rim a free tool turns otherwise, which is left out here, as is friction of its bearing.
 """
 
-from __future__ import annotations
-
 import functools
 import itertools
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Conclusion, Statement, compared, differing, most, read_result, said, script, solved
+from _common import Claims, Conclusion, compared, differing, most, read_result, said, script, solved
 from _figures import page_of
 from _polishing import KEPT, WANTED, Profiles, enough, fewest, least, profiles
 from scipy.optimize import brentq
@@ -127,27 +125,29 @@ def free_turn(ds: xr.Dataset, pace: float) -> float:
     return brentq(moment, -3, 6)
 
 
-def physics(ds: xr.Dataset, kernel: Profiles) -> list[Statement]:
+def physics(ds: xr.Dataset, kernel: Profiles) -> Claims:
     """(1) against the kernel, against the wear in all, and the moment of friction."""
     rigid, everything = spun(ds, None), range(len(kernel.rows))
     off = abs(rigid.rows - kernel.rows)[:, 1:] / kernel.rows.max(1, keepdims=True)
     e, w, fine = 0.1, float(ds.L) + 0.03, np.linspace(0, 0.3, 601)
-    lines = [
-        most("rigid tool by (1), against the kernel: profiles", "0.5 %", off, 0.005),
-        compared("  all settings, expected", f"{kernel.best(everything):.3%}", rigid.best(everything),
-                 kernel.best(everything), 0.005, 4),
-    ]  # fmt: skip
+    yield most("rigid tool by (1), against the kernel: profiles", "0.5 %", off, 0.005)
+    yield compared(
+        "  all settings, expected",
+        f"{kernel.best(everything):.3%}",
+        rigid.best(everything),
+        kernel.best(everything),
+        0.005,
+        4,
+    )
     for name, k in SPINS.items():
         theory, here = of_the_tool(ds, e, w, k), 2 * np.pi * np.trapezoid(wear(ds, e, w, k, fine) * fine, fine)
-        lines.append(
-            compared(f"turns {name}: wear in all by the tool's points", f"{theory:.5g}", here, theory, 2e-3, 5)
-        )
-    return [*lines, differing("free disc wholly on the work: k", "1", free_turn(ds, 0.3), 1.0, 1e-6, 7)]
+        yield compared(f"turns {name}: wear in all by the tool's points", f"{theory:.5g}", here, theory, 2e-3, 5)
+    yield differing("free disc wholly on the work: k", "1", free_turn(ds, 0.3), 1.0, 1e-6, 7)
 
 
-def evenness(tools: dict[str, Profiles], sets: dict[str, dict[int, list[int]]]) -> list[Statement]:
+def evenness(tools: dict[str, Profiles], sets: dict[str, dict[int, list[int]]]) -> Claims:
     """The fewest settings for a wanted unevenness, and what all of them reach."""
-    lines, wanted, drawn = [], ", ".join(f"{100 * x:g}" for x in WANTED), []
+    wanted, drawn = ", ".join(f"{100 * x:g}" for x in WANTED), []
     for name, p in tools.items():
         needed, kept = enough(p, sets[name]), 1.0
         for s in sets[name].values():
@@ -156,11 +156,9 @@ def evenness(tools: dict[str, Profiles], sets: dict[str, dict[int, list[int]]]) 
             drawn.append(p.drawn(s, times)[0] / p.expected(s, times) - 1.0)
         known, everything = FEWEST[name]
         here = ", ".join(map(str, needed)) + f"; least of the inner half {kept:.2f}"
-        lines += [
-            said(f"{name}: settings for {wanted} %, no hole", needed == known and kept > KEPT, here, f"{known}"),
-            compared("  all settings: expected [%]", f"{everything}", 100 * p.best(range(88)), everything, 0.005, 4),
-        ]
-    return [*lines, most("errors drawn: largest deviation", "3 %", max(drawn, key=abs), 0.03)]
+        yield said(f"{name}: settings for {wanted} %, no hole", needed == known and kept > KEPT, here, f"{known}")
+        yield compared("  all settings: expected [%]", f"{everything}", 100 * p.best(range(88)), everything, 0.005, 4)
+    yield most("errors drawn: largest deviation", "3 %", max(drawn, key=abs), 0.03)
 
 
 def figure(ds: xr.Dataset, tools: dict[str, Profiles], sets: dict[str, dict[int, list[int]]]) -> Any:

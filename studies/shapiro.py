@@ -12,13 +12,11 @@ J_n being Bessel's function: it is locked where abs(detuning) < abs(J_n(ac)), an
 the drive by exp(-2 pi/w sqrt(J_n^2 - detuning^2)). Without the drive (ac = 0, n = 0) both are exact.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Conclusion, Statement, differing, most, read_result, said, script
+from _common import Claims, Conclusion, Statement, differing, most, read_result, said, script
 from _figures import direct_label, page_of
 from matplotlib.colors import ListedColormap
 from scipy.special import jv
@@ -38,7 +36,7 @@ def scaled(ds: xr.Dataset) -> xr.Dataset:
     return ds.assign(bessel=bessel, decay=rate**2, locked=ds.status == Status.OK)
 
 
-def statements(ds: xr.Dataset) -> list[Statement]:
+def statements(ds: xr.Dataset) -> Claims:
     """Voltage, widths and decay."""
     inside, clear = abs(ds.bessel) - abs(ds.detuning), BORDER / ds.w
     own = ds.locked & (ds.phase_turns == ds.order)
@@ -48,16 +46,14 @@ def statements(ds: xr.Dataset) -> list[Statement]:
     exact = float(abs(free.decay - (1.0 - free.detuning**2)).where(free.locked).max())
     middle = abs(ds.decay - ds.bessel**2).where(own).sel(detuning=0.0).max(("order", "ac"))
     falls = float(np.log(middle[1] / middle[0]) / np.log(ds.w[1] / ds.w[0]))
-    return [
-        most("period of the cycle", "2 pi/w", periods, 1e-6, ""),
-        most("decay without a drive", "1 - detuning^2", exact, 1e-5, ""),
-        *(
-            said(f"w = {w:g}: n turns a period by (1), but for {BORDER / w:.2f}", here, "", "all cells")
-            for w, here in zip(ds.w.values, right, strict=True)
-        ),
-        Statement("decay in the middle beside (1)", "", ", ".join(f"{off:.4f}" for off in middle.values)),
-        differing("its deviation goes as w to the power", "-2", falls, -2.0, 0.2, 3),
-    ]
+    yield most("period of the cycle", "2 pi/w", periods, 1e-6, "")
+    yield most("decay without a drive", "1 - detuning^2", exact, 1e-5, "")
+    yield from (
+        said(f"w = {w:g}: n turns a period by (1), but for {BORDER / w:.2f}", here, "", "all cells")
+        for w, here in zip(ds.w.values, right, strict=True)
+    )
+    yield Statement("decay in the middle beside (1)", "", ", ".join(f"{off:.4f}" for off in middle.values))
+    yield differing("its deviation goes as w to the power", "-2", falls, -2.0, 0.2, 3)
 
 
 def figure(ds: xr.Dataset) -> Any:

@@ -14,13 +14,11 @@ and it ends with stick and slip where A comes to the belt's speed. Stick and sli
 alone, to which the ride on the belt adds a time of distance over speed.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Conclusion, Statement, compared, most, read_result, said, script
+from _common import Claims, Conclusion, compared, most, read_result, said, script
 from _figures import direct_label, page_of
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
@@ -54,34 +52,30 @@ def by_hand(ds: xr.Dataset, belt: float) -> float:
     return float(slip.t[-1] + (off - slip.y[0, -1]) / belt)
 
 
-def sticking(ds: xr.Dataset) -> list[Statement]:
+def sticking(ds: xr.Dataset) -> Claims:
     """Stick and slip, and where it ends."""
     ok, rests = (ds.where(ds.status == status, drop=True) for status in (Status.OK, Status.COMES_TO_REST))
     off = max(abs(float(ok.period.sel(belt=belt)) / by_hand(ds, belt) - 1.0) for belt in ok.belt.values)
     end = brentq(lambda size: float(averaged(ds, size)) - size, 0.5, 5.0)
     steady, decay = abs(rests.place / friction(ds, rests.belt) - 1.0).max(), float(abs(ok.multiplier).max())
     given = int(ok.period.notnull().sum()), rests.belt.size
-    return [
-        said("cells that stick and slip, that rest", sum(given) == ds.belt.size, f"{given}", "all"),
-        most("period beside slip by scipy and ride", "", off, 1e-8, ""),
-        said("largest multiplier, as it sticks", decay < 1e-8, f"{decay:.1e}", "0"),
-        compared("fastest belt on which it sticks", "end of (1)", float(ok.belt.max()), end, 0.04, 4),
-        most("place of steady sliding", "F(belt)", steady, 1e-8, ""),
-    ]
+    yield said("cells that stick and slip, that rest", sum(given) == ds.belt.size, f"{given}", "all")
+    yield most("period beside slip by scipy and ride", "", off, 1e-8, "")
+    yield said("largest multiplier, as it sticks", decay < 1e-8, f"{decay:.1e}", "0")
+    yield compared("fastest belt on which it sticks", "end of (1)", float(ok.belt.max()), end, 0.04, 4)
+    yield most("place of steady sliding", "F(belt)", steady, 1e-8, "")
 
 
-def dividing(ds: xr.Dataset) -> list[Statement]:
+def dividing(ds: xr.Dataset) -> Claims:
     """The unstable oscillation, and where it begins."""
     size = friction(ds, ds.belt.values) - ds.place.values
     few, off = size < 0.45, float(abs(averaged(ds, size) / ds.belt.values - 1.0).max())
     start = np.polyval(np.polyfit(size[few] ** 2, ds.belt.values[few], 2), 0.0) if few.sum() > 2 else np.nan
     grows = float(ds.multiplier.min())
     unstable = (ds.status == Status.UNSTABLE).all() and grows > 1.0
-    return [
-        said("it is unstable", unstable, f"multiplier from {grows:.4f}", "all cells"),
-        compared("belt where its amplitude is 0", "F'(belt) = -2 zeta", float(start), begins(ds), 2e-4, 5),
-        most("speed of the belt beside (1), up to 5 %", "", off, 0.05, ""),
-    ]
+    yield said("it is unstable", unstable, f"multiplier from {grows:.4f}", "all cells")
+    yield compared("belt where its amplitude is 0", "F'(belt) = -2 zeta", float(start), begins(ds), 2e-4, 5)
+    yield most("speed of the belt beside (1), up to 5 %", "", off, 0.05, "")
 
 
 def begins(ds: xr.Dataset) -> float:

@@ -23,14 +23,12 @@ torque (r -> 1), of which the next ones take back two thirds: so memory changes 
 not that over an hour. Viscous friction alone; (1) holds for changes of some per cent.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Conclusion, Statement, compared, differing, most, read_result, said, script, solved
+from _common import Claims, Conclusion, compared, differing, most, read_result, said, script, solved
 from _figures import direct_label, page_of
 from scipy.optimize import brentq, newton
 
@@ -75,20 +73,20 @@ def measured(alpha: float) -> tuple[float, float]:
     return 2 * friction / (1 - 2 * s) / np.var(season), 2 * torque / s / np.var(season)
 
 
-def seasons() -> list[Statement]:
+def seasons() -> Claims:
     """(1) and (2)."""
-    lines, x = [], 0.1 * np.cos(PHASE)
+    x = 0.1 * np.cos(PHASE)
     for alpha in (1e-3, 0.1, 1.0, 30.0, 1e6):
         for name, p, found in zip(("friction", "torque"), exponents(alpha), measured(alpha), strict=True):
             what = f"alpha = {alpha:g}: p of the mean of the {name}"
-            lines.append(differing(what, f"(2) {p:.4f}", found, p, 0.01, 4))
+            yield differing(what, f"(2) {p:.4f}", found, p, 0.01, 4)
     for alpha, m, name in ((0.1, 0.5, "both"), (HALF, 0.5, "both"), (30.0, 0.5, "both"), (HALF, 0.0, "friction")):
         m, (s, slope, _) = m * 0.1 * np.cos(PHASE - 1), theory(alpha)
         year = 0.5 * DAY * (slope * np.var(m - 2 * x) + np.var(s * m + (1 - 2 * s) * x))
         what = f"alpha = {alpha:.3g}: mean rate with a season of {name} [s/day]"
-        lines.append(compared(what, f"(1) {year:.2f}", DAY * mean_rate(alpha, m, x), year, 0.05, 4))
+        yield compared(what, f"(1) {year:.2f}", DAY * mean_rate(alpha, m, x), year, 0.05, 4)
     kept = mean_rate(30.0, 2 * x, x) - math.log(np.mean(np.exp(x)))
-    return [*lines, most("torque as the square of the friction: its arithmetic mean", "exact", kept, 1e-10)]
+    yield most("torque as the square of the friction: its arithmetic mean", "exact", kept, 1e-10)
 
 
 def scatter(alpha: float, n: int, sigma: float, sigma_a: float, shared: float) -> float:
@@ -113,14 +111,13 @@ def drawn(alpha: float, n: int, clocks: int = 4000) -> float:
     return float(np.std(time) / (2 / alpha + 2 * theory(alpha)[2]) / math.sqrt(n) / SIGMA)
 
 
-def noise(spread: dict[Any, xr.DataArray]) -> list[Statement]:
+def noise(spread: dict[Any, xr.DataArray]) -> Claims:
     """(3), kind by kind; what a sample of 64 seeds may be off by over an hour."""
-    lines = []
     for kind, here in spread.items():
         expected = [[scatter(mu, int(n), *kind) for n in here.half_swings.values] for mu in here.mu.values]
         what = "sigma = {:g}, sigma_a = {:g}, shared = {:g}: scatter".format(*kind)
         text = "after 100: " + ", ".join(f"{x:.3f}" for x in here.isel(half_swings=-1).values)
-        lines.append(most(what, "(3)", (here - expected) / np.max(expected), 0.05, text))
+        yield most(what, "(3)", (here - expected) / np.max(expected), 0.05, text)
     s, _, u = theory(30.0)
     clock = {"mu": 30, "a": 1, "phi0": 1, "sigma": 0.05, "averaging_time": 3600, "half_swings": 20000}
     hours = solved("foliot_noise", seed=np.arange(1.0, 1025.0), **clock, outputs=["rate_scatter_s_per_day"])
@@ -128,15 +125,12 @@ def noise(spread: dict[Any, xr.DataArray]) -> list[Statement]:
     few, whole, one = math.sqrt(squares[:64].mean()), math.sqrt(squares.mean()), squares.std() / 16
     first, last = (spread[NOISES[0]].sel(mu=1000.0, half_swings=n) for n in (1, 100))
     short, ten = scatter(1000, 1, *NOISES[0]) / scatter(1000, 100, *NOISES[0]), scatter(30.0, 10, *NOISES[0])
-    return [
-        *lines,
-        compared(
-            "torque, alpha = 1000: of one half swing over that of 100", f"{short:.3f}", first / last, short, 0.05, 4
-        ),
-        compared("torque, alpha = 30, of 10: noise drawn by numpy", f"{ten:.4f}", drawn(30.0, 10), ten, 0.035, 4),
-        compared("alpha = 30: from hour to hour over s, 1024 seeds", "1", whole, 1.0, 0.04, 4),
-        said("  of the first 64 of them", abs(few - 1) < 3 * one, f"{few:.3f}", f"1 +- {one:.3f}"),
-    ]
+    yield compared(
+        "torque, alpha = 1000: of one half swing over that of 100", f"{short:.3f}", first / last, short, 0.05, 4
+    )
+    yield compared("torque, alpha = 30, of 10: noise drawn by numpy", f"{ten:.4f}", drawn(30.0, 10), ten, 0.035, 4)
+    yield compared("alpha = 30: from hour to hour over s, 1024 seeds", "1", whole, 1.0, 0.04, 4)
+    yield said("  of the first 64 of them", abs(few - 1) < 3 * one, f"{few:.3f}", f"1 +- {one:.3f}")
 
 
 def figure(spread: dict[Any, xr.DataArray]) -> Any:

@@ -101,7 +101,7 @@ class CellReport:
             paragraph("cell: " + ", ".join(f"{name} = {value}" for name, value in self.place.items())),
             paragraph(
                 f"{self.status.name} ({self.status.kind}): {self.status.doc}\n"
-                f"solved by {self.method}; error bound {self.error_bound:.2g}, asked for rtol {self.rtol:g}"
+                f"solved by {self.method}; error bound {self.error_bound:.2g}, requested rtol {self.rtol:g}"
             ),
             Table(outputs, ("output", "value", "unit")).text(),
             Table(asked, headings, "Each method of the kernel at the same rtol, computed now:").text(),

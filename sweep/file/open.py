@@ -54,7 +54,7 @@ def open_result(path: str | os.PathLike[str], strict: bool = False, *, chunks: A
     for place in (output, unfinished_of(output), output):
         with contextlib.suppress(FileNotFoundError, NotADirectoryError):
             return _open(place, strict, chunks)
-    raise SweepError(f"{output}: no such file, and no sweep that writes it")
+    raise SweepError(f"{output}: no such file, nor a run that is writing it")
 
 
 def open_unfinished(path: str | os.PathLike[str]) -> xr.Dataset:

@@ -79,7 +79,7 @@ def verify(path: str | os.PathLike[str]) -> Verdict:
         with StoredFile(place) as file:
             return _verdict(output, file)
     except (FileNotFoundError, NotADirectoryError):
-        raise SweepError(f"{output}: no such file, and no sweep that writes it") from None
+        raise SweepError(f"{output}: no such file, nor a run that is writing it") from None
     except Damaged as fault:
         return Verdict(output, False, "its structure is damaged, or it is not the result of a sweep", (str(fault),))
 

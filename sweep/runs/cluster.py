@@ -198,7 +198,7 @@ class Remote:
             raise SweepError(f"{where}: {fault}") from None
         if changed:
             raise SweepError(
-                f"{where}: what computes there is not what was asked for here; install the same versions on every "
+                f"{where}: its kernel or its libraries are not those here; install the same versions on every "
                 "machine" + "".join(f"\n  {line}" for line in changed)
             )
         solver = None
