@@ -30,6 +30,10 @@ METHODS = {
 }
 SHARE = 3e-6
 """Of rtol, the tolerance of the runs: their differences are divided by thousandths."""
+WIDE = 1e-3
+"""The same where no output is such a difference; what is not right to rtol then is solved again."""
+SLOPES = "multiplier", "multipliers_real", "multipliers_imaginary"
+"""Outputs that are, beside the sensitivities."""
 ONE = 1e-8
 """What is known of a multiplier, where it cannot be told from 1, for its cycle to be none that others come to."""
 MOST_FLIPS, MOST_CYCLES = 1000.0, 1000.0
@@ -135,10 +139,17 @@ def cycle_kernel(
             origin = (numbers[branch], own.pop()) if branch else None
             the_map = maps[way]
             with compiling(name, way):
-                cells = Columns(own, flips.copy(), np.clip(SHARE * rtol, the_map.fine, the_map.rough))
+                slopes = any(name in SLOPES or name in swept for name in asked)
+                loose, tight = (np.clip(share * rtol, the_map.fine, the_map.rough) for share in (WIDE, SHARE))
+                cells = Columns(own, flips.copy(), tight if slopes else loose)
                 search = Search(the_map, turning, cells, settle, origin)
-                found = _described(search, names, swept, asked)
-            status[:], error[:] = search.status, 0.0
+                there, found = np.flatnonzero(np.isin(search.status, FOUND)), {}
+                _described(search, there, names, swept, asked, found)
+                worst = most(np.array([most(np.atleast_2d(found[name][1])) for name in asked & found.keys()]))
+                left = there[~(worst <= rtol)[there] & (search.cells.r > tight)[there]]
+                search.refined(left, tight[left])
+                _described(search, left, names, swept, asked, found)
+            status[:], error[:] = search.status, np.where(search.status == Status.COMES_TO_REST, RESTS, 0.0)
             for field, column in zip(outputs, filled, strict=True):
                 column[:] = np.nan
                 if field.name not in found:
@@ -149,7 +160,7 @@ def cycle_kernel(
                     value, off = value[ranks], most(off[ranks])
                 column[:] = np.where(status < FIRST_REFUSAL, value, np.nan).T
                 if field.name in asked:
-                    error[:] = np.maximum(error, off)
+                    error[there] = np.maximum(error, off)[there]
 
         columns = [*(f.name for f in fields), "rtol", *(["rank"] if many > 1 else []), "asked"]
         whole = signed(solve, [*columns, *(f.name for f in outputs), "error", "status"])
@@ -180,13 +191,15 @@ def _check(fields: Sequence[Field], sides: bool) -> OnColumns:
     return signed(check, [*(f.name for f in fields), "status"])
 
 
-def _described(search: Search, names: list[str], swept: Mapping[str, int], asked: set[str]) -> dict[str, Any]:
-    """{output: values and errors, (n_cells,) or (n_ranks, n_cells)} of what has been found; NaN where nothing has."""
+def _described(
+    search: Search, there: Any, names: list[str], swept: Mapping[str, int], asked: set[str], found: dict[str, Any]
+) -> None:
+    """Fills {output: values and errors, (n_cells,) or (n_ranks, n_cells)} of cells that have a cycle; else NaN."""
     count = len(search.status)
-    found = {name: (row, np.full(count, RESTS)) for name, row in zip(names, search.z, strict=True)}
-    there = np.flatnonzero(np.isin(search.status, FOUND))
+    for name, row in zip(names, search.z, strict=True):
+        found.setdefault(name, (row, np.full(count, math.inf)))
     if not len(there):
-        return found
+        return
     the_map, cells, z, scale = search.map, search.cells.taken(there), search.z[:, there], search.scale[:, there]
     sensitive = {k: key for key, k in swept.items() if key in asked}
     parts = described(the_map, cells, z, scale, search.shift[:, there], list(sensitive))
@@ -203,9 +216,10 @@ def _described(search: Search, names: list[str], swept: Mapping[str, int], asked
     search.status[there[(abs(multiplier - 1.0) <= error) & (error < ONE)]] = Status.NO_CYCLE
     for name, (value, off) in parts.items():
         shape = *value.shape[:-1], count
-        rows = found.setdefault(name, (np.full(shape, np.nan), np.zeros(shape)))
-        rows[0][..., there], rows[1][..., there] = value, np.where(off >= 0.0, off, math.inf)
-    return found
+        values, errors = found.setdefault(name, (np.full(shape, np.nan), np.full(shape, math.inf)))
+        better = ~(off >= errors[..., there]) | np.isinf(errors[..., there])
+        values[..., there] = np.where(better, value, values[..., there])
+        errors[..., there] = np.where(better, np.where(off >= 0.0, off, math.inf), errors[..., there])
 
 
 def _sizes(the_map: ReturnMap, cells: Columns, z: Any, spread: Any, scale: Any) -> tuple[Any, Any]:

@@ -220,6 +220,14 @@ class Search:
         if branch:
             self._continued(*branch, ends)
 
+    def refined(self, cells, r):
+        """The cycles of these cells again, by runs of the tolerance r."""
+        some = self.cells.taken(cells)
+        some.r = r
+        if len(cells):
+            z, _, _ = newton(self.map, some, self.z[:, cells], self.scale[:, cells], self.shift[:, cells])
+            self.z[:, cells], self.cells.r[cells] = z, some.r
+
     def _from_start(self, cells, cycles):
         """States so many cycles after the start, and statuses."""
         some, nothing = self.cells.taken(cells), np.zeros((len(self.z), len(cells)))
