@@ -94,6 +94,10 @@ def differences(the_map, cells, z, scale, h, levels, parameters=()):
     over = np.array([[2.0 * level * (by if rows is z else h + 0.0 * by) for level in levels] for rows, _, by in moves])
     with np.errstate(all="ignore"):
         slopes = (pairs[:, :, :, 0] - pairs[:, :, :, 1]) / over.reshape(len(moves), len(levels), count)
+    for move, j in enumerate(the_map.directions):
+        if j in the_map.modes:  # one that no switch of the cycle sets is no direction, as a parameter is none
+            kept = abs(slopes[1 + j, move] - 1.0) <= NEAR
+            slopes[1 + j, move] = np.where(kept, 0.0, slopes[1 + j, move])
     return found[:, 0], fine[0], slopes, fine[1:].all(axis=0)
 
 
@@ -164,7 +168,8 @@ def _described(the_map, cells, z, scale, shift, parameters, h):
         spread[at] = SAFETY * times(abs(W), rho[:, None])[:, 0]
         late = times(abs(T_z)[None], abs(W))[0] if n else np.zeros((0, len(cells)))
         signs = [np.array([[(-1.0) ** (i * k + j * (1 - k)) for j in range(n)] for i in range(n)]) for k in (0, 1)]
-        noisy = [J + noise * s[:, :, None] * size[:, None] / size[None] for s in signs]
+        felt = np.maximum.reduce(abs(J), axis=1, initial=0.0) > 0.0  # a state that is set to a number has no noise
+        noisy = [J + felt[:, None] * noise * s[:, :, None] * size[:, None] / size[None] for s in signs]
         real, imaginary, unsure = eigenvalues(J, orders[1][1:, :n], *noisy)
         multiplier = largest(real, imaginary)
         found = {

@@ -17,7 +17,7 @@ from kernels.codegen.compiled import runner
 from kernels.codegen.followed import followed
 from kernels.codegen.record import named_functions, record
 from kernels.codegen.to_tolerance import solver
-from kernels.expression.graph import INPUT, Expression, SceneError, needed
+from kernels.expression.graph import INPUT, NUMBER, Expression, SceneError, needed
 from kernels.interface import Status
 
 FRESH = "from_start"
@@ -53,6 +53,8 @@ class ReturnMap:
         """The state that is put onto the surface."""
         self.directions = [j for j in range(n) if j not in self.held]
         """Of the states, those that the map depends on."""
+        self.modes = [j for j, rate in enumerate(record(self.scene).rates) if rate.kind == NUMBER and not rate.args[0]]
+        """The states whose rate is 0."""
         first = next(iter(named_functions(self.scene.surface)))
         self.jumps = any(named_functions(scene.switch).get(name) for name in (first, ""))
         """Whether the motion jumps at the first surface."""

@@ -1,6 +1,6 @@
 """Scenes whose cycles need a drive, several surfaces or a mode of three values, known in closed form.
 
-FORCED : x'' = a cos(w t) - omega^2 x - 2 zeta omega x'
+FORCED : x'' = gear a cos(w t) - omega^2 x - 2 zeta omega x', in a gear that is never changed
 TABLE : a ball on a table at A sin(w t), which gives back the share e of the closing speed
 RESTING : x'' = -x - 2 zeta x' - mu sign(x') from x = 1
 WALLS : a body between walls; it leaves the left one at kick + e u, the right one at e u, and is j times as fast in the
@@ -14,15 +14,19 @@ MOVING = Field("x", "m", "place"), Field("v", "m/s", "speed")
 FORCED = cycle_kernel(
     name="forced",
     doc="oscillator driven by a sine",
-    states=MOVING,
+    states=(*MOVING, Field("gear", "1", "strength of the drive")),
     parameters=(
         Field("zeta", "1", "damping", default=0.05),
         Field("omega", "1/s", "its own frequency", default=1.0),
         Field("a", "m/s^2", "drive", default=1.0),
         Field("w", "1/s", "frequency of the drive", default=1.3),
     ),
-    rates=lambda x, v, t, zeta, omega, a, w: (v, a * cos(w * t) - omega * omega * x - 2.0 * zeta * omega * v),
-    start=lambda: (0.0, 0.0),
+    rates=lambda x, v, gear, t, zeta, omega, a, w: (
+        v,
+        gear * a * cos(w * t) - omega * omega * x - 2.0 * zeta * omega * v,
+        0.0,
+    ),
+    start=lambda: (0.0, 0.0, 1.0),
     drive=lambda w: 2.0 * pi / w,
 )
 TABLE = cycle_kernel(
