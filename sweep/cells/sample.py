@@ -56,7 +56,7 @@ def _picked(grid: Grid, cells: Any) -> Study:
     study, fixed = grid.study, dict(grid.study.fixed)
     axes = {name: grid.values(name, cells) for name in study.axes if name not in SETTINGS}
     if not axes:
-        name = next(p.name for p in study.kernel.parameters if p.default is None)
+        name = min(study.kernel.parameters, key=lambda p: p.default is not None).name
         axes = {name: np.resize(fixed.pop(name), len(cells))}
     method = "auto" if "method" in study.axes else study.method
     layout: dict[str, Any] = {"design": "zip", "blocks": (), "where": "", "summary": None, "method": method}

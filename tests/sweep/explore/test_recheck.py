@@ -12,6 +12,7 @@ from toy_studies import build
 
 import sweep
 from kernels.interface import Status
+from sweep.cells.sample import sampled
 
 FOLIOT = {
     "kernel": "foliot",
@@ -107,6 +108,18 @@ def test_what_is_no_cell_is_refused(clocks):
     for look in (summary.sweep.check, summary.sweep.cell):
         with pytest.raises(sweep.SweepError, match="summary"):
             look(allow_import=True)
+
+
+def test_a_scene_whose_parameters_all_have_defaults_is_asked_again_and_what_is_0_to_rounding_is_the_same():
+    keys = {"kernel": "kicked_scene:KICKED", "fixed": {"kick": 1.0}, "allow_import": True}
+    assert sampled(sweep.study(**keys, axes={"rtol": [1e-6, 1e-3]}), 5).axes["zeta"].values.tolist() == [0.0]
+    ds = sweep.run(sweep.study(**keys, axes={"zeta": [0.1]}, rtol=1e-6))
+    assert ds.sweep.check(allow_import=True).beyond == 0
+    report = ds.sweep.cell(allow_import=True)
+    assert abs(report.values["x"]) < 1e-15
+    values = report.values | {"x": -report.values["x"] - 1e-17}
+    told = str(dataclasses.replace(report, methods={"other": (report.status, 0.0, values)}))
+    assert re.search(r"^  other +OK +0 +0$", told, re.MULTILINE)
 
 
 def test_a_dataset_without_statuses_says_what_can_be_done_with_it():
