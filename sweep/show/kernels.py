@@ -50,9 +50,8 @@ class KernelPage:
         for method in kernel.methods:
             cannot = f"; cannot do {listed(method.excludes)}" if method.excludes else ""
             lacks = f"; does not give {listed(method.lacks)}" if method.lacks else ""
-            methods.append(
-                (method.name, "stated per cell" if method.bound else "within rtol", method.doc + cannot + lacks)
-            )
+            error = "stated per cell" if method.bound else "estimated per cell" if method.estimates else "within rtol"
+            methods.append((method.name, error, method.doc + cannot + lacks))
         parameters, outputs, along = (
             [(f.name, f"[{f.unit}]", *more(f)) for f in fields]
             for fields, more in (
