@@ -170,14 +170,15 @@ def table(groups: Groups, source: str = "paper") -> list[str]:
 
 def summary(groups: Groups, source: str = "paper") -> list[str]:
     """How many claims hold, part by part, and those that do not hold, in 79 columns."""
-    rows, others, subject = [(f"claims held to {source}", "hold")], [], ""
+    rows, others = [(f"claims held to {source}", "hold")], []
     for heading, lines in groups.items():
+        subject = ""
         checked = [s for s in lines if s.holds is not None]
         rows += [(heading, f"{sum(s.verdict == 'yes' for s in checked)} of {len(checked)}")] if checked else []
         for s in lines:
             subject = s.what if s.what[:1] != " " else subject
             if s.verdict in ("NO", "no, known"):
-                what = s.what if s.what is subject else f"{subject}, {s.what.strip()}"
+                what = ", ".join(filter(None, dict.fromkeys((subject, s.what.strip()))))
                 which = "does not hold" if s.failed else "known not to hold"
                 words = f"{which}: {what}; {source}: {s.paper or '-'}; here: {s.here}"
                 off = "" if s.off is None else f", deviation {_number(s.off)}"

@@ -305,12 +305,14 @@ def test_a_script_counts_what_holds_and_tells_in_full_what_does_not():
             Statement("swing", "2", "3.0", 0.5, False),
             Statement("  at rest", "yes", "no", None, False, True),
             Statement("seconds", "", "5"),
-        ]
+        ],
+        "Other": [Statement("  first of its part", "1", "2", 1.0, False)],
     }
     words = "\n".join(summary(found, "theory"))
     assert re.search(r"^Part +1 of 3$", words, re.MULTILINE)
     assert "does not hold: swing; theory: 2; here: 3.0, deviation +5.0e-01" in words
     assert "known not to hold: swing, at rest; theory: yes; here: no" in words
+    assert "does not hold: first of its part; theory: 1" in words
     assert "period" not in words
 
 

@@ -56,6 +56,7 @@ def test_a_coordinate_with_a_default_need_not_be_given():
     assert sweep.study(**keys, along={"rank": [2.0]}).along["rank"].tolist() == [2.0]
     assert not len(sweep.study(**keys, outputs=["period"]).along["rank"])
     assert "default: 3 values" in " ".join(str(sweep.kernels("forced_scene:FORCED", allow_import=True)).split())
+    assert "estimated per cell" in str(sweep.kernels("forced_scene:FORCED", allow_import=True))
     with pytest.raises(sweep.StudyError, match="<= 3"):
         sweep.study(**keys, along={"rank": [4.0]})
 
