@@ -95,11 +95,12 @@ class CellReport:
 
     def __str__(self) -> str:
         outputs = ((name, f"{value:.10g}", self.units[name]) for name, value in self.values.items())
+        width = 4 if self.values.keys() - set(self.of_method) else 3  # traces are not compared
         asked = (
-            (name, status.name, f"{error:.2g}", f"{self._apart(values):.2g}")
+            (name, status.name, f"{error:.2g}", f"{self._apart(values):.2g}")[:width]
             for name, (status, error, values) in self.methods.items()
         )
-        headings = ("method", "status", "error", "differs by")
+        headings = ("method", "status", "error", "differs by")[:width]
         return page(
             paragraph("cell: " + ", ".join(f"{name} = {value}" for name, value in self.place.items())),
             paragraph(

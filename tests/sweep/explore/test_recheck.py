@@ -110,6 +110,13 @@ def test_what_is_no_cell_is_refused(clocks):
             look(allow_import=True)
 
 
+def test_traces_are_not_said_to_be_the_same():
+    keys = {"kernel": "foliot_motion", "outputs": ["angle"], "along": {"phase": [0.1, 0.4]}}
+    told = str(sweep.run(keys | {"axes": {"mu": [0.5]}, "fixed": {"phi0": 1.0, "a": 0.3}}).sweep.cell())
+    assert "segments" in told
+    assert "differs" not in told
+
+
 def test_a_scene_whose_parameters_all_have_defaults_is_asked_again_and_what_is_0_to_rounding_is_the_same():
     keys = {"kernel": "kicked_scene:KICKED", "fixed": {"kick": 1.0}, "allow_import": True}
     assert sampled(sweep.study(**keys, axes={"rtol": [1e-6, 1e-3]}), 5).axes["zeta"].values.tolist() == [0.0]
