@@ -8,6 +8,9 @@ import numpy as np
 ROUNDS = 60
 """Of corrections of all roots of a polynomial: simple ones settle in ten, double ones to half of their digits."""
 
+WIDE = 8.0
+"""Bounds of the roots, from within which they are looked for: the size of a matrix hangs on units, and may be huge."""
+
 
 def times(A, B):
     """The product of matrices (n, m, cells) and (m, k, cells)."""
@@ -80,7 +83,8 @@ def _roots(A):
         AM = times(A, M)
         coefficients.append(-sum(AM[i, i] for i in range(n)) / k)
         M = AM + coefficients[-1] * identity(n, cells)
-    size = np.maximum(np.sqrt(sum(A[i, j] * A[i, j] for i in range(n) for j in range(n))), 1e-300)
+    norm = np.sqrt(sum(A[i, j] * A[i, j] for i in range(n) for j in range(n)))
+    size = np.maximum(np.where(norm < WIDE * _bound(coefficients), norm, WIDE * _bound(coefficients)), 1e-300)
     points = _circle(n)
     real, imaginary = (np.array([size * x[k] for x in points]).reshape(n, cells) for k in (0, 1))
     for _ in range(ROUNDS if n > 1 else 1):
@@ -94,6 +98,14 @@ def _roots(A):
                     value = _quotient(*value, real[j] - real[i], imaginary[j] - imaginary[i])
             real[j], imaginary[j] = real[j] - value[0], imaginary[j] - value[1]
     return real, imaginary
+
+
+def _bound(coefficients):
+    """A power of two of which no root is larger than twice that (Fujiwara), whatever the units of the states."""
+    found = np.zeros(coefficients[0].shape)
+    for k, c in enumerate(coefficients[1:], 1):
+        found = np.maximum(found, np.where(c == 0.0, 0.0, np.ldexp(1.0, -(-np.frexp(c)[1] // k))))
+    return found
 
 
 def _circle(n):
