@@ -35,7 +35,8 @@ WIDE = 1e-3
 SLOPES = "multiplier", "multipliers_real", "multipliers_imaginary"
 """Outputs that are, beside the sensitivities."""
 ONE = 1e-8
-"""What is known of a multiplier, where it cannot be told from 1, for its cycle to be none that others come to."""
+"""To what a multiplier must be known where it cannot be told from 1: what is 1 leaves no cycle by itself; what is 1 in
+modulus alone lets disturbances neither grow nor fade."""
 MOST_FLIPS, MOST_CYCLES = 1000.0, 1000.0
 SEARCH = (
     Field("flips", "1", "switches a cycle", default=2.0, lower=1.0, upper=MOST_FLIPS, integer=True),
@@ -212,8 +213,12 @@ def _described(
             parts |= {f"{name}_size": (sizes[j], unsure[j] / sizes[j]) for j, name in enumerate(names)}
         for j, turn in search.turns.items():
             parts[f"{names[j]}_turns"] = np.round(search.shift[j, there] / turn), np.zeros(len(there))
+    real, unsure = parts["multipliers_real"]
+    one = (abs(real - 1.0) <= unsure) & (parts["multipliers_imaginary"][0] <= unsure) & (unsure < ONE)
     multiplier, error = parts["multiplier"]
-    search.status[there[(abs(multiplier - 1.0) <= error) & (error < ONE)]] = Status.NO_CYCLE
+    neither = (abs(abs(multiplier) - 1.0) <= error) & (error < ONE) & (search.status[there] == Status.UNSTABLE)
+    search.status[there[neither]] = Status.OK
+    search.status[there[one.any(axis=0)]] = Status.NO_CYCLE
     for name, (value, off) in parts.items():
         shape = *value.shape[:-1], count
         values, errors = found.setdefault(name, (np.full(shape, np.nan), np.full(shape, math.inf)))

@@ -39,6 +39,17 @@ def test_a_driven_oscillator_has_the_cycle_and_both_multipliers_of_the_closed_fo
     assert (second["multipliers_real"][:, 0] == found["multipliers_real"][:, 1]).all()
 
 
+def test_a_cycle_without_losses_is_one_though_its_multipliers_have_modulus_1():
+    omega, w = np.array([1.0, 3.0]), 1.3
+    found, status = solve(
+        FORCED, "taylor", along=RANKS, zeta=0.0, omega=omega, w=w, a=0.7, flips=1.0, settle=0.0, rtol=1e-7
+    )
+    assert (status == Status.OK).all()
+    assert abs(found["x"] - 0.7 / (omega**2 - w**2)).max() < 1e-8
+    assert abs(found["multiplier"] - 1.0).max() < 1e-8
+    assert abs(found["multipliers_real"][:, 0] - np.cos(2.0 * np.pi * omega / w)).max() < 1e-8
+
+
 def test_a_ball_on_a_table_is_in_step_with_it():
     """It lands once a period where A w cos(phase) (1 + e) = (1 - e) g P/2; its two multipliers have the product e^2."""
     e, w, A, g = np.array([0.5, 0.8, 0.5]), 10.0, np.array([0.11, 0.036, 0.16]), 9.81
