@@ -233,10 +233,11 @@ def to_event(m, state, mode, unit, h, on, tolerance, active, errors, hides, at_k
         fine = all_of(tuple(keeps(h, power_h, u, allowed) for u in pieces.controlled))
         trial = h
         if step == 0:
-            broken = active & not_(total(tuple(magnitude(u[-1]) for u in pieces.states)) < math.inf)
+            undefined = not_(total(tuple(magnitude(u) for u in state)) < math.inf)
+            broken = active & (undefined | not_(total(tuple(magnitude(u[-1]) for u in pieces.states)) < math.inf))
             now = tuple((o < 0.5) & (fact[0] <= 0.0) for o, fact in zip(on, facts, strict=True))
             pressed = tuple((o > 0.5) & not_(rises(fact[1], fact[2])) for o, fact in zip(on, facts, strict=True))
-            stuck = active & any_of(pressed)
+            stuck = active & any_of(pressed) & not_(undefined)
             trial = where(any_of(now), 0.0, h)
             margins = tuple(
                 SLACK * tolerance * (magnitude(offset) + magnitude(factor * u[0]))

@@ -64,6 +64,18 @@ def test_what_a_function_does_not_take_is_out_of_range():
     assert status[0] == Status.OUT_OF_RANGE
 
 
+@plain
+def test_a_speed_that_is_no_number_behind_a_jump_is_out_of_range():
+    falling = scene_kernel(
+        name="falling", doc="ball that loses energy as it lands",
+        states=(Field("x", "m", "height"), Field("v", "m/s", "speed")),
+        parameters=(Field("loss", "m^2/s^2", "of the speed's square"),), rates=lambda v: (v, -9.81),
+        surface=lambda x: x, start=lambda: (1.0, 0.0), switch=lambda x, v, loss: (x, np.sqrt(v * v - loss)),
+    )  # fmt: skip
+    _, status = solve(falling, "taylor_once", [-1.0, 30.0, 15.0], flips=3.0)
+    assert list(status) == [Status.OK, Status.OUT_OF_RANGE, Status.OUT_OF_RANGE]
+
+
 def test_lanes_a_cell_alone_and_plain_python_have_the_same_bits_and_narrow_steps_are_seen():
     """x' = tanh((t - 1)/w) + hypot(t, w) and y' = mod(t, 0.7), by time from -3 on; y jumps by 1 at a second surface."""
     w = np.array([1e-3, 0.01, 0.1, 1.0] if COMPILED else [0.01])
