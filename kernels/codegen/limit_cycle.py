@@ -235,10 +235,8 @@ class Search:
 
     def _from_start(self, cells, cycles):
         """States so many cycles after the start, and statuses."""
-        some, nothing = self.cells.taken(cells), np.zeros((len(self.z), len(cells)))
-        rough = np.full(len(cells), self.map.rough)
-        (_, *z), status = self.map.passed(some.parameters, nothing, some.flips * cycles, rough, 1.0)
-        return np.array(z), status
+        some = self.cells.taken(cells)
+        return self.map.from_start(some.parameters, some.flips * cycles, np.full(len(cells), self.map.rough))
 
     def _tried(self, left, later):
         """Newton's method for these cells; gives back those whose motion goes on."""
@@ -254,7 +252,7 @@ class Search:
         return left
 
     def _newton(self, some, z):
-        """From z: states of a cycle, sizes, turns, residual, multiplier, and how far it is from rest."""
+        """From z: states of a cycle, sizes, turns, residual, multiplier, how far it is from rest and from its half."""
         rough = np.full(len(some), self.map.rough)
         (T, *P), _ = self.map.passed(some.parameters, z, some.flips, rough)
         sizes = self.map.sizes(some.parameters, z, some.flips)
@@ -267,15 +265,15 @@ class Search:
         multiplier = largest(*eigenvalues(J)[:2])
         half = np.maximum(np.floor(0.5 * some.flips), 1.0)
         (time, *middle), _ = self.map.passed(some.parameters, z, half, rough)
-        apart = np.minimum(most(abs(np.array(middle) - z) / scale), 1.0)
+        apart, by_half = (most(abs(np.array(middle) - z - share * shift) / scale) for share in (0.0, 0.5))
         alike = (half == some.flips) | self.map.driven | (not self.map.directions)
-        moved = np.where(alike, np.where(time > NEAR * T, 1.0, 0.0), apart)
+        moved = np.where(alike, np.where(time > NEAR * T, 1.0, 0.0), np.minimum(apart, 1.0))
         moved = np.where(abs(multiplier) < math.inf, moved, np.nan)
-        return z, scale, shift, off, multiplier, moved
+        return z, scale, shift, off, multiplier, moved, by_half
 
     def _taken(self, cells, some, found, keep, status):
         """Keeps what has been found for some of the cells."""
-        those, (z, scale, shift, _, multiplier, _) = cells[keep], found
+        those, (z, scale, shift, _, multiplier, *_) = cells[keep], found
         self.z[:, those], self.scale[:, those], self.shift[:, those] = z[:, keep], scale[:, keep], shift[:, keep]
         self.cells.r[those], self.multiplier[those], self.status[those] = some.r[keep], multiplier[keep], status[keep]
 
@@ -284,15 +282,12 @@ class Search:
         if not len(left):
             return
         some = self.cells.taken(left)
-        found = z, scale, shift, off, multiplier, moved = self._newton(some, z)
+        found = z, scale, _, off, multiplier, moved, by_half = self._newton(some, z)
         good, stable = (moved > NEAR) & (off <= NEAR * moved), abs(multiplier) <= 1.0
         keep = good & (stable | ~np.isin(self.status[left], FOUND))
         status = np.where(stable, Status.OK, Status.UNSTABLE)
         if doubled:  # not where half of so many switches close the cycle
-            half, rough = 0.5 * some.flips, np.full(len(left), self.map.rough)
-            (_, *middle), _ = self.map.passed(some.parameters, z, half, rough)
-            two = most(abs(np.array(middle) - z - 0.5 * shift) / scale) > NEAR
-            keep, status = good & stable & two, np.full(len(left), Status.PERIOD_2)
+            keep, status = good & stable & (by_half > NEAR), np.full(len(left), Status.PERIOD_2)
         self._taken(left, some, found, keep, status)
         still = np.flatnonzero((moved <= NEAR) & (off <= NEAR) & (abs(multiplier) < 1.0))
         if len(still) and not (doubled or self.map.driven):
@@ -343,8 +338,9 @@ class Search:
             last, some = reached[left] + by >= 1.0, self.cells.taken(left)
             some.parameters[k] = np.where(last, ends[left], begin[left] + (reached[left] + by) * way[left])
             guess = self.z[:, left] + by * slope[:, left]
-            found = z, scale, _, off, multiplier, moved = self._newton(some, guess)
+            found = z, scale, _, off, multiplier, moved, by_half = self._newton(some, guess)
             near = (most(abs(z - guess) / scale) <= STRAIGHT) & (moved > NEAR) & (off <= NEAR * moved)
+            near &= (stable[left] != Status.PERIOD_2) | (by_half > NEAR)  # else it is the cycle of half the switches
             slope[:, left[near]] = (z - self.z[:, left])[:, near] / by[near]
             self._taken(left, some, found, near, np.where(abs(multiplier) <= 1.0, stable[left], Status.UNSTABLE))
             self.cells.parameters[k, left[near]] = some.parameters[k, near]

@@ -17,7 +17,7 @@ from kernels.codegen.compiled import runner
 from kernels.codegen.followed import followed
 from kernels.codegen.record import named_functions, record
 from kernels.codegen.to_tolerance import solver
-from kernels.expression.graph import INPUT, NUMBER, Expression, SceneError, needed
+from kernels.expression.graph import DIV, INPUT, NUMBER, Expression, SceneError, needed
 from kernels.interface import Status
 
 FRESH = "from_start"
@@ -30,6 +30,8 @@ TOLERANCES = {
 is changed, where what they leave out and what the tightest runs leave out come to the same."""
 OTHERS = 1.0, 10.0, 100.0
 """Tolerances of runs whose steps end at other points, over the one of the first."""
+PARTIAL = DIV, "sqrt", "log", "power", "arcsin", "arccos"
+"""Operations of a jump that may not be defined where all states are 0."""
 TIGHT = 30.0
 """Of the tightest tolerance, that of the sizes."""
 APART = 4.0
@@ -61,13 +63,27 @@ class ReturnMap:
         self.fine, self.rough, self.step = TOLERANCES[method]
         self._how = solver(self.scene, method)
         self._turning = [(turning(self.scene, True), (1.0,)), (turning(self.scene, False), OTHERS)]
-        for recorded in (self.scene, *(scene for scene, _ in self._turning), *([] if drive else [clocked(scene)])):
+        undefined = drive is None and any(x.kind in PARTIAL for x in needed(*record(scene).switched))
+        self._begun = replace(scene, name=f"{scene.name}_begun", only_first=True) if undefined else None
+        own = [] if drive else [clocked(scene), *([self._begun] if undefined else [])]
+        for recorded in (self.scene, *(scene for scene, _ in self._turning), *own):
             record(recorded)
 
     def passed(self, parameters, before, flips, rtol, fresh=0.0):
         """Rows of time and states, and statuses: `flips` switches after the one before which the states are given."""
         found, status = self._how([*parameters, *before, np.full(len(flips), fresh), flips], rtol)
         return found[[0, *range(2, 2 + len(before))]], status
+
+    def from_start(self, parameters, flips, rtol):
+        """The states, and statuses, so many switches after the start."""
+        nothing = np.zeros((len(self.own.states) - (self.own.start_time is not None), len(flips)))
+        (_, *found), status = self.passed(parameters, nothing, flips, rtol, 1.0)
+        found, again = np.array(found), np.flatnonzero(status > Status.INACCURATE)
+        if self._begun and len(again):  # it may be the jump alone of states that are 0, which is computed besides
+            some = [*parameters[:, again], flips[again]]
+            rows, status[again] = solver(self._begun, self.method)(some, rtol[again])
+            found[:, again] = rows[2:]
+        return found, status
 
     def at(self, parameters, times):
         """The states, and statuses, of the motion from the start at a time each."""

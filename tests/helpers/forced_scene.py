@@ -5,10 +5,12 @@ TABLE : a ball on a table at A sin(w t), which gives back the share e of the clo
 RESTING : x'' = -x - 2 zeta x' - mu sign(x') from x = 1
 WALLS : a body between walls; it leaves the left one at kick + e u, the right one at e u, and is j times as fast in the
     way of its mode j: 1 behind the left wall, 2 behind the right one, 3 from the middle on
+POPULATION : once a season u becomes gain u (1 - u)
+THROWN : a ball that lands at v and leaves at 2 + e sqrt(v^2 - 1)
 """
 
 from kernels.cycle import cycle_kernel
-from kernels.scene import Field, cos, pi, sign, sin, where
+from kernels.scene import Field, cos, pi, sign, sin, sqrt, where
 
 MOVING = Field("x", "m", "place"), Field("v", "m/s", "speed")
 FORCED = cycle_kernel(
@@ -76,4 +78,26 @@ WALLS = cycle_kernel(
         "middle": lambda x, v: (x, v, 3.0),
     },
     start=lambda length: (0.25 * length, 1.0, 1.0),
+)
+POPULATION = cycle_kernel(
+    name="population",
+    doc="what each season leaves of a population",
+    states=(Field("u", "1", "share of the largest one"),),
+    parameters=(Field("gain", "1", "growth"),),
+    rates=lambda u: 0.0 * u,
+    surface={"season": lambda t: 0.5 - t},
+    switch={"season": lambda u, gain: gain * u * (1.0 - u)},
+    start=lambda: 0.3,
+    drive=1.0,
+    branch="gain",
+)
+THROWN = cycle_kernel(
+    name="thrown",
+    doc="ball that is thrown up again as it lands",
+    states=MOVING,
+    parameters=(Field("e", "1", "restitution"),),
+    rates=lambda x, v: (v, -9.81),
+    surface=lambda x: x,
+    switch=lambda x, v, e: (x, 2.0 + e * sqrt(v * v - 1.0)),
+    start=lambda: (1.0, 0.0),
 )

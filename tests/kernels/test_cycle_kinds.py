@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from columns import estimated, solve
-from forced_scene import FORCED, MOVING, RESTING, TABLE, WALLS
+from forced_scene import FORCED, MOVING, POPULATION, RESTING, TABLE, THROWN, WALLS
 from kicked_scene import BRANCHED
 from mpmath import mp, mpc, mpf
 
@@ -109,6 +109,26 @@ def test_a_branch_ends_where_two_cycles_meet():
     u = 0.25 + np.sqrt(1.0 / 16.0 + kick[:2] / 2.0)
     assert abs(abs(found["v"][:2]) - u).max() < 1e-9
     assert abs(found["multiplier"][:2] - (2.0 - 4.0 * u) ** 2).max() < 1e-6
+
+
+def test_a_doubled_cycle_is_not_followed_onto_the_one_that_it_ends_on():
+    """Of u -> gain u (1 - u), the orbit of two ends at gain = 3."""
+    gain = np.array([3.3, 3.01, 2.99, 2.9])
+    found, status = solve(POPULATION, "taylor", gain=gain, gain_from=3.3, flips=1.0, rtol=1e-8)
+    assert list(status) == [Status.PERIOD_2, Status.PERIOD_2, Status.NO_CYCLE, Status.NO_CYCLE]
+    apart = np.sqrt((gain[:2] + 1.0) * (gain[:2] - 3.0)) / (2.0 * gain[:2])
+    assert abs(abs(found["u"][:2] - (gain[:2] + 1.0) / (2.0 * gain[:2])) - apart).max() < 1e-8
+    assert abs(found["multiplier"][:2] - (4.0 + 2.0 * gain[:2] - gain[:2] ** 2)).max() < 1e-7
+
+
+def test_a_jump_that_is_not_defined_at_speed_0_begins_like_any_other():
+    """A ball that loses 0.5 J/kg as it lands, and is thrown up again by 2 m/s: v = 2 + e sqrt(v^2 - 1)."""
+    e = np.array([0.5, 0.3])
+    found, status = solve(THROWN, "taylor", e=e, flips=1.0, asked=("period", "v"))
+    assert (status == Status.OK).all()
+    up = (2.0 + e * np.sqrt(4.0 + e * e - 1.0)) / (1.0 - e * e)
+    assert abs(found["v"] + up).max() < 1e-9
+    assert abs(found["period"] - 2.0 * up / 9.81).max() < 1e-9
 
 
 def test_what_cannot_be_a_cycle_is_refused():
