@@ -175,7 +175,8 @@ def kept_on_kink(pair):
     """The pair whose steps and dense output are put back onto the kink that the motion slides along.
 
     By how much further it is off the kink than at its start, where rounding may leave it, a step has an error too, that
-    the embedded method does not tell of where a state follows another one a million times enlarged.
+    the embedded method does not tell of where a state follows another one a million times enlarged. What the weights of
+    a method make of rounding is put back too, so that an event is missed by as little as by an explicit one.
     """
     free_tried, free_dense = pair.tried, pair.dense
 
@@ -191,4 +192,4 @@ def kept_on_kink(pair):
     def dense(m, state, terms, mode, h, part):
         return m.onto(free_dense(m, state, terms, mode, h, part), mode)
 
-    return pair._replace(tried=tried, dense=dense)
+    return pair._replace(tried=tried, dense=dense, roundings=ROUNDINGS)
