@@ -15,7 +15,7 @@ import numpy as np
 from kernels.codegen.at_times import at_times
 from kernels.codegen.compiled import compiling
 from kernels.codegen.to_tolerance import at_switches
-from kernels.interface import FIRST_REFUSAL, Field, Kernel, Method, Status
+from kernels.interface import FIRST_REFUSAL, UNSOLVED, Field, Kernel, Method, Status
 from kernels.lanes.wiring import signed
 from kernels.scene import Function, Functions, Scene, limits_check, scene_of
 
@@ -92,7 +92,15 @@ def motion_kernel(
     def solved(method: str, columns: list[Any], rtol: Any, times: Any) -> Any:
         count, many = len(rtol), len(times)
         cells = [np.tile(c, many) for c in columns]
-        found, status = at_times(scene, method, cells, np.repeat(times, count), np.tile(rtol, many))
+        ends, wanted = np.repeat(times, count), np.tile(rtol, many)
+        found, status = at_times(scene, method, cells, ends, wanted)
+        for other in METHODS:  # what this method does not come to, as the last times of a stiff motion
+            left = np.flatnonzero(np.isin(status, UNSOLVED))
+            left = left[(status.reshape(many, count) < FIRST_REFUSAL).any(axis=0)[left % count]]
+            if other != method and len(left):
+                rows, verdict = at_times(scene, other, [c[left] for c in cells], ends[left], wanted[left])
+                better = verdict < FIRST_REFUSAL
+                found[:, left[better]], status[left[better]] = rows[:, better], verdict[better]
         status = status.reshape(many, count)
         rows = found.reshape(len(states), many, count)
         missing = (status >= FIRST_REFUSAL) | np.isnan(rows).any(axis=0)

@@ -8,6 +8,7 @@ from kicked_scene import MOTION, SECTION
 
 from kernels.interface import Status
 from kernels.lanes.jit import COMPILED
+from kernels.scene import Field, cos
 from kernels.trajectory import motion_kernel
 
 pytestmark = pytest.mark.skipif(not COMPILED, reason="an order of 18 takes long as plain Python")
@@ -52,3 +53,14 @@ def test_a_motion_is_known_at_any_time():
     flight = 0.4, 0.8 - fall  # it bounces at `fall`, with half of its speed
     assert found["height"][0, 0] == pytest.approx(1.0 - 9.81 * flight[0] ** 2 / 2.0, rel=1e-9)
     assert found["height"][0, 1] == pytest.approx(flight[1] * (0.5 * 9.81 * fall - 9.81 * flight[1] / 2.0), rel=1e-9)
+
+
+def test_the_last_times_of_a_stiff_motion_are_not_given_up():
+    lagging = motion_kernel(
+        name="lagging", doc="what follows a cosine at once", states=(Field("x", "1", "place"),),
+        parameters=(Field("k", "1/s", "how fast"),), rates=lambda x, t, k: -k * (x - cos(t)),
+        surface=lambda x: x + 10.0, start=lambda: 1.0,
+    )  # fmt: skip
+    found, status = solve(lagging, "taylor", [1e6], along=[np.array([1e-6, 5.0])], rtol=1e-6)
+    assert status[0] == Status.OK
+    assert abs(found["x"][0, 1] - (np.cos(5.0) + 1e-6 * np.sin(5.0))) < 1e-6
