@@ -196,6 +196,22 @@ def _sensitivity(order, one, k, T):
     return (order[0, n + k] + sum(T_z[i] * dz[i] for i in range(n))) / T
 
 
+def equilibrium(the_map, parameters, z, side):
+    """From states z: where the rates are 0, by Newton's method; and whether it is known, and draws motions to it."""
+    n = len(z)
+    with np.errstate(all="ignore"):
+        for _ in range(ROUNDS):
+            h, J = STEP * np.maximum(most(abs(z)), 1e-150), np.empty((n, n, z.shape[1]))
+            for j in range(n):
+                up, down = z.copy(), z.copy()
+                up[j], down[j] = z[j] + h, z[j] - h
+                J[:, j] = (the_map.rates(parameters, up, side) - the_map.rates(parameters, down, side)) / (2.0 * h)
+            step = solved(J, the_map.rates(parameters, z, side)[:, None])[:, 0]
+            z = z - step
+        known = most(abs(step)) <= RESTS * most(abs(z)) + 1e-140
+        return z, known & (eigenvalues(J)[0] < 0.0).all(axis=0)
+
+
 class Search:
     """The search for the cycles of cells, and what it finds; a cell's numbers depend on that cell alone.
 
@@ -221,7 +237,9 @@ class Search:
             left = self._tried(left, later)
             left = left[(self.settle[left] > 0) & ~np.isin(self.status[left], (Status.OK, Status.COMES_TO_REST))]
         self._doubled(np.flatnonzero((self.status == Status.UNSTABLE) & (self.multiplier < -1.0) & (settle > 0)))
-        self._at_rest(np.flatnonzero((self.status >= FIRST_REFUSAL) & (self.status != Status.NOT_CONVERGED)))
+        if not self.map.driven:
+            self._at_equilibrium(np.flatnonzero(~np.isin(self.status, (*FOUND, Status.COMES_TO_REST))))
+            self._at_rest(np.flatnonzero((self.status >= FIRST_REFUSAL) & (self.status != Status.NOT_CONVERGED)))
         if branch:
             self._continued(*branch, ends)
 
@@ -303,6 +321,19 @@ class Search:
         self._settled(left, self.last[:, left], doubled=True)
         self.cells.flips[left[self.status[left] != Status.PERIOD_2]] *= 0.5
 
+    def _at_equilibrium(self, left):
+        """Where a motion ended close to a stable equilibrium, closer than a cycle after its start: it comes to rest
+        there."""
+        if not len(left):
+            return
+        some, last = self.cells.taken(left), self.last[:, left]
+        first, _ = self._from_start(left, np.ones(len(left)))
+        for side in (1.0, -1.0):
+            z, stable = equilibrium(self.map, some.parameters, last, side)
+            far, near = (most(abs(x - z)) for x in (first, last))
+            rests = stable & (near <= 0.5 * far)
+            self.z[:, left[rests]], self.status[left[rests]] = z[:, rests], Status.COMES_TO_REST
+
     def _at_rest(self, left):
         """Where a motion stays that meets no switch any more: its states have moved, and at ever later times do not.
 
@@ -310,7 +341,7 @@ class Search:
         """
         before, size, seconds = np.full((len(self.z), len(left)), np.nan), 0.0, EARLIEST
         moved, lasted = self.status[left] == Status.STICKS, np.zeros(len(left))
-        for _ in range(0 if self.map.driven else TIMES):
+        for _ in range(TIMES):
             if not len(left):
                 break
             z, status = self.map.at(self.cells.parameters[:, left], np.full(len(left), seconds))

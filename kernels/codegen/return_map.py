@@ -13,12 +13,17 @@ from dataclasses import replace
 import numpy as np
 
 from kernels.codegen.at_times import asked, at_times, clocked, named
-from kernels.codegen.compiled import runner
+from kernels.codegen.compiled import runner, running, written_of
 from kernels.codegen.followed import followed
 from kernels.codegen.record import named_functions, record
 from kernels.codegen.to_tolerance import solver
 from kernels.expression.graph import DIV, INPUT, NUMBER, Expression, SceneError, needed
+from kernels.integrate.records import Mode
 from kernels.interface import Status
+from kernels.lanes.columns import DONE, fresh, to_the_end
+from kernels.lanes.jit import jit_call
+from kernels.lanes.tuples import flat, read, write
+from kernels.lanes.vectors import where
 
 FRESH = "from_start"
 TOLERANCES = {
@@ -84,6 +89,13 @@ class ReturnMap:
             rows, status[again] = solver(self._begun, self.method)(some, rtol[again])
             found[:, again] = rows[2:]
         return found, status
+
+    def rates(self, parameters, states, side):
+        """The rates of each state, columns."""
+        run, like = rating(self.own)
+        cells = fresh(len(flat(like)), [*parameters, np.full(states.shape[1], side), *states])
+        to_the_end(run, cells)
+        return cells[:, -len(states) :].T
 
     def at(self, parameters, times):
         """The states, and statuses, of the motion from the start at a time each."""
@@ -175,3 +187,20 @@ def turning(scene, everywhere):
 
     rates = named(rates, inspect.signature(scene.rates).parameters)
     return replace(scene, name=f"{scene.name}_turning", rates=rates)
+
+
+@functools.cache
+def rating(scene):
+    """What runs cells of parameters, a side and states, in whose place it puts the rates; and a cell of zeros."""
+    functions, m = written_of(scene)
+    like = 0.0, (0.0,) * len(scene.parameters), 0.0, (0.0,) * len(scene.states)
+
+    @jit_call
+    def of_lanes(memory, i):
+        stage, parameters, side, state = read(memory, i, like)
+        signs = m.natural_signs(state, Mode(side, (), parameters, False))
+        rates = m.rates(state, Mode(side, signs, parameters, False))
+        write(memory, i, (where(stage > 0.5, DONE, stage), parameters, side, rates))
+        return True
+
+    return running(functions, of_lanes, "rates"), like

@@ -10,7 +10,7 @@ from mpmath import mp, mpc, mpf
 from kernels.cycle import cycle_kernel
 from kernels.interface import Status
 from kernels.lanes.jit import COMPILED
-from kernels.scene import SceneError
+from kernels.scene import Field, SceneError, exp
 
 pytestmark = pytest.mark.skipif(not COMPILED, reason="a cycle takes minutes as plain Python")
 RANKS = [np.array([1.0, 2.0])]
@@ -75,6 +75,23 @@ def test_what_meets_no_switch_any_more_rests_where_it_stays():
     assert abs(found["x"] - [0.0, 1.0 - 8.0 * 0.13, 0.0]).max() < 1e-11
     assert abs(found["v"]).max() < 1e-11
     assert np.isnan(found["period"]).all()
+
+
+def test_what_winds_round_an_equilibrium_rests_there():
+    """Where exp(-x) = x: Omega, the solution of Omega exp(Omega) = 1. A cycle is counted where it turns back."""
+    winding = cycle_kernel(
+        name="winding",
+        doc="oscillator about a place that is not 0",
+        states=MOVING,
+        parameters=(Field("zeta", "1", "damping"),),
+        rates=lambda x, v, zeta: (v, exp(-x) - x - 2.0 * zeta * v),
+        surface=lambda v, side: side * v,
+        start=lambda: (2.0, 0.0),
+    )
+    found, status = solve(winding, "taylor", zeta=[0.3, 0.04, 0.003])
+    assert (status == Status.COMES_TO_REST).all()
+    assert abs(found["x"] - 0.5671432904097838).max() < 1e-11
+    assert abs(found["v"]).max() < 1e-11
 
 
 def test_a_mode_of_three_values_and_three_surfaces():
