@@ -213,7 +213,8 @@ def _way(y, scene):
     stretch = where(z > 1e-300, z / where(z > 1e-300, far, 1.0), 1.0)
     excess, slope = fma(2.0, log_v1, log(0.5 * total)), stretch * rate / total
     step = -excess / slope
-    return excess < 0.0, step, fma(0.0, step, SETTLED)  # no step is near that is no number
+    # only Newton's own step ends the search: a bracket that has shrunk to a point holds no root for that
+    return excess < 0.0, step, where(magnitude(step) <= SETTLED, math.inf, math.nan)
 
 
 @jit_call

@@ -33,6 +33,8 @@ class Verdict:
         What is wrong or missing, a line each; none where it is whole.
     blocks : tuple of int or None
         Damaged blocks of a finished result that can be computed again; None where that would not mend it.
+    state : str
+        What it is called if it is not whole: "damaged", or "not complete" where nothing is wrong with what there is.
     """
 
     path: Path
@@ -40,13 +42,12 @@ class Verdict:
     checked: str
     findings: tuple[str, ...]
     blocks: tuple[int, ...] | None = None
+    state: str = "damaged"
 
     def __str__(self) -> str:
         if self.whole:
             return f"{self.path}: undamaged; {self.checked}"
-        return "\n".join(
-            [f"{self.path}: damaged or not complete; {self.checked}", *(f"  {text}" for text in self.findings)]
-        )
+        return "\n".join([f"{self.path}: {self.state}; {self.checked}", *(f"  {text}" for text in self.findings)])
 
     def require_whole(self) -> None:
         """Raises SweepError where anything is wrong."""
@@ -101,12 +102,12 @@ def _verdict(output: Path, file: StoredFile) -> Verdict:
     if file.path.suffix != UNFINISHED:
         blocks = tuple(sorted(damaged)) if findings and mendable else None
         return Verdict(output, not findings, f"{file.path.stat().st_size:,} bytes checked", tuple(findings), blocks)
-    table = file.tables[file.work]
+    table, state = file.tables[file.work], "damaged" if findings else "not complete"
     missing = np.flatnonzero(~table.done).tolist()
     findings += _lines(f"missing: {file.work} {{:,}} to {{:,}}", table, missing)
     findings = findings or ["all blocks are there, but it has not ended; run the sweep again to finish"]
     checked = f"unfinished, {table.blocks.count - len(missing):,} of {table.blocks.count:,} blocks there and checked"
-    return Verdict(output, False, checked, tuple(findings))
+    return Verdict(output, False, checked, tuple(findings), state=state)
 
 
 def _lines(text: str, table: Table, blocks: list[int]) -> Iterator[str]:
