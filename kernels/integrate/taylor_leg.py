@@ -39,8 +39,8 @@ from kernels.lanes.vectors import any_lane, choose, fma, magnitude, not_, where
 from kernels.maths.intervals import most
 
 BEYOND = 1e6
-"""Times the step before, that one is at most: of a motion that is a polynomial, series would let it grow so far that
-halving it no more comes back to what an event next to 0 asks for."""
+"""Times the step before, that one is at most where the series leave nothing out: of a motion that is a polynomial it
+would grow so far that halving it no more comes back to what an event next to 0 asks for."""
 
 
 class Series(NamedTuple):
@@ -225,7 +225,7 @@ def to_event(m, state, mode, unit, h, on, tolerance, active, errors, hides, at_k
         left_out, over = fold(worse, left[0], (), left[1:])
         ratio = where(left_out <= 0.0, 0.0, left_out * power_h / (tolerance * over))
         h = where(moving, next_step(h, ratio, m.order), h)
-        h = where(h < furthest, h, furthest)
+        h = where((ratio > 0.0) | (h < furthest), h, furthest)
         h = fold(shorter, h, (), limits)
         if hides is not None:
             h = where(h < longest, h, longest)
