@@ -92,21 +92,16 @@ def motion_kernel(
     def solved(method: str, columns: list[Any], rtol: Any, times: Any) -> Any:
         count, many = len(rtol), len(times)
         cells = [np.tile(c, many) for c in columns]
-        ends, wanted = np.repeat(times, count), np.tile(rtol, many)
-        found, status = at_times(scene, method, cells, ends, wanted)
-        for other in METHODS:  # what this method does not come to, as the last times of a stiff motion
-            left = np.flatnonzero(np.isin(status, UNSOLVED))
-            left = left[(status.reshape(many, count) < FIRST_REFUSAL).any(axis=0)[left % count]]
-            if other != method and len(left):
-                rows, verdict = at_times(scene, other, [c[left] for c in cells], ends[left], wanted[left])
-                better = verdict < FIRST_REFUSAL
-                found[:, left[better]], status[left[better]] = rows[:, better], verdict[better]
+        found, status = at_times(scene, method, cells, np.repeat(times, count), np.tile(rtol, many))
         status = status.reshape(many, count)
         rows = found.reshape(len(states), many, count)
         missing = (status >= FIRST_REFUSAL) | np.isnan(rows).any(axis=0)
         short = missing & ~missing.all(axis=0)
         worst, rows = np.where(short, Status.TOO_SHORT, status).max(axis=0), np.where(missing, np.nan, rows)
-        inaccurate = (status == Status.INACCURATE).any(axis=0)
+        # what this method gives up, as the last times of a stiff motion, another one may solve
+        given_up = np.isin(status, UNSOLVED).any(axis=0) & short.any(axis=0)
+        worst[given_up] = Status.INACCURATE
+        inaccurate = given_up | (status == Status.INACCURATE).any(axis=0)
         return rows, np.where(inaccurate, math.inf, rtol), worst.astype(np.int8)
 
     return _kernel(scene, source, parameters, outputs, along, solved, example)
