@@ -82,9 +82,9 @@ def cycle_kernel(
         and `settle`, the cycles that are followed before Newton's method begins. Its outputs: `period`; each state just
         before the switch that ends a cycle; `NAME_size`, the largest size of each state in the cycle; `NAME_turns` of
         what turns; `multiplier`, that of largest modulus, by which small disturbances are multiplied each cycle; where
-        there are several, `multipliers_real` and `multipliers_imaginary` along `rank`, the largest first, of a complex
-        pair both with the size of their imaginary part; `period_by_NAME`, d ln(period)/d ln(parameter), of each
-        parameter that is no whole number.
+        there are several, `multipliers_real` and `multipliers_imaginary` along `floquet_mode`, the largest first, of
+        a complex pair both with the size of their imaginary part; `period_by_NAME`, d ln(period)/d ln(parameter), of
+        each parameter that is no whole number.
 
     Raises
     ------
@@ -99,7 +99,7 @@ def cycle_kernel(
     if drive is None and surface is None:
         raise SceneError(f"{name}: a cycle needs a surface, or a drive")
     names, numbers = [f.name for f in states], {f.name: k for k, f in enumerate(parameters)}
-    turning = {names.index(state): float(turn) for state, turn in (turns or {}).items()}
+    turning = _turning(name, names, turns or {})
     maps = {method: ReturnMap(scene, method, drive) for method in METHODS}
     the_map = maps["taylor"]
     if any(held in turning for held in the_map.held):
@@ -110,11 +110,15 @@ def cycle_kernel(
     if not (sides or drive or the_map.jumps):
         raise SceneError(f"{name}: the motion passes through the surface; let it depend on `side`, as side * x does")
     if branch is not None and branch not in numbers:
-        raise SceneError(f"{name}: there is no parameter {branch!r} to continue a cycle in")
+        raise SceneError(
+            f"branch of the scene {name}: there is no parameter {branch!r}; there are {', '.join(numbers)}"
+        )
     begins = [replace(parameters[numbers[branch]], name=f"{branch}_from", doc=f"{branch} where the search begins",
                       default=branch)] if branch else []  # fmt: skip
     fields, many = (*parameters, *begins, *SEARCH), len(the_map.directions)
-    rank = Field("rank", "1", "number of the multiplier, the largest first", float(many), 1.0, many, integer=True)
+    rank = Field(
+        "floquet_mode", "1", "number of the multiplier, the largest first", float(many), 1.0, many, integer=True
+    )
     swept = {f"period_by_{f.name}": k for k, f in enumerate(parameters) if not f.integer}
     outputs = [
         Field("period", "s", "period of the limit cycle", gaps=True),
@@ -126,7 +130,7 @@ def cycle_kernel(
     ]
     if many > 1:
         parts = ("multipliers_real", "real part"), ("multipliers_imaginary", "size of the imaginary part")
-        outputs += [Field(key, "1", f"{part} of each multiplier", dims=("rank",), gaps=True) for key, part in parts]
+        outputs += [Field(key, "1", f"{part} of each multiplier", dims=(rank.name,), gaps=True) for key, part in parts]
 
     def method(way: str) -> Method:
         def solve(*columns: Any) -> None:
@@ -163,7 +167,7 @@ def cycle_kernel(
                 if field.name in asked:
                     error[there] = np.maximum(error, off)[there]
 
-        columns = [*(f.name for f in fields), "rtol", *(["rank"] if many > 1 else []), "asked"]
+        columns = [*(f.name for f in fields), "rtol", *([rank.name] if many > 1 else []), "asked"]
         whole = signed(solve, [*columns, *(f.name for f in outputs), "error", "status"])
         return Method(way, f"Newton's method on the return map, followed by {METHODS[way]}", whole, estimates=True)
 
@@ -178,6 +182,16 @@ def cycle_kernel(
         along=(rank,) if many > 1 else (),
         example=dict(example or {}),
     )
+
+
+def _turning(scene: str, states: list[str], turns: Mapping[str, float]) -> dict[int, float]:
+    """{number of a state: what it goes on by in a turn}."""
+    for state, turn in turns.items():
+        if state not in states:
+            raise SceneError(f"turns of the scene {scene}: there is no state {state!r}; there are {', '.join(states)}")
+        if not 0.0 < turn < math.inf:
+            raise SceneError(f"turns of the scene {scene}: a turn of {state} must be above 0 and finite, found {turn}")
+    return {states.index(state): float(turn) for state, turn in turns.items()}
 
 
 def _check(fields: Sequence[Field], sides: bool) -> OnColumns:

@@ -24,7 +24,7 @@ __all__ = ["motion_kernel", "section_kernel"]
 METHODS = {
     "taylor": "Taylor series, the error propagated",
     "rodas5p": "Rosenbrock's method Rodas5P, for stiff equations; three runs compared",
-    "dop853": "Dormand-Prince 8(5,3), followed three times",
+    "dop853": "Dormand-Prince 8(5,3); three runs compared",
 }
 MOST = 1_000_000.0
 

@@ -29,7 +29,7 @@ from kernels.codegen.followed import followed, off_by_roundings, passages, statu
 from kernels.codegen.record import record
 from kernels.expression.graph import SceneError
 from kernels.integrate.carried import SMALL
-from kernels.interface import FIRST_REFUSAL, Status
+from kernels.interface import FIRST_REFUSAL, UNSOLVED, Status
 
 ROUNDING = 1e-14
 """The least rtol that is promised, whatever the runs agree to."""
@@ -174,7 +174,8 @@ def at_switches(scene, method, columns, rtol, stops):
     """Time, interval, states (n_rows, n_stops, n_cells), the error of each cell, relative, and its status.
 
     Along the way the error is carried; by a method other than "taylor" three runs are compared. What a motion does not
-    come to is NaN; a cell's status is OK, or what was remarked, or why there is nothing at all.
+    come to is NaN; a cell's status is OK, or what was remarked, or why there is nothing at all. Where the method gives
+    later switches up, which another one may solve, it is INACCURATE, and the error infinite.
     """
     n = len(scene.states)
     found, error = _along(scene, method, columns, rtol, stops)
@@ -188,9 +189,11 @@ def at_switches(scene, method, columns, rtol, stops):
     rows = np.where(ended, np.nan, found[: 2 + n])
     worst = np.fmax.reduce(np.where(ended, 0.0, verdict), axis=0)
     why = np.fmax.reduce(verdict, axis=0)
+    given_up = np.isin(why, UNSOLVED) & ~ended.all(axis=0)
     short = np.where(why == Status.STICKS, Status.COMES_TO_REST, Status.TOO_SHORT)
+    short = np.where(given_up, Status.INACCURATE, short)
     status = np.where(ended.all(axis=0), why, np.where(ended.any(axis=0), short, worst))
-    return rows, error, status.astype(np.int8)
+    return rows, np.where(given_up, np.inf, error), status.astype(np.int8)
 
 
 def _along(scene, method, columns, rtol, stops):

@@ -129,8 +129,9 @@ def test_a_cycle_of_half_the_sides_and_a_surface_of_two_states_are_refused():
         cycle_kernel(**own, rates=lambda x, v: (v, -x), surface=lambda x, v, side: side * (x + v))
     with pytest.raises(SceneError, match="side"):
         cycle_kernel(**own, rates=lambda x, v: (v, -x), surface=lambda x: x)
-    with pytest.raises(SceneError, match="turn"):
-        cycle_kernel(**own, rates=lambda x, v: (v, -x), surface=lambda x, side: side * x, turns={"x": 1.0})
+    for turns, said in (({"x": 1.0}, "turn"), ({"y": 1.0}, "turns .* 'y'; there are x, v"), ({"v": 0.0}, "above 0")):
+        with pytest.raises(SceneError, match=said):
+            cycle_kernel(**own, rates=lambda x, v: (v, -x), surface=lambda x, side: side * x, turns=turns)
 
 
 def test_a_phase_that_is_locked_to_its_drive_goes_on_by_whole_turns():

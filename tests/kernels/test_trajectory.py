@@ -9,7 +9,7 @@ from kicked_scene import MOTION, SECTION
 from kernels.interface import Status
 from kernels.lanes.jit import COMPILED
 from kernels.scene import Field, cos
-from kernels.trajectory import motion_kernel
+from kernels.trajectory import motion_kernel, section_kernel
 
 pytestmark = pytest.mark.skipif(not COMPILED, reason="an order of 18 takes long as plain Python")
 
@@ -55,17 +55,19 @@ def test_a_motion_is_known_at_any_time():
     assert found["height"][0, 1] == pytest.approx(flight[1] * (0.5 * 9.81 * fall - 9.81 * flight[1] / 2.0), rel=1e-9)
 
 
-def test_the_last_times_of_a_stiff_motion_are_left_to_the_method_for_it():
-    lagging = motion_kernel(
+@pytest.mark.parametrize(("kernel", "points"), [(motion_kernel, [1e-6, 5.0]), (section_kernel, [1.0, 2.0])])
+def test_the_end_of_a_stiff_motion_is_left_to_the_method_for_it(kernel, points):
+    """At two times, or as its surface falls through 0."""
+    lagging = kernel(
         name="lagging", doc="what follows a cosine at once", states=(Field("x", "1", "place"),),
         parameters=(Field("k", "1/s", "how fast"),), rates=lambda x, t, k: -k * (x - cos(t)),
-        surface=lambda x: x + 10.0, start=lambda: 1.0,
+        surface=lambda t: (2e-6 - t) * (t - 3.0) * (t - 4.0), start=lambda: 1.0,
     )  # fmt: skip
-    times = [np.array([1e-6, 5.0])]
-    found, status = solve(lagging, "taylor", [1e6], along=times, rtol=1e-6)
+    found, status = solve(lagging, "taylor", [1e6], along=[np.array(points)], rtol=1e-6)
     assert status[0] == Status.INACCURATE  # so that auto goes on to the next method
     assert np.isfinite(found["x"][0, 0])
     assert np.isnan(found["x"][0, 1])
-    found, status = solve(lagging, "rodas5p", [1e6], along=times, rtol=1e-6)
+    found, status = solve(lagging, "rodas5p", [1e6], along=[np.array(points)], rtol=1e-6)
     assert status[0] == Status.OK
-    assert abs(found["x"][0, 1] - (np.cos(5.0) + 1e-6 * np.sin(5.0))) < 1e-6
+    end = points[1] if kernel is motion_kernel else 4.0
+    assert abs(found["x"][0, 1] - (np.cos(end) + 1e-6 * np.sin(end))) < 1e-6
