@@ -16,6 +16,12 @@ except sweep.SweepError as error:  # no matplotlib
     sys.exit(str(error))
 
 
+NARROW = 110.0
+"""Width in mm of panels one above the other, which can be read at the width of a phone too."""
+HOLLOW = {"linestyle": "", "markerfacecolor": "white", "markersize": 3.6}
+"""Marks of what is computed, beside lines of theory."""
+
+
 @contextmanager
 def page_of(height: float, *shape: int, width: float = charts.PAGE, **how: Any) -> Iterator[tuple[Any, Any]]:
     """A figure for print of so many mm, and its panels as `subplots` gives them, lettered in the end if several."""

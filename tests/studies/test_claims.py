@@ -51,16 +51,16 @@ TABLE = {
         "balance_isochronism.angle balance_isochronism.interval balance_isochronism.time "
         "balance_isochronism_lift.multiplier balance_isochronism_lift.status "
         "balance_isochronism_positions.angle balance_isochronism_positions.interval "
-        "balance_isochronism_positions.time", 4),
+        "balance_isochronism_positions.time", 1),
     "balance_ringdown": Claims({
         "balance_ringdown": {"zeta": np.geomspace(1e-4, 2, 31), "r": np.geomspace(1e-4, 0.9, 37)},
-    }, "margin status stop_time", 5),
+    }, "margin status stop_time", 2),
     "bouncing_ball": Claims({"bouncing_ball": {"push": [1.05, 1.2, 1.4, 1.53, 1.5375, 1.545, 1.6, 1.69]}}, ""),
     "chatter_lobes": Claims({"chatter_lobes": {}}, "damping frequency frequency_error", 2),
     "cross_beat": Claims({"cross_beat": {}}, ""),
     "foliot_scaling": Claims({
         "foliot_scaling": {"mu": np.geomspace(1e-7, 1e7, 169), "a": 1.3, "phi0": 0.4},
-    }, "multiplier", 8),
+    }, "multiplier", 4),
     "friction_laws": Claims({
         "friction_laws": {"mu": np.geomspace(1e-24, 1e24, 385)},
         "friction_laws_map": {"R": np.geomspace(1e-3, 1e9, 61), "mu": np.geomspace(1e-3, 1e11, 141)},
