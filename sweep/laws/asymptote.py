@@ -15,7 +15,7 @@ import numpy as np
 import xarray as xr
 
 from sweep.errors import SweepError
-from sweep.laws.curves import Window, check_options, described, fit_lines, title
+from sweep.laws.curves import Window, fit_lines
 from sweep.laws.fits import Found, fitted, union
 from sweep.laws.lines import rounding
 from sweep.laws.loglog import Array, slope_bounds, slopes
@@ -31,15 +31,6 @@ FADES = np.exp([0, -6, -5, -4, -3, -2, -1, 1, 2, 3, 4, 5, 6]), 0.3, 80.0
 """How fast a correction may fade, per window: those tried about the best, to the power of its relative error, and the
 least and largest."""
 VERDICTS = ("a power law with a correction", "no power law with a correction", "no law at this end")
-NAMES = {
-    "exponent": "exponent far out",
-    "verdict": "whether the points are a power law with a correction that fades",
-    "correction_exponent": "D: how fast the correction fades; NaN where there is none",
-    "correction": "B x^-D at the outer end of the window",
-    "residual": "largest relative distance of a point from the curve",
-    "noisy": "1 where the interval is of noise, 0 where of what a smaller window says otherwise",
-    "fits": "1 where (1) describes the points, and its correction is less than 1 at the end",
-}
 
 
 def fit_correction(
@@ -88,21 +79,18 @@ def fit_correction(
     >>> print(f"{float(sweep.fit_correction(ds.period, 'mu').exponent):.4f}")
     -0.3334
     """
-    check_options(confidence, noise, sigma)
     if end not in ("low", "high"):
         raise SweepError(f'end: expected "low" or "high", found {end!r}')
-    sign = 1.0 if end == "high" else -1.0
 
-    def each(t: Array, z: Array, errors: Array | None, bounds: Array | None) -> dict[str, Any]:
+    def each(t: Array, z: Array, errors: Array | None, bounds: None, **options: Any) -> list[dict[str, Any]]:
         if end == "low":
             t, z, errors = -t[::-1], z[:, ::-1], None if errors is None else errors[:, ::-1]
         tried = fitted((ONE, CORRECTION, LOG_CORRECTION), t, z, errors, CORRECTION)
-        every = [_one(t, row, laws, sign, confidence, noise) for row, laws in zip(z, tried, strict=True)]
-        return {name: [one[name] for one in every] for name in every[0]}
+        sign = 1.0 if end == "high" else -1.0
+        return [_one(t, row, laws, sign, **options) for row, laws in zip(z, tried, strict=True)]
 
-    found = fit_lines(each, y, dim, window, sigma)
-    law = f"{title(y)} = A {dim}^p (1 + B {dim}^-D), {end} end"
-    return described(found, NAMES, {}, {"y": title(y), "x": dim, "law": law}, confidence)
+    law = f"{{y}} = A {{x}}^p (1 + B {{x}}^-D), {end} end"
+    return fit_lines(each, law, y, dim, window, sigma, confidence=confidence, noise=noise)
 
 
 def _one(
@@ -123,10 +111,10 @@ def _one(
         steps, least, most = FADES
         best, sigma = float(np.clip(abs(found.numbers[1]), least, most)), found.sigma
         far = np.clip(2 * np.nan_to_num(found.errors[1], posinf=most) / best, 0.02, 0.6)
-        laws = [_fading(float(fade)) for fade in np.clip(best * steps**far, least, most)]
+        laws = [_fading(fade) for fade in np.clip(best * steps**far, least, most)]
         own, *others = fitted(laws, t, z[None], None if sigma is None else sigma[None])[0].values()
         others += [one for one in (tried[ONE.name], tried[LOG_CORRECTION.name]) if one.aicc < found.aicc + AS_WELL / 2]
-        low, high = union(t, own, others, _last, word, confidence, AS_WELL)[1][:, 0] / np.ptp(t)
+        low, high = union(t, own, others, [-1], word, confidence, AS_WELL)[1][:, 0] / np.ptp(t)
     ends = sorted(sign * one for one in (low, high, exponent))[::2] if fits else (math.nan, math.nan)
     verdict = VERDICTS[1 if not fits else 0 if abs(left) < 1 else 2]
     of = {"exponent": sign * exponent, "exponent_low": ends[0], "exponent_high": ends[1], "verdict": verdict}
@@ -157,10 +145,6 @@ def _by_half(t: Array, z: Array, exponent: float) -> tuple[float, float]:
     doubt = float(slope_bounds(t, np.full(t.size, 1e-15 * (1 + abs(z).max())), 5)[-1])
     reach = 3 * abs(float(local) - exponent) + doubt
     return exponent - reach, exponent + reach
-
-
-def _last(law: Law) -> list[int]:
-    return [law.numbers - 1]
 
 
 def _fading(fade: float) -> Law:

@@ -21,15 +21,6 @@ from sweep.laws.curves import check_options, check_output, described, log_of, po
 from sweep.laws.loglog import Array
 from sweep.laws.noise import ROUNDING, regress
 
-NAMES = {
-    "x_exponent": "a of x / L^a",
-    "y_exponent": "b of y / L^b",
-    "verdict": "whether the curves fall on one another within their own scatter",
-    "residual": "relative distance of the points from the common curve, root mean square",
-    "points": "points that lie among those of another curve",
-    "dropped": "points that are missing or not positive, or lie where no other curve has any",
-    "fits": "1 where the curves fall on one another within their own scatter",
-}
 FEWEST_POINTS, MOST_DEGREE = 10, 18
 
 
@@ -102,7 +93,7 @@ def fit_collapse(y: xr.DataArray, dim: str, over: str, *, sigma: Any = None, con
     found |= {"dropped": count - points.t.size, "fits": int(fits)}
     result = xr.Dataset(found).assign(verdict="one curve" if fits else "not one curve")
     law = f"{title(y)} = {over}^b f({dim} / {over}^a)"
-    return described(result, NAMES, {}, {"y": title(y), "x": dim, "over": over, "law": law}, confidence)
+    return described(result.assign_attrs(law=law, y=title(y), x=dim, over=over, confidence=confidence), y[dim], y)
 
 
 class Points(NamedTuple):

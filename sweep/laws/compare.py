@@ -10,22 +10,12 @@ import xarray as xr
 from scipy.special import gammaincc
 
 from sweep.errors import SweepError
-from sweep.laws.curves import Window, check_output, fit_lines, title
+from sweep.laws.curves import Window, check_output, described, fit_lines, title
 from sweep.laws.fits import Found, fitted
 from sweep.laws.lines import rounding
 from sweep.laws.loglog import Array
 from sweep.laws.noise import BEYOND_DOUBT
-from sweep.laws.shapes import CORRECTION, LAWS, OFFSET
-
-NAMES = {
-    "aicc": "Akaike's criterion, corrected for few points; of one law with the noise that suits it best",
-    "bic": "Bayes' criterion, likewise",
-    "worse": "AICc above the least, or BIC, whichever is less; beyond 10 a law is ruled out",
-    "numbers": "numbers that are fitted",
-    "scatter": "relative distance of the points from the law, root mean square",
-    "residual": "largest relative distance of a point from the law",
-    "chi_squared": "chance that noise of the given sigma has so large a chi-squared; NaN without sigma",
-}
+from sweep.laws.shapes import LAWS
 
 
 def compare_laws(y: xr.DataArray, dim: str, window: Window | None = None, *, sigma: Any = None) -> xr.Dataset:
@@ -73,36 +63,28 @@ def compare_laws(y: xr.DataArray, dim: str, window: Window | None = None, *, sig
         )
     found = xr.Dataset()
 
-    def compared(t: Array, z: Array, errors: Array | None, bounds: Array | None) -> dict[str, Any]:
+    def compared(t: Array, z: Array, sigma: Array | None, bounds: None) -> dict[str, Any]:
         nonlocal found
-        found = _table(t, z[0], sorted(fitted(LAWS, t, z, errors)[0].values(), key=lambda fit: fit.aicc))
-        return {"chosen": [found.attrs["chosen"]]}
+        found = _table(t, z[0], sorted(fitted(LAWS, t, z, sigma)[0].values(), key=lambda fit: fit.aicc))
+        return {"regimes": np.zeros(1)}
 
-    fit_lines(compared, y, dim, window, sigma)
-    for name, of in (("x", y[dim]), ("y", y), ("fitted", y)):
-        found[name].attrs = {"units": str(of.attrs.get("units", "1"))}
-    return found.assign_attrs({"y": title(y), "x": dim} | found.attrs)
+    fit_lines(compared, "", y, dim, window, sigma)
+    return described(found.assign_attrs(y=title(y), x=dim), y.coords[dim], y)
 
 
 def _table(t: Array, z: Array, tried: list[Found]) -> xr.Dataset:
     """All that `compare_laws` says of laws, the best first."""
-    span, names = float(t[-1] - t[0]), [f.law.name for f in tried]
     off, aicc, bic = (np.array(one) for one in zip(*((f.off, f.aicc, f.bic) for f in tried), strict=True))
-    worse = np.minimum(aicc - aicc.min(), bic - bic.min())
-    columns: dict[str, Any] = {
-        "aicc": aicc,
-        "bic": bic,
-        "worse": worse,
-        "numbers": [f.law.numbers for f in tried],
-        "scatter": np.sqrt((off**2).mean(axis=1)),
-        "residual": [f.residual for f in tried],
-        "chi_squared": [
-            math.nan if f.sigma is None else float(gammaincc((t.size - f.law.numbers) / 2, f.deviance / 2))
-            for f in tried
-        ],
-        "formula": [f.law.formula for f in tried],
-        "exponents": [_exponents(f, span) for f in tried],
-    }
+    worse, span = np.minimum(aicc - aicc.min(), bic - bic.min()), t[-1] - t[0]
+    columns: dict[str, Any] = {"aicc": aicc, "bic": bic, "worse": worse, "scatter": np.sqrt((off**2).mean(axis=1))}
+    columns |= {"numbers": [f.law.numbers for f in tried], "residual": [f.residual for f in tried]}
+    chances = [float(gammaincc((t.size - f.law.numbers) / 2, f.deviance / 2)) for f in tried if f.sigma is not None]
+    columns |= {"chi_squared": chances or [math.nan] * len(tried), "formula": [f.law.formula for f in tried]}
+    columns["exponents"] = [
+        ", ".join(f"{name} = {f.numbers[k] / span:.4g} +- {f.errors[k] / span:.1g}" for name, k in f.law.exponents)
+        or "none"
+        for f in tried
+    ]
     alive = [f for f, by in zip(tried, worse, strict=True) if by <= BEYOND_DOUBT]
     chosen = min(alive, key=lambda f: (f.law.numbers, not f.law.power, f.aicc))
     margin = min((f.aicc for f in tried if f is not chosen), default=math.inf) - chosen.aicc
@@ -113,20 +95,7 @@ def _table(t: Array, z: Array, tried: list[Found]) -> xr.Dataset:
         text += f"all others are ruled out, the next by {margin:.3g} in AICc"
     if chosen.residual > 8 * rounding(t, z) and chosen.denied(t, "even"):
         text += "; but what it leaves has a shape, so that none of them is the law"
-    about = {name: {"units": "1", "long_name": words} for name, words in NAMES.items()}
-    variables: dict[str, Any] = {name: ("law", column, about.get(name)) for name, column in columns.items()}
-    variables |= {"fitted": (("law", "point"), np.exp(z - off))}
-    variables |= {"x": ("point", np.exp(t)), "y": ("point", np.exp(z)), "law": names}
+    variables: dict[str, Any] = {name: ("law", column) for name, column in columns.items()}
+    variables |= {"fitted": (("law", "point"), np.exp(z - off)), "x": ("point", np.exp(t)), "y": ("point", np.exp(z))}
     attrs = {"chosen": chosen.law.name, "margin": margin, "verdict": text}
-    return xr.Dataset(variables, attrs=attrs)
-
-
-def _exponents(found: Found, span: float) -> str:
-    """The exponents with their standard errors, as of independent noise."""
-    law, doubt = found.law, found.errors
-    names = ("p",) if law is OFFSET else law.exponents
-    first = 0 if law is OFFSET else found.numbers.size - len(names)
-    parts = [f"{name} = {found.numbers[k] / span:.4g} +- {doubt[k] / span:.1g}" for k, name in enumerate(names, first)]
-    if law is CORRECTION:
-        parts.append(f"D = {found.numbers[1] / span:.3g}")
-    return ", ".join(parts) or "none"
+    return xr.Dataset(variables, {"law": [f.law.name for f in tried]}, attrs)

@@ -1,4 +1,4 @@
-"""What all analysis of curves shares: the axis they run along, windows of it, logarithms, and lines of an array."""
+"""What all fits share: the axis that curves run along, windows, logarithms, lines of an array, and names of numbers."""
 
 from __future__ import annotations
 
@@ -23,6 +23,53 @@ MOST_SIGMA = 1e6
 """Relative standard error beyond which a logarithm says nothing."""
 MOST_ROWS = 20
 """Lines of a summary."""
+FIELDS = {
+    "exponent": "exponent of the power law",
+    "x_exponent": "a of x / L^a",
+    "y_exponent": "b of y / L^b",
+    "crossover": "where the two laws meet",
+    "crossover_error": "half of its interval",
+    "verdict": "what the points say of the law",
+    "kind": "what the distances of the points from the line are",
+    "regimes": "how many laws are beyond doubt, and meet in the window; 0 where none is told",
+    "evidence": "by how much AICc and BIC prefer two laws to one, whatever its noise, and to functions that are none",
+    "exponent_error": "standard error of the exponent",
+    "prefactor": "y at x = 1 on the line",
+    "prefactor_error": "standard error of the prefactor",
+    "correction_exponent": "D: how fast the correction fades; NaN where there is none",
+    "correction": "B x^-D at the outer end of the window",
+    "noisy": "1 where the interval is of noise, 0 where of error bounds or of how far smooth values bend",
+    "fits": "1 where the law describes the points, 0 where an interval is only the range of the slope",
+    "drift": "change of the exponent across the window, by a parabola",
+    "width": "width of the bend, in decades",
+    "aicc": "Akaike's criterion, corrected for few points; of one law with the noise that suits it best",
+    "bic": "Bayes' criterion, likewise",
+    "worse": "AICc above the least, or BIC, whichever is less; beyond 10 a law is ruled out",
+    "numbers": "numbers that are fitted",
+    "scatter": "relative distance of the points from the law, root mean square",
+    "residual": "largest relative distance of a point from the law",
+    "chi_squared": "chance that noise of the given sigma has so large a chi-squared; NaN without sigma",
+    "formula": "y of x",
+    "exponents": "exponents with their standard errors, as of independent noise",
+    "points": "points in the fit",
+    "dropped": "points that are missing or not positive, or lie where no other curve has any",
+    "low": "first abscissa in the fit",
+    "high": "last abscissa in the fit",
+    "centre": "geometric mean of the abscissae",
+    "level": "y on the line at the centre, or where two laws meet",
+    "level_error": "relative standard error of the level",
+    "start": "y at the first abscissa",
+    "stop": "y at the last abscissa",
+    "limit_low": "to where the local exponent tends below the window; no end of an interval; NaN where there is noise",
+    "limit_high": "to where the local exponent tends above the window; no end of an interval; NaN where there is noise",
+    "x": "places of the points",
+    "y": "values of the points",
+    "fitted": "the law at the points",
+}
+"""Numbers and words of all fits, in their order."""
+IN_X = ("crossover", "crossover_error", "low", "high", "centre", "x")
+IN_Y = ("prefactor", "prefactor_error", "level", "start", "stop", "y", "fitted")
+"""Those with the unit of x, and with that of y; all others are numbers."""
 
 
 def check_output(y: Any) -> None:
@@ -33,7 +80,7 @@ def check_output(y: Any) -> None:
         raise SweepError(f"{title(y)}: expected real numbers, found {y.dtype}")
 
 
-def check_options(confidence: float, noise: bool | str | None = None, sigma: Any = None) -> None:
+def check_options(confidence: float = 0.95, noise: bool | str | None = None, sigma: Any = None) -> None:
     """Raises SweepError where confidence is no share, or noise none of the words or given beside sigma."""
     if not 0 < confidence < 1:
         raise SweepError(f"confidence: expected a number between 0 and 1, found {confidence}")
@@ -75,102 +122,99 @@ def positive_axis(y: xr.DataArray, dim: str, repeated: bool = False) -> tuple[st
 
 
 def inside_window(x: Array, window: Window | None, dim: str) -> NDArray[np.bool_]:
-    low, high = ends(window, dim)
-    # an end that is a grid point up to rounding is meant to be in
-    return (x >= low * (1 - 8 * EPSILON)) & (x <= high * (1 + 8 * EPSILON))
-
-
-def ends(window: Window | None, dim: str) -> tuple[float, float]:
+    """Which x are in the window; an end that is a grid point up to rounding is meant to be in."""
     try:
         low, high = (None, None) if window is None else window
-        ends = 0.0 if low is None else float(low), math.inf if high is None else float(high)
+        low, high = 0.0 if low is None else float(low), math.inf if high is None else float(high)
     except (TypeError, ValueError):
         raise SweepError(f"a window of {dim} is a pair (low, high) of numbers or None; found {window!r}") from None
-    if not ends[0] < ends[1]:
-        raise SweepError(f"the window {ends[0]:g} to {ends[1]:g} of {dim} is empty; give (low, high) with low < high")
-    return ends
+    if not low < high:
+        raise SweepError(f"the window {low:g} to {high:g} of {dim} is empty; give (low, high) with low < high")
+    return (x >= low * (1 - 8 * EPSILON)) & (x <= high * (1 + 8 * EPSILON))
 
 
 def title(y: xr.DataArray) -> str:
     return str(y.name) if y.name is not None else "the array"
 
 
-def missing_is_nan(y: xr.DataArray) -> xr.DataArray:
+def missing_is_nan(y: xr.DataArray, positive: bool = False) -> xr.DataArray:
+    """y, NaN where it is no finite number, or not positive."""
     check_output(y)
     numbers = y.astype(np.float64)
-    return numbers.where(np.isfinite(numbers))
+    return numbers.where(np.isfinite(numbers) & ((numbers > 0) | (not positive)))
 
 
 def log_of(y: xr.DataArray) -> xr.DataArray:
     """Natural logarithm, NaN where there is none."""
-    numbers = missing_is_nan(y)
-    logs: xr.DataArray = xr.apply_ufunc(np.log, numbers.where(numbers > 0), dask="allowed", keep_attrs=True)
-    return logs.rename(y.name)
+    logs: xr.DataArray = xr.ufuncs.log(missing_is_nan(y, positive=True))
+    return logs
 
 
 def fit_lines(
-    function: Callable[[Array, Array, Array | None, Array | None], dict[str, Any]],
+    function: Callable[..., Any],
+    law: str,
     y: xr.DataArray,
     dim: str,
     window: Window | None,
     sigma: Any,
     bounds: xr.DataArray | None = None,
     fewest: int = FEWEST_OF_LAW,
+    **options: Any,
 ) -> xr.Dataset:
-    """What a function finds of each line of y in a window, and `points`, how many of its values are there.
+    """What a function finds of each line of y in a window, described, with `points`, how many of its values are there.
 
     `function` of ln x (n,), rising, and ln y, relative standard errors (None where `sigma` is) and bounds (m, n) of m
-    lines without gaps gives numbers and words (m,) by name. Of lines that are not positive, or have too few points, the
-    numbers are NaN and the words say so; raises SweepError where that is so of all lines.
+    lines without gaps, and of the options, gives numbers and words (m,) by name, or those of each line; of two laws
+    (m, 2). Of lines that are not positive, or have too few points, the numbers are NaN and the words say so; raises
+    SweepError where that is so of all lines.
     """
+    check_options(sigma=sigma, **options)
     dimension, x = positive_axis(y, dim, repeated=True)
     here = {dimension: np.flatnonzero(inside_window(x, window, dim))}
     part, t = y.isel(here).transpose(..., dimension).compute(), np.log(x[here[dimension]])
-    values = np.where(np.isfinite(part.values), part.values, np.nan).astype(np.float64)
-    bad, lines = np.asarray((values <= 0).any(axis=-1)), values.shape[:-1]
+    values = missing_is_nan(part).values.reshape(math.prod(part.shape[:-1]), t.size)
+    bad = np.asarray((values <= 0).any(axis=1))
     if bad.all():
-        first = part[tuple(np.argwhere(values <= 0)[0])]
+        first = part[tuple(np.argwhere((part <= 0).values)[0])]
         raise SweepError(
             f"a power law needs positive values; {(values <= 0).sum()} of {part.size} of {title(y)} in the window are "
             f"not, e.g. {float(first):g} at {dim} = {float(first.coords[dim]):g}; choose a window without them"
         )
     with np.errstate(all="ignore"):
-        z = np.where(bad[..., None], np.nan, np.log(values)).reshape(math.prod(lines), t.size)
-    others = [None if sigma is None else relative_sigma(y, sigma), bounds]
-    errors, bound = (
-        None if one is None else one.isel(here).transpose(..., dimension).values.reshape(z.shape) for one in others
-    )
-    present = np.isfinite(z) if errors is None else np.isfinite(z) & np.isfinite(errors)
-    columns: dict[str, Any] = {}
-    places = PLACES_OF_LAW if fewest == FEWEST_OF_LAW else 2
+        z = np.where(bad[:, None], np.nan, np.log(values))
+    given = [
+        None if one is None else one.isel(here).transpose(..., dimension).values.reshape(z.shape)
+        for one in (None if sigma is None else relative_sigma(y, sigma), bounds)
+    ]
+    present = np.isfinite(z) if given[0] is None else np.isfinite(z) & np.isfinite(given[0])
+    columns, places = dict[str, Any](), PLACES_OF_LAW if fewest == FEWEST_OF_LAW else 2
     for pattern, which in alike(present, plain=True):
         at = np.flatnonzero(pattern)
         at = at[np.argsort(t[at], kind="stable")]
-        if at.size >= fewest and np.unique(t[at]).size >= places:
-            grid = np.ix_(which, at)
-            given = (None if one is None else one[grid] for one in (errors, bound))
-            with np.errstate(all="ignore"):  # what overflows is infinite
-                found = function(t[at], z[grid], *given)
-            for name, column in found.items():
-                word = np.asarray(column).dtype.kind == "U"
-                columns.setdefault(name, np.full(len(z), "" if word else np.nan, object if word else np.float64))
-                columns[name][which] = column
-    count = present.sum(axis=1).reshape(lines)
-    if not columns:
-        low, high = ends(window, dim)
+        if at.size < fewest or np.unique(t[at]).size < places:
+            continue
+        grid = np.ix_(which, at)
+        with np.errstate(all="ignore"):  # what overflows is infinite
+            found = function(t[at], z[grid], *(None if one is None else one[grid] for one in given), **options)
+        if not isinstance(found, dict):
+            found = {name: np.array([one[name] for one in found]) for name in found[0]}
+        for name, column in found.items():
+            empty: Any = ("", object) if column.dtype.kind == "U" else (np.nan, np.float64)
+            columns.setdefault(name, np.full((len(z), *column.shape[1:]), *empty))[which] = column
+    columns["points"] = present.sum(axis=1)
+    if len(columns) == 1:
         raise SweepError(
-            f"a fit needs at least {fewest} points, found {count.max()} of {title(y)} in the window {low:g} to "
-            f"{high:g} of {dim}, at {np.unique(t[present.any(axis=0)]).size} places ({places} are needed); choose a "
-            "wider one"
+            f"a fit needs at least {fewest} points, found {columns['points'].max()} of {title(y)} in the window of "
+            f"{dim}, at {np.unique(t[present.any(axis=0)]).size} places ({places} are needed); choose a wider one"
         )
-    missing = np.where(bad, "not positive", "too few points").reshape(-1)
+    result = xr.Dataset(coords={name: one for name, one in part.coords.items() if dimension not in one.dims})
     for name, column in columns.items():
-        texts = column if column.dtype == np.float64 else np.where(column == "", missing, column).astype(str)
-        columns[name] = texts.reshape(lines)
-    coords = {name: one for name, one in part.coords.items() if dimension not in one.dims}
-    return xr.Dataset(
-        {name: (part.dims[:-1], column) for name, column in (columns | {"points": count}).items()}, coords
-    )
+        if column.dtype == object:
+            column = np.where(column == "", np.where(bad, "not positive", "too few points"), column).astype(str)
+        dims = ("law",) * (column.ndim - 1) + part.dims[:-1]
+        result[name] = dims, column.T.reshape(column.shape[1:] + part.shape[:-1])
+    result.attrs = {"law": law.format(y=title(y), x=dim), "y": title(y), "x": dim, **options}
+    return described(result, y.coords[dim], y)
 
 
 def like(given: Any, y: xr.DataArray, what: str) -> xr.DataArray:
@@ -223,23 +267,21 @@ def stated_error(dataset: xr.Dataset, name: str) -> xr.DataArray:
     return found.transpose(*dataset[name].dims)
 
 
-def described(
-    found: xr.Dataset, names: dict[str, str], units: dict[str, str], attrs: dict[str, Any], confidence: float
-) -> xr.Dataset:
-    """A result with its variables in the order of their names, each followed by the ends of its interval where there is
-    one, with units and long names, and a summary: a table of intervals and words, a row for each line."""
-    every = {}
-    for name, words in names.items():
-        every[name] = words, units.get(name, "1")
-        if f"{name}_low" in found:
-            every |= {f"{name}_{end}": (f"{end} end of its interval", every[name][1]) for end in ("low", "high")}
-    found = found[list(every)]
-    for name, (words, unit) in every.items():
-        found[name].attrs = {"units": unit, "long_name": words}
-    found.attrs = {**attrs, "confidence": confidence}
-    columns = [name + end for name in names if f"{name}_low" in found for end in ("", "_low", "_high")]
-    columns += [name for name in names if found[name].dtype.kind == "U"]
-    table = found[columns] if found.sizes else found[columns].expand_dims("line")
-    rows = table.to_dataframe().reset_index()[[*table.sizes, *columns]]
-    found.attrs["summary"] = rows.to_string(index=False, max_rows=MOST_ROWS, float_format="{:.6g}".format)
+def described(found: xr.Dataset, x: xr.DataArray, y: xr.DataArray) -> xr.Dataset:
+    """A result with its variables in the order of FIELDS, each followed by the ends of its interval where there is one,
+    with units and long names; and a summary: a table of intervals and words, a row for each line."""
+    there = [name for name in FIELDS if name in found]
+    ends = {name: [f"{name}_low", f"{name}_high"] if f"{name}_low" in found else [] for name in there}
+    found = found[[one for name in ends for one in (name, *ends[name])]]
+    for name in ends:
+        unit = (x if name in IN_X else y).attrs.get("units", "1") if name in IN_X + IN_Y else "1"
+        for one in (name, *ends[name]):
+            words = FIELDS[name] if one == name else f"end of the interval of {name}"
+            found[one].attrs = {"units": str(unit), "long_name": words}
+    if any(ends.values()):
+        columns = [one for name in ends if ends[name] for one in (name, *ends[name])]
+        columns += [name for name in ends if found[name].dtype.kind == "U"]
+        table = found[columns] if found[columns].sizes else found[columns].expand_dims("line")
+        rows = table.to_dataframe().reset_index()[[*table.sizes, *columns]]
+        found.attrs["summary"] = rows.to_string(index=False, max_rows=MOST_ROWS, float_format="{:.6g}".format)
     return found

@@ -9,7 +9,7 @@ from __future__ import annotations
 import functools
 import itertools
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -68,7 +68,7 @@ class Found(NamedTuple):
         ends = np.array([[-np.inf] * len(which), [np.inf] * len(which)])
         if known:
             line = regress(t, self.jacobian[:, known], self.off[None], noise, sigma=self.sigma)
-            for place, number in enumerate(which):
+            for place, number in enumerate(np.arange(len(self.numbers))[which]):
                 if number in known:
                     ends[:, place] = line.interval(known.index(number), confidence)[:, 0]
             if self.sigma is None and noise != "even":
@@ -88,14 +88,14 @@ def union(
     t: Array,
     own: Found,
     others: Iterable[Found],
-    which: Callable[[Law], list[int]],
+    which: list[int],
     noise: str,
     confidence: float,
     as_well: float,
 ) -> Array:
     """Ends of the intervals of some numbers of a law, and ends that hold those of each of the other laws, too, that the
     points do not rule out beside the best of all: whose AICc is not above it by more than `as_well` (2, 2, k)."""
-    every = [one.interval(t, which(one.law), noise, confidence) for one in (own, *others)]
+    every = [one.interval(t, which, noise, confidence) for one in (own, *others)]
     least = min(aicc for _, aicc in every) + as_well
     low, high = zip(every[0][0], *(ends for ends, aicc in every[1:] if aicc <= least), strict=True)
     ends = np.array([every[0][0], (np.min(low, axis=0), np.max(high, axis=0))])
@@ -283,9 +283,7 @@ def _columns(
 
 def _doubts(columns: Array) -> Array:
     """Standard errors (r, k) of the numbers of columns (r, n, k) beside noise of 1; inf of what is not determined."""
-    size = np.sqrt((columns**2).sum(axis=1)) + 1e-300
-    _, moved, directions = np.linalg.svd(columns / size[:, None], full_matrices=False)
-    seen = (moved > 1e-8 * moved.max(axis=1, keepdims=True))[..., None]
-    lost = (np.where(seen, 0.0, directions) ** 2).sum(axis=1) > 1e-6
-    change = np.where(seen, directions / np.where(seen, moved[..., None], 1.0), 0.0) / size[:, None]
-    return np.where(lost, np.inf, np.sqrt((change**2).sum(axis=1)))
+    unit = columns / (size := np.sqrt((columns**2).sum(axis=1, keepdims=True)) + 1e-300)
+    inverse = np.linalg.pinv(unit, rcond=1e-8)
+    lost = 1 - np.einsum("rkn,rnk->rk", inverse, unit) > 1e-6
+    return np.where(lost, np.inf, np.sqrt((inverse**2).sum(axis=2)) / size[:, 0])

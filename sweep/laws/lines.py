@@ -2,53 +2,22 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from typing import Any
 
 import numpy as np
 import xarray as xr
+from numpy.polynomial import chebyshev
 from scipy.special import gammaincc, ndtri, stdtrit
 
-from sweep.laws.curves import (
-    Window,
-    check_options,
-    described,
-    fit_lines,
-    stated_bound,
-    title,
-)
+from sweep.laws.curves import Window, fit_lines, stated_bound
 from sweep.laws.loglog import EPSILON, FEWEST, Array, alike, slope_bounds, slopes, tends
 from sweep.laws.noise import RARE, corrected, inliers, regress, roughness, shaped
 
-METHOD = "least squares in log-log; the interval is of what `kind` says"
 SMOOTH = 0.12
 """Share of the distances from a line that is noise, below which they are a bend and no noise."""
 FEWEST_FOR_BEND = 8
 """Points from which on a bend is looked for among noise."""
-
-FIT_NAMES = {
-    "exponent": "exponent of the power law",
-    "verdict": "whether one power law describes the points",
-    "kind": "what the distances of the points from the line are",
-    "exponent_error": "standard error of the exponent",
-    "prefactor": "y at x = 1 on the line",
-    "prefactor_error": "standard error of the prefactor",
-    "noisy": "1 where the interval is of noise, 0 where of error bounds or the range of a smooth slope",
-    "fits": "1 where one power law describes the points, 0 where the interval is only the range of its slope",
-    "drift": "change of the exponent across the window, by a parabola",
-    "residual": "largest relative distance of a point from the line",
-    "points": "points in the window",
-    "low": "first abscissa in the fit",
-    "high": "last abscissa in the fit",
-    "centre": "geometric mean of the abscissae",
-    "level": "y on the line at the centre",
-    "level_error": "relative standard error of the level",
-    "start": "y at the first abscissa",
-    "stop": "y at the last abscissa",
-    "limit_low": "to where the local exponent tends below the window; no end of an interval; NaN where there is noise",
-    "limit_high": "to where the local exponent tends above the window; no end of an interval; NaN where there is noise",
-}
 
 
 def fit_exponent(
@@ -112,14 +81,8 @@ def fit_exponent(
     >>> print(f"{float(sweep.fit_exponent(ds.period, 'mu').exponent):.4f}")
     -0.3334
     """
-    check_options(confidence, noise, sigma)
-    each = functools.partial(fit_line, confidence=confidence, noise=noise)
-    fit = fit_lines(each, y, dim, window, sigma, stated_bound(y, bound), FEWEST)
-    units, place = str(y.attrs.get("units", "1")), str(y.coords[dim].attrs.get("units", "1"))
-    of = dict.fromkeys(("prefactor", "prefactor_error", "level", "start", "stop"), units)
-    of |= dict.fromkeys(("low", "high", "centre"), place)
-    law = f"{title(y)} = prefactor {dim}^exponent"
-    return described(fit, FIT_NAMES, of, {"law": law, "y": title(y), "x": dim, "method": METHOD}, confidence)
+    law, more = "{y} = prefactor {x}^exponent", (sigma, stated_bound(y, bound), FEWEST)
+    return fit_lines(fit_line, law, y, dim, window, *more, confidence=confidence, noise=noise)
 
 
 def rounding(t: Array, z: Array) -> Array:
@@ -130,34 +93,33 @@ def rounding(t: Array, z: Array) -> Array:
 
 
 def fit_line(
-    t: Array, z: Array, sigma: Array | None, bound: Any, *, confidence: float = 0.95, noise: bool | str | None = None
+    t: Array, z: Array, sigma: Array | None, bound: Array, *, confidence: float = 0.95, noise: bool | str | None = None
 ) -> dict[str, Any]:
     """Of lines z (m, n) without gaps, t rising: least squares, and then by what the distances are."""
-    share = np.ones_like(z) if sigma is None else sigma**-2.0
-    share = share / share.mean(axis=1, keepdims=True)
+    weight = np.ones_like(z) if sigma is None else sigma**-2.0
+    share, n, least = weight / weight.mean(axis=1, keepdims=True), t.size, 8 * rounding(t, z)
     centre, level = (share * t).mean(axis=1), (share * z).mean(axis=1)
-    u, n, least = t - centre[:, None], t.size, 8 * rounding(t, z)
+    u = t - centre[:, None]
     spread = (share * u * u).sum(axis=1)
     slope = (share * u * (z - level[:, None])).sum(axis=1) / spread
     off = z - level[:, None] - slope[:, None] * u
     size = np.sqrt((share * off * off).sum(axis=1) / max(n - 2, 1))
-    fit: dict[str, Any] = {"exponent": slope, "level": level, "low": np.exp(t[0]), "high": np.exp(t[-1])}
-    fit |= {"start": np.exp(z[:, 0]), "stop": np.exp(z[:, -1]), "centre": np.exp(centre)}
-    fit |= {
-        "exponent_error": size / np.sqrt(spread),
-        "level_error": size / n**0.5,
-        "kind": np.full(len(z), "weighted", "U10"),
-    }
-    fit |= {name: np.full(len(z), np.nan) for name in ("exponent_low", "exponent_high", "limit_low", "limit_high")}
-    fit |= {"fits": np.ones(len(z)), "noisy": np.ones(len(z))}
     # the parabola that fits best, beside the line
     bow = u * u - spread[:, None] / n - (share * u**3).sum(axis=1, keepdims=True) / spread[:, None] * u
-    fit["drift"] = 2 * (share * bow * off).sum(axis=1) / (share * bow * bow).sum(axis=1) * (t[-1] - t[0])
+    drift = 2 * (share * bow * off).sum(axis=1) / (share * bow * bow).sum(axis=1) * (t[-1] - t[0])
+    fit: dict[str, Any] = {"exponent": slope, "exponent_error": size / np.sqrt(spread), "level": level}
+    fit |= {
+        "level_error": size / n**0.5,
+        "kind": np.full(len(z), "weighted", "U10"),
+        "fits": np.ones(len(z)),
+        "noisy": np.ones(len(z)),
+    }
+    fit |= {f"{name}_{end}": np.full(len(z), np.nan) for name in ("exponent", "limit") for end in ("low", "high")}
     if sigma is not None:
-        error = 1 / np.sqrt((sigma**-2 * u * u).sum(axis=1))
+        error = 1 / np.sqrt((weight * u * u).sum(axis=1))
         reach = ndtri((1 + confidence) / 2) * error
-        chance = gammaincc((n - 2) / 2, ((off / sigma) ** 2).sum(axis=1) / 2) if n > 2 else np.ones(len(z))
-        fit |= {"exponent_error": error, "level_error": (sigma**-2.0).sum(axis=1) ** -0.5}
+        chance = gammaincc((n - 2) / 2, (weight * off**2).sum(axis=1) / 2) if n > 2 else np.ones(len(z))
+        fit |= {"exponent_error": error, "level_error": weight.sum(axis=1) ** -0.5}
         fit |= {"exponent_low": slope - reach, "exponent_high": slope + reach}
         fit["fits"] = (chance > RARE) & ~shaped(t, off)
     else:
@@ -172,50 +134,47 @@ def fit_line(
         if (which := np.flatnonzero(~noisy)).size:
             for name, values in _exact(t, *(part[which] for part in (z, off, bound, slope))).items():
                 fit[name][which] = values
-    level, slope = fit["level"], fit["exponent"]
-    residual = np.expm1(np.minimum(abs(z - level[:, None] - slope[:, None] * u).max(axis=1), 700))
-    prefactor = np.exp(level - slope * centre)
-    relative = np.hypot(fit["level_error"], centre * fit["exponent_error"])
-    fit |= {"residual": residual, "prefactor": prefactor, "prefactor_error": prefactor * relative}
+    slope, level = fit["exponent"], fit["level"]
     fit |= {"exponent_low": np.fmin(fit["exponent_low"], slope), "exponent_high": np.fmax(fit["exponent_high"], slope)}
-    return fit | {"level": np.exp(level), "verdict": np.where(fit["fits"] == 1, "one power law", "no power law")}
+    prefactor = np.exp(level - slope * centre)
+    fit |= {"prefactor_error": prefactor * np.hypot(fit["level_error"], centre * fit["exponent_error"])}
+    residual = np.expm1(np.minimum(abs(z - level[:, None] - slope[:, None] * u).max(axis=1), 700))
+    fit |= {"drift": drift, "residual": residual, "prefactor": prefactor, "level": np.exp(level)}
+    fit |= {"low": np.exp(t[0]), "high": np.exp(t[-1]), "centre": np.exp(centre)}
+    fit |= {"start": np.exp(z[:, 0]), "stop": np.exp(z[:, -1])}
+    return fit | {"verdict": np.where(fit["fits"] == 1, "one power law", "no power law")}
 
 
 def _noisy(t: Array, z: Array, centre: Array, word: str, confidence: float) -> dict[str, Any]:
     """Lines beside noise: their numbers, or the range of the slope where they bend."""
-    u = 2 * (t - t[0]) / (t[-1] - t[0]) - 1
     powers = 4 if word == "noise" and t.size >= FEWEST_FOR_BEND else 2
-    columns = np.polynomial.chebyshev.chebvander(u, powers - 1).astype(np.float64)
+    columns = chebyshev.chebvander(2 * (t - t[0]) / (t[-1] - t[0]) - 1, powers - 1)
     columns[:, 1] = t - centre[0]
     inside = inliers(t, columns[:, :2], z) if word in ("noise", "outliers") else np.ones(z.shape, bool)
-    kind, fits, both, errors, ends = np.full(len(z), word, "U10"), np.ones(len(z)), *np.empty((3, 2, len(z)))
+    kind, fits, numbers = np.full(len(z), word, "U10"), np.ones(len(z)), np.empty((6, len(z)))
     for pattern, rows in alike(inside, plain=word == "even"):
         line = regress(t[pattern], columns[pattern], z[rows][:, pattern], word, 2)
         # a point that is left out counts as one that is not known
         wider = t.size / pattern.sum()
-        value, error = line.mean()
-        both[:, rows], errors[:, rows], fits[rows] = value.T, error.T * wider, ~line.denied
-        ends[:, rows] = value[:, 1] + wider * (line.interval(1, confidence) - value[:, 1])
+        value, error = (part.T for part in line.mean())
+        ends = value[1] + wider * (line.interval(1, confidence) - value[1])
+        numbers[:, rows], fits[rows] = np.concatenate([value, wider * error, ends]), ~line.denied
         for row in rows[line.denied] if powers > 2 else ():
-            kind[row], ends[:, row] = "bent", _range(t[pattern], z[row, pattern], confidence)
-    found = {"level": both[0], "exponent": both[1], "level_error": errors[0], "exponent_error": errors[1]}
-    return found | {"exponent_low": ends[0], "exponent_high": ends[1], "fits": fits, "kind": kind}
+            kind[row], numbers[4:, row] = "bent", _range(t[pattern], z[row, pattern], confidence)
+    names = ("level", "exponent", "level_error", "exponent_error", "exponent_low", "exponent_high", "fits", "kind")
+    return dict(zip(names, (*numbers, fits, kind), strict=True))
 
 
 def _range(t: Array, z: Array, confidence: float) -> tuple[float, float]:
     """Least and largest slope of a curve among noise, with its interval, by the best polynomial up to degree six."""
-    u, best = 2 * (t - t[0]) / (t[-1] - t[0]) - 1, math.inf
-    for degree in range(2, min(6, t.size - 4) + 1):
-        columns = np.polynomial.chebyshev.chebvander(u, degree)
-        basis, back = np.linalg.qr(columns)
-        square, left = float(((z - basis @ (basis.T @ z)) ** 2).sum()), t.size - degree - 1
-        value = float(corrected(t.size * math.log(square), t.size, degree + 2))
-        if value < best:
-            best = value
-            steep = np.polynomial.chebyshev.chebval(u, np.polynomial.chebyshev.chebder(np.eye(degree + 1))).T
-            steep = np.linalg.solve(back.T, steep.T).T * 2 / (t[-1] - t[0])
-            slope = steep @ (basis.T @ z)
-            reach = stdtrit(left, (1 + confidence) / 2) * np.sqrt((steep**2).sum(axis=1) * square / left)
+    u, n, most = 2 * (t - t[0]) / (t[-1] - t[0]) - 1, t.size, min(6, t.size - 4)
+    basis, back = np.linalg.qr(chebyshev.chebvander(u, most))
+    along = basis.T @ z
+    squares = {k: float(((z - basis[:, :k] @ along[:k]) ** 2).sum()) for k in range(3, most + 2)}
+    k = min(squares, key=lambda k: float(corrected(n * math.log(squares[k]), n, k + 1)))
+    steep = np.linalg.solve(back[:k, :k].T, chebyshev.chebval(u, chebyshev.chebder(np.eye(k)))) * 2 / (t[-1] - t[0])
+    slope = along[:k] @ steep
+    reach = stdtrit(n - k, (1 + confidence) / 2) * np.sqrt((steep**2).sum(axis=0) * squares[k] / (n - k))
     return float((slope - reach).min()), float((slope + reach).max())
 
 
@@ -228,16 +187,14 @@ def _exact(t: Array, z: Array, off: Array, bound: Array, slope: Array) -> dict[s
     reach = (abs(u) * error).sum(axis=1) / (u @ u) + least / np.ptp(t)
     straight = (abs(off) <= 2 * bound + 8 * least[:, None]).all(axis=1)
     kind = np.where(straight, np.where(bound.any(axis=1), "bounded", "exact"), "curved")
-    found = {"exponent_low": slope - reach, "exponent_high": slope + reach, "limit_low": slope.copy()}
-    found |= {"limit_high": slope.copy(), "fits": straight, "kind": kind, "noisy": 0.0 * slope}
-    if t.size < FEWEST:
-        return found
-    bent = np.flatnonzero(~straight)
-    local, rough, by_error = slopes(t, z[bent], 5), slopes(t, z[bent], 7), slope_bounds(t, error[bent], 5)
-    doubt = (abs(local - rough) + by_error).max(axis=1)
-    found["exponent_low"][bent] = np.minimum(local.min(axis=1) - doubt, slope[bent])
-    found["exponent_high"][bent] = np.maximum(local.max(axis=1) + doubt, slope[bent])
-    for i, row in enumerate(bent):
-        found["limit_low"][row] = tends(t, local[i], by_error[i, 0])[1]
-        found["limit_high"][row] = tends(-t[::-1], local[i, ::-1], by_error[i, -1])[1]
-    return found
+    low, high, *limits = slope - reach, slope + reach, slope.copy(), slope.copy()
+    if t.size >= FEWEST:
+        bent = np.flatnonzero(~straight)
+        local, rough, by_error = slopes(t, z[bent], 5), slopes(t, z[bent], 7), slope_bounds(t, error[bent], 5)
+        doubt = (abs(local - rough) + by_error).max(axis=1)
+        low[bent], high[bent] = local.min(axis=1) - doubt, local.max(axis=1) + doubt
+        for i, row in enumerate(bent):
+            limits[0][row] = tends(t, local[i], by_error[i, 0])[1]
+            limits[1][row] = tends(-t[::-1], local[i, ::-1], by_error[i, -1])[1]
+    names = ("exponent_low", "exponent_high", "limit_low", "limit_high", "fits", "kind", "noisy")
+    return dict(zip(names, (low, high, *limits, straight, kind, 0.0), strict=True))

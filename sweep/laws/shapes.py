@@ -38,8 +38,8 @@ class Law(NamedTuple):
     curve: Curve
     columns: int
     q: tuple[Number, ...] = ()
-    exponents: tuple[str, ...] = ()
-    """Names of the exponents, which are the last numbers b."""
+    exponents: tuple[tuple[str, int], ...] = ()
+    """Names of the exponents, and which of q and then b each is."""
     power: bool = True
     """Whether it is a power law or several, and not another function."""
     starts_as: str = ""
@@ -157,8 +157,8 @@ PLACE = Number(-1.0, 2.0, tuple(np.linspace(0.1, 0.9, 7)))
 WIDTH = Number(-7.0, 1.0, tuple(np.log((0.01, 0.04, 0.12, 0.3))))
 SKEW, SCALES = Number(-2.0, 2.0, (0.0,)), Number(0.0, 2.5, (0.8,))
 POWER = Number(-60.0, 60.0, (-12.0, -6.0, -2.5, -1.0, 1.0, 2.5, 6.0, 12.0))
-P_TWO = ("p low", "p high")
-ONE = Law("one law", "A x^p", lambda q, s, span: iter([(0.0, 1.0, s)]), 2, exponents=("p",))
+P, P_TWO = (("p", -1),), (("p low", -2), ("p high", -1))
+ONE = Law("one law", "A x^p", lambda q, s, span: iter([(0.0, 1.0, s)]), 2, exponents=P)
 TWO = Law("two laws", "bend fading exponentially", _bent(_logistic), 3, (PLACE, WIDTH), P_TWO)
 SHAPED = TWO._replace(q=(*TWO.q, SKEW), starts_as=TWO.name)
 BENDS = (
@@ -174,25 +174,20 @@ BENDS = (
 )
 SECOND = Number(0.02, 0.9, (0.15, 0.3, 0.45, 0.6)), Number(-2.5, 0.0, tuple(np.log((0.2, 0.35, 0.5))))
 THREE_Q = (*SECOND, WIDTH._replace(starts=WIDTH.starts[:3]))
-THREE = Law("three laws", "two bends of one width", _three, 4, THREE_Q, ("p low", "p middle", "p high"))
-OFFSET = Law("offset", "A x^p + C", _offset, 1, (POWER, Number(-1.57, 1.57, (-1.2, -0.3, 0.1, 0.8, 1.4))))
+P_THREE = (("p low", -3), ("p middle", -2), ("p high", -1))
+THREE = Law("three laws", "two bends of one width", _three, 4, THREE_Q, P_THREE)
+OFFSET = Law("offset", "A x^p + C", _offset, 1, (POWER, Number(-1.57, 1.57, (-1.2, -0.3, 0.1, 0.8, 1.4))), (("p", 0),))
 CORRECTION_Q = Number(-30.0, 60.0, (-2.5, -0.7, -0.1, 0.1, 0.7, 2.5, 6.0, 14.0)), POWER._replace(least=-80.0, most=80.0)
-CORRECTION = Law("correction to scaling", "A x^p (1 + B x^-D)", _correction, 2, CORRECTION_Q, ("p",))
+CORRECTION = Law("correction to scaling", "A x^p (1 + B x^-D)", _correction, 2, CORRECTION_Q, (*P, ("D", 1)))
 LOG_Q = (Number(-3.0, 8.0, (-1.0, 1.0, 3.0, 5.0)),)
-LOG_CORRECTION = Law("logarithmic correction", "A x^p (1 + B ln(x/x0))^c", _log_correction, 3, LOG_Q, ("p",))
+LOG_CORRECTION = Law("logarithmic correction", "A x^p (1 + B ln(x/x0))^c", _log_correction, 3, LOG_Q, P)
 LOGARITHM = Number(-2 + 1e-9, 2 - 1e-9, (-1.9, -1.5, -0.5, 0.5, 1.5, 1.9))
 OTHER_FUNCTIONS = (
-    Law("logarithm", "A x^p (1 + B ln x)", _logarithm, 2, (LOGARITHM,), ("p",), power=False),
+    Law("logarithm", "A x^p (1 + B ln x)", _logarithm, 2, (LOGARITHM,), P, power=False),
     Law("exponential", "A exp(-x/X)", lambda q, s, span: iter([(0.0, 1.0, np.exp(span * (s - 1)))]), 2, power=False),
     Law("stretched exponential", "A exp(-(x/X)^b)", _stretched, 2, (POWER,), power=False),
     Law(
-        "cut-off",
-        "A exp(-x/X) x^p",
-        lambda q, s, span: iter([(0.0, 1.0, np.exp(span * (s - 1)), s)]),
-        3,
-        (),
-        ("p",),
-        False,
+        "cut-off", "A exp(-x/X) x^p", lambda q, s, span: iter([(0.0, 1.0, np.exp(span * (s - 1)), s)]), 3, (), P, False
     ),
     Law("lognormal", "A exp(-B ln(x/X)^2)", lambda q, s, span: iter([(0.0, 1.0, s, s**2)]), 3, power=False),
     Law("two exponentials", "A exp(-x/X), with a bend to exp(-x/Y)", _bent(_logistic, True), 3, TWO.q, power=False),

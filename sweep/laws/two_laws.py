@@ -15,12 +15,12 @@ import numpy as np
 import xarray as xr
 
 from sweep.errors import SweepError
-from sweep.laws.curves import Window, check_options, described, fit_lines, title
+from sweep.laws.curves import Window, described, fit_lines
 from sweep.laws.fits import Found, fitted, union
 from sweep.laws.lines import fit_exponent, fit_line, rounding
 from sweep.laws.loglog import Array, slopes, tends
 from sweep.laws.noise import BEYOND_DOUBT, roughness
-from sweep.laws.shapes import BENDS, ONE, OTHER_FUNCTIONS, THREE, TWO, Law
+from sweep.laws.shapes import BENDS, ONE, OTHER_FUNCTIONS, THREE, TWO
 
 TELLING = 16
 """Points from which noise is told from the misfit of a smooth truth,"""
@@ -42,21 +42,6 @@ BEYOND_SHAPES = 0.5
 VERDICTS = {"one law": 1, "two laws": 2, "three laws": 3}
 VERDICTS |= {"no power law": 0, "no meeting in the window": 0, "undecided": 0}
 """Numbers of laws, by verdict."""
-LAW = xr.DataArray(["low", "high"], dims="law", name="law")
-EXPONENTS = ("exponent", "exponent_low", "exponent_high")
-"""Numbers of each law."""
-NAMES = {
-    "exponent": "exponent of the power law",
-    "crossover": "where the two laws meet",
-    "verdict": "how many laws are beyond doubt, or what speaks against it",
-    "regimes": "2 where two laws are beyond doubt: evidence above 10, meeting in the window; 0 where none is told",
-    "evidence": "by how much AICc and BIC prefer two laws to one, whatever its noise, and to functions that are none",
-    "width": "width of the bend, in decades",
-    "level": "y where the two laws meet",
-    "residual": "largest relative distance of a point from the curve",
-    "points": "points in the fit",
-    "noisy": "1 where the intervals are of noise, 0 where of the curvature of noise-free values",
-}
 
 
 def fit_two_laws(
@@ -121,22 +106,19 @@ def fit_two_laws(
     >>> print(f"{float(met.crossover):.1f}")
     0.6
     """
-    check_options(confidence, noise, sigma)
     if windows is not None:
         if window is not None:
             raise SweepError("window does not go with windows, which say where the two lines are")
         return _in_windows(y, dim, windows, confidence=confidence, noise=noise, sigma=sigma)
 
-    def each(t: Array, z: Array, errors: Array | None, bounds: Array | None) -> dict[str, Any]:
-        tried = fitted((ONE, *BENDS, *OTHER_FUNCTIONS, THREE), t, z, errors, TWO)
-        every = [_one(t, row, laws, confidence, noise) for row, laws in zip(z, tried, strict=True)]
-        return {name: [one[name] for one in every] for name in every[0]}
+    law = "equation (1) of sweep.laws.two_laws"
+    found = fit_lines(_each, law, y, dim, window, sigma, confidence=confidence, noise=noise)
+    return found.assign_coords(law=["low", "high"])
 
-    found = fit_lines(each, y, dim, window, sigma)
-    both = {name: xr.concat([found[f"{name} {law}"] for law in LAW.values], LAW) for name in EXPONENTS}
-    units = {"crossover": str(y.coords[dim].attrs.get("units", "1")), "level": str(y.attrs.get("units", "1"))}
-    attrs = {"y": title(y), "x": dim, "law": "equation (1) of sweep.laws.two_laws"}
-    return described(found.assign(both), NAMES, units, attrs, confidence)
+
+def _each(t: Array, z: Array, sigma: Array | None, bound: None, **options: Any) -> list[dict[str, Any]]:
+    tried = fitted((ONE, *BENDS, *OTHER_FUNCTIONS, THREE), t, z, sigma, TWO)
+    return [_one(t, row, laws, **options) for row, laws in zip(z, tried, strict=True)]
 
 
 def _one(t: Array, z: Array, tried: dict[str, Found], confidence: float, noise: bool | str | None) -> dict[str, Any]:
@@ -146,9 +128,10 @@ def _one(t: Array, z: Array, tried: dict[str, Found], confidence: float, noise: 
     noisy = two.sigma is not None or (_is_noise(t, z, two.off, size) if noise is None else bool(noise))
     word = noise if isinstance(noise, str) else "noise" if noisy else "even"
     others = [tried[law.name] for law in BENDS[1:] if law.name in tried]
-    units, zero = np.array([1 / span, 1 / span, span]), np.array([0.0, 0.0, t[0]])
-    best = two.numbers[[3, 4, 0]] * units + zero
-    (low, high), every = union(t, two, others, _numbers, word, confidence, OTHER_SHAPES) * units + zero
+    # both exponents, and where the laws meet
+    which, units, zero = [-2, -1, 0], np.array([1 / span, 1 / span, span]), np.array([0.0, 0.0, t[0]])
+    best = two.numbers[which] * units + zero
+    (low, high), every = union(t, two, others, which, word, confidence, OTHER_SHAPES) * units + zero
     if noisy or roughness(t, two.off)[0] > SMOOTH_TO * size:
         further = BEYOND_SHAPES * np.nan_to_num(max(low[2] - every[0, 2], every[1, 2] - high[2]))
         low, high = every
@@ -156,24 +139,18 @@ def _one(t: Array, z: Array, tried: dict[str, Found], confidence: float, noise: 
     if not noisy:
         low, high = _widened(t, z, best, low, high)
     verdict, evidence = _verdict(t, z, tried, noisy)
-    of_laws = zip(EXPONENTS, (best, low, high), strict=True)
-    found = {f"{name} {law}": of[k] for name, of in of_laws for k, law in enumerate(LAW.values)}
-    found |= {"crossover": np.exp(best[2]), "crossover_low": np.exp(low[2]), "crossover_high": np.exp(high[2])}
-    found |= {"level": np.exp(two.numbers[2]), "width": math.exp(two.numbers[1]) * span / math.log(10)}
+    width, level = math.exp(two.numbers[1]) * span / math.log(10), np.exp(two.numbers[2])
     if evidence <= 0 and not noisy:  # straight to rounding: nothing meets anywhere
-        found |= {"crossover": math.nan, "crossover_low": 0.0, "crossover_high": np.inf, "width": math.nan}
-        found["level"] = math.nan
-    if verdict in ("three laws", "no power law"):
-        found = dict.fromkeys(found, math.nan)
+        best[2], low[2], high[2], width, level = math.nan, -np.inf, np.inf, math.nan, math.nan
     if verdict == "no meeting in the window":
-        found["crossover"] = math.nan
+        best[2] = math.nan
+    found = {"width": width, "level": level}
+    for name, of in (("", best), ("_low", low), ("_high", high)):
+        found |= {f"exponent{name}": of[:2], f"crossover{name}": np.exp(of[2])}
+    if verdict in ("three laws", "no power law"):
+        found = {name: math.nan * value for name, value in found.items()}
     found |= {"verdict": verdict, "regimes": VERDICTS[verdict], "evidence": evidence}
     return found | {"residual": two.residual, "noisy": noisy}
-
-
-def _numbers(law: Law) -> list[int]:
-    """Both exponents and where the laws meet."""
-    return [len(law.q) + 1, len(law.q) + 2, 0]
 
 
 def _is_noise(t: Array, z: Array, off: Array, size: float) -> bool:
@@ -246,9 +223,12 @@ def _in_windows(y: xr.DataArray, dim: str, windows: tuple[Window, Window], **key
         low, high = windows
     except (TypeError, ValueError):
         raise SweepError(f"windows: expected two, ((low, high), (low, high)); found {windows!r}") from None
-    fits = [fit_exponent(y, dim, one, **keys) for one in (low, high)]
-    found = xr.concat([fit[list(EXPONENTS)] for fit in fits], dim=LAW, combine_attrs="override")
-    met = crossover(*fits)
+    fits, names = (
+        [fit_exponent(y, dim, one, **keys) for one in (low, high)],
+        ["exponent", "exponent_low", "exponent_high"],
+    )
+    law = xr.DataArray(["low", "high"], dims="law", name="law")
+    found, met = xr.concat([fit[names] for fit in fits], law, combine_attrs="override"), crossover(*fits)
     return found.assign(met.data_vars).assign_attrs(met.attrs)
 
 
@@ -298,7 +278,5 @@ def crossover(low_fit: xr.Dataset, high_fit: xr.Dataset) -> xr.Dataset:
     found = xr.Dataset({"crossover": np.exp(place), "crossover_low": np.exp(below), "crossover_high": np.exp(above)})
     found["crossover_error"] = (found.crossover_high - found.crossover_low) / 2
     found["level"] = np.exp(np.log(low_fit.level) + low_fit.exponent * (place - centres[0]))
-    for name in map(str, found.data_vars):
-        units = low_fit["level" if name == "level" else "centre"].attrs["units"]
-        found[name].attrs = {"units": units, "long_name": f"{name} where the two laws meet"}
-    return found.assign_attrs({name: low_fit.attrs[name] for name in ("y", "x", "method", "confidence")})
+    found.attrs = {name: low_fit.attrs[name] for name in ("y", "x", "confidence")}
+    return described(found, low_fit.centre, low_fit.level)
