@@ -124,11 +124,9 @@ def _switched(graph, scene, states, constants, met, declared):
             role, named = f"switch {name}".rstrip(), dict(zip(states, behind, strict=True)) | constants
             length = len(states) if name.startswith(".") else declared  # that of a drive puts back the time
             jumped = _called(graph, scene, role, function, named, length) + behind[length:]
-            if name:
-                share = 0.5 * (1.0 + graph.constant(met[name]))
-                jumped = tuple(
-                    x if x is y else share * x + (1.0 - share) * y for x, y in zip(jumped, behind, strict=True)
-                )
+            if name:  # what another jump comes to, where it need not be defined, does not count
+                met_here = graph.constant(met[name])
+                jumped = tuple(graph.chosen(met_here, *pair) for pair in zip(jumped, behind, strict=True))
             behind = jumped
     return behind
 

@@ -17,7 +17,7 @@ from kernels.codegen.compiled import runner, running, written_of
 from kernels.codegen.followed import followed
 from kernels.codegen.record import named_functions, record
 from kernels.codegen.to_tolerance import solver
-from kernels.expression.graph import DIV, INPUT, NUMBER, Expression, SceneError, needed
+from kernels.expression.graph import INPUT, NUMBER, Expression, SceneError, needed
 from kernels.integrate.records import Mode
 from kernels.interface import Status
 from kernels.lanes.columns import DONE, fresh, to_the_end
@@ -35,8 +35,6 @@ TOLERANCES = {
 is changed, where what they leave out and what the tightest runs leave out come to the same."""
 OTHERS = 1.0, 10.0, 100.0
 """Tolerances of runs whose steps end at other points, over the one of the first."""
-PARTIAL = DIV, "sqrt", "log", "power", "arcsin", "arccos"
-"""Operations of a jump that may not be defined where all states are 0."""
 TIGHT = 30.0
 """Of the tightest tolerance, that of the sizes."""
 APART = 4.0
@@ -68,9 +66,7 @@ class ReturnMap:
         self.fine, self.rough, self.step = TOLERANCES[method]
         self._how = solver(self.scene, method)
         self._turning = [(turning(self.scene, True), (1.0,)), (turning(self.scene, False), OTHERS)]
-        undefined = drive is None and any(x.kind in PARTIAL for x in needed(*record(scene).switched))
-        self._begun = replace(scene, name=f"{scene.name}_begun", only_first=True) if undefined else None
-        own = [] if drive else [clocked(scene), *([self._begun] if undefined else [])]
+        own = [] if drive else [clocked(scene)]
         for recorded in (self.scene, *(scene for scene, _ in self._turning), *own):
             record(recorded)
 
@@ -83,12 +79,7 @@ class ReturnMap:
         """The states, and statuses, so many switches after the start."""
         nothing = np.zeros((len(self.own.states) - (self.own.start_time is not None), len(flips)))
         (_, *found), status = self.passed(parameters, nothing, flips, rtol, 1.0)
-        found, again = np.array(found), np.flatnonzero(status > Status.INACCURATE)
-        if self._begun and len(again):  # it may be the jump alone of states that are 0, which is computed besides
-            some = [*parameters[:, again], flips[again]]
-            rows, status[again] = solver(self._begun, self.method)(some, rtol[again])
-            found[:, again] = rows[2:]
-        return found, status
+        return np.array(found), status
 
     def rates(self, parameters, states, side):
         """The rates of each state, columns."""
@@ -161,8 +152,8 @@ def returning(scene, drive):
             graph = given[FRESH].graph
             before[states[watched(scene)]] = -graph.again(offset, values) / graph.again(factor, values)
         behind = before.values() if drive or jump is None else asked(jump, values | before)
-        fresh, begun = given[FRESH], asked(scene.start, given)
-        return tuple(fresh * x + (1.0 - fresh) * y for x, y in zip(begun, behind, strict=True))
+        graph, begun = given[FRESH].graph, asked(scene.start, given)
+        return tuple(graph.chosen(given[FRESH], graph.of(x), graph.of(y)) for x, y in zip(begun, behind, strict=True))
 
     parameters = (*own.parameters, *places, FRESH)
     start = named(start, (*parameters, "side"))

@@ -21,6 +21,7 @@ from types import SimpleNamespace
 
 FLOAT_MAX = sys.float_info.max
 NUMBER, INPUT, ADD, MUL, HALF_SQUARE, SCALED, DIV = "number", "input", "add", "mul", "half_square", "scaled", "div"
+CHOSEN = "chosen"
 
 
 FUNCTIONS = (
@@ -248,6 +249,10 @@ class Graph:
         if name == "sqrt" and self._is_side(args[0]):
             return self.power(args[0], 0.5)
         return self._node(name, args, name != "floor" and any(x.varies for x in args))
+
+    def chosen(self, sign, x, y):
+        """x where a constant sign is above 0, else y, whatever the other one is; no series is taken of it."""
+        return x if x is y else self.function(CHOSEN, sign, x, y)
 
     def partials(self, x):
         """The derivative of an operation: each argument with a factor, None for 1; and what their sum is divided by."""

@@ -225,6 +225,10 @@ class Values:
         value = self.value(x.args[0])
         return V.where(value < 0.0, -1.0, V.where(value > 0.0, 1.0, 0.0))
 
+    def _chosen(self, x, k):
+        sign, this, other = map(self.value, x.args)
+        return V.where(sign > 0.0, this, other)
+
     def _rate(self, x, j):
         """j x_j."""
         if j == 1:

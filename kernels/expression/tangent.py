@@ -7,7 +7,7 @@ change between events.
 
 from collections import defaultdict
 
-from kernels.expression.graph import ADD, INPUT, SCALED, needed
+from kernels.expression.graph import ADD, CHOSEN, INPUT, SCALED, needed
 
 SHORT, FED_BACK, LONG = {12: 4, 18: 4}, {12: 6, 18: 6}, {12: 9, 18: 12}
 """Order of the changes' series on a step of the motion's: terms fall by about a quarter each, so to some 1e-3. Those of
@@ -50,6 +50,9 @@ class Tangents:
         return self._reused[x.index]
 
     def _of_operation(self, x):
+        if x.kind == CHOSEN:
+            changes = (self._graph.of(0.0) if d is None else d for d in map(self.of, x.args[1:]))
+            return self._graph.chosen(x.args[0], *changes)
         parts, divisor = self._graph.partials(x)
         deltas = [(self.of(u), factor) for u, factor in parts]
         terms = [d if factor is None else self._graph.multiply(factor, d) for d, factor in deltas if d is not None]

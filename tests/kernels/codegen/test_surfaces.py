@@ -7,7 +7,7 @@ from columns import solve
 
 from kernels.interface import Status
 from kernels.lanes.jit import COMPILED
-from kernels.scene import Field, SceneError, cos, scene_kernel, sin, where
+from kernels.scene import Field, SceneError, cos, scene_kernel, sin, sqrt, where
 from kernels.stepping import stepped_kernel
 
 
@@ -159,3 +159,19 @@ def test_surfaces_and_switches_that_do_not_fit_are_refused(changed, says):
 def test_where_there_is_one_surface_more_are_refused():
     with pytest.raises(SceneError, match="one surface"):
         stepped_kernel(**WALLS)
+
+
+@plain
+@pytest.mark.parametrize("method", ["taylor", "dop853", "rodas5p"])
+def test_the_jump_of_a_surface_that_is_not_met_need_not_be_defined(method):
+    """A ball gets 3 J/kg at the floor, and loses 2.25 at a lid 1 m above: more than it comes down with."""
+    kernel = scene_kernel(
+        name="lid", doc="", states=fields("x", "v"), parameters=fields("loss"), rates=lambda v: (v, -1.0),
+        surface={"lid": lambda x: 1.0 - x, "floor": lambda x: x}, start=lambda: (0.5, 0.0),
+        switch={"lid": lambda x, v, loss: (x, -sqrt(v * v - loss)), "floor": lambda x, v: (x, sqrt(v * v + 6.0))},
+    )  # fmt: skip
+    outputs, status = found(kernel, method, 4.5, flips=5)
+    speeds = [(0.0, 1.0), (7.0, 5.0), (0.5, 2.5), (8.5, 6.5), (2.0, 4.0)]  # squares, at both ends of each flight
+    time = sum(abs(math.sqrt(begin) - math.sqrt(end)) for begin, end in speeds)
+    assert status == Status.OK
+    assert [outputs[name] for name in ("time", "x", "v")] == pytest.approx([time, 0.0, -2.0], abs=1e-8)
