@@ -8,6 +8,7 @@ over those of every D that the points do not rule out.
 
 from __future__ import annotations
 
+import functools
 import math
 from typing import Any
 
@@ -81,45 +82,40 @@ def fit_correction(
     """
     if end not in ("low", "high"):
         raise SweepError(f'end: expected "low" or "high", found {end!r}')
-
-    def each(t: Array, z: Array, errors: Array | None, bounds: None, **options: Any) -> list[dict[str, Any]]:
-        if end == "low":
-            t, z, errors = -t[::-1], z[:, ::-1], None if errors is None else errors[:, ::-1]
-        tried = fitted((ONE, CORRECTION, LOG_CORRECTION), t, z, errors, CORRECTION)
-        sign = 1.0 if end == "high" else -1.0
-        return [_one(t, row, laws, sign, **options) for row, laws in zip(z, tried, strict=True)]
-
-    law = f"{{y}} = A {{x}}^p (1 + B {{x}}^-D), {end} end"
+    law, each = f"{{y}} = A {{x}}^p (1 + B {{x}}^-D), {end} end", functools.partial(_corrected, low=end == "low")
     return fit_lines(each, law, y, dim, window, sigma, confidence=confidence, noise=noise)
 
 
-def _one(
-    t: Array, z: Array, tried: dict[str, Found], sign: float, confidence: float, noise: bool | str | None
-) -> dict[str, Any]:
-    """Numbers of one line; t runs towards the end where (1) is a power law, and exponents take `sign`."""
-    found, fits, low, high = tried[CORRECTION.name], True, math.nan, math.nan
-    exponent, fade, left = _outer(found, t)
-    if abs(left) >= 1 and tried[ONE.name].aicc <= found.aicc + BEYOND_DOUBT:  # a correction that is none
-        exponent, fade, left = float(tried[ONE.name].numbers[1] / (t[-1] - t[0])), math.nan, 0.0
-    size = float(np.sqrt(np.mean(found.off**2)))
-    scatters = bool(roughness(t, found.off)[0] > SCATTERS * size if noise is None else noise)
-    noisy = found.sigma is not None or (scatters and size > float(8 * rounding(t, z)))
-    word = noise if isinstance(noise, str) else "noise"
-    if not noisy:
-        low, high = _by_half(t, z, exponent)
-    elif fits := not found.denied(t, word):
-        steps, least, most = FADES
-        best, sigma = float(np.clip(abs(found.numbers[1]), least, most)), found.sigma
-        far = np.clip(2 * np.nan_to_num(found.errors[1], posinf=most) / best, 0.02, 0.6)
-        laws = [_fading(fade) for fade in np.clip(best * steps**far, least, most)]
-        own, *others = fitted(laws, t, z[None], None if sigma is None else sigma[None])[0].values()
-        others += [one for one in (tried[ONE.name], tried[LOG_CORRECTION.name]) if one.aicc < found.aicc + AS_WELL / 2]
-        low, high = union(t, own, others, [-1], word, confidence, AS_WELL)[1][:, 0] / np.ptp(t)
-    ends = sorted(sign * one for one in (low, high, exponent))[::2] if fits else (math.nan, math.nan)
-    verdict = VERDICTS[1 if not fits else 0 if abs(left) < 1 else 2]
-    of = {"exponent": sign * exponent, "exponent_low": ends[0], "exponent_high": ends[1], "verdict": verdict}
-    of |= {"correction_exponent": sign * fade, "correction": left, "residual": found.residual, "noisy": noisy}
-    return of | {"fits": verdict == VERDICTS[0]}
+def _corrected(
+    t: Array, z: Array, sigma: Array | None, bound: None, low: bool, confidence: float, noise: bool | str | None
+) -> list[dict[str, Any]]:
+    """Numbers of each line; at the low end by (1) of 1/x."""
+    if low:
+        t, z, sigma = -t[::-1], z[:, ::-1], None if sigma is None else sigma[:, ::-1]
+    every, sign, word = [], -1.0 if low else 1.0, noise if isinstance(noise, str) else "noise"
+    for row, tried in zip(z, fitted((ONE, CORRECTION, LOG_CORRECTION), t, z, sigma, CORRECTION), strict=True):
+        found, one, fits, ends = tried[CORRECTION.name], tried[ONE.name], True, [math.nan, math.nan]
+        exponent, fade, left = _outer(found, t)
+        if abs(left) >= 1 and one.aicc <= found.aicc + BEYOND_DOUBT:  # a correction that is none
+            exponent, fade, left = float(one.numbers[1] / (t[-1] - t[0])), math.nan, 0.0
+        size = float(np.sqrt(np.mean(found.off**2)))
+        scatters = bool(roughness(t, found.off)[0] > SCATTERS * size if noise is None else noise)
+        if not (noisy := sigma is not None or (scatters and size > float(8 * rounding(t, row)))):
+            reach = _by_half(t, row, exponent)
+            ends = [exponent - reach, exponent + reach]
+        elif fits := not found.denied(t, word):
+            steps, least, most = FADES
+            best, known = float(np.clip(abs(found.numbers[1]), least, most)), found.sigma
+            far = np.clip(2 * np.nan_to_num(found.errors[1], posinf=most) / best, 0.02, 0.6)
+            laws = [_fading(fade) for fade in np.clip(best * steps**far, least, most)]
+            own, *others = fitted(laws, t, row[None], None if known is None else known[None])[0].values()
+            others += [law for law in (one, tried[LOG_CORRECTION.name]) if law.aicc < found.aicc + AS_WELL / 2]
+            ends = [*union(t, own, others, [-1], word, confidence, AS_WELL)[1][:, 0] / np.ptp(t), exponent]
+        verdict = VERDICTS[1 if not fits else 0 if abs(left) < 1 else 2]
+        of = {"exponent": sign * exponent, "correction_exponent": sign * fade, "correction": left, "verdict": verdict}
+        of |= {"exponent_low": min(sign * end for end in ends), "exponent_high": max(sign * end for end in ends)}
+        every.append(of | {"residual": found.residual, "noisy": noisy, "fits": verdict == VERDICTS[0]})
+    return every
 
 
 def _outer(found: Found, t: Array) -> tuple[float, float, float]:
@@ -135,16 +131,14 @@ def _outer(found: Found, t: Array) -> tuple[float, float, float]:
     return (exponent - fade) / span, -fade / span, 1 / last if last else math.inf
 
 
-def _by_half(t: Array, z: Array, exponent: float) -> tuple[float, float]:
-    """Ends of an interval three times as far as the outer half of the window moves the exponent."""
+def _by_half(t: Array, z: Array, exponent: float) -> float:
+    """Three times as far as the outer half of the window moves the exponent."""
     first = np.append(True, np.diff(t) > 0)
     t, z = t[first], z[first]
     half = t >= (t[0] + t[-1]) / 2
     other = fitted((CORRECTION,), t[half], z[None, half])[0]
     local = _outer(other[CORRECTION.name], t[half])[0] if other else slopes(t, z, 5)[-1]
-    doubt = float(slope_bounds(t, np.full(t.size, 1e-15 * (1 + abs(z).max())), 5)[-1])
-    reach = 3 * abs(float(local) - exponent) + doubt
-    return exponent - reach, exponent + reach
+    return 3 * abs(float(local) - exponent) + float(slope_bounds(t, np.full(t.size, 8 * rounding(t, z)), 5)[-1])
 
 
 def _fading(fade: float) -> Law:

@@ -76,10 +76,15 @@ def fit_collapse(y: xr.DataArray, dim: str, over: str, *, sigma: Any = None, con
     points = Points(*(column[inside] for column in points))
     a = points.best(a - 0.3 * (1 + abs(a)), a + 0.3 * (1 + abs(a)), 41)
     columns, b, off = points.curve(a)
-    _refuse_power_law(points, a, columns.shape[1])
+    k, rounding = columns.shape[1], ROUNDING * (1 + abs(points.z).max())
+    least = points.square(a) + float((points.root**2).sum()) * (rounding**2 + 1e-20 * float(np.ptp(points.z)) ** 2)
+    if min(points.square(a + step) for step in (-0.25, 0.25)) < least * (1 + 12.0 / max(1, points.z.size - k)):
+        raise SweepError(
+            "the curves collapse for any exponents of x: f is a power law, so a and b are not determined apart"
+        )
     found = {"x_exponent": a, "y_exponent": b, "residual": float(np.sqrt(np.mean(off**2))), "points": points.t.size}
     # whether a level, a slope and a bow of each curve describe the points far better than the common one
-    k, u = columns.shape[1], points.t - points.t.mean()
+    u = points.t - points.t.mean()
     own = [here * u**power for here in points.size == np.unique(points.size)[1:, None] for power in range(3)]
     basis, beside = np.linalg.qr(columns)[0], np.column_stack(own)
     left, moved, _ = np.linalg.svd(beside - basis @ (basis.T @ beside), full_matrices=False)
@@ -139,17 +144,6 @@ class Points(NamedTuple):
         k = int(np.argmin(squares))
         around = float(grid[max(k - 1, 0)]), float(grid[min(k + 1, tries - 1)])
         return float(minimize_scalar(self.square, bounds=around, method="bounded", options={"xatol": 1e-9}).x)
-
-
-def _refuse_power_law(points: Points, a: float, numbers: int) -> None:
-    """Raises SweepError where another a, far off, does as well: of a power law f any does."""
-    rounding = ROUNDING * (1 + abs(points.z).max())
-    least = points.square(a) + float((points.root**2).sum()) * (rounding**2 + 1e-20 * float(np.ptp(points.z)) ** 2)
-    worst = min(points.square(a + step) for step in (-0.25, 0.25))
-    if worst < least * (1 + 12.0 / max(1, points.z.size - numbers)):
-        raise SweepError(
-            "the curves collapse for any exponents of x: f is a power law, so a and b are not determined apart"
-        )
 
 
 def _points(y: xr.DataArray, dim: str, over: str, sigma: Any) -> tuple[Points, int]:

@@ -23,7 +23,7 @@ BEYOND_NOISE = 4.0
 MEMORY = 0.9
 """Autocorrelation of the noise that error bars of slopes are for; of independent noise they are wider, by half."""
 NEAR, WIDEST = 6, 6
-"""Points to each side that tell the size of the noise, and over which a stencil of seven points reaches at most."""
+"""Points to each side that tell the size of the noise, and between the ends of a stencil of seven points."""
 
 FEW = 20
 """Points below which noise is not told from a bend."""
@@ -46,50 +46,27 @@ def slopes(t: Array, z: Array, points: int) -> Array:
         NaN where missing; the result is NaN there, and in runs shorter than three. A run shorter than `points`
         is differentiated with what it has.
     """
-
-    def derivative(s: Array, y: Array) -> Array:
-        nodes, weights = _stencils(s, points)
-        slope = np.zeros(y.shape)
-        for k in range(nodes.shape[1]):  # differences from the home point: a constant has slope zero exactly
-            slope += weights[:, k] * (y[..., nodes[:, k]] - y)
-        return slope
-
-    return _by_runs(t, z, derivative)
-
-
-def slope_errors(t: Array, z: Array, bound: Array | None = None) -> Array:
-    """Half the 95 % interval of the slope by five points, with noise; without, more than its error.
-
-    What the polynomial through seven points says otherwise tells the error. Noise makes it alike at neighbours, over
-    the weights of both: the median near a point gives its size. Where it is far larger, the curve bends: it counts
-    itself there, and where a bend is within a step, so that more points do not tell more, the slopes of the steps
-    beside the point. What errors up to `bound` (..., n) in the values can do is added.
-    """
-    found = _by_runs(t, z, _derivative_errors)
-    if bound is None or not bound.any():
-        return found
-    missing = np.where(np.isfinite(z), np.broadcast_to(bound, z.shape), np.nan)
-    return found + _by_runs(t, missing, lambda s, b: slope_bounds(s, b, 5))
+    # differences from one point: a constant has slope zero exactly
+    return _by_runs(t, lambda s, y: (y - y[:, :1]) @ _matrix(s, points).T, z)
 
 
 def slope_bounds(t: Array, bound: Array, points: int) -> Array:
     """How far errors up to `bound` (..., n) in the values can move each slope of `slopes`; lines without gaps."""
-    nodes, weights = _stencils(t, points)
-    found: Array = (abs(weights) * bound[..., nodes]).sum(axis=-1) + abs(weights.sum(axis=1)) * bound
+    found: Array = bound @ abs(_matrix(t, points)).T
     return found
 
 
-def _by_runs(t: Array, z: Array, function: Callable[[Array, Array], Array]) -> Array:
-    """`function` of each unbroken run of at least three neighbours; lines with the same gaps at once."""
-    if np.isfinite(z).all():
-        return function(t, z)
-    rows = z.reshape(-1, t.size)
-    found = np.full(rows.shape, np.nan)
-    for pattern, which in alike(np.isfinite(rows)):
+def _by_runs(t: Array, function: Callable[..., Array], *lines: Array) -> Array:
+    """`function` of each unbroken run of at least three neighbours; lines (..., n) with the same gaps at once."""
+    rows = [np.broadcast_to(one, lines[0].shape).reshape(-1, t.size) for one in lines]
+    if np.isfinite(rows[0]).all():
+        return function(t, *rows).reshape(lines[0].shape)
+    found = np.full(rows[0].shape, np.nan)
+    for pattern, which in alike(np.isfinite(rows[0])):
         for start, stop in runs(pattern):
             if stop - start >= FEWEST:
-                found[which, start:stop] = function(t[start:stop], rows[which, start:stop])
-    return found.reshape(z.shape)
+                found[which, start:stop] = function(t[start:stop], *(one[which, start:stop] for one in rows))
+    return found.reshape(lines[0].shape)
 
 
 def alike(present: NDArray[np.bool_], plain: bool = False) -> list[tuple[NDArray[np.bool_], NDArray[np.intp]]]:
@@ -111,19 +88,37 @@ def runs(present: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
     yield from zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
 
 
-def _derivative_errors(t: Array, z: Array) -> Array:
-    """`slope_errors` of lines without gaps, with noise or without."""
-    fine, middle, rough = (7, 5, 3) if t.size > 5 else (t.size, max(2, t.size - 2), 2)  # beside few points lower orders
-    slope = slopes(t, z, middle)
-    apart, coarse = abs(slopes(t, z, fine) - slope), abs(slopes(t, z, rough) - slope)
-    sharp = 4.0 * apart > coarse  # orders that do not tell: a bend within a step, about which the steps beside it do
+def slope_errors(t: Array, z: Array, bound: Array) -> Array:
+    """Half the 95 % interval of the slope by five points, with noise; without, more than its error.
+
+    What the polynomial through seven points says otherwise tells the error. Noise makes it alike at neighbours, over
+    the weights of both: the median near a point gives its size. Where it is far larger, the curve bends: it counts
+    itself there, and where a bend is within a step, so that more points do not tell more, the slopes of the steps
+    beside the point. What errors up to `bound` (..., n) in the values can do is added.
+    """
+    return _by_runs(t, _errors, z, bound)
+
+
+def _errors(t: Array, z: Array, bound: Array) -> Array:
+    """`slope_errors` of lines (m, n) without gaps."""
+    from scipy.sparse import diags_array
+
+    orders = (7, 5, 3) if t.size > 5 else (t.size, max(2, t.size - 2), 2)  # beside few points lower orders
+    fine, middle, rough = (_matrix(t, points) for points in orders)
+    level = z - z[:, :1]
+    slope = level @ middle.T
+    apart, coarse = abs(level @ fine.T - slope), abs(level @ rough.T - slope)
+    rounding = EPSILON * (1.0 + abs(z).max(axis=-1, keepdims=True)) * np.sqrt((middle**2).sum(axis=1))
+    sharp = (
+        4.0 * apart > coarse + 8.0 * rounding
+    )  # orders that do not tell: a bend within a step, about which the steps beside it do
     steps = np.diff(z, axis=-1) / np.diff(t)
     both = [abs(steps[..., np.clip(np.arange(t.size) - k, 0, t.size - 2)] - slope) for k in (0, 1)]
-    weights, between = _dense(t, middle), _dense(t, fine)
-    places = np.arange(weights.shape[1])
-    alike = MEMORY ** abs(np.subtract.outer(places, places))
     # standard errors for values with autocorrelated errors of size 1
-    size, size_apart = (np.sqrt(np.einsum("ij,jk,ik->i", w, alike, w)) for w in (weights, between - weights))
+    reach = min(WIDEST, t.size - 1)
+    memory = [MEMORY ** abs(k) for k in range(-reach, reach + 1)]
+    noises = diags_array(memory, offsets=range(-reach, reach + 1), shape=(t.size, t.size))
+    size, size_apart = (np.sqrt(((one @ noises) * one).sum(axis=1)) for one in (middle, fine - middle))
     apart_by_noise = apart / size_apart
     # the median near a point, which a bend or a spike does not change
     noise = 1.4826 * np.median(_near(apart_by_noise, min(NEAR, (t.size - 1) // 2), "reflect"), axis=-1)
@@ -132,9 +127,8 @@ def _derivative_errors(t: Array, z: Array) -> Array:
     by_bend = np.where(sharp, np.maximum(apart, np.maximum(*both)), np.maximum(apart, coarse) if few else apart)
     error = noise * size
     error = np.where(few | rises, np.maximum(error, _near(by_bend, 2, "edge").max(axis=-1)), error)
-    rounding = EPSILON * (1.0 + abs(z).max(axis=-1, keepdims=True)) * np.sqrt((weights**2).sum(axis=1))
     found: Array = 2.3 * error + rounding  # 1.96 and what the median, of few points, is too small
-    return np.where(_beside_pole(steps) & rises, np.inf, found)
+    return np.where(_beside_pole(steps) & rises, np.inf, found) + slope_bounds(t, bound, 5)
 
 
 def _beside_pole(steps: Array) -> NDArray[np.bool_]:
@@ -159,24 +153,18 @@ def _near(values: Array, reach: int, mode: Any) -> Array:
     return sliding_window_view(padded, 2 * reach + 1, axis=-1)
 
 
-def _dense(t: Array, points: int) -> Array:
-    """Weights of the slopes (n, 2 WIDEST + 1), the home point in the middle."""
-    nodes, weights = _stencils(t, points)
-    found, home = np.zeros((t.size, 2 * WIDEST + 1)), np.arange(t.size)[:, None]
-    np.put_along_axis(found, nodes - home + WIDEST, weights, axis=1)
-    found[:, WIDEST] = -weights.sum(axis=1)
-    return found
+def _matrix(t: Array, points: int) -> Any:
+    """Weights of all values (sparse, n x n) in the slope at each point, by the polynomial through its neighbours."""
+    from scipy.sparse import csr_array
 
-
-def _stencils(t: Array, points: int) -> tuple[NDArray[np.intp], Array]:
-    """Neighbours (n, points) of each point, and their weights in its slope; that of the point itself is left zero."""
     points, row = min(points, t.size), np.arange(t.size)
     first = np.clip(row - points // 2, 0, t.size - points)
     nodes, home = first[:, None] + np.arange(points), row - first
     apart, barycentric = differences(t[nodes])
-    weights: Array = barycentric / barycentric[row, home][:, None] / apart[row, home]
+    weights = barycentric / barycentric[row, home][:, None] / apart[row, home]
     weights[row, home] = 0.0
-    return nodes, weights
+    weights[row, home] = -weights.sum(axis=1)
+    return csr_array((weights.ravel(), (row.repeat(points), nodes.ravel())), shape=(t.size, t.size))
 
 
 def differences(nodes: Array) -> tuple[Array, Array]:

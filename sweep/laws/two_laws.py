@@ -40,8 +40,7 @@ BEYOND_SHAPES = 0.5
 """Share of what other shapes add to where the laws meet, added again: the true one may be none of them."""
 
 VERDICTS = {"one law": 1, "two laws": 2, "three laws": 3}
-VERDICTS |= {"no power law": 0, "no meeting in the window": 0, "undecided": 0}
-"""Numbers of laws, by verdict."""
+"""Numbers of laws, by verdict; other verdicts tell none."""
 
 
 def fit_two_laws(
@@ -106,19 +105,25 @@ def fit_two_laws(
     >>> print(f"{float(met.crossover):.1f}")
     0.6
     """
-    if windows is not None:
-        if window is not None:
-            raise SweepError("window does not go with windows, which say where the two lines are")
-        return _in_windows(y, dim, windows, confidence=confidence, noise=noise, sigma=sigma)
+    keys: dict[str, Any] = {"confidence": confidence, "noise": noise}
+    if windows is None:
+        law = "equation (1) of sweep.laws.two_laws"
+        return fit_lines(_each, law, y, dim, window, sigma, **keys).assign_coords(law=["low", "high"])
+    if window is not None:
+        raise SweepError("window does not go with windows, which say where the two lines are")
+    try:
+        low, high = windows
+    except (TypeError, ValueError):
+        raise SweepError(f"windows: expected two, ((low, high), (low, high)); found {windows!r}") from None
+    fits = [fit_exponent(y, dim, one, sigma=sigma, **keys) for one in (low, high)]
+    both = [fit[["exponent", "exponent_low", "exponent_high"]] for fit in fits]
+    exponents = xr.concat(both, xr.Variable("law", ["low", "high"]), combine_attrs="override")
+    return crossover(*fits).assign(exponents.data_vars)
 
-    law = "equation (1) of sweep.laws.two_laws"
-    found = fit_lines(_each, law, y, dim, window, sigma, confidence=confidence, noise=noise)
-    return found.assign_coords(law=["low", "high"])
 
-
-def _each(t: Array, z: Array, sigma: Array | None, bound: None, **options: Any) -> list[dict[str, Any]]:
+def _each(t: Array, z: Array, sigma: Array | None, bound: None, **keys: Any) -> list[dict[str, Any]]:
     tried = fitted((ONE, *BENDS, *OTHER_FUNCTIONS, THREE), t, z, sigma, TWO)
-    return [_one(t, row, laws, **options) for row, laws in zip(z, tried, strict=True)]
+    return [_one(t, row, laws, **keys) for row, laws in zip(z, tried, strict=True)]
 
 
 def _one(t: Array, z: Array, tried: dict[str, Found], confidence: float, noise: bool | str | None) -> dict[str, Any]:
@@ -149,7 +154,7 @@ def _one(t: Array, z: Array, tried: dict[str, Found], confidence: float, noise: 
         found |= {f"exponent{name}": of[:2], f"crossover{name}": np.exp(of[2])}
     if verdict in ("three laws", "no power law"):
         found = {name: math.nan * value for name, value in found.items()}
-    found |= {"verdict": verdict, "regimes": VERDICTS[verdict], "evidence": evidence}
+    found |= {"verdict": verdict, "regimes": VERDICTS.get(verdict, 0), "evidence": evidence}
     return found | {"residual": two.residual, "noisy": noisy}
 
 
@@ -171,20 +176,19 @@ def _widened(t: Array, z: Array, best: Array, low: Array, high: Array) -> tuple[
     laws and to where the tangents at the ends of the window meet."""
     first = np.append(True, np.diff(t) > 0)
     t, z = t[first], z[first]
-    local, near = slopes(t, z, 5), np.eye(min(5, t.size))
+    local, noise, ends = slopes(t, z, 5), 2.5 * float(roughness(t, z)[0]), []
     half = np.flatnonzero(np.diff(np.sign(local - (best[0] + best[1]) / 2)))
     places = [t[half[np.argmin(abs(t[half] - best[2]))]] if half.size else best[2]]
-    low, high, steep = low.copy(), high.copy(), []
-    for law, (at, of) in enumerate(((t, local), (-t[::-1], local[::-1]))):
+    for at, of in ((t, local), (-t[::-1], local[::-1])):
         # what noise there is moves the local exponent at the end
-        doubt = 2.5 * float(roughness(t, z)[0]) * math.sqrt((slopes(at[:5], near, 5)[:, 0] ** 2).sum())
+        doubt = noise * math.sqrt((slopes(at[:5], np.eye(min(5, t.size)), 5)[:, 0] ** 2).sum())
         end, limit = tends(at, of, doubt)
-        low[law], high[law] = min(low[law], end - doubt, limit - doubt), max(high[law], end + doubt, limit + doubt)
-        steep.append((end, limit, end - doubt, end + doubt))
+        ends.append((end, limit, end - doubt, end + doubt, limit - doubt, limit + doubt))
     # where lines of these slopes through the first and the last point meet
-    places += [(z[-1] - z[0] + p * t[0] - q * t[-1]) / (p - q) for p, q in itertools.product(*steep) if p != q]
-    low[2], high[2] = min(low[2], *places), max(high[2], *places)
-    return low, high
+    steep = itertools.product(*(one[:4] for one in ends))
+    places += [(z[-1] - z[0] + p * t[0] - q * t[-1]) / (p - q) for p, q in steep if p != q]
+    reach = np.array([(min(one), max(one)) for one in (*ends, places)]).T
+    return np.minimum(low, reach[0]), np.maximum(high, reach[1])
 
 
 def _verdict(t: Array, z: Array, tried: dict[str, Found], noisy: bool) -> tuple[str, float]:
@@ -217,21 +221,6 @@ def _verdict(t: Array, z: Array, tried: dict[str, Found], noisy: bool) -> tuple[
     return "one law" if straight and not bends_more else "undecided", evidence
 
 
-def _in_windows(y: xr.DataArray, dim: str, windows: tuple[Window, Window], **keys: Any) -> xr.Dataset:
-    """Two straight lines, and where they meet."""
-    try:
-        low, high = windows
-    except (TypeError, ValueError):
-        raise SweepError(f"windows: expected two, ((low, high), (low, high)); found {windows!r}") from None
-    fits, names = (
-        [fit_exponent(y, dim, one, **keys) for one in (low, high)],
-        ["exponent", "exponent_low", "exponent_high"],
-    )
-    law = xr.DataArray(["low", "high"], dims="law", name="law")
-    found, met = xr.concat([fit[names] for fit in fits], law, combine_attrs="override"), crossover(*fits)
-    return found.assign(met.data_vars).assign_attrs(met.attrs)
-
-
 def crossover(low_fit: xr.Dataset, high_fit: xr.Dataset) -> xr.Dataset:
     """Where two power laws, from `fit_exponent` over two windows, meet: `crossover` with its interval,
     `crossover_error`, half of that, and `level`.
@@ -245,18 +234,15 @@ def crossover(low_fit: xr.Dataset, high_fit: xr.Dataset) -> xr.Dataset:
         raise SweepError("the windows of the two fits overlap, so their errors are not independent; take them apart")
     if bool((low_fit.centre > high_fit.centre).all()):
         low_fit, high_fit = high_fit, low_fit
-    centres = [np.log(low_fit.centre), np.log(high_fit.centre)]
-    middle = (centres[0] + centres[1]) / 2  # logarithms counted from here keep their digits
+    middle = (np.log(low_fit.centre) + np.log(high_fit.centre)) / 2  # logarithms counted from here keep their digits
     lines, outer, wide = [], [], []  # outer: through the outer ends, towards where the exponents tend
-    for fit, centre, ends in zip(
-        (low_fit, high_fit), centres, (("limit_low", "start", "low"), ("limit_high", "stop", "high")), strict=True
-    ):
-        limit, value, end = (fit[name] for name in ends)
-        lines.append((fit.exponent, np.log(fit.level), centre - middle))
-        outer.append((limit, np.log(value), np.log(end) - middle))
+    for fit, side, end in ((low_fit, "low", "start"), (high_fit, "high", "stop")):
+        centre = np.log(fit.centre) - middle
+        lines.append((fit.exponent, np.log(fit.level), centre))
+        outer.append((fit[f"limit_{side}"], np.log(fit[end]), np.log(fit[side]) - middle))
         reach = ((fit.exponent_high - fit.exponent_low) / 2).where(fit.noisy == 1, fit.exponent_error)
         factor = (reach / fit.exponent_error).where(fit.exponent_error > 0, 1.0)
-        wide.append((reach, fit.level_error * factor, centre - middle))
+        wide.append((reach, fit.level_error * factor, centre))
     slope = (lines[1][0] - lines[0][0]).where(abs(lines[1][0] - lines[0][0]) > np.hypot(wide[0][0], wide[1][0]))
     if not slope.notnull().any():
         raise SweepError("the two laws have the same exponent within their errors, so they meet nowhere")
@@ -277,6 +263,6 @@ def crossover(low_fit: xr.Dataset, high_fit: xr.Dataset) -> xr.Dataset:
     below, above = (place + (linear + sign * root) / square + sign * moved for sign in (-1, 1))
     found = xr.Dataset({"crossover": np.exp(place), "crossover_low": np.exp(below), "crossover_high": np.exp(above)})
     found["crossover_error"] = (found.crossover_high - found.crossover_low) / 2
-    found["level"] = np.exp(np.log(low_fit.level) + low_fit.exponent * (place - centres[0]))
+    found["level"] = np.exp(lines[0][1] + low_fit.exponent * (place - middle - lines[0][2]))
     found.attrs = {name: low_fit.attrs[name] for name in ("y", "x", "confidence")}
     return described(found, low_fit.centre, low_fit.level)
