@@ -37,7 +37,6 @@ PARTIAL: dict[int, dict[str, dict[int, Printed]]] = {
 SLIPS = (50.2, 9.55, 0.148, 0.96, 15.9)
 """Numbers of tables 2 to 4 that do not follow from its own data, carried through all three; 0.96 is 6.5 times 0.148 and
 15.9 is 99.4 times 0.16."""
-TABLE_2_E = (0.133, 0.264, 1.192, 0.726, 0.25, 0.358, 0.19, 0.84)
 CHAINS: dict[int, tuple[str, dict[str, list[Printed]]]] = {
     7: ("Table 3", {"J": [25.7, 1.483, 0.82, 1.45, 6.50, 96.0, "99.40"],
                     "h": [0.18, 0.014, 0.037, 0.0975, 0.187, 0.72, 13]}),
@@ -101,11 +100,3 @@ def tables_3_to_5(chains: Mapping[int, Mapping[str, np.ndarray]]) -> Claims:
                 what = f"{table}, {name}{i + 1}"
                 expected = (CARRIED[what],) if what in CARRIED else ("reproduced", "near")
                 yield judged(what, printed, chains[n][name][i], expected)
-
-
-def holzer(J: np.ndarray, e: Sequence[float]) -> np.ndarray:
-    """Undamped frequencies [Hz] of a chain in the units of the source."""
-    k = 1e3 / np.asarray(e)
-    stiff = np.diag(k + np.concatenate([[0.0], k[:-1]])) - np.diag(k[:-1], 1) - np.diag(k[:-1], -1)
-    root = np.sqrt(np.asarray(J) * 1e-3)
-    return np.sqrt(np.linalg.eigvalsh(stiff / root[:, None] / root)) / (2 * np.pi)

@@ -1,4 +1,4 @@
-"""What studies of a polishing machine share: how uneven a profile of wear is, the best of one and of few settings."""
+"""What studies of a polishing machine share: how uneven a profile is, the best of one and of few settings."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
-from _common import Claims, Statement, compared, solved
+from _common import solved
 from scipy.optimize import nnls
 
 import sweep
@@ -41,12 +41,13 @@ def least(profile: Any, weight: Any, radius: Any) -> Any:
 
 @dataclass(frozen=True)
 class Setting:
-    """One throw and offset [m] with the unevenness, and the least wear of the inner half over the mean."""
+    """One throw and offset [m] with the unevenness, the least wear of the inner half over the mean, and the profile."""
 
     e: float
     offset: float
     uneven: float
     least: float
+    profile: Any
 
     def __str__(self) -> str:
         place = f"e = {100 * self.e:.2f} cm, offset {1000 * self.offset:.1f} mm"
@@ -62,16 +63,21 @@ SEVERAL = 10
 STARTS = 24
 """Random sets that are improved."""
 WANTED = (0.02, 0.015, 0.012, 0.01)
-"""Unevenness to be expected, for which the fewest settings are told."""
+"""Unevenness to be expected, for which the fewest settings are looked for."""
 DRAWS = 4000
 """Sets of times of dwell that are drawn."""
 NAMES = ("b", "d", "f", "omega", "b_angle", "L", "Omega", "tool_a", "preston", "pressure")
 """What says the machine, but for throw and offset."""
 
 
+def machine(ds: xr.Dataset) -> dict[str, float]:
+    """The numbers of a result's machine, by `NAMES`."""
+    return {name: float(ds[name]) for name in NAMES}
+
+
 @functools.cache
-def _disc(rim: float, *machine: float) -> Callable[[Any, Any], Any]:
-    fixed = dict(zip(NAMES, machine, strict=True))
+def _disc(rim: float, *numbers: float) -> Callable[[Any, Any], Any]:
+    fixed = dict(zip(NAMES, numbers, strict=True))
     solve = sweep.solver(
         {
             "kernel": "polisher_wear",
@@ -87,7 +93,7 @@ def _disc(rim: float, *machine: float) -> Callable[[Any, Any], Any]:
 
 def disc(ds: xr.Dataset) -> Callable[[Any, Any], Any]:
     """Profiles of a round tool on the machine of a result, as a function of throw and place of the workpiece [m]."""
-    return _disc(float(ds.radius[-1]), *(float(ds[name]) for name in NAMES))
+    return _disc(float(ds.radius[-1]), *machine(ds).values())
 
 
 def best_settings(ds: xr.Dataset) -> tuple[Setting, Setting]:
@@ -108,7 +114,7 @@ def _best(wear: Callable[[Any, Any], Any], place: float, rim: float) -> tuple[Se
 
     def setting(e: float, offset: float) -> Setting:
         profile = np.asarray(wear(e, place + offset))
-        return Setting(e, offset, float(unevenness(profile, weight)), float(least(profile, weight, radius)))
+        return Setting(e, offset, float(unevenness(profile, weight)), float(least(profile, weight, radius)), profile)
 
     def border(e: float) -> Setting:
         return setting(e, brentq(lambda offset: setting(e, offset).least - KEPT, 0.02, 0.05, xtol=1e-8))
@@ -116,42 +122,6 @@ def _best(wear: Callable[[Any, Any], Any], place: float, rim: float) -> tuple[Se
     free = minimize(lambda x: setting(*x).uneven, (0.09, 0.04), method="Nelder-Mead", options={"xatol": 1e-6})
     throw = minimize_scalar(lambda e: border(e).uneven, bounds=(0.06, 0.12), method="bounded", options={"xatol": 1e-6})
     return setting(*free.x), border(throw.x)
-
-
-@functools.cache
-def _around(wear: Callable[[Any, Any], Any], place: float, rim: float, best: Setting) -> float:
-    """The least unevenness without a hole of 231 settings around the best one."""
-    radius = np.linspace(0.0, rim, POINTS)
-    weight = area(radius)
-    throws, offsets = best.e + np.linspace(-0.01, 0.01, 11), best.offset + np.linspace(-4e-3, 1e-3, 21)
-    profiles = wear(*np.meshgrid(throws, place + offsets))
-    return float(unevenness(profiles, weight)[least(profiles, weight, radius) >= KEPT].min())
-
-
-def one_setting(ds: xr.Dataset) -> Claims:
-    """What one setting of a disc can do at best, with and without a hole, and the most even of the grid solved again.
-
-    Parameters
-    ----------
-    ds : Dataset
-        Of the disc, over e and w_x.
-    """
-    (bored, best), wear = best_settings(ds), disc(ds)
-    off = _around(wear, float(ds.L), float(ds.radius[-1]), best) / best.uneven - 1.0
-    grid, weight = ds.wear.transpose("e", "w_x", "radius").values, area(ds.radius)
-    here = unevenness(grid, weight)
-    e, w_x = np.unravel_index(int(here.argmin()), here.shape)
-    profile = np.asarray(wear(float(ds.e[e]), float(ds.w_x[w_x])))[:: (POINTS - 1) // (ds.radius.size - 1)]
-    again = float(unevenness(profile, weight))
-    there = bool(bored.uneven < best.uneven < 1.1 * bored.uneven)
-    yield Statement("disc, one setting, optimised: the most even has a hole", "", str(bored), None, bored.least < KEPT)
-    yield Statement("disc, one setting, optimised, without a hole", "", str(best), None, there)
-    yield Statement(
-        "  best of 231 settings around it on a grid, over that", "1", f"{1 + off:.4f}", off, 0 <= off < 0.01
-    )
-    yield compared(
-        "disc, most even setting of the grid, solved again", f"{again:.5f}", float(here.min()), again, 1e-4, 5
-    )
 
 
 class Profiles(NamedTuple):
@@ -169,6 +139,13 @@ class Profiles(NamedTuple):
         kept = delta * np.diag(self.rough[chosen])
         found, _ = nnls(np.vstack([self.rows[chosen].T * root[:, None], kept]), np.append(root, np.zeros(len(chosen))))
         return found / found.sum()
+
+    def breach(self, times: Any, delta: float = DWELL) -> float:
+        """By how much the conditions of an optimum of U are not met: its slope is 0 where a share is above 0."""
+        mixed = times @ self.rows
+        scale = 1.0 / float(self.weight @ mixed**2 + delta**2 * times**2 @ self.rough**2)  # the least squares' own size
+        slope = self.rows @ ((scale * mixed - 1.0) * self.weight) + delta**2 * self.rough**2 * scale * times
+        return max(abs(slope[times > 1e-9]).max(), -slope[times <= 1e-9].min())
 
     def nominal(self, chosen: Any, times: Any) -> float:
         """Unevenness with exact times."""
@@ -234,22 +211,46 @@ def fewest(p: Profiles) -> dict[int, list[int]]:
     return sets
 
 
-def enough(p: Profiles, sets: dict[int, list[int]]) -> list[int]:
-    """The fewest settings that are expected to be as even as each of `WANTED`, with errors of dwell; 0: none."""
-    return [min((n for n, chosen in sets.items() if p.best(chosen) <= wanted), default=0) for wanted in WANTED]
+def reached(p: Profiles, sets: dict[int, list[int]]) -> tuple[list[int], float, float]:
+    """What the best sets are good for.
+
+    Returns
+    -------
+    tuple
+        The fewest settings that are expected to be as even as each of `WANTED`, with errors of dwell (0: none); of all
+        sets the least wear of the inner half over the mean, and by how much drawn errors deviate from U at most.
+    """
+    made = [(chosen, p.times(chosen)) for chosen in sets.values()]
+    enough = [min((n for n, chosen in sets.items() if p.best(chosen) <= wanted), default=0) for wanted in WANTED]
+    kept = min(float(least(times @ p.rows[chosen], p.weight, p.radius)) for chosen, times in made)
+    off = (p.drawn(chosen, times)[0] / p.expected(chosen, times) - 1.0 for chosen, times in made)
+    return enough, kept, max(off, key=abs)
 
 
 def swings(ds: xr.Dataset, e: Any) -> xr.Dataset:
     """alpha [rad] and its rate [rad/s] over a turn of the crank, by throw."""
-    machine = {name: float(ds[name]) for name in ("b", "d", "f", "omega", "b_angle")}
     along = {"crank_angle": np.linspace(0, 2 * np.pi, TURN, endpoint=False)}
-    return solved("polisher_motion", e=e, along=along, outputs=["alpha", "alpha_rate"], rtol=1e-12, **machine)
+    known = {name: float(ds[name]) for name in ("b", "d", "f", "omega", "b_angle")}
+    return solved("polisher_motion", e=e, along=along, outputs=["alpha", "alpha_rate"], rtol=1e-12, **known)
 
 
-def tool_wear(ds: xr.Dataset, motion: xr.Dataset, X: Any, Y: Any, beta: float = 0.0) -> np.ndarray:
-    """Wear [m/s] of points X along and Y across the tool, by throw: by their mean speed against the work."""
-    turned = np.exp(1j * (motion.alpha.values + beta))[:, :, None]
-    place = turned * (float(ds.L) + np.ravel(X) + 1j * np.ravel(Y))
-    speed = abs(motion.alpha_rate.values[:, :, None] * place - float(ds.Omega) * (place - float(ds.w_x)))
-    mean = speed.mean(axis=1).reshape(ds.sizes["e"], *np.shape(X))
+def disc_points(radius: float, rings: int = 24, spokes: int = 48) -> tuple[Any, Any]:
+    """Points x + i y of a disc and their shares of its area: Gauss in the square of the radius, evenly around."""
+    x, share = np.polynomial.legendre.leggauss(rings)
+    places = radius * np.sqrt(0.5 * (x + 1))[:, None] * np.exp(2j * np.pi * np.arange(spokes) / spokes)
+    return places.ravel(), np.repeat(0.5 * share / spokes, spokes)
+
+
+def tool_wear(ds: xr.Dataset, motion: xr.Dataset, X: Any, Y: Any, beta: float = 0.0, spin: float | None = None) -> Any:
+    """Wear [m/s] of points X along and Y across the tool, by throw: by their mean speed against the work.
+
+    The tool turns `spin` times as fast as the work; None: as the arm, on which it is rigid.
+    """
+    turned, rate = np.exp(1j * (motion.alpha.values + beta))[:, :, None], motion.alpha_rate.values[:, :, None]
+    centre, place = turned * float(ds.L), turned * (np.ravel(X) + 1j * np.ravel(Y))
+    work = float(ds.Omega)
+    speed = abs(
+        rate * centre + (rate if spin is None else spin * work) * place - work * (centre + place - float(ds.w_x))
+    )
+    mean = speed.mean(axis=1).reshape(motion.sizes["e"], *np.shape(X))
     return float(ds.preston) * float(ds.pressure) * mean

@@ -10,15 +10,13 @@ figure the crank is the root of an equation of second degree in e^2, so that no 
 """
 
 import math
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Claims, Conclusion, Statement, compared, differing, read_result, said, script, solved
-from _figures import columns_of, direct_label, hatch, plain_ticks, quality_bar
+from _common import Claims, Conclusion, Statement, compared, read_result, said, script, solved
+from _figures import direct_label, hatch, page_of, plain_ticks, quality_bar
 from matplotlib.colors import LogNorm
-from matplotlib.lines import Line2D
 
 from sweep.show.charts import COLOURS, DASHES
 
@@ -32,7 +30,7 @@ FINE = 2e-3
 
 NOTES = """\
 distortion: root of the sum of squares of the harmonics from the second on, over the first; best: least over f
-allowed: 1e-12 between similar machines, 1e-3 of a distortion interpolated between cranks; the shares are of the grid;
+allowed: 1e-3 of a distortion interpolated between cranks; the shares are of the grid;
 the paper's machine holds if it runs well, each of the others if it has less distortion than the one before
 transmission angle: least angle of coupler and arm over the turn; below 40 degree a linkage is held to run badly
 """
@@ -109,9 +107,6 @@ def quality(machines: xr.Dataset) -> Claims:
     falls = (top.thd.dropna("b").diff("b").tail(b=20) < 0).all()
     lengths = {"b": float(widest.b), "d": float(arm.d), "f": float(widest.f), "e": float(widest.crank)}
     exact = solved("polisher", outputs=["A1", "thd"], rtol=1e-10, **{**lengths, "e": [lengths["e"]]}).isel(e=0)
-    # only ratios of lengths count: a shorter arm is better as a farther motor is, and by no more
-    pairs = {name: [x, 0.789 * x] for name, x in lengths.items()}
-    one, other = solved("polisher", design="zip", rtol=1e-12, **pairs).thd.values
 
     def described(what: str, machine: xr.Dataset, holds: Any) -> Statement:
         angle, crank = math.degrees(machine.transmission_angle), 1e3 * float(machine.crank)
@@ -121,58 +116,44 @@ def quality(machines: xr.Dataset) -> Claims:
     to_edge, again = f"falls to the edge, b/d = {reach:.3g}: no best", f"{float(widest.thd):.5f}"
     yield described("the paper's machine", paper, np.degrees(paper.transmission_angle) > 40)
     yield described("best coupler for its motor's place", same, same.thd < paper.thd)
-    yield differing("distortion of a machine 0.789 times as large", f"{one:.6f}", float(other), float(one), 1e-12, 6)
     yield said("the farther the motor, in arms, the less distortion", falls, to_edge, "-")
     yield described(far, widest, widest.thd < same.thd)
     yield compared("its amplitude, degree", "15", math.degrees(exact.A1), 15.0, 1e-4, 6)
     yield compared("its distortion, once more", again, float(exact.thd), float(widest.thd), 1e-3, 5)
 
 
-def draw_map(page: Any, axes: Any, arm: xr.Dataset) -> None:
+def figure(ds: xr.Dataset) -> Any:
+    """Distortion over motor and coupler, with the border of lock-up; the best coupler; for a column of print."""
+    b, f = (np.arange(float(x[0]), float(x[-1]) + 1e-9, FINE) for x in (ds.b, ds.f))
+    with page_of(156.0, 2, width=110.0, height_ratios=(1.5, 1)) as (page, (plane, best_of)):
+        for k, d in enumerate(ds.d.values):
+            arm = machines_on(b, float(d), f)
+            top, look = best(arm), {"color": COLOURS[k], "linestyle": DASHES[k]}
+            best_of.plot(1e3 * b, 100 * top.thd, label=f"$d={1e3 * d:.0f}$ mm", **look)
+            if abs(d - ARM) < 1e-9:
+                draw_map(plane, arm, top)
+        best_of.set(xlabel="motor from pivot, $b$ [mm]", ylabel="least distortion [%]", yscale="log", ylim=(1.5, 15))
+        plain_ticks(best_of.yaxis, (2, 5, 10))
+        best_of.legend(loc="upper right")
+    return page
+
+
+def draw_map(axes: Any, arm: xr.Dataset, top: xr.Dataset) -> None:
     """Distortion over b and f for one arm, the crank it takes, and where the motor locks instead."""
-    b, f = 1e3 * arm.b.values, 1e3 * arm.f.values
-    thd = 100 * arm.thd.transpose("f", "b").values
+    b, f, thd = 1e3 * arm.b.values, 1e3 * arm.f.values, 100 * arm.thd.transpose("f", "b").values
     mesh = axes.pcolormesh(b, f, thd, norm=LogNorm(2, 40), cmap="cividis_r", shading="nearest", rasterized=True)
-    bar = quality_bar(page, mesh, axes, "distortion [%]", pad=0.02, extend="both")
+    bar = quality_bar(axes.figure, mesh, axes, "distortion [%]", pad=0.02, extend="both")
     bar.set_ticks([2, 5, 10, 20, 40], labels=["2", "5", "10", "20", "40"])
     bar.minorticks_off()
-    lines = axes.contour(b, f, 1e3 * arm.crank.transpose("f", "b").values, [50, 70, 90], colors="white", linewidths=0.6)
-    axes.clabel(lines, fmt="%g", fontsize=7, manual=[(470, 740), (560, 740), (690, 740)])
+    lines = axes.contour(b, f, 1e3 * arm.crank.transpose("f", "b").values, [70, 90], colors="white", linewidths=0.6)
+    axes.clabel(lines, fmt="$e$ = %g mm", fontsize=8, manual=[(275, 330), (350, 330)])
     hatch(axes, b, f, np.isnan(thd), "////")
-    top = best(arm)
-    axes.plot(b, 1e3 * top.f.where(top.thd.notnull()), "k--", linewidth=0.9, label="coupler of least distortion")
-    axes.plot(1e3 * PAPER["b"], 1e3 * PAPER["f"], "o", color="white", markeredgecolor="black", markersize=5,
-              label="the paper's machine")  # fmt: skip
-    keys = [*axes.lines, Line2D([], [], color="0.6", linewidth=0.8, label="crank [mm] (white)")]
-    page.legend(handles=keys, loc="outside lower center", ncols=2, fontsize=7)
+    axes.plot(b, 1e3 * top.f.where(top.thd.notnull()), "k--", linewidth=0.9, label="least distortion")
+    look = {"color": "white", "markeredgecolor": "black", "markersize": 5, "linestyle": ""}
+    axes.plot(1e3 * PAPER["b"], 1e3 * PAPER["f"], "o", label="the paper's machine", **look)
+    axes.legend(loc="upper left", frameon=True, framealpha=0.85)
     direct_label(axes, 700, 170, "motor locks")
     axes.set(xlabel="motor from pivot, $b$ [mm]", ylabel="coupler, $f$ [mm]", xlim=(b[0], b[-1]), ylim=(f[0], f[-1]))
-
-
-def draw_least(best_of: Any, cut: Any, arms: Sequence[xr.Dataset], line: xr.Dataset) -> None:
-    """The least distortion over all couplers, for each arm; a cut, with motor and arm of the paper's machine."""
-    for k, arm in enumerate(arms):
-        top, text = best(arm), f"$d={1e3 * float(arm.d):.0f}$ mm"
-        best_of.plot(1e3 * top.b, 100 * top.thd, color=COLOURS[k], linestyle=DASHES[k], label=text)
-    best_of.set(xlabel="motor from pivot, $b$ [mm]", ylabel="least distortion [%]", yscale="log")
-    plain_ticks(best_of.yaxis, (2, 5, 10, 20, 40))
-    best_of.legend(loc="upper right")
-    f = 1e3 * line.f
-    cut.plot(f, 100 * line.thd, color=COLOURS[0], label="distortion [%]")
-    cut.plot(f, np.degrees(line.transmission_angle), "--", color=COLOURS[1], label="transmission angle [degree]")
-    cut.axvline(1e3 * PAPER["f"], color="0.5", linewidth=0.8, linestyle=":", label="the paper's coupler")
-    cut.set(xlabel="coupler, $f$ [mm]", ylabel="[%], [degree]", ylim=(0, 75), xlim=(300, 800))
-    cut.legend(loc="center right", bbox_to_anchor=(1.0, 0.36), fontsize=7)
-
-
-def figure(ds: xr.Dataset) -> Any:
-    """Distortion over motor and coupler, with the border of lock-up; the best coupler; a cut; for a page of print."""
-    b, f = (np.arange(float(x[0]), float(x[-1]) + 1e-9, FINE) for x in (ds.b, ds.f))
-    arms = [machines_on(b, float(d), f) for d in ds.d]
-    with columns_of(96.0, {}, {"nrows": 2}, 1.2) as (page, left, (plane, best_of, cut)):
-        draw_map(left, plane, next(arm for arm in arms if abs(arm.d - ARM) < 1e-9))
-        draw_least(best_of, cut, arms, machines_on(np.array([PAPER["b"]]), ARM, f).isel(b=0))
-    return page
 
 
 def conclude(path: str) -> Conclusion:

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from _common import Claims, Conclusion, Statement, compared, most, read_result, said, script, solved
-from _figures import page_of
-from _polishing import KEPT, POINTS, area, best_settings, disc, least, one_setting, swings, tool_wear, unevenness
-from scipy.optimize import brentq, nnls
+from _figures import colour_map, page_of
+from _polishing import KEPT, Profiles, area, best_settings, least, machine, profiles, swings, tool_wear, unevenness
+from scipy.optimize import brentq
 
 from sweep.show.charts import COLOURS
 
@@ -32,35 +32,16 @@ length found by roots, 2 % of A0's slopes over 1 mm of throw, 5e-4 of the wear i
 """
 
 
-def mixture(ds: xr.Dataset) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Profiles of mean 1, one a row; the shares of the wear by each; the mixed profile."""
-    weight = area(ds.radius)
-    rows = ds.wear.stack(setting=("e", "w_x")).transpose("setting", "radius").values
-    rows = rows / (rows * weight).sum(axis=1, keepdims=True)
-    root = np.sqrt(weight)
-    shares, _ = nnls((rows * root).T, root)
-    shares = shares / shares.sum()
-    return rows, shares, shares @ rows
-
-
-def optimum(ds: xr.Dataset) -> Claims:
+def optimum(ds: xr.Dataset, p: Profiles, shares: Any) -> Claims:
     """What a sequence gains over one setting, and whether it is the best."""
-    weight, (rows, shares, mixed) = area(ds.radius), mixture(ds)
-    scale = float((mixed * weight).sum() / (mixed**2 * weight).sum())
-    slope = rows @ ((scale * mixed - 1) * weight)  # of the sum of squares, 0 where a share is above 0
-    used = shares > 1e-9
-    worst = max(abs(slope[used]).max(), -slope[~used].min(initial=0.0))
-    best, single = float(unevenness(mixed, weight)), best_settings(ds)[0].uneven
-    holds = best < single / 35 and least(mixed, weight, ds.radius.values) > KEPT
-    places = [(100 * e, 100 * (w - float(ds.L))) for e in ds.e.values for w in ds.w_x.values]
-    order = [i for i in np.argsort(-shares) if shares[i] > 0.01]
-    yield from one_setting(ds)
-    yield said("best sequence", holds, f"{best:.1%}, centre {mixed[0]:.2f}, {used.sum()} settings", "-")
-    yield most("  conditions of an optimum", "0", worst, 1e-6, "largest breach")
-    yield from (
-        Statement(f"  {shares[i]:.0%} of the wear at", "", "e = {:g} cm, offset {:.0f} cm".format(*places[i]))
-        for i in order
-    )
+    mixed, best, single = shares @ p.rows, p.nominal(range(len(p.rows)), shares), best_settings(ds)[0].uneven
+    holds = best < single / 35 and least(mixed, p.weight, p.radius) > KEPT
+    here = f"{best:.1%} for {single:.1%}, centre {mixed[0]:.2f}, {np.sum(shares > 1e-9)} settings"
+    yield said("best sequence, for the best of one setting", holds, here, "1/35")
+    yield most("  conditions of an optimum", "0", p.breach(shares, 0.0), 1e-6, "largest breach")
+    for i in np.argsort(-shares)[: np.sum(shares > 0.01)]:
+        e, offset = (100 * x for x in p.places[i])
+        yield Statement(f"  {shares[i]:.0%} of the wear at", "", f"e = {e:g} cm, offset {offset:.0f} cm")
 
 
 def eight_tools(ds: xr.Dataset) -> Claims:
@@ -68,12 +49,11 @@ def eight_tools(ds: xr.Dataset) -> Claims:
 
     What the work loses, 2 pi times the integral of the wear over r dr, follows from the mean speed of its points.
     """
-    names = ("b", "d", "f", "L", "preston", "pressure", "omega", "b_angle", "Omega")
-    fixed = {name: float(ds[name]) for name in names} | {"e": 0.1, "w_x": float(ds.w_x[3])}
+    fixed = machine(ds) | {"e": 0.1, "w_x": float(ds.w_x[3])}
     n, m, a, b = np.array(TOOLS).T
     radius = np.linspace(0.0, 0.4, 401)
     sizes = {"tool_n": n, "tool_m": m, "tool_a": 0.04 * a, "tool_b": 0.04 * b}
-    wear = solved("polisher_wear", design="zip", along={"radius": radius}, rtol=1e-5, **sizes, **fixed).wear.values
+    wear = solved("polisher_wear", design="zip", along={"radius": radius}, rtol=1e-5, **fixed | sizes).wear.values
     motion, work = swings(ds, [0.1]), ds.isel(w_x=3, e=[0])
     u, weight = np.polynomial.legendre.leggauss(24)
     u, weight = 0.5 * (u + 1), 0.5 * weight
@@ -114,9 +94,9 @@ def correction(ds: xr.Dataset) -> Claims:
 
 def turning(ds: xr.Dataset) -> Claims:
     """What it matters which way the work turns, on type A; type B is type A in a mirror, which is no finding."""
-    names = ("b", "d", "f", "L", "tool_a", "tool_b", "preston", "pressure", "omega", "b_angle")
-    fixed, spin = {name: float(ds[name]) for name in names} | {"e": 0.1, "w_x": 0.53}, float(ds.Omega)
-    both = solved("polisher_wear", Omega=[spin, -spin], along={"radius": ds.radius.values[::10]}, **fixed)
+    fixed = machine(ds) | {"tool_b": float(ds.tool_b), "e": 0.1, "w_x": 0.53}
+    spin = {"Omega": [fixed["Omega"], -fixed["Omega"]]}
+    both = solved("polisher_wear", along={"radius": ds.radius.values[::10]}, **fixed | spin)
     off = float(abs(both.wear[1] / both.wear[0] - 1).max())
     # the way out takes the crank from one dead point to the other, the way back the rest of its turn
     b, d, f, e = fixed["b"], fixed["d"], fixed["f"], fixed["e"]
@@ -127,92 +107,37 @@ def turning(ds: xr.Dataset) -> Claims:
     yield said(changes, 1e-3 < off < 0.05, f"{off:.2%}", "> 0.1 %")
 
 
-def figure(ds: xr.Dataset) -> Any:
-    """Machines, tools, profiles and shares; for two columns of print."""
-    with page_of(112.0, 2, 2) as (page, ((machines, tools), (profiles, shares))):
-        draw_machines(machines, ds)
-        draw_tools(tools)
-        draw_profiles(profiles, ds)
-        draw_shares(page, shares, ds)
+def figure(ds: xr.Dataset, p: Profiles, shares: Any) -> Any:
+    """The best profiles of one setting, and of the sequence, whose shares are mapped; for a column of print."""
+    bored, best = best_settings(ds)
+    shown = {"one setting": bored.profile, "one, without a hole": best.profile, "sequence": shares @ p.rows}
+    with page_of(128.0, 2, width=110.0) as (page, (profile, share)):
+        for colour, (name, row) in zip(COLOURS, shown.items(), strict=False):
+            radius = np.linspace(0.0, p.radius[-1], row.size)
+            weight = area(radius)
+            text = f"{name}, {100 * float(unevenness(row, weight)):.1f} %"
+            profile.plot(1e3 * radius, row / (row * weight).sum(), color=colour, label=text)
+        profile.set(xlabel="radius [mm]", ylabel="wear over its mean [1]", xlim=(0, 100), ylim=(0, 2))
+        profile.legend(loc="upper right")
+        grid, offset, e = 100 * shares.reshape(ds.status.shape), 1e3 * (ds.w_x - ds.L).values, 1e3 * ds.e.values
+        colour_map(share, offset, e, np.where(grid > 1e-7, grid, np.nan), "share of the wear [%]")
+        share.set(xlabel="offset [mm]", ylabel="eccentricity, $e$ [mm]", facecolor="0.92")
+        share.set(xlim=(-5, 105), ylim=(10, 170))
     return page
-
-
-def draw_machines(axes: Any, ds: xr.Dataset) -> None:
-    """Pivot, motor, crank, coupler and arm of both types at e = 10 cm, the paper's figure 3."""
-    b, d, e, turn = float(ds.b), float(ds.d), 0.1, 1.0
-    ring, pin = np.linspace(0, 2 * np.pi, 100), (b + e * math.cos(turn), e * math.sin(turn))
-    axes.plot(b + e * np.cos(ring), e * np.sin(ring), color="0.7", linewidth=0.8, label="circle of the crank")
-    axes.plot([b, pin[0]], [0, pin[1]], color="black", label="crank, $e$")
-    machine = {"b": b, "d": d, "f": float(ds.f), "e": e, "omega": 1.0}
-    motion = solved("polisher_motion", type=["A", "B"], along={"crank_angle": [turn]}, outputs=["alpha"], **machine)
-    for k, (kind, alpha) in enumerate(zip("AB", motion.alpha.values.ravel(), strict=True)):
-        x, y = d * math.cos(alpha), d * math.sin(alpha)
-        axes.plot([0, x], [0, y], color=COLOURS[k], label=f"arm, type {kind}")
-        axes.plot([x, pin[0]], [y, pin[1]], "--", color=COLOURS[k], label=f"coupler, type {kind}")
-    axes.plot([0, b], [0, 0], "o", color="black", markersize=4, label="pivot, motor")
-    axes.set(xlabel="$x$ [m]", ylabel="$y$ [m]", xlim=(-0.25, 0.95), ylim=(-0.19, 0.53))
-    axes.set_aspect("equal", "box")
-    axes.legend(loc="upper center", fontsize=6.5, ncols=2)
-
-
-def draw_tools(axes: Any) -> None:
-    """Outlines of the paper's figure 5."""
-    t = np.linspace(0, 1, 400)
-    for k, (n, m, a, b) in enumerate(TOOLS):
-        x = np.concatenate([t, t[::-1]]) ** (1 if n >= 1 else 2)
-        y = (1 - np.minimum(x**n, 1)) ** (1 / m)
-        y[400:] *= -1
-        centre = np.array([4.4 * (k % 4), -5.4 * (k // 4)])
-        for side in (1, -1):
-            axes.plot(centre[0] + side * a * x, centre[1] + b * y, color=COLOURS[0 if k < 5 else 1], linewidth=1)
-        axes.text(centre[0], centre[1] + 2.25, f"${n:g},{m:g}$", ha="center", fontsize=7)
-    axes.plot([], [], color=COLOURS[0], label="known")
-    axes.plot([], [], color=COLOURS[1], label="unknown")
-    axes.set(xlim=(-5.6, 18.8), ylim=(-10.7, 3.6), xlabel="across [half widths]", ylabel="along [half widths]")
-    axes.set_aspect("equal", "box")
-    axes.legend(loc="lower center", ncols=2, fontsize=7, title="$n, m$ of the paper's tools", title_fontsize=7)
-
-
-def draw_profiles(axes: Any, ds: xr.Dataset) -> None:
-    """The best profiles of one setting, and of the sequence."""
-    (bored, best), wear = best_settings(ds), disc(ds)
-    fine, coarse = np.linspace(0.0, float(ds.radius[-1]), POINTS), ds.radius.values
-    shown = {
-        "one setting": (fine, np.asarray(wear(bored.e, float(ds.L) + bored.offset))),
-        "one, without a hole": (fine, np.asarray(wear(best.e, float(ds.L) + best.offset))),
-        "sequence": (coarse, mixture(ds)[2]),
-    }
-    for k, (name, (radius, row)) in enumerate(shown.items()):
-        weight = area(radius)
-        text = f"{name}, {100 * float(unevenness(row, weight)):.1f} %"
-        axes.plot(1e3 * radius, row / (row * weight).sum(), color=COLOURS[k], label=text)
-    axes.set(xlabel="radius [mm]", ylabel="wear over its mean [1]", xlim=(0, 100), ylim=(0, 2))
-    axes.legend(loc="upper right", fontsize=7)
-
-
-def draw_shares(page: Any, axes: Any, ds: xr.Dataset) -> None:
-    """Share of the wear at each setting."""
-    _, shares, _ = mixture(ds)
-    grid = 100 * shares.reshape(ds.sizes["e"], ds.sizes["w_x"])
-    offset = 1e3 * (ds.w_x.values - float(ds.L))
-    mesh = axes.pcolormesh(offset, 1e3 * ds.e.values, grid, cmap="cividis", shading="nearest", rasterized=True)
-    page.colorbar(mesh, ax=axes, label="share of the wear [%]", pad=0.02)
-    unused = np.argwhere(grid < 1e-7).T
-    axes.plot(offset[unused[1]], 1e3 * ds.e.values[unused[0]], ".", color="0.7", markersize=2, label="setting not used")
-    axes.legend(loc="upper right", fontsize=7, frameon=True, framealpha=0.85)
-    axes.set(xlabel="offset [mm]", ylabel="eccentricity, $e$ [mm]")
 
 
 def conclude(path: str) -> Conclusion:
     """Statements and the figure."""
     ds = read_result(path, "polisher_wear", ["e", "w_x"], "polisher_sequence.toml")
+    p = profiles(ds)
+    shares = p.times(range(len(p.rows)), 0.0)
     groups = {
-        "Sequences of settings": optimum(ds),
+        "Sequences of settings": optimum(ds, p, shares),
         "The eight tools at e = 10 cm, offset 3 cm": eight_tools(ds),
         "Another throw about the same middle": correction(ds),
         "The way the work turns": turning(ds),
     }
-    return groups, [NOTES], lambda: figure(ds)
+    return groups, [NOTES], lambda: figure(ds, p, shares)
 
 
 main = script(__name__, "polisher_sequence.h5", conclude)

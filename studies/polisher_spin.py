@@ -16,21 +16,17 @@ times as fast as the work six or five. With all settings and errors of 5 % the l
 it hangs over the rim a free tool turns otherwise, which is left out here, as is friction of its bearing.
 """
 
-import functools
-import itertools
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Claims, Conclusion, compared, differing, most, read_result, said, script, solved
+from _common import Claims, Conclusion, compared, differing, most, read_result, said, script
 from _figures import page_of
-from _polishing import KEPT, WANTED, Profiles, enough, fewest, least, profiles
+from _polishing import KEPT, WANTED, Profiles, disc_points, fewest, machine, profiles, reached, swings, tool_wear
 from scipy.optimize import brentq
 
 from sweep.show.charts import COLOURS, DASHES
 
-CRANK = 720
-"""Crank angles of a turn."""
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
 """Of an arc of contact, from -1 to 1."""
 SPINS = {"as the work": 1.0, "5 times": 5.0, "20 times": 20.0}
@@ -49,21 +45,11 @@ of 4000 draws. Sets of up to three settings are the best of all; more are what e
 """
 
 
-@functools.cache
-def swing(machine: tuple[float, ...], e: float) -> tuple[Any, Any]:
-    """alpha [rad] and its rate [rad/s] over a turn of the crank."""
-    along = {"crank_angle": np.linspace(0, 2 * np.pi, CRANK, endpoint=False)}
-    known = dict(zip(("b", "d", "f", "omega", "b_angle"), machine, strict=True))
-    found = solved("polisher_motion", e=[e], along=along, outputs=["alpha", "alpha_rate"], rtol=1e-12, **known)
-    return found.alpha.values[0], found.alpha_rate.values[0]
-
-
-def wear(ds: xr.Dataset, e: float, w: float, k: float | None, radius: Any) -> Any:
-    """Mean wear of rings [m/s] by (1), over the arc of each that the disc covers; k None: rigid on the arm."""
-    alpha, rate = swing(tuple(float(ds[name]) for name in ("b", "d", "f", "omega", "b_angle")), float(e))
-    a, work = float(ds.tool_a), float(ds.Omega)
+def wear(ds: xr.Dataset, motion: xr.Dataset, w: float, k: float | None, radius: Any) -> Any:
+    """Mean wear of rings [m/s] by (1), over the arc of each that the disc covers, at one throw; k None: rigid."""
+    a, work, rate = float(ds.tool_a), float(ds.Omega), motion.alpha_rate.values
     turn = rate if k is None else k * work + 0 * rate
-    centre = float(ds.L) * np.exp(1j * alpha)
+    centre = float(ds.L) * np.exp(1j * motion.alpha.values)
     way = abs(centre - w)[:, None]
     ahead = ((rate - turn) * centre + turn * w) * np.exp(-1j * np.angle(centre - w))  # from the work's centre on
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -76,51 +62,35 @@ def wear(ds: xr.Dataset, e: float, w: float, k: float | None, radius: Any) -> An
     return float(ds.preston * ds.pressure) * (speed * half).mean(0) / (2 * np.pi)
 
 
-_KNOWN: dict[Any, Profiles] = {}
-_SETS: dict[Any, dict[int, list[int]]] = {}
-
-
-def key_of(ds: xr.Dataset, k: float | None) -> tuple[Any, ...]:
-    """What the wear by a tool that spins so hangs on."""
-    return k, *(float(ds[name]) for name in ("L", "tool_a", "Omega", "omega", "b", "d", "f", "b_angle"))
-
-
-def sets_of(ds: xr.Dataset, k: float) -> dict[int, list[int]]:
-    """Its best sets of settings (`fewest`)."""
-    key = key_of(ds, k)
-    if key not in _SETS:
-        _SETS[key] = fewest(spun(ds, k))
-    return _SETS[key]
+_KNOWN: dict[Any, Any] = {}
+"""What hangs on the machine alone, by what it is and by the machine's numbers."""
 
 
 def spun(ds: xr.Dataset, k: float | None) -> Profiles:
     """Profiles of all settings by a tool that spins so."""
-    key = key_of(ds, k)
+    key = "profiles", k, *machine(ds).values()
     if key not in _KNOWN:
-        rows = [[wear(ds, e, w, k, ds.radius.values) for w in ds.w_x.values] for e in ds.e.values]
+        motion = swings(ds, ds.e.values)
+        rows = [[wear(ds, motion.sel(e=e), w, k, ds.radius.values) for w in ds.w_x.values] for e in ds.e.values]
         _KNOWN[key] = profiles(ds.assign(wear=(("e", "w_x", "radius"), np.array(rows))))
     return _KNOWN[key]
 
 
-def of_the_tool(ds: xr.Dataset, e: float, w: float, k: float) -> float:
-    """The same wear in all [m^3/s], by the mean speed (1) of the points of the tool."""
-    alpha, rate = swing(tuple(float(ds[name]) for name in ("b", "d", "f", "omega", "b_angle")), float(e))
-    x, weight = np.polynomial.legendre.leggauss(24)
-    places = np.sqrt(0.5 * (x + 1))[:, None] * np.exp(2j * np.pi * np.arange(48) / 48) * float(ds.tool_a)
-    work, centre = float(ds.Omega), float(ds.L) * np.exp(1j * alpha)[:, None, None]
-    speed = abs(rate[:, None, None] * centre + k * work * places - work * (centre + places - w))
-    mean = float((0.5 * weight * speed.mean(2)).sum(1).mean())
-    return float(ds.preston * ds.pressure) * np.pi * float(ds.tool_a) ** 2 * mean
+def sets_of(ds: xr.Dataset, k: float) -> dict[int, list[int]]:
+    """Its best sets of settings (`fewest`)."""
+    key = "sets", k, *machine(ds).values()
+    if key not in _KNOWN:
+        _KNOWN[key] = fewest(spun(ds, k))
+    return _KNOWN[key]
 
 
 def free_turn(ds: xr.Dataset, pace: float) -> float:
     """k at which friction has no moment about the centre of a disc on the work, that moves over it with a speed."""
-    x, weight = np.polynomial.legendre.leggauss(24)
-    places = np.sqrt(0.5 * (x + 1))[:, None] * np.exp(2j * np.pi * np.arange(48) / 48) * float(ds.tool_a)
+    places, share = disc_points(float(ds.tool_a))
 
     def moment(k: float) -> float:
         v = pace + 1j * (k - 1) * float(ds.Omega) * places
-        return float((weight[:, None] * (np.conj(places) * v / abs(v)).imag).sum())
+        return float(((np.conj(places) * v / abs(v)).imag * share).sum())
 
     return brentq(moment, -3, 6)
 
@@ -129,56 +99,50 @@ def physics(ds: xr.Dataset, kernel: Profiles) -> Claims:
     """(1) against the kernel, against the wear in all, and the moment of friction."""
     rigid, everything = spun(ds, None), range(len(kernel.rows))
     off = abs(rigid.rows - kernel.rows)[:, 1:] / kernel.rows.max(1, keepdims=True)
-    e, w, fine = 0.1, float(ds.L) + 0.03, np.linspace(0, 0.3, 601)
+    best, again = kernel.best(everything), rigid.best(everything)
     yield most("rigid tool by (1), against the kernel: profiles", "0.5 %", off, 0.005)
-    yield compared(
-        "  all settings, expected",
-        f"{kernel.best(everything):.3%}",
-        rigid.best(everything),
-        kernel.best(everything),
-        0.005,
-        4,
-    )
+    yield compared("  all settings, expected", f"{best:.3%}", again, best, 0.005, 4)
+    # what the work loses in all is what the points of the tool lose
+    motion, work, fine = swings(ds, [0.1]), ds.sel(w_x=ds.L + 0.03, method="nearest"), np.linspace(0, 0.3, 601)
+    places, share = disc_points(float(ds.tool_a))
     for name, k in SPINS.items():
-        theory, here = of_the_tool(ds, e, w, k), 2 * np.pi * np.trapezoid(wear(ds, e, w, k, fine) * fine, fine)
+        points = tool_wear(work, motion, places.real, places.imag, spin=k)[0]
+        theory = np.pi * float(ds.tool_a) ** 2 * float((points * share).sum())
+        ring = wear(ds, motion.isel(e=0), float(work.w_x), k, fine)
+        here = 2 * np.pi * np.trapezoid(ring * fine, fine)
         yield compared(f"turns {name}: wear in all by the tool's points", f"{theory:.5g}", here, theory, 2e-3, 5)
     yield differing("free disc wholly on the work: k", "1", free_turn(ds, 0.3), 1.0, 1e-6, 7)
 
 
 def evenness(tools: dict[str, Profiles], sets: dict[str, dict[int, list[int]]]) -> Claims:
     """The fewest settings for a wanted unevenness, and what all of them reach."""
-    wanted, drawn = ", ".join(f"{100 * x:g}" for x in WANTED), []
+    wanted, errors = ", ".join(f"{100 * x:g}" for x in WANTED), []
     for name, p in tools.items():
-        needed, kept = enough(p, sets[name]), 1.0
-        for s in sets[name].values():
-            times = p.times(s)
-            kept = min(kept, float(least(times @ p.rows[s], p.weight, p.radius)))
-            drawn.append(p.drawn(s, times)[0] / p.expected(s, times) - 1.0)
-        known, everything = FEWEST[name]
+        (needed, kept, drawn), (known, everything) = reached(p, sets[name]), FEWEST[name]
         here = ", ".join(map(str, needed)) + f"; least of the inner half {kept:.2f}"
+        best = 100 * p.best(range(len(p.rows)))
         yield said(f"{name}: settings for {wanted} %, no hole", needed == known and kept > KEPT, here, f"{known}")
-        yield compared("  all settings: expected [%]", f"{everything}", 100 * p.best(range(88)), everything, 0.005, 4)
-    yield most("errors drawn: largest deviation", "3 %", max(drawn, key=abs), 0.03)
+        yield compared("  all settings: expected [%]", f"{everything}", best, everything, 0.005, 4)
+        errors.append(drawn)
+    yield most("errors drawn: largest deviation", "3 %", max(errors, key=abs), 0.03)
 
 
 def figure(ds: xr.Dataset, tools: dict[str, Profiles], sets: dict[str, dict[int, list[int]]]) -> Any:
-    """Unevenness over the number of settings and over the spin, and profiles; for two columns of print."""
-    with page_of(62.0, 1, 3) as (page, (number, spin, mixed)):
-        for colour, dash, (name, p) in zip(COLOURS, itertools.cycle(DASHES), tools.items(), strict=False):
-            look, few = {"color": colour, "label": name}, sets[name]
-            number.plot(list(few), [100 * p.best(s) for s in few.values()], "o", linestyle=dash, markersize=3, **look)
-            mixed.plot(1e3 * p.radius, p.times(few[5]) @ p.rows[few[5]], linestyle=dash, **look)
+    """Unevenness over the number of settings and over the spin; for a column of print."""
+    with page_of(124.0, 2, width=110.0) as (page, (number, spin)):
+        for colour, dash, (name, p) in zip(COLOURS, DASHES, tools.items(), strict=False):
+            few, look = sets[name], {"linestyle": dash, "markersize": 3, "color": colour, "label": name}
+            number.plot(list(few), [100 * p.best(s) for s in few.values()], "o", **look)
         number.set(xlabel="settings [1]", ylabel="expected unevenness [%]", ylim=(0, 4))
-        mixed.set(xlabel="radius [mm]", ylabel="wear over its mean [1]", ylim=(0.8, 1.12), xlim=(0, 100))
         turns = sorted({*MORE, *SPINS.values()})
         for delta, look, colour in ((0.05, "o-", COLOURS[0]), (0.0, "s--", COLOURS[1])):
-            made = [(p, p.times(range(88), delta)) for p in (spun(ds, k) for k in turns)]
-            found = [100 * p.expected(range(88), times, delta) for p, times in made]
+            made = [(p, p.times(range(len(p.rows)), delta)) for p in (spun(ds, k) for k in turns)]
+            found = [100 * p.expected(range(len(p.rows)), times, delta) for p, times in made]
             name = f"errors of {100 * delta:g} %" if delta else "exact times"
             spin.plot(turns, found, look, color=colour, markersize=3, label=name)
         spin.set(xlabel=r"rate of the tool over $\Omega$, $k$ [1]", ylabel="unevenness, all settings [%]", ylim=(0, 1))
-        for axes in (number, spin, mixed):
-            axes.legend(fontsize=6.5)
+        for axes in (number, spin):
+            axes.legend()
     return page
 
 

@@ -23,15 +23,12 @@ import numpy as np
 import xarray as xr
 from _common import Claims, Conclusion, differing, most, read_result, said, script, solved
 from _figures import page_of
-from _polishing import swings, tool_wear
+from _polishing import disc_points, swings, tool_wear
 
 from sweep.show.charts import COLOURS, DASHES, MARKS
 
-RINGS, SPOKES = 24, 48
-"""Points of the tool: Gauss in the square of the radius, evenly around."""
 A0 = {10.0: 38.4038, 15.0: 36.0997}
 """Middle of the swing from b [degree] by throw [cm], had to 50 digits by the paper's (39)."""
-UM_PER_HOUR = 3.6e9
 
 NOTES = """\
 zone: mean radius of what is worn off, by volume; outer, inner: the tool's rim farthest from and nearest to the pivot
@@ -45,12 +42,9 @@ def prepared(ds: xr.Dataset) -> xr.Dataset:
     the tool's diameter that lies on the arm, over X [m]."""
     volume = 2 * np.pi * (ds.wear * ds.radius).integrate("radius")
     zone = 2 * np.pi * (ds.wear * ds.radius**2).integrate("radius") / volume
-    # points of the disc and their shares of the area
-    x, share = np.polynomial.legendre.leggauss(RINGS)
-    around = np.linspace(0, 2 * np.pi, SPOKES, endpoint=False)
-    a, r, share = float(ds.tool_a), np.sqrt(0.5 * (x + 1))[:, None], 0.5 * share[:, None] / SPOKES
-    X, Y, motion = a * r * np.cos(around), a * r * np.sin(around), swings(ds, ds.e.values)
-    lost = [(tool_wear(ds, motion, X, Y, beta) * share).sum(axis=(1, 2)) for beta in ds.beta.values]
+    a, motion = float(ds.tool_a), swings(ds, ds.e.values)
+    places, share = disc_points(a)
+    lost = [(tool_wear(ds, motion, places.real, places.imag, beta) * share).sum(axis=1) for beta in ds.beta.values]
     x = np.linspace(-a, a, 61)
     return ds.assign_coords(X=x).assign(
         volume=volume, zone=zone, tool=(("e", "beta"), np.pi * a**2 * np.stack(lost, axis=1)),
@@ -95,28 +89,19 @@ def tools(ds: xr.Dataset) -> Claims:
 
 
 def figure(ds: xr.Dataset) -> Any:
-    """Profiles by beta, zones filled where the centre wears, and the tool's wear; for two columns of print."""
-    with page_of(66.0, 1, 3) as (page, (profiles, zone, tool)):
-        for k, degrees in enumerate((0, 5, 10, 15)):
-            line = UM_PER_HOUR * ds.wear.isel(e=0).sel(beta=math.radians(degrees), method="nearest")
-            profiles.plot(100 * ds.radius, line, color=COLOURS[k], linestyle=DASHES[k], label=f"{degrees}")
-        profiles.set(xlabel="radius [cm]", ylabel="wear [µm/h]", xlim=(0, 25), ylim=(0, None))
-        profiles.legend(title=r"$\beta$ [degree]", title_fontsize=7, fontsize=7)
+    """Zones by beta, filled where the centre wears, and the tool's wear; for a column of print."""
+    with page_of(128.0, 2, width=110.0) as (page, (zone, tool)):
         for k, e in enumerate(ds.e.values):
-            line, name, look = ds.sel(e=e), f"{100 * e:.0f}", {"color": COLOURS[k], "linestyle": ""}
+            line, look = ds.sel(e=e), {"color": COLOURS[k], "label": f"{100 * e:.0f}"}
             beta, place, worn = np.degrees(line.beta), 100 * line.zone, line.wear.isel(radius=0) > 0
-            zone.plot(beta, place, color=COLOURS[k], linewidth=0.8)
-            zone.plot(beta, place.where(worn), MARKS[k], label=name, **look)
-            zone.plot(beta, place.where(~worn), MARKS[k], markerfacecolor="white", **look)
-            across = line.across / line.across.mean()
-            tool.plot(100 * ds.X, across, color=COLOURS[k], linestyle=DASHES[k], label=name)
+            zone.plot(beta, place, MARKS[k] + "-", markerfacecolor="white", linewidth=0.8, color=COLOURS[k])
+            zone.plot(beta, place.where(worn), MARKS[k], linestyle="", **look)
+            tool.plot(100 * ds.X, line.across / line.across.mean(), linestyle=DASHES[k], **look)
         zone.plot([], [], "o", color="black", markerfacecolor="white", label="centre not worn")
         zone.set(xlabel=r"O$_\mathrm{DH}$ turned by $\beta$ [degree]", ylabel="zone, mean radius [cm]", ylim=(0, 27))
-        zone.legend(title="throw, $e$ [cm]", title_fontsize=7, fontsize=7, loc="upper center", ncols=2)
-        tool.set(
-            xlabel="place on the tool, outwards [cm]", ylabel="wear of the tool over its mean [1]", ylim=(0.88, 1.2)
-        )
-        tool.legend(title="throw, $e$ [cm]", title_fontsize=7, fontsize=7, loc="upper left", ncols=3)
+        zone.legend(title="throw, $e$ [cm]", loc="upper center", ncols=4)
+        tool.set(xlabel="place on the tool, outwards [cm]", ylabel="wear of the tool over its mean [1]")
+        tool.legend(title="throw, $e$ [cm]", loc="upper left", ncols=3)
     return page
 
 

@@ -91,7 +91,7 @@ TABLE = {
     "polisher_extrema": Claims({"polisher_extrema": {
         "e": [0, 0.01, 0.02, 0.05, 0.08, 0.1, 0.12, 0.14, 0.15, 0.16, 0.1648, 0.1649, 0.165, 0.17, 0.18],
     }}, "A0_e rate_max rate_min theta_lock", 2),
-    "polisher_robust": Claims({"polisher_robust": {}}, "wear_error", 10),
+    "polisher_robust": Claims({"polisher_robust": {}}, "wear_error", 8),
     "polisher_sequence": Claims({"polisher_sequence": {}}, "wear_error", 5),
     "polisher_spin": Claims({"polisher_spin": {}}, "wear_error", 11),
     "polisher_wear": Claims({
