@@ -12,13 +12,13 @@ from sweep.explore.solver import solver as solver
 from sweep.explore.work_precision import work_precision as work_precision
 from sweep.file.open import open_result as open_result
 from sweep.file.verify import verify as verify
-from sweep.laws.asymptote import fit_correction as fit_correction
 from sweep.laws.collapse import fit_collapse as fit_collapse
-from sweep.laws.compare import compare_laws as compare_laws
 from sweep.laws.exponents import exponent_map as exponent_map
 from sweep.laws.exponents import local_exponent as local_exponent
 from sweep.laws.exponents import where_exponent as where_exponent
+from sweep.laws.lines import fit_correction as fit_correction
 from sweep.laws.lines import fit_exponent as fit_exponent
+from sweep.laws.two_laws import compare_laws as compare_laws
 from sweep.laws.two_laws import fit_two_laws as fit_two_laws
 from sweep.results.diff import diff as diff
 from sweep.results.export import export as export

@@ -2,10 +2,8 @@
 
 Others may use
     `exponents`  local exponents, where curves pass a value, exponents over two parameters
-    `lines`      straight lines in log-log
-    `two_laws`   two power laws with a bend, fitted at once; where two straight lines meet
-    `compare`    which law of the table
-    `asymptote`  corrections to scaling
+    `lines`      straight lines in log-log, corrections to scaling
+    `two_laws`   two power laws with a bend, fitted at once; where two straight lines meet; which law of the table
     `collapse`   exponents of a collapse
     `curves`     stated_error: what a result says its values are right to
     `loglog`     is_logarithmic, spans_decades: what an axis is drawn and interpolated by

@@ -13,16 +13,8 @@ import numpy as np
 import xarray as xr
 
 from sweep.errors import SweepError, missing
-from sweep.laws.curves import (
-    Window,
-    check_output,
-    inside_window,
-    log_of,
-    missing_is_nan,
-    positive_axis,
-    stated_bound,
-    title,
-)
+from sweep.laws import curves
+from sweep.laws.curves import Window, log_of, positive_axis, title
 from sweep.laws.loglog import EPSILON, Array, brackets, is_logarithmic, root, slope_errors, slopes
 
 BORDERS = (-1.0, -0.5, -1 / 3)
@@ -70,28 +62,20 @@ def local_exponent(y: xr.DataArray, dim: str, *, error: bool = False, bound: Any
     --------
     >>> import numpy as np
     >>> import sweep
-    >>> foliot = {"kernel": "foliot", "outputs": ["period"], "fixed": {"phi0": 1.0, "a": 1.0}}
-    >>> ds = sweep.run(**foliot, axes={"mu": np.geomspace(1e5, 1e7, 9)})
+    >>> ds = sweep.run(kernel="foliot", fixed={"phi0": 1.0, "a": 1.0}, axes={"mu": np.geomspace(1e5, 1e7, 9)})
     >>> sweep.local_exponent(ds.period, "mu").values[[0, -1]].round(3)
     array([-0.333, -0.333])
     >>> bool((sweep.local_exponent(ds.period, "mu", error=True).exponent_error < 1e-3).all())
     True
     """
     dimension, x = positive_axis(y, dim)
-    t, logs, name = np.log(x), log_of(y).compute(), "" if y.name is None else f"{y.name}_"
-
-    def along(function: Any, *more: xr.DataArray) -> xr.DataArray:
-        axes = [[dimension]] * (1 + len(more))
-        found: xr.DataArray = xr.apply_ufunc(
-            function, logs, *more, input_core_dims=axes, output_core_dims=axes[:1], keep_attrs=True
-        )
-        return found.transpose(*y.dims)
-
-    found = along(lambda z: slopes(t, z, 5)).rename(f"{name}exponent")
+    t, logs, name = np.log(x), log_of(y).transpose(..., dimension).compute(), "" if y.name is None else f"{y.name}_"
+    found = logs.copy(data=slopes(t, logs.values, 5)).transpose(*y.dims).rename(f"{name}exponent")
     found.attrs = {"units": "1", "long_name": f"local exponent of {title(y)} in {dim}"}
     if not error:
         return found
-    errors = along(lambda z, b: slope_errors(t, z, b), stated_bound(y, bound).compute())
+    bounds = curves.stated_bound(y, bound).transpose(*logs.dims).values
+    errors = logs.copy(data=slope_errors(t, logs.values, bounds)).transpose(*y.dims)
     errors.attrs = {"units": "1", "long_name": f"error of the local exponent of {title(y)} in {dim}"}
     return xr.Dataset({"exponent": found, "exponent_error": errors})
 
@@ -129,16 +113,15 @@ def where_exponent(
     --------
     >>> import numpy as np
     >>> import sweep
-    >>> foliot = {"kernel": "foliot", "outputs": ["period"], "fixed": {"phi0": 1.0, "a": 1.0}}
-    >>> ds = sweep.run(**foliot, axes={"mu": np.geomspace(1e-2, 1e4, 61)})
+    >>> ds = sweep.run(kernel="foliot", fixed={"phi0": 1.0, "a": 1.0}, axes={"mu": np.geomspace(1e-2, 1e4, 61)})
     >>> print(f"{float(sweep.where_exponent(ds.period, 'mu', -0.5).abscissa):.2f}")
     1.46
     >>> print(f"{float(sweep.where_exponent(ds.period, 'mu', 2.0, values=True).abscissa):.2f}")
     26.40
     """
-    curve = missing_is_nan(y) if values else log_of(y)
+    curve = curves.missing_is_nan(y) if values else log_of(y)
     dimension, x = positive_axis(curve, dim)
-    inside, t = inside_window(x, window, dim), np.log(x)
+    inside, t = curves.inside_window(x, window, dim), np.log(x)
     orders = ((6, 0), (4, 0)) if values else ((6, 7), (4, 5))  # points of the interpolation and of the slopes
 
     def one(z: Array) -> tuple[float, float]:
@@ -200,9 +183,8 @@ def exponent_map(y: xr.DataArray, dim: str, levels: Sequence[float] = BORDERS) -
     --------
     >>> import numpy as np
     >>> import sweep
-    >>> foliot = {"kernel": "foliot", "outputs": ["period"], "fixed": {"phi0": 1.0, "a": 1.0}}
     >>> axes = {"mu": np.geomspace(1e-2, 1e4, 25), "R": [1e-4, 1e-3, 1e-2, 1e-1]}
-    >>> ds = sweep.run(**foliot, axes=axes)
+    >>> ds = sweep.run(kernel="foliot", fixed={"phi0": 1.0, "a": 1.0}, axes=axes)
     >>> sweep.exponent_map(ds.period, "mu").exponent.dims
     ('mu', 'R')
     """
@@ -217,7 +199,7 @@ def contours(field: xr.DataArray, levels: Sequence[float]) -> xr.Dataset:
     Along `point`: both coordinates, `level`, and `line`, the number of the line. Logarithms are taken of an axis whose
     grid is logarithmic. Where the field is NaN no line goes.
     """
-    check_output(field)
+    curves.check_output(field)
     if field.ndim != 2:
         raise SweepError(f"{title(field)} has {field.ndim} dimensions; a map needs two, choose with .sel or --at")
     for name in field.dims:
@@ -231,12 +213,12 @@ def contours(field: xr.DataArray, levels: Sequence[float]) -> xr.Dataset:
     logarithmic = [is_logarithmic(field[name].values) for name in names]
     x, y = (np.log(field[n].values) if take else field[n].values for n, take in zip(names, logarithmic, strict=True))
     generator = contourpy.contour_generator(x, y, np.ma.masked_invalid(field.values.astype(np.float64)))
-    lines = [(level, np.array(line)) for level in levels for line in generator.lines(float(level))]
-    points = np.concatenate([np.empty((0, 2)), *(line for _, line in lines)])
-    points[:, logarithmic] = np.exp(points[:, logarithmic])
-    count, units = [len(line) for _, line in lines], str(field.attrs.get("units", "1"))
-    columns = {name: (points[:, k], dict(field[name].attrs)) for k, name in enumerate(names)}
-    level = np.repeat(np.array([level for level, _ in lines], np.float64), count)
-    columns["level"] = level, {"units": units, "long_name": f"{title(field)} on the line"}
-    columns["line"] = np.repeat(np.arange(len(lines)), count), {"units": "1", "long_name": "number of the line"}
-    return xr.Dataset({name: ("point", *column) for name, column in columns.items()})
+    by_level = ((level, line) for level in levels for line in generator.lines(float(level)))
+    lines = [np.insert(np.array(line, np.float64), 2, level, axis=1) for level, line in by_level]
+    points = np.concatenate([np.empty((0, 3)), *lines])
+    points[:, :2][:, logarithmic] = np.exp(points[:, :2][:, logarithmic])
+    units = str(field.attrs.get("units", "1"))
+    about = [*(dict(field[name].attrs) for name in names), {"units": units, "long_name": f"{title(field)} on the line"}]
+    found = xr.Dataset({n: ("point", points[:, k], about[k]) for k, n in enumerate((*names, "level"))})
+    number = np.repeat(np.arange(len(lines)), [len(line) for line in lines])
+    return found.assign(line=("point", number, {"units": "1", "long_name": "number of the line"}))

@@ -242,7 +242,7 @@ def _meeting_cells(meeting: xr.Dataset) -> tuple[str, ...]:
 
 def comparison(dataset: xr.Dataset, y: str | None, x: str, windows: Sequence[Sequence[float]] = ()) -> xr.Dataset:
     """`compare_laws` of one line of a result. Raises SweepError, also where other axes are left."""
-    from sweep.laws.compare import compare_laws
+    from sweep.laws.two_laws import compare_laws
 
     y = output_of(dataset, y)
     if len(windows) > 1:
