@@ -67,6 +67,18 @@ def colour_map(axes: Any, x: Any, y: Any, values: Any, label: str, bar: Any = No
     return axes.figure.colorbar(mesh, ax=axes, label=label, pad=0.02, **(bar or {}))
 
 
+def exponent_map(axes: Any, ds: xr.Dataset, out: Any, text: str) -> None:
+    """A verge's exponent `s` over alpha and kappa; cells that are `out`, of shape (kappa, alpha), hatched and named."""
+    alpha, kappa = ds.alpha.values, ds.kappa.values
+    axes.set(xscale="log", yscale="log", xlabel=r"drive, $\alpha$ [1]", ylabel=r"wheel over foliot, $\kappa$ [1]")
+    ticks = {"ticks": [1 / 3, 0.5, 0.75, 1]}
+    bar = colour_map(axes, alpha, kappa, ds.s.values, "exponent, $s$ [1]", ticks, vmin=1 / 3, vmax=1)
+    bar.ax.set_yticklabels(["1/3", "1/2", "3/4", "1"])
+    hatch(axes, alpha, kappa, out, "////", "0.65")
+    axes.set(xlim=(alpha[1], alpha[-2]))
+    direct_label(axes, 2e4, 3e-3, text)
+
+
 def hatch(axes: Any, x: Any, y: Any, where: Any, pattern: str, colour: str = "0.45") -> None:
     """Hatches the cells of a map for which `where`, of shape (y, x), is true, and draws their edge."""
     shown = where.astype(float)

@@ -46,6 +46,20 @@ def shares(ds: xr.Dataset) -> xr.Dataset:
     return ds.assign({name: (speed.dims, values) for name, values in made.items()})
 
 
+def verge(ds: xr.Dataset, period: xr.DataArray, runs: xr.DataArray) -> xr.Dataset:
+    """A verge's sweep over `tau` and `I_c` with kappa, alpha, `period`, the exponent `s` and the recoil in `pitches`.
+
+    `s` is -dlnP/dlntau by differences, between cells that run.
+    """
+    a = (ds.c_v + (ds.n**2 * ds.c_c if "c_c" in ds.coords else 0.0)) / ds.I_v
+    rise = np.log(period).assign_coords(tau=np.log(ds.tau)).differentiate("tau").assign_coords(tau=ds.tau)
+    both = runs & runs.shift(tau=1, fill_value=False) & runs.shift(tau=-1, fill_value=False)
+    pitches = ds.recoil / (2 * (2 * ds.n * ds.phi0 + ds["drop"]))
+    alpha = (ds.n * ds.tau / (ds.I_v * a**2 * ds.phi0)).drop_vars("alpha", errors="ignore")
+    ds = ds.assign_coords(kappa=ds.n**2 * ds.I_c / ds.I_v, alpha=alpha)
+    return ds.assign(period=period, s=-rise.where(both), pitches=pitches)
+
+
 def width(n: Any) -> Any:
     """k_n of (1) in `law_any_swing.py`."""
     return 2.0 * (2.0 * n + 1.0) * (3.0 * n + 2.0) / (n + 2.0) ** 2

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from _common import Conclusion, Groups, Statement, all_ok, compared, read_result, script
-from _figures import direct_label, page_of, plain_ticks
+from _figures import NARROW, direct_label, page_of, plain_ticks
 
 from sweep.show.charts import COLOURS
 
@@ -67,7 +67,7 @@ def statements(ds: xr.Dataset) -> Groups:
 
 def figure(ds: xr.Dataset) -> Any:
     """How the period depends on the drive, and the period itself, over the swing."""
-    with page_of(72.0, 1, 2) as (page, (a, b)):
+    with page_of(132.0, 2, 1, width=NARROW) as (page, (a, b)):
         a.axhspan(1 / 3, 1 / 2, color="0.8", linewidth=0)
         direct_label(a, 6.0, 0.13, "verge and foliot", "0.4")
         for k, colour in enumerate(COLOURS[:3]):

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from _common import Claims, Conclusion, compared, most, read_result, said, script
-from _figures import direct_label, page_of
+from _figures import NARROW, direct_label, page_of
 
 from kernels.interface import Status
 from sweep.show.charts import COLOURS
@@ -67,7 +67,7 @@ def statements(ds: xr.Dataset) -> Claims:
 def figure(ds: xr.Dataset) -> Any:
     """The diagram of bifurcations, and beside it where bounces begin to be chaotic."""
     least, doubles = borders(float(ds.e))
-    with page_of(72.0, 1, 2) as (page, (whole, part)):
+    with page_of(132.0, 2, 1, width=NARROW) as (page, (whole, part)):
         for axes, size in ((whole, 1.2), (part, 2.0)):
             for status, colour in ((Status.OK, "black"), (Status.INACCURATE, COLOURS[1])):
                 some = ds.x.where(ds.status == status)

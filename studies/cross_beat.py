@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from _common import Claims, Conclusion, compared, count, differing, most, power, read_result, said, script, solved
-from _figures import page_of, plain_ticks
+from _figures import NARROW, page_of
 
 from sweep.show.charts import COLOURS, MARKS
 
@@ -110,61 +110,46 @@ def sums(ds: xr.Dataset) -> Claims:
     yield differing("weights moved on one: dlnP/dlnI_l", f"(1 - s)/2 = {(1 - s) / 2:.4f}", rise, (1 - s) / 2, 1e-3, 4)
 
 
-def shaken(ds: xr.Dataset) -> xr.DataArray:
-    """Forty half swings of clocks on a swaying case [s], over share and swing."""
+def steadied(ds: xr.Dataset) -> Claims:
+    """(3): scatter of forty half swings of clocks on a swaying case."""
     half, swings = 0.5 * float(ds.I_l + ds.I_r), list(range(61, 101))
     clocks = [pair(ds, flips=swings, I_l=half * (1 + x), I_r=half * (1 - x), sway=SWAY, nu=NU) for x in SHARES]
-    rows = np.array([clock.interval.values for clock in clocks])
-    return xr.DataArray(rows, {"share": list(SHARES), "swing": swings}, ("share", "swing"))
-
-
-def steadied(halves: xr.DataArray) -> Claims:
-    """(3): scatter of the half swings."""
-    scatter = halves.std("swing")
-    unit = scatter[1:] / scatter.share[1:]
+    scatter = np.array([float(clock.interval.std()) for clock in clocks])
+    unit = scatter[1:] / SHARES[1:]
     what = "scatter of half swings over (I_l - I_r)/(I_l + I_r) [s]"
     yield most(what, "one number, (3)", unit / unit.mean() - 1, 0.01, f"{unit.mean():.3e}")
     yield most("  of equal foliots, over that", "0", scatter[0] / unit.mean(), 1e-3, f"{scatter[0]:.1e} s")
 
 
-def figure(ds: xr.Dataset, halves: xr.DataArray) -> Any:
-    """Period, what the gear's wind-up does to it, and half swings on a swaying case; for two columns of print."""
-    with page_of(68.0, 1, 3) as (page, (period, wound, sway)):
+def figure(ds: xr.Dataset) -> Any:
+    """Period, and what the gear's wind-up does to it."""
+    hollow = {"markerfacecolor": "white", "linestyle": ""}
+    with page_of(132.0, 2, 1, width=NARROW, sharex=True) as (page, (period, wound)):
         period.loglog(ds.alpha, ds.sums, color=COLOURS[0], label="one foliot, (1)")
-        period.loglog(ds.alpha, ds.alone, color=COLOURS[1], linestyle=(0, (5, 1.5)), label="one of the two alone")
-        look = {"color": "black", "markerfacecolor": "white", "linestyle": "", "markersize": 4}
-        period.plot(ds.alpha, ds.period.isel(stiffness=-1), "o", label="cross-beat", **look)
-        period.set(xlabel=r"drive, $\alpha$ [1]", ylabel="period, $P$ [s]", ylim=(0.5, 60))
-        period.legend(loc="upper right", fontsize=7)
+        period.loglog(ds.alpha, ds.alone, "--", color=COLOURS[1], label="one of the two alone")
+        period.plot(ds.alpha, ds.period.isel(stiffness=-1), "o", color="black", label="cross-beat", **hollow)
+        period.set(ylabel="period, $P$ [s]", ylim=(0.5, 60))
+        period.legend(loc="upper right")
         for k, stiffness in enumerate(ds.stiffness.values):
             line = ds.sel(stiffness=stiffness)
             wound.loglog(ds.alpha, line.s * line.wound, color=COLOURS[k], label=f"{stiffness:g}")
-            wound.plot(ds.alpha, -line.off, MARKS[k], color=COLOURS[k], markerfacecolor="white")
+            wound.plot(ds.alpha, -line.off, MARKS[k], color=COLOURS[k], **hollow)
         wound.plot([], [], color="black", label="(2)")
-        wound.plot([], [], "o", color="black", markerfacecolor="white", label="scene")
+        wound.plot([], [], "o", color="black", label="scene", **hollow)
         wound.set(xlabel=r"drive, $\alpha$ [1]", ylabel=r"gain, $-\Delta P/P$ [1]")
-        wound.legend(title="gear [N m/rad]", loc="upper left", fontsize=7, title_fontsize=7, ncols=2)
-        for k, share in enumerate(halves.share.values[::-1]):
-            line, look = halves.sel(share=share), {"color": COLOURS[k], "markersize": 2.5, "linewidth": 0.6}
-            sway.plot(line.swing - 60, 1e3 * (line - line.mean()), MARKS[k] + "-", label=f"{share:g}", **look)
-        sway.set(xlabel="half swing [1]", ylabel="half swing less its mean [ms]", xlim=(0, 41), ylim=(-14, 24))
-        look = {"fontsize": 7, "title_fontsize": 7, "ncols": 4, "columnspacing": 0.8, "handlelength": 1.2}
-        title = r"$(I_\mathrm{l}-I_\mathrm{r})/(I_\mathrm{l}+I_\mathrm{r})$"
-        sway.legend(title=title, loc="upper center", **look)
-        plain_ticks(sway.yaxis, (-10, 0, 10))
+        wound.legend(title="gear [N m/rad]", loc="upper left", ncols=2)
     return page
 
 
 def conclude(path: str) -> Conclusion:
     """Statements and the figure."""
     ds = prepared(read_result(path, "cross_beat_scene:KERNEL", ["stiffness", "tau"], "cross_beat.toml"))
-    halves = shaken(ds)
     groups = {
         "Two as one": as_one(ds),
         "Only the sums count (alpha = 30)": sums(ds),
-        f"A case that sways by {SWAY:g} rad/s^2": steadied(halves),
+        f"A case that sways by {SWAY:g} rad/s^2": steadied(ds),
     }
-    return groups, [NOTES], lambda: figure(ds, halves)
+    return groups, [NOTES], lambda: figure(ds)
 
 
 main = script(__name__, "cross_beat.h5", conclude)

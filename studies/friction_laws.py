@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from _common import Claims, Conclusion, Statement, compared, differing, most, read_result, said, script, solved
-from _figures import direct_label, hatch, page_of
+from _figures import NARROW, direct_label, hatch, page_of
 
 import sweep
 from kernels.interface import Status
@@ -56,28 +56,22 @@ def ends(laws: xr.Dataset) -> Claims:
 
 
 def exact(laws: xr.Dataset) -> Claims:
-    """What holds at every drive; n = 1 by the integrals of any n, against the closed form of viscous friction.
+    """What holds at every drive; dlnP/dlnc by differences over a sweep of the friction alone.
 
     Steps in ln alpha_n are 2/n - 1 times those in ln mu, so differences of ln P are of n >= 1.
     """
-    dry, viscous, air, some = laws.sel(n=0), laws.sel(n=1), laws.sel(n=2), laws.sel(n=laws.n[laws.n >= 1])
+    dry, air, some = laws.sel(n=0), laws.sel(n=2), laws.sel(n=laws.n[laws.n >= 1])
     rho2 = (1 / dry.mu) ** 2
     held, silent = int((dry.mu <= 1).sum()), int((dry.status == Status.NEVER_STARTS).sum())
-    closed = solved("foliot", method="closed", mu=laws.mu, a=viscous.c, phi0=viscous.phi0)
-    off = max(float(abs(viscous[y] / closed[y] - 1).max()) for y in ("period", "amplitude", "sensitivity"))
     rough = float(np.diff(np.log(laws.mu)).max()) ** 4 / 4
-    apart, far = sweep.local_exponent(some.period, "mu") + some.sensitivity, "largest distance"
-    coulomb, form = dry.sensitivity / (rho2 / (1 - rho2)) - 1, "n = 1: P, amplitude, s against the viscous closed form"
-    yield most("n = 0: s at every mu > R", "rho^2/(1 - rho^2)", coulomb, 1e-10)
+    apart, coulomb = sweep.local_exponent(some.period, "mu") + some.sensitivity, rho2 / (1 - rho2)
+    viscous = laws.sel(n=1)
+    grown = viscous.amplitude * viscous.mu ** (-1 / 3)
+    yield most("n = 0: s at every mu > R", "rho^2/(1 - rho^2)", dry.sensitivity / coulomb - 1, 1e-10)
     yield said("n = 0: no cycle for mu <= R", silent == held, f"{silent} cells", f"{held} cells")
     yield most("n = 2: s at every mu", "1/2", air.sensitivity - 0.5, 1e-10)
-    yield most(form, "0", off, 1e-11, "largest deviation")
-    yield most("differences of ln P against the exact s", "0", apart, rough, far)
-    yield from by_friction()
-
-
-def by_friction() -> Claims:
-    """dlnP/dlnc, by differences over a sweep of the friction alone."""
+    yield compared("n = 1: amplitude/mu^(1/3), largest mu", "3^(2/3)/2 = 1.0400", grown[-1], 3 ** (2 / 3) / 2, 1e-9)
+    yield most("differences of ln P against the exact s", "0", apart, rough, "largest distance")
     ds = solved("foliot", n=[0.5, 1.0, 3.0], c=np.geomspace(0.9, 1.1, 9), mu=1.5, phi0=1, rtol=1e-11)
     ds = ds.assign(slope=sweep.local_exponent(ds.period, "c"), theory=(2 * ds.sensitivity - 1) / (2 - ds.n))
     for n in ds.n.values:
@@ -126,25 +120,13 @@ def best(grid: xr.Dataset, line: xr.Dataset) -> Claims:
 
 
 def figure(laws: xr.Dataset, grid: xr.Dataset, line: xr.Dataset) -> Any:
-    """Exponents against torque, their limits against n, and the map with its valley."""
-    with page_of(70.0, 1, 3, width_ratios=(1.1, 0.85, 1.25)) as (page, (exponents, limits, valley)):
+    """Exponents against torque, and the map with its valley."""
+    with page_of(142.0, 2, 1, width=NARROW, height_ratios=(1, 1.15)) as (page, (exponents, valley)):
         for i, (n, height) in enumerate(HEIGHTS.items()):
             exponents.semilogx(laws.mu, -laws.sensitivity.sel(n=n), color=COLOURS[i])
             direct_label(exponents, 3e-7 if n else 2e6, height, f"$n={n:g}$", COLOURS[i])
         exponents.set(xlim=(1e-9, 1e9), ylim=(-1.05, 0.05), xlabel=r"torque, $\mu$ [rad/s$^2$]")
         exponents.set_ylabel(r"exponent, $\mathrm{d}\ln P/\mathrm{d}\ln\mu$ [1]")
-
-        n, s = np.linspace(0.2, 4.3, 200), laws.sensitivity
-        limits.plot(n, -1 / n, color="black", linewidth=0.8)
-        limits.plot(n, -n / (n + 2), color="black", linewidth=0.8, linestyle=(0, (5, 1.5)))
-        some, small = s.sel(n=laws.n[laws.n > 0]), {"markerfacecolor": "white", "label": r"small $\mu$"}
-        limits.plot(some.n, -some.isel(mu=0), "o", color=COLOURS[0], **small)
-        limits.plot(some.n, -some.isel(mu=-1), "s", color=COLOURS[1], markersize=3, label=r"large $\mu$")
-        limits.plot(0, -s.sel(n=0)[-1], "s", color=COLOURS[1], markersize=3, clip_on=False)
-        direct_label(limits, 1.45, -1.15, "$-1/n$")
-        direct_label(limits, 0.9, -0.1, "$-n/(n+2)$", ha="left")
-        limits.set(xlim=(0, 4.3), ylim=(-2.1, 0.05), xlabel="degree of friction, $n$ [1]", ylabel="exponent [1]")
-        limits.legend(loc="lower right")
         draw_map(valley, grid, line)
     return page
 
@@ -166,9 +148,7 @@ def draw_map(axes: Any, grid: xr.Dataset, line: xr.Dataset) -> None:
     axes.plot(line.mu, line.R, color="white", linestyle=(0, (5, 1.5)))
     direct_label(axes, 0.6, 2e3, r"never starts, $\mu \leq R$")
     direct_label(axes, 2e4, 0.35, r"$s = 1/3$: $R = 0.8\,a^2\varphi_0$")
-    how = {"fontsize": 8, "bbox": {"facecolor": "white", "edgecolor": "none", "pad": 1}, "ha": "center"}
-    at = line.isel(cell=int(abs(np.log(line.R / 60)).argmin("cell")))
-    axes.annotate("best torque", (float(at.mu), 60), (2e5, 8), arrowprops={"arrowstyle": "->", "linewidth": 0.6}, **how)
+    direct_label(axes, 2e5, 8, "best torque (dashed)")
 
 
 def conclude(laws_path: str, map_path: str) -> Conclusion:

@@ -18,8 +18,8 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Claims, Conclusion, columns, compared, differing, most, read_result, said, script
-from _figures import direct_label, hatch, page_of
+from _common import Claims, Conclusion, compared, differing, most, read_result, said, script
+from _figures import NARROW, direct_label, hatch, page_of
 from matplotlib.colors import LogNorm
 
 import sweep
@@ -29,8 +29,6 @@ from sweep.show.charts import COLOURS
 SHOWN = (1e6, 1e4, 1e2, 1.0)
 """alpha of the lines in the figure."""
 DAY = 86400.0
-GOALS = {"1 min/day": 15, "1 s/day": 900}
-"""How many times less than the verge's 15 min/day."""
 
 NOTES = """\
 s = -dlnP/dlnmu; theory is of first order in the torque, exact for alpha and kappa large; deviations are relative, of
@@ -82,11 +80,10 @@ def laws(ds: xr.Dataset) -> Claims:
     middle = strong.sel(k=100.0, method="nearest")
     theory = float(first_order(alpha, middle.kappa.item()))
     slack = (math.pi / 16) * math.sqrt(high / alpha) + 1 / low**1.75  # of (1), and of the next order
-    # the exact s beside differences of ln P: P sqrt(mu/phi0) is a function of a sqrt(phi0/mu) and kappa
+    # P sqrt(mu/phi0) is a function of a sqrt(phi0/mu) and kappa; differences are of fourth order
     inner = ds.where((ds.alpha > 99) & (ds.kappa < 10), drop=True)
     by_a, by_k = sweep.local_exponent(inner.period, "a"), sweep.local_exponent(inner.period, "k")
-    off = abs(0.5 + by_a / 2 + by_k - inner.s).max()
-    rough = float(np.diff(np.log(ds.k)).max() ** 4) / 4  # differences are of fourth order
+    off, rough = 0.5 + by_a / 2 + by_k - inner.s, float(np.diff(np.log(ds.k)).max() ** 4) / 4
     weak, steep = f"s at kappa = {ds.kappa[0]:.0e}: still", f"exponent of s in kappa, 10 to 1000, alpha = {alpha:.0e}"
     yield compared(f"{weak} the foliot's", f"{bare:.6f}", float(strong.s[0]), bare, 1e-2, 6)
     yield differing(steep, "-3/4", fall, -0.75, slack)
@@ -105,9 +102,7 @@ def optimum(ds: xr.Dataset, springs: xr.Dataset) -> Claims:
         near, place = 1e-4 + 1 / alpha + float(best.blur), float(best.kappa / best.alpha)
         what = f"alpha = {alpha:.0e}: best spring, kappa/alpha"
         yield compared(what, "9/pi^2 = 0.91189", place, 9 / math.pi**2, near, 6)
-        yield compared(
-            "  s alpha there", "pi/27^(1/2) = 0.60460", float(best.s * best.alpha), math.pi / 27**0.5, near, 6
-        )
+        yield compared("  s alpha there", "pi/27^(1/2) = 0.60460", best.s * best.alpha, math.pi / 27**0.5, near, 6)
         yield compared("  A/phi0 there", "2/3^(1/2) = 1.15470", float(best.A), 2 / 3**0.5, near, 6)
         yield compared("  strongest with a cycle", "16/pi^2 = 1.6211", end, 16 / math.pi**2, 1e-3 + 4 / alpha, 5)
     Q = 1000.0
@@ -130,26 +125,6 @@ def improvement(ds: xr.Dataset) -> Claims:
     for alpha, least, word in ((1e4, 10, "dramatically"), (1e2, 10, "dramatically"), (1.0, 1, ""), (1e-2, 1, "")):
         gain = at(alpha, 0.0).s.item() / float(line_of(ds, alpha).s.min())
         yield said(f"best spring, s of alpha = {alpha:g} falls by", gain > least, f"{gain:.4g}", word)
-
-
-def clock(ds: xr.Dataset, springs: xr.Dataset) -> list[str]:
-    """Springs for the clockmaker, by drive: kappa and Q; * where it is not self-starting."""
-    rows: list[tuple[str, ...]] = [("alpha", "s/day by 1 % of torque", "torque steady to", *GOALS, "best spring")]
-    for alpha in (10.0, 1e2, 1e3, 1e4, 1e6):
-        line, best, bare = line_of(ds, alpha), line_of(springs, alpha), at(alpha, 0.0).s.item()
-        found = []
-        for s in (bare / factor for factor in GOALS.values()):
-            if not s > float(best.s):
-                found.append("out of reach")
-                continue
-            kappa = sweep.where_exponent(line.s, "kappa", s, (None, float(best.kappa)), values=True).abscissa.item()
-            cell = at(line.alpha.item(), kappa).isel(a=0, k=0)
-            star = "*" if cell.status == Status.NOT_SELF_STARTING else ""
-            found.append(f"{kappa:.3g}, {float(cell.Q):.3g}{star}")
-        least = f"{float(best.kappa):.3g}, {float(best.Q):.3g}*: {0.01 * DAY * float(best.s):.3g} s/day"
-        rows.append((f"{alpha:g}", f"{0.01 * DAY * bare:.3g}", f"{1.5 / 1.44 / bare:.2f} %", *found, least))
-    heading = "THE VERGE'S 15 MIN/DAY, and the springs (kappa, Q) that make less of it; *: not self-starting"
-    return [heading, *columns(rows, "   ")]
 
 
 def draw_lines(axes: Any, ds: xr.Dataset, springs: xr.Dataset) -> None:
@@ -196,26 +171,24 @@ def draw_map(axes: Any, ds: xr.Dataset) -> None:
     axes.plot(9 / math.pi**2 * line, line, color="white", linestyle=(0, (5, 1.5)))
     direct_label(axes, 3e4, 0.3, "sticks: no cycle")
     axes.set_title("rate [s/day] by 1 % of torque", loc="right")
-    how = {"fontsize": 8, "bbox": {"facecolor": "white", "edgecolor": "none", "pad": 1}, "ha": "center"}
-    arrow = {"arrowstyle": "->", "linewidth": 0.6}
-    axes.annotate("not self-starting", (60, 600), (1.5e5, 12), arrowprops=arrow, **how)
-    axes.annotate("best spring", (3e3, 3e3), (1e6, 4e2), arrowprops=arrow, **how)
+    direct_label(axes, 3e5, 3e2, "best spring (dashed)")
+    direct_label(axes, 3e2, 4e3, "not self-starting")
 
 
 def figure(ds: xr.Dataset, springs: xr.Dataset) -> Any:
     """Sensitivity against the spring, and a map of it over spring and drive."""
-    with page_of(84.0, 1, 2, width_ratios=(1, 1.05)) as (page, (left, right)):
-        draw_lines(left, ds, springs)
-        draw_map(right, ds)
+    with page_of(150.0, 2, 1, width=NARROW) as (page, (lines, plane)):
+        draw_lines(lines, ds, springs)
+        draw_map(plane, ds)
     return page
 
 
 def conclude(path: str) -> Conclusion:
-    """Statements, springs for the clockmaker, and the figure."""
+    """Statements and the figure."""
     ds = scaled(read_result(path, "foliot", ["a", "k"], "hairspring.toml"))
     springs = best_springs(ds)
     groups = {"The law": laws(ds), "How far it goes": optimum(ds, springs), "The paper's spring": improvement(ds)}
-    return groups, [NOTES, "", *clock(ds, springs)], lambda: figure(ds, springs)
+    return groups, [NOTES], lambda: figure(ds, springs)
 
 
 main = script(__name__, "hairspring.h5", conclude)

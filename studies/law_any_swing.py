@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from _common import Claims, Conclusion, Statement, count, most, read_result, said, script, solved
-from _figures import page_of
+from _figures import NARROW, page_of
 from _losses import any_swing, shares
 
 import sweep
@@ -76,7 +76,7 @@ def one_loss(single: dict[str, xr.Dataset]) -> Claims:
         yield most(f"{name} alone", f"(1) to {allowed:g}", ds.law / ds.sensitivity - 1, allowed, text)
 
 
-def by_periods(ds: xr.Dataset) -> list[Statement]:
+def by_periods(ds: xr.Dataset) -> Claims:
     """(2) with the periods of some of the clocks at other friction."""
     few = ds.isel(point=slice(0, SAMPLE), e=slice(0, 4)).stack(clock=("point", "e"))
     clock = {name: few[name].values for name in ("a", "R", "c", "n", "e")}
@@ -90,36 +90,29 @@ def by_periods(ds: xr.Dataset) -> list[Statement]:
     with np.errstate(divide="ignore", invalid="ignore"):
         s = 0.5 + 0.5 * (slope("a") + 2.0 * slope("R") + (2.0 - clock["n"]) * slope("c"))
     text = "s by the kernel's tangent, p_n by its periods"
-    return [most(f"(2), {SAMPLE * 4} clocks", "1e-4", s / few.sensitivity - 1, 1e-4, text)]
+    yield most(f"(2), {SAMPLE * 4} clocks", "1e-4", s / few.sensitivity - 1, 1e-4, text)
 
 
 def figure(ds: xr.Dataset, single: dict[str, xr.Dataset]) -> Any:
-    """One loss alone over the swing, (1) against every clock, and how far it is off; for two columns of print."""
+    """One loss alone over the swing, and how far (1) is off for every clock."""
     beyond, s = r"swing beyond the switch, $A-1$ [1]", ds.sensitivity.values.ravel()
-    with page_of(62.0, 1, 3) as (page, (one, law, off)):
+    with page_of(132.0, 2, 1, width=NARROW, sharex=True) as (page, (one, off)):
         for colour, (name, line) in zip(COLOURS, list(single.items())[:3], strict=False):
             one.loglog(line.swing - 1, line.law, color=colour, label=name)
             one.loglog(line.swing - 1, line.sensitivity, "o", color=colour, markersize=2.5, markerfacecolor="white")
         one.plot([], [], "ko", markersize=2.5, markerfacecolor="white", label="kernel")
-        one.set(xlabel=beyond, ylabel="exponent, $s$ [1]", xlim=(1e-3, 1e2), ylim=(0.02, 30))
-        one.legend(fontsize=6.5, loc="upper right")
-
-        dots = {"markersize": 1, "rasterized": True}
-        for name, colour, text in (("large", "0.75", "large swings alone"), ("law", COLOURS[0], "(1)")):
-            law.loglog(ds[name].values.ravel(), s, ".", color=colour, label=text, **dots)
-        law.plot([0.02, 30], [0.02, 30], color="black", linewidth=0.6)
-        law.set(xlabel="exponent by the law [1]", ylabel="exponent, $s$ [1]", xlim=(0.02, 30), ylim=(0.02, 30))
-        law.legend(fontsize=6.5, loc="upper left", markerscale=6)
+        one.set(ylabel="exponent, $s$ [1]", xlim=(1e-3, 1e2), ylim=(0.02, 30))
+        one.legend(loc="upper right")
 
         swing, far = ds.swing.values.ravel() - 1, 100 * abs(ds.law.values.ravel() / s - 1)
-        off.loglog(swing, far, ".", color="0.75", **dots)
+        off.loglog(swing, far, ".", color="0.75", markersize=1, rasterized=True)
         edges = np.geomspace(1e-3, 20, 10)
         bins = [far[(swing >= low) & (swing < high)] for low, high in itertools.pairwise(edges)]
         for share, dashes in ((95, "-"), (50, "--")):
             kept, look = [np.percentile(b, share) for b in bins], {"color": COLOURS[0], "label": f"{share} % of them"}
             off.plot(np.sqrt(edges[1:] * edges[:-1]), kept, dashes, **look)
-        off.set(xlabel=beyond, ylabel="deviation of (1) [% of $s$]", xlim=(1e-3, 100), ylim=(1e-3, 100))
-        off.legend(fontsize=6.5, loc="lower left")
+        off.set(xlabel=beyond, ylabel="deviation of (1) [% of $s$]", ylim=(1e-3, 100))
+        off.legend(loc="lower left")
     return page
 
 

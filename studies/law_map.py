@@ -20,32 +20,24 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Claims, Conclusion, compared, count, differing, last_passage, most, read_result, script, solved
-from _figures import colour_map, direct_label, hatch, page_of
+from _common import Claims, Conclusion, compared, count, last_passage, most, read_result, script, solved
+from _figures import NARROW, page_of
 from _losses import any_swing, shares
 from scipy.optimize import brentq
 
-import sweep
 from sweep.show.charts import COLOURS
 
 LARGE, SMALL = 100.0, 1.0003
 """Amplitudes over phi0 from which, and up to which, losses are called light and heavy."""
 AT_ONCE = 4000
 """Cells whose losses are summed up together: 6 MB an array."""
-DEGREES = (0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0)
-"""Of one friction alone; some are not on the grid."""
-BEST = {10.0: (0.27318, 8.719), 100.0: (0.17768, 6.098)}
-"""Least s and its mu/R by R/(a^2 phi0) where viscous and dry friction act, once in 50 digits."""
-PLANE = {"a": 1.0, "e": 0.9, "n": 3.0, "c": 4e-6, "phi0": 1.0}
-"""The clock whose exponent is mapped over torque and dry friction."""
 SPEEDS = ["amplitude", "crossing_speed", "sensitivity"]
 """Outputs that shares of the losses are made of."""
-LOSSES = ["viscous", "dry", "drag", "impacts"]
 
 NOTES = """\
 s = -dlnP/dlnmu; deviation: the difference of exponents, others relative. Shares by quadrature of the losses over the
 speed. Allowed: 1e-6 of the energy; 0.001 of (1) at swings over 100 phi0, 0.011 of (2) at swings under 1.0003 phi0, 1e-8
-from rest; 1e-4 of the best torques, which were once computed to 50 digits
+from rest
 """
 
 
@@ -62,38 +54,17 @@ def laws(ds: xr.Dataset) -> Claims:
     """(1) and (2) against every cell of large and of small swings."""
     large, small = ds.where(ds.swing > LARGE), ds.where(ds.swing < SMALL)
     light, heavy = large.sensitivity - large.large, small.sensitivity / small.small - 1
-    mixed = light.where(large[LOSSES].to_array().max("variable") < 0.7)
     whole = abs(ds.law / ds.sensitivity - 1)
     usual = whole.quantile(0.95)
     yield most("the shares are the work, swings over 2 phi0", "1", ds.deficit.where(ds.swing > 2), 1e-6)
     yield most(f"(1), swings over {LARGE:g} phi0", "s", light, 1e-3, count(light))
-    yield most("  of these no loss takes over 70 %", "s", mixed, 1e-3, count(mixed))
     yield most(f"(2), swings under {SMALL:g} phi0", "s to 1.1 %", heavy, 0.011, count(heavy))
     rest = shares(solved("foliot", mu=1 + np.geomspace(1e-2, 1e2, 9), R=1, e=0, phi0=1, rtol=1e-10, outputs=SPEEDS))
     struck = f"impacts take {float(rest.impacts.min()):.0%} to {float(rest.impacts.max()):.0%}"
-    yield most(
-        "  from rest (e = 0), dry friction", "1/(2 lambda_e)", 2 * rest.impacts * rest.sensitivity - 1, 1e-8, struck
-    )
+    exact = 2 * rest.impacts * rest.sensitivity - 1
+    yield most("  from rest (e = 0), dry friction", "1/(2 lambda_e)", exact, 1e-8, struck)
     yield most("any swing, (1) of law_any_swing.py: 95 % of all cells", "s to 5 %", usual, 0.05, f"within {usual:.2%}")
     yield most(f"  all {count(whole)} that cycle", "s to 25 %", whole, 0.25, f"within {whole.max():.1%}")
-
-
-def pure_laws(pure: xr.DataArray) -> Claims:
-    """n/(n + 2) and 1/n of one friction alone."""
-    for n in (0.25, 1.5, 2.0, 4.0):
-        weak, strong = pure.sel(n=n).values[:: 1 if n < 2 else -1]
-        off, theory = max(abs(weak - 1 / n), abs(strong - n / (n + 2))), f"{1 / n:.4f}, {n / (n + 2):.4f}"
-        here = f"{weak:.4f}, {strong:.4f}"
-        yield most(f"drag of degree {n:g} alone: 1/n, n/(n + 2)", theory, off, 1e-6, here)
-
-
-def best_torques() -> Claims:
-    """The torque of least s where viscous and dry friction act."""
-    for R, (least, place) in BEST.items():
-        s = solved("foliot", mu=R * np.geomspace(1.5, 60, 400), a=1, R=R, phi0=1, rtol=1e-12).sensitivity
-        top = sweep.where_exponent(s, "mu", 0.0).abscissa / R
-        yield differing(f"R = {R:g} a^2 phi0: least s", f"{least}", s.min(), least, 1e-4, 5)
-        yield compared("  at mu/R", f"{place}", top, place, 1e-3, 4)
 
 
 def widths(ds: xr.Dataset) -> Claims:
@@ -149,19 +120,10 @@ def all_over() -> xr.Dataset:
     return shares(solved("foliot", design="zip", **losses, mu=mu, c=0, n=3, phi0=1, rtol=1e-9, outputs=SPEEDS))
 
 
-def figure(ds: xr.Dataset, pure: xr.DataArray) -> Any:
-    """The law over shares, over torque and friction, over the degree, and against every cell; for two columns."""
-    with page_of(140.0, 2, 2) as (page, ((triangle, region), (degree, check))):
+def figure(ds: xr.Dataset) -> Any:
+    """The law over shares, and against every cell."""
+    with page_of(150.0, 2, 1, width=NARROW, height_ratios=(1.05, 1)) as (page, (triangle, check)):
         draw_triangle(page, triangle)
-        draw_region(region)
-        n = np.linspace(0.02, 4, 200)
-        degree.plot(n, n / (n + 2), color=COLOURS[0], label="large swings, $n/(n+2)$")
-        degree.plot(n, 1 / n, color=COLOURS[1], linestyle="--", label="small swings, $1/n$")
-        degree.axhline(0.5, color=COLOURS[2], linewidth=0.8, linestyle=":", label="impacts, 1/2")
-        for k, label in enumerate(("kernel, $\\mu=10^{\\mp30}$", None)):
-            degree.plot(pure.n, pure[:, k], "o", color="black", markerfacecolor="white", markersize=4, label=label)
-        degree.set(xlabel="degree of the friction, $n$ [1]", ylabel="exponent, $s$ [1]", xlim=(0, 4.2), ylim=(0, 2.2))
-        degree.legend(loc="upper right", fontsize=7)
         bands = ((1.5, 3, "0.8"), (3, 10, COLOURS[5]), (10, 100, COLOURS[1]), (100, math.inf, COLOURS[0]))
         for low, high, colour in bands:
             part = ds.where((ds.swing > low) & (ds.swing <= high))
@@ -170,7 +132,7 @@ def figure(ds: xr.Dataset, pure: xr.DataArray) -> Any:
             check.plot(part.large.values.ravel(), part.sensitivity.values.ravel(), ".", **look)
         check.plot([0, 0.6], [0, 0.6], color="black", linewidth=0.8, label="theory (1)")
         check.set(xlabel=r"$(N+\lambda_e)/(N+2)$ [1]", ylabel="exponent, $s$ [1]", xlim=(0, 0.62), ylim=(0, 1.0))
-        check.legend(title=r"swing, $A/\varphi_0$", loc="upper left", markerscale=5, fontsize=7)
+        check.legend(title=r"swing, $A/\varphi_0$", loc="upper left", markerscale=5, ncols=2)
     return page
 
 
@@ -180,7 +142,7 @@ def draw_triangle(page: Any, axes: Any) -> None:
     corner = np.array([(i / steps, j / steps) for i in range(steps + 1) for j in range(steps + 1 - i)])
     viscous, struck = corner.T
     s = (viscous + struck) / (viscous + 2)
-    look = {"vmin": 0, "vmax": 1, "cmap": "cividis"}
+    look = {"vmin": 0, "vmax": 0.5, "cmap": "cividis"}
     x, y = struck + 0.5 * viscous, viscous * math.sqrt(3) / 2
     filled = axes.tripcolor(x, y, s, shading="gouraud", rasterized=True, **look)
     lines = axes.tricontour(x, y, s, levels=[0.1, 0.2, 0.3, 0.4], colors="white", linewidths=0.7)
@@ -189,7 +151,7 @@ def draw_triangle(page: Any, axes: Any) -> None:
     place = clocks.impacts + 0.5 * clocks.viscous, clocks.viscous * math.sqrt(3) / 2
     ring = {"edgecolors": "black", "linewidths": 0.5, "s": 12, "label": "clocks of the kernel"}
     axes.scatter(*place, c=clocks.sensitivity, **look, **ring)
-    page.colorbar(filled, ax=axes, label="exponent, $s$ [1]", pad=0.02, shrink=0.85, extend="max")
+    page.colorbar(filled, ax=axes, label="exponent, $s$ [1]", pad=0.02, shrink=0.85)
     for where, text in (((0, -0.02), "dry, 0"), ((1, -0.02), "impacts, 1/2"), ((0.5, 0.89), "viscous, 1/3")):
         axes.text(*where, text, ha="center", va="bottom" if where[1] > 0 else "top", fontsize=8)
     axes.set(xlim=(-0.08, 1.08), ylim=(-0.12, 1.0), aspect="equal")
@@ -197,41 +159,11 @@ def draw_triangle(page: Any, axes: Any) -> None:
     axes.legend(loc="lower center", fontsize=7, borderaxespad=0)
 
 
-def draw_region(axes: Any) -> None:
-    """s over torque and dry friction; lines where another loss comes to be the largest, dots where s is least."""
-    R, mu = np.geomspace(1e-3, 1e4, 421), np.geomspace(1e-3, 1e8, 661)
-    whole = prepared(solved("foliot", R=R, mu=mu, **PLANE, rtol=1e-7, outputs=SPEEDS)).transpose("R", "mu")
-    s = whole.sensitivity.values
-    colour_map(axes, mu, R, s, "exponent, $s$ [1]", {"extend": "max"}, vmin=0, vmax=1)
-    parts = np.nan_to_num([whole[name].values for name in LOSSES])
-    largest = np.where(np.isfinite(s), np.argmax(parts, axis=0), np.nan)
-    for k in range(len(LOSSES)):
-        axes.contour(mu, R, np.where(largest == k, 1.0, 0.0), levels=[0.5], colors="white", linewidths=0.7)
-    hatch(axes, mu, R, np.isnan(s), "////")
-    axes.plot(mu[np.nanargmin(s, axis=1)], R, color="#D55E00", label="least $s$")
-    axes.plot([], [], color="0.6", linewidth=0.7, label="largest loss (white)")
-    for x, y, text in (
-        (3e-2, 2e-3, "viscous, 1"), (6e1, 8e-2, "viscous, 1/3"), (1e5, 8e-2, "impacts, 1/2"),
-        (2e7, 8e-2, "drag, 3/5"), (1.3e4, 1.5e3, "dry, 0"), (3e-2, 1e2, "never starts"),
-    ):  # fmt: skip
-        direct_label(axes, x, y, text, fontsize=7)
-    axes.set(xscale="log", yscale="log", xlabel=r"torque, $\mu/(a^2\varphi_0)$ [1]")
-    axes.set(ylabel=r"dry friction, $R/(a^2\varphi_0)$ [1]")
-    axes.legend(loc="lower right", fontsize=6.5, frameon=True, framealpha=0.85)
-
-
 def conclude(path: str) -> Conclusion:
     """Statements and the figure."""
     ds = prepared(read_result(path, "foliot", ["n", "e", "a", "R", "c", "mu"], "law_map.toml"))
-    pure = solved("foliot", n=DEGREES, mu=[1e-30, 1e30], c=1, phi0=1, outputs=["sensitivity"]).sensitivity
-    law = "the law: s = (N + lambda_e)/(N + 2) at large swings,\n1/(N + 2 lambda_e) at small, N = sum of n lambda_n"
-    groups = {
-        "The general law": laws(ds),
-        "One loss alone": pure_laws(pure),
-        "Best torque, viscous and dry": best_torques(),
-        "Width of the crossovers (25 to 75 %)": widths(ds),
-    }
-    return groups, [NOTES, law], lambda: figure(ds, pure)
+    groups = {"The general law": laws(ds), "Width of the crossovers (25 to 75 %)": widths(ds)}
+    return groups, [NOTES], lambda: figure(ds)
 
 
 main = script(__name__, "law_map.h5", conclude)

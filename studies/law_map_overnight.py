@@ -23,12 +23,12 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Claims, Conclusion, compared, count, differing, most, paragraph, power, said, script, solved
-from _figures import colour_map, direct_label, page_of, plain_ticks
+from _common import Claims, Conclusion, compared, count, differing, most, power, said, script, solved
+from _figures import NARROW, colour_map, direct_label, page_of, plain_ticks
 from scipy.optimize.elementwise import find_root
 
 import sweep
-from sweep.show.charts import COLOURS, DASHES, MARKS
+from sweep.show.charts import COLOURS, MARKS
 
 LARGE = 5.0
 """Way beyond the switch over phi0, by (1), from which (1) is held to `CLOSE` of s."""
@@ -79,7 +79,8 @@ def best_torques(ds: xr.Dataset) -> Claims:
     step = float(np.diff(np.log(ds.mu.values)).mean())
     steps = (abs(np.log(clocks.sensitivity_argmin_mu / theory.mu)).where(far) / step).max()
     least = ds.sensitivity_min.load()
-    inside = float(within_decades(ds).mean())
+    place = ds.sensitivity_argmin_mu.load()
+    inside = float(((place > ds.mu[0]) & (place < ds.mu[-1])).mean())
     line = least.sel(e=1).isel(n=0, c=0)
     high = line.where(line.R > 1e3, drop=True)
     limit, light = 3 * (18 * float(high.R[-1])) ** (-1 / 3), f"light viscous friction, R = {high.R[-1]:g}: least s"
@@ -90,12 +91,6 @@ def best_torques(ds: xr.Dataset) -> Claims:
     yield compared(light, f"(2) {limit:.4f}", high[-1], limit, 0.08, 4)
     yield differing("  its power of R, R > 1000", "-1/3", power(high), -1 / 3, 0.06, 4)
     yield said(paper, inside < 0.01, missed, "every clock", True)
-
-
-def within_decades(ds: xr.Dataset) -> xr.DataArray:
-    """Which clocks have their best torque within the grid, not at an end of it."""
-    at = ds.sensitivity_argmin_mu.load()
-    return (at > ds.mu[0]) & (at < ds.mu[-1])
 
 
 def borders(fine: xr.Dataset) -> Claims:
@@ -117,61 +112,33 @@ def borders(fine: xr.Dataset) -> Claims:
     yield said("  of the cells near a border, s changing", near > 0.5, f"{near:.0%}", "most")
 
 
-def answer(ds: xr.Dataset) -> list[str]:
-    """The conclusion, with the numbers of the dataset."""
-    least, inside = ds.sensitivity_min.load(), float(within_decades(ds).mean())
-    third, fifth, tenth = (float((least < x).mean()) for x in (1 / 3 - 1e-3, 0.2, 0.1))
-    k = np.unravel_index(int(np.nanargmin(least.values)), least.shape)
-    cell = least[k]
-    ratio = float(ds.sensitivity_argmin_mu[k] / cell.R)
-    lowest = {e: float(least.sel(e=e, method="nearest").min()) for e in (1, 0.99, 0.9) if e in ds.e}
-    by_e = ", ".join(f"{s:.3f} at e = {e:g}" for e, s in lowest.items())
-    return paragraph(f"""In a line: of {least.size} clocks {inside:.0%} have their best torque within
-        the twelve decades, and {third:.0%} of all come to be steadier than strong drive with viscous
-        friction, s = 1/3; {fifth:.0%} come below s = 0.2 and {tenth:.0%} below 0.1. The steadiest has
-        s = {float(cell):.4f}, with R = {float(cell.R):g} a^2 phi0 and a torque of {ratio:.1f} R; the least is
-        {by_e}.""")
-
-
 def figure(ds: xr.Dataset, fine: xr.Dataset) -> Any:
-    """How many clocks come how low, the least s over dry friction, and the refined borders; for two columns."""
-    with page_of(68.0, 1, 3) as (page, (shares, least, borders)):
+    """The least s over dry friction with hardly any drag, with (1) and (2), and the refined borders."""
+    part = ds[["sensitivity_min"]].isel(c=[0]).sel(n=[3.0]).isel(R=slice(None, None, 3)).load()
+    part = part.where(part.R > 1, drop=True)
+    theory = balanced(part, ds.mu)
+    with page_of(138.0, 2, 1, width=NARROW) as (page, (least, borders)):
         for k, e in enumerate(SHOWN):
-            low = np.sort(ds.sensitivity_min.sel(e=e, method="nearest").values.ravel())
-            shares.plot(low, np.linspace(0, 100, low.size), color=COLOURS[k], linestyle=DASHES[k], label=f"{e:g}")
-        shares.axvline(1 / 3, color="0.5", linewidth=0.7)
-        shares.set(xlabel="least exponent, $s$ [1]", ylabel="clocks below it [%]", xlim=(0, 0.6), ylim=(0, 100))
-        shares.legend(title="restitution, $e$", loc="upper left", fontsize=7, title_fontsize=7)
-        draw_least(least, ds)
+            here, line = (x.sel(e=e, method="nearest").isel(n=0, c=0) for x in (part.sensitivity_min, theory))
+            look = {"color": COLOURS[k], "linestyle": "", "markerfacecolor": "white", "markersize": 3}
+            least.loglog(here.R, here, MARKS[k], label=f"$e={e:g}$", **look)
+            least.plot(line.R, line.s.where(line.beyond > LARGE), color=COLOURS[k])
+        R = np.geomspace(10, 1e4, 20)
+        least.plot(R, 3 * (18 * R) ** (-1 / 3), color="black", linewidth=0.8, linestyle=":", label="(2)")
+        least.plot([], [], color="black", label="(1)")
+        least.set(xlabel=r"dry friction, $R/(a^2\varphi_0)$ [1]", ylabel="least $s$ [1]", ylim=(0.04, 0.7))
+        plain_ticks(least.yaxis, (0.05, 0.1, 0.2, 0.5))
+        least.legend(loc="lower left")
 
         at = {name: np.geomspace(float(fine[name].min()), float(fine[name].max()), 120) for name in ("c", "mu")}
         s = sweep.interpolated(fine, at).sensitivity.transpose("c", "mu")
         colour_map(borders, s.mu, s.c, s, "exponent, $s$ [1]", vmin=1 / 3, vmax=1)
-        cells = fine.mu.values.ravel(), fine.c.values.ravel()
-        borders.plot(*cells, ".", color="white", markersize=1.2, label="cells")
+        borders.plot(fine.mu.values.ravel(), fine.c.values.ravel(), ".", color="white", markersize=1.2)
         for x, y, text in ((3e-2, 1e-6, "1"), (3e2, 1e-6, "1/3"), (1e6, 3e-6, "3/5"), (1e6, 1e-1, "1/3, drag")):
-            direct_label(borders, x, y, text, fontsize=7)
+            direct_label(borders, x, y, text)
         borders.set(xscale="log", xlabel=r"torque, $\mu/(a^2\varphi_0)$ [1]")
         borders.set(yscale="log", ylabel=r"drag, $c\,a\varphi_0^2$ [1]")
     return page
-
-
-def draw_least(axes: Any, ds: xr.Dataset) -> None:
-    """Least s over dry friction with hardly any drag, with (1) and (2)."""
-    part = ds[["sensitivity_min"]].isel(c=[0]).sel(n=[3.0]).isel(R=slice(None, None, 3)).load()
-    part = part.where(part.R > 1, drop=True)
-    theory = balanced(part, ds.mu)
-    for k, e in enumerate(SHOWN):
-        here, line = (x.sel(e=e, method="nearest").isel(n=0, c=0) for x in (part.sensitivity_min, theory))
-        look = {"color": COLOURS[k], "linestyle": "", "markerfacecolor": "white", "markersize": 3}
-        axes.loglog(here.R, here, MARKS[k], label=f"$e={e:g}$", **look)
-        axes.plot(line.R, line.s.where(line.beyond > LARGE), color=COLOURS[k])
-    R = np.geomspace(10, 1e4, 20)
-    axes.plot(R, 3 * (18 * R) ** (-1 / 3), color="black", linewidth=0.8, linestyle=":", label="(2)")
-    axes.plot([], [], color="black", label="(1)")
-    axes.set(xlabel=r"dry friction, $R/(a^2\varphi_0)$ [1]", ylabel="least $s$ [1]", ylim=(0.04, 0.7))
-    plain_ticks(axes.yaxis, (0.05, 0.1, 0.2, 0.5))
-    axes.legend(loc="lower left", fontsize=7)
 
 
 def conclude(path: str, borders_path: str) -> Conclusion:
@@ -181,7 +148,7 @@ def conclude(path: str, borders_path: str) -> Conclusion:
         raise sweep.SweepError(f"{path} is not of this study; make it from law_map_overnight.toml")
     fine = fine.load()
     groups = {"The best torque": best_torques(ds), "Along the borders": borders(fine)}
-    return groups, [NOTES, "", *answer(ds)], lambda: figure(ds, fine)
+    return groups, [NOTES], lambda: figure(ds, fine)
 
 
 main = script(__name__, "law_map_overnight.h5 law_map_borders_fine.h5", conclude)

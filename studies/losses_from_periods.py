@@ -18,13 +18,12 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Conclusion, Statement, most, read_result, said, script, solved
-from _figures import page_of, plain_ticks
+from _common import Claims, Conclusion, Statement, most, read_result, said, script, solved
+from _figures import NARROW, page_of, plain_ticks
 from clock_losses import SHARES, SUM, THRESHOLD, Measured, forecast
 
 from sweep.show.charts import COLOURS
 
-CLOCKS = ("equal shares", "mostly dry", "mostly viscous", "mostly drag", "mostly impacts")
 NOISE = 0.01
 SPREADS = (3.0, 10.0, 30.0)
 """Largest over least torque."""
@@ -63,32 +62,23 @@ def matrices(ds: xr.Dataset, over: float, amplitude: bool, number: int = 12) -> 
     return mu[:-1], np.delete(J, [number, 2 * number + 1] if amplitude else [number], axis=0), by_u
 
 
-def knowable(ds: xr.Dataset) -> list[Statement]:
+def knowable(ds: xr.Dataset) -> Claims:
     """Forecast errors by spread of the torques, with and without amplitudes, for the clock of equal shares."""
-
-    def row(values: Any) -> str:
-        return ", ".join(f"{x:.2g}" for x in values)
-
-    lines = []
     for over in SPREADS:
         (alone, weak), (both, strong) = (forecast(*matrices(ds, over, amplitude)[1:]) for amplitude in (False, True))
         if over < 20.0:
             unknown, theory = alone[:4].min() > 0.5, "all > .5"
         else:
             unknown, theory = alone[0] < 0.125 and alone[2:4].min() > 0.5, "dry < 1/8, drag and impacts > .5"
+        texts = (", ".join(f"{x:.2g}" for x in errors) for errors in (alone[:4], both))
+        what = f"torques over a factor {over:g}: error of dry, viscous, drag, impacts"
+        yield said(what, unknown, next(texts), theory)
+        yield most("  with amplitudes, and of drag with impacts", "< .3", both.max(), 0.3, next(texts))
         least = "  least singular value, by periods alone, over that with amplitudes"
-        worth, values = weak[-1] / strong[-1], f"{weak[-1]:.3g} / {strong[-1]:.3g}"
-        lines += [
-            said(
-                f"torques over a factor {over:g}: error of dry, viscous, drag, impacts", unknown, row(alone[:4]), theory
-            ),
-            most("  with amplitudes, and of drag with impacts", "< .3", both.max(), 0.3, row(both)),
-            most(least, "< 1/5", worth, 0.2, values),
-        ]
-    return lines
+        yield most(least, "< 1/5", weak[-1] / strong[-1], 0.2, f"{weak[-1]:.3g} / {strong[-1]:.3g}")
 
 
-def chosen(ds: xr.Dataset) -> list[Statement]:
+def chosen(ds: xr.Dataset) -> Claims:
     """Which 12 torques to measure of 25 within a factor of 10, some more than once: where the shares vary least.
 
     By exchange; compared are the sums of the variances of the four shares, square rooted, and 12 torques spread evenly.
@@ -110,13 +100,11 @@ def chosen(ds: xr.Dataset) -> list[Statement]:
     values, counts = np.unique(np.round(mu[places], 1), return_counts=True)
     text = ", ".join(f"{n} x {x:g}" for x, n in zip(values, counts, strict=True))
     together, ratio = "  error of the four shares together, over that of even ones", least / even
-    return [
-        said("12 best torques within a factor 10, by exchange", len(values) < 7, text),
-        Statement(together, "< 0.95", f"{least:.3f} / {even:.3f}", ratio, ratio < 0.95),
-    ]
+    yield said("12 best torques within a factor 10, by exchange", len(values) < 7, text)
+    yield Statement(together, "< 0.95", f"{least:.3f} / {even:.3f}", ratio, ratio < 0.95)
 
 
-def covered(ds: xr.Dataset, clocks: int) -> list[Statement]:
+def covered(ds: xr.Dataset, clocks: int) -> Claims:
     """One noisy measurement of each clock: whether the best fit comes back, and intervals hold the true shares."""
     held, off, sums = [], [], []
     for clock in range(clocks):
@@ -129,59 +117,39 @@ def covered(ds: xr.Dataset, clocks: int) -> list[Statement]:
         held += [noisy.fit(share, true[share], best)[1] - least < THRESHOLD for share in shares]
     mean, share = float(np.mean(sums)), float(np.mean(held))
     enough = abs(mean - 20.0) < 3.0 * np.sqrt(40.0 / clocks)
-    hold = "  with noise: intervals of 95 % that hold the true share"
     over = "  sum of squares over the noise, mean; 24 numbers, 4 losses"
-    return [
-        most(f"{clocks} clocks without noise: shares fitted", "1e-3", np.array(off), 1e-3),
-        Statement(hold, "> 4/5", f"{sum(held)} of {len(held)}", share, share >= 0.8),
-        Statement(over, "20", f"{mean:.1f}", mean / 20 - 1, bool(enough)),
-    ]
+    hold = "  with noise: intervals of 95 % that hold the true share"
+    yield most(f"{clocks} clocks without noise: shares fitted", "1e-3", np.array(off), 1e-3)
+    yield Statement(hold, "> 4/5", f"{sum(held)} of {len(held)}", share, share >= 0.8)
+    yield Statement(over, "20", f"{mean:.1f}", mean / 20 - 1, bool(enough))
 
 
-def figure(ds: xr.Dataset, clocks: int) -> Any:
-    """Forecast errors over the spread of the torques, and intervals of 95 % of known clocks; for two columns."""
-    rings = {"color": "black", "markerfacecolor": "white", "markersize": 3}
-    with page_of(72.0, 1, 2) as (page, (spread, intervals)):
+def figure(ds: xr.Dataset) -> Any:
+    """Forecast errors of the shares over the spread of the torques."""
+    with page_of(84.0, width=NARROW) as (page, axes):
         spreads = np.geomspace(2.0, 60.0, 12)
         for dashes, amplitude in (("--", False), ("-", True)):
             errors = np.array([forecast(*matrices(ds, over, amplitude)[1:])[0] for over in spreads])
             for k, name in enumerate(SHARES):
-                spread.loglog(spreads, errors[:, k], dashes, color=COLOURS[k], label=name if amplitude else None)
-        spread.plot([], [], "--", color="black", label="periods alone")
-        spread.axhline(0.25, color="0.6", linewidth=0.6)
-        spread.set(xlabel="largest over least torque [1]", ylabel="standard error of a share [1]", ylim=(2e-3, 5))
-        plain_ticks(spread.xaxis, (2, 5, 10, 20, 50))
-        spread.legend(fontsize=6.5, ncols=2, loc="lower left")
-
-        for clock in range(clocks):
-            noisy = measured(ds, clock, True, NOISE)
-            true = SUM @ noisy.predicted(losses(ds, clock, noisy)[None])[1][0]
-            best = noisy.fit()
-            for k, name in enumerate(SHARES):
-                low, here, high = noisy.interval(k, best)
-                x, bar = clock + 0.16 * (k - 2), {"linewidth": 2.2, "solid_capstyle": "butt"}
-                label = None if clock else name
-                intervals.plot([x, x], [low, high], color=COLOURS[k], label=label, **bar)
-                intervals.plot(x, here, "_", color=COLOURS[k], markersize=5)
-                intervals.plot(x, true[k], "o", **rings)
-        intervals.plot([], [], "o", label="true", **rings)
-        intervals.tick_params(axis="x", which="minor", bottom=False, top=False)
-        intervals.set_xticks(range(len(CLOCKS)), [name.replace(" ", "\n") for name in CLOCKS], fontsize=7)
-        intervals.set(ylabel="share of the loss [1]", ylim=(-0.03, 1.35))
-        intervals.legend(fontsize=6.5, ncols=3, loc="upper left")
+                axes.loglog(spreads, errors[:, k], dashes, color=COLOURS[k], label=name if amplitude else None)
+        axes.plot([], [], "--", color="black", label="periods alone")
+        axes.axhline(0.25, color="0.6", linewidth=0.6)
+        axes.set(xlabel="largest over least torque [1]", ylabel="standard error of a share [1]", ylim=(2e-3, 5))
+        plain_ticks(axes.xaxis, (2, 5, 10, 20, 50))
+        axes.legend(ncols=2, loc="lower left")
     return page
 
 
 def conclude(path: str, tell: bool = True) -> Conclusion:
     """Statements and the figure; `tell`: all shares of all clocks are fitted, not two of the first."""
-    clocks = len(CLOCKS) if tell else 1
     ds = read_result(path, "foliot", ["point", "mu"], "losses_from_periods.toml")
+    clocks = ds.sizes["point"] if tell else 1
     groups = {
         "What can be known": knowable(ds),
         "Which torques to measure": chosen(ds),
         "Clocks of known losses": covered(ds, clocks),
     }
-    return groups, [NOTES], lambda: figure(ds, clocks if tell else 0)
+    return groups, [NOTES], lambda: figure(ds)
 
 
 main = script(__name__, "losses_from_periods.h5", conclude)

@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Conclusion, Statement, all_ok, compared, differing, read_result, script
-from _figures import direct_label, page_of
+from _common import Claims, Conclusion, all_ok, compared, differing, read_result, script
+from _figures import NARROW, direct_label, page_of
 
 from sweep.show.charts import COLOURS
 
@@ -31,50 +31,38 @@ Weak: T = 2 pi (1 + mu^2/16), largest x 2 + mu^2/96, multiplier exp(-2 pi mu).
 Strong (Dorodnicyn 1947): T = (3 - 2 ln 2) mu + 7.0143 mu^-1/3."""
 
 
-def weak(ds: xr.Dataset) -> list[Statement]:
+def weak(ds: xr.Dataset) -> Claims:
     """The limit of weak friction; x by a cell in which what it exceeds 2 by is more than the error that rtol allows."""
-    here, near = ds.isel({"mu": 0}), ds.sel({"mu": 0.018}, method="nearest")
-    larger = (float(near.x_size) - 2.0) / float(near.mu) ** 2
-    mu, left = float(here.mu), math.exp(-2 * math.pi * float(here.mu))
-    return [
-        compared("(T/2 pi - 1)/mu^2", "1/16", (float(here.period) / (2.0 * math.pi) - 1.0) / mu**2, 1.0 / 16.0, 1e-3),
-        compared("(largest x - 2)/mu^2 at mu = 0.018", "1/96", larger, 1.0 / 96.0, 1e-3),
-        compared("multiplier at the weakest", "exp(-2 pi mu)", float(here.multiplier), left, 1e-4),
-    ]
+    here, near = ds.isel(mu=0), ds.sel(mu=0.018, method="nearest")
+    mu, larger = float(here.mu), (near.x_size - 2.0) / near.mu**2
+    yield compared("(T/2 pi - 1)/mu^2", "1/16", (here.period / (2.0 * math.pi) - 1.0) / mu**2, 1.0 / 16.0, 1e-3)
+    yield compared("(largest x - 2)/mu^2 at mu = 0.018", "1/96", larger, 1.0 / 96.0, 1e-3)
+    yield compared("multiplier at the weakest", "exp(-2 pi mu)", here.multiplier, math.exp(-2 * math.pi * mu), 1e-4)
 
 
-def strong(ds: xr.Dataset) -> list[Statement]:
+def strong(ds: xr.Dataset) -> Claims:
     """The limit of strong friction."""
-    late = ds.where(ds.mu >= 1e3, drop=True)
-    more = late.period - SLOW * late.mu
-    slope = np.polyfit(np.log(late.mu), np.log(more), 1)[0]
-    last, mu = ds.isel({"mu": -1}), float(ds.mu[-1])
+    late, last, mu = ds.where(ds.mu >= 1e3, drop=True), ds.isel(mu=-1), float(ds.mu[-1])
+    slope = np.polyfit(np.log(late.mu), np.log(late.period - SLOW * late.mu), 1)[0]
     theory = SLOW * mu + NEXT * mu ** (-1 / 3)
-    return [
-        compared("T at the strongest", "(3 - 2 ln 2) mu + 7.0143 mu^-1/3", float(last.period), theory, 1e-7),
-        differing("exponent of T - (3 - 2 ln 2) mu", "-1/3", float(slope), -1.0 / 3.0, 0.02),
-        differing("d ln T/d ln mu at the strongest", "1", float(last.period_by_mu), 1.0, 1e-4),
-    ]
+    yield compared("T at the strongest", "(3 - 2 ln 2) mu + 7.0143 mu^-1/3", last.period, theory, 1e-7)
+    yield differing("exponent of T - (3 - 2 ln 2) mu", "-1/3", slope, -1.0 / 3.0, 0.02)
+    yield differing("d ln T/d ln mu at the strongest", "1", last.period_by_mu, 1.0, 1e-4)
 
 
 def figure(ds: xr.Dataset) -> Any:
-    """Period with its limits; what is left of it beyond the strong one; largest x and multiplier."""
-    with page_of(62.0, 1, 3) as (page, (a, b, c)):
-        a.plot(ds.mu, ds.period, color=COLOURS[0])
-        a.plot(ds.mu, SLOW * ds.mu, color="0.5", linestyle="--", linewidth=0.8)
-        a.axhline(2.0 * math.pi, color="0.5", linestyle=":", linewidth=0.8)
-        a.set(xscale="log", yscale="log", xlabel=r"friction $\mu$", ylabel="period $T$", ylim=(3.0, 3e4))
-        direct_label(a, 1500.0, 200.0, r"$(3-2\,\ln 2)\,\mu$", "0.4")
-        direct_label(a, 0.1, 4.4, r"$2\pi$", "0.4")
-        b.plot(ds.mu, ds.period - SLOW * ds.mu, color=COLOURS[0])
-        b.plot(ds.mu, NEXT * ds.mu ** (-1 / 3), color="0.5", linestyle="--", linewidth=0.8)
-        b.set(xscale="log", yscale="log", xlabel=r"friction $\mu$", ylabel=r"$T-(3-2\,\ln 2)\,\mu$")
-        direct_label(b, 400.0, 4.0, r"$7.0143\,\mu^{-1/3}$", "0.4")
-        c.plot(ds.mu, ds.x_size, color=COLOURS[0], label="largest $x$")
-        c.plot(ds.mu, ds.multiplier.clip(0.0), color=COLOURS[1], linestyle="--", label="multiplier")
-        c.plot(ds.mu, ds.period_by_mu, color=COLOURS[2], linestyle="-.", label=r"d ln $T$/d ln $\mu$")
-        c.set(xscale="log", xlabel=r"friction $\mu$", ylim=(-0.05, 2.2))
-        c.legend(loc="center right", fontsize=6, bbox_to_anchor=(1.0, 0.68))
+    """Period with its limits; what is left of it beyond the strong one."""
+    with page_of(120.0, 2, 1, width=NARROW, sharex=True) as (page, (period, rest)):
+        period.loglog(ds.mu, ds.period, color=COLOURS[0])
+        period.plot(ds.mu, SLOW * ds.mu, color="0.5", linestyle="--", linewidth=0.8)
+        period.axhline(2.0 * math.pi, color="0.5", linestyle=":", linewidth=0.8)
+        period.set(ylabel="period $T$ [1]", ylim=(3.0, 3e4))
+        direct_label(period, 1500.0, 200.0, r"$(3-2\,\ln 2)\,\mu$", "0.4")
+        direct_label(period, 0.1, 4.4, r"$2\pi$", "0.4")
+        rest.loglog(ds.mu, ds.period - SLOW * ds.mu, color=COLOURS[0])
+        rest.plot(ds.mu, NEXT * ds.mu ** (-1 / 3), color="0.5", linestyle="--", linewidth=0.8)
+        rest.set(xlabel=r"friction $\mu$ [1]", ylabel=r"$T-(3-2\,\ln 2)\,\mu$ [1]")
+        direct_label(rest, 400.0, 4.0, r"$7.0143\,\mu^{-1/3}$", "0.4")
     return page
 
 

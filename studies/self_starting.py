@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from _common import Conclusion, Groups, read_result, said, script, solved
-from _figures import page_of
+from _figures import NARROW, page_of
 from matplotlib.colors import ListedColormap
 from matplotlib.patches import Patch
 
@@ -69,8 +69,8 @@ def statements(ds: xr.Dataset) -> Groups:
 def figure(ds: xr.Dataset) -> Any:
     """Where it starts, by hairspring; lines are (1)."""
     palette = ("0.85", COLOURS[5], COLOURS[0])
-    with page_of(78.0, 1, 3, sharey=True) as (page, panels):
-        for axes, k in zip(panels, ds.k.values, strict=True):
+    with page_of(86.0, 1, 2, width=NARROW, sharey=True) as (page, panels):
+        for axes, k in zip(panels, ds.k.values[[0, -1]], strict=True):
             part = ds.sel(k=k, R_s=0.6)
             kind = started(part).sel(a=0).astype(int) + started(part).sel(a=1)
             axes.pcolormesh(ds.phi_start, ds.mu, kind.transpose("mu", "phi_start"), cmap=ListedColormap(list(palette)),
@@ -83,7 +83,7 @@ def figure(ds: xr.Dataset) -> Any:
         panels[0].set_ylabel(r"torque, $\mu/\varphi_0$ [s$^{-2}$]")
         words = ("rests", "starts if $a=0$ only", "starts")
         keys = [Patch(color=colour, label=text) for colour, text in zip(palette, words, strict=True)]
-        page.legend(handles=[*keys, *panels[0].lines], loc="outside lower center", ncols=5)
+        page.legend(handles=[*keys, *panels[0].lines], loc="outside lower center", ncols=3)
     return page
 
 

@@ -30,7 +30,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from _common import Claims, Conclusion, columns, compared, differing, power, read_result, script, solved
-from _figures import page_of
+from _figures import NARROW, page_of
 
 from sweep.show.charts import COLOURS
 
@@ -42,6 +42,9 @@ TIMES = ("white", "1 min", "1 h", "1 day")
 LINEAR = 0.3
 """Noise beyond which torque would now and then vanish, and the linear law says no more than that."""
 Clocks = dict[str, xr.Dataset]
+NOTES = """\
++-: what a number may be off by, three standard errors of these seeds and days for a scatter, four for a loss\
+"""
 
 
 def without_noise(ds: xr.Dataset) -> xr.Dataset:
@@ -139,19 +142,6 @@ def clock_statements(name: str, ds: xr.Dataset) -> Claims:
         yield line if error < 0.1 else replace(line, here=f"{line.here} +- {part.gain_error:.1g}", holds=None)
 
 
-def lasting(clocks: Clocks) -> Claims:
-    """eps/s of a lasting change, by the series of s at weak and at strong drive."""
-    verge, buergi = clocks["verge"], clocks["Bürgi"]
-    alpha, strong = (float(ds.mu / (ds.a**2 * ds.phi0)) for ds in (verge, buergi))
-    b2 = (3 / strong) ** (2 / 3)
-    minute = 100 * 60 / DAY
-    series = minute / (1 / 3 + 4 * b2 / 45 + 52 * b2**2 / 4725)
-    per_cent = f"verge, 1 % of rate: lasting change of torque [%], +- {1e-6:g}"
-    by_series, by_minute = f"1/s by its series = {series:.4g}", "Bürgi, 1 min/day: lasting change [%], +- 1e-3"
-    yield compared(per_cent, f"1 + alpha = {1 + alpha:.5g}", 1 / verge.s, 1 + alpha, 1e-6, 5)
-    yield compared(by_minute, by_series, minute / buergi.s, series, 1e-3, 4)
-
-
 def table(clocks: Clocks) -> list[str]:
     """The torque noise, in % of the torque, that scatters a clock by each goal; the lasting change that shifts it."""
     rows = [("clock", "goal", *(f"noise, {x}" for x in TIMES), "lasting change")]
@@ -166,28 +156,10 @@ def table(clocks: Clocks) -> list[str]:
     ]
 
 
-def in_words(clocks: Clocks) -> list[str]:
-    """The answer, from the numbers."""
-    white, _, hour, day = clocks["verge"].scatter.sel(sigma=0.1).values
-    eps = {"verge": 900, "Bürgi": 60, "spring": 1}
-    lasting = [f"{100 * rate / DAY / float(clocks[name].s):.2f} %" for name, rate in eps.items()]
-    many = DAY / float(clocks["verge"]["T"])
-    errors = ", ".join(f"{3 * float(ds.blur):.0%} ({name})" for name, ds in clocks.items())
-    return f"""\
-+-: what a number may be off by, three standard errors of these seeds and days for a scatter, four for a loss. So law
-(1) is confirmed to {errors} in one run, not better; in SI nothing else is. Torque noise of 10 % scatters the verge by
-{white:.0f} s/day if it is white, since a day averages {many:.0f} half swings; by {hour:.0f} s/day if it lasts an
-hour, by {day:.0f} s/day if it lasts a day. So no noise from swing to swing makes 15 min/day: the paper's eps/s is of
-changes that last. These may be {lasting[0]} of torque for the verge's 15 min/day, {lasting[1]} for Bürgi's 1 min/day,
-and {lasting[2]} for 1 s/day with this spring. What lasts for ever is regulated away, and so is the loss by white
-noise, a share of sigma^2; what differs from day to day stays.\
-""".splitlines()
-
-
 def figure(clocks: Clocks) -> Any:
-    """Scatter against noise, white and of a day, with (1); against correlation; loss against white noise, with (2)."""
+    """Scatter against noise, white and of a day, and against the correlation of the noise, with (1)."""
     wide = np.geomspace(1e-3, 0.3, 2)
-    with page_of(76.0, 1, 3) as (page, (scatter, correlation, losses)):
+    with page_of(142.0, 2, 1, width=NARROW) as (page, (scatter, correlation)):
         for (name, ds), colour, mark in zip(clocks.items(), COLOURS, "os^", strict=False):
             for j, dashes, fill in ((0, "-", "white"), (3, (0, (5, 1.5)), colour)):
                 scatter.loglog(wide, law(ds, ds.tau_c[j]) * wide, color=colour, linestyle=dashes)
@@ -197,20 +169,13 @@ def figure(clocks: Clocks) -> Any:
             y = ds.per_sigma / unit
             correlation.errorbar(lasts(ds, ds.tau_c), y, float(ds.blur) * y, label=name, **look)
             correlation.loglog(lasts(ds, theta), law(ds, theta) / unit, color=colour, linewidth=0.8)
-            white = ds.isel(tau_c=0)
-            white = white.sel(sigma=white.gain < -2 * white.gain_error)  # known to half of itself
-            losses.errorbar(white.sigma, -white.gain, white.gain_error, **look)
-            losses.loglog(wide, second_order(ds, 0.0) * wide**2, color=colour)
         for goal, rate in GOALS.items():
             scatter.axhline(rate, color="0.6", linewidth=0.6)
-            look = {"fontsize": 7, "va": "center", "transform": scatter.get_yaxis_transform()}
-            scatter.text(1.03, rate, goal.removesuffix("/day"), **look)
+            scatter.text(1.02, rate, goal, fontsize=8, va="center", transform=scatter.get_yaxis_transform())
         scatter.set(xlim=(1e-3, 0.3), ylim=(1e-4, 1e4), xlabel=r"torque noise, $\sigma$ [1]")
         scatter.set_ylabel("scatter of the rate from day to day [s/day]")
         correlation.set(xlim=(1e-6, 10), ylim=(1e-3, 1.2), xlabel="correlation time of the torque [day]")
         correlation.set_ylabel(r"scatter over $s\sigma$ [1]")
-        losses.set(xlim=(1e-3, 0.3), ylim=(1e-6, 1e4), xlabel=r"torque noise, $\sigma$, white [1]")
-        losses.set_ylabel("mean loss [s/day]")
         page.legend(*correlation.get_legend_handles_labels(), loc="outside upper center", ncols=3)
         scatter.plot([], [], "o-", color="black", markerfacecolor="white", label="white")
         scatter.plot([], [], "o", color="black", linestyle=(0, (5, 1.5)), label="of a day")
@@ -228,8 +193,7 @@ def conclude(*paths: str) -> Conclusion:
     """Statements, tables and the figure."""
     clocks = {name: read(path, study) for (name, study), path in zip(CLOCKS.items(), paths, strict=True)}
     groups = {name: clock_statements(name, ds) for name, ds in clocks.items()}
-    groups["Lasting changes, eps/s"] = lasting(clocks)
-    return groups, ["", *table(clocks), "", *in_words(clocks)], lambda: figure(clocks)
+    return groups, [NOTES, "", *table(clocks)], lambda: figure(clocks)
 
 
 main = script(__name__, "timekeeping.h5 timekeeping_buergi.h5 timekeeping_spring.h5", conclude)

@@ -12,11 +12,6 @@ switch follows from the balance of energy, friction of degree n taking abs(v)^(n
     s = (sum n lambda_n + lambda_impact)/(2 + sum n lambda_n),                                           (1)
 
 n = 1 for viscous and 0 for dry friction: 1/3, 1/2 and 0 where one of them takes all. At weak drive s = 1/(1 + alpha).
-
-Answer: with a light wheel the turn from 1/3 to 1/2 lies where the wheel would be thrown back by more than half a
-pitch, out of mesh; there the equations go on and no clock does. In mesh a light wheel comes near 1/3 and never back to
-1/2, and a wheel heavy enough to stay in mesh at any drive, from about a sixth of the foliot's inertia on, never comes
-below .43: no clock of the grid shows both. A clock with a light wheel loses most to viscous and least to impacts.
 """
 
 from __future__ import annotations
@@ -26,22 +21,11 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import (
-    Conclusion,
-    Statement,
-    count,
-    differing,
-    last_passage,
-    most,
-    power,
-    read_result,
-    said,
-    script,
-    solved,
-)
-from _figures import colour_map, direct_label, hatch, page_of
+from _common import Claims, Conclusion, count, differing, last_passage, most, power, read_result, said, script
+from _figures import NARROW, exponent_map, page_of
+from _losses import verge
 
-from sweep.show.charts import COLOURS, DASHES, MARKS
+from sweep.show.charts import COLOURS
 
 STRONG = 1e4
 """alpha from which (1) is held to 0.015, what is left of the drop and of a swing that is not endless."""
@@ -59,47 +43,22 @@ where friction moves to the wheel and s < 1/2; near the torque that just drives 
 
 
 def prepared(ds: xr.Dataset) -> xr.Dataset:
-    """`ds` with kappa, alpha, `period`, `s`, the shares of the losses, and the recoil over the wheel's tooth pitch."""
-    a = (ds.c_v + ds.n**2 * ds.c_c) / ds.I_v
-    ds = ds.assign_coords(kappa=ds.n**2 * ds.I_c / ds.I_v, alpha=ds.n * ds.tau / (ds.I_v * a**2 * ds.phi0))
-    way = 2 * ds.n * ds.phi0 + ds["drop"]
-    work = ds.tau * way
+    """`ds` with its groups, and the shares of the losses."""
+    period, work = 2 * ds.clock, ds.tau * (2 * ds.n * ds.phi0 + ds["drop"])
     together = (ds.n * ds.I_c * ds.wheel - ds.I_v * ds.speed) / (ds.I_v + ds.n**2 * ds.I_c)
     kept = (ds.I_v + ds.n**2 * ds.I_c) * together**2
     knocked = 0.5 * (ds.I_v * ds.speed**2 + ds.I_c * ds.wheel**2 - kept)
-    period = 2 * ds.clock
-    rise = np.log(period).assign_coords(tau=np.log(ds.tau)).differentiate("tau").assign_coords(tau=ds.tau)
-    driven = np.isfinite(period.shift(tau=1)) & np.isfinite(period.shift(tau=-1))
-    ds = ds.assign(period=period, s=-rise.where(driven), pitches=ds.recoil / (2 * way))
+    ds = verge(ds, period, np.isfinite(period))
     return ds.assign(viscous=ds.drag / work, dry=ds.rubbing / work, impact=knocked / work)
 
 
-def law(ds: xr.Dataset) -> xr.DataArray:
-    """(1)."""
-    return (ds.viscous + ds.impact) / (2 + ds.viscous)
-
-
-def ends(smooth: xr.Dataset) -> list[Statement]:
-    """The exponents at the ends of the grid, without dry friction, and one body beside the two.
-
-    That is the kernel `foliot` that keeps (1 - kappa)/(1 + kappa) of its speed, for wheels lighter than the foliot.
-    """
+def ends(smooth: xr.Dataset) -> Claims:
+    """The exponents at the ends of the grid, without dry friction."""
     light, heavy = smooth.isel(I_c=0), smooth.sel(I_c=2.5e-3, method="nearest")
     first, weak = light.s.isel(tau=1), 1 / (1 + float(light.alpha[1]))
-    off = []
-    for k in np.flatnonzero(smooth.kappa.values < 0.99):
-        line = smooth.isel(I_c=int(k))
-        share, mu = float(line.kappa), line.n * line.tau / (line.I_v * (1 + line.kappa))
-        foliot = {"a": line.c_v / line.I_v / (1 + share), "phi0": line.phi0, "e": (1 - share) / (1 + share)}
-        off.append(line.period.values / solved("foliot", mu=mu, **foliot, outputs=["period"]).period.values - 1)
-    drop = float(smooth["drop"] / (2 * smooth.n * smooth.phi0))
-    one = "one body that keeps (1 - kappa)/(1 + kappa): period"
-    return [
-        differing("kappa = .001, weakest drive", f"1/(1 + alpha) = {weak:.4f}", first, weak, 0.01, 4),
-        differing("kappa = .001: least s", "1/3", light.s.min(), 1 / 3, 0.01, 4),
-        differing("kappa = 1: strongest drive", "1/2", heavy.s.isel(tau=-2), 0.5, 0.01, 4),
-        most(one, f"to the drop, {drop:.1%}", xr.DataArray(off), 1.2 * drop),
-    ]
+    yield differing("kappa = .001, weakest drive", f"1/(1 + alpha) = {weak:.4f}", first, weak, 0.01, 4)
+    yield differing("kappa = .001: least s", "1/3", light.s.min(), 1 / 3, 0.01, 4)
+    yield differing("kappa = 1: strongest drive", "1/2", heavy.s.isel(tau=-2), 0.5, 0.01, 4)
 
 
 def passage(smooth: xr.Dataset, value: float) -> xr.DataArray:
@@ -109,55 +68,48 @@ def passage(smooth: xr.Dataset, value: float) -> xr.DataArray:
     return xr.DataArray(found, {"kappa": smooth.kappa.values}, ("kappa",))
 
 
-def turns(smooth: xr.Dataset, upper: xr.DataArray, lower: xr.DataArray) -> list[Statement]:
+def turns(smooth: xr.Dataset, upper: xr.DataArray, lower: xr.DataArray) -> Claims:
     """Where one exponent turns into the other, without dry friction: at s = 3/4 and, farther on, at 5/12."""
-    deep = lower.where((lower.kappa > 0.008) & (lower.kappa < 0.05), drop=True)
-    lost = 4 * deep.kappa / (1 + deep.kappa) ** 2  # 1 - e^2
-    by_loss = power(deep.assign_coords(kappa=lost.values))
+    there, deep = upper.dropna("kappa"), lower.where((lower.kappa > 0.008) & (lower.kappa < 0.05), drop=True)
     text = ", ".join(f"{float(x):.2g} at kappa = {float(x.kappa):.3g}" for x in deep)
-    near = smooth.viscous.isel(I_c=int(abs(smooth.kappa - 0.01).argmin("I_c")))
-    share = float(np.interp(math.log(float(deep[0])), np.log(smooth.alpha.values), near.values))
-    there = upper.dropna("kappa")
     ranged = f"{float(there[0]):.2f} to {float(there[-1]):.2f}, kappa = .001 to {float(there.kappa[-1]):.0f}"
     weak = abs(there[0] - 1 / 3) < 0.02 and there[-1] < 1.0
-    return [
-        said("s = 3/4, halfway from -1 to -1/2, at alpha", weak, ranged, "1/3 without wheel"),
-        said("s = 5/12, halfway from -1/3 to -1/2, at alpha", deep.size >= 2, text, "-"),
-        differing("  alpha ~ (1 - e^2)^x, e = (1 - kappa)/(1 + kappa)", "-3", by_loss, -3, 0.2, 4),
-        differing("  share of viscous losses there, kappa = .01", "2/5 by (1)", share, 0.4, 0.02, 4),
-    ]
+    lost = 4 * deep.kappa / (1 + deep.kappa) ** 2  # 1 - e^2
+    by_loss = power(deep.assign_coords(kappa=lost.values))
+    near = smooth.viscous.isel(I_c=int(abs(smooth.kappa - 0.01).argmin("I_c")))
+    share = float(np.interp(math.log(float(deep[0])), np.log(smooth.alpha.values), near.values))
+    yield said("s = 3/4, halfway from -1 to -1/2, at alpha", weak, ranged, "1/3 without wheel")
+    yield said("s = 5/12, halfway from -1/3 to -1/2, at alpha", deep.size >= 2, text, "-")
+    yield differing("  alpha ~ (1 - e^2)^x, e = (1 - kappa)/(1 + kappa)", "-3", by_loss, -3, 0.2, 4)
+    yield differing("  share of viscous losses there, kappa = .01", "2/5 by (1)", share, 0.4, 0.02, 4)
 
 
-def in_mesh(smooth: xr.Dataset, turn: xr.DataArray) -> list[Statement]:
+def in_mesh(smooth: xr.Dataset, turn: xr.DataArray) -> Claims:
     """How far the exponent goes, without dry friction, where the recoil leaves the wheel in mesh, kappa by kappa."""
-    s = smooth.s.where(smooth.pitches <= MESH)
+    s, logs = smooth.s.where(smooth.pitches <= MESH), np.log(smooth.alpha.values)
     least, where = s.min("tau"), s.fillna(np.inf).argmin("tau")
     back = float(s.where(s.tau >= s.tau.isel(tau=where)).max("tau").where(least < 0.38).max())
-    light, stays = int(abs(smooth.kappa - 0.01).argmin("I_c")), np.flatnonzero(np.isfinite(s.isel(tau=-2)))
-    first = int(stays[0]) if stays.size else -1
-    logs = np.log(smooth.alpha.values)
     recoil = [
         float(np.interp(math.log(alpha), logs, smooth.pitches.isel(I_c=k)))
         for k, alpha in enumerate(turn.values)
         if alpha > 0 and smooth.kappa[k] < 0.05
     ] or [0.0]
-    at = [f"{float(x):.3f} at alpha = {float(a):.3g}" for x, a in zip(least, smooth.alpha.isel(tau=where), strict=True)]
-    line = smooth.isel(I_c=light, tau=slice(1, int(smooth.pitches.isel(I_c=light).argmax("tau"))))
+    line = smooth.isel(I_c=int(abs(smooth.kappa - 0.01).argmin("I_c")))
+    line = line.isel(tau=slice(1, int(line.pitches.argmax("tau"))))
     border = float(np.interp(MESH, line.pitches.values, line.s.values))
-    end, text = float(s[first, -2]), f"{min(recoil):.2g} to {max(recoil):.2g}"
+    stays = np.flatnonzero(np.isfinite(s.isel(tau=-2)))
+    first = int(stays[0]) if stays.size else -1
+    dips, end = float(least[first]), float(s[first, -2])
     heavy = f"kappa = {float(smooth.kappa[first]):.2g} stays in mesh at any drive: least s, strongest"
-    dips = least[first] > 0.43 and abs(end - 0.5) < 0.01
+    text, what = f"{min(recoil):.2g} to {max(recoil):.2g}", "least s in mesh of kappa = .01, at half a pitch"
     again = "in mesh, of clocks that have s < .38: s at a stronger drive"
-    return [
-        said("recoil where s rises through 5/12, kappa < .05 [pitches]", min(recoil) > MESH, text),
-        said("  so in mesh s of kappa = .01 is at least", least[light] > 0.35, at[light], "> 1/3"),
-        differing("  at half a pitch itself, between cells", f"{AT_BORDER} by `verge`", border, AT_BORDER, 0.005, 4),
-        said(heavy, dips, f"{at[first]}, {end:.3f}", ", 1/2"),
-        said(again, back < 0.38, f"at most {back:.3f}", "< .38"),
-    ]
+    yield said("recoil where s rises through 5/12, kappa < .05 [pitches]", min(recoil) > MESH, text, "out of mesh")
+    yield differing(what, f"{AT_BORDER} by `verge`", border, AT_BORDER, 0.005, 4)
+    yield said(heavy, dips > 0.43 and abs(end - 0.5) < 0.01, f"{dips:.3f}, {end:.3f}", ", 1/2")
+    yield said(again, back < 0.38, f"at most {back:.3f}", "< .38")
 
 
-def answer(ds: xr.Dataset) -> list[Statement]:
+def answer(ds: xr.Dataset) -> Claims:
     """What part of a clock's losses is which, and its exponent.
 
     Its wheel is light (kappa = .01), its dry friction I_v a^2 phi0, its recoil a quarter of a pitch.
@@ -167,80 +119,43 @@ def answer(ds: xr.Dataset) -> list[Statement]:
     text = ", ".join(f"{name} {clock[name]:.0%}" for name in LOSSES)
     what = f"kappa = .01, alpha = {clock.alpha:.3g}, recoil of {clock.pitches:.2g} pitch"
     viscous = clock.viscous > clock.dry > clock.impact
-    between = "  its exponent, between those of friction alone"
-    return [
-        said(f"{what}: losses", viscous, text, "viscous most, impact least"),
-        said(between, 1 / 3 < clock.s < 0.5, f"{clock.s:.3f}", "1/3 to 1"),
-    ]
+    yield said(f"{what}: losses", viscous, text, "viscous most, impact least")
+    yield said("  its exponent", 1 / 3 < clock.s < 0.5, f"{clock.s:.3f}", "1/3 to 1/2")
 
 
-def by_shares(ds: xr.Dataset) -> list[Statement]:
+def by_shares(ds: xr.Dataset) -> Claims:
     """Theory (1) at strong drive, and how far it is off at weaker."""
-    off = ds.s - law(ds)
+    off = ds.s - (ds.viscous + ds.impact) / (2 + ds.viscous)
     strong, smooth = off.where(ds.alpha > STRONG), off.isel(R_v=0).where(ds.alpha > 100)
-    return [
-        most(f"s by the shares, (1), alpha > {STRONG:.0e}", "0.015", strong, 0.015, count(strong)),
-        most("  the same, alpha > 100 without dry friction", "0.05", smooth, 0.05, count(smooth)),
-    ]
+    yield most(f"s by the shares, (1), alpha > {STRONG:.0e}", "0.015", strong, 0.015, count(strong))
+    yield most("  the same, alpha > 100 without dry friction", "0.05", smooth, 0.05, count(smooth))
 
 
-def on_the_wheel(ds: xr.Dataset, wheel: xr.Dataset) -> list[Statement]:
+def on_the_wheel(ds: xr.Dataset, wheel: xr.Dataset) -> Claims:
     """The same friction on the wheel instead."""
-    lines = []
     for R_c, name in ((0.0, "viscous"), (float(wheel.R_c[-1]), "and dry")):
         moved = wheel.s.sel(R_c=R_c).values
         stayed = ds.s.sel(R_v=R_c * float(wheel.n), I_c=wheel.I_c, method="nearest").values
         both = (moved < 0.5) & (stayed < 0.5)
-        here = f"largest difference of {both.sum()} cells"
-        lines.append(
-            most(f"friction on the wheel, {name}: exponents", "as on the foliot", (moved - stayed)[both], 0.02, here)
-        )
-    return lines
+        what, here = f"friction on the wheel, {name}: exponents", f"largest difference of {both.sum()} cells"
+        yield most(what, "as on the foliot", (moved - stayed)[both], 0.02, here)
 
 
 def figure(ds: xr.Dataset) -> Any:
-    """Maps of the exponent, shares of the losses, and (1); for two columns of print."""
-    alpha, kappa, light = ds.alpha.values, ds.kappa.values, ds.sel(I_c=2.5e-5, method="nearest")
-    with page_of(130.0, 2, 2) as (page, ((plane, rubbed), (shares, scatter))):
-        draw_plane(plane, alpha, kappa, ds.isel(R_v=0))
-        unit = float(ds.I_v * (ds.c_v / ds.I_v) ** 2 * ds.phi0)
-        for k, R in enumerate(ds.R_v.values):
-            rubbed.semilogx(alpha, light.s[k], color=COLOURS[k], linestyle=DASHES[k], label=f"{R / unit:.3g}")
-        for value, text in ((1 / 3, "1/3"), (0.5, "1/2")):
-            rubbed.axhline(value, color="0.7", linewidth=0.6)
-            rubbed.text(1.2e6, value, text, fontsize=7, va="center")
-        rubbed.set(xlabel=r"drive, $\alpha$ [1]", ylabel="exponent, $s$ [1]", ylim=(0.1, 1.0), xlim=(0.1, 1e6))
-        rubbed.legend(title=r"dry friction, $R/(I_\mathrm{v}a^2\varphi_0)$", title_fontsize=7, loc="upper right")
-        clock = light.isel(R_v=1)
+    """The exponent over drive and wheel, and the shares of the losses of a clock with a light wheel."""
+    with page_of(128.0, 2, 1, width=NARROW, height_ratios=(1.3, 1)) as (page, (plane, shares)):
+        smooth = ds.isel(R_v=0)
+        exponent_map(plane, smooth, (smooth.pitches > MESH).values, "recoil over 1/2 pitch")
+        lines = plane.contour(ds.alpha, ds.kappa, smooth.s, levels=[0.36, 5 / 12, 0.75], colors="white", linewidths=0.8)
+        plane.clabel(lines, fmt={0.36: "0.36", 5 / 12: "5/12", 0.75: "3/4"}, fontsize=7, inline_spacing=2)
+        clock = ds.isel(R_v=1).sel(I_c=2.5e-5, method="nearest")
         clock = clock.isel(tau=np.isfinite(clock.viscous.values))
         parts = [clock[name].values for name in LOSSES]
         shares.stackplot(clock.alpha.values, parts, colors=COLOURS[:3], labels=LOSSES, alpha=0.85)
         shares.set(xscale="log", xlabel=r"drive, $\alpha$ [1]", ylabel="share of the energy [1]", ylim=(0, 1))
-        shares.set(xlim=(clock.alpha[0], alpha[-1]))
+        shares.set(xlim=(clock.alpha[0], clock.alpha[-1]))
         shares.legend(loc="lower left", framealpha=0.9, frameon=True)
-        for k, (low, high) in enumerate(((1e-1, 1e2), (1e2, 1e4), (1e4, 1e7))):
-            part = ds.where((ds.alpha > low) & (ds.alpha <= high))
-            look = {"color": ("0.75", COLOURS[1], COLOURS[0])[k], "markersize": 2.2, "rasterized": True}
-            name = rf"$10^{{{round(math.log10(low))}}}$ to $10^{{{min(round(math.log10(high)), 6)}}}$"
-            scatter.plot(law(part).values.ravel(), part.s.values.ravel(), MARKS[k], label=name, **look)
-        scatter.plot([0, 0.6], [0, 0.6], color="black", linewidth=0.8, label="law of the shares")
-        label = r"$(\sum n\lambda_n+\lambda_\mathrm{impact})/(2+\sum n\lambda_n)$ [1]"
-        scatter.set(xlabel=label, ylabel="exponent, $s$ [1]", xlim=(0.05, 0.52), ylim=(0.05, 1.4))
-        scatter.legend(title=r"$\alpha$", loc="upper right", markerscale=2, fontsize=7)
     return page
-
-
-def draw_plane(axes: Any, alpha: Any, kappa: Any, ds: xr.Dataset) -> None:
-    """s over alpha and kappa; hatched where the wheel would be thrown back by more than half a pitch."""
-    axes.set(xscale="log", yscale="log", xlabel=r"drive, $\alpha$ [1]", ylabel=r"wheel over foliot, $\kappa$ [1]")
-    ticks = {"ticks": [1 / 3, 0.5, 0.75, 1]}
-    bar = colour_map(axes, alpha, kappa, ds.s.values, "exponent, $s$ [1]", ticks, vmin=1 / 3, vmax=1, shading="gouraud")
-    bar.ax.set_yticklabels(["1/3", "1/2", "3/4", "1"])
-    lines = axes.contour(alpha, kappa, ds.s, levels=[0.36, 5 / 12, 0.75], colors="white", linewidths=0.8)
-    axes.clabel(lines, fmt={0.36: "0.36", 5 / 12: "5/12", 0.75: "3/4"}, fontsize=7, inline_spacing=2)
-    hatch(axes, alpha, kappa, (ds.pitches > MESH).values, "////", "0.85")
-    axes.set(xlim=(alpha[1], alpha[-2]))
-    direct_label(axes, 2e4, 3e-3, "recoil over 1/2 pitch", fontsize=7)
 
 
 def conclude(path: str, wheel_path: str) -> Conclusion:

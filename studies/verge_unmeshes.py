@@ -16,13 +16,6 @@ thrown back by more than half a pitch, 2 n phi0 + drop, is out of mesh. Theory, 
    form alpha ln cosh q = 3, q - tanh q = 1/alpha, that is at alpha = 22.16, and there s = 0.3575.         (2)
 3. Bounces of a light wheel last about e kappa/(1 - e) of a half period. Where they die out in contact they take what
    a plastic impact takes at once: e does not matter.
-
-Answer: -1/2 is the law of clocks whose wheel has more than a sixth of the foliot's inertia. A verge with a light wheel
-passes through 1/2 at one torque, near alpha = 1.5, and leaves its mesh near alpha = 25 before impacts take most of the
-work: it shows -1/2 by chance of its torque alone. No inertia of a real crown wheel with its train is in the sources, so
-kappa, to be compared with (1), is what to measure. Heavy wheels with e > 0 bounce so far that a tooth comes back behind
-the pallet which it has left, and pushes it once more. Many of these clocks limp, one half period longer than the other,
-and have 1/2 at strong drive too; from rest some come to no cycle of one tooth.
 """
 
 from __future__ import annotations
@@ -32,8 +25,9 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Conclusion, Statement, compared, count, differing, most, read_result, said, script, solved
-from _figures import colour_map, direct_label, hatch, page_of
+from _common import Claims, Conclusion, compared, count, differing, most, read_result, said, script, solved
+from _figures import NARROW, direct_label, exponent_map, page_of
+from _losses import verge
 from scipy.optimize import brentq
 
 from kernels.interface import Status
@@ -42,8 +36,6 @@ from sweep.show.charts import COLOURS, DASHES
 BORDER = 3 - 2 * math.sqrt(2)
 NEAR = 0.02
 """How near to 1/2 an exponent is called 1/2."""
-BOUNCING = {0.532: 0.158094937838, 0.626: 0.179918327561, 0.737: 0.202553715917, 0.867: 0.217808238137}
-"""Periods [s] by kappa of wheels that meet a tooth again, by `impact`, contact by contact; e = 0.5, no friction."""
 NOTES = """\
 s: differences of ln P over ln torque, 8 points a decade, between cells that run; deviation: of exponents the difference
 allowed: 1e-3 of the borders, found in steps of 6e-4; 0.01 of exponents and 10 % of the recoil at the strongest drive,
@@ -52,16 +44,8 @@ as theory leaves out the drop, which is 5 % of n phi0
 
 
 def prepared(ds: xr.Dataset) -> xr.Dataset:
-    """`ds` over alpha and kappa, with s, and the recoil over the tooth pitch."""
-    a = float(ds.c_v / ds.I_v)
-    alpha = (ds.n * ds.tau / (ds.I_v * a**2 * ds.phi0)).values
-    period = np.log(ds.period).assign_coords(tau=np.log(alpha))
-    slope = -period.differentiate("tau").assign_coords(tau=ds.tau)
-    runs = ds.status == 0
-    both = runs & runs.shift(tau=1, fill_value=False) & runs.shift(tau=-1, fill_value=False)
-    pitches = ds.recoil / (2 * (2 * ds.n * ds.phi0 + ds["drop"]))
-    ds = ds.assign_coords(kappa=ds.n**2 * ds.I_c / ds.I_v, alpha=("tau", alpha))
-    return ds.assign(s=slope.where(both), pitches=pitches, out=ds.status == Status.UNMESHES)
+    """`ds` with its groups, and which clocks come out of mesh."""
+    return verge(ds, ds.period, ds.status == 0).assign(out=ds.status == Status.UNMESHES)
 
 
 def one_body() -> tuple[float, float]:
@@ -77,7 +61,7 @@ def border(axis: str, values: Any, **changed: float) -> float:
     return 0.5 * float(values[turns[0]] + values[turns[0] + 1]) if turns.size == 1 else math.nan
 
 
-def mesh(ds: xr.Dataset, smooth: xr.Dataset) -> list[Statement]:
+def mesh(ds: xr.Dataset, smooth: xr.Dataset) -> Claims:
     """Which clocks stay in mesh, and the recoil of those that do."""
     light, leaves, (alpha, _) = smooth.isel(I_c=0), smooth.out.any("tau"), one_body()
     last, first = light.alpha.where(~light.out).max(), light.alpha.where(light.out).min()
@@ -89,17 +73,17 @@ def mesh(ds: xr.Dataset, smooth: xr.Dataset) -> list[Statement]:
     free, last_first = "kappa from which on no drive unmeshes it, no friction", f"{last:.3g}, {first:.3g}"
     bare, body = "alpha at which a wheel without inertia unmeshes, no drop", f"{alpha:.5g}, by one body"
     near, recoil = last < 1.1 * alpha < first, "  their recoil at alpha = 1e5 [pitches]"
-    return [
-        compared(free, "3 - 2 sqrt 2 = 0.17157", kappa, BORDER, 1e-3, 5),
-        said("  with viscous friction, between", below < BORDER < above, f"{below:.3f}, {above:.3f}", "the same"),
-        most(recoil, "(1 - kappa)^2/(8 kappa)", off, 0.1, f"{heavy.sizes['I_c']} wheels"),
-        compared(bare, body, leaves_at, alpha, 1e-3, 5),
-        said("  kappa = .001, with the drop, between", near, last_first, "the same and 10 %"),
-        said("largest recoil of a clock that runs [pitches]", 0.45 < farthest <= 0.5, f"{farthest:.3f}", "at most 1/2"),
-    ]
+    yield compared(free, "3 - 2 sqrt 2 = 0.17157", kappa, BORDER, 1e-3, 5)
+    yield said("  with viscous friction, between", below < BORDER < above, f"{below:.3f}, {above:.3f}", "the same")
+    yield most(recoil, "(1 - kappa)^2/(8 kappa)", off, 0.1, f"{heavy.sizes['I_c']} wheels")
+    yield compared(bare, body, leaves_at, alpha, 1e-3, 5)
+    yield said("  kappa = .001, with the drop, between", near, last_first, "the same and 10 %")
+    yield said(
+        "largest recoil of a clock that runs [pitches]", 0.45 < farthest <= 0.5, f"{farthest:.3f}", "1/2 at most"
+    )
 
 
-def exponents(smooth: xr.Dataset) -> list[Statement]:
+def exponents(smooth: xr.Dataset) -> Claims:
     """The exponent in mesh, beside that of one body that keeps (1 - kappa)/(1 + kappa) of its speed."""
     off = []
     for i in np.flatnonzero(smooth.kappa.values < 0.7):
@@ -110,35 +94,23 @@ def exponents(smooth: xr.Dataset) -> list[Statement]:
         off.append(line.s.values[1:-1] - one.sensitivity.values[1:-1])
     heavy, (_, s) = smooth.s.where(smooth.kappa > BORDER, drop=True).isel(tau=-2), one_body()
     body = "s, kappa < .7: one body keeping (1 - kappa)/(1 + kappa)"
-    return [
-        differing("least s in mesh, kappa = .001", f"{s:.4f} or more", smooth.s.isel(I_c=0).min(), s, 0.01, 4),
-        most(body, "foliot", xr.DataArray(off), 0.01, "largest difference"),
-        differing("strongest drive, kappa > .17: least s", "1/2", heavy.min(), 0.5, 0.01, 4),
-        differing("  and largest", "1/2", heavy.max(), 0.5, 0.01, 4),
-    ]
+    yield differing("least s in mesh, kappa = .001", f"{s:.4f} or more", smooth.s.isel(I_c=0).min(), s, 0.01, 4)
+    yield most(body, "foliot", xr.DataArray(off), 0.01, "largest difference")
+    yield most("strongest drive, kappa > .17: s", "1/2", heavy - 0.5, 0.01, f"{heavy.min():.4f} to {heavy.max():.4f}")
 
 
-def halves(ds: xr.Dataset, smooth: xr.Dataset) -> list[Statement]:
+def halves(ds: xr.Dataset, smooth: xr.Dataset) -> Claims:
     """Over which torques the exponent is 1/2."""
     decades = (abs(smooth.s - 0.5) < NEAR).sum("tau") / 8
     light, heavy = (decades.sel(I_c=kappa * 2.5e-3, method="nearest") for kappa in (0.01, 1.0))
     dry = ds.isel(R_v=1, e=0).s.sel(I_c=2.5e-5, method="nearest")
     near, friction = f"within {NEAR} of 1/2, kappa = .01", "kappa = .01, dry friction of I_v a^2 phi0: s in mesh"
-    return [
-        said(f"decades of torque with s {near}", 0.0 < light < 0.5, f"{light:.2g}", "< 1/2"),
-        said("  kappa = 1", heavy > 3, f"{heavy:.2g}", "> 3"),
-        said(friction, dry.min() < 0.4, f"{dry.max():.3f} to {dry.min():.3f}", "below 1/2 at its end"),
-    ]
+    yield said(f"decades of torque with s {near}", 0.0 < light < 0.5, f"{light:.2g}", "< 1/2")
+    yield said("  kappa = 1", heavy > 3, f"{heavy:.2g}", "> 3")
+    yield said(friction, dry.min() < 0.4, f"{dry.max():.3f} to {dry.min():.3f}", "below 1/2 at its end")
 
 
-def bouncing() -> Any:
-    """Periods of the clocks of `BOUNCING`."""
-    kappa, h, n = np.array(list(BOUNCING)), 2 * math.pi / 15 / 4.1, 0.2
-    clock = {"tau": 1.0, "I_v": 1e-4, "n": n, "phi0": h / n, "drop": 0.05 * h, "e": 0.5, "rtol": 1e-9}
-    return solved("verge", I_c=kappa * 1e-4 / n**2, **clock, outputs=["period"]).period
-
-
-def restitution(ds: xr.Dataset) -> list[Statement]:
+def restitution(ds: xr.Dataset) -> Claims:
     """What e changes."""
     bounce, plastic = ds.e * ds.kappa / (1 - ds.e), ds.isel(e=0)
     short, longer = ((ds.period / plastic.period - 1).where(bounce < x) for x in (0.005, 0.1))
@@ -148,58 +120,32 @@ def restitution(ds: xr.Dataset) -> list[Statement]:
     irregular = ds.status == Status.NOT_CONVERGED
     none = f"{int(irregular.sum())} of {ds.status.size}"
     heavy = ds.s.where((ds.e > 0.0) & (ds.kappa > BORDER) & (ds.alpha > 1e4))
-    again = bouncing() / np.array(list(BOUNCING.values())) - 1
     alike = "  < .25, kappa < .17: cells that unmesh otherwise than with e = 0"
-    return [
-        most("e kappa/(1 - e) < .005: period against e = 0", "no difference", short, 1e-4, "largest"),
-        most("  < .1", "small", longer, 0.05, "largest"),
-        said(alike, other == 0 < leave, f"{other} of {leave}", "0"),
-        said("  and that do not run, unmesh, or stick", unknown == 0, f"{unknown}", "0"),
-        most("tooth met again, no friction: period", "impact", again, 1e-9, "largest"),
-        said("no cycle of one tooth from rest", bounce.where(irregular).min() > 0.4, none, "only e kappa/(1 - e) > .4"),
-        differing(f"e > 0, kappa > .17, alpha > 1e4: median s, {count(heavy)}", "1/2", heavy.median(), 0.5, 0.01, 4),
-    ]
+    yield most("e kappa/(1 - e) < .005: period against e = 0", "no difference", short, 1e-4, "largest")
+    yield most("  < .1", "small", longer, 0.05, "largest")
+    yield said(alike, other == 0 < leave, f"{other} of {leave}", "0")
+    yield said("  and that do not run, unmesh, or stick", unknown == 0, f"{unknown}", "0")
+    yield said("no cycle of one tooth from rest", bounce.where(irregular).min() > 0.4, none, "e kappa/(1 - e) > .4")
+    yield differing(f"e > 0, kappa > .17, alpha > 1e4: median s, {count(heavy)}", "1/2", heavy.median(), 0.5, 0.01, 4)
 
 
-def figure(ds: xr.Dataset, smooth: xr.Dataset) -> Any:
-    """Maps of the exponent without and with restitution; the exponent and the recoil over the drive."""
-    with page_of(130.0, 2, 2) as (page, ((plastic, bouncing), (lines, recoil))):
-        draw_map(plastic, smooth)
-        draw_map(bouncing, ds.isel(R_v=0).sel(e=0.6, method="nearest"))
+def figure(smooth: xr.Dataset) -> Any:
+    """A map of the exponent with plastic impacts, and the exponent over the drive."""
+    with page_of(128.0, 2, 1, width=NARROW, height_ratios=(1.2, 1)) as (page, (plane, lines)):
+        exponent_map(plane, smooth, smooth.out.values, "unmeshes")
+        plane.contour(smooth.alpha, smooth.kappa, smooth.s, levels=[0.5], colors="white", linewidths=0.8)
+        plane.axhline(BORDER, color="C3", linewidth=0.8, linestyle="--")
+        direct_label(plane, 2e3, 0.25, r"$3-2\sqrt{2}$", "C3")
         for i, kappa in enumerate((0.01, 0.1, 0.18, 1.0)):
             line, look = smooth.sel(I_c=kappa * 2.5e-3, method="nearest"), {"color": COLOURS[i]}
             lines.semilogx(line.alpha, line.s, linestyle=DASHES[i], label=f"{line.kappa:.2g}", **look)
             if line.out.any():
                 there = np.flatnonzero(np.isfinite(line.s.values))[-1]
                 lines.plot(line.alpha[there], line.s[there], "x", markersize=5, **look)
-            recoil.loglog(line.alpha, line.pitches.where(line.pitches > 0), linestyle=DASHES[i], **look)
-            if kappa == 0.18:  # what (1) says of the strongest drive
-                most = (1 - line.kappa) ** 2 / (8 * line.kappa)
-                recoil.plot(1e5, most, "o", markersize=4, clip_on=False, **look)
         lines.axhline(0.5, color="0.7", linewidth=0.6)
         lines.set(xlabel=r"drive, $\alpha$ [1]", ylabel="exponent, $s$ [1]", xlim=(0.1, 1e5), ylim=(0.3, 1.0))
-        lines.legend(title=r"$\kappa$", title_fontsize=7, loc="upper right")
-        recoil.axhline(0.5, color="0.4", linewidth=0.8)
-        direct_label(recoil, 3e3, 0.72, "out of mesh", fontsize=7)
-        recoil.set(xlabel=r"drive, $\alpha$ [1]", ylabel="recoil [pitch]", xlim=(0.1, 1e5), ylim=(3e-3, 1.0))
+        lines.legend(title=r"$\kappa$", loc="upper right")
     return page
-
-
-def draw_map(axes: Any, ds: xr.Dataset) -> None:
-    """s over alpha and kappa; hatched where the clock unmeshes, white where there is no cycle of one tooth."""
-    alpha, kappa, ticks = ds.alpha.values, ds.kappa.values, {"ticks": [1 / 3, 0.5, 0.75, 1]}
-    axes.set(xscale="log", yscale="log", xlabel=r"drive, $\alpha$ [1]", ylabel=r"wheel over foliot, $\kappa$ [1]")
-    bar = colour_map(axes, alpha, kappa, ds.s, "exponent, $s$ [1]", ticks, vmin=1 / 3, vmax=1)
-    bar.ax.set_yticklabels(["1/3", "1/2", "3/4", "1"])
-    axes.contour(alpha, kappa, ds.s, levels=[0.5], colors="white", linewidths=0.8)
-    hatch(axes, alpha, kappa, ds.out.values, "////", "0.4")
-    axes.axhline(BORDER, color="C3", linewidth=0.8, linestyle="--")
-    axes.set(xlim=(0.13, 7e4))
-    irregular = bool((ds.status == Status.NOT_CONVERGED).any())
-    axes.set_title(f"$e = {ds.e:.1g}$" + irregular * "; white: no cycle of one tooth", fontsize=8)
-    direct_label(axes, 2e3, 8e-3, "unmeshes", fontsize=7)
-    if not irregular:
-        direct_label(axes, 2e3, 0.25, r"$3-2\sqrt{2}$", "C3", fontsize=7)
 
 
 def conclude(path: str) -> Conclusion:
@@ -212,7 +158,7 @@ def conclude(path: str) -> Conclusion:
         "Where s is 1/2": halves(ds, smooth),
         "Restitution": restitution(ds),
     }
-    return groups, [NOTES], lambda: figure(ds, smooth)
+    return groups, [NOTES], lambda: figure(smooth)
 
 
 main = script(__name__, "verge_unmeshes.h5", conclude)
