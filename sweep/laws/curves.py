@@ -172,7 +172,7 @@ def fit_lines(
     dimension, x = positive_axis(y, dim, repeated=True)
     here = {dimension: np.flatnonzero(inside_window(x, window, dim))}
     part, t = y.isel(here).transpose(..., dimension).compute(), np.log(x[here[dimension]])
-    values = missing_is_nan(part).values.reshape(math.prod(part.shape[:-1]), t.size)
+    values = np.where(np.isfinite(part.values), part.values, np.nan).reshape(math.prod(part.shape[:-1]), t.size)
     bad = np.asarray((values <= 0).any(axis=1))
     if bad.all():
         first = part[tuple(np.argwhere((part <= 0).values)[0])]
@@ -207,14 +207,14 @@ def fit_lines(
             f"a fit needs at least {fewest} points, found {columns['points'].max()} of {title(y)} in the window of "
             f"{dim}, at {np.unique(t[present.any(axis=0)]).size} places ({places} are needed); choose a wider one"
         )
-    result = xr.Dataset(coords={name: one for name, one in part.coords.items() if dimension not in one.dims})
     for name, column in columns.items():
         if column.dtype == object:
             column = np.where(column == "", np.where(bad, "not positive", "too few points"), column).astype(str)
         dims = ("law",) * (column.ndim - 1) + part.dims[:-1]
-        result[name] = dims, column.T.reshape(column.shape[1:] + part.shape[:-1])
-    result.attrs = {"law": law.format(y=title(y), x=dim), "y": title(y), "x": dim, **options}
-    return described(result, y.coords[dim], y)
+        columns[name] = dims, column.T.reshape(column.shape[1:] + part.shape[:-1])
+    coords = {name: one for name, one in part.coords.items() if dimension not in one.dims}
+    attrs = {"law": law.format(y=title(y), x=dim), "y": title(y), "x": dim, **options}
+    return described(xr.Dataset(columns, coords, attrs), y.coords[dim], y)
 
 
 def like(given: Any, y: xr.DataArray, what: str) -> xr.DataArray:
@@ -277,7 +277,7 @@ def described(found: xr.Dataset, x: xr.DataArray, y: xr.DataArray) -> xr.Dataset
         unit = (x if name in IN_X else y).attrs.get("units", "1") if name in IN_X + IN_Y else "1"
         for one in (name, *ends[name]):
             words = FIELDS[name] if one == name else f"end of the interval of {name}"
-            found[one].attrs = {"units": str(unit), "long_name": words}
+            found.variables[one].attrs = {"units": str(unit), "long_name": words}
     if any(ends.values()):
         columns = [one for name in ends if ends[name] for one in (name, *ends[name])]
         columns += [name for name in ends if found[name].dtype.kind == "U"]

@@ -47,14 +47,14 @@ class Found(NamedTuple):
     """Numbers of the noise that are fitted too."""
 
     @property
-    def aicc(self) -> float:
-        """Akaike's criterion, corrected for few points."""
-        return float(corrected(self.deviance, self.off.size, self.law.numbers + self.more))
+    def criteria(self) -> tuple[float, float]:
+        """Akaike's criterion, corrected for few points, and Bayes'."""
+        numbers, points = self.law.numbers + self.more, self.off.size
+        return float(corrected(self.deviance, points, numbers)), self.deviance + numbers * math.log(points)
 
     @property
-    def bic(self) -> float:
-        """Bayes' criterion."""
-        return self.deviance + (self.law.numbers + self.more) * math.log(self.off.size)
+    def aicc(self) -> float:
+        return self.criteria[0]
 
     @property
     def residual(self) -> float:
@@ -68,7 +68,7 @@ class Found(NamedTuple):
         ends = np.array([[-np.inf] * len(which), [np.inf] * len(which)])
         if known:
             line = regress(t, self.jacobian[:, known], self.off[None], noise, sigma=self.sigma)
-            for place, number in enumerate(np.arange(len(self.numbers))[which]):
+            for place, number in enumerate(np.arange(self.numbers.size)[which]):
                 if number in known:
                     ends[:, place] = line.interval(known.index(number), confidence)[:, 0]
             if self.sigma is None and noise != "even":

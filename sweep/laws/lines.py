@@ -246,9 +246,8 @@ def fit_correction(
     Returns
     -------
     Dataset
-        `exponent` with `exponent_low`, `exponent_high`; `verdict`, words; `correction_exponent` (D) [1];
-        `correction`, B x^-D at the outer end; `residual`; `noisy`; `fits`. The dimensions are those of `y` but `dim`.
-        NaN of fewer than eight points.
+        `exponent` with its interval; `verdict`, words; `correction_exponent` (D), `correction`, B x^-D at the outer
+        end, and more. The dimensions are those of `y` but `dim`. NaN of fewer than eight points.
 
     Raises
     ------

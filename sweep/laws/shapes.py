@@ -94,27 +94,26 @@ Bend = Callable[[Any, Any], tuple[Any, Any, Any]]
 """Of v and k: b, which tends to 0 far below and to v far above, and its derivatives by v and k."""
 
 
+def _ramp(v: Any, width: Any) -> tuple[Any, Any, Any]:
+    """width ln(1 + exp(v/width)), max(0, v) with a bend; its slope, and derivative by the logarithm of the width."""
+    b, slope = width * np.logaddexp(0, v / width), expit(v / width)
+    return b, slope, b - v * slope
+
+
 def _logistic(v: Any, k: Any) -> tuple[Any, Any, Any]:
     """Widths exp(k) below and exp(-k) above."""
     shift = 2 * math.log(2) * np.sinh(k)
-    moved = v - shift
-    above = moved >= 0
+    above = v >= shift
     sign = np.where(above, -1.0, 1.0)
-    own = np.exp(sign * k)
-    b, slope = own * np.logaddexp(0, moved / own), expit(moved / own)
-    by_k = sign * (b - moved * slope) + 2 * math.log(2) * np.cosh(k) * (above - slope)
-    return b + shift * above, slope, by_k
+    b, slope, by_width = _ramp(v - shift, np.exp(sign * k))
+    return b + shift * above, slope, sign * by_width + 2 * math.log(2) * np.cosh(k) * (above - slope)
 
 
 def _three_scales(v: Any, k: Any) -> tuple[Any, Any, Any]:
     """A third of it of each width exp(k), 1, exp(-k), so that it begins sharply and fades slowly."""
-    parts = []
-    for sign in (-1, 0, 1):
-        width = np.exp(sign * k)
-        b, slope = width * np.logaddexp(0, v / width), expit(v / width)
-        parts.append((b, slope, sign * (b - v * slope)))
-    b, slope, by_k = (sum(part) / 3 for part in zip(*parts, strict=True))
-    return b, slope, by_k
+    parts = [_ramp(v, np.exp(sign * k)) for sign in (-1, 0, 1)]
+    b, slope, _ = (sum(part) / 3 for part in zip(*parts, strict=True))
+    return b, slope, (parts[2][2] - parts[0][2]) / 3
 
 
 def _hyperbola(v: Any, k: Any) -> tuple[Any, Any, Any]:
@@ -143,24 +142,21 @@ def _bent(bend: Bend, over_x: bool = False) -> Curve:
 def _three(q: Array, s: Array, span: float) -> Iterator[Parts]:
     """q: where the first two laws meet, the logarithm of how much further the other two do, and of the width."""
     further, width = np.exp(q[1]), np.exp(q[2])
-    u, v = s - q[0], s - q[0] - further
-    a, b = width * np.logaddexp(0, u / width), width * np.logaddexp(0, v / width)
-    of_a, of_b = expit(u / width), expit(v / width)
+    (a, of_a, a_by_width), (b, of_b, b_by_width) = (_ramp(s - q[0] - place, width) for place in (0.0, further))
     yield 0.0, 1.0, s - a, a - b, b
     yield 0.0, 0.0, of_a, of_b - of_a, -of_b
     yield 0.0, 0.0, 0.0, further * of_b, -further * of_b
-    a, b = a - u * of_a, b - v * of_b
-    yield 0.0, 0.0, -a, a - b, b
+    yield 0.0, 0.0, -a_by_width, a_by_width - b_by_width, b_by_width
 
 
 PLACE = Number(-1.0, 2.0, tuple(np.linspace(0.1, 0.9, 7)))
 WIDTH = Number(-7.0, 1.0, tuple(np.log((0.01, 0.04, 0.12, 0.3))))
-SKEW, SCALES = Number(-2.0, 2.0, (0.0,)), Number(0.0, 2.5, (0.8,))
+SKEWED, SCALES = (PLACE, WIDTH, Number(-2.0, 2.0, (0.0,))), (PLACE, WIDTH, Number(0.0, 2.5, (0.8,)))
 POWER = Number(-60.0, 60.0, (-12.0, -6.0, -2.5, -1.0, 1.0, 2.5, 6.0, 12.0))
 P, P_TWO = (("p", -1),), (("p low", -2), ("p high", -1))
 ONE = Law("one law", "A x^p", lambda q, s, span: iter([(0.0, 1.0, s)]), 2, exponents=P)
 TWO = Law("two laws", "bend fading exponentially", _bent(_logistic), 3, (PLACE, WIDTH), P_TWO)
-SHAPED = TWO._replace(q=(*TWO.q, SKEW), starts_as=TWO.name)
+SHAPED = TWO._replace(q=SKEWED, starts_as=TWO.name)
 BENDS = (
     TWO,
     SHAPED._replace(name="two laws, two widths", formula="one width below, another above"),
@@ -169,7 +165,7 @@ BENDS = (
         name="two laws, three scales",
         formula="bend of three widths, one in the other",
         curve=_bent(_three_scales),
-        q=(*TWO.q, SCALES),
+        q=SCALES,
     ),
 )
 SECOND = Number(0.02, 0.9, (0.15, 0.3, 0.45, 0.6)), Number(-2.5, 0.0, tuple(np.log((0.2, 0.35, 0.5))))

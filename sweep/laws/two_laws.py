@@ -80,14 +80,11 @@ def fit_two_laws(
         `exponent`, `exponent_low`, `exponent_high` along `law` ("low", "high"); `crossover` with its interval, in
         the unit of `dim`; `verdict`: "two laws" where they are beyond doubt, "one law" where one does as well and is
         not denied as in `fit_exponent`, "three laws", "no power law" where AICc and BIC prefer another function to one
-        law by more than 10, and two laws to it by less, "no meeting in the window", "undecided";
-        `regimes`, how many laws; `evidence` (difference of AICc or BIC); `width` [decades], `level` (y where the laws
-        meet), `residual`, `points`, `noisy`. NaN where the verdict is "three laws" or "no power law", and of fewer than
-        eight points.
+        law by more than 10, and two laws to it by less, "no meeting in the window", "undecided"; and more, each with a
+        `long_name`. NaN where the verdict is "three laws" or "no power law", and of fewer than eight points.
 
-        With `windows`: exponents with intervals; `crossover` with its interval and `crossover_error`, half of that;
-        `level`. Without noise the interval is a bound: how far the place moves if a law is not the line through its
-        window but goes through the outer end of it with the exponent to which the local one tends.
+        With `windows`, without noise, the interval of `crossover` is a bound: how far the place moves if a law is not
+        the line through its window but goes through the outer end of it with the exponent to which the local one tends.
 
     Raises
     ------
@@ -200,7 +197,7 @@ def _verdict(t: Array, z: Array, tried: dict[str, Found], noisy: bool) -> tuple[
     bends, others = ([tried[law.name] for law in laws if law.name in tried] for laws in (BENDS, OTHER_FUNCTIONS))
 
     def gain(simple: Found, better: Found) -> float:
-        return min(simple.aicc - better.aicc, simple.bic - better.bic)
+        return min(one - other for one, other in zip(simple.criteria, better.criteria, strict=True))
 
     evidence = min(gain(one, two) for one in (line, *others))
     nearest = min((*bends, *others), key=lambda fit: fit.aicc)
@@ -324,9 +321,10 @@ def compare_laws(y: xr.DataArray, dim: str, window: Window | None = None, *, sig
 
 def _table(t: Array, z: Array, tried: list[Found]) -> xr.Dataset:
     """All that `compare_laws` says of laws, the best first."""
-    off, aicc, bic = (np.array(one) for one in zip(*((f.off, f.aicc, f.bic) for f in tried), strict=True))
-    worse, span = np.minimum(aicc - aicc.min(), bic - bic.min()), t[-1] - t[0]
-    columns: dict[str, Any] = {"aicc": aicc, "bic": bic, "worse": worse, "scatter": np.sqrt((off**2).mean(axis=1))}
+    off, criteria, span = np.stack([f.off for f in tried]), np.array([f.criteria for f in tried]).T, t[-1] - t[0]
+    worse = (criteria - criteria.min(axis=1, keepdims=True)).min(axis=0)
+    columns: dict[str, Any] = dict(zip(("aicc", "bic"), criteria, strict=True))
+    columns |= {"worse": worse, "scatter": np.sqrt((off**2).mean(axis=1))}
     columns |= {"numbers": [f.law.numbers for f in tried], "residual": [f.residual for f in tried]}
     chances = [float(gammaincc((t.size - f.law.numbers) / 2, f.deviance / 2)) for f in tried if f.sigma is not None]
     columns |= {"chi_squared": chances or [math.nan] * len(tried), "formula": [f.law.formula for f in tried]}
