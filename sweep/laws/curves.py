@@ -137,17 +137,13 @@ def title(y: xr.DataArray) -> str:
     return str(y.name) if y.name is not None else "the array"
 
 
-def missing_is_nan(y: xr.DataArray, positive: bool = False) -> xr.DataArray:
-    """y, NaN where it is no finite number, or not positive."""
+def log_of(y: xr.DataArray, values: bool = False) -> xr.DataArray:
+    """Natural logarithm, or the values themselves; NaN where there is none."""
     check_output(y)
     numbers = y.astype(np.float64)
-    return numbers.where(np.isfinite(numbers) & ((numbers > 0) | (not positive)))
-
-
-def log_of(y: xr.DataArray) -> xr.DataArray:
-    """Natural logarithm, NaN where there is none."""
-    logs: xr.DataArray = xr.ufuncs.log(missing_is_nan(y, positive=True))
-    return logs
+    numbers = numbers.where(np.isfinite(numbers) & (values | (numbers > 0)))
+    found: xr.DataArray = numbers if values else xr.ufuncs.log(numbers)
+    return found
 
 
 def fit_lines(

@@ -119,7 +119,7 @@ def where_exponent(
     >>> print(f"{float(sweep.where_exponent(ds.period, 'mu', 2.0, values=True).abscissa):.2f}")
     26.40
     """
-    curve = curves.missing_is_nan(y) if values else log_of(y)
+    curve = log_of(y, values)
     dimension, x = positive_axis(curve, dim)
     inside, t = curves.inside_window(x, window, dim), np.log(x)
     orders = ((6, 0), (4, 0)) if values else ((6, 7), (4, 5))  # points of the interpolation and of the slopes

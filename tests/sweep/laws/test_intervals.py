@@ -308,6 +308,15 @@ def test_the_error_bar_is_above_what_the_sampling_leaves_and_falls_with_it(point
     assert (constant.exponent_error < 1e-13).all()
 
 
+def test_the_error_bar_at_the_middle_of_a_symmetric_bend_is_not_decided_by_rounding():
+    """There, all orders tell the same slope; in other units, by other roundings, bars were 100 times as wide."""
+    t = axis(61, 4.6)
+    levels = np.linspace(0.0, 9.0, 40)[:, None]
+    found = sweep.local_exponent(curve(t, levels - t + 0.27 * np.logaddexp(0, t / 0.4)), "mu", error=True)
+    assert (abs(found.exponent + 1.0 - 0.675 / (1.0 + np.exp(-t / 0.4))) <= found.exponent_error).all()
+    assert (found.exponent_error[:, 27:34].max("mu") < 5.0 * found.exponent_error[:, [26, 34]].max("mu")).all()
+
+
 @pytest.mark.parametrize("place", [0.15, 0.4, 0.9, 2.3])
 @pytest.mark.parametrize("points", [13, 25, 61])
 def test_a_kink_between_two_points_is_in_the_error_bars_beside_it(points, place):
