@@ -23,7 +23,7 @@ from kernels.drivetrain._frequencies import natural_frequencies
 from kernels.drivetrain._holzer import SHAPE, mode, mode_rows
 from kernels.drivetrain._modes import ritz
 from kernels.drivetrain._rivin import step
-from kernels.lanes.jit import jit, jit_apart
+from kernels.lanes.jit import jit, jit_apart, jit_shared
 from kernels.lanes.vectors import sqrt
 from kernels.maths.small_dense import square
 
@@ -46,7 +46,7 @@ def _share(part, whole):
     return part / whole if whole < float("inf") else 0.0
 
 
-@jit_apart
+@jit_shared
 def guyan(p, order, scene):
     """The basis (1): each master turned by 1 while the others stand; with free ends, row 0 is all turned by 1.
 

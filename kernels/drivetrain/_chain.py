@@ -15,7 +15,7 @@ import numpy as np
 
 from kernels.drivetrain._holzer import ROWS
 from kernels.lanes.codes import BAD_INPUT, OK, OUT_OF_RANGE
-from kernels.lanes.jit import jit, jit_apart
+from kernels.lanes.jit import jit, jit_apart, jit_shared
 from kernels.lanes.vectors import exponent, magnitude, nearest
 from kernels.maths.elementary import NORMAL_HIGH, NORMAL_LOW, in_unit
 
@@ -91,27 +91,26 @@ class Model(NamedTuple):
     status: float
 
 
-@jit_apart
+@jit_shared
 def new_chain(n):
     """Room for a chain of n inertias."""
     return Chain(np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(2 * n, np.complex128))
 
 
-@jit_apart
+@jit_shared
 def new_room(n):
     """Buffers of a chain of n inertias."""
     ways, waves, pairs = np.empty((ROWS, n)), np.empty((ROWS, n), np.complex128), np.empty(2 * n, np.complex128)
     return Room(np.empty(3 * n + 2), ways, waves, np.empty((2, n)), np.empty(2 * n), pairs)
 
 
-@jit_apart
-def new_scene(columns):
-    """Room for a chain and what it is reduced to."""
-    n = columns.J.shape[1]
+@jit_shared
+def new_scene(n):
+    """Room for a chain of n inertias and what it is reduced to."""
     squares, waves, rows = np.empty((4, n, n)), np.empty((2, n, n), np.complex128), np.empty((3, n))
     modes = Modes(squares[0], squares[1], rows[0], squares[2], rows[1], squares[3], rows[2], waves[0], waves[1])
     samples = np.empty((2, 2 * SAMPLES * n + GRID))
-    return (Scene(new_chain(n), new_chain(n), new_room(n), np.empty((2, n)), samples, modes),)
+    return Scene(new_chain(n), new_chain(n), new_room(n), np.empty((2, n)), samples, modes)
 
 
 @jit_apart

@@ -1,11 +1,11 @@
 """A reduced model against its chain: as few masses as are wanted, and the largest error of the spindle's receptance.
 
-make(p, order, scene) -> Model          makes a model of p masses in the scene
-receptance(w, model, scene)             of the spindle, by the model
+`make(p, order, scene)` makes a `Model` of p masses in the scene; what follows is compiled once for all kinds of them.
 """
 
 from kernels.drivetrain._chain import GRID, TURN, Model, off_by
-from kernels.drivetrain._rivin import receptance_of_chain
+from kernels.drivetrain._modes import receptance_of_modes
+from kernels.drivetrain._rivin import receptance_of_chain, receptance_of_exact, receptance_of_kept
 from kernels.lanes.jit import jit_apart
 from kernels.lanes.vectors import fma, magnitude, sqrt
 from kernels.maths.elementary import exp, log
@@ -13,6 +13,8 @@ from kernels.maths.small_dense import sort, square
 
 AROUND = (-16.0, -8.0, -4.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
 """Where a resonance is looked at, in its half widths: `_chain.SAMPLES` of them."""
+CHAIN_AT_REST, CHAIN_OF_FREQUENCY, MODES = 0, 1, 2
+"""Kinds of models: `_rivin.rivin`, `_rivin.exact`, those of `_bases`."""
 NARROWINGS = 40
 """Of an interval around a largest value, by the golden section: to 4e-9 of its width, 2e-17 of the value."""
 _GOLDEN = 0.6180339887498949
@@ -88,7 +90,17 @@ def _largest(count, of_error, receptance, model, scene):
 
 
 @jit_apart
-def receptance_error(f_max, own_poles, receptance, model, scene):
+def _largest_of(kind, count, of_error, model, scene):
+    """`_largest` by a model of that kind, each with a loop of its own: asked at each frequency, a third of the time."""
+    if kind == MODES:
+        return _largest(count, of_error, receptance_of_modes, model, scene)
+    if kind == CHAIN_AT_REST:
+        return _largest(count, of_error, receptance_of_kept, model, scene)
+    return _largest(count, of_error, receptance_of_exact, model, scene)
+
+
+@jit_apart
+def receptance_error(f_max, own_poles, kind, model, scene):
     """Largest abs(dH) up to f_max over the largest abs(H), and a bound on its rounding.
 
     NaN where H is infinite in the band: with a free end, or with a resonance that nothing damps. The samples are 0, the
@@ -119,5 +131,5 @@ def receptance_error(f_max, own_poles, receptance, model, scene):
     sort(at, count)
     off, size = 0.0, 0.0
     for of_chain in range(2):
-        off, size = size, _largest(count, 1 - of_chain, receptance, model, scene)
+        off, size = size, _largest_of(kind, count, 1 - of_chain, model, scene)
     return off / size, _ROUNDING * n / zeta

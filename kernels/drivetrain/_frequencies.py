@@ -28,7 +28,7 @@ import math
 from kernels.drivetrain._chain import spread_is_normal
 from kernels.lanes.codes import NOT_CONVERGED, OK, OUT_OF_RANGE
 from kernels.lanes.columns import GROUP, cells_at
-from kernels.lanes.jit import jit, jit_apart
+from kernels.lanes.jit import jit, jit_apart, jit_shared
 from kernels.lanes.vectors import any_lane, choose, fma, magnitude, nearest, not_, sqrt, where
 
 SWEEP_LIMIT = 200
@@ -206,7 +206,7 @@ def frequencies(n, at, lanes, J, k, frequency, rows):
     return failed
 
 
-@jit_apart
+@jit_shared
 def natural_frequencies(n, J, k, frequency, work):
     """Status of the n `frequencies` of one chain: OK, OUT_OF_RANGE beyond SPREAD, NOT_CONVERGED."""
     if not (spread_is_normal(n, J) and spread_is_normal(n, k)):

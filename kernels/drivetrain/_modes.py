@@ -11,7 +11,7 @@ Source: Demmel & Veselic, SIAM J. Matrix Anal. Appl. 13:1204 (1992).
 
 from kernels.drivetrain._chain import TURN, extremes
 from kernels.drivetrain._poles import modal_poles, poles_of_chain, undamped_poles
-from kernels.lanes.jit import jit, jit_apart
+from kernels.lanes.jit import jit, jit_apart, jit_shared
 from kernels.lanes.vectors import fma, magnitude, sqrt
 from kernels.maths.small_dense import eliminate, substitute_back
 
@@ -83,7 +83,7 @@ def _make_orthonormal(W, G, first, p, n):
     return most / least if reached and least > 0.0 else float("inf")
 
 
-@jit_apart
+@jit_shared
 def ritz(p, scene):
     """Rows W and G of p shapes to those of modes, frequencies rising; a bound on the relative error of these.
 

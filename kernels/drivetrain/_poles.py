@@ -24,7 +24,7 @@ perturbation of the quadratic eigenvalue problem, derived here.
 from kernels.drivetrain import _holzer
 from kernels.drivetrain._chain import TURN, extremes
 from kernels.drivetrain._holzer import FLEXIBILITY, SHAPE, STRAIN
-from kernels.lanes.jit import jit_apart
+from kernels.lanes.jit import jit_apart, jit_shared
 from kernels.lanes.vectors import exponent, magnitude, pow2, sqrt
 from kernels.maths.small_dense import eliminate, over, size, square, substitute_back
 
@@ -228,7 +228,7 @@ def undamped_poles(chain):
         chain.s[2 * i], chain.s[2 * i + 1] = complex(0.0, TURN * chain.f[i]), complex(0.0, -TURN * chain.f[i])
 
 
-@jit_apart
+@jit_shared
 def poles_of_chain(chain, n, room):
     """All 2 n poles of a chain's first n masses by rising size, a pair as +Im, -Im; a bound on their relative errors.
 

@@ -33,7 +33,7 @@ Wittrick & Williams, Q. J. Mech. Appl. Math. 24:263 (1971); the pivots of b deri
 from kernels.drivetrain._chain import CHAIN_ROUNDING, Model, off_by
 from kernels.drivetrain._frequencies import natural_frequencies
 from kernels.drivetrain._poles import poles_of_chain
-from kernels.lanes.jit import jit, jit_apart
+from kernels.lanes.jit import jit, jit_apart, jit_shared
 from kernels.lanes.vectors import magnitude, sqrt
 from kernels.maths import pairs
 from kernels.maths.pairs import two_product
@@ -224,7 +224,7 @@ def _find(i, low, high, p, scene):
     return 0.5 * (low + high), low
 
 
-@jit_apart
+@jit_shared
 def _merge(p, order, scene):
     """The chain of p masses by Rivin's steps, which `scene.steps` keeps; the largest h e of merged springs."""
     full, kept, n, slower = scene.full, scene.kept, scene.full.J.size, 0.0

@@ -23,6 +23,7 @@ the frf_error of n masses is known to 4e-16 n/zeta, the frequencies to all their
 
 import math
 from collections import namedtuple
+from typing import Any, NamedTuple
 
 from kernels.drivetrain import _bases, _modes, _rivin
 from kernels.drivetrain._chain import (
@@ -36,13 +37,13 @@ from kernels.drivetrain._chain import (
     refusal,
     take_units,
 )
-from kernels.drivetrain._error import receptance_error, reduce_enough
+from kernels.drivetrain._error import CHAIN_AT_REST, CHAIN_OF_FREQUENCY, MODES, receptance_error, reduce_enough
 from kernels.drivetrain._frequencies import natural_frequencies
 from kernels.drivetrain._poles import modal_damping, poles_of_chain
 from kernels.interface import Field
 from kernels.lanes.codes import BAD_INPUT, DAMPERS_OUT_OF_RANGE, OK
 from kernels.lanes.columns import cell_by_cell
-from kernels.lanes.jit import jit, jit_apart
+from kernels.lanes.jit import jit, jit_apart, jit_shared
 from kernels.lanes.ranges import partly
 from kernels.lanes.records import largest, read
 from kernels.lanes.wiring import kernel, split, tracing
@@ -56,35 +57,57 @@ def _held(x, e):
     return value if is_normal(value) or x == 0.0 else math.nan
 
 
-@jit_apart
-def _begin(i, columns, full, room):
-    """Every output of a cell to NaN; the exponents of its units, and the status of the full chain's frequencies."""
-    for j in range(columns.J.shape[1]):
-        columns.frequency[i, j] = columns.frequency_error[i, j] = columns.damping[i, j] = math.nan
-        columns.J_kept[i, j] = columns.k_kept[i, j] = columns.h_kept[i, j] = math.nan
-    columns.n_kept[i] = columns.frf_error[i] = columns.valid_to[i] = columns.error[i] = math.nan
-    e_J, e_k = take_units(columns.J[i], columns.k[i], columns.h[i], full)
+class Rows(NamedTuple):
+    """A cell's rows of the outputs of these names."""
+
+    frequency: Any
+    frequency_error: Any
+    damping: Any
+    J_kept: Any
+    k_kept: Any
+    h_kept: Any
+
+
+@jit_shared
+def _begun(J, k, h, rows, full, room):
+    """Every row to NaN; the exponents of a cell's units, and the status of the full chain's frequencies."""
+    for row in rows:
+        row[:] = math.nan
+    e_J, e_k = take_units(J, k, h, full)
     return e_J, e_k, natural_frequencies(full.J.size, full.J, full.k, full.f, room.work)
 
 
 @jit_apart
-def _write(i, columns, full, kept, e_J, e_k, count, p, slower, frf_error, errors):
-    """Outputs in SI units: `count` frequencies, and where p > 0 the reduced chain; `errors` as of `Outputs`.
+def _begin(i, columns, full, room):
+    """Every output of a cell to NaN, and what `_begun` returns."""
+    columns.n_kept[i] = columns.frf_error[i] = columns.valid_to[i] = columns.error[i] = math.nan
+    return _begun(columns.J[i], columns.k[i], columns.h[i], read(Rows, columns, i), full, room)
+
+
+@jit_apart
+def _fill(rows, full, kept, e_J, e_k, count, p):
+    """Rows in SI units: `count` frequencies, and where p > 0 the reduced chain; whether float64 holds them."""
+    fine, e = True, 0.5 * (e_k - e_J)
+    for mode in range(count):
+        rows.frequency[mode] = _held(kept.f[mode], e)
+        rows.frequency_error[mode] = off_by(kept.f[mode], full.f[mode])
+        fine = fine and rows.frequency[mode] >= 0.0
+    modal_damping(kept.s[: 2 * count], rows.damping)
+    for j in range(p):
+        J, k, h = _held(kept.J[j], e_J), _held(kept.k[j], e_k), _held(kept.h[j], 0.5 * (e_J + e_k))
+        rows.J_kept[j], rows.k_kept[j], rows.h_kept[j] = J, k, h
+        fine = fine and J >= 0.0 and k >= 0.0 and h >= 0.0
+    return fine
+
+
+@jit_apart
+def _write(i, columns, fine, e, p, slower, frf_error, errors):
+    """Outputs without rows in SI units; `errors` as of `Outputs`, `fine` as of `_fill`.
 
     Merged dampers hold up to w h e = SMALL_PHASE, `slower` being the largest h e.
     """
-    fine, e = True, 0.5 * (e_k - e_J)
-    for mode in range(count):
-        columns.frequency[i, mode] = _held(kept.f[mode], e)
-        columns.frequency_error[i, mode] = off_by(kept.f[mode], full.f[mode])
-        fine = fine and columns.frequency[i, mode] >= 0.0
-    modal_damping(kept.s[: 2 * count], columns.damping[i])
-    for j in range(p):
-        J, k, h = _held(kept.J[j], e_J), _held(kept.k[j], e_k), _held(kept.h[j], 0.5 * (e_J + e_k))
-        columns.J_kept[i, j], columns.k_kept[i, j], columns.h_kept[i, j] = J, k, h
-        fine = fine and J >= 0.0 and k >= 0.0 and h >= 0.0
     limit = SMALL_PHASE / (TURN * slower) if slower > 0.0 else math.inf
-    columns.valid_to[i] = scale(limit, e) if slower > 0.0 else columns.f_max[i]
+    columns.n_kept[i], columns.valid_to[i] = p, scale(limit, e) if slower > 0.0 else columns.f_max[i]
     columns.frf_error[i], columns.error[i] = frf_error, largest(errors, columns.asked, Outputs, Outputs)
     verdict = OK if limit >= in_unit(columns.f_max[i], e) else DAMPERS_OUT_OF_RANGE
     columns.status[i] = partly(fine, verdict)
@@ -96,39 +119,57 @@ def _known(error):
     return error if error >= 0.0 else math.inf
 
 
-def _reducing(name, make, poles, receptance, leaves_chain, has_all):
-    """A solver of one reduction, whose functions are those of `_error` and `poles(p, scene)` of its model.
+@jit_shared
+def _finish(kind, f_max, e_J, e_k, model, rows, scene):
+    """Rows of a reduced model, whether float64 holds them, its `receptance_error`; bounds on errors.
 
-    It leaves a chain or not, and has all frequencies of the full one however few its masses: where `tol` is to be met,
-    one. Lightly damped, a receptance's error has fewer digits than the frequencies.
+    Bounds of frequencies, of damping, and of that error: lightly damped, it has fewer digits than the frequencies.
     """
+    off, error, rounding, n = math.nan, _known(model.error), math.inf, scene.full.J.size
+    if kind == MODES:
+        blur, own_poles = _modes.poles_of_modes(model.p, scene)
+    elif kind == CHAIN_AT_REST:
+        blur, own_poles = _rivin.poles_of_both(model.p, scene)
+    else:
+        blur, own_poles = _rivin.poles_of_full(model.p, scene)
+    blur = max(error, _known(blur))
+    if blur < math.inf:
+        off, rounding = receptance_error(f_max, own_poles, kind, model, scene)
+        rounding = max(blur, _known(rounding))
+    count, p = n if kind == CHAIN_OF_FREQUENCY else model.p, 0 if kind == MODES else model.p
+    return _fill(rows, scene.full, scene.kept, e_J, e_k, count, p), off, error, blur, rounding
+
+
+@jit
+def _scene(columns):
+    return (new_scene(columns.J.shape[1]),)
+
+
+def _reducing(name, make, kind):
+    """A solver of one reduction, made as `_error` says, of a kind that is named there.
+
+    `exact` has all frequencies of the full chain however few its masses: where `tol` is to be met, one.
+    """
+    has_all = kind == CHAIN_OF_FREQUENCY
 
     @jit_apart
     def fill(i, columns, scene):
-        p, full, kept = read(Drivetrain, columns, i), scene.full, scene.kept
-        e_J, e_k, status = _begin(i, columns, full, scene.room)
+        p = read(Drivetrain, columns, i)
+        e_J, e_k, status = _begin(i, columns, scene.full, scene.room)
         if status > OK:
             columns.status[i] = status
             return
-        f_max = in_unit(p.f_max, 0.5 * (e_k - e_J))
-        n_keep = 1.0 if has_all and not p.n_keep > 0.0 else p.n_keep
+        e, n_keep = 0.5 * (e_k - e_J), 1.0 if has_all and not p.n_keep > 0.0 else p.n_keep
+        f_max = in_unit(p.f_max, e)
         model = reduce_enough(make, n_keep, p.tol, f_max, p.order, scene)
         if model.status > OK:
             columns.status[i] = model.status
             return
-        off, error, rounding = math.nan, _known(model.error), math.inf
-        blur, own_poles = poles(model.p, scene)
-        blur = max(error, _known(blur))
-        if blur < math.inf:
-            off, rounding = receptance_error(f_max, own_poles, receptance, model, scene)
-            rounding = max(blur, _known(rounding))
-        count, chosen = full.J.size if has_all else model.p, 0.0 if n_keep > 0.0 else error
-        errors = Outputs(error, error, blur, chosen, rounding, *_OF_CHAIN)
-        columns.n_kept[i] = model.p
-        p_chain = model.p if leaves_chain else 0
-        _write(i, columns, full, kept, e_J, e_k, count, p_chain, model.slower, off, errors)
+        fine, off, error, blur, rounding = _finish(kind, f_max, e_J, e_k, model, read(Rows, columns, i), scene)
+        errors = Outputs(error, error, blur, 0.0 if n_keep > 0.0 else error, rounding, *_OF_CHAIN)
+        _write(i, columns, fine, e, model.p, model.slower, off, errors)
 
-    return tracing(name, "", fill, buffers=new_scene, loop=cell_by_cell, estimates=True)
+    return tracing(name, "", fill, buffers=_scene, loop=cell_by_cell, estimates=True)
 
 
 @jit_apart
@@ -140,8 +181,8 @@ def _whole(i, columns, full, room):
         return
     n, blur = full.J.size, max(CHAIN_ROUNDING, _known(poles_of_chain(full, full.J.size, room)))
     errors = Outputs(CHAIN_ROUNDING, CHAIN_ROUNDING, blur, 0.0, blur, *_OF_CHAIN)
-    columns.n_kept[i] = n
-    _write(i, columns, full, full, e_J, e_k, n, n, 0.0, 0.0 if blur < math.inf else math.nan, errors)
+    fine = _fill(read(Rows, columns, i), full, full, e_J, e_k, n, n)
+    _write(i, columns, fine, 0.5 * (e_k - e_J), n, 0.0, 0.0 if blur < math.inf else math.nan, errors)
 
 
 @jit_apart
@@ -152,15 +193,14 @@ def _whole_room(columns):
 
 _OF_CHAIN = (CHAIN_ROUNDING, CHAIN_ROUNDING, CHAIN_ROUNDING, CHAIN_ROUNDING)
 """Bounds of what merging dampers and masses leaves."""
-_OF_MODES = _modes.poles_of_modes, _modes.receptance_of_modes, False, False
 SOLVERS = (
     tracing("none", "", _whole, buffers=_whole_room, loop=cell_by_cell, estimates=True),
-    _reducing("rivin", _rivin.rivin, _rivin.poles_of_both, _rivin.receptance_of_kept, True, False),
-    _reducing("guyan", _bases.guyan, *_OF_MODES),
-    _reducing("irs", _bases.irs, *_OF_MODES),
-    _reducing("craig_bampton", _bases.craig_bampton, *_OF_MODES),
-    _reducing("modal", _bases.modal, *_OF_MODES),
-    _reducing("exact", _rivin.exact, _rivin.poles_of_full, _rivin.receptance_of_exact, True, True),
+    _reducing("rivin", _rivin.rivin, CHAIN_AT_REST),
+    _reducing("guyan", _bases.guyan, MODES),
+    _reducing("irs", _bases.irs, MODES),
+    _reducing("craig_bampton", _bases.craig_bampton, MODES),
+    _reducing("modal", _bases.modal, MODES),
+    _reducing("exact", _rivin.exact, CHAIN_OF_FREQUENCY),
 )
 """Each is compiled when a cell asks for it first; its machine code is kept by its name."""
 REDUCTIONS = {solver.name: code for code, solver in enumerate(SOLVERS)}

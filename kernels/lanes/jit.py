@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 import numba
 from numba import njit
 
-from kernels.lanes.inlining import aligned, part
+from kernels.lanes.inlining import aligned, part, shared
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -45,6 +45,17 @@ def jit_apart(function: F) -> F:
     In lanes a call may cost more than it saves.
     """
     made: F = part(function, forceinline=False, **_OPTIONS)
+    return made
+
+
+def jit_shared(function: F) -> F:
+    """As `jit_apart`, but compiled once for all entries that call it, and kept: for what is long and of many entries.
+
+    Functions among its arguments would make it one for each of them again.
+    """
+    from kernels.lanes.cache import enable
+
+    made: F = enable(shared(function, forceinline=False, **_OPTIONS))
     return made
 
 

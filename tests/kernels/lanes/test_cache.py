@@ -100,6 +100,33 @@ def test_a_damaged_cache_is_compiled_again_and_mended(filled):
     assert run(CHECK, filled)[:2] == ["0", "1"]
 
 
+SHARED = """
+import sys
+sys.path.append("tests/helpers")
+import numpy as np
+from columns import solve
+from numba.core import event
+from kernels.drivetrain.receptance import DRIVETRAIN_FRF
+cells = {name: [value] for name, value in DRIVETRAIN_FRF.example.items()}
+with event.install_recorder("numba:compile") as recorder:
+    outputs, status = solve(DRIVETRAIN_FRF, "continued", along=[np.array([1.0, 40.0])], **cells)
+print(*(amplitude.hex() for amplitude in outputs["amplitude"][0]))
+print(*(one.data["dispatcher"].py_func.__name__ for _, one in recorder.buffer if one.is_start))
+"""
+"""A kernel that calls a function whose machine code several entries share, `new_chain`; what is compiled for it."""
+
+
+def test_a_shared_function_is_loaded_for_who_calls_it_and_alone_is_compiled_again_where_it_is_lost(tmp_path):
+    first = run(SHARED, tmp_path)
+    assert first.count("new_chain") == 1
+    assert run(SHARED, tmp_path) == first[:2]
+    kept = [*tmp_path.rglob("*new_chain*.nb?")]
+    assert kept
+    for file in kept:
+        file.unlink()
+    assert [word for word in run(SHARED, tmp_path) if word != "impl"] == [*first[:2], "new_chain"]  # numba's own
+
+
 def test_where_there_can_be_no_cache_it_works_without(tmp_path):
     (tmp_path / "file").write_text("")
     assert run(CHECK, tmp_path / "file")[2] == "None"
