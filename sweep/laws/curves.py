@@ -203,13 +203,14 @@ def fit_lines(
             f"a fit needs at least {fewest} points, found {columns['points'].max()} of {title(y)} in the window of "
             f"{dim}, at {np.unique(t[present.any(axis=0)]).size} places ({places} are needed); choose a wider one"
         )
+    coords: dict[Any, Any] = {name: one for name, one in part.coords.items() if dimension not in one.dims}
     for name, column in columns.items():
         if column.dtype == object:
             column = np.where(column == "", np.where(bad, "not positive", "too few points"), column).astype(str)
         dims = ("law",) * (column.ndim - 1) + part.dims[:-1]
+        coords |= {"law": ["low", "high"]} if column.ndim > 1 else {}
         columns[name] = dims, column.T.reshape(column.shape[1:] + part.shape[:-1])
-    coords = {name: one for name, one in part.coords.items() if dimension not in one.dims}
-    attrs = {"law": law.format(y=title(y), x=dim), "y": title(y), "x": dim, **options}
+    attrs = {"law": law.format(y=title(y), x=dim), "y": title(y), "x": dim, "confidence": options.get("confidence")}
     return described(xr.Dataset(columns, coords, attrs), y.coords[dim], y)
 
 

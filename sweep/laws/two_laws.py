@@ -105,7 +105,7 @@ def fit_two_laws(
     keys: dict[str, Any] = {"confidence": confidence, "noise": noise}
     if windows is None:
         law = "equation (1) of sweep.laws.two_laws"
-        return fit_lines(_each, law, y, dim, window, sigma, **keys).assign_coords(law=["low", "high"])
+        return fit_lines(_each, law, y, dim, window, sigma, **keys)
     if window is not None:
         raise SweepError("window does not go with windows, which say where the two lines are")
     try:
@@ -261,7 +261,7 @@ def crossover(low_fit: xr.Dataset, high_fit: xr.Dataset) -> xr.Dataset:
     found = xr.Dataset({"crossover": np.exp(place), "crossover_low": np.exp(below), "crossover_high": np.exp(above)})
     found["crossover_error"] = (found.crossover_high - found.crossover_low) / 2
     found["level"] = np.exp(lines[0][1] + low_fit.exponent * (place - middle - lines[0][2]))
-    found.attrs = {name: low_fit.attrs[name] for name in ("y", "x", "confidence")}
+    found.attrs = {name: low_fit.attrs[name] for name in ("law", "y", "x", "confidence")}
     return described(found, low_fit.centre, low_fit.level)
 
 
