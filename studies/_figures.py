@@ -33,32 +33,6 @@ def page_of(height: float, *shape: int, width: float = charts.PAGE, **how: Any) 
             charts.letter(axes, text)
 
 
-@contextmanager
-def columns_of(
-    height: float, left: dict[str, Any], right: dict[str, Any], ratio: float = 1.12
-) -> Iterator[tuple[Any, Any, list[Any]]]:
-    """A figure for print of so many mm, of two columns whose panels, one above the other, need not align.
-
-    Parameters
-    ----------
-    left, right : what `subplots` of a column is called with
-    ratio : width of the left column over that of the right one
-
-    Yields
-    ------
-    tuple
-        The page, its left column (for a colour bar or a legend of its own), and all panels, lettered in the end.
-    """
-    with charts.style():
-        page = charts.new_figure(charts.PAGE, height)
-        parts = page.subfigures(1, 2, width_ratios=(ratio, 1))
-        both = zip(parts, (left, right), strict=True)
-        panels = [axes for part, how in both for axes in np.ravel(part.subplots(**how))]
-        yield page, parts[0], panels
-        for axes, text in zip(panels, "abcdefghi", strict=False):
-            charts.letter(axes, text)
-
-
 def colour_map(axes: Any, x: Any, y: Any, values: Any, label: str, bar: Any = None, **how: Any) -> Any:
     """A map of values, of shape (y, x), to the edges of its grid; gives its bar, whose options are `bar`."""
     how = {"cmap": "cividis", "shading": "nearest", "rasterized": True, **how}

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Conclusion, Groups, Statement, all_ok, compared, read_result, script
+from _common import Claims, Conclusion, Statement, all_ok, compared, read_result, script
 from _figures import NARROW, direct_label, page_of, plain_ticks
 
 from sweep.show.charts import COLOURS
@@ -46,23 +46,23 @@ def near(what: str, theory: str, off: xr.DataArray, allowed: xr.DataArray) -> St
     return Statement(what, theory, f"{share:.2f} of the next order", float(abs(off).max()), share <= 1)
 
 
-def statements(ds: xr.Dataset) -> Groups:
-    """Theory beside each cell; where drive does not matter; the verge."""
+def cells(ds: xr.Dataset) -> Claims:
+    """Theory beside each cell; the verge."""
+    yield all_ok(ds)
+    yield near("amplitude/A - 1, next order A^2/16 + e", "(1)", ds.angle_size / ds.A - 1, ds.A**2 / 16 + ds.e)
+    yield near("P/P0 - 1", "(2)", ds.error - ds.error_theory, ds.next)
+    yield near("s", "(3)", ds.s - ds.s_theory, ds.next)
     worst, theory = (1 / 3 / float(abs(s).where(np.degrees(ds.A) < 5).max()) for s in (ds.s, ds.s_theory))
-    cells = [
-        all_ok(ds),
-        near("amplitude/A - 1, next order A^2/16 + e", "(1)", ds.angle_size / ds.A - 1, ds.A**2 / 16 + ds.e),
-        near("P/P0 - 1", "(2)", ds.error - ds.error_theory, ds.next),
-        near("s", "(3)", ds.s - ds.s_theory, ds.next),
-    ]
-    ratio = compared("the verge's 1/3 over the largest abs(s), A < 5 degrees", f"{theory:.4g}", worst, theory, 0.01, 5)
-    balances = []  # the swing at which a change of the drive changes nothing
+    yield compared("the verge's 1/3 over the largest abs(s), A < 5 degrees", f"{theory:.4g}", worst, theory, 0.01, 5)
+
+
+def balances(ds: xr.Dataset) -> Claims:
+    """The swing at which a change of the drive changes nothing."""
     for line in (ds.isel(phi0=k) for k in range(ds.sizes["phi0"])):
         A = np.degrees(np.hypot(line.phi0, 4 / (line.phi0 * line.Q)).item())
         here = np.degrees(np.interp(0.0, line.period_by_mu, line.angle_size))
         what = f"phi0 = {np.degrees(line.phi0.item()):g} degrees: A of s = 0 [degrees]"
-        balances.append(compared(what, f"{A:.5g}", here, A, 0.005, 5))
-    return {"Every cell": cells, "Recoil and circular error in balance": balances, "Beside the verge": [ratio]}
+        yield compared(what, f"{A:.5g}", here, A, 0.005, 5)
 
 
 def figure(ds: xr.Dataset) -> Any:
@@ -93,7 +93,8 @@ def figure(ds: xr.Dataset) -> Any:
 def conclude(path: str) -> Conclusion:
     """Statements and the figure."""
     ds = with_theory(read_result(path, "anchor_scene:KERNEL", ["phi0", "mu"], "anchor.toml"))
-    return statements(ds), [NOTES], lambda: figure(ds)
+    groups = {"Every cell": cells(ds), "Recoil and circular error in balance": balances(ds)}
+    return groups, [NOTES], lambda: figure(ds)
 
 
 main = script(__name__, "anchor.h5", conclude)

