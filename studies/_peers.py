@@ -62,28 +62,26 @@ class OneByOne:
     def __init__(self, rtol: float) -> None:
         self.rtol = rtol
 
-    def half_swing(self, a: float, R: float, speed: float) -> tuple[float, float, float]:
-        """Time, turning point and speed at the end of a half swing from the switch at +1."""
-        raise NotImplementedError
-
     def settle(self, a: Any, R: Any, speed: Any, count: Any) -> Any:
         """Rows of period, amplitude and speed before the switch."""
-        return np.array([self._settled(*cell) for cell in zip(a, R, speed, count, strict=True)])
+        return np.array([self.settled(*cell) for cell in zip(a, R, speed, count, strict=True)])
 
-    def _settled(self, a: float, R: float, speed: float, count: int) -> tuple[float, float, float]:
-        time, top, speed = 0.0, 1.0, START * speed
-        for _ in range(count):
-            time, top, speed = self.half_swing(a, R, speed)
-        return 2.0 * time, top, speed
+    def settled(self, a: float, R: float, speed: float, count: int) -> tuple[float, float, float]:
+        """Those of one clock."""
+        raise NotImplementedError
 
 
 class Scipy(OneByOne):
     """solve_ivp by DOP853."""
 
-    def half_swing(self, a: float, R: float, speed: float) -> tuple[float, float, float]:
-        out, top, _ = self._leg((1.0, speed), a, R, 1)
-        back, _, last = self._leg((top, 0.0), a, -R, 0)
-        return out + back, top, -last
+    def settled(self, a: float, R: float, speed: float, count: int) -> tuple[float, float, float]:
+        """Half swing after half swing from the switch at +1."""
+        time, top, speed = 0.0, 1.0, START * speed
+        for _ in range(count):
+            out, top, _ = self._leg((1.0, speed), a, R, 1)
+            back, _, last = self._leg((top, 0.0), a, -R, 0)
+            time, speed = out + back, -last
+        return 2.0 * time, top, speed
 
     def _leg(self, begin: tuple[float, float], a: float, friction: float, which: int) -> tuple[float, float, float]:
         from scipy.integrate import solve_ivp
@@ -126,7 +124,8 @@ class Heyoka(OneByOne):
         motion = [(x, v), (v, drive - a * v - way * friction)]
         self.run = hy.taylor_adaptive(motion, [0.0, 1.0], t_events=events, tol=rtol, pars=[0.0] * 4)
 
-    def _settled(self, a: float, R: float, speed: float, count: int) -> tuple[float, float, float]:
+    def settled(self, a: float, R: float, speed: float, count: int) -> tuple[float, float, float]:
+        """By one run over all switches."""
         self.log.clear()
         self.wanted[0] = count
         self.run.time = 0.0

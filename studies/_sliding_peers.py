@@ -43,24 +43,21 @@ def scipy_places(method: str, belt: Any, fall: Any, until: Any, rtol: float) -> 
 
 def modes(belt: Any, fall: Any, until: Any, rtol: float) -> Any:
     """By solve_ivp's DOP853, stick and slip apart."""
-    return np.array([motion(*map(float, cell), rtol)[0, -1] for cell in zip(belt, fall, until, strict=True)])
 
+    def place(belt: float, fall: float, until: float) -> float:
+        def catches(t: float, u: Any) -> float:
+            return belt - float(u[1])
 
-def motion(belt: float, fall: float, until: float, rtol: float, longest: float = np.inf) -> Any:
-    """Places and speeds of one cell, which starts on the belt and is on it at the time `until`; steps to `longest`."""
+        catches.terminal, catches.direction = True, -1  # type: ignore[attr-defined]
+        how = {"method": "DOP853", "events": catches, "rtol": rtol, "atol": 1e-3 * rtol}
+        t, place, last = 0.0, 0.0, MU + fall * belt
+        while t + (last - place) / belt < until:
+            t += (last - place) / belt
+            slip = solve_ivp(lambda _, u: (u[1], fall * u[1] - u[0] + MU), (t, until), (last, belt), **how)
+            t, place = float(slip.t[-1]), float(slip.y[0, -1])
+        return place + belt * (until - t)
 
-    def catches(t: float, u: Any) -> float:
-        return belt - float(u[1])
-
-    catches.terminal, catches.direction = True, -1  # type: ignore[attr-defined]
-    t, found, last = 0.0, [np.array([[0.0], [belt]])], MU + fall * belt
-    while t + (last - found[-1][0, -1]) / belt < until:
-        t += (last - found[-1][0, -1]) / belt
-        how = {"events": catches, "rtol": rtol, "atol": 1e-3 * rtol, "max_step": longest}
-        slip = solve_ivp(lambda _, u: (u[1], fall * u[1] - u[0] + MU), (t, until), (last, belt), "DOP853", **how)
-        t = float(slip.t[-1])
-        found.append(slip.y)
-    return np.concatenate([*found, [[found[-1][0, -1] + belt * (until - t)], [belt]]], axis=1)
+    return np.array([place(*map(float, cell)) for cell in zip(belt, fall, until, strict=True)])
 
 
 def _kvaerno5(belt: Any, fall: Any, until: Any, rtol: Any) -> Any:

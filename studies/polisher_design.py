@@ -89,13 +89,11 @@ def best(machines: xr.Dataset) -> xr.Dataset:
 
 def existence(machines: xr.Dataset) -> Claims:
     """Which machines of the amplitude there are."""
-    longest, there = to_spare(machines.b, machines.d, machines.f)
-    within, found = there.transpose("d", "b", "f"), machines.thd.notnull()
+    within = to_spare(machines.b, machines.d, machines.f)[1].transpose("d", "b", "f")
+    found = machines.thd.notnull()
     strangers, share = int((found & ~within).sum()), float(found.sum() / within.sum())
-    spare = float((longest / machines.crank - 1).min())
     yield said("machines beyond the border", strangers == 0, f"{strangers} of {int(found.sum())}", "none")
     yield said("of those within it, in the sweep's cranks", share > 0.5, f"{share:.1%}", "most")
-    yield said("crank to spare before it locks, least", spare > 0, f"{spare:.2%}", "> 0")
 
 
 def quality(machines: xr.Dataset) -> Claims:

@@ -15,7 +15,7 @@ import numpy as np
 import xarray as xr
 from _common import Claims, Conclusion, Statement, compared, most, read_result, said, script, solved
 from _figures import colour_map, page_of
-from _polishing import KEPT, Profiles, area, best_settings, least, machine, profiles, swings, tool_wear, unevenness
+from _polishing import KEPT, Profiles, area, best_settings, least, machine, profiles, unevenness
 from scipy.optimize import brentq
 
 from sweep.show.charts import COLOURS
@@ -28,7 +28,7 @@ TOOLS = (
 
 NOTES = """\
 unevenness: standard deviation over the area, over the mean; allowed: 1e-6 of the conditions of an optimum, 1e-9 m of a
-length found by roots, 2 % of A0's slopes over 1 mm of throw, 5e-4 of the wear in all, by 24 by 24 points of a quarter
+length found by roots, 2 % of A0's slopes over 1 mm of throw
 """
 
 
@@ -45,30 +45,16 @@ def optimum(ds: xr.Dataset, p: Profiles, shares: Any) -> Claims:
 
 
 def eight_tools(ds: xr.Dataset) -> Claims:
-    """Wear by each tool of the paper's figure 5, its half widths 4 cm times a and b, and the same in all by its points.
-
-    What the work loses, 2 pi times the integral of the wear over r dr, follows from the mean speed of its points.
-    """
-    fixed = machine(ds) | {"e": 0.1, "w_x": float(ds.w_x[3])}
+    """Unevenness by each tool of the paper's figure 5, its half widths 4 cm times a and b."""
     n, m, a, b = np.array(TOOLS).T
-    radius = np.linspace(0.0, 0.4, 401)
     sizes = {"tool_n": n, "tool_m": m, "tool_a": 0.04 * a, "tool_b": 0.04 * b}
-    wear = solved("polisher_wear", design="zip", along={"radius": radius}, rtol=1e-5, **fixed | sizes).wear.values
-    motion, work = swings(ds, [0.1]), ds.isel(w_x=3, e=[0])
-    u, weight = np.polynomial.legendre.leggauss(24)
-    u, weight = 0.5 * (u + 1), 0.5 * weight
-    for k, row in enumerate(wear):
-        # a quarter of the outline, X = a x, x = u^2 (3 - 2 u), towards whose ends Gauss's points crowd
-        x, dx = u * u * (3 - 2 * u), 6 * u * (1 - u) * weight
-        top = (1 - x ** n[k]) ** (1 / m[k])
-        X, Y = (sizes["tool_a"][k] * x)[:, None], sizes["tool_b"][k] * top[:, None] * u
-        area_of = sizes["tool_a"][k] * sizes["tool_b"][k] * (dx * top)[:, None] * weight
-        corners = [(s * X + 0 * Y, t * Y) for s in (1, -1) for t in (1, -1)]
-        theory = sum(float((tool_wear(work, motion, *at)[0] * area_of).sum()) for at in corners)
-        here, inner = 2 * np.pi * np.trapezoid(row * radius, radius), radius <= float(ds.radius[-1]) + 1e-9
-        uneven = float(unevenness(row[inner], area(radius[inner])))
-        what = f"n, m = {n[k]:g}, {m[k]:g}, b = {b[k]:g} a: uneven by {uneven:.0%}, wear in all [m^3/s]"
-        yield compared(what, f"{theory:.4g}", here, theory, 5e-4, 4)
+    given, along = machine(ds) | sizes | {"e": 0.1, "w_x": float(ds.w_x[3])}, {"radius": ds.radius.values}
+    found = unevenness(
+        solved("polisher_wear", design="zip", along=along, rtol=1e-5, **given).wear.values, area(ds.radius)
+    )
+    for row, uneven in zip(TOOLS, found, strict=True):
+        yield Statement("n, m = {:g}, {:g}, a, b = {:g}, {:g}: uneven by".format(*row), "", f"{uneven:.0%}")
+    yield said("the disc is the most even of them", found.argmin() == 0, f"{found[0]:.0%}")
 
 
 def middle(d: float, e: float, b: float, f: float) -> float:
@@ -90,21 +76,6 @@ def correction(ds: xr.Dataset) -> Claims:
     yield compared(
         "  for 1 mm of throw, by A0_e/A0_d [um]", f"{1e6 * (small - d):.2f}", 1e6 * slope, 1e6 * (small - d), 0.02, 5
     )
-
-
-def turning(ds: xr.Dataset) -> Claims:
-    """What it matters which way the work turns, on type A; type B is type A in a mirror, which is no finding."""
-    fixed = machine(ds) | {"tool_b": float(ds.tool_b), "e": 0.1, "w_x": 0.53}
-    spin = {"Omega": [fixed["Omega"], -fixed["Omega"]]}
-    both = solved("polisher_wear", along={"radius": ds.radius.values[::10]}, **fixed | spin)
-    off = float(abs(both.wear[1] / both.wear[0] - 1).max())
-    # the way out takes the crank from one dead point to the other, the way back the rest of its turn
-    b, d, f, e = fixed["b"], fixed["d"], fixed["f"], fixed["e"]
-    dead = [math.acos((b * b + (f + s * e) ** 2 - d * d) / (2 * b * (f + s * e))) for s in (1, -1)]
-    out = 0.5 + (dead[1] - dead[0]) / (2 * math.pi)
-    changes = "  so the wear changes where the work turns the other way"
-    yield said("share of the crank's turn in which the arm goes out", abs(out - 0.5) > 1e-3, f"{out:.3f}")
-    yield said(changes, 1e-3 < off < 0.05, f"{off:.2%}", "> 0.1 %")
 
 
 def figure(ds: xr.Dataset, p: Profiles, shares: Any) -> Any:
@@ -135,7 +106,6 @@ def conclude(path: str) -> Conclusion:
         "Sequences of settings": optimum(ds, p, shares),
         "The eight tools at e = 10 cm, offset 3 cm": eight_tools(ds),
         "Another throw about the same middle": correction(ds),
-        "The way the work turns": turning(ds),
     }
     return groups, [NOTES], lambda: figure(ds, p, shares)
 

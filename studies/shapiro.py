@@ -58,7 +58,7 @@ def statements(ds: xr.Dataset) -> Claims:
 
 def figure(ds: xr.Dataset) -> Any:
     """The steps over both currents, their borders by (1), and the decay on one of them."""
-    with page_of(80.0, 1, 2, width_ratios=(1.35, 1.0)) as (page, (plane, decay)):
+    with page_of(136.0, 2, width=110.0) as (page, (plane, decay)):
         slow, fast = ds.sel(w=2.0), ds.sel(w=8.0)
         fine = np.linspace(0.0, 6.0, 200)
         for n in map(int, ds.order.values):

@@ -61,7 +61,7 @@ def sticking(ds: xr.Dataset) -> Claims:
     given = int(ok.period.notnull().sum()), rests.belt.size
     yield said("cells that stick and slip, that rest", sum(given) == ds.belt.size, f"{given}", "all")
     yield most("period beside slip by scipy and ride", "", off, 1e-8, "")
-    yield said("largest multiplier, as it sticks", decay < 1e-8, f"{decay:.1e}", "0")
+    yield most("largest multiplier, as it sticks", "0", decay, 1e-8, "")
     yield compared("fastest belt on which it sticks", "end of (1)", float(ok.belt.max()), end, 0.04, 4)
     yield most("place of steady sliding", "F(belt)", steady, 1e-8, "")
 

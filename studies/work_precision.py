@@ -5,8 +5,8 @@
 sweeps ten thousand foliots with viscous and Coulomb friction by every method at every tolerance, on one core, follows
 some of the same foliots by heyoka.py, diffrax and scipy (the extra `peers`), and draws work_precision.png. The time is
 that of the whole `sweep.run`, over its cells. Errors are the largest among 400 of the cells, against 20 digits
-where mpmath is installed, else against the best method. Two tables are printed beside it: the same for drag, and the
-order of integrators at a fixed step. Timings are noisy and for information only; errors and counts are checked.
+where mpmath is installed, else against the best method. A table for drag is printed beside it. Timings are noisy and
+for information only; errors and counts are checked.
 """
 
 import sys
@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Claims, Conclusion, Statement, cheapest, differing, measured, said, script
+from _common import Claims, Conclusion, Statement, cheapest, measured, said, script
 from _figures import direct_label, page_of
 from _peers import FOLLOWERS, swings
 
@@ -35,35 +35,27 @@ DIGITS = 20
 PEER_CELLS = {"heyoka.py": 1, "diffrax": 2, "scipy": 10}
 """Other libraries follow every so many-th of the cells; diffrax follows all of them side by side."""
 LONGEST = 10.0
-ORDERS = {"euler": (1, 1e-2), "semi_implicit": (1, 1e-2), "verlet": (2, 1e-2), "rk4": (4, 1e-2)}
-"""Order, and by how much the exponent of the error in the step may be off, for steps from 0.01 to 0.1 s."""
 PLACES = {
     "auto": (0.6, 1.0), "coulomb": (0.85, 9.0), "quadrature": (1.7, 9.0), "segments": (1.9, 1.0), "sdirk4": (1.9, 2.0),
 }  # fmt: skip
 """Where the names of methods stand whose marks are close: factors of time and error. Others stand above their marks."""
 
 NOTES = """\
-error: the largest of period, amplitude and speed at the switch, relative; of fixed steps: of the third switch's time
+error: the largest of period, amplitude and speed at the switch, relative
 The other libraries are given how many half swings it takes until nothing is left of a start 10 % from the cycle;
 diffrax follows all clocks side by side, each for as many half swings as the slowest"""
 
 
-def oracle(name: str) -> Any:
-    """A module of true values by mpmath; None where that is not installed or the module is not at hand."""
+def cycles(study: sweep.study.read.Study, cells: int) -> dict[str, Any] | None:
+    """True values of the outputs by mpmath; None where that is not installed or the oracle is not at hand."""
     folder = str(Path(__file__).parents[1] / "tests" / "oracles")
     sys.path += [] if folder in sys.path else [folder]
     try:
-        return import_module(name)
+        truth = import_module("foliot_oracles")
     except ImportError:
         return None
-
-
-def cycles(study: sweep.study.read.Study, cells: int) -> dict[str, Any] | None:
-    """True values of the outputs; None where there is no oracle."""
-    truth, columns, rows = oracle("foliot_oracles"), precision_cells(study, cells), []
-    if truth is None:
-        return None
     fixed = {name: study.fixed[name] for name in ("mu", "phi0", "a", "R", "c", "n", "k", "e") if name in study.fixed}
+    columns, rows = precision_cells(study, cells), []
     for values in zip(*columns.values(), strict=True):
         cell = {**fixed, **dict(zip(columns, map(float, values), strict=True))}
         rows.append([float(x) for x in truth.cycle(**cell, digits=DIGITS)])
@@ -108,27 +100,6 @@ def errors_of(made: Any, rows: Any, rtol: float) -> Any:
     a, R, left, *true = rows.T
     found = made(rtol).settle(a, R, true[2], [swings(rtol, x) for x in left])
     return abs(found / np.transpose(true) - 1).max(axis=1)
-
-
-def orders(path: Path) -> Claims:
-    """The exponent in the step of the error of the third switch, and what order 1 and 4 cost in calls of the rates."""
-    truth = oracle("scene_oracles")
-    if truth is None:
-        return
-    ds = sweep.run(sweep.study(path))
-    fixed = [float(ds[name]) for name in ("phi0", "a", "c")]
-    true = [float(truth.quadratic_foliot(float(mu), *fixed, int(ds.flips))[0]) for mu in ds.mu]
-    error = abs(ds.time / xr.DataArray(true, dims="mu") - 1)
-    for name, (order, allowed) in ORDERS.items():
-        row = error.median("mu").sel({"method": name}).where((ds.step > 0.01) & (ds.step < 0.1), drop=True)
-        slope = float(np.polyfit(np.log(row.step), np.log(row), 1)[0])
-        what = f"{name}: exponent of the error in the step"
-        yield differing(what, str(order), slope, order, allowed * order * 5)
-    for name in ("verlet", "rk4", "dopri5", "dop853"):
-        worst, calls = (x.sel({"method": name}) for x in (error.max("mu"), ds.rate_calls.mean("mu")))
-        calls = calls.where(worst <= 1e-7)
-        text = "-" if bool(calls.isnull().all()) else f"{float(calls.min()):.4g}"
-        yield Statement(f"{name}: calls of the rates for 1e-7", "", text)
 
 
 def honesty(title: str, found: xr.Dataset) -> Claims:
@@ -177,14 +148,13 @@ def conclude(path: str, cells: int = 400, tolerances: Sequence[float] = TOLERANC
     true, keys = cycles(study, cells), {"cells": cells, "tolerances": tolerances}
     coulomb = work_precision(study, truth=true, **keys)
     dragged = work_precision(drag, truth=cycles(drag, cells), **keys)
-    steps = list(orders(Path(path).with_name("work_precision_steps.toml")))
     coulomb, others = swept(study, coulomb), peers(study, true, cells, tolerances)
     missing = [Statement(name, "", "not installed") for name in PEER_CELLS if name not in others]
     groups = {
         "Honesty": [*honesty("viscous and Coulomb", coulomb), *honesty("drag", dragged)],
         "Cost, viscous and Coulomb": [*cheapest(whole(coulomb) | others), *missing],
         "Cost, drag": cheapest(whole(dragged)),
-    } | ({"Fixed steps": steps} if steps else {})
+    }
     tables = [f"{one.attrs['title']}\n{precision_text(one, complete=True)}\n" for one in (coulomb, dragged)]
     return groups, [NOTES, "", *tables], lambda: figure(coulomb, others)
 
