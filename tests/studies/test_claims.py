@@ -56,7 +56,7 @@ TABLE = {
         "balance_ringdown": {"zeta": np.geomspace(1e-4, 2, 31), "r": np.geomspace(1e-4, 0.9, 37)},
     }, "margin status stop_time", 2),
     "bouncing_ball": Claims({"bouncing_ball": {"push": [1.05, 1.2, 1.4, 1.53, 1.5375, 1.545, 1.6, 1.69]}}, ""),
-    "chatter_lobes": Claims({"chatter_lobes": {}}, "damping frequency frequency_error", 2),
+    "chatter_lobes": Claims({"chatter_lobes": {}}, "damping frequency frequency_error", 1),
     "cross_beat": Claims({"cross_beat": {}}, ""),
     "foliot_scaling": Claims({
         "foliot_scaling": {"mu": np.geomspace(1e-7, 1e7, 169), "a": 1.3, "phi0": 0.4},
@@ -68,7 +68,7 @@ TABLE = {
     "friction_varies": Claims({"friction_varies": {}, "friction_varies_noise": {}},
         "friction_varies.angle friction_varies.speed friction_varies.time "
         "friction_varies_noise.rate_error_s_per_day friction_varies_noise.truncated", 8),
-    "fula_milling_machine": Claims({"fula_milling_machine": {}}, "frf_error n_kept status", 10),
+    "fula_milling_machine": Claims({"fula_milling_machine": {}}, "frf_error n_kept status", 5),
     "hairspring": Claims({
         "hairspring": {"a": np.geomspace(1e-3, 10, 33), "k": np.geomspace(3e-6, 3e7, 105)},
     }, "amplitude multiplier", 10),
