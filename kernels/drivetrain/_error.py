@@ -1,20 +1,18 @@
 """A reduced model against its chain: as few masses as are wanted, and the largest error of the spindle's receptance.
 
-`make(p, order, scene)` makes a `Model` of p masses in the scene; what follows is compiled once for all kinds of them.
+make(p, order, scene) -> Model          makes a model of p masses in the scene
+receptance(w, model, scene)             of the spindle, by the model
 """
 
 from kernels.drivetrain._chain import GRID, TURN, Model, off_by
-from kernels.drivetrain._modes import receptance_of_modes
-from kernels.drivetrain._rivin import receptance_of_chain, receptance_of_exact, receptance_of_kept
-from kernels.lanes.jit import jit_apart
+from kernels.drivetrain._rivin import receptance_of_chain
+from kernels.lanes.jit import jit_apart, jit_shared
 from kernels.lanes.vectors import fma, magnitude, sqrt
 from kernels.maths.elementary import exp, log
 from kernels.maths.small_dense import sort, square
 
 AROUND = (-16.0, -8.0, -4.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
 """Where a resonance is looked at, in its half widths: `_chain.SAMPLES` of them."""
-CHAIN_AT_REST, CHAIN_OF_FREQUENCY, MODES = 0, 1, 2
-"""Kinds of models: `_rivin.rivin`, `_rivin.exact`, those of `_bases`."""
 NARROWINGS = 40
 """Of an interval around a largest value, by the golden section: to 4e-9 of its width, 2e-17 of the value."""
 _GOLDEN = 0.6180339887498949
@@ -89,28 +87,17 @@ def _largest(count, of_error, receptance, model, scene):
     return most
 
 
-@jit_apart
-def _largest_of(kind, count, of_error, model, scene):
-    """`_largest` by a model of that kind, each with a loop of its own: asked at each frequency, a third of the time."""
-    if kind == MODES:
-        return _largest(count, of_error, receptance_of_modes, model, scene)
-    if kind == CHAIN_AT_REST:
-        return _largest(count, of_error, receptance_of_kept, model, scene)
-    return _largest(count, of_error, receptance_of_exact, model, scene)
+@jit_shared
+def _sampled(f_max, own_poles, p, scene):
+    """How many frequencies are looked at, into `scene.samples`, and the least damping; none where H is infinite.
 
-
-@jit_apart
-def receptance_error(f_max, own_poles, kind, model, scene):
-    """Largest abs(dH) up to f_max over the largest abs(H), and a bound on its rounding.
-
-    NaN where H is infinite in the band: with a free end, or with a resonance that nothing damps. The samples are 0, the
-    end of the band, frequencies between even on a log scale, and those close around every pole.
+    They are 0, the end of the band, frequencies between even on a log scale, and those close around every pole.
     """
     full, kept, at = scene.full, scene.kept, scene.samples[0]
     n = full.J.size
-    w_max = TURN * min(f_max, _BEYOND * max(full.f[n - 1], kept.f[model.p - 1]))
+    w_max = TURN * min(f_max, _BEYOND * max(full.f[n - 1], kept.f[p - 1]))
     zeta, count = 1.0, GRID
-    for s, poles, own in ((full.s, 2 * n, 2 * n), (kept.s, 2 * model.p, own_poles)):
+    for s, poles, own in ((full.s, 2 * n, 2 * n), (kept.s, 2 * p, own_poles)):
         for i in range(poles):
             if s[i].imag > 0.0 and s[i].imag <= w_max:
                 zeta = min(zeta, -s[i].real / sqrt(square(s[i])))
@@ -121,7 +108,7 @@ def receptance_error(f_max, own_poles, kind, model, scene):
                         at[count] = w
                         count += 1
     if not (zeta > 0.0 and full.k[n - 1] > 0.0 and w_max > 0.0):
-        return float("nan"), 0.0
+        return 0, zeta
     at[0], at[1] = 0.0, w_max
     w = min(TURN * full.f[0], w_max) / 32.0
     ratio = exp(log(w_max / w) / (GRID - 2))
@@ -129,7 +116,19 @@ def receptance_error(f_max, own_poles, kind, model, scene):
         at[i] = w
         w *= ratio
     sort(at, count)
+    return count, zeta
+
+
+@jit_apart
+def receptance_error(f_max, own_poles, receptance, model, scene):
+    """Largest abs(dH) up to f_max over the largest abs(H), and a bound on its rounding.
+
+    NaN where H is infinite in the band: with a free end, or with a resonance that nothing damps.
+    """
+    count, zeta = _sampled(f_max, own_poles, model.p, scene)
+    if count == 0:
+        return float("nan"), 0.0
     off, size = 0.0, 0.0
     for of_chain in range(2):
-        off, size = size, _largest_of(kind, count, 1 - of_chain, model, scene)
-    return off / size, _ROUNDING * n / zeta
+        off, size = size, _largest(count, 1 - of_chain, receptance, model, scene)
+    return off / size, _ROUNDING * scene.full.J.size / zeta

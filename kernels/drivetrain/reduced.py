@@ -37,7 +37,7 @@ from kernels.drivetrain._chain import (
     refusal,
     take_units,
 )
-from kernels.drivetrain._error import CHAIN_AT_REST, CHAIN_OF_FREQUENCY, MODES, receptance_error, reduce_enough
+from kernels.drivetrain._error import receptance_error, reduce_enough
 from kernels.drivetrain._frequencies import natural_frequencies
 from kernels.drivetrain._poles import modal_damping, poles_of_chain
 from kernels.interface import Field
@@ -119,25 +119,39 @@ def _known(error):
     return error if error >= 0.0 else math.inf
 
 
-@jit_shared
-def _finish(kind, f_max, e_J, e_k, model, rows, scene):
+@jit_apart
+def _finish(poles, receptance, leaves_chain, has_all, f_max, e_J, e_k, model, rows, scene):
     """Rows of a reduced model, whether float64 holds them, its `receptance_error`; bounds on errors.
 
-    Bounds of frequencies, of damping, and of that error: lightly damped, it has fewer digits than the frequencies.
+    `poles(p, scene)` and `receptance` are those of the model. Bounds of frequencies, of damping, and of that error:
+    lightly damped, it has fewer digits than the frequencies.
     """
-    off, error, rounding, n = math.nan, _known(model.error), math.inf, scene.full.J.size
-    if kind == MODES:
-        blur, own_poles = _modes.poles_of_modes(model.p, scene)
-    elif kind == CHAIN_AT_REST:
-        blur, own_poles = _rivin.poles_of_both(model.p, scene)
-    else:
-        blur, own_poles = _rivin.poles_of_full(model.p, scene)
+    off, error, rounding = math.nan, _known(model.error), math.inf
+    blur, own_poles = poles(model.p, scene)
     blur = max(error, _known(blur))
     if blur < math.inf:
-        off, rounding = receptance_error(f_max, own_poles, kind, model, scene)
+        off, rounding = receptance_error(f_max, own_poles, receptance, model, scene)
         rounding = max(blur, _known(rounding))
-    count, p = n if kind == CHAIN_OF_FREQUENCY else model.p, 0 if kind == MODES else model.p
+    count, p = scene.full.J.size if has_all else model.p, model.p if leaves_chain else 0
     return _fill(rows, scene.full, scene.kept, e_J, e_k, count, p), off, error, blur, rounding
+
+
+@jit_apart
+def _finish_rivin(f_max, e_J, e_k, model, rows, scene):
+    poles, receptance = _rivin.poles_of_both, _rivin.receptance_of_kept
+    return _finish(poles, receptance, True, False, f_max, e_J, e_k, model, rows, scene)
+
+
+@jit_apart
+def _finish_exact(f_max, e_J, e_k, model, rows, scene):
+    poles, receptance = _rivin.poles_of_full, _rivin.receptance_of_exact
+    return _finish(poles, receptance, True, True, f_max, e_J, e_k, model, rows, scene)
+
+
+@jit_shared
+def _finish_modes(f_max, e_J, e_k, model, rows, scene):
+    poles, receptance = _modes.poles_of_modes, _modes.receptance_of_modes
+    return _finish(poles, receptance, False, False, f_max, e_J, e_k, model, rows, scene)
 
 
 @jit
@@ -145,12 +159,11 @@ def _scene(columns):
     return (new_scene(columns.J.shape[1]),)
 
 
-def _reducing(name, make, kind):
-    """A solver of one reduction, made as `_error` says, of a kind that is named there.
+def _reducing(name, make, finish, has_all=False):
+    """A solver of one reduction, made as `_error` says and finished as by `_finish`.
 
-    `exact` has all frequencies of the full chain however few its masses: where `tol` is to be met, one.
+    It has all frequencies of the full chain however few its masses, or not: where `tol` is to be met, one.
     """
-    has_all = kind == CHAIN_OF_FREQUENCY
 
     @jit_apart
     def fill(i, columns, scene):
@@ -165,7 +178,7 @@ def _reducing(name, make, kind):
         if model.status > OK:
             columns.status[i] = model.status
             return
-        fine, off, error, blur, rounding = _finish(kind, f_max, e_J, e_k, model, read(Rows, columns, i), scene)
+        fine, off, error, blur, rounding = finish(f_max, e_J, e_k, model, read(Rows, columns, i), scene)
         errors = Outputs(error, error, blur, 0.0 if n_keep > 0.0 else error, rounding, *_OF_CHAIN)
         _write(i, columns, fine, e, model.p, model.slower, off, errors)
 
@@ -195,12 +208,12 @@ _OF_CHAIN = (CHAIN_ROUNDING, CHAIN_ROUNDING, CHAIN_ROUNDING, CHAIN_ROUNDING)
 """Bounds of what merging dampers and masses leaves."""
 SOLVERS = (
     tracing("none", "", _whole, buffers=_whole_room, loop=cell_by_cell, estimates=True),
-    _reducing("rivin", _rivin.rivin, CHAIN_AT_REST),
-    _reducing("guyan", _bases.guyan, MODES),
-    _reducing("irs", _bases.irs, MODES),
-    _reducing("craig_bampton", _bases.craig_bampton, MODES),
-    _reducing("modal", _bases.modal, MODES),
-    _reducing("exact", _rivin.exact, CHAIN_OF_FREQUENCY),
+    _reducing("rivin", _rivin.rivin, _finish_rivin),
+    _reducing("guyan", _bases.guyan, _finish_modes),
+    _reducing("irs", _bases.irs, _finish_modes),
+    _reducing("craig_bampton", _bases.craig_bampton, _finish_modes),
+    _reducing("modal", _bases.modal, _finish_modes),
+    _reducing("exact", _rivin.exact, _finish_exact, has_all=True),
 )
 """Each is compiled when a cell asks for it first; its machine code is kept by its name."""
 REDUCTIONS = {solver.name: code for code, solver in enumerate(SOLVERS)}
