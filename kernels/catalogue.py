@@ -20,9 +20,9 @@ KERNELS = {
     "polisher": "kernels.polisher.arm:POLISHER",
     "polisher_motion": "kernels.polisher.motion:POLISHER_MOTION",
     "polisher_wear": "kernels.wear.ring:POLISHER_WEAR",
-    "drivetrain_frf": "kernels.drivetrain.receptance:DRIVETRAIN_FRF",
     "polisher_wear_point": "kernels.wear.point:POLISHER_WEAR_POINT",
     "drivetrain": "kernels.drivetrain.reduced:DRIVETRAIN",
+    "drivetrain_frf": "kernels.drivetrain.receptance:DRIVETRAIN_FRF",
 }
 
 

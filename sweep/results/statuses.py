@@ -50,10 +50,8 @@ class Account:
         return dict(zip(KINDS, astuple(self), strict=True))
 
     def __str__(self) -> str:
-        counts = self.by_kind
-        if not self.not_asked:
-            del counts["not asked"]
-        return f"{self.total:,} cells: " + ", ".join(f"{cells:,} {kind}" for kind, cells in counts.items())
+        counts = [f"{cells:,} {kind}" for kind, cells in self.by_kind.items() if cells]
+        return f"{self.total:,} cells: {', '.join(counts) or 'none'}"
 
 
 @dataclass(frozen=True)
@@ -66,7 +64,7 @@ class StatusCount:
     example: dict[str, str] = field(default_factory=dict)
 
     def __str__(self) -> str:
-        text = f"{self.cells} of {self.total} cells: {self.name}"
+        text = f"{self.cells:,} of {self.total:,} cells: {self.name}"
         cell = " ".join(f"{k}={v}" for k, v in self.example.items())
         return f"{text}, e.g. {cell}" if cell else text
 

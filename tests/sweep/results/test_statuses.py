@@ -49,7 +49,8 @@ def test_a_status_that_is_none_is_failed_with_the_exit_status_of_that(number, tm
     for heights, code in ((given[1:], 0), (sorted([*given[1:], number]), 4)):
         Path("s.toml").write_text(to_toml(sweep.study(**study, axes={"height": heights})))
         assert main(["run", "s.toml", "--allow-import", "--no-isolate", "--force"]) == code
-        assert f"16 remarked, 9 refused, 3 unsolved, {code // 4} FAILED, 0 pending" in capsys.readouterr().out
+        failed = ", 1 FAILED" if code else ""
+        assert f"16 remarked, 9 refused, 3 unsolved{failed};" in capsys.readouterr().out
         with sweep.open_result("s.h5") as found:
             assert found.status.values.tolist() == [Status.FAILED if h == number else h for h in heights]
             assert np.isnan(found.fall_time).values.tolist() == [h >= 64 or h == number for h in heights]
