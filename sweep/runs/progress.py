@@ -21,7 +21,7 @@ from sweep.words import SHORTEST, duration, one_digit, printable, speed
 QUIET_SECONDS = 1.0
 """A run that ends sooner says nothing."""
 LINE_SECONDS, LOG_SECONDS = 30.0, 60.0
-"""How often a line is told where there is no bar, the first ones sooner; and one is logged."""
+"""How often a line is told where there is no bar, the first ones sooner if cells were done; and one is logged."""
 
 
 def from_everywhere(jobs: Iterable[int]) -> list[int]:
@@ -70,6 +70,7 @@ class Progress:
         self._live = self._stream is not None and (self._stream.isatty() or notebook)
         self._begun = self._last = self._logged = clock()
         self._said: float | None = None
+        self._told = done
         self._work_left, self._blocks = work, 0
         self._spent = self._first_round = np.zeros(2)  # the work of blocks that are done, and their seconds
 
@@ -104,7 +105,8 @@ class Progress:
             self._logged = now
             self._log(self.line())
         since = now - self._begun
-        due = self._live or self._said is None or now - self._said >= min(LINE_SECONDS, since / 3)
+        pause = min(LINE_SECONDS, since / 3) if self.done > self._told else LINE_SECONDS
+        due = self._live or now - (self._begun if self._said is None else self._said) >= pause
         if since >= QUIET_SECONDS and due:
             self._say(self.line())
 
@@ -156,7 +158,7 @@ class Progress:
         log(text, "progress", **fields, **more)
 
     def _say(self, text: str) -> None:
-        self._said = self._clock()
+        self._said, self._told = self._clock(), self.done
         if not self._live:
             self.tell(text)
             return
