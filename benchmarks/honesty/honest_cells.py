@@ -156,10 +156,12 @@ def flips_truth(mu, phi0, phi_start, **losses):
 
 
 def rippled(random, n):
-    """Coulomb friction and a ripple of the torque, with a spring in half of the cells."""
+    """Coulomb friction and a ripple of the torque, wild in half of the cells, with a spring in half of them."""
     mu, phi0 = decades(random, -2, 2, n), decades(random, -2, 2, n)
     k = some(random, 0.5, decades(random, -3, -0.5, n) * mu / phi0)
-    depth, harmonic = random.uniform(0, 0.9, n), random.integers(1, 5, n).astype(float)
+    wild = random.random(n) < 0.5
+    depth = np.where(wild, 1 - decades(random, -6, -1, n), random.uniform(0, 0.9, n))
+    harmonic = random.integers(1, np.where(wild, 65, 5)).astype(float)
     return {
         "mu": mu, "phi0": phi0, "R": random.uniform(0.01, 0.6, n) * mu * (1 - depth), "k": k, "depth": depth,
         "harmonic": harmonic,

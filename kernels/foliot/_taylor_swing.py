@@ -8,9 +8,11 @@ multiple of the tangent along the motion itself, (v, v'), with the factor
 which is what dry friction's change of sign shifts the time by. The cycle then follows by (4) of `_integrated_swing`.
 
 Each cell goes through four stages on its own. SEARCH: Newton's method within a bracket, at a coarse tolerance. NEAR: at
-one that follows the square of its step. ROUGH and FINE: two last half swings, whose difference tells the error. The
-rough one has a tolerance FINER times larger than the fine one, and parameters some roundings off, as in
-`to_tolerance`. Where the error is too large both are followed once more at a tighter tolerance.
+one that follows the square of its step. ROUGH and FINE: two half swings, whose difference tells the error. The rough
+one has a tolerance FINER times larger than the fine one, and parameters some roundings off, as in `to_tolerance`. Where
+the torque varies outputs may hang on the speed a thousandfold, which could hide what the tolerance does: LAST, from the
+speed that the fine one gives and at its tolerance, tells it. Where the error is too large they are followed once more
+at a tighter tolerance.
 """
 
 import numpy as np
@@ -37,7 +39,7 @@ _STIFFEST = 100.0
 """Larger f'(V)/V makes steps that are stable too short."""
 _MILDEST = 1.0
 """Degree of drag below which its slope has a pole at rest, which series come close to slowly."""
-SEARCH, NEAR, ROUGH, FINE = 0, 1, 2, 3
+SEARCH, NEAR, ROUGH, FINE, LAST = 0, 1, 2, 3, 4
 """What a cell's next half swing is for."""
 _COARSE, _CLOSE, _CHECKED = 1e-4, 0.05, 0.01
 """Tolerance of the search, the relative step below which it ends, and the one below which a rough swing has a twin."""
@@ -52,11 +54,11 @@ AGAIN = 3
 """How often that is tried."""
 _LEAST = 1e-17
 """Of tolerances: finer ones change nothing but the time that they take."""
-_TOLD, _TOLD_STEEP, _TOLD_ROUGH = 4.0, 16.0, 32.0
-"""Error that is stated over what the two last half swings differ by, of which the finer one's should be a fifteenth;
-where the torque varies, on which the sensitivity hangs steeply; and where the drag is of a degree below 2: cores of
-abs(v)^n have a low order. Besides, an output is off by what the fine one's Newton step would still change, at the rate
-at which it changed from the rough one's speed to the fine one's: a thousandfold at times."""
+_TOLD, _TOLD_ROUGH, _TOLD_STEEP = 4.0, 32.0, 128.0
+"""Error that is stated over what rough and fine half swings differ by, of which the fine one's should be a fifteenth;
+where the torque varies, or the drag is of a degree below 2: cores of abs(v)^n have a low order; and of the sensitivity
+where the torque varies, on which it hangs steeply. Besides, an output is off by what the last one's Newton step would
+still change, at the rate at which it changed from the speed before."""
 _ROUNDING = 2e-14
 """Of a half swing's speed and time; a cycle's are off by 1/(1 - multiplier) as much."""
 
@@ -109,7 +111,8 @@ def _columns(function, parameters, outputs):
 
 
 _CELL = (*Foliot._fields, "depth", "harmonic")
-_E, _DECAY, _SENSITIVITY = Foliot._fields.index("e"), Swung._fields.index("decay"), Outputs._fields.index("sensitivity")
+_E, _SENSITIVITY = Foliot._fields.index("e"), Outputs._fields.index("sensitivity")
+_DECAY, _TOP = Swung._fields.index("decay"), Swung._fields.index("top")
 """Positions of columns."""
 _BEGUN = (*TERMS, "v1", "stiff")
 _begin = _columns(begin, _CELL, _BEGUN)
@@ -180,12 +183,15 @@ def cycles(cells, rtol, rippled, asked):
     dragged = terms["gamma"] > 0.0
     rough, linear = dragged & (terms["degree"] < 2.0), ~dragged & rippled
     varies = cells[-2] > 0.0
-    told = np.where(rough, _TOLD_ROUGH, np.where(varies, _TOLD_STEEP, _TOLD))
+    told = np.tile(np.where(rough | varies, _TOLD_ROUGH, _TOLD), (len(Outputs._fields), 1))
+    told[_SENSITIVITY, varies] = _TOLD_STEEP
     share = np.where(rough | varies, _SHARE_ROUGH, _SHARE)
     forms = RIPPLED if rippled else SMOOTH, SEARCHED, LINEAR
     low, high, stuck, again = np.full(n, -1.0), np.full(n, np.inf), np.zeros(n, int), np.zeros(n, int)
     stage, tolerance, before = np.full(n, SEARCH), np.full(n, _COARSE), np.full(n, np.nan)
+    final = np.where(varies, LAST, FINE)
     outputs, errors = np.full((len(Outputs._fields), n), np.nan), np.full((len(Outputs._fields), n), np.inf)
+    by_tolerance = errors.copy()
     status = np.where(possible, Status.NOT_CONVERGED, Status.NO_METHOD).astype(np.int8)
     i = np.flatnonzero(possible)
     for _ in range(LIMIT):
@@ -211,22 +217,24 @@ def cycles(cells, rtol, rippled, asked):
         stuck[i] = np.where(free, 0, stuck[i] + 1)
         lost = (stuck[i] > STUCK) | ((stage[i] == SEARCH) & (high[i] - low[i] <= _COARSE * v[i]))
 
-        # the error of fine ones by how far they are from the rough ones; done where that will do, or nothing helps
+        # the error by how far fine ones are from rough ones, and by the speed; done where that will do or nothing helps
         moved = np.abs(v[i] / before[i] - 1.0)
         apart = np.abs(found / outputs[:, i] - 1.0)
         rate = np.divide(
             relative, moved, out=np.zeros_like(moved), where=moved > 0.0
         )  # 0 of a speed that has not moved
-        apart = (told[i] + 2.0 * rate) * apart + 2.0 * relative
-        floor = np.tile((_ROUNDING + tolerance[i]) / gap, (len(found), 1))
+        by_tolerance[:, i] = np.where(stage[i] == LAST, by_tolerance[:, i] + apart, told[:, i] * apart)
+        # without tangents the errors of steps add up over the waves
+        waves = np.where(linear[i] & (not asked[_SENSITIVITY]), terms["wave"][i] / np.pi * (1.0 + swung[_TOP]), 0.0)
+        floor = np.tile((_ROUNDING + tolerance[i] * (1.0 + waves)) / gap, (len(found), 1))
         floor[3] *= 1.0 + cancels
         floor[4] *= 1.0 + decay
-        fine = free & (stage[i] == FINE)
-        outputs[:, i[free]], errors[:, i] = found[:, free], np.where(fine, apart + floor, np.inf)
+        ended, stated = free & (stage[i] == final[i]), by_tolerance[:, i] + 2.0 * (rate * apart + relative) + floor
+        outputs[:, i[free]], errors[:, i] = found[:, free], np.where(ended, stated, np.inf)
         right = errors[:, i][asked].max(axis=0) <= rtol[i]
-        last = fine & (right | (again[i] >= AGAIN) | (tolerance[i] <= _LEAST))
+        last = ended & (right | (again[i] >= AGAIN) | (tolerance[i] <= _LEAST))
         status[i[last]] = verdict[last]
-        repeated = i[fine & ~last]
+        repeated = i[ended & ~last]
         share[repeated], again[repeated] = _TIGHTER * share[repeated], again[repeated] + 1
 
         # the next speed: Newton's, or where that leaves the bracket one that narrows it
@@ -237,20 +245,20 @@ def cycles(cells, rtol, rippled, asked):
         new = now + change
         inside = free & (new > low[i]) & (new < high[i]) & (new < 8.0 * now + 8.0)
         between = np.where(high[i] < np.inf, 0.5 * (np.maximum(low[i], 0.0) + high[i]), 2.0 * now + 1.0)
+        checked = inside & (stage[i] >= ROUGH) & (stage[i] < final[i]) & (relative < _CHECKED)
         v[i] = np.where(inside, new, between)
 
         # the next stage and its tolerance: an error of F counts 1/(1 - slope)-fold in v1. Where the search is cheap,
         # it goes on until what Newton's method leaves is below what is wanted
-        wanted = np.maximum(share[i] * rtol[i] * gap / (1.0 + decay), _LEAST)
+        wanted = np.fmax(share[i] * rtol[i] * gap / (1.0 + decay) / (1.0 + waves), _LEAST)
         near = np.clip(0.01 * np.sqrt(rtol[i] * gap), FINER * wanted, _COARSE)
         converged = relative < np.sqrt(near)
         left = relative * relative
         near = np.where(linear[i], np.clip(0.01 * left, np.minimum(4.0 * wanted, _CALM), _COARSE), near)
         converged = np.where(linear[i], (left < wanted) & (tolerance[i] <= FINER * wanted), converged)
         close = inside & np.where(stage[i] == SEARCH, relative < _CLOSE, converged)
-        checked = inside & (stage[i] == ROUGH) & (relative < _CHECKED)
-        onward = np.where(close & (stage[i] < ROUGH), stage[i] + 1, stage[i])
-        stage[i] = np.where(stage[i] == FINE, ROUGH, np.where(checked, FINE, onward))
-        tolerance[i] = np.choose(stage[i], [np.full(len(i), _COARSE), near, FINER * wanted, wanted])
+        onward = checked | (close & (stage[i] < ROUGH))
+        stage[i] = np.where(onward, stage[i] + 1, np.minimum(stage[i], ROUGH))
+        tolerance[i] = np.choose(stage[i], [np.full(len(i), _COARSE), near, FINER * wanted, wanted, wanted])
         i = i[~(last | lost)]
     return outputs, errors, status

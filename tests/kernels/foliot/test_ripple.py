@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import ripple_oracles
-from columns import relative_error, solve
+from columns import estimated, relative_error, solve
 
 from kernels.foliot.ripple import FOLIOT_RIPPLE
 from kernels.interface import Status
@@ -20,6 +20,12 @@ BY_ENERGY = [
     {"mu": 0.5, "phi0": 1.5, "R": 0.2, "e": -0.4, "depth": 0.3, "harmonic": 4},
     {"mu": 1.0, "R": 0.2, "e": 0.5, "depth": 0.0, "harmonic": 1},
 ]
+
+MANY_WAVES = [
+    {"mu": 1.9141755747392093, "phi0": 0.010432977027702297, "R": 0.03934459754130002, "depth": 0.429, "harmonic": 4},
+    {"mu": 0.017680954108928747, "phi0": 7.972097180461389, "R": 0.004017033171566029, "depth": 0.545, "harmonic": 3},
+]
+"""A hundred waves a swing, on which errors of steps add up; a sensitivity that hangs on the speed 700-fold."""
 
 
 def as_columns(cells):
@@ -67,3 +73,15 @@ def test_sticking_agrees_with_energy_over_a_grid():
     found = [s in (Status.OK, Status.INACCURATE) for s in status]
     assert found == exists, [c for c, f, x in zip(cells, found, exists, strict=True) if f != x]
     assert 0 < sum(exists) < len(exists)
+
+
+@pytest.mark.skipif(not COMPILED, reason="two thousand cycles of a hundred waves each")
+@pytest.mark.parametrize("cell", MANY_WAVES)
+def test_errors_that_add_up_over_waves_or_hide_each_other_are_told(cell):
+    truth = ripple_oracles.by_energy(**cell)
+    rtol, cells = np.geomspace(1e-5, 1e-2, 250), as_columns([cell] * 250)
+    for name, true in zip(NAMES, truth, strict=True):
+        outputs, status, error = estimated(FOLIOT_RIPPLE, "taylor", rtol=rtol, asked=[name], **cells)
+        off = relative_error(outputs[name], [true] * len(rtol))
+        assert (off <= error)[status == Status.OK].all(), (name, (off / error).max())
+        assert (status == Status.OK).mean() > 0.98
