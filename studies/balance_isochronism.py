@@ -35,8 +35,6 @@ LARGE = 20.0
 FIRST = 0.02
 FLAT = 1e-3
 """Loss [s/day] that counts as none; the sweep is right to rtol 1e-11 of a period, 1e-6 s/day."""
-WATCH = 0.15, 1e-4 * 9.81, 5e-5, 3.75e-5, 2.96e-7
-"""Friction coefficient, weight [N], radii of pivot and of its end [m], spring [N m/rad] of a watch."""
 
 NOTES = """\
 loss: how much slower than 2 pi/omega_d, in s a day; deviation: relative, of losses the largest difference in s/day
@@ -116,22 +114,6 @@ def positions(ds: xr.Dataset) -> Claims:
     yield most("heavy at the side: of that", "0", level, 5e-3, "")
 
 
-def pivots() -> Claims:
-    """What the position does to amplitude and rate of a watch, from the page's mu, m, g and radius to r.
-
-    On its side a pivot climbs its hole by arctan(mu), so that R = mu m g r/sqrt(1 + mu^2), the page's R to first order
-    in mu. Upright its flat end is evenly pressed, and a disc rubs at 2/3 of its radius.
-    """
-    mu, weight, pivot, end, k = WATCH
-    upright, flat = weight * pivot * mu / math.sqrt(1 + mu * mu) / k, 2 / 3 * mu * weight * end / k
-    ds = driven({"r": [flat, upright]}, {"zeta": 1 / 600, "omega_n": 15.708, "w": 0.2}, 1e-9)
-    loss, a = lost(ds, ds.period).values, np.degrees(ds.amplitude.values)
-    work = (2 * ds.r * ds.amplitude + math.pi / 600 * ds.amplitude**2).values
-    what = f"w = 0.2, r = {upright:.4f} hanging, {flat:.4f} rad lying: amplitudes [degree]"
-    yield most(what, "by the work", abs(work / 0.2 - 1).max(), 0.02, f"{a[1]:.0f}, {a[0]:.0f}")
-    yield said("  loss hanging, lying [s/day]", loss[1] > loss[0], f"{loss[1]:.2f}, {loss[0]:.2f}", "-")
-
-
 def draw_lines(axes: Any, ds: xr.Dataset) -> None:
     """Loss over amplitude, impulse by impulse, with (1)."""
     for k, at in enumerate((-0.05, -0.025, -0.0125, 0.0, 0.05)):
@@ -186,7 +168,6 @@ def conclude(path: str, lift_path: str, hung_path: str) -> Conclusion:
         "Impulses before, at and behind the centre": impulses(ds),
         "A lift": lifts(lift),
         "Positions, out of poise": positions(hung),
-        "Positions, friction": pivots(),
     }
     return groups, [NOTES], lambda: figure(ds, lift)
 

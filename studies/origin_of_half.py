@@ -95,7 +95,8 @@ def followed() -> dict[str, xr.Dataset]:
     mixtures, mu = [m for m in MIXTURES if of_degree_two(m)], np.array(TORQUES)
     cells = [(m, x) for m in mixtures for x in TORQUES]
     axes = {name: [losses(m)[name] for m, _ in cells] for name in ("e", "c")}
-    axes |= {"mu": [x for _, x in cells], "R": [RHO * x if "Coulomb ~ drive" in m else 0.0 for m, x in cells]}
+    dry = [{"Coulomb ~ drive": RHO * x, "Coulomb": FIXED}.get(m.split(" + ")[-1], 0.0) for m, x in cells]
+    axes |= {"mu": [x for _, x in cells], "R": dry}
     ds = solved("foliot_scene:KERNEL", design="zip", **axes, phi0=1, flips=120, rtol=1e-10)
     period, speed = ((2 * ds.interval).values, abs(ds.speed.values))
     found = {}

@@ -34,8 +34,6 @@ out. Without drop two plastic bodies are one that keeps the share (m - M)/(m + M
 
 IN_SI = (1e-5, 1e-3, 0.1, 10.0)
 """Torques [N m] at which the models with impacts are followed in SI units."""
-HALF = 1.46299058758
-"""alpha where s = 1/2: q - tanh q = 1/alpha."""
 
 
 def two_bodies(impact: xr.Dataset) -> xr.Dataset:
@@ -90,12 +88,8 @@ def laws(ds: xr.Dataset, followed: dict[str, xr.Dataset]) -> Claims:
         yield differing(f"exponent, {name}, in SI units", "-1/2", fit.exponent, -0.5, 1e-8)
         yield most("  period of the kernel beside it", "the same", one.period / kernel - 1, 1e-8, "largest")
     viscous = ds.sel(model="viscous")
-    half = sweep.where_exponent(viscous.period, "torque", -0.5).abscissa
-    theory = HALF * float(ds.viscous_unit)
-    text = f"alpha = {HALF:.5f}: {theory:.5g}"
     yield differing("exponent, viscous, weakest drive", "-1", viscous.exponent[0], -1.0, 0.01, 5)
     yield differing("exponent, viscous, strongest drive", "-1/3", viscous.exponent[-1], -1 / 3, 0.01, 5)
-    yield compared("torque of exponent -1/2, viscous [N m]", text, half, theory, 1e-3, 5)
 
 
 def swings(ds: xr.Dataset, followed: dict[str, xr.Dataset]) -> Claims:

@@ -51,7 +51,7 @@ TABLE = {
         "balance_isochronism.angle balance_isochronism.interval balance_isochronism.time "
         "balance_isochronism_lift.multiplier balance_isochronism_lift.status "
         "balance_isochronism_positions.angle balance_isochronism_positions.interval "
-        "balance_isochronism_positions.time", 1),
+        "balance_isochronism_positions.time"),
     "balance_ringdown": Claims({
         "balance_ringdown": {"zeta": np.geomspace(1e-4, 2, 31), "r": np.geomspace(1e-4, 0.9, 37)},
     }, "margin status stop_time", 2),
@@ -71,7 +71,7 @@ TABLE = {
     "fula_milling_machine": Claims({"fula_milling_machine": {}}, "frf_error n_kept status", 5),
     "hairspring": Claims({
         "hairspring": {"a": np.geomspace(1e-3, 10, 33), "k": np.geomspace(3e-6, 3e7, 105)},
-    }, "amplitude multiplier", 10),
+    }, "amplitude multiplier", 8),
     "impact_map": Claims({
         "impact_map": {"I_c": 16, "e": 24}, "impact_map_lever": {"I_c": 16, "nu": 16},
     },
