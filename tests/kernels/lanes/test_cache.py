@@ -119,7 +119,6 @@ print(*(one.data["dispatcher"].py_func.__name__ for _, one in recorder.buffer if
 def test_a_shared_function_is_loaded_for_who_calls_it_and_alone_is_compiled_again_where_it_is_lost(tmp_path):
     first = run(SHARED, tmp_path)
     assert first.count("new_chain") == 1
-    assert run(SHARED, tmp_path) == first[:2]
     kept = [*tmp_path.rglob("*new_chain*.nb?")]
     assert kept
     for file in kept:
