@@ -25,12 +25,10 @@ LAST = 0.15
 B_ANGLE = math.atan2(-38.0, 49.0)
 
 NOTES = """\
-paper: Cordero-Davila et al., Opticheskii Zhurnal 78(3):55 (2011); of figures 6 and 7 the text has the ticks only, 10
-to 30 degree and 0.2, 0.4 rad; where "-" stands it says nothing, and the formula is named in the line. Allowed: 1e-12
-of a formula, 1.5 degree for "does not move"; "no, known" is a statement of the source that its
-own equations refute; degrees of the crank count from b, against the clock which extreme moves: with the paper's own
-equations for type A (upper signs) it is the minimum of alpha, and later. Its figure 4 has the maxima move to the
-right: that is the same arm with alpha counted clockwise. In value both move.
+paper: Cordero-Davila et al., Opticheskii Zhurnal 78(3):55 (2011); where "-" stands it says nothing, and the formula is
+named in the line. Allowed: 1e-12 of a formula, 1.5 degree for "does not move"; "no, known" is a statement of the
+source that its own equations refute: degrees of the crank count from b, and with the paper's equations for type A
+(upper signs) the minimum of alpha moves, and later. Its figure 4 is the same arm with alpha counted clockwise.
 """
 
 

@@ -31,11 +31,9 @@ SHAPES = {"disc": (2, 0.04), "ellipse": (2, 0.08), "rhombus 1:2": (1, 0.08), "rh
 """Exponent and half width [m] of the tools."""
 
 NOTES = """\
-unevenness: standard deviation of the wear over the workpiece's area, over its mean; least: the least wear of the inner
-half of the radius over that mean; with a hole: below a half. Optimised: over throw and offset, not on the grid.
-Each conclusion fails if a machine on the grid says otherwise
-offset: how much farther from the pivot the workpiece's centre lies than the tool's; place of tool and workpiece, rates,
-pressure and Preston's coefficient are chosen here, for the paper gives none of them"""
+uneven: standard deviation over the area over the mean; a hole: least wear of the inner half below half the mean.
+Optimised: over throw and offset, not on the grid. Offset: how much farther from the pivot the workpiece's centre lies
+than the tool's; place of tool and workpiece, rates, pressure and Preston's coefficient are chosen here"""
 
 
 def scaled(ds: xr.Dataset) -> xr.Dataset:

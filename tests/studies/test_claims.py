@@ -67,7 +67,7 @@ TABLE = {
     }, "friction_laws_map.amplitude friction_laws_map.period friction_laws_map.status", 1),
     "friction_varies": Claims({"friction_varies": {}, "friction_varies_noise": {}},
         "friction_varies.angle friction_varies.speed friction_varies.time "
-        "friction_varies_noise.rate_error_s_per_day friction_varies_noise.truncated", 8),
+        "friction_varies_noise.rate_error_s_per_day friction_varies_noise.truncated", 4),
     "fula_milling_machine": Claims({"fula_milling_machine": {}}, "frf_error n_kept status", 5),
     "hairspring": Claims({
         "hairspring": {"a": np.geomspace(1e-3, 10, 33), "k": np.geomspace(3e-6, 3e7, 105)},
@@ -97,7 +97,7 @@ TABLE = {
     "polisher_wear": Claims({
         "polisher_wear": {"e": [0.02, 0.08, 0.1, 0.16], "w_x": [0.5, 0.53, 0.54, 0.56, 0.58], "radius": 2},
         "polisher_wear_load": {"radius": [0.0, 0.05, 0.098], "rtol": 1e-4},
-    }, "wear_error", 8),
+    }, "wear_error", 7),
     "polisher_zone": Claims({"polisher_zone": {}}, "wear_error", 2),
     "rate_parameters": Claims({"rate_parameters": {}}, "", 1),
     "self_starting": Claims({"self_starting": {}}, "flip_speed status", 2),
