@@ -24,7 +24,7 @@ import keyword
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Required, TypedDict
 
 import numpy as np
 
@@ -124,6 +124,20 @@ class Scene:
             raise SceneError("a scene needs a surface")
 
 
+class SceneParts(TypedDict, total=False):
+    """What the kernels of a scene are declared by, as `scene_kernel` says; a cycle that is driven needs no surface."""
+
+    name: Required[str]
+    doc: Required[str]
+    states: Required[Sequence[Field]]
+    parameters: Required[Sequence[Field]]
+    rates: Required[Function]
+    start: Required[Function]
+    surface: Functions | None
+    switch: Functions | None
+    start_time: Function | float | None
+
+
 def scene_kernel(
     *,
     name: str,
@@ -142,6 +156,7 @@ def scene_kernel(
 
     Parameters
     ----------
+    name, doc : what the kernel is called, and a line about it
     states, parameters : what they are called, their units; a state's Field is also that of the output
     rates, surface, start, switch : as in `Scene`
     start_time : what `t` is at the start, where one of the functions asks for it: a number, or (parameters) -> one
@@ -158,7 +173,10 @@ def scene_kernel(
     SceneError
         Where the functions ask for what is not there, or do what cannot be recorded.
     """
-    scene = scene_of(name, doc, states, parameters, rates, surface, start, switch, start_time)
+    scene = scene_of(
+        name=name, doc=doc, states=states, parameters=parameters, rates=rates, start=start, surface=surface,
+        switch=switch, start_time=start_time,
+    )  # fmt: skip
     fields, outputs = (*parameters, flips_field(40.0, MOST_FLIPS)), (*TIMES, *states)
     return Kernel(
         name=name,
@@ -180,14 +198,15 @@ TIMES = (
 
 
 def scene_of(
+    *,
     name: str,
     doc: str,
     states: Sequence[Field],
     parameters: Sequence[Field],
     rates: Function,
-    surface: Functions | None,
     start: Function,
-    switch: Functions | None,
+    surface: Functions | None = None,
+    switch: Functions | None = None,
     start_time: Function | float | None = None,
 ) -> Scene:
     """The scene of states and parameters that are given as fields; the time is its last state if it is asked for."""

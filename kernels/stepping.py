@@ -129,7 +129,10 @@ def stepped_kernel(
     """
     if not callable(surface):
         raise SceneError(f"the scene {name}: at a fixed step there is one surface")
-    scene = scene_of(name, doc, states, parameters, rates, surface, start, switch, start_time)
+    scene = scene_of(
+        name=name, doc=doc, states=states, parameters=parameters, rates=rates, surface=surface, start=start,
+        switch=switch, start_time=start_time,
+    )  # fmt: skip
     fields, outputs = (*parameters, *stepping_fields()), (*TIMES, *states, *COST)
     return Kernel(
         name=name,

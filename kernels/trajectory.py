@@ -8,7 +8,7 @@ the way, and each time to rtol of itself; the worst one counts for the cell.
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from kernels.codegen.compiled import compiling
 from kernels.codegen.to_tolerance import at_switches
 from kernels.interface import FIRST_REFUSAL, UNSOLVED, Field, Kernel, Method, Status
 from kernels.lanes.wiring import signed
-from kernels.scene import Function, Functions, Scene, limits_check, scene_of
+from kernels.scene import Function, Scene, SceneParts, limits_check, scene_of
 
 __all__ = ["motion_kernel", "section_kernel"]
 
@@ -31,17 +31,9 @@ MOST = 1_000_000.0
 
 def section_kernel(
     *,
-    name: str,
-    doc: str,
-    states: Sequence[Field],
-    parameters: Sequence[Field],
-    rates: Function,
-    surface: Functions,
-    start: Function,
-    switch: Functions | None = None,
-    start_time: Function | float | None = None,
     source: str = "a study's own",
     example: Mapping[str, float] | None = None,
+    **parts: Unpack[SceneParts],
 ) -> Kernel:
     """A kernel of a scene's states at many of its switches; the arguments are those of `kernels.scene.scene_kernel`.
 
@@ -50,7 +42,7 @@ def section_kernel(
     Kernel
         Along `passage`, the numbers of the switches that a study asks for, rising: `time` and each state just before.
     """
-    scene = scene_of(name, doc, states, parameters, rates, surface, start, switch, start_time)
+    scene, states = scene_of(**parts), parts["states"]
     along = Field("passage", "1", "number of the switch, from the start", lower=1.0, upper=MOST, integer=True)
     outputs = tuple(
         replace(f, dims=("passage",), gaps=True) for f in (Field("time", "s", "time of the switch"), *states)
@@ -60,22 +52,14 @@ def section_kernel(
         rows, error, status = at_switches(scene, method, columns, rtol, stops)
         return np.delete(rows, 1, axis=0)[: 1 + len(states)], error, status
 
-    return _kernel(scene, source, parameters, outputs, along, solved, example)
+    return _kernel(scene, source, parts["parameters"], outputs, along, solved, example)
 
 
 def motion_kernel(
     *,
-    name: str,
-    doc: str,
-    states: Sequence[Field],
-    parameters: Sequence[Field],
-    rates: Function,
-    surface: Functions,
-    start: Function,
-    switch: Functions | None = None,
-    start_time: Function | float | None = None,
     source: str = "a study's own",
     example: Mapping[str, float] | None = None,
+    **parts: Unpack[SceneParts],
 ) -> Kernel:
     """A kernel of a scene's states at given times; the arguments are those of `kernels.scene.scene_kernel`.
 
@@ -85,7 +69,7 @@ def motion_kernel(
         Along `at`, rising times after the start: each state then. TOO_SHORT where the motion does not come to all of
         them, as where its switches accumulate: then later states are NaN.
     """
-    scene = scene_of(name, doc, states, parameters, rates, surface, start, switch, start_time)
+    scene, states = scene_of(**parts), parts["states"]
     along = Field("at", "s", "time after the start", lower=0.0, open_lower=True)
     outputs = tuple(replace(f, dims=("at",), gaps=True) for f in states)
 
@@ -104,7 +88,7 @@ def motion_kernel(
         inaccurate = given_up | (status == Status.INACCURATE).any(axis=0)
         return rows, np.where(inaccurate, math.inf, rtol), worst.astype(np.int8)
 
-    return _kernel(scene, source, parameters, outputs, along, solved, example)
+    return _kernel(scene, source, parts["parameters"], outputs, along, solved, example)
 
 
 def _kernel(

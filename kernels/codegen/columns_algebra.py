@@ -84,9 +84,11 @@ def _roots(A):
         coefficients.append(-sum(AM[i, i] for i in range(n)) / k)
         M = AM + coefficients[-1] * identity(n, cells)
     norm = np.sqrt(sum(A[i, j] * A[i, j] for i in range(n) for j in range(n)))
-    size = np.maximum(np.where(norm < WIDE * _bound(coefficients), norm, WIDE * _bound(coefficients)), 1e-300)
-    points = _circle(n)
-    real, imaginary = (np.array([size * x[k] for x in points]).reshape(n, cells) for k in (0, 1))
+    size = np.maximum(np.fmin(norm, WIDE * _bound(coefficients)), 1e-300)
+    points = [(1.0, 0.0)]  # where they are looked for first: powers of a number of no symmetry
+    for _ in range(n - 1):
+        points.append(_product(*points[-1], 0.4, 0.9))
+    real, imaginary = (np.array([size * x[k] for x in points[:n]]).reshape(n, cells) for k in (0, 1))
     for _ in range(ROUNDS if n > 1 else 1):
         for j in range(n):
             value = coefficients[0], 0.0 * size
@@ -106,14 +108,6 @@ def _bound(coefficients):
     for k, c in enumerate(coefficients[1:], 1):
         found = np.maximum(found, np.where(c == 0.0, 0.0, np.ldexp(1.0, -(-np.frexp(c)[1] // k))))
     return found
-
-
-def _circle(n):
-    """Where the roots are looked for first: powers of a number of no symmetry."""
-    points = [(1.0, 0.0)]
-    for _ in range(n - 1):
-        points.append(_product(*points[-1], 0.4, 0.9))
-    return points[:n]
 
 
 def _product(a, b, c, d):

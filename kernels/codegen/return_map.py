@@ -92,9 +92,17 @@ class ReturnMap:
         """The states, and statuses, of the motion from the start at a time each."""
         return at_times(self.own, self.method, list(parameters), times, np.full(len(times), TIGHT * self.fine))
 
-    def sizes(self, parameters, before, flips):
-        """The largest size of each state on the way to some digits; NaN where the motion does not get there."""
-        return self._sizes(self.scene, parameters, before, flips, self.rough)
+    def once(self, parameters, before, flips):
+        """Rows of time and states after so many switches, and the states' largest sizes on the way, to some digits.
+
+        The sizes are NaN where a single run does not get there, as where the motion slides.
+        """
+        rows, sizes = self._once(self.scene, parameters, before, flips, self.rough)
+        left = np.flatnonzero(np.isnan(rows[0]))
+        if len(left):
+            rough = np.full(len(left), self.rough)
+            rows[:, left], _ = self.passed(parameters[:, left], before[:, left], flips[left], rough)
+        return rows, sizes
 
     def turned(self, parameters, before, flips):
         """The same tightly, where states turn round; and by how much it may be off besides.
@@ -106,18 +114,20 @@ class ReturnMap:
             left = np.flatnonzero(np.isnan(sizes).any(axis=0))
             if len(left):
                 some, here, steps = parameters[:, left], before[:, left], flips[left]
-                found = [self._sizes(scene, some, here, steps, many * TIGHT * self.fine) for many in tolerances]
+                found = [self._once(scene, some, here, steps, many * TIGHT * self.fine)[1] for many in tolerances]
                 sizes[:, left] = np.maximum.reduce(found)
                 off[:, left] = APART * (sizes[:, left] - np.minimum.reduce(found))
         return sizes, np.where(np.isnan(off), np.inf, off)
 
-    def _sizes(self, scene, parameters, before, flips, rtol):
-        """The largest size of each state at the ends of steps."""
+    def _once(self, scene, parameters, before, flips, rtol):
+        """By one run: rows of time and states, and the largest size of each state at the ends of steps."""
         # a scene that is followed with its error is compiled so already; without, it has the same bits
         by = "told" if self.method == "taylor" and scene is self.scene else self.method
         columns = [*parameters, *before, 0.0 * flips, flips]
-        found, begin = followed(runner(scene, by), columns, np.full(len(flips), rtol)), 2 + len(scene.states)
-        return np.where(found[-1] <= Status.INACCURATE, found[begin : begin + len(before)], np.nan)
+        found, many = followed(runner(scene, by), columns, np.full(len(flips), rtol)), len(before)
+        found = np.where(found[-1] <= Status.INACCURATE, found, np.nan)
+        sizes = 2 + len(scene.states)
+        return found[[0, *range(2, 2 + many)]], found[sizes : sizes + many]
 
 
 def watched(scene):

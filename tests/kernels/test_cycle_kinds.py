@@ -121,7 +121,7 @@ def test_a_branch_ends_where_two_cycles_meet():
     """u = kick + 2 u (1 - u) has a root down to kick = -1/8."""
     kick = np.array([-0.12, -0.1249, -0.13])
     cells = {"kick": kick, "kick_from": 0.0, "gain": 2.0, "bend": 1.0}
-    found, status = solve(BRANCHED["kick"], "taylor", **cells, asked=("v", "period"))
+    found, status = solve(BRANCHED["kick"], "taylor", **cells, asked=("v", "period", "multiplier"), rtol=1e-8)
     assert list(status) == [Status.OK, Status.OK, Status.NO_CYCLE]
     u = 0.25 + np.sqrt(1.0 / 16.0 + kick[:2] / 2.0)
     assert abs(abs(found["v"][:2]) - u).max() < 1e-9
@@ -158,3 +158,18 @@ def test_what_cannot_be_a_cycle_is_refused():
         cycle_kernel(**own, rates=lambda x, v: (v, -x))
     with pytest.raises(SceneError, match="gain"):
         cycle_kernel(**own, rates=lambda x, v: (v, -x), surface=lambda x, side: side * x, branch="gain")
+
+
+def test_a_branch_ends_where_it_meets_another_one_and_is_followed_where_others_fork_off():
+    """u -> gain u - u^3: two cycles +-sqrt(gain - 1) fork off from u = 0 at gain = 1, and double at gain = 2."""
+    own = {"doc": "", "states": (Field("u", "1", "u"),), "parameters": (Field("gain", "1", ""), Field("u0", "1", ""))}
+    fork = cycle_kernel(
+        **own, name="fork", rates=lambda u: 0.0 * u, surface={"season": lambda t: 0.5 - t},
+        switch={"season": lambda u, gain: gain * u - u * u * u}, start=lambda u0: u0, drive=1.0, branch="gain",
+    )  # fmt: skip
+    gain, begin = np.array([1.2, 1.001, 0.999, 0.8, 1.4, 0.9]), np.array([1.5, 1.5, 1.5, 1.5, 0.5, 0.5])
+    cells = {"gain": gain, "gain_from": begin, "u0": np.where(begin > 1.0, 0.7, 0.0), "flips": 1.0}
+    found, status = solve(fork, "taylor", **cells, asked=("period", "multiplier"), rtol=1e-7)
+    assert list(status) == [Status.OK, Status.OK, Status.NO_CYCLE, Status.NO_CYCLE, Status.UNSTABLE, Status.OK]
+    assert abs(found["u"][[0, 1, 4, 5]] - [np.sqrt(0.2), np.sqrt(0.001), 0.0, 0.0]).max() < 1e-7
+    assert abs(found["multiplier"][[0, 1, 4, 5]] - [0.6, 0.998, 1.4, 0.9]).max() < 1e-7
