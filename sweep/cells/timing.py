@@ -221,14 +221,16 @@ work_clock = WorkClock()
 
 
 @contextlib.contextmanager
-def compiling_told(name: str, note: Callable[[str], None]) -> Iterator[None]:
-    """Notes that a kernel is compiled, once, where that takes long."""
+def compiling_told(
+    name: str, note: Callable[[str], None], compiles: Callable[[], bool] = lambda: bool(work_clock.flag.value)
+) -> Iterator[None]:
+    """Notes that a kernel is compiled, once, where that takes long; `compiles` says whether it is now."""
     work_clock.watch()
     done = threading.Event()
 
     def tell() -> None:
         while not done.wait(SILENT_SECONDS):
-            if work_clock.flag.value:
+            if compiles():
                 note(f"compiling {name} ...")
                 return
 

@@ -166,18 +166,18 @@ def plan(
     folder = Path(path).absolute().parent if path is not None else Path.cwd()
     if not folder.is_dir():
         raise SweepError(f"{path}: there is no folder {folder}")
-    apart = isolate or cell_timeout is not None
+    apart, tell = isolate or cell_timeout is not None, note or (lambda text: None)
     with ExitStack() as stack:
         before = work_clock.compiled
         if apart:
             begun = time.monotonic()
             processes = Processes(study, None if cell_timeout is None else seconds_of("cell_timeout", cell_timeout))
             stack.callback(processes.end)
-            sample, isolated = processes.sampled(), processes.solver()
+            sample, isolated = processes.sampled(tell), processes.solver()
             starting = time.monotonic() - begun - isolated.seconds
             solver: SolveCells = isolated
         else:
-            sample = sampled_study(study, note or (lambda text: None))
+            sample = sampled_study(study, tell)
             solver = Guard(Solver(study), lambda cell: None)
         blocks = Blocks(study, cut(study, crew, sample))
         seconds = RUN_SECONDS + sample.cost * blocks.rows.size / min(crew, blocks.count)

@@ -104,7 +104,7 @@ class CellReport:
         return page(
             paragraph("cell: " + ", ".join(f"{name} = {value}" for name, value in self.place.items())),
             paragraph(
-                f"{self.status.name} ({self.status.kind}): {self.status.doc}\n"
+                f"{self.status.name}{'' if self.status is Status.OK else f' ({self.status.kind})'}: {self.status.doc}\n"
                 f"solved by {self.method}; error bound {self.error_bound:.2g}, requested rtol {self.rtol:g}"
             ),
             Table(outputs, ("output", "value", "unit")).text(),

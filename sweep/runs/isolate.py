@@ -15,6 +15,7 @@ import signal
 import sys
 import threading
 import time
+from collections.abc import Callable
 from multiprocessing import forkserver
 from multiprocessing.connection import wait
 from pathlib import Path
@@ -25,7 +26,7 @@ from sweep.cells.block import Unsolved, sampled_by, told
 from sweep.cells.grid import Cells, Grid
 from sweep.cells.schema import cells_of, columns
 from sweep.cells.solve import Solver
-from sweep.cells.timing import Sample, work_clock
+from sweep.cells.timing import Sample, compiling_told, work_clock
 from sweep.errors import SweepError
 from sweep.study.model import Study
 
@@ -63,10 +64,11 @@ class Processes:
         self._idle: list[Isolated] = []
         self._solvers: list[Isolated] = []
 
-    def sampled(self) -> Sample:
+    def sampled(self, note: Callable[[str], None]) -> Sample:
         """A timed sample, as `sampled_study` takes it."""
         solver = self.solver()
-        found = sampled_by(solver, self.study, lambda: solver.seconds)
+        with compiling_told(self.study.kernel_name, note, solver.compiles):
+            found = sampled_by(solver, self.study, lambda: solver.seconds)
         self._idle.append(solver)
         return found
 
@@ -165,6 +167,11 @@ class Isolated:
             f"{self._all.study.kernel_name}: no process of its own can be started and load it ({reason}); what is "
             "finished is kept. The name of the folder TMPDIR must be short, and ulimit -n and -u large enough"
         )
+
+    def compiles(self) -> bool:
+        """Whether its process compiles now."""
+        process = self._process
+        return process is not None and bool(process.compiling.value)
 
     def end(self, seconds: float = 0.0, process: Any = None) -> int | None:
         """Kills the process; its exit status, if that is known in so many seconds."""

@@ -154,7 +154,7 @@ class Loop:
         def take() -> Sample:
             if processes is None:
                 return sampled_study(study, self.task.note)
-            found = processes.sampled()
+            found = processes.sampled(self.task.note)
             processes.cost = float(found.costs.max())
             return found
 
