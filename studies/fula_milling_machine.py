@@ -136,8 +136,9 @@ def others(ds: xr.Dataset) -> Claims:
         here = f"{row[:4].max():.2g} %, {row[4]:.2g} %; damping of f1-f4 {damping.max():.2g} %"
         yield said(f"{name}: largest error of f1-f4, of f5", close, here, f"{first} %, {fifth} %")
     yield said("each method better at f5 than the one before", np.all(np.diff(off[:5, 4]) < 0))
-    guyan = off[:, :4].max() < 1.0 and lost[1].max() == lost.max() > 2.0
-    yield said("all hold f1-f4 to 1 %, Guyan's the damping worst", guyan, f"{lost[1].max():.2g} %", "> 2 %")
+    guyan, rest = lost[1].max(), np.delete(lost, 1, axis=0).max()
+    held = off[:, :4].max() < 1.0 and rest < 1.1 and 1.9 < guyan < 2.3
+    yield said("all hold f1-f4 to 1 %; damping by Guyan, by others", held, f"{guyan:.2g} %, {rest:.2g} %", "2.1 %, 1 %")
 
 
 def figure(ds: xr.Dataset) -> Any:
