@@ -288,7 +288,8 @@ def _corrected(
         elif fits := not found.denied(t, word):
             steps, least, most = FADES
             best, known = float(np.clip(abs(found.numbers[1]), least, most)), found.sigma
-            far = np.clip(2 * np.nan_to_num(found.errors[1], posinf=most) / best, 0.02, 0.6)
+            doubt = 0.5 * np.ptp(found.interval(t, [1], word, confidence)[0])
+            far = np.clip(np.nan_to_num(doubt, posinf=most) / best, 0.02, 0.6)
             laws = [_fading(fade) for fade in np.clip(best * steps**far, least, most)]
             own, *others = fitted(laws, t, row[None], None if known is None else known[None])[0].values()
             others += [law for law in (one, tried[LOG_CORRECTION.name]) if law.aicc < found.aicc + AS_WELL / 2]
