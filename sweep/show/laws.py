@@ -210,6 +210,8 @@ def _lines(dataset: xr.Dataset, along: str = "law") -> Iterator[tuple[dict[str, 
 
 def _fit_cells(fit: xr.Dataset) -> tuple[str, ...]:
     v = _numbers(fit)
+    if math.isnan(v["exponent"]):
+        return "-", "-", v["kind"], f"{v['points']}", "-", "-", "-"
     low, high = v["exponent_low"], v["exponent_high"]
     # of an exponent that does not fit, as many digits as the range of the local one has in common
     digits = 8 if v["fits"] == 1 else 3 if abs(high - low) < 0.1 * abs(v["exponent"]) else 2

@@ -48,6 +48,13 @@ def test_two_laws_are_told_in_a_text_a_page_and_a_table(tmp_path):
     assert "residual" in laws_text(found, complete=True)
 
 
+def test_a_line_that_cannot_be_fitted_has_the_reason_in_the_table():
+    text = laws_text(laws(lines_of(BENT, np.nan * X, -BENT, a=[1.0, 2.0, 3.0]), "y", "x"), complete=True)
+    assert "too few points" in " ".join(text.split())
+    assert "not positive" in " ".join(text.split())
+    assert "nan" not in text
+
+
 def test_laws_of_one_line_are_compared_in_one_window():
     found = comparison(lines_of(BENT).isel(a=0), "y", "x")
     ruled_out = {str(law) for law in found.law.values[found.worse.values > 10]}
