@@ -25,6 +25,9 @@ MEMORY = 0.9
 NEAR, WIDEST = 6, 6
 """Points to each side that tell the size of the noise, and between the ends of a stencil of seven points."""
 
+SLOWER = 1e-6
+"""Share by which a change must be less than the one before to be told from an equal one, beside rounding."""
+
 FEW = 20
 """Points below which noise is not told from a bend."""
 
@@ -109,9 +112,8 @@ def _errors(t: Array, z: Array, bound: Array) -> Array:
     slope = level @ middle.T
     apart, coarse = abs(level @ fine.T - slope), abs(level @ rough.T - slope)
     rounding = EPSILON * (1.0 + abs(z).max(axis=-1, keepdims=True)) * np.sqrt((middle**2).sum(axis=1))
-    sharp = (
-        4.0 * apart > coarse + 8.0 * rounding
-    )  # orders that do not tell: a bend within a step, about which the steps beside it do
+    # orders that do not tell: a bend within a step, about which the steps beside it do
+    sharp = 4.0 * apart > coarse + 8.0 * rounding
     steps = np.diff(z, axis=-1) / np.diff(t)
     both = [abs(steps[..., np.clip(np.arange(t.size) - k, 0, t.size - 2)] - slope) for k in (0, 1)]
     # standard errors for values with autocorrelated errors of size 1
@@ -184,7 +186,8 @@ def tends(t: Array, local: Array, doubt: float) -> tuple[float, float]:
     step = min(np.log(10), (t[-1] - t[0]) / 8)
     first, second, third = np.interp(t[0] + step * np.arange(3), t, local)
     last, before = first - second, second - third
-    left = last * last / (before - last) if abs(last) < abs(before) and last * before > 0 else 10 * last
+    slows = last * before > 0 and abs(last) < (1 - SLOWER) * abs(before)
+    left = last * last / (before - last) if slows else 10 * last
     return float(first), float(first + 3 * left) if abs(last) > doubt else float(first)
 
 
