@@ -41,7 +41,7 @@ def fit_collapse(y: xr.DataArray, dim: str, over: str, *, sigma: Any = None, con
     Returns
     -------
     Dataset
-        `x_exponent` (a), `y_exponent` (b), each with `_low`, `_high`; `verdict`, words; `residual`; `points`,
+        `x_exponent` (a), `y_exponent` (b), each with `_low`, `_high`; `verdict`, words; `scatter`; `points`,
         `dropped`; `fits`. The intervals are of noise about the common curve that may be autocorrelated along each
         curve, or of `sigma`; without noise of how well a polynomial follows the curve. There are none where the curves
         do not fall on one another: where levels, slopes and bows of their own describe them far better.
@@ -82,7 +82,7 @@ def fit_collapse(y: xr.DataArray, dim: str, over: str, *, sigma: Any = None, con
         raise SweepError(
             "the curves collapse for any exponents of x: f is a power law, so a and b are not determined apart"
         )
-    found = {"x_exponent": a, "y_exponent": b, "residual": float(np.sqrt(np.mean(off**2))), "points": points.t.size}
+    found = {"x_exponent": a, "y_exponent": b, "scatter": float(np.sqrt(np.mean(off**2))), "points": points.t.size}
     # whether a level, a slope and a bow of each curve describe the points far better than the common one
     u = points.t - points.t.mean()
     own = [here * u**power for here in points.size == np.unique(points.size)[1:, None] for power in range(3)]

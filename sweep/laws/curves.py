@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Hashable, Iterable
 from typing import Any
 
 import numpy as np
@@ -28,7 +28,7 @@ FIELDS = {
     "x_exponent": "a of x / L^a",
     "y_exponent": "b of y / L^b",
     "crossover": "where the two laws meet",
-    "crossover_error": "half of its interval",
+    "crossover_error": "half of the interval of crossover",
     "verdict": "what the points say of the law",
     "kind": "what the distances of the points from the line are",
     "regimes": "how many laws are beyond doubt, and meet in the window; 0 where none is told",
@@ -39,7 +39,7 @@ FIELDS = {
     "correction_exponent": "D: how fast the correction fades; NaN where there is none",
     "correction": "B x^-D at the outer end of the window",
     "noisy": "1 where the interval is of noise, 0 where of error bounds or of how far smooth values bend",
-    "fits": "1 where the law describes the points, 0 where an interval is only the range of the slope",
+    "fits": "1 where the law describes the points; where 0, an interval, if any, is only the range of the slope",
     "drift": "change of the exponent across the window, by a parabola",
     "width": "width of the bend, in decades",
     "aicc": "Akaike's criterion, corrected for few points; of one law with the noise that suits it best",
@@ -89,6 +89,15 @@ def check_options(confidence: float = 0.95, noise: bool | str | None = None, sig
         raise SweepError(f"noise: expected True, False or one of {', '.join(words)}; found {noise!r}")
     if noise is not None and sigma is not None:
         raise SweepError("noise does not go with sigma, which says all of the noise; give one of them")
+
+
+def check_names(y: xr.DataArray, taken: Iterable[Hashable]) -> None:
+    """Raises SweepError where axes of y have names that the result uses itself."""
+    if names := sorted(map(str, taken)):
+        raise SweepError(
+            f"{title(y)} has an axis {names[0]!r}, and so has the result, of another meaning; rename it first, e.g. "
+            f"y.rename({names[0]}='{names[0]}_of_y')"
+        )
 
 
 def positive_axis(y: xr.DataArray, dim: str, repeated: bool = False) -> tuple[str, Array]:
@@ -168,9 +177,10 @@ def fit_lines(
     dimension, x = positive_axis(y, dim, repeated=True)
     here = {dimension: np.flatnonzero(inside_window(x, window, dim))}
     part, t = y.isel(here).transpose(..., dimension).compute(), np.log(x[here[dimension]])
-    values = np.where(np.isfinite(part.values), part.values, np.nan).reshape(math.prod(part.shape[:-1]), t.size)
+    values = part.values.astype(np.float64).reshape(math.prod(part.shape[:-1]), t.size)
+    values[~np.isfinite(values)] = np.nan
     bad = np.asarray((values <= 0).any(axis=1))
-    if bad.all():
+    if bad.size and bad.all():
         first = part[tuple(np.argwhere((part <= 0).values)[0])]
         raise SweepError(
             f"a power law needs positive values; {(values <= 0).sum()} of {part.size} of {title(y)} in the window are "
@@ -179,7 +189,7 @@ def fit_lines(
     with np.errstate(all="ignore"):
         z = np.where(bad[:, None], np.nan, np.log(values))
     given = [
-        None if one is None else one.isel(here).transpose(..., dimension).values.reshape(z.shape)
+        None if one is None else one.isel(here).transpose(..., dimension).values.astype(np.float64).reshape(z.shape)
         for one in (None if sigma is None else relative_sigma(y, sigma), bounds)
     ]
     present = np.isfinite(z) if given[0] is None else np.isfinite(z) & np.isfinite(given[0])
@@ -199,11 +209,16 @@ def fit_lines(
             columns.setdefault(name, np.full((len(z), *column.shape[1:]), *empty))[which] = column
     columns["points"] = present.sum(axis=1)
     if len(columns) == 1:
+        where, way = f"along {dim}", "add points"
+        if window is not None:
+            ends = ("open" if end is None else f"{float(end):g}" for end in window)
+            where, way = f"in the window {' to '.join(ends)} of {dim}", "choose a wider one"
         raise SweepError(
-            f"a fit needs at least {fewest} points, found {columns['points'].max()} of {title(y)} in the window of "
-            f"{dim}, at {np.unique(t[present.any(axis=0)]).size} places ({places} are needed); choose a wider one"
+            f"a fit needs at least {fewest} points, found {columns['points'].max(initial=0)} of {title(y)} {where}, "
+            f"at {np.unique(t[present.any(axis=0)]).size} places ({places} are needed); {way}"
         )
     coords: dict[Any, Any] = {name: one for name, one in part.coords.items() if dimension not in one.dims}
+    check_names(y, {*coords, *part.dims[:-1]} & {*columns})
     for name, column in columns.items():
         if column.dtype == object:
             column = np.where(column == "", np.where(bad, "not positive", "too few points"), column).astype(str)
@@ -272,9 +287,9 @@ def described(found: xr.Dataset, x: xr.DataArray, y: xr.DataArray) -> xr.Dataset
     found = found[[one for name in ends for one in (name, *ends[name])]]
     for name in ends:
         unit = (x if name in IN_X else y).attrs.get("units", "1") if name in IN_X + IN_Y else "1"
-        for one in (name, *ends[name]):
-            words = FIELDS[name] if one == name else f"end of the interval of {name}"
-            found.variables[one].attrs = {"units": str(unit), "long_name": words}
+        words = FIELDS[name], *(f"{end} end of the interval of {name}" for end in ("low", "high"))
+        for one, text in zip((name, *ends[name]), words, strict=False):
+            found.variables[one].attrs = {"units": str(unit), "long_name": text}
     if any(ends.values()):
         columns = [one for name in ends if ends[name] for one in (name, *ends[name])]
         columns += [name for name in ends if found[name].dtype.kind == "U"]

@@ -16,7 +16,7 @@ import xarray as xr
 from scipy.special import gammaincc
 
 from sweep.errors import SweepError
-from sweep.laws.curves import Window, check_output, described, fit_lines, title
+from sweep.laws.curves import Window, check_names, check_output, described, fit_lines, title
 from sweep.laws.fits import Found, fitted, union
 from sweep.laws.lines import fit_exponent, fit_line, rounding
 from sweep.laws.loglog import Array, slopes, tends
@@ -102,6 +102,8 @@ def fit_two_laws(
     >>> print(f"{float(met.crossover):.1f}")
     0.6
     """
+    check_output(y)
+    check_names(y, {*y.dims} & {"law"} - {dim})
     keys: dict[str, Any] = {"confidence": confidence, "noise": noise}
     if windows is None:
         law = "equation (1) of sweep.laws.two_laws"
@@ -115,7 +117,7 @@ def fit_two_laws(
     fits = [fit_exponent(y, dim, one, sigma=sigma, **keys) for one in (low, high)]
     both = [fit[["exponent", "exponent_low", "exponent_high"]] for fit in fits]
     exponents = xr.concat(both, xr.Variable("law", ["low", "high"]), combine_attrs="override")
-    return crossover(*fits).assign(exponents.data_vars)
+    return described(crossover(*fits).assign(exponents.data_vars), y.coords[dim], y)
 
 
 def _each(t: Array, z: Array, sigma: Array | None, bound: None, **keys: Any) -> list[dict[str, Any]]:

@@ -110,6 +110,8 @@ def test_numbers_have_units_and_names_and_further_axes_keep_theirs():
     units = {"exponent": "1", "low": "rad/s^2", "start": "s", "level": "s", "centre": "rad/s^2"}
     assert {name: fit[name].attrs["units"] for name in units} == units
     assert all(variable.attrs["long_name"] for variable in fit.data_vars.values())
+    assert [fit[f"exponent_{end}"].attrs["long_name"].split()[0] for end in ("low", "high")] == ["low", "high"]
+    assert {"exponent_high", "crossover_high"} < set(met.attrs["summary"].split())
     assert sweep.fit_two_laws(y[::8], "mu").attrs["summary"].splitlines()[1].split()[:2] == ["low", "1"]
     for found in (fit, met, sweep.fit_two_laws(y[::8], "mu"), sweep.compare_laws(y[::8, 0], "mu")):
         assert len(found.to_netcdf())  # attributes are such as files can hold

@@ -90,6 +90,7 @@ def test_the_exponents_of_a_collapse_are_found_without_a_start_and_points_withou
     found = sweep.fit_collapse(y, "x", "L")
     assert (float(found.x_exponent), float(found.y_exponent)) == pytest.approx((a, b), abs=1e-4)
     assert int(found.points + found.dropped) == 125
+    assert found.scatter.attrs["long_name"].endswith("root mean square")
     y[0, :3], y[1, 4] = np.nan, -1.0
     gappy = sweep.fit_collapse(y, "x", "L")
     assert int(gappy.points + gappy.dropped) == 125
@@ -295,7 +296,11 @@ def test_eight_points_are_enough_and_may_fall_or_have_gaps():
         (lambda y: sweep.fit_correction(y.assign_coords(x=np.repeat([1.0, 9.0], 31)[:61]), "x"), "2 places"),
         (lambda y: sweep.local_exponent(y.assign_coords(x=np.maximum(X, 3.0)), "x"), "3 stands there more than once"),
         (lambda y: sweep.fit_two_laws(y, "nu"), "no axis 'nu'"),
-        (lambda y: sweep.fit_two_laws(y, "x", (1.0, 5.0)), "at least 8 points"),
+        (lambda y: sweep.fit_two_laws(y, "x", (1.0, 5.0)), "at least 8 points.* window 1 to 5 of x"),
+        (lambda y: sweep.fit_exponent(y, "x", (None, 0.5)), "found 0 of y in the window open to 0.5 of x"),
+        (lambda y: sweep.fit_exponent(y.expand_dims(a=[1.0])[:0], "x"), "found 0 of y"),
+        (lambda y: sweep.fit_exponent(y.expand_dims(level=[1.0]), "x"), "rename"),
+        (lambda y: sweep.fit_two_laws(y.expand_dims(law=["a", "b", "c"]), "x"), "rename"),
         (lambda y: sweep.fit_two_laws(-y, "x"), "positive values"),
         (lambda y: sweep.fit_two_laws(y, "x", confidence=95), "between 0 and 1"),
         (lambda y: sweep.fit_two_laws(y, "x", noise="white"), "noise"),

@@ -27,6 +27,22 @@ def kind(found):
 # numbers of a fit
 
 
+def test_values_of_another_precision_are_fitted_in_double_precision():
+    t = np.linspace(0.0, 5.0, 37)
+    single = curve(np.log(3.0) - 0.7 * t, t).astype(np.float32)
+    for fit in (sweep.fit_exponent, sweep.fit_two_laws, sweep.fit_correction, sweep.compare_laws):
+        xr.testing.assert_identical(fit(single, "x"), fit(single.astype(np.float64), "x"))
+    assert int(sweep.fit_exponent(single.astype(np.longdouble), "x", sigma=0.1 * single).points) == 37
+
+
+def test_a_slope_that_changes_evenly_tends_to_no_limit_that_rounding_decides():
+    for shift in np.linspace(0.0, 3.0, 12):
+        t = np.linspace(-1.0, 1.0, 31) + shift
+        fit = sweep.fit_exponent(curve(-0.1 * t**2, t), "x")
+        steps = -0.2 * np.array([t[0] - 7.5, t[-1] + 7.5])  # 30 times the change over an eighth of the window
+        assert [float(fit.limit_low), float(fit.limit_high)] == pytest.approx(steps, abs=1e-6), shift
+
+
 def test_a_line_is_that_of_polyfit_with_its_covariance():
     rng, t = np.random.default_rng(3), np.linspace(-2.0, 5.0, 31)
     z = np.log(3) - 0.7 * t + 0.1 * rng.standard_normal(31)
