@@ -121,6 +121,8 @@ def where_exponent(
     """
     curve = log_of(y, values)
     dimension, x = positive_axis(curve, dim)
+    if not curve.size:
+        raise SweepError(f"{title(curve)} has no line along {dim}; an axis of it is empty: {dict(curve.sizes)}")
     inside, t = curves.inside_window(x, window, dim), np.log(x)
     orders = ((6, 0), (4, 0)) if values else ((6, 7), (4, 5))  # points of the interpolation and of the slopes
 

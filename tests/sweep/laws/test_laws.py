@@ -299,6 +299,7 @@ def test_eight_points_are_enough_and_may_fall_or_have_gaps():
         (lambda y: sweep.fit_two_laws(y, "x", (1.0, 5.0)), "at least 8 points.* window 1 to 5 of x"),
         (lambda y: sweep.fit_exponent(y, "x", (None, 0.5)), "found 0 of y in the window open to 0.5 of x"),
         (lambda y: sweep.fit_exponent(y.expand_dims(a=[1.0])[:0], "x"), "found 0 of y"),
+        (lambda y: sweep.where_exponent(y.expand_dims(a=[1.0])[:0], "x", -0.5), "y has no line along x"),
         (lambda y: sweep.fit_exponent(y.expand_dims(level=[1.0]), "x"), "rename"),
         (lambda y: sweep.fit_two_laws(y.expand_dims(law=["a", "b", "c"]), "x"), "rename"),
         (lambda y: sweep.fit_two_laws(-y, "x"), "positive values"),
