@@ -211,6 +211,24 @@ def two_sided(random, n):
     return {"p": p, "w": 10.0 ** random.uniform(-4, 1, n), "T": p * random.uniform(1.3, 2.0, n)}
 
 
+def _crossed_truth(p, w, v, T):
+    p, w, v, T = (REAL(1) * c for c in (p, w, v, T))
+    y = w / (2 * v) * (2 - np.exp(-2 * p / w) - np.exp(-2 * (v * T - p) / w))
+    return Truth(T, [T, v * T, v, y], [T, v * T, v, y], p / w)
+
+
+@family(
+    scene(
+        "crossed", "t x u y", "p w v T", lambda x, u, p, w: (1.0, u, 0.0 * x, exp(-2.0 * abs(x - p) / w)),
+        lambda t, T: T - t, lambda v: (0.0, 0.0, v, 0.0),
+    ), _crossed_truth,
+)  # fmt: skip
+def crossed_pulse(random, n):
+    """The same at a place that the motion passes at a speed of its own."""
+    p, v = random.uniform(1.0, 30.0, n), random.uniform(0.5, 2.0, n)
+    return {"p": p, "w": 10.0 ** random.uniform(-4, 1, n), "v": v, "T": p / v * random.uniform(1.3, 2.0, n)}
+
+
 def _behind_truth(a, v, flips):
     """From x = 1 at rest to 0, then from -a with the speed v up and down again."""
     a, v = REAL(1) * a, REAL(1) * v
@@ -374,8 +392,8 @@ def _den_hartog_one(w, f, x0, periods):
         )
 
     def first(g, t0):
-        """The first sign change of g behind t0, or the end."""
-        grid = t0 + (end - t0) * (np.arange(4001).astype(REAL) / 4000)
+        """The first sign change of g behind t0, or the end; points are dense behind t0, where a short rest may end."""
+        grid = t0 + (end - t0) * (np.arange(8001).astype(REAL) / 8000) ** 2
         values = g(grid)
         signs = np.flatnonzero((values[2:] > 0) != (values[1:-1] > 0))
         if not len(signs):

@@ -3,7 +3,8 @@
 
 python benchmarks/speed/own_scenes.py          (needs the extra `peers`)
 
-Ours is `taylor_once` of each scene. heyoka.py is in its best form, as in `taylor.py`: its scalar integrator with
+Ours is `taylor_once` of each scene, its kernel alone and through `sweep.run` with all that an engine does (checks,
+blocks, statuses, a Dataset in the end). heyoka.py is in its best form, as in `taylor.py`: its scalar integrator with
 fast_math and one terminal event; where the oscillator sticks and where it slips its callback sets by hand. Truth is
 heyoka.py in 80 bits. Errors are the worst of the last switch's time and of a state there. Times are CPU seconds of the
 thread, the best of a few runs in turn. The last lines: whole runs on an uneven grid by `sweep.run`, on all cores
@@ -154,33 +155,53 @@ def ours(one, columns, tolerance, judged):
     return rate, np.stack([outputs[0], outputs[2 + judged]], axis=1)
 
 
+def by_engine(scene, columns, tolerance, judged):
+    """The same by `sweep.run`, on one core; times are of all threads of the process."""
+    names = [f.name for f in scene["parameters"]]
+    study = _study(
+        scene["name"], tolerance, design="zip", axes=dict(zip(names, columns, strict=True)), fixed={"flips": FLIPS}
+    )
+    begin = time.process_time()
+    found = sweep.run(study, workers=1, progress=False)
+    rate = CELLS / (time.process_time() - begin)
+    return rate, np.stack([found["time"].values, found[scene["states"][judged].name].values], axis=1)
+
+
+def _study(name, tolerance, **keys):
+    kernel = f"own_scenes:{name.upper()}"
+    return sweep.study(kernel=kernel, allow_import=True, method="taylor_once", rtol=tolerance, **keys)
+
+
 def worst(found, truth):
     return float(max(abs(found[: len(truth)] / truth - 1.0).ravel()))
 
 
 def compare(scene, judged, tolerances):
-    """Prints cells per second, ratio and errors."""
+    """Prints cells per second, ratios and errors."""
     one, columns = runner(scene_of(**scene, switch=None), "taylor"), cells(scene, CELLS)
     truth = theirs(Heyoka(scene, 1e-19, np.longdouble), columns, judged, JUDGED)[1]
     for their, our in tolerances:
         follower = Heyoka(scene, their)
-        runs = [lambda f=follower: theirs(f, columns, judged), lambda t=our: ours(one, columns, t, judged)]
-        runs[1]()
+        runs = [
+            lambda f=follower: theirs(f, columns, judged),
+            lambda t=our: ours(one, columns, t, judged),
+            lambda t=our: by_engine(scene, columns, t, judged),
+        ]
+        for run in runs[1:]:
+            run()
         rounds = [[run() for run in runs] for _ in range(ROUNDS)]
-        best = [max((each[k] for each in rounds), key=lambda found: found[0]) for k in range(2)]
-        errors = " and ".join(f"{worst(found, truth):.1e}" for _, found in best)
-        print(
-            f"{scene['name']:20}{best[0][0]:10,.0f} cells/s {best[1][0]:10,.0f} cells/s "
-            f"{best[1][0] / best[0][0]:6.1f} times, errors {errors}",
-            flush=True,
-        )
+        best = [max((each[k] for each in rounds), key=lambda found: found[0]) for k in range(len(runs))]
+        errors = ", ".join(f"{worst(found, truth):.1e}" for _, found in best)
+        (base, _), *others = best
+        rates = "".join(f"{rate:12,.0f} ({rate / base:4.1f})" for rate, _ in others)
+        print(f"{scene['name']:18}{base:8,.0f}{rates}   {errors}", flush=True)
 
 
 def cores(name):
     """Seconds of a whole run on one core over those on all, where a cell has 4 to 400 switches; the median of a few."""
     (first, low), *rest = RANGES[name].items()
-    study = sweep.study(
-        kernel=f"own_scenes:{name.upper()}", allow_import=True, method="taylor_once", rtol=1e-8,
+    study = _study(
+        name, 1e-8,
         axes={"flips": np.unique(np.floor(np.geomspace(4, 400, 60))), first: np.linspace(*low, WIDTHS[name])},
         fixed={other: 0.5 * sum(ends) for other, ends in rest},
     )  # fmt: skip
@@ -188,6 +209,7 @@ def cores(name):
 
 
 def main():
+    print("cells/s of heyoka.py, of the kernel alone and of sweep.run (times heyoka.py's); errors of the three")
     compare(PENDULUM, SPEED, ((1e-9, 1e-10), (1e-13, 3e-13)))
     compare(RELAY, SPEED, ((1e-6, 1e-8), (1e-11, 2e-12)))
     compare(STICK_SLIP, PLACE, ((1e-7, 2e-9), (3e-12, 1e-13)))
