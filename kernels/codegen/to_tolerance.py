@@ -33,14 +33,15 @@ from kernels.interface import FIRST_REFUSAL, UNSOLVED, Status
 
 ROUNDING = 1e-14
 """The least rtol that is promised, whatever the runs agree to."""
-ROUGH, BETWEEN, FINER = 2.0, 4.0, 16.0
+ROUGH, MIDDLE, FINER = 2.0, 4.0, 16.0
 MANY = 8.0
 """By how many times as many roundings parameters are changed: beside them those of the steps of a run are few."""
 CONVERGED, BY_STEPS, ROUNDED = 3.0, 0.4, 0.2
 """How many times nearer to the finest run the one between is where both are off by their steps: it may then differ by
 BY_STEPS of rtol; else rounding is what tells them apart, of which the finest run has no less, and by ROUNDED of it."""
-TIGHTER, TIGHT = 1e-4, 1e-14
-"""The second tolerance, over the first one, and at most: what is stiff may come to rest only in the last digits."""
+TIGHTER, TIGHT, BETWEEN = 1e-4, 1e-14, 1e-2
+"""The second tolerance, over the first one, and at most: what is stiff may come to rest only in the last digits; and
+the third one, over the first one."""
 TIGHTEST = 1e-13
 """The tightest second tolerance of an embedded pair: below it rounding stops the steps."""
 TRIED_AGAIN = Status.INACCURATE, Status.GRAZING, Status.STEP_LIMIT, Status.OUT_OF_RANGE
@@ -99,15 +100,18 @@ def by_runs(one, columns, rtol, tightest=0.0):
     """Rows and status by three runs; INACCURATE where they differ by more than the finest one could mend.
 
     Where they do, or a run breaks off, the cell is followed by three again, with a tighter tolerance, of at least
-    `tightest`.
+    `tightest`; where that breaks off too, as of what is stiff, with one between.
     """
     rows, status = _compared(one, columns, rtol, rtol)
-    tighter = np.maximum(np.minimum(TIGHT, TIGHTER * rtol), tightest)
-    again = np.flatnonzero(np.isin(status, TRIED_AGAIN) & (tighter < rtol) & (rtol >= ROUNDING))
-    if len(again):
-        better, verdict = _compared(one, [c[again] for c in columns], tighter[again], rtol[again])
-        right = verdict <= Status.INACCURATE
-        rows[:, again[right]], status[again[right]] = better[:, right], verdict[right]
+    again, last = np.flatnonzero(np.isin(status, TRIED_AGAIN) & (rtol >= ROUNDING)), 0.0 * rtol
+    for tighter in (np.minimum(TIGHT, TIGHTER * rtol), BETWEEN * rtol):
+        steps = np.maximum(tighter, tightest)
+        again = again[((steps < rtol) & (steps > last))[again]]
+        if len(again):
+            better, verdict = _compared(one, [c[again] for c in columns], steps[again], rtol[again])
+            right = verdict <= Status.INACCURATE
+            rows[:, again[right]], status[again[right]] = better[:, right], verdict[right]
+            again, last = again[~right], steps
     return rows, status
 
 
@@ -133,7 +137,7 @@ def three_runs(run, columns, rtol):
     rtol : tolerance of the steps, but for `finer`
     """
     rough = run(off_by_roundings(columns, MANY), ROUGH, 1.0)
-    other = run(off_by_roundings(columns, -MANY), ROUGH * BETWEEN, -1.0)
+    other = run(off_by_roundings(columns, -MANY), ROUGH * MIDDLE, -1.0)
     fine = run(columns, ROUGH * FINER, 0.0)
     states = (len(fine) - 3) // 2
     scale = np.concatenate([abs(fine[:2]), fine[2 + states : -1]])

@@ -210,6 +210,7 @@ def arrived(m, cell, found, late, active, tells):
     verdict = raised(cell.verdict, found.hangs | found.grazing, GRAZING)
     refused = where(found.stuck, STICKS, where(found.broken, OUT_OF_RANGE, verdict))
     verdict = where(found.lost, STEP_LIMIT, refused)
+    sliding = active & not_(active)
     if m.speeds is not None:  # lanes whose slide has no end rest, as far as can be told
         sliding = total(tuple(magnitude(sign) for sign in cell.signs[:-1])) < len(cell.signs) - 1.5
         verdict = where(active & sliding & (found.lost | found.broken), STICKS, verdict)
@@ -221,6 +222,7 @@ def arrived(m, cell, found, late, active, tells):
         longest = where(blur > longest, blur, longest)
     shaken, shake = moving & (magnitude(cell.shake) > 0.0), shaken_on(cell.shake)
     off = missed_by(m, shake) * longest
+    off = where(sliding, magnitude(off), off)  # before the end of a slide the motion is still pressed onto it
     return cell._replace(
         shake=shake, verdict=verdict, h=found.h, on=found.on, size=reached(cell.size, found.reach),
         state=tuple(where(shaken, fma(off, rate, u), u) for rate, u in zip(rates, state, strict=True)),

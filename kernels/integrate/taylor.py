@@ -18,7 +18,7 @@ from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.symbols import symbolic, written
 from kernels.lanes.vectors import any_lane, exponent, fma, horner, magnitude, nearest, not_, pow2, sqrt, where
 
-STEP_LIMIT = 2000
+STEP_LIMIT = 10_000
 """Steps between two events after which a cell is given up."""
 HALVINGS = 40
 ROOT_LIMIT = 60
