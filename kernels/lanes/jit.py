@@ -55,8 +55,8 @@ def jit_shared(function: F) -> F:
     """
     from kernels.lanes.cache import enable
 
-    made: F = enable(shared(function, forceinline=False, **_OPTIONS))
-    return made
+    made: F = shared(function, forceinline=False, **_OPTIONS)
+    return enable(made) if COMPILED else made
 
 
 def jit_entry(function: Callable[..., Any]) -> Any:
