@@ -45,6 +45,18 @@ def test_stick_and_slip_on_a_belt_keep_their_period_for_many_cycles(method, rtol
     assert (abs(outputs["speed"] - belt)[right] <= rtol * belt[right]).all()  # it slides where it is switched
 
 
+@many
+@pytest.mark.parametrize("method", METHODS)
+def test_a_slow_belt_lets_go_of_a_mass_that_short_steps_follow(method):
+    belt, drag, cycles = np.geomspace(0.005, 0.02, 8), -0.1, 8
+    cells = {"press": 1.0, "belt": belt, "drag": drag, "speed0": belt, "stiffness": 1.0, "mid": 1.0, "wall": -1e9}
+    outputs, status = solve(SLIDING, method, **cells, flips=2.0 * cycles + 1, rtol=1e-9)
+    with mp.workdps(50):
+        truths = [1 / mpf(b) + cycles * belt_cycle(1, mpf(b), mpf(drag)) for b in belt]
+    assert (status == Status.OK).all()
+    assert (relative_error(outputs["time"], truths) < 1e-9).all()
+
+
 def relay_time(m, mid):
     """Of w' = sin(t) - m sign(w), x' = 1 + w, from rest: when x is `mid`, on its second way with w below 0."""
     t1 = mp.asin(m)
