@@ -210,7 +210,6 @@ def arrived(m, cell, found, late, active, tells):
     verdict = raised(cell.verdict, found.hangs | found.grazing, GRAZING)
     refused = where(found.stuck, STICKS, where(found.broken, OUT_OF_RANGE, verdict))
     verdict = where(found.lost, STEP_LIMIT, refused)
-    sliding = active & not_(active)
     if m.speeds is not None:  # lanes whose slide has no end rest, as far as can be told
         sliding = total(tuple(magnitude(sign) for sign in cell.signs[:-1])) < len(cell.signs) - 1.5
         verdict = where(active & sliding & (found.lost | found.broken), STICKS, verdict)
@@ -222,7 +221,10 @@ def arrived(m, cell, found, late, active, tells):
         longest = where(blur > longest, blur, longest)
     shaken, shake = moving & (magnitude(cell.shake) > 0.0), shaken_on(cell.shake)
     off = missed_by(m, shake) * longest
-    off = where(sliding, magnitude(off), off)  # before the end of a slide the motion is still pressed onto it
+    if m.speeds is not None:  # a slide ends late: before its end the motion is still pressed onto it, and would stick
+        slides = zip(cell.signs[:-1], found.on[1:], strict=True)
+        ends = moving & any_of(tuple((magnitude(sign) < 0.5) & (on > 0.5) for sign, on in slides))
+        shaken, off = shaken | ends, where(ends & (longest < math.inf), magnitude(off) + longest, off)
     return cell._replace(
         shake=shake, verdict=verdict, h=found.h, on=found.on, size=reached(cell.size, found.reach),
         state=tuple(where(shaken, fma(off, rate, u), u) for rate, u in zip(rates, state, strict=True)),

@@ -48,7 +48,7 @@ def test_stick_and_slip_on_a_belt_keep_their_period_for_many_cycles(method, rtol
 @many
 @pytest.mark.parametrize("method", METHODS)
 def test_a_slow_belt_lets_go_of_a_mass_that_short_steps_follow(method):
-    belt, drag, cycles = np.geomspace(0.005, 0.02, 8), -0.1, 8
+    belt, drag, cycles = np.geomspace(1e-4, 0.02, 24), -0.1, 8
     cells = {"press": 1.0, "belt": belt, "drag": drag, "speed0": belt, "stiffness": 1.0, "mid": 1.0, "wall": -1e9}
     outputs, status = solve(SLIDING, method, **cells, flips=2.0 * cycles + 1, rtol=1e-9)
     with mp.workdps(50):
