@@ -156,7 +156,8 @@ def flips_truth(mu, phi0, phi_start, **losses):
 
 
 def rippled(random, n):
-    """Coulomb friction and a ripple of the torque, wild in half of the cells, with a spring in half of them."""
+    """Coulomb friction, and a spring in half of the cells; a ripple of the torque, in half of them of up to 64 half
+    waves and down to 1e-6 of a torque that stops."""
     mu, phi0 = decades(random, -2, 2, n), decades(random, -2, 2, n)
     k = some(random, 0.5, decades(random, -3, -0.5, n) * mu / phi0)
     wild = random.random(n) < 0.5

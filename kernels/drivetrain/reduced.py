@@ -138,24 +138,28 @@ def _finish(poles, receptance, leaves_chain, has_all, f_max, e_J, e_k, model, ro
 
 @jit_apart
 def _finish_rivin(f_max, e_J, e_k, model, rows, scene):
+    """`_finish` of Rivin's model: a chain with as many frequencies as masses."""
     poles, receptance = _rivin.poles_of_both, _rivin.receptance_of_kept
     return _finish(poles, receptance, True, False, f_max, e_J, e_k, model, rows, scene)
 
 
 @jit_apart
 def _finish_exact(f_max, e_J, e_k, model, rows, scene):
+    """`_finish` of the exact model: a chain with all frequencies of the full one."""
     poles, receptance = _rivin.poles_of_full, _rivin.receptance_of_exact
     return _finish(poles, receptance, True, True, f_max, e_J, e_k, model, rows, scene)
 
 
 @jit_shared
 def _finish_modes(f_max, e_J, e_k, model, rows, scene):
+    """`_finish` of a model of modes, which is no chain."""
     poles, receptance = _modes.poles_of_modes, _modes.receptance_of_modes
     return _finish(poles, receptance, False, False, f_max, e_J, e_k, model, rows, scene)
 
 
 @jit
 def _scene(columns):
+    """The buffers of a cell."""
     return (new_scene(columns.J.shape[1]),)
 
 

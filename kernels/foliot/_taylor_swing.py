@@ -10,9 +10,9 @@ which is what dry friction's change of sign shifts the time by. The cycle then f
 Each cell goes through four stages on its own. SEARCH: Newton's method within a bracket, at a coarse tolerance. NEAR: at
 one that follows the square of its step. ROUGH and FINE: two half swings, whose difference tells the error. The rough
 one has a tolerance FINER times larger than the fine one, and parameters some roundings off, as in `to_tolerance`. Where
-the torque varies outputs may hang on the speed a thousandfold, which could hide what the tolerance does: LAST, from the
-speed that the fine one gives and at its tolerance, tells it. Where the error is too large they are followed once more
-at a tighter tolerance.
+the torque varies, outputs may depend on the speed a thousandfold, and a change of speed can hide the effect of the
+tolerance: LAST, which starts at the speed that the fine one gives and has its tolerance, shows how much that is. Where
+the error is too large, they are followed once more at a tighter tolerance.
 """
 
 import numpy as np
@@ -57,7 +57,7 @@ _LEAST = 1e-17
 _TOLD, _TOLD_ROUGH, _TOLD_STEEP = 4.0, 32.0, 128.0
 """Error that is stated over what rough and fine half swings differ by, of which the fine one's should be a fifteenth;
 where the torque varies, or the drag is of a degree below 2: cores of abs(v)^n have a low order; and of the sensitivity
-where the torque varies, on which it hangs steeply. Besides, an output is off by what the last one's Newton step would
+where the torque varies, on which it depends steeply. Besides, an output is off by what the last one's Newton step would
 still change, at the rate at which it changed from the speed before."""
 _ROUNDING = 2e-14
 """Of a half swing's speed and time; a cycle's are off by 1/(1 - multiplier) as much."""
