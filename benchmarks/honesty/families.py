@@ -1,4 +1,4 @@
-"""Is a scene of one's own that says OK right, over fifteen families of scenes that mislead integrators?
+"""Is a scene of one's own that says OK right, over sixteen families of scenes that mislead integrators?
 
 Prints, by family and method, how many cells were OK, remarked and refused, and the largest error of an OK cell over its
 rtol; exit status 1 where one is off by more than its rtol, or where too few of those that can be solved are OK:
@@ -348,6 +348,21 @@ def _long_truth(w, x0, T):
 def long_oscillation(random, n):
     """An oscillator over up to 1,600 periods."""
     return {"w": random.uniform(1.0, 10.0, n), "x0": random.uniform(0.5, 2.0, n), "T": 10.0 ** random.uniform(0, 3, n)}
+
+
+def _growth_truth(x0, T):
+    """Below 1e-290 nobody promises anything, so those cannot be solved."""
+    x0, T = REAL(1) * x0, REAL(1) * T
+    x = x0 * np.exp(T)
+    return Truth(T, [T, x], [T, x], np.where(x > 1e-290, T, np.inf))
+
+
+@family(
+    scene("growth", "t x", "x0 T", lambda x: (1.0, x), lambda t, T: T - t, lambda x0: (0.0, x0)), _growth_truth
+)  # fmt: skip
+def growth(random, n):
+    """x' = x from next to the least float64 on."""
+    return {"x0": 10.0 ** random.uniform(-307, 0, n), "T": 10.0 ** random.uniform(0, 2.84, n)}
 
 
 def _relay_truth(M, T, y0, a):

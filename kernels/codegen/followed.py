@@ -9,6 +9,7 @@ import math
 import numpy as np
 
 from kernels.integrate.driver import GOLDEN
+from kernels.integrate.taylor import TINY
 from kernels.interface import FIRST_REFUSAL, Status
 from kernels.lanes.columns import MOVING, fresh, to_the_end
 from kernels.lanes.tuples import first_rows, flat
@@ -23,6 +24,8 @@ STOPS = 2.0, 4.0, math.inf
 """Switches behind which cells are put in the order of the steps of their last two legs, from event to event."""
 ROUNDINGS = 8.0
 """By how many roundings a parameter is changed at most."""
+FAINT = 16.0 * TINY
+"""The largest size on the way of a state below which steps do not hold its relative error."""
 
 
 def followed(runner, columns, rtol, of_a_step=None, shake=0.0, told=False):
@@ -108,8 +111,9 @@ def off_by_roundings(columns, many=1.0):
 
 
 def status_of(results, verdict, outputs):
-    """The verdict; OUT_OF_RANGE where one of so many outputs is no normal number."""
-    sizes, status = abs(results[:outputs]), verdict.astype(np.int8)
-    normal = (sizes == 0) | ((sizes >= NORMAL_LOW) & (sizes <= NORMAL_HIGH))
-    status[~normal.all(axis=0) & (status == Status.OK)] = Status.OUT_OF_RANGE
+    """The verdict; OUT_OF_RANGE where one of so many outputs is no normal number, or a state is never above FAINT."""
+    values, sizes, status = abs(results[:outputs]), results[outputs:-1], verdict.astype(np.int8)
+    normal = (values == 0) | ((values >= NORMAL_LOW) & (values <= NORMAL_HIGH))
+    told = normal.all(axis=0) & ((sizes == 0) | (sizes >= FAINT)).all(axis=0)
+    status[~told & (status == Status.OK)] = Status.OUT_OF_RANGE
     return status

@@ -103,6 +103,19 @@ def test_a_decay_of_one_state_by_its_exponential():
     assert abs(mpf(float(outputs["time"][0])) / true - 1) < 5e-13
 
 
+@pytest.mark.skipif(COMPILED, reason="one more compilation; run with NUMBA_DISABLE_JIT=1")
+def test_a_state_too_small_for_its_relative_error_is_refused_and_is_right_above():
+    kernel = scene_kernel(
+        name="growth", doc="x' = x", states=(Field("t", "1", "time"), Field("x", "1", "what grows")),
+        parameters=(Field("x0", "1", "start"),), rates=lambda x: (1.0, x), surface=lambda t: 6.0 - t,
+        start=lambda x0: (0.0, x0),
+    )  # fmt: skip
+    x0 = [1e-307, 1e-293, 1e-278, 1.0]
+    outputs, status = solve(kernel, "taylor", x0, flips=1.0, rtol=1e-6)
+    assert list(status) == [Status.OUT_OF_RANGE, Status.OUT_OF_RANGE, Status.OK, Status.OK]
+    assert np.allclose(outputs["x"][2:] / x0[2:], np.exp(6.0), rtol=1e-6)
+
+
 def test_the_studys_own_scene_runs_and_is_right(tmp_path):
     if not COMPILED:
         pytest.skip("as a user runs it")
