@@ -16,8 +16,8 @@ b = gamma v1^n; M = m0 + m1 s + m2 s^n. Units and records: see `_units`. Derived
 """
 
 import math
+from collections import namedtuple
 from decimal import Decimal, localcontext
-from typing import NamedTuple
 
 import numpy as np
 
@@ -67,29 +67,11 @@ def _rule():
 
 _S, _REST, _LOG_S, _WEIGHT = _rule()
 
+Terminal = namedtuple("Terminal", "log_V D G")
+"""ln V of f(V) = 1, and the shares D and G of 1 - rho there; without drag V is infinite and D = 0."""
 
-class Terminal(NamedTuple):
-    """ln V of f(V) = 1, and the shares D and G of 1 - rho there; without drag V is infinite and D = 0."""
-
-    log_V: float
-    D: float
-    G: float
-
-
-class Speeds(NamedTuple):
-    """v1, ln v1, z, far, near; F1 = 1 - f(v1), and that over `near`, which tends to V f'(V); a, b; 1 - far^n, far^n."""
-
-    v1: float
-    log_v1: float
-    z: float
-    far: float
-    near: float
-    F1: float
-    slope: float
-    a: float
-    b: float
-    kept: float
-    power: float
+Speeds = namedtuple("Speeds", "v1 log_v1 z far near F1 slope a b kept power")
+"""v1, ln v1, z, far, near; F1 = 1 - f(v1), and that over `near`, which tends to V f'(V); a, b; 1 - far^n, far^n."""
 
 
 @jit

@@ -18,7 +18,7 @@ what J exp(-Y) is with the slope followed to rest.
 """
 
 import math
-from typing import NamedTuple
+from collections import namedtuple
 
 from kernels.integrate.tableaux import DOPRI5, DOPRI5_ERROR
 from kernels.lanes.jit import jit, jit_call, jit_inline
@@ -69,81 +69,42 @@ estimate, in quadrature of a power of the time with exponents from -0.9 to 3."""
 _SLOW = 0.01
 """Of the tolerance, what is left out below the slow speed."""
 
+Problem = namedtuple(
+    "Problem",
+    "e rho_s outwards inwards d gamma n kappa depth wave rtol floor share rough stiffness pace",
+)
+"""A cell by the terms of (1) and (2).
 
-class Problem(NamedTuple):
-    """A cell by the terms of (1) and (2).
+outwards, inwards : 1 + rho, with which dry friction helps, and 1 - rho; wave = harmonic pi/2
+floor : speed below which power-law friction is constant
+share : of rtol that a single step may take; rough: whether friction's slope is not smooth at rest
+stiffness, pace : f'(V) and 1/V for the speed V at which friction balances the drive, within a factor of 2
+"""
 
-    outwards, inwards : 1 + rho, with which dry friction helps, and 1 - rho; wave = harmonic pi/2
-    floor : speed below which power-law friction is constant
-    share : of rtol that a single step may take; rough: whether friction's slope is not smooth at rest
-    stiffness, pace : f'(V) and 1/V for the speed V at which friction balances the drive, within a factor of 2
-    """
+Law = namedtuple("Law", "side steady floor problem")
+"""The right-hand side of (1) from a reversal to the next: sign of the speed, constant force, floor, and terms.
 
-    e: float
-    rho_s: float
-    outwards: float
-    inwards: float
-    d: float
-    gamma: float
-    n: float
-    kappa: float
-    depth: float
-    wave: float
-    rtol: float
-    floor: float
-    share: float
-    rough: bool
-    stiffness: float
-    pace: float
+Below the speed `floor` power-law friction is constant.
+"""
 
+Leg = namedtuple("Leg", "stop forgotten forgetting slow scales")
+"""What ends a leg and bounds its steps.
 
-class Law(NamedTuple):
-    """The right-hand side of (1) from a reversal to the next: sign of the speed, constant force, floor, and terms.
+stop, forgotten : speed along it and Y at its end; forgetting: f', roughly
+slow : speed above which power-law friction is not smooth, 0 if it is smooth
+scales : what a step's errors are relative to, at least: of speed, of its tangent by ln mu, of those by v0
+"""
 
-    Below the speed `floor` power-law friction is constant.
-    """
+Half = namedtuple("Half", "end state rate top top_by_start time shrink helped lost")
+"""A half swing.
 
-    side: float
-    steady: float
-    floor: float
-    problem: Problem
-
-
-class Leg(NamedTuple):
-    """What ends a leg and bounds its steps.
-
-    stop, forgotten : speed along it and Y at its end; forgetting: f', roughly
-    slow : speed above which power-law friction is not smooth, 0 if it is smooth
-    scales : what a step's errors are relative to, at least: of speed, of its tangent by ln mu, of those by v0
-    """
-
-    stop: float
-    forgotten: float
-    forgetting: float
-    slow: float
-    scales: tuple
-
-
-class Half(NamedTuple):
-    """A half swing.
-
-    end : speed F at the switch, 0 where it is not reached
-    state : (x, v, x_mu, v_mu, x_start, v_start, Y) at the switch, with tangents by ln mu and by v0; rate: x'' there
-    top, top_by_start : turning point and its tangent by v0
-    time : taken
-    shrink : J exp(-Y), 0 where helped
-    helped, lost : came to rest on its way in; met the step limit
-    """
-
-    end: float
-    state: tuple
-    rate: float
-    top: float
-    top_by_start: float
-    time: float
-    shrink: float
-    helped: bool
-    lost: bool
+end : speed F at the switch, 0 where it is not reached
+state : (x, v, x_mu, v_mu, x_start, v_start, Y) at the switch, with tangents by ln mu and by v0; rate: x'' there
+top, top_by_start : turning point and its tangent by v0
+time : taken
+shrink : J exp(-Y), 0 where helped
+helped, lost : came to rest on its way in; met the step limit
+"""
 
 
 @jit

@@ -16,7 +16,7 @@ Units and records: see `_units`. Derived here.
 """
 
 import math
-from typing import NamedTuple
+from collections import namedtuple
 
 from kernels.foliot._units import Cycle, errors
 from kernels.integrate import linear_flow
@@ -35,29 +35,12 @@ _STIFFEST = 1e60
 ROUNDING = 2e-15
 """Relative error of one half swing: of time, amplitude, speed and of the terms of (4)."""
 
+Legs = namedtuple("Legs", "time top speed comes t1 s1 c1 slope1 g1 t2 s2 c2 slope2 g2 down back end")
+"""A half swing: until the switch, largest x, speed there, whether it comes; and each leg.
 
-class Legs(NamedTuple):
-    """A half swing: until the switch, largest x, speed there, whether it comes; and each leg.
-
-    Leg 1 rises, for the time t1, against the force g1; leg 2 falls under g2, beginning with the speed `down`. s, c and
-    slope are the responses of `linear_flow` over a leg.
-    """
-
-    time: float
-    top: float
-    speed: float
-    comes: bool
-    t1: float
-    s1: float
-    c1: float
-    slope1: float
-    g1: float
-    t2: float
-    s2: float
-    c2: float
-    slope2: float
-    g2: float
-    down: float
+Leg 1 rises, for the time t1, against the force g1, which is `back` in the end; leg 2 falls under g2, beginning with the
+speed `down`, with the acceleration `end` in the end. s, c and slope are the responses of `linear_flow` over a leg.
+"""
 
 
 @jit_call
@@ -78,50 +61,34 @@ def half_swing(torque, scene, start):
     t2 = where(comes, t2, 0.0)
     s2, c2, slope2 = linear_flow.response(beta, kappa, t2)
     speed = fma(down, slope2, g2 * s2)
-    return Legs(t1 + t2, top, speed, comes, t1, s1, c1, slope1, g1, t2, s2, c2, slope2, g2, down)
-
-
-@jit
-def _back(scene, legs):
-    """Force at the turning point just before it."""
-    return 1.0 + scene.rho + scene.kappa * legs.top
-
-
-@jit
-def _end(scene, legs):
-    """Acceleration along the drive on arrival at the switch."""
-    return fma(legs.g2, legs.slope2, -legs.down * fma(scene.d, legs.slope2, scene.kappa * legs.s2))
+    back, end = 1.0 + scene.rho + kappa * top, fma(g2, slope2, -down * fma(scene.d, slope2, kappa * s2))
+    return Legs(t1 + t2, top, speed, comes, t1, s1, c1, slope1, g1, t2, s2, c2, slope2, g2, down, back, end)
 
 
 @jit_apart
-def slopes(scene, start, legs):
-    """dE_1/dE_0 of a half swing that began with the speed `start`; dT by abs(start), and the size of its terms.
+def passed_on(scene, start, legs):
+    """dE_1/dE_0 of a half swing that began with the speed `start`; dT by abs(start), the size of its terms; the noise.
 
     By (3), and for e > 0 by (2), with d for a change by that of the speed:
         dA = S1,  dt1 = S1'/back,  dg2 = kappa dA,  dt2 = (dA - C2 dg2)/v.
+    The noise is what rounding adds to E_1 and to the time.
     """
-    rises, back = scene.e > 0.0, _back(scene, legs)
+    rises, back, speed, push = scene.e > 0.0, legs.back, legs.speed, scene.kappa * legs.s1
     kept = exp(-scene.d * legs.time) * where(rises, legs.g2 / back, 1.0)
-    push = scene.kappa * legs.s1
-    longer = where(rises, legs.slope1 / back + (legs.s1 - legs.c2 * push) / legs.speed, -legs.s2 / legs.speed)
+    longer = where(rises, legs.slope1 / back + (legs.s1 - legs.c2 * push) / speed, -legs.s2 / speed)
     of_push = scene.kappa * magnitude(legs.s1)
-    rising = magnitude(legs.slope1) / back + (magnitude(legs.s1) + magnitude(legs.c2) * of_push) / legs.speed
-    return kept, longer, where(rises, rising, magnitude(legs.s2) / legs.speed)
-
-
-@jit
-def own_noise(scene, start, legs):
-    """What rounding adds to E_1 and to the time."""
+    rising = magnitude(legs.slope1) / back + (magnitude(legs.s1) + magnitude(legs.c2) * of_push) / speed
     way = 1.0 + legs.top
-    energy = 0.5 * (legs.speed * legs.speed + start * start) + way * magnitude(_end(scene, legs))
-    return ROUNDING * energy, ROUNDING * (legs.time + way / legs.speed)
+    energy = 0.5 * (speed * speed + start * start) + way * magnitude(legs.end)
+    late = ROUNDING * (legs.time + way / speed)
+    return kept, longer, where(rises, rising, magnitude(legs.s2) / speed), ROUNDING * energy, late
 
 
 @jit
 def _lost(scene, legs):
     """1 minus e^2 times dE_1/dE_0, with its digits where that is small."""
-    e, back = scene.e, _back(scene, legs)
-    shrink = where(e > 0.0, 2.0 * scene.rho / back, 0.0)  # 1 - g2/back
+    e = scene.e
+    shrink = where(e > 0.0, 2.0 * scene.rho / legs.back, 0.0)  # 1 - g2/back
     kept = -expm1(-scene.d * legs.time)
     return (1.0 - e) * (1.0 + e) + e * e * (kept + (1.0 - kept) * shrink)
 
@@ -135,13 +102,13 @@ def _turn(scene, energy):
     """
     d, e, kappa = scene.d, scene.e, scene.kappa
     legs = half_swing(1.0, scene, e * sqrt(2.0 * energy))
-    back, g2 = _back(scene, legs), legs.g2
+    back, g2 = legs.back, legs.g2
     after = 0.5 * legs.speed * legs.speed
     balanced = (after > 2.0) & (e > 0.0)
     risen, fallen = linear_flow.loss(-0.5 * d, kappa, legs.t1), linear_flow.loss(0.5 * d, kappa, legs.t2)
     losses = d * (back * back * risen + g2 * g2 * fallen)
     work = 2.0 - 2.0 * scene.rho * legs.top - losses - (1.0 - e) * (1.0 + e) * energy
-    noise = ROUNDING * where(balanced, 4.0, after + energy + (1.0 + legs.top) * magnitude(_end(scene, legs)))
+    noise = ROUNDING * where(balanced, 4.0, after + energy + (1.0 + legs.top) * magnitude(legs.end))
     return where(balanced, work, after - energy), noise, balanced, legs
 
 
@@ -155,7 +122,7 @@ def _by_torque(scene, balanced, legs, start):
     where dA = dt1 = 0 for e < 0. The sizes are the sums of the magnitudes of the terms: the changes round so.
     """
     d, rho, kappa = scene.d, scene.rho, scene.kappa
-    rises, back, speed, end = scene.e > 0.0, _back(scene, legs), legs.speed, _end(scene, legs)
+    rises, back, speed, end = scene.e > 0.0, legs.back, legs.speed, legs.end
     dtop, dt1 = where(rises, -legs.c1, 0.0), where(rises, -legs.s1 / back, 0.0)
     of_top, of_t1 = magnitude(dtop), magnitude(dt1)
     dg, of_g = fma(kappa, dtop, 1.0), fma(kappa, of_top, 1.0)
@@ -195,7 +162,7 @@ def segments(scene, rtol):
     # s = -dlnP/dlnmu of the fixed point E_1(E, mu) = E; the sizes of its terms, and of the terms of those; dlnT/dlnE
     start, time = magnitude(scene.e) * sqrt(2.0 * energy), legs.time
     gain, longer, of_gain, of_longer = _by_torque(scene, balanced, legs, start)
-    area, by_start, of_start = slopes(scene, start, legs)
+    area, by_start, of_start, _, _ = passed_on(scene, start, legs)
     by_gain = magnitude(scene.e) / sqrt(2.0 * energy) / rest
     chain = by_start * (by_gain * gain)
     of_chain = magnitude(by_start) * (by_gain * of_gain)

@@ -6,7 +6,7 @@ a search of the speed, which needs no tangent, for dF/dv1 is known from `decay` 
 """
 
 import functools
-from typing import NamedTuple
+from collections import namedtuple
 
 import numpy as np
 
@@ -15,22 +15,8 @@ from kernels.codegen.followed import followed
 from kernels.expression.graph import cos, power, sign, sin
 from kernels.scene import Scene
 
-
-class Swung(NamedTuple):
-    """What a half swing comes to: its time, and states at the switch."""
-
-    time: float
-    x: float
-    v: float
-    x_mu: float
-    v_mu: float
-    x_start: float
-    v_start: float
-    decay: float
-    top: float
-    up_mu: float
-    up_start: float
-
+Swung = namedtuple("Swung", "time x v x_mu v_mu x_start v_start decay top up_mu up_start")
+"""What a half swing comes to: its time, and states at the switch."""
 
 STATES = Swung._fields[1:]
 TERMS = ("drag", "outwards", "inwards", "gamma", "degree", "kappa")
@@ -76,14 +62,8 @@ def linear_rates(x, v, x_mu, v_mu, x_start, v_start, drag, outwards, inwards, ka
     return x_rate, v_rate, v_mu, by_mu, v_start, by_start, top_rate, rising * by_mu, rising * by_start
 
 
-class Form(NamedTuple):
-    """A scene, which follows some of `STATES` by some of the terms."""
-
-    name: str
-    states: tuple
-    terms: tuple
-    rates: object
-
+Form = namedtuple("Form", "name states terms rates")
+"""A scene, which follows some of `STATES` by some of the terms."""
 
 _LINEAR = ("drag", "outwards", "inwards", "kappa", *RIPPLE)
 SMOOTH = Form("foliot_swing", STATES, TERMS, smooth_rates)

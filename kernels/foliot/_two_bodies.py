@@ -10,7 +10,7 @@ bodies, so it ends where the wheel alone would slow down less than the foliot: k
 """
 
 import math
-from typing import NamedTuple
+from collections import namedtuple
 
 from kernels.integrate import linear_flow
 from kernels.lanes.jit import jit_call
@@ -27,35 +27,15 @@ EVENTS = 3000
 DIES_OUT = 1e-12
 """Share of the first closing speed at which the bodies go on together: they would part by 1e-24 of the way."""
 
+Scene = namedtuple("Scene", "kappa d r drop e")
+"""kappa, d, r, and drop as above, and the restitution."""
 
-class Scene(NamedTuple):
-    """kappa, d, r, and drop as above, and the restitution."""
+Half = namedtuple("Half", "v w gap time swing way back lost closing impacts end")
+"""Speed of the foliot and of the wheel, and the gap, at escape, and what happened in the half period.
 
-    kappa: float
-    d: float
-    r: float
-    drop: float
-    e: float
-
-
-class Half(NamedTuple):
-    """Speed of the foliot and of the wheel, and the gap, at escape, and what happened in the half period.
-
-    `swing` is the largest abs(y), `way` that of the foliot to and fro, `back` the wheel's way backwards since its
-    first landing, `lost` the energy of impacts, and `closing` the first closing speed.
-    """
-
-    v: float
-    w: float
-    gap: float
-    time: float
-    swing: float
-    way: float
-    back: float
-    lost: float
-    closing: float
-    impacts: float
-    end: float
+`swing` is the largest abs(y), `way` that of the foliot to and fro, `back` the wheel's way backwards since its
+first landing, `lost` the energy of impacts, and `closing` the first closing speed.
+"""
 
 
 @jit_call

@@ -7,7 +7,6 @@ It starts with e times the speed before the switch and ends at x = -1; the other
 """
 
 from collections import namedtuple
-from typing import NamedTuple
 
 from kernels.lanes.jit import jit
 from kernels.lanes.ranges import judged
@@ -15,69 +14,26 @@ from kernels.lanes.vectors import any_lane, not_, where
 from kernels.maths.elementary import is_normal, mantissa_exponent, measured, power, scale, scaled_root
 from kernels.maths.pairs import two_sum
 
-
-class Foliot(NamedTuple):
-    """Parameters."""
-
-    mu: float
-    phi0: float
-    a: float
-    R: float
-    R_s: float
-    c: float
-    n: float
-    k: float
-    e: float
-
+Foliot = namedtuple("Foliot", "mu phi0 a R R_s c n k e")
+"""Parameters."""
 
 LinearFoliot = namedtuple("LinearFoliot", [name for name in Foliot._fields if name not in ("c", "n")])
 """Parameters without drag."""
 
+Outputs = namedtuple("Outputs", "period amplitude crossing_speed sensitivity multiplier")
+"""Outputs of a limit cycle, or the relative error of each."""
 
-class Outputs(NamedTuple):
-    """Outputs of a limit cycle, or the relative error of each."""
+Scene = namedtuple("Scene", "d rho rho_s gamma n kappa e slack")
+"""Coefficients of (1), and slack = 1 - rho without the rounding of rho.
 
-    period: float
-    amplitude: float
-    crossing_speed: float
-    sensitivity: float
-    multiplier: float
+Drag of degree 0 is Coulomb friction: it is counted in rho, rho_s and slack. n is 1 where gamma is 0.
+"""
 
+Units = namedtuple("Units", "t e_t m_phi e_phi fine")
+"""T0 = t 2^e_t and phi0 = m_phi 2^e_phi, and whether all groups of (1) are normal numbers."""
 
-class Scene(NamedTuple):
-    """Coefficients of (1), and slack = 1 - rho without the rounding of rho.
-
-    Drag of degree 0 is Coulomb friction: it is counted in rho, rho_s and slack. n is 1 where gamma is 0.
-    """
-
-    d: float
-    rho: float
-    rho_s: float
-    gamma: float
-    n: float
-    kappa: float
-    e: float
-    slack: float
-
-
-class Units(NamedTuple):
-    """T0 = t 2^e_t and phi0 = m_phi 2^e_phi, and whether all groups of (1) are normal numbers."""
-
-    t: float
-    e_t: float
-    m_phi: float
-    e_phi: float
-    fine: bool
-
-
-class Cycle(NamedTuple):
-    """A limit cycle: half period, amplitude, speed before the switch, s = -dlnP/dlnmu, multiplier."""
-
-    half_period: float
-    amplitude: float
-    speed: float
-    sensitivity: float
-    multiplier: float
+Cycle = namedtuple("Cycle", "half_period amplitude speed sensitivity multiplier")
+"""A limit cycle: half period, amplitude, speed before the switch, s = -dlnP/dlnmu, multiplier."""
 
 
 @jit

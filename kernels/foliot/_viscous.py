@@ -9,7 +9,7 @@ follows by differentiating (2). Everything depends on k alone; `given` puts the 
 """
 
 import math
-from typing import NamedTuple
+from collections import namedtuple
 
 from kernels.foliot._units import Outputs, errors
 from kernels.foliot._viscous_fit import AMPLITUDE_STRONG, GAP_WEAK, OVERSHOOT_WEAK, Q_STRONG, SENSITIVITY_STRONG, SPLIT
@@ -30,28 +30,11 @@ _EXP_MINUS_2 = 0.1353352832366127
 _FIT = Q_STRONG, AMPLITUDE_STRONG, SENSITIVITY_STRONG
 _SERIES = (2 / 15, 3 / 175, 2 / 1575), (1 / 10, 4 / 525, -1 / 31500), (4 / 45, 52 / 4725, -32 / 70875)
 
+ViscousCycle = namedtuple("ViscousCycle", "q lam amplitude sensitivity multiplier")
+"""The limit cycle as in (2) and (3)."""
 
-class ViscousCycle(NamedTuple):
-    """The limit cycle as in (2) and (3)."""
-
-    q: float
-    lam: float
-    amplitude: float
-    sensitivity: float
-    multiplier: float
-
-
-class Scaled(NamedTuple):
-    """mu = m_mu 2^e_mu and so on, whether powers of two were taken out of any, and whether k is a normal number."""
-
-    m_mu: float
-    m_phi: float
-    m_a: float
-    e_mu: float
-    e_phi: float
-    e_a: float
-    wild: bool
-    representable: bool
+Scaled = namedtuple("Scaled", "m_mu m_phi m_a e_mu e_phi e_a wild representable")
+"""mu = m_mu 2^e_mu and so on, whether powers of two were taken out of any, and whether k is a normal number."""
 
 
 @jit

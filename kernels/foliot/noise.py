@@ -21,7 +21,7 @@ Derived here; the model without noise is that of Hoyng & Nieuwenhuizen, arXiv:16
 """
 
 import math
-from typing import NamedTuple
+from collections import namedtuple
 
 import numpy as np
 
@@ -50,40 +50,14 @@ PAIRS = 64
 
 _COUNTABLE = 2.0**50
 
+Clock = namedtuple("Clock", "scene sigma sigma_a remembered fresh floor nominal tau shared own")
+"""What a half swing needs: (1) in units of mu, T and the averaging time in those of the scene."""
 
-class Clock(NamedTuple):
-    """What a half swing needs: (1) in units of mu, T and the averaging time in those of the scene."""
+Run = namedtuple("Run", "x apart speed t gain truncated")
+"""x, x' and the speed, t and D of (2) after a half swing, and how many had their torque raised to the floor."""
 
-    scene: Scene
-    sigma: float
-    sigma_a: float
-    remembered: float
-    fresh: float
-    floor: float
-    nominal: float
-    tau: float
-    shared: float
-    own: float
-
-
-class Run(NamedTuple):
-    """x, x' and the speed, t and D of (2) after a half swing, and how many had their torque raised to the floor."""
-
-    x: float
-    apart: float
-    speed: float
-    t: float
-    gain: float
-    truncated: float
-
-
-class Averages(NamedTuple):
-    """How many averaging times are closed, D at the end of the last, its y, and the sum of squares in (3)."""
-
-    closed: float
-    reading: float
-    rate: float
-    squares: float
+Averages = namedtuple("Averages", "closed reading rate squares")
+"""How many averaging times are closed, D at the end of the last, its y, and the sum of squares in (3)."""
 
 
 @jit_call
@@ -188,8 +162,7 @@ def segments(first, columns, radii, turns, radii_apart, turns_apart):
     # error of the rate as a fraction: of each half swing, and of all that they pass on
     start = e * cycle.speed
     legs = _linear_swing.half_swing(1.0, scene, start)
-    kept, longer, _ = _linear_swing.slopes(scene, start, legs)
-    energy, late = _linear_swing.own_noise(scene, start, legs)
+    kept, longer, _, energy, late = _linear_swing.passed_on(scene, start, legs)
     passed_on = energy / (cycle.speed * cycle.speed * (1.0 - e * e * kept))
     accurate = (late + magnitude(longer * start) * passed_on) / cycle.half_period <= columns.rtol[i]
 

@@ -11,7 +11,7 @@ Derived here from Hoyng & Nieuwenhuizen, arXiv:1604.06681, section 2, and from `
 """
 
 import math
-from typing import NamedTuple
+from collections import namedtuple
 
 from kernels.foliot import _linear_swing, _units
 from kernels.foliot._linear_swing import ROUNDING
@@ -33,15 +33,8 @@ FLIP_LIMIT = 1e6
 UNSURE = 0.5
 """Error of a speed, as a share of it, from which on it is open whether the switch was reached at all."""
 
-
-class Flip(NamedTuple):
-    """Time and its low part, speed, share by which the speed may be wrong, error of the time."""
-
-    time: float
-    low: float
-    speed: float
-    wrong: float
-    late: float
+Flip = namedtuple("Flip", "time low speed wrong late")
+"""Time and its low part, speed, share by which the speed may be wrong, error of the time."""
 
 
 @jit
@@ -99,8 +92,7 @@ def _next(scene, flip):
     legs = _linear_swing.half_swing(1.0, scene, start)
     held, unsure = _held(scene, legs.top)
     turns = not_(start < 0.0)
-    kept, longer, _ = _linear_swing.slopes(scene, start, legs)
-    energy_noise, time_noise = _linear_swing.own_noise(scene, start, legs)
+    kept, longer, _, energy_noise, time_noise = _linear_swing.passed_on(scene, start, legs)
     wrong = fma(kept * start * start, flip.wrong, energy_noise) / (legs.speed * legs.speed)
     late = flip.late + magnitude(longer * start) * flip.wrong + time_noise
     energy = start * start * (flip.wrong + ROUNDING)

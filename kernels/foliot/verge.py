@@ -24,7 +24,7 @@ pallets. Derived here.
 """
 
 import math
-from typing import NamedTuple
+from collections import namedtuple
 
 from kernels.foliot import _two_bodies
 from kernels.foliot._two_bodies import Half, Scene, half_period
@@ -42,28 +42,11 @@ HALF_PERIODS = 600
 ROUNDING = 1e-14
 """Relative error of half a period: its landings and its escape, by 20 digits."""
 
+Cycle = namedtuple("Cycle", "period amplitude escape_speed recoil impact_share dry_share")
+"""The outputs, or their relative errors."""
 
-class Cycle(NamedTuple):
-    """The outputs, or their relative errors."""
-
-    period: float
-    amplitude: float
-    escape_speed: float
-    recoil: float
-    impact_share: float
-    dry_share: float
-
-
-class Units(NamedTuple):
-    """The time unit, and the foliot's and the wheel's angles, each a mantissa and an exponent; whether in range."""
-
-    time: float
-    e_time: float
-    angle: float
-    e_angle: float
-    wheel: float
-    e_wheel: float
-    fine: bool
+Units = namedtuple("Units", "time e_time angle e_angle wheel e_wheel fine")
+"""The time unit, and the foliot's and the wheel's angles, each a mantissa and an exponent; whether in range."""
 
 
 @jit
