@@ -28,11 +28,9 @@ from kernels.lanes.vectors import any_lane, fma, magnitude, not_, sqrt, where
 from kernels.maths.elementary import exp, expm1, is_normal, log, log1p
 from kernels.maths.roots import by_steps, in_bracket
 
-NEWTON_LIMIT = 60
-"""Newton steps or bisections for (2), and Newton steps for V; about five are usual."""
-
-SETTLED = 1e-8
-"""A Newton step in ln v1 below which the next one, about its square, would be below rounding."""
+NEWTON_LIMIT, SETTLED = 60, 1e-8
+"""Newton steps or bisections for (2), and Newton steps for V, about five being usual; and a Newton step in ln v1 below
+which the next one, about its square, would be below rounding."""
 
 _NEAR = 1.1  # from this z on the pole is taken out; below, where V > 1.5 v1, the rule does without
 _FAR = 1e300  # ln V where there is no drag
@@ -45,21 +43,17 @@ def _rule():
 
     Newton's method on P_n, n = _NODES, in decimal arithmetic: the table has the same bits on every machine.
     """
-
-    def legendre(x):
-        before, value = Decimal(1), x
-        for k in range(2, _NODES + 1):
-            before, value = value, ((2 * k - 1) * x * value - (k - 1) * before) / k
-        return value, _NODES * (x * value - before) / (x * x - 1)
-
     rows = []
     with localcontext(prec=40):
         for j in range(_NODES):
             x = Decimal(-math.cos(math.pi * (j + 0.75) / (_NODES + 0.5)))
-            for _ in range(6):
-                value, slope = legendre(x)
+            for _ in range(7):
+                before, value = Decimal(1), x
+                for k in range(2, _NODES + 1):
+                    before, value = value, ((2 * k - 1) * x * value - (k - 1) * before) / k
+                slope = _NODES * (x * value - before) / (x * x - 1)
                 x -= value / slope
-            u, weight = (1 + x) / 2, 1 / ((1 - x * x) * legendre(x)[1] ** 2)
+            u, weight = (1 + x) / 2, 1 / ((1 - x * x) * slope**2)
             s = u**_POWER
             rows.append([float(v) for v in (s, 1 - s, s.ln(), weight * _POWER * u ** (_POWER - 1))])
     return (np.array(column) for column in zip(*rows, strict=True))
@@ -76,7 +70,10 @@ Speeds = namedtuple("Speeds", "v1 log_v1 z far near F1 slope a b kept power")
 
 @jit
 def _terminal_step(u, scene):
-    """Newton's step for ln(D + G) in u = ln V, and whether it is the last."""
+    """Newton's step for ln(D + G) in u = ln V, and whether it is the last.
+
+    It is convex: from above the root, where each share alone is at most 1 - rho, the steps are monotone.
+    """
     log_d, log_gamma, n, left = scene
     D, G = exp(u + log_d), exp(fma(n, u, log_gamma))
     step = (log(D + G) - left) * (D + G) / fma(n, G, D)
@@ -85,11 +82,7 @@ def _terminal_step(u, scene):
 
 @jit_call
 def _terminal(scene):
-    """The terminal speed.
-
-    Newton for ln(D + G) in ln V, which is convex: from above the root, where each share alone is at most 1 - rho, the
-    steps are monotone.
-    """
+    """The terminal speed."""
     d, gamma, n, slack = scene.d, scene.gamma, scene.n, scene.slack
     left, log_d, log_gamma = log(slack), log(d), log(gamma)
     by_d, by_gamma = log(slack / d), log(slack / gamma) / n
@@ -212,8 +205,7 @@ def _strong(scene, speeds):
         1 - g = int s ((1 - e^2) - (f/F)^2 + (E f_B/B)^2) ds/W,  f = rho + a s + b s^n, f_B that at E s,
         1/F^2 - E^2/B^2 = ((1 - E) F + M)(E F + B)/(F B)^2,  for each term with its own power of E.
     """
-    rho, n, e = scene.rho, scene.n, scene.e
-    F1, a, b = speeds.F1, speeds.a, speeds.b
+    rho, n, e, F1, a, b = scene.rho, scene.n, scene.e, speeds.F1, speeds.a, speeds.b
     lost, m0, m1, m2 = _leg(scene, a, b)
     E = magnitude(e)
     log_E = log(E)
@@ -221,9 +213,7 @@ def _strong(scene, speeds):
     j0, j1, j2 = (1.0 - E) / (1.0 + root), 1.0 - E, -expm1((0.5 * n + 0.5) * log_E)  # 1 - sqrt(E), 1 - E ...
     k0, k1, k2 = rho * (1.0 - E), a * (1.0 - E) * (1.0 + E), -b * expm1((n + 1.0) * log_E)  # f - E f_B
     back = e * (E * E)
-    way, time, rise = 0.0 * F1, 0.0 * F1, 0.0 * F1
-    excess, g_a, g_b = 0.0 * F1, 0.0 * F1, 0.0 * F1
-    h_rho, h_a, h_b = 0.0 * F1, 0.0 * F1, 0.0 * F1
+    way = time = rise = excess = g_a = g_b = h_rho = h_a = h_b = 0.0 * F1
     for j in range(_NODES):
         s, w, ws = _S[j], _WEIGHT[j], _WEIGHT[j] * _S[j]
         q = -expm1(n * _LOG_S[j])
@@ -260,17 +250,14 @@ def _weak(scene, terminal, speeds):
     The change of z that keeps (2) is then worth `ratio`, the way's share over the time's at the end v = v1 of both
     integrals, where their integrands are infinitely steep at weak drive and their ratio is not.
     """
-    rho, n, e = scene.rho, scene.n, scene.e
-    _, D, G = terminal
-    z, far, near, F1, b, kept, power = (
-        speeds.z, speeds.far, speeds.near, speeds.F1, speeds.b, speeds.kept, speeds.power
-    )  # fmt: skip
+    rho, n, e, (_, D, G) = scene.rho, scene.n, scene.e, terminal
+    _, _, z, far, near, F1, _, _, b, kept, power = speeds
     lost, m0, m1, m2 = _leg(scene, D * far, b)
     _, _, m1_D, m2_G = _leg(scene, far, power)
     K = fma(n, G, D)
     stretch = -(0.5 * D + rho + (1.0 - 0.5 * n) * G) / K
     D_, G_ = D * (0.5 + stretch), G * fma(n, stretch - 0.5, 1.0)
-    way, time, rise, rule, way_, time_ = 0.0 * z, 0.0 * z, 0.0 * z, 0.0 * z, 0.0 * z, 0.0 * z
+    way = time = rise = rule = way_ = time_ = 0.0 * z
     for j in range(_NODES):
         w, ws = _WEIGHT[j], _WEIGHT[j] * _S[j]
         q = -expm1(n * _LOG_S[j])

@@ -37,21 +37,16 @@ SDIRK4 = (
 """Stages 1 to 4 from all before, beside 1/4 of their own."""
 SDIRK4_ERROR = (-3 / 16, -27 / 32, 25 / 32, 1 / 4)
 """Of stages 0, 1, 2 and 4."""
-HELP_LIMIT = 1000
-"""Places of rest on one half swing; a motion with more is taken for one that does not arrive."""
-STEP_LIMIT = 10_000
-"""Steps of a leg after which a cell is given up."""
+HELP_LIMIT, STEP_LIMIT = 1000, 10_000
+"""Places of rest on one half swing, and steps of a leg, after which a cell is given up."""
 _ROOT_LIMIT, _SETTLED = 60, 1e-9
-"""Trials for the end of a leg; Newton's step, over the whole one, after which the next is the last: its error is the
-square."""
+"""Trials for the end of a leg; Newton's step, over the whole one, after which the next is the last."""
 _STAGE_LIMIT = 12
 """Newton's steps for a stage of an implicit method."""
 _SAFETY, _SHRINK, _GROW = 0.9, 0.2, 5.0
-_SHARE = 0.3
-"""Of rtol that a single step may take; the rest is left to their sum."""
-_ROUGH_SHARE, _SHARP_SHARE = 0.1, 0.03
-"""The same for friction whose slope is not smooth at rest, near which estimates of the error are too low; and where its
-degree is below 2 or torque varies: errors of v count more there."""
+_SHARE, _ROUGH_SHARE, _SHARP_SHARE = 0.3, 0.1, 0.03
+"""Of rtol that a single step may take; the same for friction whose slope is not smooth at rest, where estimates of the
+error are too low; and where its degree is below 2 or torque varies: errors of v count more there."""
 _SMOOTHER = 4.0
 """Degree of drag from which a step that begins or ends at rest has an error below its estimate."""
 _FLOOR = 1e-4
@@ -64,14 +59,13 @@ _ARRIVED, _ROUNDED = 1e-12, 4e-15
 _CLEARLY = 0.01
 """Of the hairspring, what is missing at the switch so that no rounding and no tolerance brings the motion there."""
 _NEARER, _FARTHER = 0.8, 3.0
-"""Of the time to rest, and of that since rest, which a step may be long: its error is then at most 3 and 8 times the
+"""Of the time to rest, and of that since, which a step may be long: its error is then at most 3 and 8 times the
 estimate, in quadrature of a power of the time with exponents from -0.9 to 3."""
 _SLOW = 0.01
 """Of the tolerance, what is left out below the slow speed."""
 
 Problem = namedtuple(
-    "Problem",
-    "e rho_s outwards inwards d gamma n kappa depth wave rtol floor share rough stiffness pace",
+    "Problem", "e rho_s outwards inwards d gamma n kappa depth wave rtol floor share rough stiffness pace"
 )
 """A cell by the terms of (1) and (2).
 
@@ -82,54 +76,39 @@ stiffness, pace : f'(V) and 1/V for the speed V at which friction balances the d
 """
 
 Law = namedtuple("Law", "side steady floor problem")
-"""The right-hand side of (1) from a reversal to the next: sign of the speed, constant force, floor, and terms.
+"""The right-hand side of (1) from a reversal to the next: sign of the speed, constant force, terms, and the speed below
+which power-law friction is constant."""
 
-Below the speed `floor` power-law friction is constant.
-"""
-
-Leg = namedtuple("Leg", "stop forgotten forgetting slow scales")
-"""What ends a leg and bounds its steps.
-
-stop, forgotten : speed along it and Y at its end; forgetting: f', roughly
-slow : speed above which power-law friction is not smooth, 0 if it is smooth
-scales : what a step's errors are relative to, at least: of speed, of its tangent by ln mu, of those by v0
-"""
+Leg = namedtuple("Leg", "stop forgotten slow scales")
+"""What ends a leg and bounds its steps: speed along it and Y at its end, and the speed above which power-law friction
+is not smooth, 0 if it is; what errors are relative to, at least: of speed, of its tangent by ln mu, of those by v0."""
 
 Half = namedtuple("Half", "end state rate top top_by_start time shrink helped lost")
-"""A half swing.
-
-end : speed F at the switch, 0 where it is not reached
-state : (x, v, x_mu, v_mu, x_start, v_start, Y) at the switch, with tangents by ln mu and by v0; rate: x'' there
-top, top_by_start : turning point and its tangent by v0
-time : taken
-shrink : J exp(-Y), 0 where helped
-helped, lost : came to rest on its way in; met the step limit
-"""
+"""A half swing: the speed F at the switch, 0 where it is not reached, and (x, v, x_mu, v_mu, x_start, v_start, Y)
+there, with tangents by ln mu and by v0; x'' there; the turning point and its tangent by v0; the time; J exp(-Y), 0
+where helped; and whether it came to rest on its way in, or met the step limit."""
 
 
 @jit
 def problem_of(scene, ripple, rtol):
-    """The cell's terms.
-
-    Friction of degree 1 is viscous. Of a degree below, the slope at rest is infinite: below the floor friction is held
-    constant.
-    """
+    """The cell's terms. Friction of degree 1 is viscous; that of a degree below, whose slope at rest is infinite, is
+    constant below the floor."""
     d, rho, rho_s, gamma, n, kappa, e, slack = scene
     depth, harmonic = ripple
     linear = not_(n < 1.0) & not_(n > 1.0)
     d, gamma = d + where(linear, gamma, 0.0), where(linear, 0.0, gamma)
-    by_drag, by_power = d / slack, 0.0 * d
+    by_power = 0.0 * d
     if any_lane(gamma > 0.0):
         by_power = where(gamma > 0.0, power(gamma / slack, 1.0 / n), 0.0)
-    pace = by_drag + by_power
-    floor = where(n < 1.0, _FLOOR * rtol / (1.0 + pace), 0.0)
+    pace = d / slack + by_power
     whole = not_(nearest(n) > n) & not_(nearest(n) < n)
     rough = (gamma > 0.0) & (n < _SMOOTHER) & not_(whole)
-    share = where((depth > 0.0) | ((gamma > 0.0) & (n < 2.0)), _SHARP_SHARE, where(rough, _ROUGH_SHARE, _SHARE))
-    wave, stiffness = harmonic * (0.5 * math.pi), d + n * slack * by_power
     return Problem(
-        e, rho_s, 1.0 + rho, slack, d, gamma, n, kappa, depth, wave, rtol, floor, share, rough, stiffness, pace
-    )
+        e, rho_s, 1.0 + rho, slack, d, gamma, n, kappa, depth, harmonic * (0.5 * math.pi), rtol,
+        floor=where(n < 1.0, _FLOOR * rtol / (1.0 + pace), 0.0),
+        share=where((depth > 0.0) | ((gamma > 0.0) & (n < 2.0)), _SHARP_SHARE, where(rough, _ROUGH_SHARE, _SHARE)),
+        rough=rough, stiffness=d + n * slack * by_power, pace=pace,
+    )  # fmt: skip
 
 
 @jit_call
@@ -271,18 +250,7 @@ def _left(state, acceleration, law, leg):
     way = x + 1.0
     value, rate = where(value < way, value, way), where(value < way, rate, v)
     memory = leg.forgotten - decay
-    return where(value < memory, value, memory), where(value < memory, rate, -leg.forgetting)
-
-
-@jit
-def _held_back(state, law):
-    """Whether a hairspring takes more than there is on the way to the switch, so that what creeps need not be followed.
-
-    Without a ripple the work of torque, dry friction and spring on that way is (x + 1)(1 - rho + kappa (x - 1)/2).
-    """
-    x, v, problem = state[0], state[1], law.problem
-    energy = fma(0.5 * v, v, (x + 1.0) * fma(0.5 * problem.kappa, x - 1.0, law.steady))
-    return (law.side < 0.0) & not_(problem.depth > 0.0) & (energy < -_CLEARLY * problem.kappa)
+    return where(value < memory, value, memory), where(value < memory, rate, -law.problem.stiffness)
 
 
 @jit
@@ -311,7 +279,13 @@ def _to_end(step, state, law, leg, h, tolerance, active):
         new, last, error = step(state, first, law, h, leg.scales)
         ratio = error / tolerance
         accepted = moving & (ratio <= 1.0)
-        passed = accepted & ((_left(new, 0.0, law, leg)[0] <= 0.0) | _held_back(new, law))
+
+        # at the end, or where a hairspring takes more than torque and dry friction have to give on the way to the
+        # switch, (x + 1)(1 - rho + kappa (x - 1)/2) without a ripple, so that what creeps need not be followed
+        x, v, kappa = new[0], new[1], law.problem.kappa
+        energy = fma(0.5 * v, v, (x + 1.0) * fma(0.5 * kappa, x - 1.0, law.steady))
+        held_back = (law.side < 0.0) & not_(law.problem.depth > 0.0) & (energy < -_CLEARLY * kappa)
+        passed = accepted & ((_left(new, 0.0, law, leg)[0] <= 0.0) | held_back)
         moving = moving & not_(passed)
         accepted = accepted & moving
         state, first, t = choose(accepted, (new, last, t + h), (state, first, t))
@@ -356,13 +330,13 @@ def _moved(state, law, steady, time):
 
 
 @jit
-def _turned(state, law, slow, problem):
+def _turned(state, law, slow):
     """The state behind the turning point; J; way and its tangent by v0 there; and the time taken.
 
     Power-law friction that is not smooth at rest is constant from the speed of the state to rest, and from there to
     the speed `slow`: J takes both, and with the integral Y outside is what it is without a step through rest.
     """
-    zero, v, turns = 0.0 * slow, state[1], problem.e > 0.0
+    zero, v, problem, turns = 0.0 * slow, state[1], law.problem, law.problem.e > 0.0
     still = turns | not_(v < 0.0)
     speed = where(slow > 0.0, larger(v, zero), zero)
     held = _held_at(problem, speed)
@@ -381,6 +355,13 @@ def _turned(state, law, slow, problem):
     return choose(still, behind, state), jump, x, x_start, before + after_rest
 
 
+@jit
+def _wins(x, scene):
+    """Whether the drive wins over dry friction at x."""
+    slack, problem = scene
+    return slack + pull(x, problem) > 0.0
+
+
 @jit_call
 def _released(x, slack, problem):
     """The next place inwards from x where the drive wins over dry friction; -1 where there is none."""
@@ -396,13 +377,6 @@ def _released(x, slack, problem):
         free = where(found & (there > -1.0), there, free)
         searching = searching & not_(found)
     return bisected(_wins, held, free, (slack, problem), _BISECTIONS)
-
-
-@jit
-def _wins(x, scene):
-    """Whether the drive wins over dry friction at x."""
-    slack, problem = scene
-    return slack + pull(x, problem) > 0.0
 
 
 @jit_inline
@@ -434,7 +408,7 @@ def half_swing(step, start, problem, tolerance, active):
     for _ in range(HELP_LIMIT):
         if not any_lane(moving):
             break
-        behind, jumped, there, there_by_start, spent = _turned(state, falling, slow, problem)
+        behind, jumped, there, there_by_start, spent = _turned(state, falling, slow)
         forgotten = where(turning & not_(varied), state[6] + _FORGOTTEN, forgotten)
         turned, old = (behind, jumped, there, there_by_start, time + spent), (state, jump, top, top_by_start, time)
         state, jump, top, top_by_start, time = choose(turning, turned, old)
@@ -442,7 +416,7 @@ def half_swing(step, start, problem, tolerance, active):
         side, steady = where(rising, 1.0, falling.side), where(rising, problem.outwards, problem.inwards)
         law = Law(side, steady, floor, problem)
         stop = where(rising, smaller(slow, 0.5 * start), zero)
-        leg = Leg(stop, forgotten, problem.stiffness, slow, scales)
+        leg = Leg(stop, forgotten, slow, scales)
         state, spent, h, late = _to_end(step, state, law, leg, h, tolerance, moving)
         time, lost, moving = time + spent, lost | late, moving & not_(late)
         turning, inward = moving & rising, moving & not_(rising)

@@ -23,27 +23,22 @@ from kernels.maths.elementary import larger, smaller
 NEWTON_LIMIT = 60
 SMOOTH = (0.0, 0.0)
 """The ripple (depth, harmonic) of a torque that does not vary."""
-EXPLICIT = (1e4, 1e6)
+EXPLICIT, IMPLICIT = (1e4, 1e6), (math.inf, math.inf)
 """Larger f'(V)/V (viscous friction: d^2) takes a stable explicit method more steps than the limit: about 2/3 of it; and
 the same where the motion becomes uniform and need not be followed so far."""
-IMPLICIT = (math.inf, math.inf)
 _CHECK = 4.0
 """The last swing but one has a tolerance so much wider than the last: how far the two differ is the error's measure."""
-_COARSE, _ORDERLY = 1e-3, 3e-5
-"""Tolerances to begin with, and below which an error falls as the tolerance does."""
+_COARSE, _ORDERLY, _FINEST = 1e-3, 3e-5, 3e-15
+"""Tolerances to begin with, below which an error falls as the tolerance does, and which rounding leaves possible."""
 _NOISE = 100.0
 """Tolerances within which the sign of F - v may be wrong."""
-_FINEST = 3e-15
-"""Tolerance of a step that rounding leaves possible."""
 _V_ROUNDING = 1e-14
 """Of the speed after a half swing."""
-_CANCELS = 0.3
-"""Of how many times the terms of s are larger than s, by which tolerances are finer where friction is not smooth: steps
-are then bounded by the time to rest, and two tolerances may differ by less than either is off."""
+_CANCELS, _STEEP = 0.3, 0.2
+"""Of how many times the terms of s are larger than s where friction is not smooth, and of how steeply s hangs on v1, by
+which tolerances are finer: two of them may differ by less than either is off."""
 _STEEP_FROM, _STEEP_TO = 1e-8, 0.03
 """Changes of v1 between two swings, near the cycle, whose effect on s is their own, not that of the tolerances."""
-_STEEP = 0.2
-"""Of how steeply s hangs on v1, by which tolerances are finer: two may differ by less than either is off."""
 
 
 @jit
@@ -103,15 +98,8 @@ def limit_cycle(step, stiffest, rippled, rtol):
     must agree to 0.3 rtol, or the tolerance is lowered further. A ripple makes s hang on v1 steeply, a thousandfold at
     times: how steeply the steps themselves tell, and what is left of v1's error is counted so.
 
-    Parameters
-    ----------
-    step, stiffest : of `_half_swing`, and EXPLICIT or IMPLICIT
-    rippled : a `_units.Scene`, and (depth, harmonic) of (2), or SMOOTH
-
-    Returns
-    -------
-    cycle : half period, amplitude, speed before the switch, s, multiplier
-    verdict : OK, INACCURATE, STICKS, NOT_CONVERGED or STEP_LIMIT
+    `step` is one of `_half_swing`, `stiffest` EXPLICIT or IMPLICIT, and `rippled` a `_units.Scene` with (depth,
+    harmonic) of (2). It returns the half period, amplitude, speed before the switch, s and multiplier; and the verdict.
     """
     problem = problem_of(*rippled, rtol)
     zero, one, stiff = 0.0 * problem.e, 0.0 * problem.e + 1.0, problem.stiffness * problem.pace

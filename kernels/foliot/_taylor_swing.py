@@ -1,11 +1,14 @@
 """The general foliot's limit cycle by Taylor series: half swings followed as a scene of one's own, and Newton's method.
 
-The half swing of `_half_swing`, equation (1) there, is a scene of `_swing_scenes`, with a kink at the turning point.
-The series, the proof that no event is passed over, and the core of abs(v)^n are those of `kernels.codegen`. At that
-point the tangents' speeds should jump by J of (3). That they do not is made good for at the end: what is wanting is a
-multiple of the tangent along the motion itself, (v, v'), with the factor
+The half swing of `_half_swing`, equation (1) there, is a scene of one's own, from x = 1 with the speed v0 to x = -1,
+with a kink at the turning point. The series, the proof that no event is passed over, and the core of abs(v)^n are those
+of `kernels.codegen`. The two tangents go along as states; of them `up_mu` and `up_start` keep the speeds that they have
+at the turning point, where they should jump by J of (3). That they do not is made good for at the end: what is wanting
+is a multiple of the tangent along the motion itself, (v, v'), with the factor
     beta = (J - 1) v_mu/v'  at the turning point,                                                        (1)
 which is what dry friction's change of sign shifts the time by. The cycle then follows by (4) of `_integrated_swing`.
+A form of the scene follows what its cells need: with drag of any degree; without, where the friction's slope is a
+constant; and for a search of the speed, which needs no tangent, for dF/dv1 is known from `decay` and `top`.
 
 Each cell goes through four stages on its own. SEARCH: Newton's method within a bracket, at a coarse tolerance. NEAR: at
 one that follows the square of its step. ROUGH and FINE: two half swings, whose difference tells the error. The rough
@@ -15,14 +18,18 @@ tolerance: LAST, which starts at the speed that the fine one gives and has its t
 the error is too large, they are followed once more at a tighter tolerance.
 """
 
+import functools
+from collections import namedtuple
+
 import numpy as np
 
-from kernels.codegen.followed import off_by_roundings
+from kernels.codegen.compiled import runner
+from kernels.codegen.followed import followed, off_by_roundings
 from kernels.codegen.to_tolerance import FINER
+from kernels.expression.graph import cos, power, sign, sin
 from kernels.foliot import _units
 from kernels.foliot._half_swing import Half, inwards, problem_of, pull, rates
 from kernels.foliot._integrated_swing import cycle_by, first_speed, held, newton
-from kernels.foliot._swing_scenes import LINEAR, RIPPLE, RIPPLED, SEARCHED, SMOOTH, TERMS, Swung, half_swings
 from kernels.foliot._units import Foliot, Outputs
 from kernels.interface import FIRST_REFUSAL, Field, Method, Status
 from kernels.lanes.codes import OK, STICKS
@@ -30,6 +37,7 @@ from kernels.lanes.jit import jit
 from kernels.lanes.vectors import where
 from kernels.lanes.wiring import kernel, method, signed
 from kernels.maths.elementary import exp
+from kernels.scene import Scene
 
 LIMIT = 40
 """Half swings of a cell."""
@@ -63,26 +71,93 @@ _ROUNDING = 2e-14
 """Of a half swing's speed and time; a cycle's are off by 1/(1 - multiplier) as much."""
 
 
-@jit
-def _problem(p):
-    """The cell's terms, friction of any degree as it is down to rest; and its units."""
-    scene, units = _units.without_dimensions(p)
-    return problem_of(scene, (p.depth, p.harmonic), 0.0 * p.e), units
+Swung = namedtuple("Swung", "time x v x_mu v_mu x_start v_start decay top up_mu up_start")
+"""What a half swing comes to: its time, and states at the switch."""
+TERMS, RIPPLE = ("drag", "outwards", "inwards", "gamma", "degree", "kappa"), ("depth", "wave")
+Form = namedtuple("Form", "name states terms")
+"""A scene of a half swing, which follows some of its states by some of the terms."""
+SMOOTH = Form("foliot_swing", Swung._fields[1:], TERMS)
+RIPPLED = Form("foliot_ripple_swing", SMOOTH.states, (*TERMS, *RIPPLE))
+_BARE = tuple(name for name in RIPPLED.terms if name not in ("gamma", "degree"))
+LINEAR = Form("foliot_ripple_linear", tuple(name for name in SMOOTH.states if name != "decay"), _BARE)
+SEARCHED = Form("foliot_ripple_search", ("x", "v", "top"), _BARE)
+_UNKNOWN = {"x_mu": np.nan, "v_mu": np.nan, "up_mu": np.nan}
+_FIRST = {"x": 1.0, "v_start": 1.0, "top": 1.0, "up_start": 1.0}
+_STEP = (*TERMS, "first", "stiff", "end", "change", "slope", "cancels", *Outputs._fields)
+_CELL = (*Foliot._fields, "depth", "harmonic")
+_E, _SENSITIVITY = Foliot._fields.index("e"), Outputs._fields.index("sensitivity")
+_DECAY, _TOP = Swung._fields.index("decay"), Swung._fields.index("top")
+"""Positions of columns."""
 
 
-@jit
-def begin(p, rtol):
-    """Terms of `_half_swing`, the speed that Newton's method begins with, and the stiffness."""
-    problem, _ = _problem(p)
-    first, _ = first_speed(problem.pace)
-    friction = problem.d, problem.outwards, problem.inwards, problem.gamma, problem.n
-    return (*friction, problem.kappa, first, problem.stiffness * problem.pace), OK
+def _rates_of(form):
+    """(1) of `_half_swing` with what its tangents and the states at the turning point change by."""
+    dragged, varies = "gamma" in form.terms, "wave" in form.terms
+
+    def rates_of_named(**p):
+        x, v, drag, kappa = p["x"], p["v"], p["drag"], p["kappa"]
+        side = sign(v)
+        rising, falling = 0.5 * (1.0 + side), 0.5 * (1.0 - side)
+        steady, slope = rising * p["outwards"] + falling * p["inwards"], drag
+        angle = p["wave"] * (1.0 - x) if varies else None
+        extra = p["depth"] * cos(angle) if varies else 0.0
+        if dragged:
+            gamma, degree, speed = p["gamma"], p["degree"], abs(v)
+            slope = drag + degree * gamma * power(speed, degree - 1.0)
+            force = steady + ((1.0 + extra) - 1.0) + drag * v + side * gamma * power(speed, degree) + kappa * x
+        else:
+            force = steady + drag * v + kappa * x + extra
+        found = {"x": v, "v": -force, "top": rising * v, "decay": slope}
+        if "x_mu" in p:
+            stiffness = kappa + p["depth"] * p["wave"] * sin(angle) if varies else kappa
+            pushed = -(1.0 + extra) if dragged else -1.0 - extra
+            by_mu = pushed - stiffness * p["x_mu"] - slope * p["v_mu"]
+            by_start = -stiffness * p["x_start"] - slope * p["v_start"]
+            found |= {"x_mu": p["v_mu"], "v_mu": by_mu, "x_start": p["v_start"], "v_start": by_start}
+            found |= {"up_mu": rising * by_mu, "up_start": rising * by_start}
+        return tuple(found[name] for name in form.states)
+
+    return signed(rates_of_named, [*form.states, *form.terms])
+
+
+@functools.cache
+def _runner(form):
+    """The compiled half swing."""
+
+    def surface(x):
+        return x + 1.0
+
+    def start(v0):
+        return tuple(v0 if name == "v" else _FIRST.get(name, 0.0) for name in form.states)
+
+    terms = (*form.terms, "v0")
+    functions = _rates_of(form), surface, start
+    return runner(Scene(form.name, "half swing of a foliot", form.states, terms, *functions, most_kinks=1), "taylor")
+
+
+def half_swings(form, columns, tolerance):
+    """The half swings of cells, rows of a `Swung` and of statuses, from columns: the form's terms, v0, and 1.
+
+    Tangents that the form does not follow are NaN by mu, so that the sensitivity is none; by v0 they are 0, which
+    takes from time and amplitude what Newton's last step would better.
+    """
+    rows = followed(_runner(form), columns, tolerance)
+    found = dict(zip(("time", "interval", *form.states), rows, strict=False))
+    if "decay" not in found:
+        found["decay"] = columns[form.terms.index("drag")] * found["time"]
+    nothing = {name: np.full(len(tolerance), _UNKNOWN.get(name, 0.0)) for name in Swung._fields}
+    return np.array([*((nothing | found)[name] for name in Swung._fields), rows[-1]])
 
 
 @jit
 def step(p, rtol):
-    """Newton's step from v1, the speed before the half swing, to F, with (1) made good for; and the cycle by it."""
-    problem, units = _problem(p)
+    """Terms of `_half_swing`, with friction of any degree as it is down to rest; the speed that Newton's method begins
+    with, and the stiffness; Newton's step from v1, the speed before the half swing, to F, with (1) made good for; and
+    the cycle by it."""
+    scene, units = _units.without_dimensions(p)
+    problem = problem_of(scene, (p.depth, p.harmonic), 0.0 * p.e)
+    first, _ = first_speed(problem.pace)
+    friction = problem.d, problem.outwards, problem.inwards, problem.gamma, problem.n
     e, v, force = problem.e, p.v, pull(p.top, problem)
     behind = problem.inwards + force
     jump = where(e > 0.0, behind / (problem.outwards + force), 1.0)
@@ -97,26 +172,18 @@ def step(p, rtol):
     (period, amplitude, speed, s, multiplier), status = _units.given(
         units, cycle, where(held(problem, half.top), STICKS, OK)
     )
-    return (half.end, change, slope, cancels, period, amplitude, speed, s, multiplier), status
+    begun = (*friction, problem.kappa, first, problem.stiffness * problem.pace)
+    return (*begun, half.end, change, slope, cancels, period, amplitude, speed, s, multiplier), status
 
 
-def _columns(function, parameters, outputs):
-    """The function as one of columns: (*parameters, rtol, *outputs, status)."""
-    names = [tuple(Field(name, "1", "") for name in some) for some in (parameters, outputs)]
-    made = kernel(
-        f"foliot_swing_{function.__name__}", doc="", source="", parameters=names[0], outputs=names[1],
-        methods=(method(function.__name__, "", function),),
-    )  # fmt: skip
-    return made.methods[0].solve
-
-
-_CELL = (*Foliot._fields, "depth", "harmonic")
-_E, _SENSITIVITY = Foliot._fields.index("e"), Outputs._fields.index("sensitivity")
-_DECAY, _TOP = Swung._fields.index("decay"), Swung._fields.index("top")
-"""Positions of columns."""
-_BEGUN = (*TERMS, "v1", "stiff")
-_begin = _columns(begin, _CELL, _BEGUN)
-_step = _columns(step, (*_CELL, "v1", *Swung._fields), ("end", "change", "slope", "cancels", *Outputs._fields))
+_step = kernel(
+    "foliot_swing",
+    doc="",
+    source="",
+    parameters=[Field(name, "1", "") for name in (*_CELL, "v1", *Swung._fields)],
+    outputs=[Field(name, "1", "") for name in _STEP],
+    methods=(method("step", "", step),),
+).methods[0].solve  # fmt: skip
 
 
 def by_taylor(parameters, rippled):
@@ -147,14 +214,21 @@ def by_taylor(parameters, rippled):
     )
 
 
+def stepped(cells, v, swung, rtol):
+    """Columns of what `step` gives, and statuses."""
+    found, status = np.empty((len(_STEP), len(rtol))), np.empty(len(rtol), np.int8)
+    _step(*cells, v, *swung, rtol, *found, status)
+    return found[:8], found[8:12], found[12:], status
+
+
 def begun(cells, rtol):
     """Terms and first speeds of cells, and where the method is worth while.
 
     Not where steps are short for stability, nor where the drag is steep at rest; nor where a hairspring holds what
     creeps inwards, overdamped, before it comes to the switch.
     """
-    found = np.empty((len(_BEGUN), len(rtol)))
-    _begin(*cells, rtol, *found, np.empty(len(rtol), np.int8))
+    some = np.ones(len(rtol))
+    found, *_ = stepped(cells, some, [-some if name == "v" else some for name in Swung._fields], rtol)
     terms, (drag, _, inwards, gamma, degree, kappa, v, stiff) = dict(zip(TERMS, found, strict=False)), found
     with np.errstate(over="ignore"):  # an infinite square compares as the square itself would
         creeps = (kappa > inwards) & (drag * drag >= 4.0 * kappa) & (cells[_E] >= 0.0)
@@ -209,8 +283,7 @@ def cycles(cells, rtol, rippled, asked):
             swung[:, of_kind] = half_swings(form, off_by_roundings(columns) if k % 2 else columns, tolerance[j])
 
         # Newton's step of each, and the cycle by it
-        step_of, found, verdict = np.empty((4, len(i))), np.empty((len(outputs), len(i))), np.empty(len(i), np.int8)
-        _step(*(column[i] for column in cells), v[i], *swung[:-1], rtol[i], *step_of, *found, verdict)
+        _, step_of, found, verdict = stepped([column[i] for column in cells], v[i], swung[:-1], rtol[i])
         end, change, slope, cancels = step_of
         free = (swung[-1] < FIRST_REFUSAL) & np.isfinite(step_of[:3]).all(axis=0) & (end > 0.0)
         relative, gap, decay = np.abs(change / end), 1.0 - slope, np.where(swung[_DECAY] < 750.0, swung[_DECAY], 0.0)

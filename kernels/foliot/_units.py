@@ -10,6 +10,7 @@ from collections import namedtuple
 
 from kernels.lanes.jit import jit
 from kernels.lanes.ranges import judged
+from kernels.lanes.records import read
 from kernels.lanes.vectors import any_lane, not_, where
 from kernels.maths.elementary import is_normal, mantissa_exponent, measured, power, scale, scaled_root
 from kernels.maths.pairs import two_sum
@@ -75,6 +76,12 @@ def without_dimensions(p):
 
 
 @jit
+def linear(columns, i):
+    """The scene of cell i of columns without drag, and its units."""
+    return without_dimensions(without_drag(read(LinearFoliot, columns, i)))
+
+
+@jit
 def spare_torque(mu, R, solid):
     """mu - R - solid, rounded once: what is left of the torque may be a small difference of large ones."""
     first, lost = two_sum(mu, -R)
@@ -83,14 +90,8 @@ def spare_torque(mu, R, solid):
 
 
 @jit
-def angle(units, x):
-    """[rad], NaN where it is no normal number, as all sizes that are put back here."""
-    return measured(units.m_phi * x, units.e_phi)
-
-
-@jit
 def speed(units, v):
-    """[rad/s]."""
+    """[rad/s], NaN where it is no normal number, as all sizes that are put back here."""
     return measured(units.m_phi / units.t * v, units.e_phi - units.e_t)
 
 
@@ -104,9 +105,10 @@ def time(units, t):
 def given(units, cycle, verdict):
     """What a method gives of a cycle: its outputs and its status."""
     half_period, amplitude, before, sensitivity, multiplier = cycle
-    period, swing, fast = time(units, 2.0 * half_period), angle(units, amplitude), speed(units, before)
-    whole = (period > 0.0) & (swing > 0.0) & (fast > 0.0)
-    return Outputs(period, swing, fast, sensitivity, multiplier), judged(units.fine, whole, verdict)
+    period, fast = time(units, 2.0 * half_period), speed(units, before)
+    swing = measured(units.m_phi * amplitude, units.e_phi)
+    verdict = judged(units.fine, (period > 0.0) & (swing > 0.0) & (fast > 0.0), verdict)
+    return Outputs(period, swing, fast, sensitivity, multiplier), verdict
 
 
 UNITS = without_dimensions, given

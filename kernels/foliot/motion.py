@@ -45,7 +45,7 @@ def closed(i, columns):
 @jit
 def segments(i, columns):
     """The exact pieces of the swing on the cycle that `foliot` finds with them."""
-    scene, units = _units.without_dimensions(_units.without_drag(read(LinearFoliot, columns, i)))
+    scene, units = _units.linear(columns, i)
     cycle, errors, verdict = _linear_swing.segments(scene, columns.rtol[i])
     columns.error[i] = errors.period if errors.period > errors.multiplier else errors.multiplier
     start = scene.e * cycle.speed

@@ -26,14 +26,13 @@ from collections import namedtuple
 import numpy as np
 
 from kernels.foliot import _linear_swing, _units
-from kernels.foliot._units import LinearFoliot, Scene
+from kernels.foliot._units import Scene
 from kernels.foliot.cycle import FOLIOT, check
 from kernels.integrate import linear_flow
 from kernels.interface import FIRST_REFUSAL, Field
 from kernels.lanes.codes import INACCURATE, NOT_SELF_STARTING, OK, OUT_OF_RANGE, STICKS, TOO_SHORT
 from kernels.lanes.columns import GROUP, cells_at
 from kernels.lanes.jit import jit, jit_call
-from kernels.lanes.records import read
 from kernels.lanes.vectors import any_lane, choose, fma, magnitude, nearest, not_, sqrt, where
 from kernels.lanes.wiring import kernel, tracing
 from kernels.maths import philox
@@ -96,12 +95,9 @@ def _beat(run, averages, z, z_apart, clock):
 @jit_call
 def _run(first, seed, half_swings, clock, speed, active, radii, turns, radii_apart, turns_apart):
     """All half swings of the active cells of a group, and those of them that did not come to a switch."""
-    count = half_swings[cells_at(first)]
-    zero = 0.0 * speed
+    count, zero = half_swings[cells_at(first)], 0.0 * speed
     run, averages = Run(zero, zero, speed, zero, zero, zero), Averages(zero, zero, zero, zero)
-    two_noises = any_lane(clock.own > 0.0)
-    stopped = count < 0.0
-    most = 0.0
+    two_noises, stopped, most = any_lane(clock.own > 0.0), count < 0.0, 0.0
     for cell in range(GROUP):
         most = max(most, half_swings[first + cell])
     for chunk in range(int(min(most, HALF_SWING_LIMIT)) // (2 * PAIRS) + 1):
@@ -130,7 +126,7 @@ def _run(first, seed, half_swings, clock, speed, active, radii, turns, radii_apa
 def segments(first, columns, radii, turns, radii_apart, turns_apart):
     """Every half swing from exact pieces. `rtol` is meant of rates as fractions: 1e-9 of a day is 8.6e-5 s."""
     i = cells_at(first)
-    scene, units = _units.without_dimensions(_units.without_drag(read(LinearFoliot, columns, i)))
+    scene, units = _units.linear(columns, i)
     cycle, _, found = _linear_swing.segments(scene, columns.rtol[i])
 
     # the floor of (1): from rest at the switch the force must reach over the way 2, which grows with it

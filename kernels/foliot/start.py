@@ -15,7 +15,6 @@ from collections import namedtuple
 
 from kernels.foliot import _linear_swing, _units
 from kernels.foliot._linear_swing import ROUNDING
-from kernels.foliot._units import LinearFoliot
 from kernels.foliot.cycle import FOLIOT
 from kernels.integrate import linear_flow
 from kernels.interface import Field
@@ -23,7 +22,6 @@ from kernels.lanes.codes import BAD_INPUT, COMES_TO_REST, GRAZING, INACCURATE, N
 from kernels.lanes.columns import cells_at, one_row, write_row
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.ranges import partly
-from kernels.lanes.records import read
 from kernels.lanes.vectors import any_lane, choose, fma, magnitude, not_, where
 from kernels.lanes.wiring import kernel, tracing
 from kernels.maths.elementary import is_normal, larger
@@ -50,13 +48,12 @@ def _held(scene, x):
 def _near_miss(scene, energy, push, speed, way):
     """Whether a motion that turned before the switch lacked less than its energy is unsure by.
 
-    It starts with `speed` and the force `push`; what it lacked is at most the force against it at the switch, times
-    the way left.
+    It starts with `speed` and the force `push`; it lacked at most the force against it at the switch, times the way
+    left.
     """
-    kappa = scene.kappa
-    against = fma(kappa, way, -push)
-    left = way - linear_flow.reach(0.5 * scene.d, kappa, speed, push)
-    rounding = 8.0 * ROUNDING * way * (magnitude(against) + 1.0 + kappa * (1.0 + way))
+    against = fma(scene.kappa, way, -push)
+    left = way - linear_flow.reach(0.5 * scene.d, scene.kappa, speed, push)
+    rounding = 8.0 * ROUNDING * way * (magnitude(against) + 1.0 + scene.kappa * (1.0 + way))
     return left * against <= 2.0 * energy + rounding
 
 
@@ -105,16 +102,16 @@ def _next(scene, flip):
 
 @jit
 def segments(first, columns, row):
-    """Exact pieces from flip to flip of a group of cells, and how far their rounding may have added up.
+    """Exact pieces from flip to flip; INACCURATE where their rounding may have added up beyond rtol.
 
-    INACCURATE where that is beyond rtol. Flips asked for in falling order are followed from the release again.
+    Flips asked for in falling order are followed from the release again.
     """
     i, flip = cells_at(first), columns.flip
     for number in flip:  # whole numbers from 1 on; NaN fails
         if not (1.0 <= number <= FLIP_LIMIT and number == math.floor(number)):
             columns.status[i] = BAD_INPUT
             return
-    scene, units = _units.without_dimensions(_units.without_drag(read(LinearFoliot, columns, i)))
+    scene, units = _units.linear(columns, i)
     phi0, phi_start = columns.phi0[i], columns.phi_start[i]
     before = phi_start < phi0
     way = where(before, phi0 - phi_start, phi_start + phi0) / phi0  # 1 + x, with its digits for a start just before

@@ -21,13 +21,21 @@ a cycle in 600 half periods; some clocks come to a cycle of several teeth, or to
 more than 3000 landings and escapes. NO_METHOD: groups beyond 2^+-40 or kappa above 2^13. Without friction and with
 e = 0 this is `impact`, without inertia of the wheel `foliot`. Leaves out: friction of the wheel, the shape of the
 pallets. Derived here.
+
+Without dimensions the foliot is at y phi0, counted along the push of the pallet that meets a tooth, that tooth at
+(y - gap) phi0. With the time unit sqrt(I_v phi0/(n tau)), kappa = n^2 I_c/I_v, d = c_v sqrt(phi0/(I_v n tau)) and
+r = R_v/(n tau)
+    flight    y'' = -d y' - r sign(y'),  wheel'' = 1/kappa                                               (4)
+    impact    y' - wheel' times -e, with y' + kappa wheel' kept                                          (5)
+    contact   (1 + kappa) y'' = 1 - d y' - r sign(y')                                                    (6)
+The tooth escapes as y rises through 1; the other pallet then stands `drop` ahead of its tooth. Contact pushes both
+bodies, so it ends where the wheel alone would slow down less than the foliot: kappa (d abs(y') + r) > 1, y' < 0.
 """
 
 import math
 from collections import namedtuple
 
-from kernels.foliot import _two_bodies
-from kernels.foliot._two_bodies import Half, Scene, half_period
+from kernels.integrate import linear_flow
 from kernels.interface import Field
 from kernels.lanes.codes import NEVER_STARTS, NO_METHOD, NOT_CONVERGED, OK, STEP_LIMIT, UNMESHES
 from kernels.lanes.columns import cell_by_cell
@@ -35,12 +43,29 @@ from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.ranges import judged
 from kernels.lanes.vectors import magnitude, sqrt, where
 from kernels.lanes.wiring import kernel, method
-from kernels.maths.elementary import mantissa_exponent, measured, scale, scaled_root
+from kernels.maths.elementary import log, mantissa_exponent, measured, scale, scaled_root
 
 HALF_PERIODS = 600
 """Half periods that are followed until one repeats the one before; secants between them."""
 ROUNDING = 1e-14
 """Relative error of half a period: its landings and its escape, by 20 digits."""
+
+DONE, OUT_OF_MESH, FALLS_BACK, TOO_MANY, LANDED = 0.0, 1.0, 2.0, 3.0, 4.0
+"""How half a period ends: by the escape; the wheel is half a pitch back; without end (TOO_MANY). A flight also: the
+pallet left before is back in front of its tooth (FALLS_BACK); the gap has closed (LANDED)."""
+STEPS, EVENTS = 500, 3000
+"""Steps to one landing, five of which are usual; landings and escapes of half a period: with e = 0.95 the closing speed
+is 1e-12 of the first after 540 landings."""
+DIES_OUT = 1e-12
+"""Share of the first closing speed at which the bodies go on together: they would part by 1e-24 of the way."""
+
+Scene = namedtuple("Scene", "kappa d r drop e")
+"""kappa, d, r, and drop as above, and the restitution."""
+
+Half = namedtuple("Half", "v w gap time swing way back lost closing impacts end")
+"""Speed of the foliot and of the wheel, and the gap, at escape, and what happened in the half period: `swing` is the
+largest abs(y), `way` that of the foliot to and fro, `back` the wheel's way backwards since its first landing, `lost`
+the energy of impacts, and `closing` the first closing speed."""
 
 Cycle = namedtuple("Cycle", "period amplitude escape_speed recoil impact_share dry_share")
 """The outputs, or their relative errors."""
@@ -51,29 +76,24 @@ Units = namedtuple("Units", "time e_time angle e_angle wheel e_wheel fine")
 
 @jit
 def without_dimensions(p):
-    """The scene of `_two_bodies` and its units."""
+    """The scene and its units."""
     (tau, e_tau), (I_v, e_v), (I_c, e_c) = mantissa_exponent(p.tau), mantissa_exponent(p.I_v), mantissa_exponent(p.I_c)
     (n, e_n), (phi0, e_phi) = mantissa_exponent(p.n), mantissa_exponent(p.phi0)
     time, e_time = scaled_root(I_v * phi0 / (n * tau), e_v + e_phi - e_n - e_tau)
     e_kappa = 2.0 * e_n + e_c - e_v
     c, e_c_v = mantissa_exponent(where(p.c_v > 0.0, p.c_v, p.I_v))
-    e_d = e_c_v + e_time - e_v
     drop, e_drop = mantissa_exponent(where(p.drop > 0.0, p.drop, p.phi0))
-    e_drop = e_drop - e_n - e_phi
     R, e_R = mantissa_exponent(where(p.R_v > 0.0, p.R_v, p.tau))
-    e_R = e_R - e_n - e_tau
+    e_d, e_drop, e_R = e_c_v + e_time - e_v, e_drop - e_n - e_phi, e_R - e_n - e_tau
     damped, drops = p.c_v > 0.0, p.drop > 0.0
-    fine = (
-        (e_kappa <= 12.0) & (e_kappa >= -40.0) & ((magnitude(e_d) <= 40.0) | (p.c_v <= 0.0))
-        & ((magnitude(e_drop) <= 40.0) | (p.drop <= 0.0))
-    )  # fmt: skip
-    r = where(p.R_v > 0.0, scale(R / (n * tau), where(e_R < 40.0, e_R, 40.0)), 0.0)
+    fine = (e_kappa <= 12.0) & (e_kappa >= -40.0) & ((magnitude(e_d) <= 40.0) | (p.c_v <= 0.0))
+    fine = fine & ((magnitude(e_drop) <= 40.0) | (p.drop <= 0.0))
     scene = Scene(
-        scale(n * n * I_c / I_v, where(fine, e_kappa, 0.0)),
-        where(damped, scale(c * time / I_v, where(fine, e_d, 0.0)), 0.0),
-        r,
-        where(drops, scale(drop / (n * phi0), where(fine, e_drop, 0.0)), 0.0),
-        p.e,
+        kappa=scale(n * n * I_c / I_v, where(fine, e_kappa, 0.0)),
+        d=where(damped, scale(c * time / I_v, where(fine, e_d, 0.0)), 0.0),
+        r=where(p.R_v > 0.0, scale(R / (n * tau), where(e_R < 40.0, e_R, 40.0)), 0.0),
+        drop=where(drops, scale(drop / (n * phi0), where(fine, e_drop, 0.0)), 0.0),
+        e=p.e,
     )
     return scene, Units(time, e_time, phi0, e_phi, n * phi0, e_n + e_phi, fine)
 
@@ -90,6 +110,119 @@ def given(units, answer, verdict):
     verdict = verdict if units.fine else NO_METHOD
     cycle = Cycle(period, amplitude, speed, recoil, share, rubbed)
     return cycle, judged(sound, sound and speed > 0.0 and recoil >= 0.0, verdict)
+
+
+@jit_call
+def _safe_step(scene, gap, v, w, force):
+    """A time in which the gap does not close but at its end, and nearly does.
+
+    gap'' is at least -1/kappa where the foliot speeds up towards the tooth or rests, and else what it is now: friction
+    falls with the speed.
+    """
+    pull, closing = 1.0 / scene.kappa, w - v
+    if force > pull and not closing > 0.0:  # the wheel lags until the foliot slows down by 1/kappa, or rests
+        if scene.r * scene.kappa < 1.0 and scene.d > 0.0:
+            return log(force * scene.kappa) / scene.d
+        return linear_flow.first_reversal(0.5 * scene.d, 0.0, -v, -scene.r)
+    strength = pull - min(force, 0.0)
+    root = sqrt(closing * closing + 2.0 * strength * gap)
+    return 2.0 * gap / (root + closing) if closing > 0.0 else (root - closing) / strength
+
+
+@jit_call
+def _flight(scene, y, v, w, gap, watched):
+    """(4) until the gap closes or the tooth escapes: y, v, w, gap, time, the foliot's way, the wheel's, the least of
+    that on the way, and how it ends. After a landing the other pallet is `watched`: back at y = -1 it must find the
+    tooth that it let go ahead."""
+    beta, time, way, rim, least = 0.5 * scene.d, 0.0, 0.0, 0.0, 0.0
+    for _ in range(STEPS):
+        rub = -scene.r if v > 0.0 else scene.r if v < 0.0 else 0.0
+        force, speed = rub - scene.d * v, magnitude(v)
+        step = _safe_step(scene, gap, v, w, force)
+        stop = linear_flow.first_reversal(beta, 0.0, speed, -scene.r) if speed > 0.0 else math.inf
+        stops, escapes, falls = stop <= step, False, False
+        step = min(step, stop)
+        if watched and v > 0.0 and y < -1.0:
+            back = linear_flow.first_crossing(beta, 0.0, v, rub, -1.0 - y)
+            falls = back <= step and gap - 1.0 - y - (w + 0.5 * back / scene.kappa) * back > scene.drop
+            step, stops = (back, False) if falls else (step, stops)
+        if watched and v > 0.0 and not falls:
+            out = linear_flow.first_crossing(beta, 0.0, v, rub, 1.0 - y)
+            escapes = out <= step
+            step, stops = (out, False) if escapes else (step, stops)
+        s, c, _ = linear_flow.response(beta, 0.0, step)
+        moved, rolled = v * step + force * c, (w + 0.5 * step / scene.kappa) * step
+        if w < 0.0:
+            least = min(least, rim - 0.5 * w * w * scene.kappa if -w * scene.kappa < step else rim + rolled)
+        time, way, rim, y = time + step, way + magnitude(moved), rim + rolled, y + moved
+        gap = max(gap + (v - w) * step + force * c - 0.5 * step * step / scene.kappa, 0.0)
+        v, w = (0.0 if stops else v + force * s), w + step / scene.kappa
+        if escapes:
+            return 1.0, v, w, gap, time, way, rim, least, DONE
+        if falls:
+            return -1.0, v, w, gap, time, way, rim, least, FALLS_BACK
+        if not (gap > 0.0) or (step <= 1e-15 * time and not stops):
+            return y, v, w, 0.0, time, way, rim, least, LANDED
+    return y, v, w, gap, time, way, rim, least, TOO_MANY
+
+
+@jit_call
+def _contact(scene, y, v):
+    """(6) from y with speed v to the escape: speed there, time, and the way back before the push wins."""
+    both = 1.0 + scene.kappa
+    beta, against, push = 0.5 * scene.d / both, (1.0 + scene.r) / both, (1.0 - scene.r) / both
+    back, turn = 0.0, 0.0
+    if v < 0.0:
+        turn = linear_flow.first_reversal(beta, 0.0, -v, -against)
+        back, _ = linear_flow.motion(beta, 0.0, -v, -against, turn)
+        v = 0.0
+    time = linear_flow.first_crossing(beta, 0.0, v, push, 1.0 - y + back)
+    _, out = linear_flow.motion(beta, 0.0, v, push, time)
+    return out, turn + time, back
+
+
+@jit_call
+def half_period(scene, v, w, gap):
+    """From an escape with these speeds and this gap to the next one, seen from the pallet that is met.
+
+    Where a bounce throws the wheel so far back that the pallet left before comes back in front of its tooth, that tooth
+    is met again, and all is seen from that pallet until the tooth escapes once more: one `fallen` back, or several.
+    """
+    kappa, mesh = scene.kappa, 2.0 + scene.drop
+    y, v, gap = -1.0, -v, gap + scene.drop
+    time, way, rim, least, swing = 0.0, 0.0, 0.0, 0.0, 1.0
+    lost, first, scale, last = 0.0, 0.0, 0.0, 0.0
+    impacts, fallen, how = 0, 0, TOO_MANY
+    for _ in range(EVENTS):
+        y, v, w, gap, t, moved, rolled, low, end = _flight(scene, y, v, w, gap, impacts > 0)
+        if impacts > 0:
+            least, rim = min(least, rim + low), rim + rolled
+        time, way, swing = time + t, way + moved, max(swing, magnitude(y))
+        if -least > mesh:
+            how = OUT_OF_MESH
+            break
+        if end == LANDED:
+            impacts, last = impacts + 1, w - v
+            first = last if impacts == 1 else first
+            scale = last if scale == 0.0 else scale
+            together, dies = (v + kappa * w) / (1.0 + kappa), not (scene.e * last > DIES_OUT * scale)
+            e = 0.0 if dies else scene.e
+            lost = lost + 0.5 * kappa / (1.0 + kappa) * (1.0 - e) * (1.0 + e) * last * last
+            v, w = together + kappa * e * last / (1.0 + kappa), together - e * last / (1.0 + kappa)
+            if not dies or (together < 0.0 and kappa * (scene.r - scene.d * together) > 1.0):
+                continue
+            out, t, back = _contact(scene, y, together)
+            least, swing = min(least, rim - back), max(swing, back - y)
+            way, time, rim = way + 2.0 * back + 1.0 - y, time + t, rim + 1.0 - y
+            v, w, gap, end = out, out, 0.0, OUT_OF_MESH if -least > mesh else DONE
+        if end == FALLS_BACK:
+            fallen, y, v, gap, scale = fallen + 1, 1.0, -v, gap - scene.drop, 0.0
+        elif end == DONE and fallen > 0:
+            fallen, y, v, gap, scale = fallen - 1, -1.0, -v, gap + scene.drop, 0.0
+        else:
+            how = end
+            break
+    return Half(v, w, gap, time, swing, way, -least, lost, first, 1.0 * impacts, how)
 
 
 @jit
@@ -113,11 +246,10 @@ def of_both(one, other):
 def repeated(scene):
     """The half period that repeats, the clock started from rest; its relative error; the status.
 
-    Where it repeats only after the one between, the clock limps, and the answer is of both.
-
-    Where bounces die out before the escape the next half period depends on one speed alone, and secants lead to the
-    speed that repeats. A speed tried by a secant may unmesh where the clock itself does not come to it: then it is a
-    ceiling, and halfway to it is tried next.
+    Where it repeats only after the one between, the clock limps, and the answer is of both. Where bounces die out
+    before the escape the next half period depends on one speed alone, and secants lead to the speed that repeats. A
+    speed tried by a secant may unmesh where the clock itself does not come to it: then it is a ceiling, and halfway to
+    it is tried next.
     """
     v, w, gap, tried, floor, ceiling = 0.0, 0.0, 0.0, False, 0.0, math.inf
     old_v, old_image, slope, before = -1.0, 0.0, 0.0, math.inf
@@ -125,9 +257,9 @@ def repeated(scene):
     one, first_v, first_w, first_gap = half, -1.0, 0.0, 0.0
     limped, earlier, pace = math.inf, math.inf, 0.0
     for _ in range(HALF_PERIODS):
-        if half.end != _two_bodies.DONE:
+        if half.end != DONE:
             if not tried:
-                return half, math.nan, UNMESHES if half.end == _two_bodies.OUT_OF_MESH else STEP_LIMIT
+                return half, math.nan, UNMESHES if half.end == OUT_OF_MESH else STEP_LIMIT
             v, w, gap, tried, ceiling = floor, floor, 0.0, False, v
             half = half_period(scene, v, w, gap)
             continue
