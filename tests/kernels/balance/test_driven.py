@@ -4,8 +4,6 @@ import balance_oracles as oracles
 import numpy as np
 import pytest
 from columns import bounds, checked, relative_error, solve
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from mpmath import mpf
 
 from kernels.balance.driven import BALANCE_DRIVEN
@@ -155,16 +153,6 @@ def test_an_overdamped_balance_needs_a_lift(zeta):
     outputs, status = solve(BALANCE_DRIVEN, "newton", [zeta], [1.0], [0.1], [0.0], [3.0], [1.0], rtol=1e-11)
     assert status[0] == Status.OK
     compare(outputs, status, ([zeta], [1.0], [0.1], [0.0], [3.0], [1.0]), 1e-12)
-
-
-@settings(max_examples=40 if COMPILED else 5)
-@given(st.floats(0.001, 0.5), st.floats(-3, -1.5), st.floats(0.01, 1.0))
-def test_a_stronger_drive_swings_wider_and_is_less_stable(zeta, log_r, more):
-    w = np.array([1.0, 1.0 + more])
-    outputs, status = solve(BALANCE_DRIVEN, "newton", [zeta] * 2, [1.0], [10.0**log_r], w)
-    if (status < FIRST_REFUSAL).all():
-        assert outputs["amplitude"][1] > outputs["amplitude"][0] > 2 * 10.0**log_r
-        assert outputs["multiplier"][1] > outputs["multiplier"][0]
 
 
 def test_where_there_is_no_formula_none_is_taken():

@@ -4,8 +4,6 @@ import balance_oracles as oracles
 import numpy as np
 import pytest
 from columns import bounds, checked, relative_error, solve
-from hypothesis import given
-from hypothesis import strategies as st
 from mpmath import mpf
 
 from kernels.balance.release import BALANCE
@@ -157,18 +155,6 @@ def test_released_within_stiction_it_stays_where_it_is():
     assert not outputs["half_swings"].any()
     assert not outputs["stop_time"].any()
     np.testing.assert_allclose(outputs["margin"], [0.5, 0.5, 1.0, 0.0, 0.0], rtol=1e-15)
-
-
-@given(st.floats(0, 0.99), st.floats(-6, 0), st.floats(1.0, 3.0))
-def test_it_rests_within_stiction_and_more_friction_never_makes_more_swings(zeta, log_r, more):
-    r = 10.0**log_r * np.array([1.0, more])
-    outputs, status = solve(BALANCE, "closed", [zeta] * 2, [1.3], r, r, [1.0])
-    assert (abs(outputs["stop_angle"]) <= r).all()
-    if not (status == Status.GRAZING).any():
-        assert outputs["half_swings"][1] <= outputs["half_swings"][0]
-    assert outputs["period"][0] == outputs["period"][1]  # isochronous
-    halves = outputs["half_swings"] * outputs["period"] / 2
-    np.testing.assert_allclose(outputs["stop_time"], halves, rtol=1e-15)
 
 
 def trace(*columns, half_swing):

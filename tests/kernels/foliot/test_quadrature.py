@@ -4,8 +4,6 @@ import foliot_oracles
 import numpy as np
 import pytest
 from columns import bounds, relative_error, solve
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from mpmath import atan, atanh, exp, expm1, findroot, hyp2f1, log, log1p, mp, mpf, sqrt
 
 from kernels.foliot.cycle import FOLIOT
@@ -58,6 +56,8 @@ def test_viscous_and_dry_friction_and_restitution_together(inward):
 
 HARD = [
     {"c": 1.0, "n": 1.5},
+    {"c": 0.25, "n": 0.0, "R": 0.1, "a": 0.3},  # dry friction
+    {"c": 0.5, "n": 1.0, "a": 2.0},  # viscous friction
     {"c": 1e-12, "n": 4.0},
     {"c": 0.034, "n": 4.0},  # v1/V near 2/3, V the speed that is never exceeded
     {"c": 0.8, "n": 1e-3},  # almost dry friction of 0.8, V = 1e97
@@ -75,7 +75,7 @@ HARD = [
 ]
 
 
-@pytest.mark.parametrize("cell", HARD if COMPILED else HARD[12:14])
+@pytest.mark.parametrize("cell", HARD if COMPILED else HARD[14:16])
 def test_mixtures_and_degrees_that_are_hard(cell):
     check([foliot_oracles.cycle(1.0, 1.0, **cell, digits=8)], **cell)
 
@@ -111,25 +111,6 @@ def test_drag_of_any_degree_gives_the_hypergeometric_functions(degrees):
         limit = bound_of(name, c=c, n=n)
         assert (error <= limit).all(), (name, n[(error / limit).argmax()], z[(error / limit).argmax()])
         assert degrees[1] > 4.0 or error.max() < 4e-14
-
-
-@settings(max_examples=100 if COMPILED else 15)
-@given(st.floats(-8, 3), st.floats(-0.99, 1.0))
-def test_with_losses_of_degree_2_only_the_period_goes_as_torque_to_minus_one_half(log_c, e):
-    outputs, status = cycles(c=10.0**log_c, n=2.0, e=e)
-    assert status[0] == Status.OK
-    assert outputs["sensitivity"][0] == pytest.approx(0.5, rel=1e-13)
-
-
-@settings(max_examples=100 if COMPILED else 15)
-@given(st.floats(0, 0.99), st.floats(-3, 3), st.floats(-3, 3), st.floats(0.3, 4.0), st.floats(0.1, 1.0))
-def test_the_sensitivity_is_the_slope_of_the_period(R, log_a, log_c, n, e):
-    step = 1e-5
-    mu = np.exp(step * np.array([-1.0, 0.0, 1.0]))
-    outputs, status = cycles(mu=mu, a=10.0**log_a, R=R, c=10.0**log_c, n=n, e=e)
-    if (status == Status.OK).all():
-        slope, s = -np.log(outputs["period"][2] / outputs["period"][0]) / (2 * step), outputs["sensitivity"][1]
-        assert slope == pytest.approx(s, rel=1e-6, abs=1e-8 * max(1.0, abs(s)) ** 3)
 
 
 def dry(R):
@@ -169,14 +150,6 @@ def test_one_loss_alone_follows_its_closed_law(loss):
         there = np.array([abs(truth[position]) > TINY for truth in truths])
         error = relative_error(outputs[name][there], [t[position] for t in truths if abs(t[position]) > TINY])
         assert error.max() < (3e-15 if (loss, name) == ("c", "multiplier") else 1e-15), name
-
-
-def test_degree_0_is_dry_friction_and_degree_1_is_viscous():
-    R, a, more = np.array([0.1, 0.5, 0.0]), np.array([0.3, 0.0, 2.0]), np.array([0.25, 0.125, 0.5])
-    for n, same in ((0.0, {"a": a, "R": R + more}), (1.0, {"a": a + more, "R": R})):
-        drag, plain = cycles(a=a, R=R, c=more, n=n)[0], cycles(**same)[0]
-        for name in NAMES:
-            np.testing.assert_allclose(drag[name], plain[name], rtol=1e-14, err_msg=name)
 
 
 def test_what_cannot_be_solved_is_said_and_the_promise_ends_where_the_rule_does():

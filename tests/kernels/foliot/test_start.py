@@ -3,10 +3,9 @@
 import foliot_oracles
 import numpy as np
 import pytest
-from columns import checked, relative_error, solve
+from columns import relative_error, solve
 from mpmath import expm1, mp, mpf
 
-from kernels.foliot.cycle import FOLIOT
 from kernels.foliot.start import FLIP_LIMIT, FOLIOT_START
 from kernels.interface import Status
 from kernels.lanes.jit import COMPILED
@@ -140,31 +139,6 @@ def test_errors_of_a_thousand_flips_stay_within_what_is_promised(alpha):
     assert error[2] < 5e-16 or alpha > 1  # the sum of the durations loses nothing
     assert status[0] == Status.OK
     assert tight[0] == Status.INACCURATE
-
-
-def test_the_flips_come_to_the_limit_cycle_by_its_multiplier():
-    cell = {"mu": [1.3], "phi0": [0.9], "a": [0.4], "R": [0.1], "k": [0.2], "e": [0.8]}
-    cycle, _ = solve(FOLIOT, "segments", **cell)
-    speed, multiplier, half = cycle["crossing_speed"][0], cycle["multiplier"][0], 0.5 * cycle["period"][0]
-    times, speeds, _ = start(**cell, flips=40 if COMPILED else 12)
-    near = speeds[0] - speed
-    assert near[5] / near[4] == pytest.approx(multiplier, rel=1e-2)
-    if COMPILED:
-        assert speeds[0, -1] == pytest.approx(speed, rel=1e-14)
-        assert times[0, -1] - times[0, -2] == pytest.approx(half, rel=1e-13)
-
-
-def test_a_clock_that_loses_nothing_swings_ever_wider():
-    """Each half swing adds 2 mu phi0 to v^2/2: v^2 = 2 mu phi0 (2 j - 1) at flip j."""
-    times, speeds, status = start([2.0], [0.5], flips=6)
-    j = np.arange(1, 7)
-    v = np.sqrt(2 * 2.0 * 0.5 * (2 * j - 1))
-    assert np.allclose(speeds[0], v, rtol=1e-14)
-    assert np.allclose(times[0], np.cumsum(np.r_[v[0], v[1:] + v[:-1]]) / 2.0, rtol=1e-14)
-    assert status[0] == Status.OK
-    assert checked(FOLIOT_START, [2.0], [0.5])[0] == Status.OK  # no cycle is asked for
-    assert checked(FOLIOT_START, [0.0], [0.5])[0] == Status.BAD_INPUT
-    assert checked(FOLIOT_START, [2.0], [0.5], R=1.0, R_s=0.5)[0] == Status.BAD_INPUT
 
 
 @pytest.mark.parametrize("phi_start", [1.0, 1.5, 30.0])

@@ -123,30 +123,6 @@ def test_a_flat_lever_is_stable_just_for_a_wheel_heavier_than_the_pallets():
     assert (np.sign(outputs["multiplier"] - 1) == [1, 1, 0, -1, -1]).all()
 
 
-def test_a_lever_that_shrinks_as_the_pallet_is_pushed_makes_a_heavy_foliot_stable():
-    kappa, e = 0.5, 0.35
-    first = -4 * (1 + kappa) / (kappa * (1 - kappa))
-    last = -4 * (1 + e) ** 2 / ((1 - e) ** 2 * kappa + 2 * (1 + e * e))
-    nu = np.array([last * (1 - 1e-9), last * (1 + 1e-9), 0.5 * (last + max(first, -4.0))])
-    columns = joined(*(cell_of(kappa, e, 0.0, v) for v in nu))
-    assert assert_cycle(columns).tolist() == [Status.UNSTABLE, Status.OK, Status.OK]
-
-
-def test_the_loss_of_each_impact_is_the_work_of_the_torque_over_half_a_pitch():
-    columns = clocks(SOME, seed=5, kappa=(-1, 2), e=0.3, units=3.0)
-    columns[6][:] = 0.0
-    torque, I_c, I_v, r_c, r_v, teeth = columns[:6]
-    outputs, status = solve(IMPACT, "closed", *columns)
-    there = status != Status.NO_CYCLE
-    apart = outputs["pallet_speed"] * r_v - outputs["wheel_speed"] * r_c
-    M, m = I_c / r_c**2, I_v / r_v**2
-    loss = 0.5 * M * m / (M + m) * (apart / 0.3) ** 2 * (1 - 0.3**2)
-    np.testing.assert_allclose(loss[there], (torque * np.pi / teeth)[there], rtol=1e-13)
-    momentum = 2 * m * outputs["pallet_speed"] * r_v  # turned round by the force at the rim in half a period
-    np.testing.assert_allclose(momentum[there], (torque / r_c * outputs["period"] / 2)[there], rtol=1e-14)
-    assert there.sum() > len(there) / 4
-
-
 QUARTERS = [(0.03, 31), (0.1, 3), (1 / 3, 101), (0.0127, 15)]
 
 

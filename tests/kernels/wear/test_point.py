@@ -12,7 +12,6 @@ from paper_machine import PAPER
 from kernels.interface import Status
 from kernels.lanes.jit import COMPILED
 from kernels.wear.point import POLISHER_WEAR_POINT
-from kernels.wear.ring import POLISHER_WEAR
 
 POINT = PAPER | {"r0": 6.0, "theta0": 0.3, "tau": 20.0}
 NEAREST = 1e-9 if COMPILED else 1e-4
@@ -77,15 +76,6 @@ def test_wear_is_that_of_the_way_within_its_stated_error(name):
     assert value[0] > 0
     assert abs(value[0] - exact) <= error[0] + 2e-12 * exact
     assert error[0] <= NEAREST * exact
-
-
-@pytest.mark.skipif(not COMPILED, reason="thousands of turns")
-def test_over_many_turns_a_point_wears_as_its_ring():
-    ring, _ = solve(POLISHER_WEAR, "contour", along=[np.array([6.0])], **{k: [v] for k, v in PAPER.items()})
-    tau = 500 * 2 * math.pi
-    value, _, status = wear(Omega=0.4 * 1.0061803398, tau=tau, rtol=1e-6)
-    assert status[0] == Status.OK
-    assert value[0] / tau == pytest.approx(ring["wear"][0, 0], rel=5e-3)
 
 
 @pytest.mark.skipif(not COMPILED, reason="thousands of areas")
