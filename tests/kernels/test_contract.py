@@ -290,3 +290,26 @@ def test_the_example_runs_by_every_method_that_has_its_terms(name):
             found = golden.solved(kernel, method, columns, np.array([1e-9]))
             assert found["status"][0] == Status.OK, method.name
             assert all(np.isnan(found[output]).all() for output in method.lacks)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_everything_declared_is_named_once_and_told(name):
+    kernel = get(name)
+    assert kernel.name == name
+    assert kernel.source
+    assert all(m.doc for m in kernel.methods)
+    fields = [*kernel.parameters, *kernel.outputs, *kernel.along]
+    names = [f.name for f in fields]
+    assert len(set(names)) == len(names)
+    assert all(f.doc and f.unit for f in fields)
+    arrays = {dim for p in kernel.parameters for dim in p.dims}
+    assert all(len(p.dims) <= 1 for p in kernel.parameters)
+    assert set(kernel.same_length.values()) <= arrays
+    known = {c.name for c in kernel.along} | arrays | set(kernel.same_length)
+    assert all(set(f.dims) <= known for f in kernel.outputs)
+
+
+def test_status_numbers_fit_their_kind():
+    assert all((s.kind in ("refused", "unsolved")) == (64 <= s < 125) for s in Status)
+    assert all(s.doc for s in Status)
+    assert max(Status) == Status.PENDING == 127

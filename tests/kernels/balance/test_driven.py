@@ -126,7 +126,7 @@ def test_just_above_the_least_drive_every_cycle_is_right_to_14_digits(zeta):
     usual, verdict = solve(BALANCE_DRIVEN, "newton", *columns, rtol=1e-12)
     assert (status == Status.OK).mean() > 0.98
     assert (verdict == Status.OK).mean() > 0.98
-    for i in np.flatnonzero(status == Status.OK)[::5]:
+    for i in np.flatnonzero(status == Status.OK)[::10]:
         cell = [column[i] for column in columns]
         for name, true in zip(NAMES, oracles.driven(*cell, digits=60), strict=True):
             if name == "multiplier" and true < mpf(10) ** -20:

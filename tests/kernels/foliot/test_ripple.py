@@ -58,9 +58,9 @@ def test_under_dry_friction_alone_the_amplitude_knows_nothing_of_the_ripple():
         assert np.allclose(outputs["amplitude"], 4.0, rtol=rtol)
 
 
-@pytest.mark.skipif(not COMPILED, reason="the oracle alone takes ten seconds")
+@pytest.mark.skipif(not COMPILED, reason="the oracle alone takes two seconds")
 def test_sticking_agrees_with_energy_over_a_grid():
-    grid = [(R, depth, h) for R in (0.7, 0.95) for depth in (0.3, 0.8) for h in (1, 2, 3, 6)]
+    grid = [(R, depth, h) for R in (0.7, 0.95) for depth in (0.3, 0.8) for h in (2, 3)]
     cells = [{"R": R, "depth": depth, "harmonic": h} for R, depth, h in grid]
     exists = []
     for cell in cells:
@@ -75,11 +75,11 @@ def test_sticking_agrees_with_energy_over_a_grid():
     assert 0 < sum(exists) < len(exists)
 
 
-@pytest.mark.skipif(not COMPILED, reason="two thousand cycles of a hundred waves each")
+@pytest.mark.skipif(not COMPILED, reason="hundreds of cycles of a hundred waves each")
 @pytest.mark.parametrize("cell", MANY_WAVES)
 def test_errors_that_add_up_over_waves_or_hide_each_other_are_told(cell):
     truth = ripple_oracles.by_energy(**cell)
-    rtol, cells = np.geomspace(1e-5, 1e-2, 250), as_columns([cell] * 250)
+    rtol, cells = np.geomspace(1e-5, 1e-2, 64), as_columns([cell] * 64)
     for name, true in zip(NAMES, truth, strict=True):
         outputs, status, error = estimated(FOLIOT_RIPPLE, "taylor", rtol=rtol, asked=[name], **cells)
         off = relative_error(outputs[name], [true] * len(rtol))

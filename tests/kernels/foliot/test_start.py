@@ -10,7 +10,7 @@ from kernels.foliot.start import FLIP_LIMIT, FOLIOT_START
 from kernels.interface import Status
 from kernels.lanes.jit import COMPILED
 
-SOME = 300 if COMPILED else 12
+SOME = 150 if COMPILED else 12
 LOSSES = ("a", "R", "k", "e")
 INF, NAN = np.inf, np.nan
 

@@ -52,17 +52,16 @@ def test_dry_friction_a_hairspring_and_restitution_are_right_to_rtol(rtol):
     compare(FOLIOT, "segments", cells, rtol, 0.9)
 
 
-@pytest.mark.parametrize("depth", [0.0, 0.7])
-def test_drag_with_a_hairspring_and_a_torque_that_varies_is_right_to_rtol(depth):
-    """By steps to half of it; the oracle takes ten seconds."""
-    cell = {"mu": 2.0, "phi0": 0.7, "a": 0.3, "R": 0.2, "c": 0.8, "k": 1.0, "e": 0.9, "depth": depth, "harmonic": 3}
+def test_drag_with_a_hairspring_and_a_torque_that_varies_is_right_to_rtol():
+    """By steps to half of it; the oracle takes three seconds."""
+    cell = {"mu": 2.0, "phi0": 0.7, "a": 0.3, "R": 0.2, "c": 0.8, "k": 1.0, "e": 0.9, "depth": 0.7, "harmonic": 3}
     truth = ripple_oracles.by_taylor(**cell)
     for rtol in (1e-5, 1e-8, 1e-11):
         outputs, status, _ = estimated(FOLIOT_RIPPLE, "taylor", rtol=rtol, **cell | {"mu": [2.0], "n": 2.0})
         assert status[0] == Status.OK
         for name, true in zip(NAMES, truth, strict=True):
             assert relative_error(outputs[name], [true])[0] <= rtol
-    for rtol in (1e-3, 1e-6, 1e-9) if depth > 0.0 else ():
+    for rtol in (1e-3, 1e-6, 1e-9):
         outputs, status = solve(FOLIOT_RIPPLE, "dopri5", rtol=rtol, **cell | {"mu": [2.0], "n": 2.0})
         assert status[0] == Status.OK
         for name, true in zip(NAMES, truth, strict=True):
