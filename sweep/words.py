@@ -148,22 +148,19 @@ def speed(rate: float) -> str:
     return f"{rate:,.0f} cells/s" if rate >= 9.5 else f"{rate:.2g} cells/s"
 
 
+UNITS = ("d", 86400.0), ("h", 3600.0), ("min", 60.0), ("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)
+
+
 def duration(seconds: float) -> str:
-    """Seconds as people say them: `0.4 s`, `42 s`, `3 min 05 s`, `7 h 12 min`, `3 d 4 h`."""
-    if seconds < 9.95:
-        return f"{seconds:.1f} s"
-    whole = round(seconds)
-    if whole >= 86400:
-        return f"{whole // 86400} d {whole % 86400 // 3600} h"
-    if whole >= 3600:
-        return f"{whole // 3600} h {whole % 3600 // 60:02d} min"
-    return f"{whole // 60} min {whole % 60:02d} s" if whole >= 60 else f"{whole} s"
+    """A time in three digits: `5.1 ns`, `20 us`, `3.4 ms`, `42 s`, `3.08 min`, `7.2 h`."""
+    seconds = float(f"{seconds:.3g}")
+    unit, size = next((unit for unit in UNITS if seconds >= unit[1]), UNITS[-1])
+    return f"{seconds / size:.3g} {unit}"
 
 
 def one_digit(seconds: float) -> str:
     """A time rounded up to one digit, as one tells what is not known better: `0.3 s`, `40 s`, `4 min`, `2 h`."""
-    units = ("d", 86400.0), ("h", 3600.0), ("min", 60.0), ("s", 1.0)
-    unit, size = next((unit for unit in units if seconds >= unit[1]), units[-1])
+    unit, size = next((unit for unit in UNITS[:4] if seconds >= unit[1]), UNITS[3])
     count = max(seconds, SHORTEST) / size
     digit = 10.0 ** math.floor(math.log10(count))
     return f"{math.ceil(count / digit - 1e-9) * digit:g} {unit}"
@@ -172,9 +169,8 @@ def one_digit(seconds: float) -> str:
 def seconds_of(name: str, text: float | str) -> float:
     """Seconds, from a number or from words as `duration` says them: "90", "60s", "5 min", "1 h". Raises SweepError."""
     match = re.fullmatch(r"\s*([0-9.eE+-]+)\s*([a-z]*)\s*", str(text))
-    units = {"": 1.0, "s": 1.0, "min": 60.0, "h": 3600.0}
     try:
-        found = float(match[1]) * units[match[2]] if match else math.nan
+        found = float(match[1]) * dict(UNITS)[match[2] or "s"] if match else math.nan
     except (ValueError, KeyError):
         found = math.nan
     if not 0.0 < found < math.inf:

@@ -7,7 +7,6 @@ Also those that have no result yet: kernels and studies that come with foliot.
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 
 import sweep
@@ -48,20 +47,13 @@ def studies(arguments: argparse.Namespace) -> None:
     say("\n".join(map(str, copy_study(name, force=arguments.force))) if name else studies_text())
 
 
-@command(
-    "sweep show foliot.h5",
-    o.RESULT,
-    switch("--follow", "then print the run's log until it ends, on any machine that sees it"),
-)
+@command("sweep show foliot.h5", o.RESULT)
 def show(arguments: argparse.Namespace) -> None:
     """Contents of a result, how much is computed, and a count of statuses."""
-    from sweep.show.text import follow, result_text
+    from sweep.show.text import result_text
 
     with opened(arguments) as dataset:
         say(result_text(arguments.result, dataset))
-    for line in follow(arguments.result) if arguments.follow else ():
-        say(line)
-        sys.stdout.flush()
 
 
 @command("sweep verify foliot.h5", o.RESULT, o.JSON)

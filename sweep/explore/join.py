@@ -5,22 +5,23 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
-import xxhash
 
 from kernels.interface import Status
 from sweep.cells.fingerprint import fingerprint, is_of_program
 from sweep.cells.grid import Grid
 from sweep.cells.schema import ANCILLARY, STATUS, cell_schema
 from sweep.errors import SweepError
+from sweep.file.disk import check_target
 from sweep.file.open import in_memory, memory
 from sweep.results.diff import diff, two_results
 from sweep.runs.run import store_cells
 from sweep.study.model import SETTINGS, Axis, Block, Study, frozen, setting
-from sweep.words import listed
+from sweep.words import as_path, listed
 
 PAIR = ("first", "second")
 
@@ -51,13 +52,13 @@ def join(
     labels : two str
         Its values.
     force : bool
-        Overwrite another result.
+        Overwrite what is there.
 
     Raises
     ------
     SweepError
-        They are not two results, cannot be joined, are unfinished, or are larger than the memory; or `path` holds
-        another result, or a join of other cells or labels.
+        They are not two results, cannot be joined, are unfinished, or are larger than the memory; or `path` is there
+        already.
 
     Examples
     --------
@@ -83,22 +84,22 @@ def join(
     if axis is None and len(apart) == 1 and (apart[0] == "points" or apart[0].startswith("axes.")):
         study, whole = _longer(studies[0], studies[1], results, apart[0].removeprefix("axes."))
     else:
-        made = _difference(apart, studies) if axis is None else _named(axis, labels, apart, results[0])
+        made = _new_axis(apart, studies, axis, labels, results[0])
         study, whole = _with_axis(studies[0], results, made)
     study = replace(study, text="", title=studies[0].title)
 
     grid, arrays = Grid(study), dict[str, Any]()
-    versions = "\n".join(f"{k}: {d.attrs.get('versions', '')}" for k, d in zip(labels, results, strict=True))
-    digest = xxhash.xxh3_128(versions.encode())
     for name in (*study.outputs, *ANCILLARY):
         values = whole[name].transpose(*grid.dims, ...).values
         arrays[name] = np.ascontiguousarray(values.reshape(grid.size, *values.shape[len(grid.dims) :]))
-        digest.update(arrays[name])
-    # of other cells or labels it is another result; no run continues it, nor is it of the program that joins
-    mark = {**_said(study), "joined": f"of two results (digest {digest.hexdigest()})"}
+    # no run continues it, nor is it of the program that joins
+    mark = {**_said(study), "joined": "of two results"}
     if path is None:
         return in_memory(cell_schema(study, mark), arrays)
-    return store_cells(study, path, arrays, force, mark, {"taken_over": versions})
+    sources = [Path(d.encoding["source"]) for d in results if "source" in d.encoding]
+    check_target(as_path(path), force=force, read=sources)
+    versions = "\n".join(f"{k}: {d.attrs.get('versions', '')}" for k, d in zip(labels, results, strict=True))
+    return store_cells(study, path, arrays, True, mark, {"taken_over": versions})
 
 
 def _said(study: Study) -> dict[str, str]:
@@ -115,21 +116,21 @@ def _apart(first: Study, second: Study) -> list[str]:
     return apart
 
 
-def _named(axis: Any, labels: tuple[Any, ...], apart: Sequence[str], dataset: xr.Dataset) -> Axis:
-    """A new axis of two labels. Raises SweepError where two results cannot stand along it."""
-    if apart:
-        raise SweepError(f"along {axis} all else is to be the same; they differ in {listed(apart, word='and')}")
-    if not isinstance(axis, str) or not axis.isidentifier() or axis in (*dataset.variables, *SETTINGS, *dataset.dims):
-        raise SweepError(f'"{axis}" cannot be the name of a new axis; choose another')
-    if len(labels) != 2 or len(set(labels)) != 2 or not all(isinstance(label, str) and label for label in labels):
-        raise SweepError("a new axis needs two labels that differ")
-    return Axis(axis, frozen([0.0, 1.0]), "values", labels)
-
-
-def _difference(apart: Sequence[str], studies: Sequence[Study]) -> Axis:
-    """The one parameter or setting that two studies differ in, as an axis. Raises SweepError."""
+def _new_axis(
+    apart: Sequence[str], studies: Sequence[Study], axis: Any, labels: tuple[Any, ...], dataset: xr.Dataset
+) -> Axis:
+    """What two results stand along: two labels, or the one parameter or setting that they differ in. SweepError."""
+    if axis is not None:
+        if apart:
+            raise SweepError(f"along {axis} all else is to be the same; they differ in {listed(apart, word='and')}")
+        taken = (*dataset.variables, *SETTINGS, *dataset.dims)
+        if not isinstance(axis, str) or not axis.isidentifier() or axis in taken:
+            raise SweepError(f'"{axis}" cannot be the name of a new axis; choose another')
+        if len(labels) != 2 or len(set(labels)) != 2 or not all(isinstance(label, str) and label for label in labels):
+            raise SweepError("a new axis needs two labels that differ")
+        return Axis(axis, frozen([0.0, 1.0]), "values", labels)
     kernel, name = studies[0].kernel, apart[0].removeprefix("fixed.") if len(apart) == 1 else ""
-    if name not in SETTINGS and not (apart and apart[0] == f"fixed.{name}"):
+    if name not in SETTINGS and apart != [f"fixed.{name}"]:
         differ = f"they differ in {listed(apart, word='and')}" if apart else "they do not differ; name a new axis"
         raise SweepError(f"the results do not fit together: {differ}")
     field = setting(name, kernel) if name in SETTINGS else kernel.parameter(name)

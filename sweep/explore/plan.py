@@ -116,7 +116,7 @@ class Plan:
             "disk": f"{quantity(self.free_bytes)} free in {self.folder}",
             "memory": quantity(self.memory_bytes),
             "time": f"{duration(self.seconds)} on {self.workers} core{'s' * (self.workers > 1)}, "
-            f"{small_duration(self.cell_seconds)} a cell",
+            f"{duration(self.cell_seconds)} a cell",
             "compile": f"about {duration(self.compile_seconds)} {when}" if self.compile_seconds else "",
             "methods": shares(self.methods),
             "statuses": shares(self.statuses),
@@ -250,10 +250,3 @@ def _looked_at(study: Study, solver: SolveCells, seconds: float) -> tuple[dict[s
 
     methods = {-1: "none", **dict(enumerate(method.name for method in study.kernel.methods))}
     return shares(cells.used, methods), shares(cells.status, {int(s): s.name for s in Status}), sampled
-
-
-def small_duration(seconds: float) -> str:
-    """Seconds as people say them where there may be few: `5.1 ns`, `20 us`, `3.4 ms`, `2.0 s`."""
-    seconds = float(f"{seconds:.3g}")
-    unit, size = next(((u, s) for u, s in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6)) if seconds >= s), ("ns", 1e-9))
-    return f"{seconds / size:.3g} {unit}"

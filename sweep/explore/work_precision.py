@@ -25,12 +25,11 @@ from sweep.cells.sample import relative_error, sampled, solved, with_method
 from sweep.cells.schema import STATUS
 from sweep.cells.solve import GIVEN_UP, Solver, among, usable_methods
 from sweep.errors import SweepError
-from sweep.explore.plan import small_duration
 from sweep.runs.run import run
 from sweep.study.model import Study, frozen
 from sweep.study.read import Given
 from sweep.study.read import study as as_study
-from sweep.words import Table, did_you_mean, page, paragraph
+from sweep.words import Table, did_you_mean, duration, page, paragraph
 
 TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13)
 CELLS = 1024
@@ -187,29 +186,28 @@ def precision_text(found: xr.Dataset, complete: bool = False) -> str:
     """
     every = complete or found.rtol.size <= 3
     shown = found if every else found.isel(rtol=[found.rtol.size // 2])
-    work, more = ([name for name in WORK if name in found], ["inaccurate"]) if complete else ([], [])
-    rows = []
-    for cell in shown.to_dataframe().reset_index().itertuples():
+    shares = ("ok", "unsolved", "silent", *["inaccurate"] * complete)
+    work, rows = [name for name in WORK if complete and name in found], []
+    for cell in shown.to_dataframe().reset_index().to_dict("records"):
         # of the reference itself nothing can be said but that it is below its floor
-        floor = found.attrs["reference_error"] if cell.method == found.attrs["reference"] else -1.0
-        off = ("reference" if error <= floor else f"{error:.1e}" for error in (cell.error_median, cell.error_worst))
-        counts = (f"{getattr(cell, name):.4g}" for name in work)
-        shares = (f"{100 * getattr(cell, name):.3g} %" for name in ("ok", "unsolved", "silent", *more))
-        row = (cell.method, f"{cell.rtol:.0e}", *off, small_duration(cell.seconds), *counts, *shares)
-        rows.append((*row, cell.worst_cell) if complete else row)
-    headings = ("method", "rtol", "median", "worst", "time", *work, "ok", "unsolved", "silent", *more, "worst cell")
+        floor = found.attrs["reference_error"] if cell["method"] == found.attrs["reference"] else -1.0
+        errors = (cell["error_median"], cell["error_worst"])
+        row = [cell["method"], f"{cell['rtol']:.0e}", *("reference" if e <= floor else f"{e:.1e}" for e in errors)]
+        row += [duration(cell["seconds"]), *(f"{cell[name]:.4g}" for name in work)]
+        rows.append([*row, *(f"{100 * cell[name]:.3g} %" for name in shares), *[cell["worst_cell"]] * complete])
+    headings = ["method", "rtol", "median", "worst", "time", *work, *shares, *["worst cell"] * complete]
     basis = f"errors against {found.attrs['reference']}, in {found.attrs['cells']} cells"
     basis += f"; its own error is at most {found.attrs['reference_error']:.1e}"
     if found.attrs["open_cells"]:
         basis += f"; {found.attrs['open_cells']} cells left aside, of which it is not sure"
     left_out = f"Omissions: {found.attrs['omissions']}" if found.attrs["omissions"] else ""
-    columns = [name.replace("_", " ") for name in headings[: None if complete else -1]]
     rest = "" if complete else "Every tolerance, inaccurate cells, and where the worst cell is: --all."
-    return page(Table(rows, columns).text(wide=complete), paragraph(basis), paragraph(left_out), rest)
+    table = Table(rows, [name.replace("_", " ") for name in headings]).text(wide=complete)
+    return page(table, paragraph(basis), paragraph(left_out), rest)
 
 
 def _omissions(found: xr.Dataset, study: Study, able: Sequence[str] | None) -> list[str]:
-    """What fails where, in words; and first, if those that are `able` were charted, why others cannot do the study."""
+    """What fails most at which tolerance; and first, if those that are `able` were charted, why others cannot do it."""
     lines, faults = [], (("unsolved", "does not solve", "unsolved_as"), ("silent", "is silently wrong in", "silent_at"))
     for method in study.kernel.methods:
         if able is not None and method.name not in able:
@@ -218,13 +216,10 @@ def _omissions(found: xr.Dataset, study: Study, able: Sequence[str] | None) -> l
             lines.append(f"{method.name} {'cannot do' if terms else 'does not give'} {', '.join(terms or lacks)}")
     for name, (key, verb, where) in itertools.product(found["method"].values, faults):
         row = found.sel({"method": name})
-        if row[key].any():
-            parts = [f"{100 * share:.3g} %" for share in row[key].values]
-            at = [(part, f"{rtol:.0e}") for part, rtol in zip(parts, row.rtol.values, strict=True) if part != "0 %"]
-            if len(parts) > 1 == len(set(parts)):
-                at = [(parts[0], "every rtol")]
-            shares = ", ".join(f"{part} at {rtol}" for part, rtol in at)
-            lines.append(f"{name} {verb} {shares}, first {next(place for place in row[where].values if place)}")
+        worst = row.isel(rtol=row[key].values.argmax())
+        if worst[key] > 0:
+            share = f"{100 * worst[key].item():.3g} % at {worst.rtol.item():.0e}"
+            lines.append(f"{name} {verb} {share}, first {worst[where].item()}")
     return lines
 
 

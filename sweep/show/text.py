@@ -1,11 +1,9 @@
-"""What `sweep show` prints: what is in a result, and what became of its cells, as tables, which a page shows too; and
-the log of a run until it ends, in another terminal or on another machine."""
+"""What `sweep show` prints: what is in a result, and what became of its cells, as tables, which a page shows too."""
 
 from __future__ import annotations
 
 import math
-import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +12,6 @@ import numpy as np
 from kernels.interface import Status
 from sweep.cells.reduce import BY_METHOD, BY_STATUS
 from sweep.cells.schema import ANCILLARY, METHOD_USED, STATUS
-from sweep.errors import SweepError
 from sweep.results.statuses import (
     account,
     boxes,
@@ -37,12 +34,6 @@ LARGEST_SCAN = 1 << 28
 """Bytes of an output up to which its smallest and largest value are looked up."""
 MOST_FAILED = 20
 """Cells that FAILED which are reported one by one."""
-LOOK_SECONDS = 0.5
-SILENT_SECONDS = 600.0
-"""A log that says nothing for so long, though a line is due every minute, is that of a run that was killed."""
-LAST = 10
-"""Lines so far that are told."""
-ENDED = "ended with "
 _FAILED, _REASON = " FAILED (", "): "
 
 
@@ -213,29 +204,6 @@ def _failed(path: Path, dataset: xr.Dataset) -> Table:
         for number in numbers[:MOST_FAILED]
     ]
     return Table(rows, title="FAILED, and why")
-
-
-def follow(output: Path, sleep: Callable[[float], None] = time.sleep) -> Iterator[str]:
-    """The last lines of the log of a run, and those to come until it ends. Raises SweepError."""
-    path = log_path(output)
-    if path.is_fifo():
-        raise SweepError(f"{path} is a pipe, and no log of a run")
-    silent, told, size = 0.0, 0, -1
-    while silent < SILENT_SECONDS:
-        try:
-            now = path.stat().st_size
-        except OSError:
-            raise SweepError(f"{path}: there is no log to follow; sweep run writes one beside its output") from None
-        if now != size:
-            lines = list(read_lines(path.read_text("utf-8")))
-            for line in lines[max(told, len(lines) - LAST) if told == 0 else told :]:
-                yield f"{line['time']}  {line['text']}"
-            silent, told, size = 0.0, len(lines), now
-            if lines and lines[-1]["text"].startswith(ENDED):
-                return
-        sleep(LOOK_SECONDS)
-        silent += LOOK_SECONDS
-    raise SweepError(f"{path}: nothing new for {SILENT_SECONDS:.0f} s; its run was killed, or the machine is away")
 
 
 def reasons(output: Path) -> dict[int, str]:

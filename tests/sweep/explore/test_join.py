@@ -121,42 +121,16 @@ def test_results_beyond_the_memory_are_refused(monkeypatch):
         sweep.join(a, b)
 
 
-def killed_at(target):
-    """Renames, but is killed before a result gets its name."""
-
-    def rename(old, new):
-        if new == target:
-            raise KeyboardInterrupt
-        old.replace(new)
-
-    return rename
-
-
-def test_a_join_of_other_cells_or_labels_is_never_taken_for_the_one_that_is_there(tmp_path, monkeypatch):
-    """The studies of all three are the same: some source has changed. A join that was killed is continued."""
+def test_a_file_that_is_there_is_replaced_by_force_alone(tmp_path):
+    """The studies of all three are the same: some source has changed."""
     a, b, c = of(), of(), of()
     b.fall_time[0] += 1.0
     c.fall_time[0] += 2.0
-    path, begun = tmp_path / "j.h5", tmp_path / "k.h5"
-
-    def joined(other, labels=("old", "new"), path=path, **options):
-        with sweep.join(a, other, path, axis="version", labels=labels, **options) as found:
-            assert found.version.values.tolist() == list(labels)
-            assert np.array_equal(found.fall_time[1], other.fall_time)
-        return path.read_bytes()
-
-    for other, labels in ((c, ("old", "new")), (b, ("1", "2"))):
-        whole = joined(b, force=True)
-        assert joined(b) == whole
-        with pytest.raises(sweep.SweepError, match="--force"):
-            joined(other, labels)
-        assert path.read_bytes() == whole
-        joined(other, labels, force=True)
-        with monkeypatch.context() as patch:
-            patch.setattr("sweep.file.disk.rename", killed_at(begun))
-            with pytest.raises(KeyboardInterrupt):
-                joined(b, path=begun)
-        with pytest.raises(sweep.SweepError, match="--force"):
-            joined(other, labels, path=begun)
-        joined(b, path=begun)
-        begun.unlink()
+    path = tmp_path / "j.h5"
+    sweep.join(a, b, path, axis="version").close()
+    whole = path.read_bytes()
+    with pytest.raises(sweep.SweepError, match="--force"):
+        sweep.join(a, c, path, axis="version")
+    assert path.read_bytes() == whole
+    with sweep.join(a, c, path, axis="version", force=True) as found:
+        assert np.array_equal(found.fall_time[1], c.fall_time)

@@ -1,4 +1,4 @@
-"""What is printed of results and laws: tables, where a status occurs, what is picked, a log that is followed."""
+"""What is printed of results and laws: tables, where a status occurs, what is picked."""
 
 import csv
 
@@ -11,7 +11,7 @@ import sweep
 from kernels.interface import Status
 from sweep.errors import SweepError
 from sweep.show.laws import comparison, comparison_text, laws, laws_text, pick, write_laws
-from sweep.show.text import follow, result_text
+from sweep.show.text import result_text
 
 X = np.geomspace(1e-4, 1e4, 33)
 BENT = X**-1 + X**-0.25
@@ -97,41 +97,8 @@ def test_a_status_is_told_with_the_part_of_each_axis_where_it_occurs(design):
     assert "height 100 to 158.489, v0 1; e.g. height=100.0 v0=1.0" in text
 
 
-# logs
-
-
-def logged(k, text=None):
-    return f"2026-01-01 00:00:{k % 60:02}  {text or f'line {k}'}\n"
-
-
 @pytest.mark.parametrize("heights", [[2.0], [2.0, 2.0 + 1e-9]])
 def test_an_output_of_one_value_is_told_as_one_number(heights):
     text = result_text("x.h5", sweep.run(build(axes={"height": heights}), progress=False))
     assert "  0.63866  " in text.partition("outputs")[2]
     assert "0.63866 to" not in text
-
-
-@pytest.fixture
-def log(tmp_path):
-    return tmp_path / "x.h5.log"
-
-
-def test_a_log_is_told_line_by_line_until_its_run_ends_or_is_silent_for_ten_minutes(log):
-    with pytest.raises(SweepError, match="no log"):
-        list(follow(log.with_suffix("")))
-    later, pauses = ["", logged(12), "", logged(13, "ended with 3 cells")], []
-
-    def sleep(seconds):
-        pauses.append(seconds)
-        if later:
-            log.write_text(log.read_text() + later.pop(0))
-
-    log.write_text("".join(map(logged, range(12))))
-    said = list(follow(log.with_suffix(""), sleep))
-    assert said == [*(logged(k).strip() for k in range(2, 13)), logged(13, "ended with 3 cells").strip()]
-    assert len(pauses) == 4
-    log.write_text(logged(0))
-    pauses.clear()
-    with pytest.raises(SweepError, match="for 600 s"):
-        list(follow(log.with_suffix(""), sleep))
-    assert sum(pauses) == 600
