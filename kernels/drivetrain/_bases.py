@@ -18,12 +18,11 @@ Source: Guyan, AIAA J. 3:380 (1965); O'Callahan, Proc. 7th IMAC (1989) 17; Craig
 O'Callahan et al., 7th IMAC (1989).
 """
 
-from kernels.drivetrain._chain import CHAIN_ROUNDING, TURN, Model, extremes
-from kernels.drivetrain._frequencies import natural_frequencies
+from kernels.drivetrain._chain import CHAIN_ROUNDING, FREQUENCIES, RITZ, STATIC, TURN, Model, extremes
 from kernels.drivetrain._holzer import SHAPE, mode, mode_rows
-from kernels.drivetrain._modes import ritz
 from kernels.drivetrain._rivin import step
-from kernels.lanes.jit import jit, jit_apart, jit_shared
+from kernels.lanes.addresses import jit_by_address
+from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.vectors import sqrt
 from kernels.maths.small_dense import square
 
@@ -46,7 +45,7 @@ def _share(part, whole):
     return part / whole if whole < float("inf") else 0.0
 
 
-@jit_shared
+@jit_by_address
 def guyan(p, order, scene):
     """The basis (1): each master turned by 1 while the others stand; with free ends, row 0 is all turned by 1.
 
@@ -80,7 +79,7 @@ def guyan(p, order, scene):
     if not k[n - 1] > 0.0:
         for j in range(n):
             W[0, j], G[0, j] = sqrt(J[j]), 0.0
-    return Model(p, ritz(p, scene), slower, 0.0, 0.0)
+    return Model(p, RITZ(scene.parts, p, scene), slower, 0.0, 0.0)
 
 
 @jit_apart
@@ -107,21 +106,21 @@ def _add_span(W, G, J, k, angle, w_square, left, right):
                 W[j] += sqrt(J[j]) * (torque * held_right * turned if held_right > 0.0 else at_m)
 
 
-@jit_apart
+@jit_by_address
 def irs(p, order, scene):
     """Guyan's modes with (2) added to each, as a basis."""
-    static = guyan(p, order, scene)
+    static = STATIC(scene.parts, p, order, scene)
     J, k, masters, modes = scene.full.J, scene.full.k, scene.steps[0], scene.modes
     for i in range(p):
         for j in range(J.size):
-            modes.angle[j] = modes.W[i, j] / sqrt(J[j])
+            modes.spindle[j] = modes.W[i, j] / sqrt(J[j])
         for span in range(p):
             left, right = int(masters[span]), int(masters[span + 1]) if span + 1 < p else J.size
-            _add_span(modes.W[i], modes.G[i], J, k, modes.angle, modes.w[i] * modes.w[i], left, right)
-    return Model(p, static.error + ritz(p, scene), static.slower, 0.0, 0.0)
+            _add_span(modes.W[i], modes.G[i], J, k, modes.spindle, modes.w[i] * modes.w[i], left, right)
+    return Model(p, static.error + RITZ(scene.parts, p, scene), static.slower, 0.0, 0.0)
 
 
-@jit_apart
+@jit_by_address
 def craig_bampton(p, order, scene):
     """The spindle at rest, all turned by 1 where the last end is free, and p - 1 modes with the spindle held."""
     J, k, h, modes, room, status = scene.full.J, scene.full.k, scene.full.h, scene.modes, scene.room, 0.0
@@ -133,15 +132,15 @@ def craig_bampton(p, order, scene):
         modes.G[0, j] = 1.0 / (sqrt(k[j]) * whole) if held else 0.0
     if p > 1:
         own, J[0] = J[0], HOLD * extremes(n, J)[1]
-        status = natural_frequencies(n, J, k, scene.kept.f, room.work)
+        status = FREQUENCIES(scene.parts, n, J, k, scene.kept.f, room.work)
         for i in range(1, p):
             mode_rows(n, J, k, h, TURN * scene.kept.f[i], modes.W[i], modes.G[i], room.ways, room.e)
             modes.W[i, 0] = 0.0
         J[0] = own
-    return Model(p, ritz(p, scene), 0.0, 0.0, status)
+    return Model(p, RITZ(scene.parts, p, scene), 0.0, 0.0, status)
 
 
-@jit_apart
+@jit_by_address
 def modal(p, order, scene):
     """The lowest p modes, and what the others give way at rest (3)."""
     full, modes, room, residual = scene.full, scene.modes, scene.room, 0.0

@@ -14,8 +14,9 @@ from typing import NamedTuple
 import numpy as np
 
 from kernels.drivetrain._holzer import ROWS
+from kernels.lanes.addresses import part
 from kernels.lanes.codes import BAD_INPUT, OK, OUT_OF_RANGE
-from kernels.lanes.jit import jit, jit_apart, jit_shared
+from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.vectors import exponent, magnitude, nearest
 from kernels.maths.elementary import NORMAL_HIGH, NORMAL_LOW, in_unit
 
@@ -41,34 +42,35 @@ class Chain(NamedTuple):
 
 
 class Modes(NamedTuple):
-    """Rows W and G of modes (`_modes`), their w, damping C and shape at the spindle, and buffers of their size."""
+    """Rows W and G of modes (`_modes`), their w, damping C and shape at the spindle, and complex A and B of C's size.
+
+    Until modes are made, C and `spindle` are room for anything.
+    """
 
     W: np.ndarray
     G: np.ndarray
     w: np.ndarray
     C: np.ndarray
     spindle: np.ndarray
-    before: np.ndarray
-    angle: np.ndarray
     A: np.ndarray
     B: np.ndarray
 
 
 class Room(NamedTuple):
-    """Buffers of frequencies (`work`), of the walk from both ends, real and complex, and of poles."""
+    """Buffers of frequencies and of the errors of poles (`work`), of both ways, real and complex, and of poles."""
 
     work: np.ndarray
     ways: np.ndarray
     waves: np.ndarray
     e: np.ndarray
-    errors: np.ndarray
     pairs: np.ndarray
 
 
 class Scene(NamedTuple):
     """A chain, and what it is reduced to: a chain, or modes with their frequencies and poles in `kept`.
 
-    `steps` are types and places of the systems replaced, or the masters; `samples` frequencies and values there.
+    `steps` are types and places of the systems replaced, or the masters; `samples` frequencies and values there;
+    `parts` the addresses of what its reduction alone does, or of what all of them do.
     """
 
     full: Chain
@@ -77,6 +79,7 @@ class Scene(NamedTuple):
     steps: np.ndarray
     samples: np.ndarray
     modes: Modes
+    parts: np.ndarray
 
 
 class Model(NamedTuple):
@@ -91,26 +94,37 @@ class Model(NamedTuple):
     status: float
 
 
-@jit_shared
-def new_chain(n):
-    """Room for a chain of n inertias."""
-    return Chain(np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(2 * n, np.complex128))
-
-
-@jit_shared
-def new_room(n):
-    """Buffers of a chain of n inertias."""
-    ways, waves, pairs = np.empty((ROWS, n)), np.empty((ROWS, n), np.complex128), np.empty(2 * n, np.complex128)
-    return Room(np.empty(3 * n + 2), ways, waves, np.empty((2, n)), np.empty(2 * n), pairs)
-
-
-@jit_shared
-def new_scene(n):
+@jit
+def new_scene(n, parts):
     """Room for a chain of n inertias and what it is reduced to."""
-    squares, waves, rows = np.empty((4, n, n)), np.empty((2, n, n), np.complex128), np.empty((3, n))
-    modes = Modes(squares[0], squares[1], rows[0], squares[2], rows[1], squares[3], rows[2], waves[0], waves[1])
-    samples = np.empty((2, 2 * SAMPLES * n + GRID))
-    return Scene(new_chain(n), new_chain(n), new_room(n), np.empty((2, n)), samples, modes)
+    rows, squares = np.empty((10, n)), np.empty((3, n, n))
+    roots, waves = np.empty((3, 2 * n), np.complex128), np.empty((2, n, n), np.complex128)
+    full = Chain(rows[0], rows[1], rows[2], rows[3], roots[0])
+    kept = Chain(rows[4], rows[5], rows[6], rows[7], roots[1])
+    both = np.empty((ROWS, n), np.complex128)
+    room = Room(np.empty(3 * n + 2), np.empty((ROWS, n)), both, np.empty((2, n)), roots[2])
+    modes = Modes(squares[0], squares[1], rows[8], squares[2], rows[9], waves[0], waves[1])
+    return Scene(full, kept, room, np.empty((2, n)), np.empty((2, 2 * SAMPLES * n + GRID)), modes, parts)
+
+
+_LIKE = getattr(new_scene, "py_func", new_scene)(2, np.zeros(1, np.int64))
+_MODEL = Model(1, 0.0, 0.0, 0.0, 0.0)
+
+MAKE = part(0, _MODEL, 1, 0.0, _LIKE)
+"""make(p, order, scene) -> the `Model` of p masses, made in the scene."""
+POLES = part(1, (0.0, 1), 1, _LIKE)
+"""poles(p, scene) -> a bound on the relative error of the poles of chain and model, and how many the model has."""
+ERROR = part(2, (0.0, 0.0), 0.0, 1, _MODEL, _LIKE)
+"""receptance_error(f_max, number of the model's poles, model, scene) of the model, as in `_error`."""
+FREQUENCIES = part(3, 0.0, 1, *_LIKE.full[:2], _LIKE.full.f, _LIKE.room.work)
+"""natural_frequencies(n, J, k, f, work) -> status, as in `_frequencies`."""
+CHAIN_POLES = part(4, 0.0, _LIKE.full, 1, _LIKE.room)
+"""poles_of_chain(chain, n, room) -> a bound on their relative error, as in `_poles`."""
+STATIC = part(5, _MODEL, 1, 0.0, _LIKE)
+"""What another reduction begins with, as MAKE."""
+RITZ = part(6, 0.0, 1, _LIKE)
+"""ritz(p, scene) -> a bound on the relative error of the frequencies, as in `_modes`."""
+PARTS = 7
 
 
 @jit_apart

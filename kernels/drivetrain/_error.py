@@ -1,12 +1,11 @@
 """A reduced model against its chain: as few masses as are wanted, and the largest error of the spindle's receptance.
 
-make(p, order, scene) -> Model          makes a model of p masses in the scene
 receptance(w, model, scene)             of the spindle, by the model
 """
 
-from kernels.drivetrain._chain import GRID, TURN, Model, off_by
+from kernels.drivetrain._chain import GRID, MAKE, TURN, Model, off_by
 from kernels.drivetrain._rivin import receptance_of_chain
-from kernels.lanes.jit import jit_apart, jit_shared
+from kernels.lanes.jit import jit_apart
 from kernels.lanes.vectors import fma, magnitude, sqrt
 from kernels.maths.elementary import exp, log
 from kernels.maths.small_dense import sort, square
@@ -22,7 +21,7 @@ _ROUNDING = 4e-16
 
 
 @jit_apart
-def reduce_enough(make, n_keep, tol, f_max, order, scene):
+def reduce_enough(n_keep, tol, f_max, order, scene):
     """The model of n_keep masses.
 
     Where that is 0, its masses are those before the first number, from all of them downwards, with which a frequency of
@@ -32,7 +31,7 @@ def reduce_enough(make, n_keep, tol, f_max, order, scene):
     p = int(n_keep) if fixed else n
     model = Model(p, 0.0, 0.0, 0.0, 0.0)
     for _ in range(2 * n + 1):
-        model, worst = make(p, order, scene), 0.0
+        model, worst = MAKE(scene.parts, p, order, scene), 0.0
         if fixed:
             break
         for i in range(n):
@@ -87,7 +86,7 @@ def _largest(count, of_error, receptance, model, scene):
     return most
 
 
-@jit_shared
+@jit_apart
 def _sampled(f_max, own_poles, p, scene):
     """How many frequencies are looked at, into `scene.samples`, and the least damping; none where H is infinite.
 

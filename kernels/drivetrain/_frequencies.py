@@ -26,9 +26,10 @@ Source: Fernando & Parlett, Numer. Math. 67:191 (1994), sections 4 and 6; (3) an
 import math
 
 from kernels.drivetrain._chain import spread_is_normal
+from kernels.lanes.addresses import jit_by_address
 from kernels.lanes.codes import NOT_CONVERGED, OK, OUT_OF_RANGE
 from kernels.lanes.columns import GROUP, cells_at
-from kernels.lanes.jit import jit, jit_apart, jit_shared
+from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.vectors import any_lane, choose, fma, magnitude, nearest, not_, sqrt, where
 
 SWEEP_LIMIT = 200
@@ -206,7 +207,7 @@ def frequencies(n, at, lanes, J, k, frequency, rows):
     return failed
 
 
-@jit_shared
+@jit_by_address
 def natural_frequencies(n, J, k, frequency, work):
     """Status of the n `frequencies` of one chain: OK, OUT_OF_RANGE beyond SPREAD, NOT_CONVERGED."""
     if not (spread_is_normal(n, J) and spread_is_normal(n, k)):

@@ -9,9 +9,10 @@ With the shape at the spindle phi_i and the damping c_ij = sum_l h_l d_il d_jl o
 Source: Demmel & Veselic, SIAM J. Matrix Anal. Appl. 13:1204 (1992).
 """
 
-from kernels.drivetrain._chain import TURN, extremes
-from kernels.drivetrain._poles import modal_poles, poles_of_chain, undamped_poles
-from kernels.lanes.jit import jit, jit_apart, jit_shared
+from kernels.drivetrain._chain import CHAIN_POLES, TURN, extremes
+from kernels.drivetrain._poles import modal_poles, undamped_poles
+from kernels.lanes.addresses import jit_by_address
+from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.vectors import fma, magnitude, sqrt
 from kernels.maths.small_dense import eliminate, substitute_back
 
@@ -83,14 +84,14 @@ def _make_orthonormal(W, G, first, p, n):
     return most / least if reached and least > 0.0 else float("inf")
 
 
-@jit_shared
+@jit_by_address
 def ritz(p, scene):
     """Rows W and G of p shapes to those of modes, frequencies rising; a bound on the relative error of these.
 
     With a free end row 0 is a motion that strains nothing (and G[0] is 0); it is then mode 0, w = 0. Of the others each
     is off by the rounding of every row G_j, of size |G_j|, by its share in the mode.
     """
-    W, G, w, _, _, before, size, _, _ = scene.modes
+    W, G, w, before, size = scene.modes.W, scene.modes.G, scene.modes.w, scene.modes.C, scene.modes.spindle
     n = scene.full.J.size
     first = 0 if scene.full.k[n - 1] > 0.0 else 1
     condition = _make_orthonormal(W, G, first, p, n)
@@ -118,7 +119,7 @@ def ritz(p, scene):
     return _ROUNDING * condition * worst * sqrt(1.0 * n) if reached else float("inf")
 
 
-@jit_apart
+@jit_by_address
 def poles_of_modes(p, scene):
     """Those of the chain and of the model; a bound on their relative error, and how many the model has of its own.
 
@@ -137,7 +138,7 @@ def poles_of_modes(p, scene):
                     strains = modes.G[i, c] * modes.G[j, c] if by_spring else modes.W[i, c] * modes.W[j, c]
                     total = fma(h[c] / (k[c] if by_spring else J[c]), strains, total)
             modes.C[i, j] = modes.C[j, i] = total
-    error = poles_of_chain(full, n, scene.room)
+    error = CHAIN_POLES(scene.parts, full, n, scene.room)
     if not extremes(n, h)[1] > 0.0:
         undamped_poles(kept)
         return error, 2 * p

@@ -24,7 +24,8 @@ perturbation of the quadratic eigenvalue problem, derived here.
 from kernels.drivetrain import _holzer
 from kernels.drivetrain._chain import TURN, extremes
 from kernels.drivetrain._holzer import FLEXIBILITY, SHAPE, STRAIN
-from kernels.lanes.jit import jit_apart, jit_shared
+from kernels.lanes.addresses import jit_by_address
+from kernels.lanes.jit import jit_apart
 from kernels.lanes.vectors import exponent, magnitude, pow2, sqrt
 from kernels.maths.small_dense import eliminate, over, size, square, substitute_back
 
@@ -228,7 +229,7 @@ def undamped_poles(chain):
         chain.s[2 * i], chain.s[2 * i + 1] = complex(0.0, TURN * chain.f[i]), complex(0.0, -TURN * chain.f[i])
 
 
-@jit_shared
+@jit_by_address
 def poles_of_chain(chain, n, room):
     """All 2 n poles of a chain's first n masses by rising size, a pair as +Im, -Im; a bound on their relative errors.
 
@@ -246,8 +247,8 @@ def poles_of_chain(chain, n, room):
         _start(n, j, TURN * f[j], 0.5 * viscous / solid, s)
     for i in range(fixed):
         s[i] = 0.0j
-    settled = _approach(_newton_of_chain, (n, J, k, h), fixed, s, room.errors)
-    error = _refine(n, J, k, h, fixed, s, room.errors, room.waves, room.e)
+    settled = _approach(_newton_of_chain, (n, J, k, h), fixed, s, room.work)
+    error = _refine(n, J, k, h, fixed, s, room.work, room.waves, room.e)
     complete = _in_pairs(fixed, 0.0, s, room.pairs)
     return error if settled and complete and strongest < REACH else float("inf")
 
@@ -281,7 +282,7 @@ def modal_poles(p, modes, free, s, room):
     for i in range(fixed):
         s[i] = 0.0j
     model = p, modes.w, modes.C, modes.A, modes.B
-    settled, error = _approach(_newton_of_modes, model, fixed, s, room.errors), _MODAL_ROUNDING
+    settled, error = _approach(_newton_of_modes, model, fixed, s, room.work), _MODAL_ROUNDING
     for i in range(fixed, s.size):
         error = max(error, size(_newton_of_modes(s[i], model)) / size(s[i]))
     complete = _in_pairs(fixed, 2.0 * p * error, s, room.pairs)

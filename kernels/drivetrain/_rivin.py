@@ -30,10 +30,9 @@ Source: Baran & Marchelek, Mechanika Teoretyczna i Stosowana 9 (1971) 201, after
 Wittrick & Williams, Q. J. Mech. Appl. Math. 24:263 (1971); the pivots of b derived here.
 """
 
-from kernels.drivetrain._chain import CHAIN_ROUNDING, Model, off_by
-from kernels.drivetrain._frequencies import natural_frequencies
-from kernels.drivetrain._poles import poles_of_chain
-from kernels.lanes.jit import jit, jit_apart, jit_shared
+from kernels.drivetrain._chain import CHAIN_POLES, CHAIN_ROUNDING, FREQUENCIES, Model, off_by
+from kernels.lanes.addresses import jit_by_address
+from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.vectors import magnitude, sqrt
 from kernels.maths import pairs
 from kernels.maths.pairs import two_product
@@ -224,7 +223,7 @@ def _find(i, low, high, p, scene):
     return 0.5 * (low + high), low
 
 
-@jit_shared
+@jit_apart
 def _merge(p, order, scene):
     """The chain of p masses by Rivin's steps, which `scene.steps` keeps; the largest h e of merged springs."""
     full, kept, n, slower = scene.full, scene.kept, scene.full.J.size, 0.0
@@ -236,19 +235,19 @@ def _merge(p, order, scene):
     return slower
 
 
-@jit_apart
+@jit_by_address
 def rivin(p, order, scene):
     """The chain at rest alike, of p masses."""
     slower, kept = _merge(p, order, scene), scene.kept
-    status = natural_frequencies(p, kept.J, kept.k, kept.f, scene.room.work)
+    status = FREQUENCIES(scene.parts, p, kept.J, kept.k, kept.f, scene.room.work)
     return Model(p, CHAIN_ROUNDING, slower, 0.0, status)
 
 
-@jit_apart
+@jit_by_address
 def poles_of_both(p, scene):
     """Those of the chain and of the reduced one; a bound on their relative error, and how many the latter has."""
-    error = poles_of_chain(scene.full, scene.full.J.size, scene.room)
-    return max(error, poles_of_chain(scene.kept, p, scene.room)), 2 * p
+    error = CHAIN_POLES(scene.parts, scene.full, scene.full.J.size, scene.room)
+    return max(error, CHAIN_POLES(scene.parts, scene.kept, p, scene.room)), 2 * p
 
 
 @jit_apart
@@ -257,7 +256,7 @@ def receptance_of_kept(w, model, scene):
     return receptance_of_chain(w, scene.kept, model.p)
 
 
-@jit_apart
+@jit_by_address
 def exact(p, order, scene):
     """All frequencies, from p masses that depend on the frequency; how far they are from the full chain's is error.
 
@@ -278,10 +277,10 @@ def exact(p, order, scene):
     return Model(p, CHAIN_ROUNDING + apart, 0.0, 0.0, 0.0)
 
 
-@jit_apart
+@jit_by_address
 def poles_of_full(p, scene):
     """Those of the chain, which are the model's too; a bound on their relative error, and 0: it has none of its own."""
-    error = poles_of_chain(scene.full, scene.full.J.size, scene.room)
+    error = CHAIN_POLES(scene.parts, scene.full, scene.full.J.size, scene.room)
     for i in range(scene.full.s.size):
         scene.kept.s[i] = scene.full.s[i]
     return error, 0

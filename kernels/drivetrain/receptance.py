@@ -17,7 +17,7 @@ from collections import namedtuple
 
 import numpy as np
 
-from kernels.drivetrain._chain import TURN, new_chain, refusal, take_units
+from kernels.drivetrain._chain import TURN, Chain, refusal, take_units
 from kernels.drivetrain._frequencies import row_at
 from kernels.drivetrain._receptance import receptance
 from kernels.interface import Field
@@ -71,7 +71,8 @@ def _follow(i, columns, chain, rows):
 @jit
 def _buffers(columns):
     n = columns.J.shape[1]
-    return new_chain(n), np.empty(3 * n * GROUP)
+    rows, none = np.empty((4, n)), np.empty(0, np.complex128)
+    return Chain(rows[0], rows[1], rows[2], rows[3], none), np.empty(3 * n * GROUP)
 
 
 @jit

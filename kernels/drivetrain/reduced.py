@@ -25,13 +25,22 @@ import math
 from collections import namedtuple
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from kernels.drivetrain import _bases, _modes, _rivin
 from kernels.drivetrain._chain import (
+    CHAIN_POLES,
     CHAIN_ROUNDING,
+    ERROR,
+    FREQUENCIES,
+    MAKE,
     MASS_LIMIT,
+    PARTS,
+    POLES,
+    RITZ,
+    STATIC,
     TURN,
-    new_chain,
-    new_room,
+    Model,
     new_scene,
     off_by,
     refusal,
@@ -41,12 +50,13 @@ from kernels.drivetrain._error import receptance_error, reduce_enough
 from kernels.drivetrain._frequencies import natural_frequencies
 from kernels.drivetrain._poles import modal_damping, poles_of_chain
 from kernels.interface import Field
+from kernels.lanes.addresses import jit_by_address, table
 from kernels.lanes.codes import BAD_INPUT, DAMPERS_OUT_OF_RANGE, OK
 from kernels.lanes.columns import cell_by_cell
-from kernels.lanes.jit import jit, jit_apart, jit_shared
+from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.ranges import partly
 from kernels.lanes.records import largest, read
-from kernels.lanes.wiring import kernel, split, tracing
+from kernels.lanes.wiring import kernel, tracing
 from kernels.maths.elementary import in_unit, is_normal, scale
 
 
@@ -68,24 +78,8 @@ class Rows(NamedTuple):
     h_kept: Any
 
 
-@jit_shared
-def _begun(J, k, h, rows, full, room):
-    """Every row to NaN; the exponents of a cell's units, and the status of the full chain's frequencies."""
-    for row in rows:
-        row[:] = math.nan
-    e_J, e_k = take_units(J, k, h, full)
-    return e_J, e_k, natural_frequencies(full.J.size, full.J, full.k, full.f, room.work)
-
-
 @jit_apart
-def _begin(i, columns, full, room):
-    """Every output of a cell to NaN, and what `_begun` returns."""
-    columns.n_kept[i] = columns.frf_error[i] = columns.valid_to[i] = columns.error[i] = math.nan
-    return _begun(columns.J[i], columns.k[i], columns.h[i], read(Rows, columns, i), full, room)
-
-
-@jit_apart
-def _fill(rows, full, kept, e_J, e_k, count, p):
+def _rows(rows, full, kept, e_J, e_k, count, p):
     """Rows in SI units: `count` frequencies, and where p > 0 the reduced chain; whether float64 holds them."""
     fine, e = True, 0.5 * (e_k - e_J)
     for mode in range(count):
@@ -100,127 +94,110 @@ def _fill(rows, full, kept, e_J, e_k, count, p):
     return fine
 
 
-@jit_apart
-def _write(i, columns, fine, e, p, slower, frf_error, errors):
-    """Outputs without rows in SI units; `errors` as of `Outputs`, `fine` as of `_fill`.
-
-    Merged dampers hold up to w h e = SMALL_PHASE, `slower` being the largest h e.
-    """
-    limit = SMALL_PHASE / (TURN * slower) if slower > 0.0 else math.inf
-    columns.n_kept[i], columns.valid_to[i] = p, scale(limit, e) if slower > 0.0 else columns.f_max[i]
-    columns.frf_error[i], columns.error[i] = frf_error, largest(errors, columns.asked, Outputs, Outputs)
-    verdict = OK if limit >= in_unit(columns.f_max[i], e) else DAMPERS_OUT_OF_RANGE
-    columns.status[i] = partly(fine, verdict)
-
-
 @jit
 def _known(error):
     """A bound on an error; inf for NaN."""
     return error if error >= 0.0 else math.inf
 
 
-@jit_apart
-def _finish(poles, receptance, leaves_chain, has_all, f_max, e_J, e_k, model, rows, scene):
-    """Rows of a reduced model, whether float64 holds them, its `receptance_error`; bounds on errors.
-
-    `poles(p, scene)` and `receptance` are those of the model. Bounds of frequencies, of damping, and of that error:
-    lightly damped, it has fewer digits than the frequencies.
-    """
-    off, error, rounding = math.nan, _known(model.error), math.inf
-    blur, own_poles = poles(model.p, scene)
-    blur = max(error, _known(blur))
-    if blur < math.inf:
-        off, rounding = receptance_error(f_max, own_poles, receptance, model, scene)
-        rounding = max(blur, _known(rounding))
-    count, p = scene.full.J.size if has_all else model.p, model.p if leaves_chain else 0
-    return _fill(rows, scene.full, scene.kept, e_J, e_k, count, p), off, error, blur, rounding
+@jit_by_address
+def whole(p, order, scene):
+    """The chain as it is."""
+    full, kept = scene.full, scene.kept
+    for j in range(full.J.size):
+        kept.J[j], kept.k[j], kept.h[j], kept.f[j] = full.J[j], full.k[j], full.h[j], full.f[j]
+    return Model(p, CHAIN_ROUNDING, 0.0, 0.0, 0.0)
 
 
-@jit_apart
-def _finish_rivin(f_max, e_J, e_k, model, rows, scene):
-    """`_finish` of Rivin's model: a chain with as many frequencies as masses."""
-    poles, receptance = _rivin.poles_of_both, _rivin.receptance_of_kept
-    return _finish(poles, receptance, True, False, f_max, e_J, e_k, model, rows, scene)
+@jit_by_address
+def no_error(f_max, own_poles, model, scene):
+    """`receptance_error` of the chain itself."""
+    return 0.0, 0.0
 
 
-@jit_apart
-def _finish_exact(f_max, e_J, e_k, model, rows, scene):
-    """`_finish` of the exact model: a chain with all frequencies of the full one."""
-    poles, receptance = _rivin.poles_of_full, _rivin.receptance_of_exact
-    return _finish(poles, receptance, True, True, f_max, e_J, e_k, model, rows, scene)
+@jit_by_address
+def error_of_kept(f_max, own_poles, model, scene):
+    """`receptance_error` of Rivin's chain."""
+    return receptance_error(f_max, own_poles, _rivin.receptance_of_kept, model, scene)
 
 
-@jit_shared
-def _finish_modes(f_max, e_J, e_k, model, rows, scene):
-    """`_finish` of a model of modes, which is no chain."""
-    poles, receptance = _modes.poles_of_modes, _modes.receptance_of_modes
-    return _finish(poles, receptance, False, False, f_max, e_J, e_k, model, rows, scene)
+@jit_by_address
+def error_of_exact(f_max, own_poles, model, scene):
+    """`receptance_error` of the chain that depends on the frequency."""
+    return receptance_error(f_max, own_poles, _rivin.receptance_of_exact, model, scene)
+
+
+@jit_by_address
+def error_of_modes(f_max, own_poles, model, scene):
+    """`receptance_error` of a model of modes."""
+    return receptance_error(f_max, own_poles, _modes.receptance_of_modes, model, scene)
 
 
 @jit
 def _scene(columns):
     """The buffers of a cell."""
-    return (new_scene(columns.J.shape[1]),)
-
-
-def _reducing(name, make, finish, has_all=False):
-    """A solver of one reduction, made as `_error` says and finished as by `_finish`.
-
-    It has all frequencies of the full chain however few its masses, or not: where `tol` is to be met, one.
-    """
-
-    @jit_apart
-    def fill(i, columns, scene):
-        p = read(Drivetrain, columns, i)
-        e_J, e_k, status = _begin(i, columns, scene.full, scene.room)
-        if status > OK:
-            columns.status[i] = status
-            return
-        e, n_keep = 0.5 * (e_k - e_J), 1.0 if has_all and not p.n_keep > 0.0 else p.n_keep
-        f_max = in_unit(p.f_max, e)
-        model = reduce_enough(make, n_keep, p.tol, f_max, p.order, scene)
-        if model.status > OK:
-            columns.status[i] = model.status
-            return
-        fine, off, error, blur, rounding = finish(f_max, e_J, e_k, model, read(Rows, columns, i), scene)
-        errors = Outputs(error, error, blur, 0.0 if n_keep > 0.0 else error, rounding, *_OF_CHAIN)
-        _write(i, columns, fine, e, model.p, model.slower, off, errors)
-
-    return tracing(name, "", fill, buffers=_scene, loop=cell_by_cell, estimates=True)
+    return (new_scene(columns.J.shape[1], np.empty_like(columns.parts[0])),)
 
 
 @jit_apart
-def _whole(i, columns, full, room):
-    """A chain that stays as it is."""
-    e_J, e_k, status = _begin(i, columns, full, room)
+def _fill(i, columns, scene):
+    """The rows and numbers of a cell."""
+    p, rows, full, kept = read(Drivetrain, columns, i), read(Rows, columns, i), scene.full, scene.kept
+    columns.n_kept[i] = columns.frf_error[i] = columns.valid_to[i] = columns.error[i] = math.nan
+    for row in rows:
+        row[:] = math.nan
+    n, reduction = full.J.size, int(p.reduction)
+    for place in range(PARTS):
+        scene.parts[place] = columns.parts[reduction, place]
+    e_J, e_k = take_units(p.J, p.k, p.h, full)
+    status = FREQUENCIES(scene.parts, n, full.J, full.k, full.f, scene.room.work)
     if status > OK:
         columns.status[i] = status
         return
-    n, blur = full.J.size, max(CHAIN_ROUNDING, _known(poles_of_chain(full, full.J.size, room)))
-    errors = Outputs(CHAIN_ROUNDING, CHAIN_ROUNDING, blur, 0.0, blur, *_OF_CHAIN)
-    fine = _fill(read(Rows, columns, i), full, full, e_J, e_k, n, n)
-    _write(i, columns, fine, 0.5 * (e_k - e_J), n, 0.0, 0.0 if blur < math.inf else math.nan, errors)
 
+    # exact models have all frequencies however few their masses: where `tol` is to be met, one
+    e, has_all = 0.5 * (e_k - e_J), reduction in (NONE, EXACT)
+    n_keep = n if reduction == NONE else 1.0 if has_all and not p.n_keep > 0.0 else p.n_keep
+    f_max = in_unit(p.f_max, e)
+    model = reduce_enough(n_keep, p.tol, f_max, p.order, scene)
+    if model.status > OK:
+        columns.status[i] = model.status
+        return
 
-@jit_apart
-def _whole_room(columns):
-    n = columns.J.shape[1]
-    return new_chain(n), new_room(n)
+    # bounds of frequencies, of damping, and of the receptance's error: lightly damped, it has fewer digits than these
+    off, error, rounding = math.nan, _known(model.error), math.inf
+    blur, own_poles = POLES(scene.parts, model.p, scene)
+    blur = max(error, _known(blur))
+    if blur < math.inf:
+        off, rounding = ERROR(scene.parts, f_max, own_poles, model, scene)
+        rounding = max(blur, _known(rounding))
+    fine = _rows(rows, full, kept, e_J, e_k, n if has_all else model.p, model.p if has_all or reduction == RIVIN else 0)
+
+    # merged dampers hold up to w h e = SMALL_PHASE, `slower` being the largest h e
+    limit = SMALL_PHASE / (TURN * model.slower) if model.slower > 0.0 else math.inf
+    columns.n_kept[i], columns.valid_to[i] = model.p, scale(limit, e) if model.slower > 0.0 else p.f_max
+    errors = Outputs(error, error, blur, 0.0 if n_keep > 0.0 else error, rounding, *_OF_CHAIN)
+    columns.frf_error[i], columns.error[i] = off, largest(errors, columns.asked, Outputs, Outputs)
+    columns.status[i] = partly(fine, OK if limit >= f_max else DAMPERS_OUT_OF_RANGE)
 
 
 _OF_CHAIN = (CHAIN_ROUNDING, CHAIN_ROUNDING, CHAIN_ROUNDING, CHAIN_ROUNDING)
 """Bounds of what merging dampers and masses leaves."""
-SOLVERS = (
-    tracing("none", "", _whole, buffers=_whole_room, loop=cell_by_cell, estimates=True),
-    _reducing("rivin", _rivin.rivin, _finish_rivin),
-    _reducing("guyan", _bases.guyan, _finish_modes),
-    _reducing("irs", _bases.irs, _finish_modes),
-    _reducing("craig_bampton", _bases.craig_bampton, _finish_modes),
-    _reducing("modal", _bases.modal, _finish_modes),
-    _reducing("exact", _rivin.exact, _finish_exact, has_all=True),
-)
-"""Each is compiled when a cell asks for it first; its machine code is kept by its name."""
-REDUCTIONS = {solver.name: code for code, solver in enumerate(SOLVERS)}
+_COMMON = {FREQUENCIES: natural_frequencies, CHAIN_POLES: poles_of_chain}
+_EXACT = _COMMON | {POLES: _rivin.poles_of_full, ERROR: error_of_exact}
+_MODES = _COMMON | {POLES: _modes.poles_of_modes, ERROR: error_of_modes, RITZ: _modes.ritz}
+WAYS = {
+    "none": _EXACT | {MAKE: whole, ERROR: no_error},
+    "rivin": _COMMON | {MAKE: _rivin.rivin, POLES: _rivin.poles_of_both, ERROR: error_of_kept},
+    "guyan": _MODES | {MAKE: _bases.guyan},
+    "irs": _MODES | {MAKE: _bases.irs, STATIC: _bases.guyan},
+    "craig_bampton": _MODES | {MAKE: _bases.craig_bampton},
+    "modal": _MODES | {MAKE: _bases.modal},
+    "exact": _EXACT | {MAKE: _rivin.exact},
+}
+"""What each reduction consists of; compiled when a cell asks for it first."""
+REDUCTIONS = {name: code for code, name in enumerate(WAYS)}
+NONE, RIVIN, EXACT = REDUCTIONS["none"], REDUCTIONS["rivin"], REDUCTIONS["exact"]
 ORDERS = {"strict": 0, "paper": 1}
 EVERYTHING = 1e300
 """Band [Hz] that holds every frequency."""
@@ -289,9 +266,9 @@ DRIVETRAIN = kernel(
     check=check,
     loop=cell_by_cell,
     methods=(
-        split(
-            "direct", "frequencies by dqds, reduced models as they are defined", "reduction",
-            {float(code): solver for code, solver in enumerate(SOLVERS)},
+        tracing(
+            "direct", "frequencies by dqds, reduced models as they are defined", _fill,
+            buffers=_scene, loop=cell_by_cell, estimates=True, parts=table("reduction", dict(enumerate(WAYS.values()))),
         ),
     ),
     example={"J": (0.25, 0.012, 0.06, 0.98), "k": (7e4, 1.3e4, 2.7e4, 1.2e4), "h": (1.8, 0.4, 1.8, 60.0),

@@ -5,26 +5,18 @@ translates it, level above level, although only what Python calls is ever run. A
 Its code is handed on as it is written, and optimised in the function called by Python (an *entry*) that it ends up in:
 the same digits in less than half of the seconds. Called from Python after all, it is compiled by itself, as numba does.
 
-A *shared function* is the opposite: machine code of its own, kept on the disk, that all entries call. It is compiled
-once for all of them, where an inlined one is compiled once for each. What calls it knows it by name alone, so that name
-hangs on the function and its types only, and code from the disk is used where the name there is still the same.
-
-Both begin their stack on the border of a cache line. numba asks for 16 bytes, so that of the vectors that found no
+All begin their stack on the border of a cache line. numba asks for 16 bytes, so that of the vectors that found no
 register all but one in four straddle two lines: up to 1.4 times the time, more or less from one process to the next.
 
 This rests on the inside of numba's compiler, so other versions of numba than those tried get plain `njit`.
 """
 
 import contextlib
-import functools
 import gc
-import importlib
-import weakref
 
 import numba
 from llvmlite.binding import Linkage
 from numba import njit, types
-from numba.core import sigutils
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, Flags
 from numba.core.compiler_lock import global_compiler_lock
@@ -182,10 +174,8 @@ class _EntryLibrary(_AlignedLibrary):
     """Code of a function that Python calls, and of all inlined functions below it, each linked in once."""
 
     def finalize(self):
-        every = _all_below(self)
-        below = [called for called in every if called not in _SHARED]
+        below = _all_below(self)
         self._reload_init.update(*(called._reload_init for called in below))
-        self._reload_init.update(_SHARED[called] for called in every if called in _SHARED)
         if below:
             self._final_module.link_in(_linked([called._get_module_for_linking().clone() for called in below]))
             _set_linkage(self._final_module, Linkage.weak_odr, Linkage.linkonce_odr)
@@ -193,18 +183,13 @@ class _EntryLibrary(_AlignedLibrary):
         super().finalize()
 
 
-_SHARED = weakref.WeakKeyDictionary()
-"""Libraries of shared functions, and what loads each again."""
-
-
 def _all_below(library, found=None):
-    """What a library calls, and what that calls, down to shared functions."""
+    """What a library calls, and what that calls."""
     found = {} if found is None else found
     for called in library._linking_libraries:
         if called not in found:
             found[called] = True
-            if called not in _SHARED:
-                _all_below(called, found)
+            _all_below(called, found)
     return list(found)
 
 
@@ -271,44 +256,6 @@ class _EntryCompiler(Compiler):
         self.state.flags = _Flags(self.state.flags)
 
 
-class _Shared(_Part, _Entry):
-    """A function that is only ever called by compiled code, but has machine code of its own."""
-
-    def compile(self, sig):
-        entry_point = super().compile(sig)
-        made = self.overloads[tuple(sigutils.normalize_signature(sig)[0])]
-        function = self.py_func.__module__, self.py_func.__qualname__
-        _SHARED[made.library] = functools.partial(_load, *function, made.signature.args, made.fndesc.mangled_name)
-        return entry_point
-
-
-def _load(module, name, types_of, symbol):
-    """Brings a shared function into this process before the code that calls it by that symbol.
-
-    Raises
-    ------
-    LookupError
-        It has another symbol here: that code is to be compiled again.
-    """
-    shared = getattr(importlib.import_module(module), name)
-    shared.compile(types_of)
-    if shared.overloads[tuple(types_of)].fndesc.mangled_name != symbol:
-        raise LookupError(symbol)
-
-
-class _SharedCompiler(_EntryCompiler):
-    """As of an entry, without what Python would need to call it, and with a name that is the same in every process."""
-
-    def __init__(self, *arguments):
-        super().__init__(*arguments)
-        self.state.flags.no_cpython_wrapper = True
-        self.state.flags.no_cfunc_wrapper = True
-
-    def _compile_bytecode(self):
-        self.state.func_id.unique_name, self.state.func_id.unique_id = self.state.func_id.func_qualname, 0
-        return super()._compile_bytecode()
-
-
 def _is_tried():
     return not numba.config.DISABLE_JIT and numba.__version__.startswith(TRIED)
 
@@ -342,14 +289,3 @@ def part(function, **options):
     inner._insert = lambda *overload: None  # there is nothing that Python could call
     inner._compile_for_args = whole._compile_for_args
     return inner
-
-
-def shared(function, **options):
-    """As `part`, but with machine code of its own; of a function that its module has under its name."""
-    whole = aligned(function, **options)
-    if not _is_tried():
-        return whole
-    made = _made(_Shared, _SharedCompiler, function, options)
-    made._insert = lambda *overload: None
-    made._compile_for_args = whole._compile_for_args
-    return made

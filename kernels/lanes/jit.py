@@ -10,31 +10,31 @@ from typing import Any, TypeVar
 import numba
 from numba import njit
 
-from kernels.lanes.inlining import aligned, part, shared
+from kernels.lanes.inlining import aligned, part
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 COMPILED = not numba.config.DISABLE_JIT
 """False under NUMBA_DISABLE_JIT=1, where every function here is plain Python of one cell."""
 
-_OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "fastmath": False}
+OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "fastmath": False}
 
 
 def jit(function: F) -> F:
     """Physics: compiled where it is called, for one cell or for lanes, and always inlined."""
-    made: F = part(function, forceinline=True, **_OPTIONS)
+    made: F = part(function, forceinline=True, **OPTIONS)
     return made
 
 
 def jit_inline(function: F) -> F:
     """As `jit`, but pasted in before anything is compiled: for what is long and used once; saves compile seconds."""
-    made: F = njit(inline="always", **_OPTIONS)(function)
+    made: F = njit(inline="always", **OPTIONS)(function)
     return made
 
 
 def jit_call(function: F) -> F:
     """As `jit`, but left a call: for what is long and used in several places."""
-    made: F = part(function, **_OPTIONS)
+    made: F = part(function, **OPTIONS)
     return made
 
 
@@ -44,24 +44,13 @@ def jit_apart(function: F) -> F:
     For rooms that go cell by cell, whose code would be pasted in everywhere: wear compiles in a third of the seconds.
     In lanes a call may cost more than it saves.
     """
-    made: F = part(function, forceinline=False, **_OPTIONS)
+    made: F = part(function, forceinline=False, **OPTIONS)
     return made
-
-
-def jit_shared(function: F) -> F:
-    """As `jit_apart`, but compiled once for all entries that call it, and kept: for what is long and of many entries.
-
-    Functions among its arguments would make it one for each of them again.
-    """
-    from kernels.lanes.cache import enable
-
-    made: F = shared(function, forceinline=False, **_OPTIONS)
-    return enable(made) if COMPILED else made
 
 
 def jit_entry(function: Callable[..., Any]) -> Any:
     """As `jit_call`, called from Python."""
-    return aligned(function, **_OPTIONS)
+    return aligned(function, **OPTIONS)
 
 
 def cached(function: Callable[..., Any]) -> Any:

@@ -23,8 +23,6 @@ from functools import partial
 from types import FunctionType
 from typing import Any
 
-import numpy as np
-
 from kernels.interface import BoundCell, CheckCell, Field, FillCells, Kernel, Method, OnColumns, SolveCell
 from kernels.lanes import columns as loops
 from kernels.lanes.cache import is_ours
@@ -59,6 +57,7 @@ class method(Method):
     units : (take, put_back) of a method whose scene has no units. `scene, units = take(p)` is what `solve` and `bound`
         get in place of p, and `put_back(units, outputs, status)` makes outputs and status of what is solved.
     fills : whether it writes the rows of its cells itself
+    parts : of a record of the parameters' columns, the addresses that `fill` finds as `columns.parts` (`addresses`)
     """
 
     solve: SolveCell | FillCells  # type: ignore[assignment]
@@ -68,24 +67,11 @@ class method(Method):
     loop: Loop = loops.in_lanes
     units: tuple[Callable[..., Any], Callable[..., Any]] | None = None
     fills: bool = False
+    parts: Callable[[Any], Any] | None = None
 
 
 tracing = partial(method, fills=True, loop=loops.in_groups)
 """A method by `fill(i, columns, *buffers())`: `i` is the first cell of a group, or by `cell_by_cell` a cell."""
-
-
-@dataclass(frozen=True)
-class split:
-    """A method that is several: the value of one parameter says which of them solves a cell.
-
-    Each is compiled when a cell asks for it first. Values with the same solver are one entry: it is compiled once, and
-    their cells are solved together. Either all of them estimate or none does.
-    """
-
-    name: str
-    doc: str
-    parameter: str
-    solvers: dict[float, method]
 
 
 def kernel(
@@ -95,7 +81,7 @@ def kernel(
     source: str,
     parameters: Sequence[Field],
     outputs: Sequence[Field],
-    methods: Sequence[split | Method],
+    methods: Sequence[Method],
     check: CheckCell | None = None,
     along: Sequence[Field] = (),
     example: Mapping[str, float | Sequence[float]] | None = None,
@@ -124,8 +110,7 @@ def kernel(
     if (found := list(getattr(record, "_fields", ()))) != names:
         raise TypeError(f"{name}: the record has {found}, the parameters are {names}")
     wiring = _Wiring(name, record, names, [f.name for f in along], [f.name for f in outputs], loop)
-    first = methods[0] if methods else None
-    owner = check or (next(iter(first.solvers.values())) if isinstance(first, split) else first).solve  # type: ignore[union-attr]
+    owner = check or methods[0].solve
     return Kernel(
         name=name,
         doc=doc,
@@ -204,44 +189,24 @@ class _Wiring:
 
         return self._entry("check", owner, body, [*self.parameters, "status"], self.loop)
 
-    def solved_by(self, solver: split | Method) -> Method:
+    def solved_by(self, solver: Method) -> Method:
         """The method of columns."""
-        if isinstance(solver, split):
-            estimates = any(each.estimates for each in solver.solvers.values())
-            return Method(solver.name, solver.doc, self._split(solver, estimates), estimates=estimates)
         if not isinstance(solver, method):
             return solver
         strange = set(solver.lacks) - set(self.outputs) | set(solver.excludes) - set(self.parameters)
         if strange:
             raise TypeError(f"{self.name}.{solver.name} lacks or excludes what there is not: {sorted(strange)}")
         body = solver.solve if solver.fills else self._body(solver)
-        names, sooner = self._names(solver.estimates), solver.sooner
-        solve = self._entry(solver.name, solver.solve, body, names, solver.loop, solver.buffers)
+        asked, error = (["asked"], ["error"]) if solver.estimates else ([], [])
+        names = [*self.parameters, "rtol", *self.along, *asked, *self.outputs, *error, "status"]
+        sooner, parts, hidden = solver.sooner, solver.parts, ["parts"] if solver.parts else []
+        solve = self._entry(solver.name, solver.solve, body, names + hidden, solver.loop, solver.buffers)
+        if parts is not None:
+            entry, own = solve, len(self.parameters)
+            solve = signed(lambda *columns: entry(*columns, parts(self.record(*columns[:own]))), names)
         of_record = sooner and (lambda *columns: sooner(self.record(*columns[:-1]), columns[-1]))
         of_columns = {"solve": solve, "bound": self._bound(solver), "sooner": of_record}
         return Method(**{field.name: getattr(solver, field.name) for field in fields(Method)} | of_columns)
-
-    def _names(self, estimates: bool) -> list[str]:
-        """Of the columns that a method is called with."""
-        asked, error = (["asked"], ["error"]) if estimates else ([], [])
-        return [*self.parameters, "rtol", *self.along, *asked, *self.outputs, *error, "status"]
-
-    def _split(self, several: split, estimates: bool) -> OnColumns:
-        entries = {solver: self.solved_by(solver).solve for solver in dict.fromkeys(several.solvers.values())}
-        chosen, names = self.parameters.index(several.parameter), self._names(estimates)
-        shared, first_output = {*self.along, "asked"}, names.index(self.outputs[0])
-
-        def solve(*columns: Any) -> None:
-            for solver in dict.fromkeys(several.solvers[value] for value in np.unique(columns[chosen])):
-                rows = np.isin(columns[chosen], [value for value, by in several.solvers.items() if by == solver])
-                if rows.all():
-                    return entries[solver](*columns)
-                part = [c if name in shared else c[rows] for name, c in zip(names, columns, strict=True)]
-                entries[solver](*part)
-                for column, result in zip(columns[first_output:], part[first_output:], strict=True):
-                    column[rows] = result
-
-        return signed(solve, names)
 
     def _given(self, solver: method, gives: bool = True) -> Record:
         """A record of the outputs that the method gives, or of those that it does not."""

@@ -106,24 +106,28 @@ sys.path.append("tests/helpers")
 import numpy as np
 from columns import solve
 from numba.core import event
-from kernels.drivetrain.receptance import DRIVETRAIN_FRF
-cells = {name: [value] for name, value in DRIVETRAIN_FRF.example.items()}
+from kernels.drivetrain.reduced import DRIVETRAIN
+cells = {name: np.array([value, value]) for name, value in DRIVETRAIN.example.items()} | {"reduction": [0.0, 1.0]}
 with event.install_recorder("numba:compile") as recorder:
-    outputs, status = solve(DRIVETRAIN_FRF, "continued", along=[np.array([1.0, 40.0])], **cells)
-print(*(amplitude.hex() for amplitude in outputs["amplitude"][0]))
+    outputs, status = solve(DRIVETRAIN, "direct", **cells)
+print(*(frequency.hex() for frequency in outputs["frequency"][:, 0]))
 print(*(one.data["dispatcher"].py_func.__name__ for _, one in recorder.buffer if one.is_start))
 """
-"""A kernel that calls a function whose machine code several entries share, `new_chain`; what is compiled for it."""
+"""Two reductions, which call `natural_frequencies` by its address; what is compiled for them."""
 
 
-def test_a_shared_function_is_loaded_for_who_calls_it_and_alone_is_compiled_again_where_it_is_lost(tmp_path):
+def test_a_function_called_by_its_address_is_compiled_once_and_alone_where_it_is_lost(tmp_path):
     first = run(SHARED, tmp_path)
-    assert first.count("new_chain") == 1
-    kept = [*tmp_path.rglob("*new_chain*.nb?")]
+    assert first.count("natural_frequencies") == 1
+    assert "guyan" not in first
+    kept = [*tmp_path.rglob("*natural_frequencies*.nb?")]
     assert kept
     for file in kept:
         file.unlink()
-    assert [word for word in run(SHARED, tmp_path) if word != "impl"] == [*first[:2], "new_chain"]  # numba's own
+    again = run(SHARED, tmp_path)
+    assert again[:2] == first[:2]
+    assert "natural_frequencies" in again
+    assert "poles_of_chain" not in again
 
 
 def test_where_there_can_be_no_cache_it_works_without(tmp_path):
