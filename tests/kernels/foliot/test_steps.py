@@ -139,15 +139,6 @@ def test_free_flight_with_dry_friction_is_exact_for_methods_of_order_two(method)
     assert outputs["amplitude"][0] == pytest.approx(float(phi0 + top), rel=1e-13)
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_the_work_is_counted(method):
-    outputs, status = solve(KERNEL, method, [1.0], phi0=1.0, flips=1.0, step=0.1, location=0.0)
-    calls = {"euler": 1, "semi_implicit": 1, "verlet": 2, "rk4": 4, "dopri5": 6, "dop853": 12, "moreau": 2}
-    assert status[0] == Status.OK
-    assert outputs["time"][0] == pytest.approx(0.1 * outputs["steps"][0], rel=1e-12)
-    assert outputs["rate_calls"][0] == calls[method] * outputs["steps"][0]
-
-
 @pytest.mark.parametrize(
     ("cell", "method", "location", "statuses"),
     [
