@@ -80,29 +80,14 @@ Method("m", "", 1e-9)
 """
 
 
-@pytest.fixture(scope="module")
-def wrong_lines(tmp_path_factory):
-    """Lines of a file in which mypy finds something."""
-    folder = tmp_path_factory.mktemp("types")
-    path = folder / "kernel_of_mine.py"
+def test_a_kernel_that_keeps_the_protocol_passes_and_each_wrong_line_fails(tmp_path):
+    path = tmp_path / "kernel_of_mine.py"
     path.write_text(HEAD + RIGHT + WRONG, encoding="utf-8")
     command = [sys.executable, "-m", "mypy", "--config-file=", "--follow-imports=silent", "--ignore-missing-imports"]
-    done = subprocess.run(
-        [*command, f"--cache-dir={folder}", "kernel_of_mine.py"],
-        cwd=folder,
-        env={**os.environ, "MYPYPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-    )
+    environment = {**os.environ, "MYPYPATH": str(ROOT)}
+    command += [f"--cache-dir={tmp_path}", path.name]
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
     assert done.stderr == ""
     found = re.findall(r"^kernel_of_mine\.py:(\d+): error", done.stdout, re.MULTILINE)
-    return {path.read_text(encoding="utf-8").splitlines()[int(line) - 1] for line in found}
-
-
-def test_a_kernel_that_keeps_the_protocol_passes(wrong_lines):
-    assert wrong_lines.isdisjoint((HEAD + RIGHT).splitlines())
-
-
-@pytest.mark.parametrize("line", WRONG.split("\n")[1:-1])
-def test_a_wrong_kernel_fails(wrong_lines, line):
-    assert line in wrong_lines
+    lines = path.read_text(encoding="utf-8").splitlines()
+    assert [lines[number - 1] for number in sorted({int(n) for n in found})] == WRONG.split("\n")[1:-1], done.stdout
