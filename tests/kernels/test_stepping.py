@@ -1,13 +1,6 @@
 """Scenes of one's own at a fixed step: which methods can do which, and a scene of one state."""
 
-import math
-
-import numpy as np
-import pytest
-from columns import solve
-
-from kernels.interface import Field, Status
-from kernels.lanes.jit import COMPILED
+from kernels.interface import Field
 from kernels.scene import sign
 from kernels.stepping import METHODS, stepped_kernel
 
@@ -57,13 +50,3 @@ def test_methods_of_pairs_are_kept_from_scenes_that_are_none():
 
     assert names(kernel("swing", ["level", "speed"], swing, two)) == set(METHODS)
     assert names(kernel("bent", ["level", "speed"], bent, two)) == set(METHODS) - {"moreau"}
-
-
-@pytest.mark.skipif(COMPILED, reason="one more compilation; run with NUMBA_DISABLE_JIT=1")
-def test_a_scene_of_one_state():
-    outputs, status = solve(FILLING, "dop853", [2.0], flips=3.0, step=0.1)
-    assert status[0] == Status.OK
-    assert outputs["time"][0] == pytest.approx((math.log(2) + 2 * math.log(3)) / 2, rel=1e-11)
-    assert outputs["interval"][0] == pytest.approx(math.log(3) / 2, rel=1e-11)
-    assert outputs["level"][0] == pytest.approx(1.0, rel=1e-12)
-    assert np.isfinite(outputs["error"][0])

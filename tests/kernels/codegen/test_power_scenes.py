@@ -55,18 +55,6 @@ def test_the_power_0_is_dry_friction_and_the_power_2_is_quadratic_drag():
     assert relative_error(outputs["time"], [dry, drag]).max() < 1e-9
 
 
-@pytest.mark.skipif(not COMPILED, reason="thousands of steps")
-def test_over_decades_what_is_not_remarked_is_right():
-    random = np.random.default_rng(6)
-    cells = [10.0 ** random.uniform(-4, 4, 200) for _ in range(4)] + [random.uniform(-0.9, 6.0, 200)]
-    outputs, status = followed(*cells, flips=1.0, rtol=1e-6)
-    finer, again = followed(*cells, flips=1.0, rtol=1e-8)
-    fine = (status == Status.OK) & (again == Status.OK)
-    assert fine.mean() > 0.5
-    for name in ("time", "speed"):
-        np.testing.assert_allclose(outputs[name][fine], finer[name][fine], rtol=1e-6)
-
-
 @pytest.mark.parametrize("rtol", [1e-6, 1e-13] if COMPILED else [1e-10])
 @pytest.mark.parametrize("a", [0.0, 1.0])
 def test_what_a_power_below_1_brings_to_rest_sticks(rtol, a):

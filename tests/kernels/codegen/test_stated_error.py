@@ -8,44 +8,9 @@ from rich_scene import RICH
 
 from kernels.interface import Status
 from kernels.lanes.jit import COMPILED
-from kernels.scene import Field, scene_kernel, sin
+from kernels.scene import Field, scene_kernel
 
 many = pytest.mark.skipif(not COMPILED, reason="many cells")
-
-
-def scene(rates, states, parameters):
-    """Driven back and forth between -phi0 and phi0, from rest."""
-    return scene_kernel(
-        name=rates.__name__, doc="waits", states=[Field(name, "1", name) for name in states],
-        parameters=[Field(name, "1", name) for name in parameters], rates=rates, surface=surface,
-        start=lambda: (0.0,) * len(states),
-    )  # fmt: skip
-
-
-def surface(x, side, phi0):
-    return phi0 - side * x
-
-
-def pendulum(x, v, t, side, mu, a, k, depth, omega):
-    return v, side * mu - a * v - k * sin(x) + depth * sin(omega * t), 1.0
-
-
-PENDULUM = scene(pendulum, "xvt", ("mu", "phi0", "a", "k", "depth", "omega"))
-
-
-@many
-@pytest.mark.parametrize("rtol", [1e-4, 1e-6])
-def test_where_states_feed_back_what_is_ok_is_right(rtol):
-    """Against the same motion at a thousandth of the tolerance."""
-    n, random = 400, np.random.default_rng(6)
-    decades = (-0.5, 0.5), (-1, 0), (-2, -0.3), (-1, 0.3), (-2, 0.3), (-1, 1)
-    columns = [10.0 ** random.uniform(*each, n) for each in decades]
-    found, status = solve(PENDULUM, "taylor", *columns, flips=4.0, rtol=rtol)
-    finer, sure = solve(PENDULUM, "taylor", *columns, flips=4.0, rtol=1e-3 * rtol)
-    right = (status == Status.OK) & (sure == Status.OK)
-    assert right.mean() > 0.5
-    for name, size in (("time", 0.0), ("interval", 0.0), ("v", 1.0)):  # a speed relative to the largest on the way
-        np.testing.assert_allclose(found[name][right], finer[name][right], rtol=1.01 * rtol, atol=size * rtol)
 
 
 @many

@@ -11,7 +11,6 @@ from kernels.scene import exp, power, scene_kernel, sqrt
 from kernels.stepping import stepped_kernel
 
 END = 30
-METHODS = ("taylor", "dop853")
 
 
 def fields(*names):
@@ -74,9 +73,9 @@ def wrong(found, status, true, rtol):
 
 
 @pytest.mark.parametrize("rtol", [1e-6, 1e-10])
-@pytest.mark.parametrize("method", METHODS if COMPILED else METHODS[:1])
-def test_a_gaussian_pulse_is_seen_wherever_it_is_and_however_narrow(method, rtol):
-    outputs, status = solved(GAUSSIAN, method, rtol, cells(), t0=0.0)
+def test_a_gaussian_pulse_is_seen_wherever_it_is_and_however_narrow(rtol):
+    """By steps it is a nightly family of benchmarks/honesty."""
+    outputs, status = solved(GAUSSIAN, "taylor", rtol, cells(), t0=0.0)
     assert not wrong(outputs["x"], status, [area(of_gaussian, *cell) for cell in cells()], rtol).any()
     assert (status == Status.OK).mean() > 0.9
 
@@ -122,10 +121,9 @@ def test_at_a_fixed_step_a_pulse_between_the_points_is_not_quiet():
     assert status[-1] == Status.OK
 
 
-@pytest.mark.parametrize("method", ["taylor", "dop853"] if COMPILED else ["taylor"])
-def test_a_start_that_rounding_puts_on_the_switch_is_not_quiet(method):
+def test_a_start_that_rounding_puts_on_the_switch_is_not_quiet():
     t0 = np.array([0.0, 1e17, 1e18, 1e19] if COMPILED else [1e18])
-    outputs, status = solved(GAUSSIAN, method, 1e-12, [(1.0, 1.0, 20.0)] * len(t0), t0=t0)
+    outputs, status = solved(GAUSSIAN, "taylor", 1e-12, [(1.0, 1.0, 20.0)] * len(t0), t0=t0)
     assert (status[t0 > 1e10] != Status.OK).all()
     if COMPILED:
         assert status[0] == Status.OK

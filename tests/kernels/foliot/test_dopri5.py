@@ -106,12 +106,6 @@ def test_what_a_spring_keeps_from_the_switch_is_not_followed_to_its_rest():
     assert (solve(FOLIOT, "sdirk4", rtol=rtol, **as_columns(cells))[1] == Status.STICKS).all()
 
 
-def test_stiction_holds_a_turning_point_that_the_spring_does_not_free():
-    cells = {"R": 0.5, "R_s": [0.9, 1.5, 1.5, 1.5], "k": [0.0, 0.0, 10.0, 0.0], "e": [1.0, 1.0, 1.0, -0.5]}
-    _, status = solve(FOLIOT, "dopri5", **UNIT, **cells, rtol=1e-6)
-    assert status.tolist() == [Status.OK, Status.STICKS, Status.OK, Status.OK]  # the last does not turn
-
-
 @pytest.mark.skipif(not COMPILED, reason="the finest tolerances in plain Python")
 @pytest.mark.parametrize(
     ("cell", "rtol", "statuses"),

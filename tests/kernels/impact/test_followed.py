@@ -134,25 +134,6 @@ def test_what_is_called_ok_is_right_to_rtol_against_50_digits(kind):
             assert words not in kind or outputs["impacts"][-1] == count
 
 
-@pytest.mark.skipif(not COMPILED, reason="many clocks")
-def test_random_clocks_go_where_a_plain_simulation_goes():
-    scenes = random_clocks(30, seed=11, high=0.6)
-    outputs, status = events(*scenes)
-    compared = 0
-    for i, scene in enumerate(zip(*map(np.ndarray.tolist, scenes), strict=True)):
-        try:
-            start, half_swings = oracles.settled(*scene, 2000)
-        except ArithmeticError:
-            continue
-        clock = oracles.Clock(*scene)
-        for _ in range(2 * half_swings):
-            start = clock.half_swing(start)
-        if status[i] in (Status.OK, Status.PERIOD_2):
-            compared += 1
-            assert outputs["period"][i] == pytest.approx(clock.time / clock.way, rel=1e-6)
-    assert compared >= 15
-
-
 @pytest.mark.skipif(not COMPILED, reason="two thousand half swings")
 def test_a_clock_that_never_settles_is_named_and_its_means_are_those_of_a_simulation():
     scene = (0.6516, 0.0204, 0.2948)
