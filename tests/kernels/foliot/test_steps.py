@@ -8,8 +8,10 @@ from mpmath import mp, mpf
 
 from kernels.catalogue import get
 from kernels.integrate.events import LOCATIONS, METHODS, ORDER
-from kernels.interface import FIRST_REFUSAL, Status
+from kernels.interface import FIRST_REFUSAL, Field, Status
 from kernels.lanes.jit import COMPILED
+from kernels.scene import sign
+from kernels.stepping import stepped_kernel
 
 KERNEL = get("foliot_steps")
 CELL = {"mu": 1.0, "phi0": 1.0, "a": 0.5, "c": 0.3}
@@ -178,3 +180,18 @@ def test_a_switch_that_only_the_steps_error_reaches_is_no_quiet_number(method, l
     cells = {"mu": [1.0] * 21, "k": k, "step": step, "location": float(LOCATIONS[location])}
     outputs, status = solve(KERNEL, method, phi0=1.0, flips=1.0, **cells)
     assert ((status != Status.OK) | np.isinf(outputs["error"])).all()
+
+
+def test_methods_of_pairs_are_kept_from_scenes_that_are_none():
+    def methods(rates, *states):
+        kernel = stepped_kernel(
+            name="scene", doc="", states=[Field(state, "1", "") for state in states],
+            parameters=[Field("r", "1/s", "")],
+            rates=rates, surface=lambda level, side: 1.0 - side * level, start=lambda: (0.0,) * len(states),
+        )  # fmt: skip
+        return {m.name for m in kernel.methods}
+
+    assert methods(lambda level, side, r: r * (2.0 * side - level), "level") == {"euler", "rk4", "dopri5", "dop853"}
+    assert methods(lambda speed, side, r: (speed, side - r * sign(speed)), "level", "speed") == set(METHODS)
+    bent = methods(lambda level, speed, side, r: (speed, side - r * abs(level)), "level", "speed")
+    assert bent == set(METHODS) - {"moreau"}

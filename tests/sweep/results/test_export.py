@@ -92,7 +92,7 @@ sweep.export(sweep.run(kernel="foliot", axes={"mu": [1.0]}, fixed={"phi0": 1.0, 
 """
 
 
-@pytest.mark.parametrize("suffix", [".csv", ".nc", ".zarr"])
+@pytest.mark.parametrize("suffix", [".nc", ".zarr"])
 def test_what_an_export_left_that_was_killed_goes_with_the_next_one(tmp_path, suffix):
     target = tmp_path / f"out{suffix}"
     killed = subprocess.run([sys.executable, "-c", KILLED, target], env=environment())

@@ -7,12 +7,10 @@ import sys
 import numpy as np
 import pytest
 import toy
-from columns import columns_of
 from toy_studies import build, build_rich, message_of
 
 import sweep
-from kernels import catalogue
-from kernels.interface import FIRST_REFUSAL, Field
+from kernels.interface import Field
 from sweep.study.designs import GENERATORS
 from sweep.study.model import load_kernel
 
@@ -178,27 +176,6 @@ def test_a_kernel_declares_each_name_once_and_none_of_the_results_own(name):
         with pytest.raises(sweep.SweepError, match=said):
             load_kernel("toy:OWN", True)
     del toy.OWN
-
-
-@pytest.mark.parametrize("name", sorted(catalogue.KERNELS))
-def test_what_runs_as_an_axis_is_not_refused_under_fixed(name):
-    """As the free end of a drivetrain was: its last spring may be 0."""
-    kernel = catalogue.get(name)
-    columns = dict(zip([p.name for p in kernel.parameters], columns_of(kernel, (), dict(kernel.example)), strict=True))
-    columns = {p: v.reshape(1, -1) for p, v in columns.items()}
-    for field in (p for p in kernel.parameters if not p.choices):
-        low, high = field.lower, field.upper
-        ends = {low, high, 0.0, -1.0, 1.0, 2.5, -np.inf, np.nextafter(low, -np.inf), np.nextafter(high, np.inf)}
-        for value, place in ((v, j) for v in ends for j in range(columns[field.name].shape[-1])):
-            cell = {p: column.copy() for p, column in columns.items()}
-            cell[field.name][..., place] = value
-            given = [v if p.dims else v[0] for p, v in zip(kernel.parameters, cell.values(), strict=True)]
-            kernel.check(*given, status := np.zeros(1, np.int8))
-            if status[0] < FIRST_REFUSAL:
-                one = cell[field.name][0].tolist()
-                with pytest.raises(sweep.StudyError) as caught:  # no axis is given
-                    sweep.study(kernel=name, fixed={field.name: one if field.dims else one[0]})
-                assert f"fixed.{field.name}" not in {m.where for m in caught.value.mistakes}
 
 
 @pytest.mark.parametrize("values", [[1.0, math.nan], [math.inf], [-1.0], [0]])
