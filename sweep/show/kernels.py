@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -46,25 +46,27 @@ class KernelPage:
         return head + "".join(table.html() for table in self._tables())
 
     def _tables(self) -> list[Table]:
-        kernel, methods = self.kernel, []
+        kernel, methods, rows = self.kernel, list[Sequence[str]](), dict[str, list[Sequence[str]]]()
         for method in kernel.methods:
             cannot = f"; cannot do {listed(method.excludes)}" if method.excludes else ""
             lacks = f"; does not give {listed(method.lacks)}" if method.lacks else ""
             error = "stated per cell" if method.bound else "estimated per cell" if method.estimates else "within rtol"
             methods.append((method.name, error, method.doc + cannot + lacks))
-        parameters, outputs, along = (
-            [(f.name, f"[{f.unit}]", *more(f)) for f in fields]
-            for fields, more in (
-                (kernel.parameters, lambda f: (limits(f), _default(f), f.doc + _along(f, ", one for each "))),
-                (kernel.outputs, lambda f: (_along(f, "along "), f.doc)),
-                (kernel.along, lambda f: (limits(f), f.doc + _counted(f))),
-            )
-        )
+        for group in ("parameters", "outputs", "along"):
+            for field in getattr(kernel, group):
+                words, value = {float(number): choice for choice, number in field.choices.items()}, field.default
+                shown = value if isinstance(value, str | None) else words.get(value, f"{value:g}")
+                counted = f" values from {field.lower:g} on" if group == "along" else ""
+                default = "required" if value is None else f"default {shown}{counted}"
+                each = f", one for each {listed(field.dims, word='and')}" if field.dims else ""
+                row = (field.name, f"[{field.unit}]", limits(field), default, field.doc + each)
+                rows.setdefault(group, []).append(row)
         cheapest = 'methods, cheapest first; "auto" takes the first whose error bound meets rtol'
+        heading = ("unit", "allowed", "default", "meaning")
         return [
-            Table(parameters, ("parameter", "unit", "allowed", "default", "meaning"), "parameters"),
-            Table(outputs, ("output", "unit", "", "meaning"), "outputs"),
-            Table(along, ("coordinate", "unit", "allowed", "meaning"), "coordinates that all cells share"),
+            Table(rows.get("parameters", ()), ("parameter", *heading), "parameters"),
+            Table([(*row[:2], row[-1]) for row in rows.get("outputs", ())], ("output", "unit", "meaning"), "outputs"),
+            Table(rows.get("along", ()), ("coordinate", *heading), "coordinates that all cells share"),
             Table(methods, ("method", "error", "how"), cheapest),
         ]
 
@@ -185,18 +187,3 @@ def _spacing(field: Field, middle: Any = None) -> list[str]:
 
 def _first(kernel: Kernel) -> str:
     return kernel.doc.splitlines()[0]
-
-
-def _along(field: Field, words: str) -> str:
-    return f"{words}{listed(field.dims, word='and')}" if field.dims else ""
-
-
-def _counted(field: Field) -> str:
-    return "" if field.default is None else f"; default: {field.default:g} values from {field.lower:g} on"
-
-
-def _default(field: Field) -> str:
-    words, value = {float(number): choice for choice, number in field.choices.items()}, field.default
-    if value is None:
-        return "required"
-    return f"default {value if isinstance(value, str) else words.get(value, f'{value:g}')}"
