@@ -43,11 +43,17 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#0
 DASHES = ("-", (0, (5, 1.5)), (0, (1.2, 1.2)), (0, (6, 1.5, 1.2, 1.5)))
 """Line styles, so that a line is known in black and white too."""
 
+TICKS = {
+    "labelsize": 8,
+    "direction": "in",
+    "minor.visible": True,
+    "major.width": 0.6,
+    "minor.width": 0.4,
+}
 STYLE = {
     "font.family": "STIXGeneral",
     "mathtext.fontset": "stix",
     "font.size": 9,
-    "axes.labelsize": 9,
     "axes.titlesize": 9,
     "axes.linewidth": 0.6,
     "axes.formatter.use_mathtext": True,
@@ -56,18 +62,9 @@ STYLE = {
     "legend.handlelength": 2.4,
     "lines.linewidth": 1.2,
     "lines.markersize": 4,
-    "xtick.labelsize": 8,
-    "ytick.labelsize": 8,
-    "xtick.direction": "in",
-    "ytick.direction": "in",
+    **{f"{axis}tick.{key}": value for axis in "xy" for key, value in TICKS.items()},
     "xtick.top": True,
     "ytick.right": True,
-    "xtick.minor.visible": True,
-    "ytick.minor.visible": True,
-    "xtick.major.width": 0.6,
-    "ytick.major.width": 0.6,
-    "xtick.minor.width": 0.4,
-    "ytick.minor.width": 0.4,
     "figure.dpi": 150,
     "savefig.dpi": 300,
     "svg.hashsalt": "foliot",
