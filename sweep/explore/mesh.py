@@ -22,6 +22,7 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import LinearNDInterpolator
 from scipy.spatial import Delaunay, cKDTree
 from threadpoolctl import threadpool_limits
 
@@ -33,8 +34,6 @@ SHEAR = 0.013
 and it is alike in all boxes."""
 FLAT = 1e-9
 """Volume, in products of its edges, below which a simplex is none."""
-OUTSIDE = 1e-9
-"""How far out of a simplex a place may be by rounding."""
 SAFETY, MISFIT = 1.6, 2.5
 """Times the parabola's error, and times what the parabola leaves."""
 LEAST_BASIS, RIDGE, BATCH = 0.3, 1e-12, 2_000
@@ -103,18 +102,13 @@ class Mesh:
                 cut[here] = middle[np.arange(len(here)), :, size[here].argmax(axis=1)].argmax(axis=1)
         return size, rough, cut
 
-    def shares(self, at: Array) -> tuple[Indices, Array, Indices]:
-        """Corners of the simplex of each place, their shares in its value, NaN outside; and its number, else -1."""
+    def between(self, at: Array, heights: Array) -> tuple[Array, Indices]:
+        """Heights (n, ...) on straight lines at places, NaN outside; and the simplex of each, -1 outside."""
         places = at @ self.matrix
         with threadpool_limits(1, "blas"):  # on busy cores its threads wait some milliseconds for each other, each time
-            where = self._joined.find_simplex(places, tol=OUTSIDE).astype(np.intp)
-        inverse = self._joined.transform[where]
-        shares = np.einsum("nij,nj->ni", inverse[:, :-1], places - inverse[:, -1])
-        shares = np.column_stack([shares, 1 - shares.sum(axis=1)])
-        shares = np.where(abs(shares) < OUTSIDE, 0.0, shares)
-        shares[where < 0] = np.nan
-        number = np.where(where < 0, -1, self._numbers[where])
-        return self._joined.simplices[where].astype(np.intp), shares, number
+            where = self._joined.find_simplex(places)
+            found: Array = LinearNDInterpolator(self._joined, heights)(places)
+        return found, np.where(where < 0, -1, self._numbers[where])
 
 
 def _pairs(axes: int) -> Indices:

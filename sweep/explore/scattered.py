@@ -25,6 +25,8 @@ from sweep.words import require_dataset
 
 LOGARITHMIC = 1.999
 """Ratio of its ends from which on a positive axis is taken in logarithms; below, it makes no difference."""
+SAME = 1e-9
+"""Distance from a cell within which its own values are taken."""
 FEWEST_ON_A_LINE = 5
 MOST_AXES = 5
 REFINED_TO = "refined_to"
@@ -132,25 +134,24 @@ def interpolated(dataset: xr.Dataset, at: Mapping[str, Sequence[float] | Array])
     box, status, shape = Box.of(dataset, names), dataset[STATUS], whole[0].shape
     points = box.points(dataset)
     places = box.points({name: column.ravel() for name, column in zip(grids, whole, strict=True)})
-    nearest = dataset.isel({status.dims[0]: cKDTree(points).query(places)[1]})
+    places = np.where(abs(places - 0.5) < 0.5 + SAME, np.clip(places, 0.0, 1.0), places)  # out of it by rounding
+    distance, index = cKDTree(points).query(places)
+    nearest, there = dataset.isel({status.dims[0]: index}), distance < SAME
 
     # cells are joined as outputs that were refined want it; their error counts
     numbers = [n for n, v in dataset.data_vars.items() if v.dims == status.dims and v.dtype.kind == "f"]
     numbers = [str(name) for name in numbers if name != ERROR_BOUND]
     refined = {name: t for name, t in json.loads(dataset.attrs.get(REFINED_TO, "{}")).items() if name in numbers}
     mesh = mesh_of(points, [dataset[name].values for name in refined or numbers], status.values)
-    corners, shares, number = mesh.shares(places)
-    off = np.where(shares.max(axis=1) == 1, 0.0, np.where(number < 0, np.inf, mesh.errors()[0][number].T))
+    between, number = mesh.between(places, np.stack([heights(dataset[name].values) for name in numbers], axis=1))
+    off = np.where(there, 0.0, np.where(number < 0, np.inf, mesh.errors()[0][number].T))
     most = np.array([[tolerance] for tolerance in refined.values()] or sys.float_info.max)
     valued, inaccurate = nearest[STATUS].values < FIRST_REFUSAL, nearest[STATUS].values == Status.INACCURATE
     inaccurate |= ~(off <= most).all(axis=0)
     columns = dict[Any, Any]()
-    for name in numbers:
-        values = dataset[name].values
-        # a corner that takes no part need have no value
-        total: Array = np.where(shares == 0, 0.0, shares * heights(values)[corners]).sum(axis=1)
-        between = total * size_of(values) if size_of(values) else np.exp(total)
-        columns[name] = np.where(nearest[name].isnull(), np.nan, between)
+    for name, height in zip(numbers, between.T, strict=True):
+        size, own = size_of(dataset[name].values), nearest[name].values
+        columns[name] = np.where(there | np.isnan(own), own, height * size if size else np.exp(height))
     columns[STATUS] = np.where(inaccurate & valued, np.int8(Status.INACCURATE), nearest[STATUS])
     if ERROR_BOUND in dataset:
         columns[ERROR_BOUND] = np.where(valued, np.fmax(off.max(axis=0), nearest[ERROR_BOUND]), np.nan)
