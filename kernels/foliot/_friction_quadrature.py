@@ -64,8 +64,9 @@ _S, _REST, _LOG_S, _WEIGHT = _rule()
 Terminal = namedtuple("Terminal", "log_V D G")
 """ln V of f(V) = 1, and the shares D and G of 1 - rho there; without drag V is infinite and D = 0."""
 
-Speeds = namedtuple("Speeds", "v1 log_v1 z far near F1 slope a b kept power")
-"""v1, ln v1, z, far, near; F1 = 1 - f(v1), and that over `near`, which tends to V f'(V); a, b; 1 - far^n, far^n."""
+Speeds = namedtuple("Speeds", "v1 log_v1 z far near F1 slope a b kept power terms")
+"""v1, ln v1, z, far, near; F1 = 1 - f(v1), and that over `near`, which tends to V f'(V); a, b; 1 - far^n, far^n; and
+1 - e^2, m0, m1, m2."""
 
 
 @jit
@@ -97,6 +98,16 @@ def _terminal(scene):
 
 
 @jit
+def _leg(scene, a, b):
+    """1 - e^2, and the coefficients m0, m1, m2 of M for friction rho + a s + b s^n."""
+    n, e = scene.n, scene.e
+    outward = e > 0.0
+    less = -expm1(n * log(magnitude(e)))  # 1 - E^n
+    m1, m2 = a * (1.0 + e), b * where(outward, 2.0 - less, less)
+    return (1.0 - e) * (1.0 + e), where(outward, 2.0 * scene.rho, 0.0), m1, m2
+
+
+@jit
 def _speeds(scene, terminal, y):
     """The speeds at y."""
     n, (log_V, D, G) = scene.n, terminal
@@ -110,17 +121,8 @@ def _speeds(scene, terminal, y):
     slope = fma(G, where(near > 1e-290, kept / near, n), D)
     v1 = exp(y) * ratio
     F1, log_v1 = fma(G, kept, D * near), y + log_ratio
-    return Speeds(v1, log_v1, z, far, near, F1, slope, scene.d * v1, G * power, kept, power)
-
-
-@jit
-def _leg(scene, a, b):
-    """1 - e^2, and the coefficients m0, m1, m2 of M for friction rho + a s + b s^n."""
-    n, e = scene.n, scene.e
-    outward = e > 0.0
-    less = -expm1(n * log(magnitude(e)))  # 1 - E^n
-    m1, m2 = a * (1.0 + e), b * where(outward, 2.0 - less, less)
-    return (1.0 - e) * (1.0 + e), where(outward, 2.0 * scene.rho, 0.0), m1, m2
+    a, b = scene.d * v1, G * power
+    return Speeds(v1, log_v1, z, far, near, F1, slope, a, b, kept, power, _leg(scene, a, b))
 
 
 @jit
@@ -173,8 +175,7 @@ def _way(y, scene):
     """Whether the right side of (2) is below its left at y; Newton's step by logarithms; which one is the last."""
     scene, terminal = scene
     n, e, (_, D, G) = scene.n, scene.e, terminal
-    _, log_v1, z, far, near, F1, v_slope, a, b, _, _ = _speeds(scene, terminal, y)
-    lost, m0, m1, m2 = _leg(scene, a, b)
+    _, log_v1, z, far, near, F1, v_slope, a, b, _, _, (lost, m0, m1, m2) = _speeds(scene, terminal, y)
     total, rule = 0.0 * y, 0.0 * y
     for j in range(_NODES):
         q = -expm1(n * _LOG_S[j])
@@ -205,8 +206,8 @@ def _strong(scene, speeds):
         1 - g = int s ((1 - e^2) - (f/F)^2 + (E f_B/B)^2) ds/W,  f = rho + a s + b s^n, f_B that at E s,
         1/F^2 - E^2/B^2 = ((1 - E) F + M)(E F + B)/(F B)^2,  for each term with its own power of E.
     """
-    rho, n, e, F1, a, b = scene.rho, scene.n, scene.e, speeds.F1, speeds.a, speeds.b
-    lost, m0, m1, m2 = _leg(scene, a, b)
+    rho, n, e = scene.rho, scene.n, scene.e
+    _, _, _, _, _, F1, _, a, b, _, _, (lost, m0, m1, m2) = speeds
     E = magnitude(e)
     log_E = log(E)
     root, root_n = sqrt(E), exp(0.5 * n * log_E)  # sqrt(E), E^(n/2)
@@ -251,7 +252,7 @@ def _weak(scene, terminal, speeds):
     integrals, where their integrands are infinitely steep at weak drive and their ratio is not.
     """
     rho, n, e, (_, D, G) = scene.rho, scene.n, scene.e, terminal
-    _, _, z, far, near, F1, _, _, b, kept, power = speeds
+    _, _, z, far, near, F1, _, _, b, kept, power, _ = speeds
     lost, m0, m1, m2 = _leg(scene, D * far, b)
     _, _, m1_D, m2_G = _leg(scene, far, power)
     K = fma(n, G, D)
@@ -292,8 +293,7 @@ def quadrature(scene, rtol):
     terminal = _terminal(scene)
     y, unsettled = _solve(scene, terminal)
     speeds = _speeds(scene, terminal, y)
-    v1, F1 = speeds.v1, speeds.F1
-    _, m0, m1, m2 = _leg(scene, speeds.a, speeds.b)
+    v1, F1, (_, m0, m1, m2) = speeds.v1, speeds.F1, speeds.terms
     e, near = scene.e, speeds.z > _NEAR
     time, rise, s = 0.0 * y, 0.0 * y, 0.0 * y
     if any_lane(not_(near)):

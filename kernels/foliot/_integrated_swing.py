@@ -84,9 +84,9 @@ def cycle_by(e, half, new, change, slope):
 
 
 @jit
-def held(problem, top):
-    """Whether stiction holds the turning point."""
-    return (problem.e >= 0.0) & not_(1.0 + pull(top, problem) > problem.rho_s)
+def held(problem, force):
+    """Whether stiction holds the turning point, where `pull` is that force."""
+    return (problem.e >= 0.0) & not_(1.0 + force > problem.rho_s)
 
 
 @jit_inline
@@ -153,7 +153,7 @@ def limit_cycle(step, stiffest, rippled, rtol):
         at_floor = (wanted < _FINEST) & (tolerance < _FINEST) & free & (relative <= larger(rtol, _V_ROUNDING + zero))
         blur = larger(steep, cancels) * _V_ROUNDING
         right = settled & (wanted >= _FINEST) & (blur <= 0.3 * rtol * (1.0 - slope))
-        sticks = stuck | held(problem, half.top)
+        sticks = stuck | held(problem, pull(half.top, problem))
         status = where(half.lost, STEP_LIMIT, where(sticks, STICKS, where(right, OK, INACCURATE)))
         done = active & (settled | stuck | at_floor | half.lost)
         verdict, active = where(done, status, verdict), active & not_(done)

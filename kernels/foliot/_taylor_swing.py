@@ -39,29 +39,23 @@ from kernels.lanes.wiring import kernel, method, signed
 from kernels.maths.elementary import exp
 from kernels.scene import Scene
 
-LIMIT = 40
-"""Half swings of a cell."""
-STUCK = 6
-"""Of them, those that come to rest on their way in, one after the other."""
-_STIFFEST = 100.0
-"""Larger f'(V)/V makes steps that are stable too short."""
-_MILDEST = 1.0
-"""Degree of drag below which its slope has a pole at rest, which series come close to slowly."""
+LIMIT, STUCK = 40, 6
+"""Half swings of a cell, and of them those that come to rest on their way in, one after the other."""
+_STIFFEST, _MILDEST = 100.0, 1.0
+"""f'(V)/V above which steps that are stable are too short; degree of drag below which its slope has a pole at rest,
+which series come close to slowly."""
 SEARCH, NEAR, ROUGH, FINE, LAST = 0, 1, 2, 3, 4
 """What a cell's next half swing is for."""
 _COARSE, _CLOSE, _CHECKED = 1e-4, 0.05, 0.01
 """Tolerance of the search, the relative step below which it ends, and the one below which a rough swing has a twin."""
 _NOISE, _NOISE_BARE = 100.0, 3000.0
 """Tolerances within which the sign of F - v may be wrong; where no tangents make steps shorter."""
-_CALM = 1e-6
-"""Tolerance at which a half swing is right enough for Newton's method to converge, whatever is wanted."""
-_SHARE, _SHARE_ROUGH, _TIGHTER = 0.1, 0.01, 0.01
+_CALM, _LEAST = 1e-6, 1e-17
+"""Tolerance at which a half swing is right enough for Newton's method to converge, whatever is wanted; and below which
+a finer one changes nothing but the time that it takes."""
+_SHARE, _SHARE_ROUGH, _TIGHTER, AGAIN = 0.1, 0.01, 0.01, 3
 """Of rtol that a half swing may be off by; where the drag is of a degree below 2 or the torque varies, on which time
-and sensitivity hang steeply; how much less where it did not do."""
-AGAIN = 3
-"""How often that is tried."""
-_LEAST = 1e-17
-"""Of tolerances: finer ones change nothing but the time that they take."""
+and sensitivity hang steeply; how much less where it did not do, and how often that is tried."""
 _TOLD, _TOLD_ROUGH, _TOLD_STEEP = 4.0, 32.0, 128.0
 """Error that is stated over what rough and fine half swings differ by, of which the fine one's should be a fifteenth;
 where the torque varies, or the drag is of a degree below 2: cores of abs(v)^n have a low order; and of the sensitivity
@@ -69,7 +63,6 @@ where the torque varies, on which it depends steeply. Besides, an output is off 
 still change, at the rate at which it changed from the speed before."""
 _ROUNDING = 2e-14
 """Of a half swing's speed and time; a cycle's are off by 1/(1 - multiplier) as much."""
-
 
 Swung = namedtuple("Swung", "time x v x_mu v_mu x_start v_start decay top up_mu up_start")
 """What a half swing comes to: its time, and states at the switch."""
@@ -170,7 +163,7 @@ def step(p, rtol):
     slope, change = newton(e, p.v1, half)
     cycle, cancels = cycle_by(e, half, p.v1 + change, change, slope)
     (period, amplitude, speed, s, multiplier), status = _units.given(
-        units, cycle, where(held(problem, half.top), STICKS, OK)
+        units, cycle, where(held(problem, force), STICKS, OK)
     )
     begun = (*friction, problem.kappa, first, problem.stiffness * problem.pace)
     return (*begun, half.end, change, slope, cancels, period, amplitude, speed, s, multiplier), status
@@ -239,17 +232,10 @@ def begun(cells, rtol):
 def cycles(cells, rtol, rippled, asked):
     """Limit cycles of many cells by Newton's method on v1, each cell at its own stage.
 
-    Parameters
-    ----------
-    cells : columns of a `Foliot`, depth and harmonic
-    rtol : column
-    rippled : whether torque varies; without drag then the search follows no tangents, which make steps shorter
-    asked : which of the outputs must be right; without the sensitivity no tangents are followed where none are needed
-
-    Returns
-    -------
-    outputs, errors : (outputs, cells), errors relative
-    status : NOT_CONVERGED where half swings come to rest or the bracket closes on nothing
+    `cells` are columns of a `Foliot`, depth and harmonic; `rippled` says that torque varies, where without drag the
+    search follows no tangents, which make steps shorter, and `asked` which of the outputs must be right: without the
+    sensitivity no tangents are followed where none are needed. The result is outputs, relative errors, one row for each
+    output, and statuses: NOT_CONVERGED where half swings come to rest or the bracket closes on nothing.
     """
     n = len(rtol)
     terms, v, possible = begun(cells, rtol)
@@ -293,9 +279,7 @@ def cycles(cells, rtol, rippled, asked):
         # the error by how far fine ones are from rough ones, and by the speed; done where that will do or nothing helps
         moved = np.abs(v[i] / before[i] - 1.0)
         apart = np.abs(found / outputs[:, i] - 1.0)
-        rate = np.divide(
-            relative, moved, out=np.zeros_like(moved), where=moved > 0.0
-        )  # 0 of a speed that has not moved
+        rate = np.where(moved > 0.0, relative / moved, 0.0)
         by_tolerance[:, i] = np.where(stage[i] == LAST, by_tolerance[:, i] + apart, told[:, i] * apart)
         # without tangents the errors of steps add up over the waves
         waves = np.where(linear[i] & (not asked[_SENSITIVITY]), terms["wave"][i] / np.pi * (1.0 + swung[_TOP]), 0.0)

@@ -240,9 +240,5 @@ def event_map_bound(scene):
     That it settles to rtol, its status says.
     """
     k, _ = scene
-    strong = k < SPLIT
-    b = 0.0 * k + 1.0
-    if any_lane(strong):
-        b = where(strong, cbrt(3.0 * where(strong, k, 1.0)), b)
-    cycle = 8e-15 + 2e-15 / b
+    cycle = 8e-15 + 2e-15 / where(k < SPLIT, cbrt(3.0 * where(k < SPLIT, k, 1.0)), 1.0)
     return errors(cycle, cycle, cycle + where(k < 400.0, 4e-15 * k, 0.0))

@@ -23,13 +23,10 @@ e = 0 this is `impact`, without inertia of the wheel `foliot`. Leaves out: frict
 pallets. Derived here.
 
 Without dimensions the foliot is at y phi0, counted along the push of the pallet that meets a tooth, that tooth at
-(y - gap) phi0. With the time unit sqrt(I_v phi0/(n tau)), kappa = n^2 I_c/I_v, d = c_v sqrt(phi0/(I_v n tau)) and
-r = R_v/(n tau)
-    flight    y'' = -d y' - r sign(y'),  wheel'' = 1/kappa                                               (4)
-    impact    y' - wheel' times -e, with y' + kappa wheel' kept                                          (5)
-    contact   (1 + kappa) y'' = 1 - d y' - r sign(y')                                                    (6)
-The tooth escapes as y rises through 1; the other pallet then stands `drop` ahead of its tooth. Contact pushes both
-bodies, so it ends where the wheel alone would slow down less than the foliot: kappa (d abs(y') + r) > 1, y' < 0.
+(y - gap) phi0; with the time unit sqrt(I_v phi0/(n tau)), kappa = n^2 I_c/I_v, d = c_v sqrt(phi0/(I_v n tau)) and
+r = R_v/(n tau), (1) is (1 + kappa) y'' = 1 - d y' - r sign(y'), and in (2) wheel'' = 1/kappa. The tooth escapes as y
+rises through 1; the other pallet then stands `drop` ahead of its tooth. Contact pushes both bodies, so it ends where
+the wheel alone would slow down less than the foliot: kappa (d abs(y') + r) > 1, y' < 0.
 """
 
 import math
@@ -131,7 +128,7 @@ def _safe_step(scene, gap, v, w, force):
 
 @jit_call
 def _flight(scene, y, v, w, gap, watched):
-    """(4) until the gap closes or the tooth escapes: y, v, w, gap, time, the foliot's way, the wheel's, the least of
+    """(2) until the gap closes or the tooth escapes: y, v, w, gap, time, the foliot's way, the wheel's, the least of
     that on the way, and how it ends. After a landing the other pallet is `watched`: back at y = -1 it must find the
     tooth that it let go ahead."""
     beta, time, way, rim, least = 0.5 * scene.d, 0.0, 0.0, 0.0, 0.0
@@ -168,7 +165,7 @@ def _flight(scene, y, v, w, gap, watched):
 
 @jit_call
 def _contact(scene, y, v):
-    """(6) from y with speed v to the escape: speed there, time, and the way back before the push wins."""
+    """(1) from y with speed v to the escape: speed there, time, and the way back before the push wins."""
     both = 1.0 + scene.kappa
     beta, against, push = 0.5 * scene.d / both, (1.0 + scene.r) / both, (1.0 - scene.r) / both
     back, turn = 0.0, 0.0
