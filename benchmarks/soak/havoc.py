@@ -19,7 +19,7 @@ sys.path[:0] = [p for p in PATHS if p not in sys.path]
 
 import sweep  # noqa: E402
 from sweep.errors import SweepError  # noqa: E402
-from sweep.file.reading import ENDING_BYTES, StoredFile  # noqa: E402
+from sweep.file.reading import StoredFile  # noqa: E402
 from sweep.file.store import Store, unfinished_of  # noqa: E402
 from sweep.file.verify import verify  # noqa: E402
 from sweep.runs.run import complete  # noqa: E402
@@ -72,15 +72,16 @@ def damage(rng, path, strange):
     """Damages a result, finished or not, in some way; `strange` is one of another study. Tells what it did."""
     kind, content = rng.choice(DAMAGES), bytearray(path.read_bytes())
     with StoredFile(path) as file:
-        table, ending, finished = file.tables[file.work], file.ending_at, bool(file.ending)
+        table, ending, finished = file.tables[file.work], file.tables["ending"], bool(file.ending)
+        last = [span(ending.columns[0], 0), slice(ending.digests_at, ending.digests_at + ending.row_bytes)]
         chunks = [[span(column, block) for column in table.columns] for block in range(table.blocks.count)]
-        stands = [slice(0, table.digests_at + table.digests.size), *itertools.chain(*chunks)]
+        stands = [slice(0, table.digests_at + table.digests.size), *itertools.chain(*chunks, last)]
     block, other = rng.sample(range(table.blocks.count), 2)
     number = rng.randrange(len(table.columns))
     if kind in ("flip", "zeroed"):
         length = 1 if kind == "flip" else 512
         at = rng.randrange(len(content) - length)
-        if not finished and ending - length < at < ending + ENDING_BYTES:
+        if not finished and any(one.start - length < at < one.stop for one in last):
             return damage(rng, path, strange)  # what is written over at the end
         if kind == "flip" and not content[at] and not any(one.start <= at < one.stop for one in stands):
             return damage(rng, path, strange)  # between chunks and pages of HDF5's tables nothing stands

@@ -26,7 +26,7 @@ from sweep.cells.reduce import part_columns
 from sweep.cells.schema import STATUS, Column, Schema
 from sweep.file import disk
 from sweep.file.fletcher import checksum
-from sweep.file.reading import BYTES, ENDING_BYTES, FORMAT, StoredFile, digest_before
+from sweep.file.reading import BYTES, FORMAT, StoredFile, digest_before
 from sweep.study.model import ARRAY
 
 if TYPE_CHECKING:
@@ -46,6 +46,8 @@ TEXT_BYTES = 30 << 10
 """Of the structure of a result, about."""
 WRONG = b"\xff" * 4
 """A checksum that zeros have not."""
+GROUPS = {"cells": "", "rows": "rows/", "ending": "integrity/"}
+"""Where the columns of each table stand."""
 
 
 @dataclass(frozen=True)
@@ -63,12 +65,14 @@ class Cut:
 
 def cuts_of(study: Study, schema: Schema, blocks: Partition) -> dict[str, Cut]:
     """The tables of a study's result, whose output has a schema, and in which blocks are computed."""
+    ending = Cut((Column("ending", "S240", (), (), {}),), (1,), Partition(1, 1))
     if study.summary is None:
-        return {"cells": Cut(schema.columns, schema.grid.shape, blocks)}
+        return {"cells": Cut(schema.columns, schema.grid.shape, blocks), "ending": ending}
     rows, columns = row_blocks(study), part_columns(study)
     row_bytes = sum(column.cell_bytes for column in columns)
     groups = boxes(schema.grid.shape, GATHERED_BYTES // (row_bytes * rows.per_row))
-    return {"rows": Cut(columns, (rows.count,), blocks), "cells": Cut(schema.columns, schema.grid.shape, groups)}
+    cells = Cut(schema.columns, schema.grid.shape, groups)
+    return {"rows": Cut(columns, (rows.count,), blocks), "cells": cells, "ending": ending}
 
 
 def expected_size(schema: Schema, cuts: Mapping[str, Cut]) -> int:
@@ -142,15 +146,15 @@ def _lay_out(skeleton: _Skeleton, schema: Schema, cuts: Mapping[str, Cut], align
         dims = _write_variables(file, schema, cuts["cells"])
         tables: dict[str, dict[str, Any]] = {}
         for name, cut in cuts.items():
-            paths = [column.name if name == "cells" else f"{name}/{column.name}" for column in cut.columns]
+            paths = [GROUPS[name] + column.name for column in cut.columns]
             blocks = (cut.blocks.size, cut.blocks.cells, cut.blocks.row)
             tables[name] = {"grid": cut.grid, "blocks": blocks, "paths": paths}
-            for column in cut.columns if name == "rows" else ():
+            for column in cut.columns if name != "cells" else ():
                 shape = (*cut.grid, *column.shape)
-                _make(file.require_group(name), column.name, shape, column.dtype, cut.chunk(column))
-        integrity = file.create_group("integrity")
+                _make(file.require_group(GROUPS[name]), column.name, shape, column.dtype, cut.chunk(column))
+        integrity = file["integrity"]
         _say(integrity, {"format": FORMAT, "contents": json.dumps({"tables": tables, "dims": dims})})
-        shapes: dict[str, tuple[int, ...]] = {"key": (BYTES,), "ending": (ENDING_BYTES,)}
+        shapes: dict[str, tuple[int, ...]] = {"key": (BYTES,)}
         shapes |= {f"{name}_digests": (cut.blocks.count, len(cut.columns), BYTES) for name, cut in cuts.items()}
         pieces = [integrity.create_dataset(name, shape, "u1") for name, shape in shapes.items()]
         # from here on nothing is made, and places alone are found, that of the key first

@@ -30,11 +30,11 @@ from sweep.file import disk
 from sweep.file.fletcher import checksum
 from sweep.study.model import study_together
 
-FORMAT = 5
+FORMAT = 6
 UNFINISHED = ".unfinished"
 """How the name of a result ends while its sweep runs."""
-BYTES, ENDING_BYTES = 16, 256
-"""Of a digest; of what is written when all is done: JSON, and its digest."""
+BYTES = 16
+"""Of a digest."""
 FILE_END = 28, 8
 """Where, and in how many bytes, files of HDF5 say how long they are."""
 OF_NETCDF = {"CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_Netcdf4Coordinates", "_Netcdf4Dimid", "coordinates"}
@@ -53,19 +53,11 @@ class StoredFile:
     """A result of this program, open for reading, or for writing by other `flags`. To be used with `with`.
 
     Of a column or a coordinate `file[name]` gives `dims`, `attrs`, and its numbers as `values` or by indices. `tables`
-    are "cells", the output's columns, and of a summary "rows", which they are made of; `work` names the one that is
-    computed. `attrs` are those of the file, texts as str. `ending` is what is known at the end, empty before: then what
-    is missing or damaged is handed out as NaN and PENDING. `key`, the digest of all that stands before it, tells this
-    file from any other.
-
-    Raises
-    ------
-    Damaged
-        It is none of ours, or damaged beside the numbers.
-    FileNotFoundError, NotADirectoryError
-        There is none.
-    SweepError
-        It cannot be read, or is of another format.
+    are "cells", the output's columns, of a summary "rows", which they are made of, and "ending"; `work` names the one
+    that is computed. `attrs` are those of the file, texts as str. `ending` is what is known at the end, empty before:
+    then what is missing is handed out as NaN and PENDING. `key`, the digest of all that stands before it, tells this
+    file from any other. Raises Damaged where it is none of ours, or damaged beside the numbers; FileNotFoundError or
+    NotADirectoryError where there is none; SweepError where it cannot be read, or is of another format.
     """
 
     def __init__(self, path: Path, flags: int = os.O_RDONLY) -> None:
@@ -94,9 +86,8 @@ class StoredFile:
                 )
             contents = json.loads(integrity["contents"])
             self.dims = {name: tuple(dims) for name, dims in contents["dims"].items()}
-            self.key_at, self.ending_at = (_own(h5, f"integrity/{k}").id.get_offset() for k in ("key", "ending"))
+            self.key_at = _own(h5, "integrity/key").id.get_offset()
             self.key = read_bytes(self.fd, self.key_at, BYTES)
-            self.ending = ending_of(read_bytes(self.fd, self.ending_at, ENDING_BYTES))
             self.tables = {name: Table(self, h5, name, **keys) for name, keys in contents["tables"].items()}
             self.coords = {}
             for name in (name for name in self.dims if name not in self.columns()):
@@ -107,7 +98,10 @@ class StoredFile:
                 self.coords[name] = Coordinate(name, self.dims[name], values, attrs)
             attrs = _attrs(h5)
         self.work = "rows" if "rows" in self.tables else "cells"
+        said = self.tables["ending"].columns[0].read(0)
+        self.ending: dict[str, str] = {} if said is None else json.loads(said[0])
         self.attrs = {**attrs, "study_json": study_together(attrs["study_json"], self.coords), **self.ending}
+        self.fingerprint = dict(json.loads(attrs["fingerprint"]))
 
     def __enter__(self) -> StoredFile:
         return self
@@ -135,14 +129,6 @@ class StoredFile:
         except (OSError, EOFError):
             return False
 
-    @property
-    def fingerprint(self) -> dict[str, str]:
-        """Of the study and of the program that computed it. Raises Damaged where another program has changed it."""
-        try:
-            return dict(json.loads(self.attrs["fingerprint"]))
-        except DAMAGE as fault:
-            raise _refusal(self.path, fault) from fault
-
     def columns(self, name: str = "cells") -> dict[str, Numbers]:
         """The columns of a table."""
         return {column.name: column for column in self.tables[name].columns}
@@ -169,22 +155,16 @@ class Table:
         self.row_bytes, shape = BYTES * len(paths), (self.blocks.count, len(paths), BYTES)
         self.digests = np.empty(shape, "u1")
         disk.read_all(file.fd, (self.digests,), self.digests_at)
-        self._sound = np.zeros(self.blocks.count, bool)
 
     @property
     def done(self) -> Any:
         """Which blocks have digests: ndarray of bool."""
         return np.any(self.digests, axis=2).all(axis=1)
 
-    def is_sound(self, block: int) -> bool:
-        """Whether all columns of a block are there and as they were written; looked at once."""
-        if not self._sound[block] and self.digests[block].any():
-            self._sound[block] = not self.damaged([block])
-        return bool(self._sound[block])
-
-    def damaged(self, blocks: Iterable[int]) -> list[int]:
-        """Which of some blocks are not what was written."""
-        return [block for block in blocks if any(column.read(block) is None for column in self.columns)]
+    def damaged(self, blocks: Iterable[int]) -> dict[str, list[int]]:
+        """Which of some blocks are not what was written, by the names of columns; all are read."""
+        blocks = [*blocks]
+        return {column.name: [block for block in blocks if column.read(block) is None] for column in self.columns}
 
     def write(self, block: int, arrays: Mapping[str, Any]) -> bytes:
         """Writes the chunks of a block, and gives their digests. Raises OSError."""
@@ -198,12 +178,10 @@ class Table:
         return row
 
     def write_digests(self, digests: Mapping[int, bytes]) -> None:
-        """Writes those of some blocks, neighbouring ones at once. Raises OSError."""
-        for _, some in itertools.groupby(enumerate(sorted(digests)), lambda pair: pair[1] - pair[0]):
-            blocks = [block for _, block in some]
-            rows = np.frombuffer(b"".join(digests[block] for block in blocks), "u1")
-            disk.write_all(self.file.fd, (rows,), self.digests_at + blocks[0] * self.row_bytes)
-            self.digests[blocks] = rows.reshape(len(blocks), -1, BYTES)
+        """Writes those of some blocks. Raises OSError."""
+        for block, row in digests.items():
+            disk.write_all(self.file.fd, (row,), self.digests_at + block * self.row_bytes)
+            self.digests[block] = np.frombuffer(row, "u1").reshape(-1, BYTES)
 
 
 class Numbers:
@@ -283,19 +261,18 @@ class Numbers:
 
     def _fill(self, block: int, out: Any) -> None:
         """Fills in the cells of a block. Raises SweepError where it is damaged, or the file is closed."""
-        file = self.table.file
+        file, table = self.table.file, self.table
         if file.fd < 0:
             raise SweepError(f"{file.path}: is closed; open it again to read {self.name}")
-        if (file.ending or self.table.is_sound(block)) and self.read(block, out) is not None:
-            return
-        if file.ending or self.table.name == "rows":  # what is missing of these is not asked for
-            start, stop = self.table.blocks.bounds(block)
+        if not file.ending and not table.digests[block].any(axis=-1).all():
+            out[...] = {STATUS: int(Status.PENDING), METHOD_USED: -1}.get(self.name, math.nan)
+        elif self.read(block, out) is None:
+            start, stop = table.blocks.bounds(block)
             raise SweepError(
                 f"{file.path}: {self.name} is damaged between its cells {start:,} and {stop:,}, or was changed by "
-                "another program; sweep verify tells of all damage, and sweep run --repair computes the damaged cells "
-                "again"
+                "another program; sweep verify tells of all damage, and "
+                f"{'sweep run --repair' if file.ending else 'the same run'} computes the damaged cells again"
             )
-        out[...] = {STATUS: int(Status.PENDING), METHOD_USED: -1}.get(self.name, math.nan)
 
 
 def again(path: Path, key: bytes, flags: int = os.O_RDONLY) -> StoredFile:
@@ -309,8 +286,6 @@ def again(path: Path, key: bytes, flags: int = os.O_RDONLY) -> StoredFile:
 
 def _refusal(path: Path, fault: BaseException) -> SweepError:
     """What a user is told of a file that cannot be read, or is no result."""
-    if disk.mark(path) and not path.is_file():
-        return SweepError(f"{path}: is {'a folder' if path.is_dir() else 'no file'}, not the result of a sweep")
     if isinstance(fault, OSError) and fault.errno and fault.errno not in OF_DAMAGE:
         return SweepError(f"{path}: cannot be read ({os.strerror(fault.errno)})")
     reason = (str(fault).splitlines() or [type(fault).__name__])[0]
@@ -355,15 +330,3 @@ def read_bytes(fd: int, begin: int, count: int) -> bytes:
 def digest_before(fd: int, end: int) -> bytes:
     """Digest of all bytes before a place. Raises OSError, EOFError."""
     return xxhash.xxh3_128_digest(read_bytes(fd, 0, end))
-
-
-def ending_of(text: bytes) -> dict[str, str]:
-    """What was written at the end of a run; empty where that has not come, or is damaged."""
-    said = text[:-BYTES]
-    return dict(json.loads(said)) if xxhash.xxh3_128_digest(said) == text[-BYTES:] else {}
-
-
-def ending_text(texts: Mapping[str, str]) -> bytes:
-    """What `ending_of` reads; zeros of nothing."""
-    said = json.dumps(dict(texts)).encode().ljust(ENDING_BYTES - BYTES)
-    return said + xxhash.xxh3_128_digest(said) if texts else bytes(ENDING_BYTES)

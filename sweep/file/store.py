@@ -11,10 +11,11 @@ blocks at a time: numbers, fdatasync, digests. The next sync brings the digests 
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -25,7 +26,7 @@ from sweep.cells.schema import Schema
 from sweep.errors import Incomplete, SweepError
 from sweep.file import disk
 from sweep.file.frame import PAGE, Cut, create
-from sweep.file.reading import BYTES, UNFINISHED, Damaged, StoredFile, Table, ending_text, read_bytes
+from sweep.file.reading import BYTES, UNFINISHED, Damaged, StoredFile, Table, read_bytes
 
 SYNC_SECONDS = 0.2
 """How often blocks are brought to the disk, and it is looked whether the file is still in its place."""
@@ -55,7 +56,8 @@ class Store:
         self.temporary = self.path.with_name(self.path.name + ".tmp")
         self.file: StoredFile | None = None
         self._waiting: deque[tuple[int, bytes]] = deque()
-        self._synced, self._size, self._elsewhere = time.monotonic(), 0, False
+        self._mark: tuple[int, ...] = ()  # of the file: it is still the one, and as long
+        self._synced, self._elsewhere = time.monotonic(), False
         self._syncing, self._last = ThreadPoolExecutor(1), Future[None]()  # beside those that compute
         self._last.set_result(None)
         self.finished = False
@@ -70,16 +72,13 @@ class Store:
         """What an earlier run left; None where there is nothing, or to `give_up` what is damaged. Raises SweepError."""
         if not self.path.exists():
             return None
-        try:
+        with contextlib.suppress(SweepError if give_up else Damaged):
             file = StoredFile(self.path, os.O_RDWR)
             if file.is_as_made():
                 return file
-        except SweepError as fault:
-            if not give_up and not isinstance(fault, Damaged):
-                raise
-        if not give_up:
-            raise SweepError(f"{self.path}: damaged beside its numbers; remove it, or give it up with --force")
-        return None
+        if give_up:
+            return None
+        raise SweepError(f"{self.path}: damaged beside its numbers; remove it, or give it up with --force")
 
     def begin(self, schema: Schema, cuts: Mapping[str, Cut], shared: bool = False) -> None:
         """Makes the file, with room on the disk for all of it. Raises SweepError."""
@@ -95,35 +94,30 @@ class Store:
         file.path = self.path
         self.resume(file, ())
 
-    def resume(self, file: StoredFile, damaged: Sequence[int] | None = None) -> Sequence[int]:
+    def resume(self, file: StoredFile, damaged: Iterable[int] | None = None) -> list[int]:
         """Takes up what an earlier run left; its damaged blocks count as missing, and are returned.
 
         `damaged` names them where that is known; None: all blocks that are done are read and compared with their
         digests. Raises SweepError.
         """
-        if file.ending:  # it was killed just before it was renamed, or is taken up again
-            file.ending = {}
-            with disk.refusing(self.path):
-                disk.write_all(file.fd, (ending_text({}),), file.ending_at)
-        self.file, self._size = file, os.fstat(file.fd).st_size
+        self.file, status, table = file, os.fstat(file.fd), file.tables[file.work]
+        self._mark = status.st_ino, status.st_size
         if damaged is None:
-            damaged = self.table.damaged(np.flatnonzero(self.table.done).tolist())
-        self.table.digests[list(damaged)] = 0
-        return damaged
+            damaged = set[int]().union(*table.damaged(np.flatnonzero(table.done).tolist()).values())
+        with disk.refusing(self.path):
+            if file.ending:  # it was killed just before it was renamed, or is taken up again
+                file.ending = {}
+                ending = file.tables["ending"]
+                ending.write_digests({0: bytes(ending.row_bytes)})
+            table.write_digests({block: bytes(table.row_bytes) for block in damaged})
+        return sorted(damaged)
 
     def reopen(self, damaged: Sequence[int]) -> None:
         """Takes a finished result up again, some blocks of which are to be computed again. Raises SweepError."""
         with disk.refusing(self.output):
             disk.rename(self.output, self.path)
             disk.sync_folder(self.output.parent)
-        file = self.found()
-        assert file is not None
-        self.resume(file, damaged)
-
-    @property
-    def count(self) -> int:
-        """Blocks that are acknowledged."""
-        return int(self.table.done.sum())
+        self.resume(StoredFile(self.path, os.O_RDWR), damaged)
 
     def missing(self) -> list[int]:
         """Numbers of the blocks that are not done, ascending."""
@@ -156,9 +150,7 @@ class Store:
         """
         file, self._synced = self.table.file, time.monotonic()
         with disk.refusing(self.path):
-            ours = os.fstat(file.fd)
-            there = disk.mark(self.path)[:1] == (ours.st_ino,) and ours.st_size >= self._size
-            if not there or read_bytes(file.fd, file.key_at, BYTES) != file.key:
+            if disk.mark(self.path)[:2] != self._mark or read_bytes(file.fd, file.key_at, BYTES) != file.key:
                 raise Incomplete(
                     f"{self.path}: was moved, removed, cut or overwritten while the run wrote to it; if it was moved, "
                     "move it back, and the same command continues; else remove what is left, and begin anew"
@@ -181,10 +173,11 @@ class Store:
                 digests = {block: cells.write(block, gather(file, block)) for block in range(cells.blocks.count)}
                 disk.sync_numbers(file.fd)
                 cells.write_digests(digests)
-            disk.write_all(file.fd, (ending_text(texts),), file.ending_at)
+            ending = file.tables["ending"]
+            ending.write_digests({0: ending.write(0, {"ending": np.array([json.dumps(dict(texts))], "S240")})})
             disk.fsync(file.fd)
             last = cells.blocks.count - 1
-            if cells.damaged({0, last // 2, last}):
+            if any(cells.damaged({0, last // 2, last}).values()):
                 raise SweepError(
                     f"{self.output}: differs when read back from what was written; the disk may be failing"
                 )
@@ -196,11 +189,6 @@ class Store:
         """By what another process opens the file to write blocks; None where blocks of two would share a page."""
         paged = not any((column.at % PAGE).any() for column in self.table.columns)
         return (self.path, self.table.file.key) if paged else None
-
-    def discard(self) -> None:
-        """Removes what is there. Raises SweepError."""
-        with disk.refusing(self.path):
-            disk.remove(self.path)
 
     def close(self) -> None:
         """Acknowledges what is written, brings that to the disk if that can be, and gives the file back."""

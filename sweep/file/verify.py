@@ -91,22 +91,20 @@ def _verdict(output: Path, file: StoredFile) -> Verdict:
     if not file.is_as_made():
         findings.append("its structure is not as it was made: damaged, or changed by another program")
     mendable, damaged = not findings, set[int]()
+    work = file.tables[file.work]
     # the columns of a summary are made at its end
-    for name in file.tables if file.ending else (file.work,):
-        table = file.tables[name]
-        for column in table.columns:
-            there = np.arange(column.at.size)[table.done | bool(file.ending)].tolist()
-            bad = [block for block in there if column.read(block) is None]
-            damaged.update(bad if name == file.work else ())
-            findings += _lines(f"{column.name}: damaged between its cells {{:,}} and {{:,}}", table, bad)
+    for table in (work, *({file.tables["cells"]} - {work} if file.ending else ())):
+        there = range(table.blocks.count) if file.ending else np.flatnonzero(table.done).tolist()
+        for name, bad in table.damaged(there).items():
+            damaged.update(bad if table is work else ())
+            findings += _lines(f"{name}: damaged between its cells {{:,}} and {{:,}}", table, bad)
     if file.path.suffix != UNFINISHED:
         blocks = tuple(sorted(damaged)) if findings and mendable else None
         return Verdict(output, not findings, f"{file.path.stat().st_size:,} bytes checked", tuple(findings), blocks)
-    table, state = file.tables[file.work], "damaged" if findings else "not complete"
-    missing = np.flatnonzero(~table.done).tolist()
-    findings += _lines(f"missing: {file.work} {{:,}} to {{:,}}", table, missing)
+    state, missing = "damaged" if findings else "not complete", np.flatnonzero(~work.done).tolist()
+    findings += _lines(f"missing: {file.work} {{:,}} to {{:,}}", work, missing)
     findings = findings or ["all blocks are there, but it has not ended; run the sweep again to finish"]
-    checked = f"unfinished, {table.blocks.count - len(missing):,} of {table.blocks.count:,} blocks there and checked"
+    checked = f"unfinished, {work.blocks.count - len(missing):,} of {work.blocks.count:,} blocks there and checked"
     return Verdict(output, False, checked, tuple(findings), state=state)
 
 

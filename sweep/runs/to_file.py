@@ -38,7 +38,7 @@ def run_to_file(task: Task, precomputed: Precomputed | None = None) -> Ending:
         is_ours = found is not None and found.fingerprint == dict(task.fingerprint)
         if standing == "complete":
             if is_ours:
-                store.discard()
+                disk.remove(store.path)
             return "done before"
         if found is not None and is_ours:
             damaged = store.resume(found)
@@ -52,7 +52,7 @@ def run_to_file(task: Task, precomputed: Precomputed | None = None) -> Ending:
                         f"{store.path}: the unfinished result of another study or version; finish that one first, "
                         f"choose another name, or give it up with --force\n{_changes(found.fingerprint, task)}"
                     )
-            store.discard()
+            disk.remove(store.path)
         try:
             _computed(store, task, precomputed, standing == "reused", damaged)
             return "complete"
@@ -62,7 +62,7 @@ def run_to_file(task: Task, precomputed: Precomputed | None = None) -> Ending:
             kept = "before the first block"
             if store.file is not None:
                 store.commit()
-                kept = f"{store.count} of {store.table.blocks.count} blocks are kept"
+                kept = f"{int(store.table.done.sum())} of {store.table.blocks.count} blocks are kept"
             why = f", for {reason}" if isinstance(reason, TimeUp) else ""
             task.note(f"stopped{why}; {kept}, run the same command again to continue")
             if isinstance(reason, TimeUp):

@@ -68,7 +68,7 @@ def test_a_file_of_another_format_is_refused_by_its_number(tmp_path):
     with h5py.File(path, "r+") as file:
         file["integrity"].attrs["format"] = 4
     for function in (sweep.open_result, sweep.verify):
-        with pytest.raises(sweep.SweepError, match=r"\(4\).*format 5"):
+        with pytest.raises(sweep.SweepError, match=r"\(4\).*format 6"):
             function(path)
 
 

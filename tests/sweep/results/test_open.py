@@ -167,7 +167,7 @@ def test_what_is_no_result_is_one_clear_line(tmp_path, name, content, capsys):
     elif content is not None:
         path.write_bytes(content)
     if name == "open_result" or not isinstance(content, bytes):
-        with pytest.raises(SweepError, match=r"foreign\.h5: .*(no such|folder|damaged)") as told:
+        with pytest.raises(SweepError, match=r"foreign\.h5: .*(no such|[Dd]irectory|damaged)") as told:
             getattr(sweep, name)(path)
         assert "\n" not in str(told.value)
     assert main(["verify", str(path)]) == 2
