@@ -25,7 +25,7 @@ from sweep.errors import SweepError
 
 LANES = 32
 """Cells that a lane kernel solves at once: it takes as long for one of them."""
-POSITIONS, PLACES = 64, 8
+POSITIONS, PLACES = 64, 16
 """Places of the grid where probes are made; and how many are tried in turn where one in the middle fails."""
 BUDGET = 0.003, 0.03
 """Seconds a sample may take in any run, unless one call takes longer; and in one that takes 100 times as long;"""
@@ -35,8 +35,8 @@ PROBE_SECONDS = 5e-4
 """A probe as long as this sees past the cost of a call, and 64 of them take a few hundredths of a second."""
 DEAR = 2e-3
 """Seconds of a probe that counts among those of the sample, wherever it was made."""
-FAILED_PROBE, MOST_FAILED = max(BUDGET) / 16, 16
-"""Seconds that a probe counts for which fails; a kernel that fails in so many, and in no other, is given up."""
+FAILED_PROBE = max(BUDGET) / 16
+"""Seconds that a probe counts for which fails."""
 BLOCK_SECONDS = (0.05, 1.0)
 CALLS = 400
 """Times that a block's cells cost what a call does beside them, by probes of few cells; of many, which cost less each
@@ -52,7 +52,7 @@ SILENT_SECONDS = 1.0
 
 @dataclass(frozen=True)
 class Sample:
-    """Timed probes: cell each starts at (ascending), its seconds per cell, and how many cells each has.
+    """Timed probes: cell each starts at (ascending), and its seconds per cell.
 
     `lanes`: whether one cell takes as long as 32, where cells are so dear that it matters. `call`: what a call costs
     beside the share of its cells, in seconds: what one cell alone takes beyond it. Where cells are solved in lanes,
@@ -61,7 +61,6 @@ class Sample:
 
     positions: Any
     costs: Any
-    cells: int
     lanes: bool = False
     call: float = 0.0
 
@@ -70,14 +69,13 @@ class Sample:
         """Mean seconds per cell over the grid."""
         return float(np.mean(self.costs))
 
-    def weights(self, partition: Partition, first: Callable[[Any], Any] | None = None) -> Any:
-        """Estimated seconds of every block; `first` tells the first cells of rows where a row is more than a cell."""
-        edges = partition.first(np.arange(partition.count + 1, dtype=np.int64))
-        edges = edges if first is None else first(edges)
+    def weights(self, partition: Partition, first: Callable[[Any], Any]) -> Any:
+        """Estimated seconds of every block; `first` gives the first cells of rows."""
+        edges = first(partition.first(np.arange(partition.count + 1, dtype=np.int64)))
         return np.interp((edges[:-1] + edges[1:]) / 2, self.positions, self.costs) * np.diff(edges)
 
 
-UNSAMPLED = Sample(np.zeros(1), np.ones(1), 1)
+UNSAMPLED = Sample(np.zeros(1), np.ones(1))
 """Stands in where no cell is left to compute: every block weighs its cells."""
 
 
@@ -85,32 +83,35 @@ def take_sample(solver: SolveCells, columns: Sequence[Column], size: int, clock:
     """Times a few cells at up to 64 places of the grid, in a few hundredths of a second or a hundredth of the run.
 
     A probe has few enough cells for 64 of them in the budget, and enough to see past the cost of a call. Probes that
-    fail are left out. Raises what the kernel does where all fail.
+    fail are left out. Raises what the kernel does where single cells fail all over the grid.
     """
-    made: dict[int, dict[int, float]] = {}
     faults: list[Exception] = []
+    dear: dict[int, dict[int, float]] = {}  # probes of so many cells that are not made twice, by their first cells
 
-    def probe(start: int, cells: int) -> float | None:
-        """Seconds of so many cells; None where the kernel fails."""
+    def probe(start: int, cells: int) -> float:
+        """Seconds of so many cells; infinity where the kernel fails."""
         arrays = {column.name: column.empty(cells) for column in columns}
         begun = clock()
         with tolerated() as fault:
             solver.solve(start, cells_of(arrays))
-            seconds = made.setdefault(cells, {})[start] = clock() - begun
-            return seconds
+            return clock() - begun
         faults.extend(fault)
-        if not made and len(faults) >= MOST_FAILED:
-            raise faults[-1]
-        return None
+        return math.inf
 
     def anywhere(cells: int) -> float:
         """Seconds that some cells in the middle of the grid take, or elsewhere where these fail."""
-        starts = (*_places(size, 1, cells), *_places(size, PLACES, cells))
-        return next((taken for start in starts if (taken := probe(start, cells)) is not None), math.inf)
+        for start in _places(size, PLACES, cells):
+            if (seconds := probe(start, cells)) < math.inf:
+                dear[cells] = {start: seconds} if seconds >= DEAR else {}
+                return seconds
+        return math.inf
 
-    cells, lanes, alone = 1, False, anywhere(1)
+    alone = anywhere(1)
+    if alone == math.inf:
+        raise faults[-1]
     if alone < 2 * PROBE_SECONDS:  # what is met for the first time matters in it
         alone = min(alone, anywhere(1))
+    cells, lanes = 1, False
     if size > 1 and alone > PROBE_SECONDS:
         # where two cells take as long as one, 32 will
         lanes = anywhere(2) < 1.5 * alone
@@ -119,23 +120,18 @@ def take_sample(solver: SolveCells, columns: Sequence[Column], size: int, clock:
         taken, more = alone, LANES
         while (cells == 1 or taken <= PROBE_SECONDS) and size >= (4 if cells == 1 else POSITIONS) * more:
             cells, taken, more = more, anywhere(more), 4 * more
-    for count in dict.fromkeys((cells, 1)):  # a bad cell spoils a probe of many
-        # a dear probe that was made before is among them
-        probes = {start: seconds for start, seconds in made.get(count, {}).items() if seconds >= DEAR}
-        spent, planned = sum(probes.values()), _places(size, max(1, min(POSITIONS, size // (4 * count))), count)
-        # where all that are planned fail, others are looked at until one does not
-        for turn, start in enumerate((*planned, *_places(size, PLACES, count))):
-            run = spent / (len(probes) * count) * size if probes else math.inf
-            most = max(BUDGET[0], min(BUDGET[1], run / 100), SHARE * run)
-            if probes and (turn >= len(planned) or spent > most):
-                break
-            seconds = probe(start, count)
-            spent += FAILED_PROBE if seconds is None else seconds
-            probes |= {} if seconds is None else {start: seconds}
-        if probes:
-            costs = np.array([probes[start] / count for start in sorted(probes)])
-            return Sample(np.array(sorted(probes)), costs, count, lanes, max(0.0, alone - float(np.min(costs))))
-    raise faults[-1]
+    probes = dear.get(cells, {})
+    spent = sum(probes.values())
+    for start in _places(size, max(1, min(POSITIONS, size // (4 * cells))), cells):
+        run = spent / (len(probes) * cells) * size if probes else math.inf
+        if probes and spent > max(BUDGET[0], min(BUDGET[1], run / 100), SHARE * run):
+            break
+        seconds = probe(start, cells)
+        spent += FAILED_PROBE if seconds == math.inf else seconds
+        probes |= {start: seconds} if seconds < math.inf else {}
+    probes = probes or {0: alone * cells}
+    costs = np.array([probes[start] / cells for start in sorted(probes)])
+    return Sample(np.array(sorted(probes)), costs, lanes, max(0.0, alone - float(np.min(costs))))
 
 
 def _places(size: int, count: int, cells: int) -> list[int]:

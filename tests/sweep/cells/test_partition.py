@@ -10,10 +10,10 @@ from sweep.cells.timing import BLOCK_BYTES, LANES, MOST_BLOCKS, Sample, partitio
 COLUMNS = tuple(Column(name, "i1", (), (), {}) for name in ("status", "method_used"))
 
 
-def sample(costs, size, cells=LANES):
+def sample(costs, size):
     costs = np.atleast_1d(np.asarray(costs, float))
     places = (np.arange(len(costs)) + 0.5) * size / len(costs)
-    return Sample(places, costs, cells)
+    return Sample(places, costs)
 
 
 @given(

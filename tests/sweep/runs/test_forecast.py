@@ -49,7 +49,7 @@ class Run:
         places = (2 * np.arange(64) + 1) * CELLS // 128
         noise = np.random.default_rng(seed).uniform(0.5, 1.5, 64)
         probed = noise * [costs[p : p + 32].mean() for p in places]
-        self.weights = Sample(places, probed, 32).weights(partition)
+        self.weights = Sample(places, probed).weights(partition, lambda cells: cells)
         self.now, self.workers, self.slow = 0.0, workers, slow
         work = float(self.weights.sum())
         self.progress = Progress(partition.count, False, work=work, clock=lambda: self.now)
