@@ -31,7 +31,7 @@ from sweep.errors import SweepError
 from sweep.study.model import Study
 
 CELL_SECONDS, DEARER = 60.0, 100.0
-"""What a cell may take where nobody says otherwise; or so many times what the dearest of the sample does."""
+"""What a cell may take where nobody says otherwise; or so many times what the dearest so far has taken."""
 SEVERAL_SECONDS, SLACK = 1.0, 10.0
 """Several cells may take this and so many times what they should; then they are halved."""
 LOAD_SECONDS = 180.0
@@ -41,9 +41,6 @@ TRIALS = 3
 LOOK_SECONDS = 0.2
 """How often it is looked whether time goes by, or the machine slept."""
 
-Answer = tuple[list[Any], float]
-"""Columns of cells, and the seconds that they took."""
-
 
 class Died(Unsolved):
     """The process died, or has no memory left; another one may not."""
@@ -52,33 +49,32 @@ class Died(Unsolved):
 class Processes:
     """The processes of a run on this machine.
 
-    A cell may take `limit` seconds; None: `CELL_SECONDS`, or longer where cells do. `cost` is what the dearest cell of
-    the timed sample takes; 0: not known yet, then `dearest`, of those that have ended, stands in.
+    A cell may take `limit` seconds; None: `CELL_SECONDS`, or longer where cells do. `cost` is what the dearest cell
+    has taken; 0: none has ended yet.
     """
 
     def __init__(self, study: Study, limit: float | None, cost: float = 0.0) -> None:
         self.study, self.limit, self.cost, self.grid = study, limit, cost, Grid(study)
         self.text = study.to_json()
-        self.over, self.alone, self.dearest = False, threading.Lock(), 0.0
-        self.good: int | None = None  # a cell that is known to end
+        self.over, self.alone, self._sampling = False, threading.Lock(), False
         self._idle: list[Isolated] = []
         self._solvers: list[Isolated] = []
 
     def sampled(self, note: Callable[[str], None]) -> Sample:
         """A timed sample, as `sampled_study` takes it."""
-        solver = self.solver()
+        solver, self._sampling = self.solver(), True
         with compiling_told(self.study.kernel_name, note, solver.compiles):
             found = sampled_by(solver, self.study, lambda: solver.seconds)
+        self._sampling = False
         self._idle.append(solver)
         return found
 
     def seconds(self, cells: int) -> float:
         """What some cells may take. One of a sample is not waited for to its end: it is left out, but never FAILED."""
-        cost = self.cost or self.dearest
-        one = self.limit or max(CELL_SECONDS, DEARER * cost)
-        if cells == 1 and (self.cost or not cost):
+        one = self.limit or max(CELL_SECONDS, DEARER * self.cost)
+        if cells <= 1 and not (self._sampling and self.cost):
             return one
-        return min(one, SEVERAL_SECONDS) + SLACK * cost * cells
+        return min(one, SEVERAL_SECONDS) + SLACK * self.cost * cells
 
     def solver(self) -> Isolated:
         """A solver with a process of its own, for one thread at a time; one that is idle, if there is any."""
@@ -120,49 +116,48 @@ class Isolated:
                 if cells.number > 1 or trial == TRIALS:
                     raise
         self.seconds += seconds
-        crew.dearest = max(crew.dearest, seconds / cells.number)
-        crew.good = start if crew.good is None else crew.good
+        crew.cost = max(crew.cost, seconds / cells.number)
         for column, values in zip(cells.columns, columns, strict=False):  # errors come last, and may not be wanted
             column[...] = values
 
-    def _solved(self, *words: Any) -> Answer:
-        """What the process answers. Raises Unsolved, Died, SweepError."""
-        process, limit, late = self._process or self._begin(), self._all.seconds(words[1]), False
+    def _solved(self, start: int, count: int, wanted: Any) -> tuple[list[Any], float]:
+        """Columns of cells, and the seconds that they took. Raises Unsolved, Died, SweepError."""
+        process, limit, late = self._process or self._begin(), self._all.seconds(count), False
         try:
-            return _answer(process, limit, *words)
-        except Died:
-            self.end()
-            raise
+            found, reason = _answer(process, limit, start, count, wanted)
         except (OSError, EOFError, AttributeError) as fault:
             late = isinstance(fault, TimeoutError)
-        code = self.end(1.0, process)
-        # one that died by itself, as late as that, is not late
-        if late and code in (None, -signal.SIGKILL):
-            raise Unsolved(f"took longer than {limit:.3g} s")
-        if code is not None and code < 0:
-            raise Died(f"its process died of {signal.Signals(-code).name}")
-        raise Died("its process died" if code is None else f"its process ended with {code}")
+            code = self.end(1.0, process)
+            # one that died by itself, as late as that, is not late
+            if late and code in (None, -signal.SIGKILL):
+                raise Unsolved(f"took longer than {limit:.3g} s") from None
+            if code is not None and code < 0:
+                raise Died(f"its process died of {signal.Signals(-code).name}") from None
+            raise Died("its process died" if code is None else f"its process ended with {code}") from None
+        if reason.startswith(MemoryError.__name__):
+            self.end()
+            raise Died(reason)
+        if reason:
+            raise Unsolved(reason)
+        return found  # type: ignore[no-any-return]
 
     def _begin(self) -> Any:
-        """A process that has loaded the kernel, and solved a cell that is known to end, if any is. Raises SweepError.
-
-        Other cells would be blamed for what a process does before its first one.
-        """
+        """A process that has loaded the kernel. Raises SweepError."""
         for _ in range(10):
             try:
                 with self._lock:
                     if self._all.over:
                         raise SweepError("the run is being stopped")
                     process = self._process = _started(self._all.text)
-                good = self._all.good
-                _answer(process, LOAD_SECONDS + DEARER * self._all.dearest, good or 0, int(good is not None), None)
-                return process
+                reason = _answer(process, LOAD_SECONDS, 0, 0, None)[1]
+                if not reason:
+                    return process
             except SweepError:
                 raise
             except Exception as fault:
                 reason = told(fault)
-                self.end()
-                time.sleep(0.5)
+            self.end()
+            time.sleep(0.5)
         raise SweepError(
             f"{self._all.study.kernel_name}: no process of its own can be started and load it ({reason}); what is "
             "finished is kept. The name of the folder TMPDIR must be short, and ulimit -n and -u large enough"
@@ -184,8 +179,8 @@ class Isolated:
         return process.exitcode  # type: ignore[no-any-return]
 
 
-def _answer(process: Any, limit: float, *words: Any) -> Answer:
-    """What a process answers. Raises TimeoutError, EOFError or OSError where it died, Unsolved, Died.
+def _answer(process: Any, limit: float, *words: Any) -> Any:
+    """What a process answers: columns and seconds, or why there are none. Raises TimeoutError, EOFError, OSError.
 
     No seconds count while the machine sleeps or the process compiles; compiling has a limit of its own.
     """
@@ -194,10 +189,7 @@ def _answer(process: Any, limit: float, *words: Any) -> Answer:
     while min(left.values()) > 0.0:
         begun = time.monotonic()
         if wait([process.pipe], min(LOOK_SECONDS, left[False])):
-            found, reason = process.pipe.recv()
-            if reason:
-                raise (Died if reason.startswith(MemoryError.__name__) else Unsolved)(reason)
-            return found  # type: ignore[no-any-return]
+            return process.pipe.recv()
         left[bool(process.compiling.value)] -= min(time.monotonic() - begun, 2 * LOOK_SECONDS)
     raise TimeoutError
 

@@ -152,11 +152,7 @@ class Loop:
         study, processes = self.task.study, self._processes
 
         def take() -> Sample:
-            if processes is None:
-                return sampled_study(study, self.task.note)
-            found = processes.sampled(self.task.note)
-            processes.cost = float(found.costs.max())
-            return found
+            return sampled_study(study, self.task.note) if processes is None else processes.sampled(self.task.note)
 
         begun, sample = time.monotonic(), self._threads.submit(take)
         try:

@@ -83,16 +83,6 @@ def says(height, *rest):
 SAYING = dataclasses.replace(RAISING, methods=(dataclasses.replace(toy.KERNEL.methods[1], solve=says),))
 
 
-def _ready(height, *rest, begun=[]):  # noqa: B006
-    """Takes a second the first time that a process calls it."""
-    time.sleep(0.0 if begun else 1.0)
-    begun.append(True)
-    toy.exact(height, *rest)
-
-
-PREPARED = dataclasses.replace(RAISING, methods=(dataclasses.replace(toy.KERNEL.methods[1], solve=_ready),))
-
-
 @numba.njit
 def _slowly_compiled(x):
     """Takes longer to compile than cells are given in the test."""

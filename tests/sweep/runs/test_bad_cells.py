@@ -102,20 +102,6 @@ def test_a_cell_that_is_stopped_in_its_last_trial_is_not_blamed(monkeypatch):
     assert not seen
 
 
-def test_what_a_new_process_does_first_is_not_taken_for_what_a_cell_takes():
-    """A cell may take half a second, and a millisecond is usual; a process takes a second before its first one."""
-    processes, seen = Processes(tall(50, "bad:PREPARED"), None), []
-    solver = processes.solver()
-    guard = Guard(solver, seen.append)
-    cell = Cells({"fall_time": np.empty(1)}, np.empty(1, np.int8), np.empty(1, np.int8))
-    guard.solve(0, cell)
-    processes.limit, processes.cost = 0.5, 1e-3
-    solver.end()
-    guard.solve(5, cell)
-    processes.end()
-    assert not seen
-
-
 def test_a_kernel_that_kills_its_parent_costs_the_cell_and_none_of_those_that_other_processes_are_at():
     found = quiet(tall(120, "bad:ORPHANED"), isolate=True, block_cells=30)
     assert heights_of(found, Status.FAILED) == [bad.ORPHANS]
