@@ -19,9 +19,6 @@ from sweep.study.model import Block, Study, study_together
 from sweep.words import as_path, did_you_mean, kind, listed
 
 KEYWORDS = 'keywords, e.g. kernel="foliot", axes={"mu": [0.1, 1.0]}, fixed={"phi0": 1.0, "a": 1.0}'
-LARGEST_TEXT = 50_000_000
-"""Bytes of a study file."""
-
 
 Given = Study | str | os.PathLike[str] | Mapping[str, Any]
 """What a study may be given as: itself, its file, its keys, or a result that came from it (a Dataset is a Mapping)."""
@@ -97,12 +94,8 @@ def _text(path: Path) -> str:
     if other := others.get(path.suffix.replace(".nc", ".h5")):
         raise SweepError(f"{path} is {other} {path}")
     try:
-        if path.is_dir():
-            raise SweepError(f"{path} is a folder; name a study file in it, e.g. {path / 'study.toml'}")
         if path.exists() and not path.is_file():
-            raise SweepError(f"{path} is no regular file; a pipe could be waited for without end")
-        if path.stat().st_size > LARGEST_TEXT:
-            raise SweepError(f"{path} is larger than {LARGEST_TEXT} bytes; keep long lists in a csv file")
+            raise SweepError(f"{path} is no file, but a folder or a pipe; name a study file, e.g. study.toml")
         text = path.read_bytes().decode("utf-8-sig")
     except FileNotFoundError:
         near = did_you_mean(path.name, [p.name for p in path.parent.glob("*.toml")])

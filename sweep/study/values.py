@@ -90,7 +90,7 @@ def axis(entry: Entry, field: Field, shares: Floats | None = None) -> Axis:
     elif form == "spacing":
         values = _spaced(entry, field, factor, shares)
     elif form == "values":
-        values = _scaled((_rows if array else _list)(listing, field), factor)
+        values = _scaled(_list(listing, field, array), factor)
     elif form == "file":
         values = _scaled(entry["file"].read(NONE, _columns, entry.folder, field, array), factor)
     for key in (key for key in ends if key in entry and form in ("values", "file")):
@@ -172,14 +172,25 @@ def _spaced(entry: Entry, field: Field, factor: Decimal | None, shares: Floats |
     return NONE
 
 
-def _list(entry: Entry, field: Field) -> Floats:
-    """A list of numbers or words; none of them if one is bad."""
+def _list(entry: Entry, field: Field, rows: bool = False) -> Floats:
+    """A list of numbers or words, or of `rows` of equal length, one for each value; nothing if one is bad."""
     found, bad = entry.value, list[Mistake]()
     if isinstance(found, str | bytes) or not isinstance(found, Sequence | np.ndarray):
         entry.wrong(f"expected a list, found {show(found)}; write e.g. [1.0, 2.0]")
         return NONE
-    if not _allowed_length(entry):
+    if not 0 < len(found) <= LARGEST_AXIS:
+        many = f"expected at most {LARGEST_AXIS} values, found {len(found)}"
+        entry.wrong(many if len(found) else "has no values; give at least one")
         return NONE
+    if rows and not all(isinstance(row, list | tuple | np.ndarray) for row in found):
+        entry.wrong("expected a list of lists, one for each cell; write e.g. [[1.0, 2.0], [1.5, 2.0]]")
+        return NONE
+    if rows:
+        lists = [_list(entry[i], field) for i in range(len(found))]
+        lengths = sorted({len(row) for row in lists})
+        if len(lengths) > 1 and lengths[0]:
+            entry.wrong(f"expected lists of equal length, found {lengths[0]} and {lengths[-1]} values")
+        return np.array(lists) if len(lengths) == 1 and lengths[0] else NONE
     if not field.choices and (isinstance(found, np.ndarray) or all(type(item) is float for item in found)):
         return np.asarray(found)
     values = np.empty(len(found))
@@ -192,27 +203,6 @@ def _list(entry: Entry, field: Field) -> Floats:
     if len(bad) > MOST_BAD_VALUES:
         entry.wrong(f"and {len(bad) - MOST_BAD_VALUES} more like these")
     return NONE if bad else values
-
-
-def _rows(entry: Entry, field: Field) -> Floats:
-    """A list of lists of equal length: a row for each value of the axis."""
-    found = entry.value
-    if not isinstance(found, list | tuple) or not all(isinstance(row, list | tuple | np.ndarray) for row in found):
-        entry.wrong("expected a list of lists, one for each cell; write e.g. [[1.0, 2.0], [1.5, 2.0]]")
-        return NONE
-    rows = [_list(entry[i], field) for i in range(len(found))] if _allowed_length(entry) else []
-    lengths = sorted({len(row) for row in rows})
-    if len(lengths) > 1 and lengths[0]:
-        entry.wrong(f"expected lists of equal length, found {lengths[0]} and {lengths[-1]} values")
-    return np.array(rows) if len(lengths) == 1 and lengths[0] else NONE
-
-
-def _allowed_length(entry: Entry) -> bool:
-    length = len(entry.value)
-    if not 0 < length <= LARGEST_AXIS:
-        many = f"expected at most {LARGEST_AXIS} values, found {length}"
-        entry.wrong(many if length else "has no values; give at least one")
-    return 0 < length <= LARGEST_AXIS
 
 
 def _columns(file: Any, folder: Path, field: Field, numbered: bool) -> Floats:

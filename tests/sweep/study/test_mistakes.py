@@ -174,8 +174,8 @@ def test_what_is_no_study_is_refused_in_one_line_that_names_the_way(tmp_path):
     path.touch()
     for given, message in (
         (None, "give one"), (3, "found 3"), ("a = 1\nb = 2", "is the text of a study"), ("a.h5", "sweep show a.h5"),
-        ("a.py", "python a.py"), ("nowhere.toml", "no such file"), ("/dev/zero", "no regular file"),
-        ("\0.toml", "cannot be read"), (tmp_path, "is a folder"),
+        ("a.py", "python a.py"), ("nowhere.toml", "no such file"), ("/dev/zero", "is no file"),
+        ("\0.toml", "cannot be read"), (tmp_path, "a folder"),
         (tmp_path / "foliot_scalling.toml", "did you mean foliot_scaling.toml?"),
         *((tmp_path / f"{name}.toml", message) for name, message in enumerate(contents.values())),
     ):  # fmt: skip
