@@ -8,6 +8,7 @@ import golden_columns as golden
 import numpy as np
 import pytest
 
+import sweep
 from kernels.catalogue import KERNELS, get
 from kernels.interface import FIRST_REFUSAL, Status
 from kernels.lanes.jit import COMPILED
@@ -313,3 +314,35 @@ def test_status_numbers_fit_their_kind():
     assert all((s.kind in ("refused", "unsolved")) == (64 <= s < 125) for s in Status)
     assert all(s.doc for s in Status)
     assert max(Status) == Status.PENDING == 127
+
+
+def run(kernel, outputs, rtol=1e-13):
+    refused = set.intersection(*(set(method.excludes) for method in kernel.methods))
+    columns = {name: values[:12] for name, values in golden.inputs(kernel.name)[0].items() if name not in refused}
+    for field in kernel.parameters:
+        if field.choices:
+            words = {float(number): word for word, number in field.choices.items()}
+            columns[field.name] = [words[value] for value in columns[field.name]]
+    needed = {dim for field in kernel.outputs if field.name in outputs for dim in field.dims}
+    along = zip(kernel.along, golden.along_of(kernel), strict=True)
+    coordinates = {field.name: values for field, values in along if field.name in needed}
+    keys = {"kernel": kernel.name, "outputs": outputs, "axes": columns, "along": coordinates}
+    return sweep.run(**keys, design="zip", rtol=rtol, progress=False)
+
+
+def rank(status):
+    """0: right to rtol; 1: less is known; 2: refused."""
+    return np.where(status >= FIRST_REFUSAL, 2, np.where(status == Status.INACCURATE, 1, 0))
+
+
+@compiled
+@pytest.mark.parametrize("name", NAMES)
+def test_an_output_asked_for_alone_is_never_worse_off_than_with_others(name):
+    kernel = get(name)
+    names = [field.name for field in kernel.outputs]
+    together = run(kernel, names)
+    for output in names:
+        alone = run(kernel, [output])
+        assert (rank(alone.status.values) <= rank(together.status.values)).all(), output
+        unbounded = [np.isposinf(ds.error_bound.values) for ds in (alone, together)]
+        assert not (unbounded[0] & ~unbounded[1]).any(), output

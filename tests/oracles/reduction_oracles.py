@@ -26,12 +26,6 @@ def hertz(squares):
     return [sqrt(s) / (2 * pi) if s > floor**2 or s > 0 else mpf(0) for s in squares]
 
 
-def chain_frequencies(J, k):
-    """Natural frequencies [Hz] of a chain."""
-    with mp.workdps(DIGITS):
-        return hertz(modes(stiffness(numbers(k)), diag(numbers(J)))[0])
-
-
 def _places(k):
     """Flexibility from each mass to ground, and 0 for the ground."""
     x = [mpf(0)]

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import reduction_oracles as oracles
+from chain_oracles import frequencies
 from columns import checked, relative_error, solve
 
 from kernels.drivetrain.reduced import DRIVETRAIN, ORDERS, REDUCTIONS
@@ -57,8 +58,7 @@ def test_the_reduced_chain_is_that_of_the_levers_to_a_few_ulp(seed, n, decades):
         for name, values in zip(("J_kept", "k_kept", "h_kept"), truth, strict=True):
             assert relative_error(outputs[name][0, :n_keep], values).max() < 2e-14, name
             assert np.isnan(outputs[name][0, n_keep:]).all()
-        frequencies = oracles.chain_frequencies(*truth[:2])
-        assert relative_error(outputs["frequency"][0, :n_keep], frequencies).max() < 1e-13
+        assert relative_error(outputs["frequency"][0, :n_keep], frequencies(*truth[:2], 60)).max() < 1e-13
 
 
 @pytest.mark.parametrize("reduction", BASES)
@@ -121,7 +121,7 @@ def test_frequencies_of_the_exact_reduction_are_those_of_the_full_chain_to_a_few
     """It has no error; also where the chain is free."""
     chain = random_chain(seed, n, decades)
     for k in (chain["k"], np.append(chain["k"][:-1], 0.0)):
-        truth = oracles.chain_frequencies(chain["J"], k)
+        truth = frequencies(chain["J"], k, 60)
         free = int(k[-1] == 0.0)
         for n_keep in {1, n // 2, n - 1}:
             outputs, status = reduced("exact", chain | {"k": k}, n_keep=n_keep, f_max=1.0)
@@ -137,7 +137,7 @@ def test_where_a_partial_system_stands_still_in_a_mode_twelve_digits_are_left_or
     """Equal masses and springs, free: mass 4 rests in a mode of its own partial frequency."""
     n = 8
     chain = {"J": np.ones(n), "k": np.append(np.ones(n - 1), 0.0), "h": np.zeros(n)}
-    truth = oracles.chain_frequencies(chain["J"], chain["k"])
+    truth = frequencies(chain["J"], chain["k"], 60)
     for n_keep in range(1, n) if COMPILED else (1,):
         outputs, status = reduced("exact", chain, n_keep=n_keep)
         assert status[0] == Status.OK

@@ -142,14 +142,6 @@ def test_a_change_point_in_decimals_is_named_and_its_angles_are_sensible(unit):
     assert np.isnan([outputs[name][0] for name in ("A0_b", "A1_e", "thd")]).all()
 
 
-@pytest.mark.parametrize("cell", [(1, 1, 1, 1), (2, 1, 2, 1), (3, 4, 7, 0), (7, 4, 3, 0), (4, 7, 3, 0)])
-def test_a_linkage_that_lies_flat_has_finite_angles(cell):
-    outputs, status = solve(POLISHER, "stable", *([float(x)] for x in cell))
-    assert status[0] == Status.CHANGE_POINT
-    for name in ("A0", "A1", "eta_plus", "eta_minus", "theta_plus", "theta_minus", "transmission_angle"):
-        assert np.isfinite(outputs[name][0]), name
-
-
 @pytest.mark.parametrize("method", ["stable", "waveform"])
 def test_a_motor_without_throw_holds_the_arm_where_the_triangle_does(method):
     outputs, status = solve(POLISHER, method, [3.0], 4.0, 5.0, 0.0)
