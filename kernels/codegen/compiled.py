@@ -103,8 +103,8 @@ def runner(scene, method):
     m = m._replace(factored=factored, solved=solved, roundings=pair.roundings)
 
     @jit_call
-    def leg(state, mode, unit, h, on, tolerance, active, errors):
-        return adaptive.to_event(m, pair, state, mode, unit, h, on, tolerance, active)
+    def leg(cell, mode, active):
+        return adaptive.to_event(m, pair, cell, mode, active)
 
     run = _driven(functions, m, leg, method)
     return Runner(scene, m, run, run, pair.order)
@@ -119,8 +119,8 @@ def _by_series(functions, m, changes=None):
         series = functions.of_series(m, order, changes)
 
         @jit_call
-        def leg(state, mode, unit, h, on, tolerance, active, errors):
-            return taylor_leg.to_event(series, state, mode, unit, h, on, tolerance, active, errors, hides, at_kink)
+        def leg(cell, mode, active):
+            return taylor_leg.to_event(series, cell, mode, active, hides, at_kink)
 
         return _driven(functions, m, leg, f"taylor_{order}", series.error)
 

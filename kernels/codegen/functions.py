@@ -7,6 +7,7 @@ They are what is special of a scene: rates, series, tangents, events; what is do
 import functools
 import hashlib
 import inspect
+import itertools
 
 from kernels.expression import stiff
 from kernels.expression.graph import DIV, HALF_SQUARE, INPUT, MUL, NUMBER, SCALED, Expression, needed
@@ -23,7 +24,7 @@ from kernels.integrate.taylor import BY_SERIES, BY_SUM
 from kernels.integrate.taylor_leg import Series
 from kernels.lanes.jit import jit_call
 from kernels.lanes.symbols import ANY, written
-from kernels.lanes.vectors import where
+from kernels.lanes.vectors import fma, where
 
 
 def cell_of(states, parameters, kinks, tells=False):
@@ -178,6 +179,21 @@ class Functions:
 
         return self.of_inputs(lost)
 
+    def _of_clocks(self):
+        """`Written.on_clock` and `Written.clocks_off`."""
+        clocks = [r.kind == NUMBER and r.args[0] == 1.0 for r in self.recorded.rates]
+
+        def on_clock(state, unit, h):
+            for u in itertools.compress(state, clocks):
+                gone_on = fma(h, unit, u) - u
+                h = where(gone_on > 0.0, gone_on / unit, h)
+            return h
+
+        def clocks_off(state, by):
+            return tuple(fma(by, u, u) if clock else u for u, clock in zip(state, clocks, strict=True))
+
+        return {"on_clock": written(on_clock), "clocks_off": written(clocks_off)}
+
     def _rates_of(self, *values):
         """The rates of expressions."""
         gradients = [[Tangents.along(self.graph, s).of(value) for s in self.states] for value in values]
@@ -266,7 +282,7 @@ class Functions:
             most_kinks=KINK_LIMIT if scene.most_kinks is None else float(scene.most_kinks), cell=cell_of(*self.size),
             roundings=ROUNDINGS,
             speeds=speeds, onto=onto, surfaces=surfaces, hiding=hiding, passable=passable,
-            deciding=deciding if any(deciding) else None, factored=None, solved=None,
+            deciding=deciding if any(deciding) else None, **self._of_clocks(), factored=None, solved=None,
         )  # fmt: skip
 
     def linear(self):

@@ -83,6 +83,7 @@ def on_dense(m, pair, mode, step, terms, which, part, seeking):
         change = magnitude(new - part)
         part = where(seeking, new, part)
         seeking = seeking & (change > 4e-16 * part)
+    part = m.on_clock(step.state, h, part)
     return part, pair.dense(m, step.state, terms, mode, h, part), slope
 
 
@@ -101,15 +102,17 @@ def next_length(pair, h, last_h, error, before):
 
 
 @jit
-def to_event(m, pair, state, mode, unit, h, on, tolerance, active):
+def to_event(m, pair, cell, mode, active):
     """Follow the active lanes until an event falls through 0, and stop there; see `taylor_leg`."""
-    h = pair.first(m, state, mode, unit, h)
+    state, unit, on, tolerance = cell.state, cell.unit, cell.on, cell.tolerance
+    h = pair.first(m, state, mode, unit, cell.h)
     moving, nothing, fired = active, active & not_(active), times(0.0, on)
     stuck, lost, blown, broken, grazing, hangs = nothing, nothing, nothing, nothing, nothing, nothing
     t, cuts, tried, last_h, last_error = 0.0 * h, 0.0 * h, 0.0 * h, h, 0.0 * h
     start, start_rates = events(m, state, mode)
     wide, reach = reached(fired, start), reached(times(0.0, state), state)
     for _ in range(STEP_LIMIT):
+        h = m.on_clock(state, unit, h)
         length = h * unit
         trial = pair.tried(m, state, mode, length)
         new, first = trial.new, trial.stages[0]

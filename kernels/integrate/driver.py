@@ -26,6 +26,9 @@ BLUR = 16.0
 BACK = 1e-9
 """Of an event's rate before a switch, that of one which rounding may be all of behind it."""
 ONE_ULP = 2.0**-52
+CLOCK_OFF = 8.0
+"""Roundings that a clock is off by from one event to the next in a shaken run: what is near an event in time hangs on
+the time that has gone by since then, of which what is left of a clock's rounding is much more than of the clock."""
 GOLDEN = 0.6180339887498949
 """What the share of the roundings that an event is missed by goes on by from one event to the next, so that no two of
 some events one behind the other are missed alike: what is between them would not show it."""
@@ -219,15 +222,18 @@ def arrived(m, cell, found, late, active, tells):
     for o, (extent, rate) in zip(found.on, m.made(state, mode), strict=True):
         blur = where(o > 0.5, ONE_ULP * extent / magnitude(rate), 0.0)
         longest = where(blur > longest, blur, longest)
-    shaken, shake = moving & (magnitude(cell.shake) > 0.0), shaken_on(cell.shake)
-    off = missed_by(m, shake) * longest
+    shakes, shake = moving & (magnitude(cell.shake) > 0.0), shaken_on(cell.shake)
+    by = missed_by(m, shake)
+    off, clocks_off = by * longest, where(by < 0.0, -CLOCK_OFF * ONE_ULP, CLOCK_OFF * ONE_ULP)
+    shaken = shakes
     if m.speeds is not None:  # a slide ends late: before its end the motion is still pressed onto it, and would stick
         slides = zip(cell.signs[:-1], found.on[1:], strict=True)
         ends = moving & any_of(tuple((magnitude(sign) < 0.5) & (on > 0.5) for sign, on in slides))
         shaken, off = shaken | ends, where(ends & (longest < math.inf), magnitude(off) + longest, off)
+    missed = tuple(where(shaken, fma(off, rate, u), u) for rate, u in zip(rates, state, strict=True))
     return cell._replace(
         shake=shake, verdict=verdict, h=found.h, on=found.on, size=reached(cell.size, found.reach),
-        state=tuple(where(shaken, fma(off, rate, u), u) for rate, u in zip(rates, state, strict=True)),
+        state=choose(shakes, m.clocks_off(missed, clocks_off), missed),
         time=where(moving, fma(found.t, cell.unit, cell.time), cell.time),
         since=where(moving, fma(found.t, cell.unit, cell.since), cell.since),
         steps=where(active, found.tried, cell.steps), before=where(active, cell.steps, cell.before),
@@ -347,7 +353,7 @@ def advance(m, leg, memory, i, tells):
     done = active & not_(active)
     for _ in range(EVENTS):
         moving = active & (cell.verdict < REFUSED)
-        found, late = leg(cell.state, mode_of(cell), cell.unit, cell.h, cell.on, cell.tolerance, moving, cell.own)
+        found, late = leg(cell, mode_of(cell), moving)
         cell, moving, rates = arrived(m, cell, found, late, active, tells)
         switches, counts, first, met = meets(m, cell, moving)
         cell, left = turned(m, cell, moving, switches, counts)

@@ -40,6 +40,8 @@ class Written(NamedTuple):
     hiding : 1 for each rate, and for each event, that can hide something
     passable : 1 for the surface, and for each kink, that does not depend on the side: a motion may pass through it
     deciding : 1 for each kink whose side decides what a switch does; None where there is none
+    on_clock : (state, unit, h) -> the step next to h > 0 by which each *clock*, a state whose rate is 1, is not rounded
+    clocks_off : (state, by) -> the state, its clocks off by so many parts of themselves
     factored, solved : None, or of a scene that may be stiff (`expression.stiff`)
     """
 
@@ -64,6 +66,8 @@ class Written(NamedTuple):
     hiding: tuple
     passable: tuple
     deciding: object
+    on_clock: object
+    clocks_off: object
     factored: object
     solved: object
 

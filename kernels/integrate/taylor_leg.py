@@ -93,7 +93,7 @@ def judged(m, pieces, facts, margins, now, trial):
 
 @jit_call
 @over_tuples
-def doubted(m, pieces, facts, margins, now, trial, unsure, fallings):
+def doubted(m, pieces, state, unit, facts, margins, now, trial, unsure, fallings):
     """Steps of the unsure lanes halved until each event is proved to fall or to stay clear; which fall."""
     stays_apart(trial)
     for _ in range(HALVINGS):
@@ -103,7 +103,7 @@ def doubted(m, pieces, facts, margins, now, trial, unsure, fallings):
         unsure = unsure & not_(proved)
         if not any_lane(unsure):
             break
-        trial = where(unsure, 0.5 * trial, trial)
+        trial = where(unsure, m.scene.on_clock(state, unit, 0.5 * trial), trial)
     return trial, unsure, fallings
 
 
@@ -156,13 +156,14 @@ def first_root(found, number, way, curve, event, facts, passed, met, span, toler
 
 
 @symbolic
-def ended(m, pieces, facts, passed, met, span, tolerance, state):
+def ended(m, pieces, facts, passed, met, span, tolerance, state, unit):
     """The end of a leg in its last step, by which event, whether only just; what fires, and others too; the states."""
     numbers = tuple(map(float, range(len(passed))))
     end, which, hangs = fold(
         first_root, (span, -1.0 - 0.0 * span, met & not_(met)), (met, span, tolerance),
         numbers, m.watched, pieces.of_events, pieces.events, facts, passed,
     )  # fmt: skip
+    end = m.scene.on_clock(state, unit, end)
     own = tuple(met & (which > j - 0.5) & (which < j + 0.5) for j in numbers)
     near = fma(SAME, tolerance, ROUNDING)
     beside = tuple(
@@ -190,16 +191,12 @@ def shorter(h, limit):
 
 @jit
 @over_tuples
-def to_event(m, state, mode, unit, h, on, tolerance, active, errors, hides, at_kink):
+def to_event(m, cell, mode, active, hides, at_kink):
     """Follow the motion of the active lanes until an event falls through 0, and stop there.
 
     Parameters
     ----------
-    unit : of time, in seconds
-    h : first guess of a step, in units
-    on : for each event 1 where the motion starts on it, else 0
-    tolerance : of a step, relative to each state's own size
-    errors : `Errors` at the start of the leg, or ()
+    cell : `Cell` at the start of the leg; its h is the first guess of a step
     hides : None where neither rates nor events can hide anything
     at_kink : None, or the entry of a tuple of the kink whose u is the rate of the surface
 
@@ -208,6 +205,7 @@ def to_event(m, state, mode, unit, h, on, tolerance, active, errors, hides, at_k
     leg : Leg
     late : `carried.Late`, or ()
     """
+    state, unit, h, on, tolerance, errors = cell.state, cell.unit, cell.h, cell.on, cell.tolerance, cell.own
     moving, t, span, tried = active, 0.0 * h, h, 0.0 * h
     nothing = active & not_(active)
     passed = tuple(nothing for _ in on)
@@ -229,6 +227,7 @@ def to_event(m, state, mode, unit, h, on, tolerance, active, errors, hides, at_k
         h = fold(shorter, h, (), limits)
         if hides is not None:
             h = where(h < longest, h, longest)
+        h = m.scene.on_clock(state, unit, h)
         power_h = natural_power(h, m.order - 1)
         fine = all_of(tuple(keeps(h, power_h, u, allowed) for u in pieces.controlled))
         trial = h
@@ -256,7 +255,7 @@ def to_event(m, state, mode, unit, h, on, tolerance, active, errors, hides, at_k
             clears, fallings = by_kink(facts, now, clears, fallings, at_kink)
         unsure = steps & not_(all_of(tuple(x | y for x, y in zip(clears, fallings, strict=True))))
         if any_lane(unsure):
-            trial, unsure, fallings = doubted(m, pieces, facts, margins, now, trial, unsure, fallings)
+            trial, unsure, fallings = doubted(m, pieces, state, unit, facts, margins, now, trial, unsure, fallings)
         furthest = where(trial > 0.0, BEYOND * trial, furthest)
         broken = broken | (unsure & not_(power_h < FAR))  # it goes off to where no event is
         grazing = grazing | (unsure & not_(broken))
@@ -285,7 +284,7 @@ def to_event(m, state, mode, unit, h, on, tolerance, active, errors, hides, at_k
             break
     lost = moving
     met = active & not_(lost | stuck | broken | grazing)
-    end, which, hangs, fires, others, ends = ended(m, pieces, facts, passed, met, span, tolerance, state)
+    end, which, hangs, fires, others, ends = ended(m, pieces, facts, passed, met, span, tolerance, state, unit)
     t = where(met, t + end, t)
     h = where(met & (t > 0.0) & (h > LONGEST * t), LONGEST * t, h)
     late = carried.at_event(
