@@ -64,56 +64,6 @@ class Expression:
         """Whether no input is in it."""
         return self.kind != INPUT and all(a.of_numbers for a in self.args if isinstance(a, Expression))
 
-    def __add__(self, other):
-        return self.graph.add(self, other)
-
-    def __sub__(self, other):
-        return self.graph.add(self, -self.graph.of(other))
-
-    def __rsub__(self, other):
-        return self.graph.add(other, -self)
-
-    def __mul__(self, other):
-        return self.graph.multiply(self, other)
-
-    def __truediv__(self, other):
-        return self.graph.divide(self, other)
-
-    def __rtruediv__(self, other):
-        return self.graph.divide(other, self)
-
-    def __mod__(self, other):
-        return mod(self, other)
-
-    def __rmod__(self, other):
-        return mod(other, self)
-
-    def __floordiv__(self, other):
-        return floor(self / other)
-
-    def __rfloordiv__(self, other):
-        return floor(other / self)
-
-    def __floor__(self):
-        return floor(self)
-
-    def __pow__(self, exponent):
-        return self.graph.power(self, exponent)
-
-    def __rpow__(self, base):
-        return self.graph.power(base, self)
-
-    def __neg__(self):
-        return self.graph.multiply(-1.0, self)
-
-    def __pos__(self):
-        return self
-
-    def __abs__(self):
-        return self.graph.magnitude(self)
-
-    __radd__, __rmul__ = __add__, __mul__
-
     def __repr__(self):
         return self.args[0] if self.kind == INPUT else f"<an expression: {self.kind}>"
 
@@ -124,18 +74,6 @@ class Expression:
 
     def __bool__(self):
         raise SceneError(f"it branches on a value, which is not recorded; {INSTEAD}")
-
-    def __gt__(self, other):
-        return Comparison(self - other)
-
-    def __lt__(self, other):
-        return Comparison(other - self)
-
-    def __ge__(self, other):
-        return Comparison(other - self, negated=True)
-
-    def __le__(self, other):
-        return Comparison(self - other, negated=True)
 
     def __float__(self):
         raise SceneError("it calls a function of plain numbers (a cast, or math's) with a value; " + FUNCTIONS)
@@ -153,6 +91,32 @@ class Expression:
         if known is None or named:
             raise SceneError(f"numpy's {function.__name__} is not recorded; {FUNCTIONS}")
         return known(*arguments)
+
+
+for _name, _operator in {
+    "add": lambda x, y: x.graph.add(x, y),
+    "sub": lambda x, y: x.graph.add(x, -x.graph.of(y)),
+    "rsub": lambda x, y: x.graph.add(y, -x),
+    "mul": lambda x, y: x.graph.multiply(x, y),
+    "truediv": lambda x, y: x.graph.divide(x, y),
+    "rtruediv": lambda x, y: x.graph.divide(y, x),
+    "mod": lambda x, y: mod(x, y),
+    "rmod": lambda x, y: mod(y, x),
+    "floordiv": lambda x, y: floor(x / y),
+    "rfloordiv": lambda x, y: floor(y / x),
+    "pow": lambda x, y: x.graph.power(x, y),
+    "rpow": lambda x, y: x.graph.power(y, x),
+    "neg": lambda x: x.graph.multiply(-1.0, x),
+    "pos": lambda x: x,
+    "abs": lambda x: x.graph.magnitude(x),
+    "floor": lambda x: floor(x),
+    "gt": lambda x, y: Comparison(x - y),
+    "lt": lambda x, y: Comparison(y - x),
+    "ge": lambda x, y: Comparison(y - x, negated=True),
+    "le": lambda x, y: Comparison(x - y, negated=True),
+}.items():
+    setattr(Expression, f"__{_name}__", _operator)
+Expression.__radd__, Expression.__rmul__ = Expression.__add__, Expression.__mul__
 
 
 class Graph:
