@@ -93,10 +93,10 @@ def runner(scene, method):
         m = m._replace(cell=m.cell._replace(own=fixed_step.nothing_yet(m.cell.state)))
 
         @jit_call
-        def of_lanes(memory, i):
-            return fixed_step.advance(m, memory, i)
+        def leg(cell, mode, active):
+            return fixed_step.to_event(m, cell, mode, active)
 
-        run = running(functions, of_lanes, "fixed")
+        run = _driven(functions, m, leg, "fixed")
         return Runner(scene, m, run, run)
     pair = kept_on_kink(PAIRS[method]) if scene.slides else PAIRS[method]
     factored, solved = functions.linear()

@@ -53,6 +53,7 @@ def followed(runner, method, columns, step, location, substeps=1.0):
         cells = location == one
         table = fresh(len(flat(cell)), [np.broadcast_to(c, step.shape)[cells] for c in (*columns, TOLERANCE)])
         table[:, row["h"]] = step[cells]
+        table[:, row["own"] + states] = np.inf
         table[:, -4:] = GRAZING, METHODS.index(method), one, substeps
         to_the_end(runner.low, table)
         results[:, cells] = table[:, shown].T

@@ -8,13 +8,12 @@ bracket. A step within which the rates may hide more
 than the tolerance (`expression.hidden`) is not taken: the points that an error is estimated from may miss it.
 """
 
-from kernels.integrate.events import cubic_root, of_event
-from kernels.integrate.fixed_step import dip, finite, first_event, passed_another
+from kernels.integrate.events import cubic_root, dip, finite, first_event, met_at, of_event, passed_another
 from kernels.integrate.pairs import at_least, of_size
 from kernels.integrate.records import Leg, Step
 from kernels.integrate.steps import ONE, events
 from kernels.integrate.taylor import COME_UP, next_step
-from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.jit import jit
 from kernels.lanes.symbols import symbolic
 from kernels.lanes.tuples import after, boxes, marks, reached, times
 from kernels.lanes.vectors import any_lane, choose, fma, magnitude, not_, where
@@ -27,7 +26,6 @@ SHRINK, GROW = 0.2, 5.0
 FORGOTTEN = 1e-4
 """The error of a step over the tolerance below which it says nothing of how errors grow: events have cut the step."""
 CUTS = 60
-ROOT_LIMIT = 60
 CLOSE = 30.0
 """Tolerances within which a turning point of an event is too close to 0 to be told from a crossing."""
 SUNK, ROUNDED = 0.01, 1e-11
@@ -65,26 +63,6 @@ def doubted(m, step, box, mode, on, cuts, margins, tolerance):
         doubt = doubt | unsure
         near = near | (unsure & (on[j] < 0.5) & (magnitude(step.end[j]) <= margin))
     return doubt, near
-
-
-@jit_call
-def on_dense(m, pair, mode, step, terms, which, part, seeking):
-    """Where in the step the event fires, the state there and the event's rate, by the dense output."""
-    h = step.h
-    low, high, slope = 0.0 * h, 0.0 * h + 1.0, 0.0 * h
-    for _ in range(ROOT_LIMIT):
-        if not any_lane(seeking):
-            break
-        values, slopes = events(m, pair.dense(m, step.state, terms, mode, h, part), mode)
-        value, slope = of_event(values, which), where(seeking, of_event(slopes, which), slope)
-        low, high = where(value > 0.0, part, low), where(value > 0.0, high, part)
-        new = part - value / (slope * h)
-        new = where((new >= low) & (new <= high), new, 0.5 * (low + high))
-        change = magnitude(new - part)
-        part = where(seeking, new, part)
-        seeking = seeking & (change > 4e-16 * part)
-    part = m.on_clock(step.state, h, part)
-    return part, pair.dense(m, step.state, terms, mode, h, part), slope
 
 
 @symbolic
@@ -145,7 +123,7 @@ def to_event(m, pair, cell, mode, active):
             curved = seeking & (above > 0.0)
             terms = pair.series(m, state, trial, mode, length)
             part = where(curved, cubic_root(above, below, length * rate, length * last_rate, curved), 0.0)
-            part, found, slope = on_dense(m, pair, mode, step, terms, which, part, curved)
+            part, found, slope, _ = met_at(m, pair.dense, mode, step, terms, which, part, 4e-16, curved)
             part, found = where(curved, part, 0.0), choose(curved, found, state)
             vague = of_size(state, new, first, length, pair.vague(m, state, terms, mode, length, part))
             other = curved & (part < 0.999999) & (part > 0.0)
@@ -181,5 +159,5 @@ def to_event(m, pair, cell, mode, active):
             break
     lost = lost | moving
     return Leg(
-        state, t, h, fired, stuck, lost & not_(blown), broken | (lost & blown), grazing, hangs, tried, reach,
+        state, t, h, fired, stuck, lost & not_(blown), broken | (lost & blown), grazing, hangs, nothing, tried, reach,
     ), ()  # fmt: skip

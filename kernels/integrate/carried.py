@@ -260,9 +260,9 @@ def started(tells, errors, state):
 
 @symbolic
 def later(tells, errors, at_event, unit):
-    """The errors at the end of a leg."""
+    """The errors at the end of a leg; of another method what that carries along."""
     if tells is None:
-        return errors
+        return at_event
     late, spread_late = at_event.late, at_event.spread_late
     return errors._replace(
         late=fma(late, unit, errors.late),

@@ -210,7 +210,7 @@ def onto_kinks(m, cell, left, lanes):
 @symbolic
 def arrived(m, cell, found, late, active, tells):
     """The cell at the end of a leg; which lanes are on an event; the rates there, before rounding misses it."""
-    verdict = raised(cell.verdict, found.hangs | found.grazing, GRAZING)
+    verdict = raised(raised(cell.verdict, found.hangs | found.grazing, GRAZING), found.vague, INACCURATE)
     refused = where(found.stuck, STICKS, where(found.broken, OUT_OF_RANGE, verdict))
     verdict = where(found.lost, STEP_LIMIT, refused)
     if m.speeds is not None:  # lanes whose slide has no end rest, as far as can be told

@@ -1,15 +1,18 @@
-"""Where in a step an event fires, and the state there: four ways, generic in one cell or lanes.
+"""Which event fires in a step, where, and the state there; generic in one cell or lanes.
 
-An event is known at both ends of the step [0, h] by its value (e0 > 0 >= e1) and its rate (d0, d1). `linear` and
-`hermite` find the part of the step by a line or by the cubic through all four, and take a step of just that length.
-`root` is exact to the method: each trial is a step of its own from the same start, which is the method's continuous
-extension. `none` takes the event to fire at the end of the step: the fault to be shown.
+An event is known at both ends of the step [0, h] by its value (e0 > 0 >= e1) and its rate (d0, d1). At a fixed step
+`linear` and `hermite` find the part of the step by a line or by the cubic through all four, and take a step of just
+that length. `root` is exact to the method: each trial is a step of its own from the same start, which is the method's
+continuous extension. `none` takes the event to fire at the end of the step: the fault to be shown.
 """
+
+import math
 
 from kernels.integrate.steps import dop853, dopri5, euler, events, moreau, rk4, semi_implicit, verlet
 from kernels.lanes.jit import jit_call
 from kernels.lanes.symbols import symbolic
-from kernels.lanes.vectors import any_lane, choose, fma, magnitude, not_, sqrt, where
+from kernels.lanes.tuples import total
+from kernels.lanes.vectors import any_lane, fma, magnitude, not_, sqrt, where
 
 METHODS = ("euler", "semi_implicit", "verlet", "rk4", "dopri5", "dop853", "moreau")
 EULER, SEMI_IMPLICIT, VERLET, RK4, DOPRI5, DOP853, MOREAU = range(7)
@@ -20,8 +23,8 @@ NONE, LINEAR, HERMITE, ROOT = range(4)
 LOCATIONS = {"none": NONE, "linear": LINEAR, "hermite": HERMITE, "root": ROOT}
 
 ROOT_LIMIT = 60
-SETTLED = 1e-11
-"""Change of the part of a step after which the event is where the next trial ends."""
+LOW = 0.25
+"""Of the smaller end: an event that the cubic takes below this share of it is looked at where it is lowest."""
 
 
 @jit_call
@@ -44,6 +47,12 @@ def leap(m, scheme, state, mode, h):
         else:
             state = moreau(m, state, mode, substep)
     return state
+
+
+@jit_call
+def leapt(m, state, scheme, mode, h, part):
+    """The state after that part of a step, as a step of its own."""
+    return leap(m, scheme, state, mode, part * h)
 
 
 @symbolic
@@ -92,29 +101,68 @@ def of_event(values, which):
 
 
 @jit_call
-def shortened(m, scheme, mode, step, which, first, seeking):
-    """The step that ends on the event: part of h, state, trials, and whether it is not found.
+def met_at(m, state_at, mode, step, terms, which, part, enough, seeking):
+    """Where in the step the event fires, by Newton's method in a bracket; the state there, the event's rate, trials.
 
-    Regula falsi with halving (Illinois): the event's rate is not the slope of its value over the step's length.
+    `state_at` : (m, state, terms, mode, h, part) -> the state at that part of the step
+    `enough` : the relative change of the part at which the search ends
     """
     h = step.h
-    low, high, part, trials = 0.0 * h, 0.0 * h + 1.0, first, 0.0 * h
-    above, below = of_event(step.start, which), of_event(step.end, which)
-    new = leap(m, scheme, step.state, mode, part * h)
-    settled, last = seeking & not_(seeking), 0.0 * h
+    low, high, slope, trials = 0.0 * h, 0.0 * h + 1.0, 0.0 * h, 0.0 * h + 1.0
     for _ in range(ROOT_LIMIT):
-        trials = where(seeking, trials + 1.0, trials)
-        seeking = seeking & not_(settled)
         if not any_lane(seeking):
             break
-        value = of_event(events(m, new, mode)[0], which)
-        before = value > 0.0
-        above = where(before, value, where(last < 0.0, 0.5 * above, above))
-        below = where(before, where(last > 0.0, 0.5 * below, below), value)
-        low, high = where(before, part, low), where(before, high, part)
-        last = where(before, 1.0, -1.0)
-        guess = fma(high - low, above / (above - below), low)
-        settled = (magnitude(guess - part) <= SETTLED) | (magnitude(value) <= 0.0)
-        part = where(seeking, guess, part)
-        new = choose(seeking, leap(m, scheme, step.state, mode, part * h), new)
-    return part, new, trials, seeking
+        values, slopes = events(m, state_at(m, step.state, terms, mode, h, part), mode)
+        value, slope = of_event(values, which), where(seeking, of_event(slopes, which), slope)
+        low, high = where(value > 0.0, part, low), where(value > 0.0, high, part)
+        new = part - value / (slope * h)
+        new = where((new >= low) & (new <= high), new, 0.5 * (low + high))
+        change = magnitude(new - part)
+        part, trials = where(seeking, new, part), where(seeking, trials + 1.0, trials)
+        seeking = seeking & (change > enough * part)
+    part = m.on_clock(step.state, h, part)
+    return part, state_at(m, step.state, terms, mode, h, part), slope, trials
+
+
+@symbolic
+def first_event(step, on, natural):
+    """The event passed first in a step, by the line between the ends; -1 where none is.
+
+    With `natural`, 1, only the switch counts, and not while it still rises from below.
+    """
+    which, earliest = 0.0 * step.start[0] - 1.0, 0.0 * step.start[0] + math.inf
+    for j, (start, end) in enumerate(zip(step.start, step.end, strict=True)):
+        part = where(start > 0.0, start / (start - end), 0.0)
+        passed = (end <= 0.0) & (part < earliest)
+        rising = (on[j] > 0.5) & (step.end_rates[j] > 0.0)
+        passed = passed & ((natural < 0.5) | (not_(rising) if j == 0 else natural < 0.5))
+        which, earliest = where(passed, float(j), which), where(passed, part, earliest)
+    return which
+
+
+@symbolic
+def dip(step):
+    """Where in the step an event that ends above 0 may have been below it; 0 where none was."""
+    at = 0.0 * step.h
+    for start, end, first, last in zip(step.start, step.end, step.start_rates, step.end_rates, strict=True):
+        turns = (start > 0.0) & (end > 0.0) & (first < 0.0) & (last > 0.0)
+        s, low = lowest(start, end, step.h * first, step.h * last)
+        deep = turns & (low < LOW * where(start < end, start, end)) & (s > 1e-3) & (s < 0.999)
+        at = where(deep & not_((at > 0.0) & (at < s)), s, at)
+    return at
+
+
+@symbolic
+def passed_another(values, which, on):
+    """Whether another event than this one is behind."""
+    other = which < -math.inf
+    for j, value in enumerate(values):
+        own = (which > j - 0.5) & (which < j + 0.5)
+        other = other | ((value < 0.0) & not_(own | (on[j] > 0.5)))
+    return other
+
+
+@symbolic
+def finite(state):
+    """Whether every entry is a number."""
+    return total(tuple(magnitude(u) for u in state)) < math.inf

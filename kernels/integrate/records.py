@@ -168,6 +168,7 @@ class Leg(NamedTuple):
     on : 1 for the event that fired, and for what fell with it
     stuck, lost, broken : pressed on what it started on; not there within limits; numbers that are none
     grazing, hangs : neither met nor missed for sure; met, but only just
+    vague : the rates may have hidden something
     tried : steps
     reach : the largest magnitude of each state on the way
     """
@@ -181,5 +182,6 @@ class Leg(NamedTuple):
     broken: bool
     grazing: bool
     hangs: bool
+    vague: bool
     tried: float
     reach: tuple

@@ -292,4 +292,4 @@ def to_event(m, cell, mode, active, hides, at_kink):
     )
     reach = choose(met, reached(reach, ends), reach)
     fired = tuple(where(x, 1.0, 0.0) for x in fires)
-    return Leg(ends, t, h, fired, stuck, lost, broken, grazing, hangs, tried, reach), late
+    return Leg(ends, t, h, fired, stuck, lost, broken, grazing, hangs, nothing, tried, reach), late
