@@ -207,7 +207,7 @@ def _strong(scene, speeds):
         1/F^2 - E^2/B^2 = ((1 - E) F + M)(E F + B)/(F B)^2,  for each term with its own power of E.
     """
     rho, n, e = scene.rho, scene.n, scene.e
-    _, _, _, _, _, F1, _, a, b, _, _, (lost, m0, m1, m2) = speeds
+    F1, a, b, (lost, m0, m1, m2) = speeds.F1, speeds.a, speeds.b, speeds.terms
     E = magnitude(e)
     log_E = log(E)
     root, root_n = sqrt(E), exp(0.5 * n * log_E)  # sqrt(E), E^(n/2)
@@ -252,7 +252,8 @@ def _weak(scene, terminal, speeds):
     integrals, where their integrands are infinitely steep at weak drive and their ratio is not.
     """
     rho, n, e, (_, D, G) = scene.rho, scene.n, scene.e, terminal
-    _, _, z, far, near, F1, _, _, b, kept, power, _ = speeds
+    z, far, near, F1 = speeds.z, speeds.far, speeds.near, speeds.F1
+    b, kept, power = speeds.b, speeds.kept, speeds.power
     lost, m0, m1, m2 = _leg(scene, D * far, b)
     _, _, m1_D, m2_G = _leg(scene, far, power)
     K = fma(n, G, D)
