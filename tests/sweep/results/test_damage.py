@@ -15,9 +15,10 @@ from hypothesis import strategies as st
 from running import flip, interrupted, kept, keys, place, quiet, tall
 
 import sweep
+from kernels.interface import Status
 from sweep.cli import main
 from sweep.file.reading import StoredFile
-from sweep.file.store import unfinished_of
+from sweep.file.store import Store, unfinished_of
 
 BLOCK, CELLS = 11, 33
 PIECES = st.fixed_dictionaries({}, optional={"v0": keys(3), "height": keys(11), "phase": keys(3)})
@@ -267,6 +268,20 @@ def test_a_damaged_result_is_read_once_before_it_is_repaired(tmp_path, monkeypat
     assert places.count(healthy) == 1
     monkeypatch.undo()
     assert sweep.verify(path).whole
+
+
+def test_a_repair_that_is_interrupted_is_unfinished_and_continues(copy, monkeypatch):
+    harm(copy, "fall_time", 17)
+    with monkeypatch.context() as patch:
+        patch.setattr(Store, "put", lambda *words: 1 / 0)
+        with pytest.raises(sweep.SweepError, match="ZeroDivisionError"):
+            quiet(study(), copy, repair=True)
+    with sweep.open_result(copy) as found:
+        assert "end" not in found.attrs
+        pending = np.flatnonzero(found.status.values.ravel() == Status.PENDING)
+        assert pending.tolist() == list(range(BLOCK, 2 * BLOCK))
+    quiet(study(), copy).close()
+    assert sweep.verify(copy).whole
 
 
 @pytest.mark.parametrize("kind", ["cells", "summary"])
