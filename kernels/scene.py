@@ -55,7 +55,7 @@ from kernels.expression.graph import (
     tanh,
     where,
 )
-from kernels.interface import Field, Kernel, Method, OnColumns, Status
+from kernels.interface import FIRST_REFUSAL, Field, Kernel, Method, OnColumns, Status
 from kernels.lanes.wiring import signed
 
 __all__ = [
@@ -136,6 +136,8 @@ class SceneParts(TypedDict, total=False):
     surface: Functions | None
     switch: Functions | None
     start_time: Function | float | None
+    source: str
+    example: Mapping[str, float] | None
 
 
 def scene_kernel(
@@ -173,10 +175,10 @@ def scene_kernel(
     SceneError
         Where the functions ask for what is not there, or do what cannot be recorded.
     """
-    scene = scene_of(
+    scene = scene_of(SceneParts(
         name=name, doc=doc, states=states, parameters=parameters, rates=rates, start=start, surface=surface,
         switch=switch, start_time=start_time,
-    )  # fmt: skip
+    ))  # fmt: skip
     fields, outputs = (*parameters, flips_field(40.0, MOST_FLIPS)), (*TIMES, *states)
     return Kernel(
         name=name,
@@ -197,26 +199,16 @@ TIMES = (
 """The first outputs of every scene."""
 
 
-def scene_of(
-    *,
-    name: str,
-    doc: str,
-    states: Sequence[Field],
-    parameters: Sequence[Field],
-    rates: Function,
-    start: Function,
-    surface: Functions | None = None,
-    switch: Functions | None = None,
-    start_time: Function | float | None = None,
-) -> Scene:
+def scene_of(parts: SceneParts) -> Scene:
     """The scene of states and parameters that are given as fields; the time is its last state if it is asked for."""
-    of_states, of_parameters = (tuple(field.name for field in fields) for fields in (states, parameters))
-    scene = Scene(name, doc, of_states, of_parameters, rates, surface, start, switch)
-    functions = (rates, *named_functions(surface).values(), *named_functions(switch).values())
-    if asks_for_time(functions, (*of_states, *of_parameters)):
-        return replace(scene, states=(*of_states, "t"), start_time=0.0 if start_time is None else start_time)
+    states, parameters = (tuple(field.name for field in parts[key]) for key in ("states", "parameters"))
+    surface, switch, start_time = parts.get("surface"), parts.get("switch"), parts.get("start_time")
+    scene = Scene(parts["name"], parts["doc"], states, parameters, parts["rates"], surface, parts["start"], switch)
+    functions = (scene.rates, *named_functions(surface).values(), *named_functions(switch).values())
+    if asks_for_time(functions, (*states, *parameters)):
+        return replace(scene, states=(*states, "t"), start_time=0.0 if start_time is None else start_time)
     if start_time is not None:
-        raise SceneError(f"start_time of the scene {name}: none of its functions asks for the time t")
+        raise SceneError(f"start_time of the scene {scene.name}: none of its functions asks for the time t")
     return scene
 
 
@@ -256,8 +248,63 @@ def _methods(scene: Scene, parameters: list[str], outputs: list[str]) -> tuple[M
     return tuple(map(method, docs))
 
 
-def limits_check(fields: Sequence[Field]) -> OnColumns:
-    """BAD_INPUT for what is NaN, infinite or outside its limits, and for a number of switches that is not whole."""
+def estimating_kernel(
+    parts: SceneParts,
+    parameters: Sequence[Field],
+    outputs: Sequence[Field],
+    along: Sequence[Field],
+    docs: Mapping[str, str],
+    solved: Function,
+    check: OnColumns | None = None,
+) -> Kernel:
+    """A kernel of a scene by methods that know afterwards what their values are right to.
+
+    Parameters
+    ----------
+    along : one coordinate, whose values have to rise, or none
+    docs : {method: a line about it}
+    solved : (method, columns of parameters, rtol, values along, names of outputs that are asked for) -> values of each
+        output, (n_cells,) or (n_values, n_cells); error; status
+    check : further refusals, of cells within their limits
+    """
+    count, names = len(parameters), [f.name for f in outputs]
+
+    def method(name: str) -> Method:
+        def solve(*columns: Any) -> None:
+            rtol, (*values, asked) = columns[count], columns[count + 1 : count + 2 + len(along)]
+            *found, error, status = columns[count + 2 + len(along) :]
+            if not len(status):
+                return
+            if any(not (len(points) and (np.diff(points) > 0.0).all()) for points in values):
+                status[:], error[:] = Status.BAD_INPUT, math.nan
+                return
+            wanted = {output for output, one in zip(names, asked, strict=True) if one}
+            with compiling(parts["name"], name):
+                rows, error[:], status[:] = solved(name, columns[:count], rtol, *(values or [np.empty(0)]), wanted)
+            for column, row in zip(found, rows, strict=True):
+                column[:] = np.where(status >= FIRST_REFUSAL, np.nan, row).T
+
+        columns = [*(f.name for f in parameters), "rtol", *(f.name for f in along), "asked", *names, "error", "status"]
+        return Method(name, docs[name], signed(solve, columns), estimates=True)
+
+    return Kernel(
+        name=parts["name"],
+        doc=parts["doc"],
+        source=parts.get("source", "a study's own"),
+        parameters=tuple(parameters),
+        outputs=tuple(outputs),
+        check=limits_check(parameters, check),
+        methods=tuple(map(method, docs)),
+        along=tuple(along),
+        example=dict(parts.get("example") or {}),
+    )
+
+
+def limits_check(fields: Sequence[Field], further: OnColumns | None = None) -> OnColumns:
+    """BAD_INPUT for what is NaN, infinite or outside its limits, and for a number of switches that is not whole.
+
+    `further` writes into the status what else is refused.
+    """
 
     def check(*columns: Any) -> None:
         *values, status = columns
@@ -267,5 +314,7 @@ def limits_check(fields: Sequence[Field]) -> OnColumns:
             if f.integer:
                 good &= value == np.floor(value)
         status[...] = np.where(good, Status.OK, Status.BAD_INPUT)
+        if further:
+            further(*columns)
 
     return signed(check, [*(f.name for f in fields), "status"])

@@ -19,7 +19,7 @@ from kernels.expression.graph import INPUT
 from kernels.integrate.events import LOCATIONS, METHODS
 from kernels.interface import Field, Kernel, Method, Status
 from kernels.lanes.wiring import signed
-from kernels.scene import TIMES, Function, Scene, SceneError, flips_field, limits_check, scene_of
+from kernels.scene import TIMES, Function, Scene, SceneError, SceneParts, flips_field, limits_check, scene_of
 
 __all__ = ["METHODS", "stepped_kernel", "stepping_fields", "stepping_methods"]
 
@@ -129,10 +129,10 @@ def stepped_kernel(
     """
     if not callable(surface):
         raise SceneError(f"the scene {name}: at a fixed step there is one surface")
-    scene = scene_of(
+    scene = scene_of(SceneParts(
         name=name, doc=doc, states=states, parameters=parameters, rates=rates, surface=surface, start=start,
         switch=switch, start_time=start_time,
-    )  # fmt: skip
+    ))  # fmt: skip
     fields, outputs = (*parameters, *stepping_fields()), (*TIMES, *states, *COST)
     return Kernel(
         name=name,

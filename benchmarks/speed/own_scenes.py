@@ -178,7 +178,7 @@ def worst(found, truth):
 
 def compare(scene, judged, tolerances):
     """Prints cells per second, ratios and errors."""
-    one, columns = runner(scene_of(**scene, switch=None), "taylor"), cells(scene, CELLS)
+    one, columns = runner(scene_of(scene), "taylor"), cells(scene, CELLS)
     truth = theirs(Heyoka(scene, 1e-19, np.longdouble), columns, judged, JUDGED)[1]
     for their, our in tolerances:
         follower = Heyoka(scene, their)

@@ -8,9 +8,6 @@ import numpy as np
 ROUNDS = 60
 """Of corrections of all roots of a polynomial: simple ones settle in ten, double ones to half of their digits."""
 
-WIDE = 8.0
-"""Bounds of the roots, from within which they are looked for: the size of a matrix hangs on units, and may be huge."""
-
 
 def times(A, B):
     """The product of matrices (n, m, cells) and (m, k, cells)."""
@@ -22,23 +19,17 @@ def times(A, B):
 
 def solved(A, B):
     """The solution X (n, m, cells) of A X = B, by the largest pivots; NaN or infinite where there is none."""
-    A, B, n = A.copy(), B.copy(), len(A)
+    n, rows = len(A), np.arange(len(A))[:, None]
+    M = np.concatenate([A, B], axis=1)
     for k in range(n):
-        best = k + np.argmax(abs(A[k:, k]), axis=0)
-        for M in (A, B):
-            rows = np.broadcast_to(best, (1, *M.shape[1:])).copy()
-            pivots, first = np.take_along_axis(M, rows, 0), M[k : k + 1].copy()
-            np.put_along_axis(M, rows, first, 0)
-            M[k] = pivots[0]
-        for r in range(k + 1, n):
-            factor = A[r, k] / A[k, k]
-            A[r, k:] = A[r, k:] - factor * A[k, k:]
-            B[r] = B[r] - factor * B[k]
-    for k in range(n - 1, -1, -1):
-        for c in range(k + 1, n):
-            B[k] = B[k] - A[k, c] * B[c]
-        B[k] = B[k] / A[k, k]
-    return B
+        best = k + np.argmax(abs(M[k:, k]), axis=0)
+        order = np.where(rows == k, best, np.where(rows == best, k, rows))
+        M = np.take_along_axis(M, order[:, None], 0)
+        M[k] = M[k] / M[k, k]
+        for r in range(n):
+            if r != k:
+                M[r] = M[r] - M[r, k] * M[k]
+    return M[:, n:]
 
 
 def most(A):
@@ -47,15 +38,13 @@ def most(A):
 
 
 def identity(n, cells):
-    return np.broadcast_to(np.eye(n)[:, :, None], (n, n, cells)).copy()
+    return np.broadcast_to(np.eye(n)[:, :, None], (n, n, cells))
 
 
 def eigenvalues(A, *others):
     """Real parts and sizes of imaginary ones (n, cells), the largest first; and what they differ by from the others'.
 
-    Roots of the characteristic polynomial. Its coefficients are those of Faddeev and Le Verrier, c_k = -trace(A M_k)/k,
-    M_(k+1) = A M_k + c_k, good for the few states that a scene has; its roots are found at once by the corrections of
-    Durand and Kerner. The differences are sums, over other matrices, of distances to the next root of each.
+    The differences are sums, over other matrices, of distances to the next root of each.
     """
     real, imaginary = _roots(A)
     squares, unsure = real * real + imaginary * imaginary, 0.0 * real
@@ -76,22 +65,27 @@ def largest(real, imaginary):
 
 
 def _roots(A):
-    """Real and imaginary parts of the eigenvalues, in no order."""
-    n, cells = len(A), A.shape[-1]
-    M, coefficients = identity(n, cells), [np.ones(cells)]
+    """Real and imaginary parts of the eigenvalues, in no order: the roots of the characteristic polynomial.
+
+    Its coefficients are those of Faddeev and Le Verrier, c_k = -trace(A M_k)/k, M_(k+1) = A M_k + c_k, good for the few
+    states that a scene has; its roots are found at once by the corrections of Durand and Kerner, from within a bound
+    of Fujiwara's, a power of two, whatever the units of the states.
+    """
+    n, one = len(A), identity(len(A), A.shape[-1])
+    M, coefficients, bound = one, [np.ones(A.shape[-1])], np.full(A.shape[-1], 1e-300)
     for k in range(1, n + 1):
         AM = times(A, M)
-        coefficients.append(-sum(AM[i, i] for i in range(n)) / k)
-        M = AM + coefficients[-1] * identity(n, cells)
-    norm = np.sqrt(sum(A[i, j] * A[i, j] for i in range(n) for j in range(n)))
-    size = np.maximum(np.fmin(norm, WIDE * _bound(coefficients)), 1e-300)
-    points = [(1.0, 0.0)]  # where they are looked for first: powers of a number of no symmetry
-    for _ in range(n - 1):
-        points.append(_product(*points[-1], 0.4, 0.9))
-    real, imaginary = (np.array([size * x[k] for x in points[:n]]).reshape(n, cells) for k in (0, 1))
+        c = -sum(AM[i, i] for i in range(n)) / k
+        bound = np.maximum(bound, np.where(c == 0.0, 0.0, np.ldexp(2.0, -(-np.frexp(c)[1] // k))))
+        M = AM + c * one
+        coefficients.append(c)
+    (real, imaginary), start = np.empty((2, *A.shape[1:])), (1.0, 0.0)
+    for j in range(n):  # powers of a number of no symmetry
+        real[j], imaginary[j] = start[0] * bound, start[1] * bound
+        start = _product(*start, 0.4, 0.9)
     for _ in range(ROUNDS if n > 1 else 1):
         for j in range(n):
-            value = coefficients[0], 0.0 * size
+            value = coefficients[0], 0.0 * bound
             for c in coefficients[1:]:
                 x, y = _product(*value, real[j], imaginary[j])
                 value = x + c, y
@@ -100,14 +94,6 @@ def _roots(A):
                     value = _quotient(*value, real[j] - real[i], imaginary[j] - imaginary[i])
             real[j], imaginary[j] = real[j] - value[0], imaginary[j] - value[1]
     return real, imaginary
-
-
-def _bound(coefficients):
-    """A power of two of which no root is larger than twice that (Fujiwara), whatever the units of the states."""
-    found = np.zeros(coefficients[0].shape)
-    for k, c in enumerate(coefficients[1:], 1):
-        found = np.maximum(found, np.where(c == 0.0, 0.0, np.ldexp(1.0, -(-np.frexp(c)[1] // k))))
-    return found
 
 
 def _product(a, b, c, d):

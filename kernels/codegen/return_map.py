@@ -8,6 +8,7 @@ Of a scene that is driven with a period, the switch is that one has passed: then
 
 import functools
 import inspect
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -52,34 +53,39 @@ class ReturnMap:
     """
 
     def __init__(self, scene, method, drive=None):
+        if drive is None and scene.start_time is not None:
+            raise SceneError(f"{scene.name}: a cycle that depends on the time `t` needs the period of its `drive`")
+        if drive is None and scene.surface is None:
+            raise SceneError(f"{scene.name}: a cycle needs a surface, or a drive")
         self.own, self.method, self.driven = scene, method, drive is not None
         self.scene, n = returning(scene, drive), len(scene.states) - (scene.start_time is not None)
+        recorded, first = record(self.scene), next(iter(named_functions(self.scene.surface)))
+        parts = needed(*recorded.rates, recorded.surface, *recorded.graph.kinks, *recorded.switched)
+        self.sides = any(x.kind == INPUT and x.args[0] == "side" for x in parts)
+        """Whether the motion, a surface or a switch hangs on the side."""
+        if self.sides and (self.driven or isinstance(scene.surface, Mapping)):
+            raise SceneError(f"{scene.name}: `side` cannot occur here; take a state of rate 0 that switches set")
+        if not (self.sides or self.driven or any(named_functions(scene.switch).get(name) for name in (first, ""))):
+            raise SceneError(f"{scene.name}: the motion passes through the surface, but not through one as side * x")
         self.held = [] if self.driven else [watched(scene)]
         """The state that is put onto the surface."""
         self.directions = [j for j in range(n) if j not in self.held]
         """Of the states, those that the map depends on."""
-        self.modes = [j for j, rate in enumerate(record(self.scene).rates) if rate.kind == NUMBER and not rate.args[0]]
+        self.modes = [j for j, rate in enumerate(recorded.rates) if rate.kind == NUMBER and not rate.args[0]]
         """The states whose rate is 0."""
-        first = next(iter(named_functions(self.scene.surface)))
-        self.jumps = any(named_functions(scene.switch).get(name) for name in (first, ""))
-        """Whether the motion jumps at the first surface."""
         self.fine, self.rough, self.step = TOLERANCES[method]
         self._how = solver(self.scene, method)
         self._turning = [(turning(self.scene, True), (1.0,)), (turning(self.scene, False), OTHERS)]
-        own = [] if drive else [clocked(scene)]
-        for recorded in (self.scene, *(scene for scene, _ in self._turning), *own):
-            record(recorded)
+        for one in (*(scene for scene, _ in self._turning), *([] if self.driven else [clocked(scene)])):
+            record(one)
 
     def passed(self, parameters, before, flips, rtol, fresh=0.0):
-        """Rows of time and states, and statuses: `flips` switches after the one before which the states are given."""
+        """Rows of time and states, and statuses: `flips` switches after the one before which the states are given.
+
+        `fresh` : 1 where that is the scene's start instead
+        """
         found, status = self._how([*parameters, *before, np.full(len(flips), fresh), flips], rtol)
         return found[[0, *range(2, 2 + len(before))]], status
-
-    def from_start(self, parameters, flips, rtol):
-        """The states, and statuses, so many switches after the start."""
-        nothing = np.zeros((len(self.own.states) - (self.own.start_time is not None), len(flips)))
-        (_, *found), status = self.passed(parameters, nothing, flips, rtol, 1.0)
-        return np.array(found), status
 
     def rates(self, parameters, states, side):
         """The rates of each state, columns."""
@@ -136,13 +142,6 @@ def watched(scene):
     if u.kind != INPUT:
         raise SceneError(f"surface of the scene {scene.name}: of a cycle it has to be a state, but for constants")
     return scene.states.index(u.args[0])
-
-
-def has_sides(scene):
-    """Whether the motion, a surface or a switch hangs on the side."""
-    recorded = record(scene)
-    parts = needed(*recorded.rates, recorded.surface, *recorded.graph.kinks, *recorded.switched)
-    return any(x.kind == INPUT and x.args[0] == "side" for x in parts)
 
 
 @functools.cache
