@@ -279,7 +279,7 @@ def estimating_kernel(
                 status[:], error[:] = Status.BAD_INPUT, math.nan
                 return
             wanted = {output for output, one in zip(names, asked, strict=True) if one}
-            with compiling(parts["name"], name):
+            with compiling(parts["name"], name), np.errstate(all="ignore"):
                 rows, error[:], status[:] = solved(name, columns[:count], rtol, *(values or [np.empty(0)]), wanted)
             for column, row in zip(found, rows, strict=True):
                 column[:] = np.where(status >= FIRST_REFUSAL, np.nan, row).T

@@ -45,22 +45,21 @@ def described(the_map, cells, cycle, swept, h):
     """
     n = len(the_map.directions)
     rows, slopes, right = differences(the_map, cells, cycle.z, cycle.scale, h, (1.0, 2.0, 4.0), swept)
-    with np.errstate(all="ignore"):
-        low, lower = ((4.0 * slopes[:, :, k] - slopes[:, :, k + 1]) / 3.0 for k in (0, 1))
-        high, noise = (16.0 * low - lower) / 15.0, 1.5 * cells.r / h
-        found, late = closed(the_map, cells, cycle._replace(rows=rows, slopes=high))
-        J, signs = high[1:, :n], (-1.0) ** np.arange(n)[:, None]
-        felt = noise * (most(abs(J.swapaxes(0, 1))) > 0.0)[:, None]  # a state that is set to a number has no noise
-        real, imaginary, unsure = eigenvalues(J, low[1:, :n], J + felt * signs, J + felt * signs[:, None])
-        multiplier, modulus = largest(real, imaginary), np.sqrt(real * real + imaginary * imaginary)
-        found["multiplier"] = multiplier, SAFETY * most(unsure[:1]) / np.maximum(1.0, abs(multiplier))
-        found["multipliers_real"] = real, SAFETY * unsure / np.maximum(1.0, modulus)
-        found["multipliers_imaginary"] = imaginary, SAFETY * unsure / np.maximum(1.0, modulus)
-        for k, name in enumerate(swept.values(), n):
-            pull, other = (push(D, k) for D in (high, low))
-            value, rough = ((D[0, k] + times(D[:1, :n], z)[0, 0]) / rows[0] for D, z in ((high, pull), (low, other)))
-            doubt = noise * (1.0 + np.add.reduce(late)) * (1.0 + np.add.reduce(abs(pull[:, 0])))
-            found[name] = value, SAFETY * (abs(value - rough) + doubt) / np.maximum(1.0, abs(value))
+    low, lower = ((4.0 * slopes[:, :, k] - slopes[:, :, k + 1]) / 3.0 for k in (0, 1))
+    high, noise = (16.0 * low - lower) / 15.0, 1.5 * cells.r / h
+    found, late = closed(the_map, cells, cycle._replace(rows=rows, slopes=high))
+    J, signs = high[1:, :n], (-1.0) ** np.arange(n)[:, None]
+    felt = noise * (most(abs(J.swapaxes(0, 1))) > 0.0)[:, None]  # a state that is set to a number has no noise
+    real, imaginary, unsure = eigenvalues(J, low[1:, :n], J + felt * signs, J + felt * signs[:, None])
+    multiplier, modulus = largest(real, imaginary), np.sqrt(real * real + imaginary * imaginary)
+    found["multiplier"] = multiplier, SAFETY * most(unsure[:1]) / np.maximum(1.0, abs(multiplier))
+    found["multipliers_real"] = real, SAFETY * unsure / np.maximum(1.0, modulus)
+    found["multipliers_imaginary"] = imaginary, SAFETY * unsure / np.maximum(1.0, modulus)
+    for k, name in enumerate(swept.values(), n):
+        pull, other = (push(D, k) for D in (high, low))
+        value, rough = ((D[0, k] + times(D[:1, :n], z)[0, 0]) / rows[0] for D, z in ((high, pull), (low, other)))
+        doubt = noise * (1.0 + np.add.reduce(late)) * (1.0 + np.add.reduce(abs(pull[:, 0])))
+        found[name] = value, SAFETY * (abs(value - rough) + doubt) / np.maximum(1.0, abs(value))
     return {name: (value, np.where(right & (error >= 0.0), error, math.inf)) for name, (value, error) in found.items()}
 
 
@@ -90,8 +89,7 @@ class Described:
         search, r = self.search, self.search.cells.r
         there, sure = np.isin(search.status, FOUND), abs(search.cycle.multiplier) < 1.0 - SURE
         some = np.flatnonzero(there & sure & (search.cycle.off <= CLOSED * r))
-        with np.errstate(all="ignore"):
-            self._keep(some, closed(self.map, taken(search.cells, some), taken(search.cycle, some))[0])
+        self._keep(some, closed(self.map, taken(search.cells, some), taken(search.cycle, some))[0])
         self._by_differences(there & ~(self._error() <= rtol), rtol)
         left = there & (self.unclear | ~(self._error() <= rtol)) & (r > tight)
         search.refined(np.flatnonzero(left), tight[left])
@@ -154,5 +152,4 @@ class Described:
             moved[j] = moved[j] + by * scale[j]
             other, _ = self.map.turned(cells.parameters, moved, cells.flips)
             apart = apart + 2.0 * abs(other - sizes) * (off[j] / by)
-        with np.errstate(all="ignore"):
-            return sizes, apart / sizes
+        return sizes, apart / sizes

@@ -91,9 +91,8 @@ def differences(the_map, cells, z, scale, h, levels, parameters):
     found, status = the_map.passed(whole[:first], whole[first:], np.tile(cells.flips, many), np.tile(cells.r, many))
     found, right = found.reshape(-1, many, count), (status == Status.OK).reshape(many, count).all(axis=0)
     pairs = found[[0, *(1 + j for j in at)], 1:].reshape(1 + len(at), len(moves), len(levels), 2, count)
-    with np.errstate(all="ignore"):
-        slopes = (pairs[:, :, :, 0] - pairs[:, :, :, 1]) / (2.0 * h * np.array(levels)[:, None])
-        slopes[1:] = slopes[1:] / scale[at][:, None, None]
+    slopes = (pairs[:, :, :, 0] - pairs[:, :, :, 1]) / (2.0 * h * np.array(levels)[:, None])
+    slopes[1:] = slopes[1:] / scale[at][:, None, None]
     for move, j in enumerate(at):
         if j in the_map.modes:  # one that no switch of the cycle sets is no direction, as a parameter is none
             kept = abs(slopes[1 + move, move] - 1.0) <= NEAR
@@ -122,14 +121,13 @@ def newton(the_map, cells, cycle, parameters=()):
                 )
                 if levels:
                     D[:, :, those] = new[:, :, 0]
-        with np.errstate(all="ignore"):
-            rho = ((found[1:] - z[:, left] - cycle.shift[:, left]) / scale)[at]
-            now = np.where(right, np.maximum(most(abs(rho)), CLOSED * some.r), math.inf)
-            step = solved(identity(n, len(left)) - D[1:, :n], rho[:, None])[:, 0]
-            far = most(abs(step))
-            step = scale[at] * step / np.maximum(1.0, far)
-        improved = left[now < off[left]]
+        rho = ((found[1:] - z[:, left] - cycle.shift[:, left]) / scale)[at]
+        now = np.where(right, np.maximum(most(abs(rho)), CLOSED * some.r), math.inf)
+        step = solved(identity(n, len(left)) - D[1:, :n], rho[:, None])[:, 0]
+        far = most(abs(step))
+        step = scale[at] * step / np.maximum(1.0, far)
         better = now < off[left]
+        improved = left[better]
         best[:, improved], off[improved] = z[:, improved], now[better]
         rows[:, improved], slopes[:, :, improved] = found[:, better], D[:, :, better]
         lost = ~(now < math.inf) | ~(far < math.inf)
@@ -141,9 +139,8 @@ def newton(the_map, cells, cycle, parameters=()):
         if not len(left):
             break
     best[the_map.held] = np.where(off < math.inf, rows[[1 + j for j in the_map.held]], best[the_map.held])
-    return cycle._replace(
-        z=best, off=off, rows=rows, slopes=slopes, multiplier=largest(*eigenvalues(slopes[1:, :n])[:2])
-    )
+    multiplier = largest(*eigenvalues(slopes[1:, :n])[:2])
+    return cycle._replace(z=best, off=off, rows=rows, slopes=slopes, multiplier=multiplier)
 
 
 def push(slopes, k):
@@ -155,16 +152,15 @@ def push(slopes, k):
 def equilibrium(the_map, parameters, z, side):
     """From states z: where the rates are 0, by Newton's method; and how far off, infinite where motions go from it."""
     n = len(z)
-    with np.errstate(all="ignore"):
-        for _ in range(ROUNDS):
-            h, J = STEP * np.maximum(most(abs(z)), 1e-150), np.empty((n, n, z.shape[1]))
-            for j in range(n):
-                up, down = z.copy(), z.copy()
-                up[j], down[j] = z[j] + h, z[j] - h
-                J[:, j] = (the_map.rates(parameters, up, side) - the_map.rates(parameters, down, side)) / (2.0 * h)
-            step = solved(J, the_map.rates(parameters, z, side)[:, None])[:, 0]
-            z = z - step
-        return z, np.where((eigenvalues(J)[0] < 0.0).all(axis=0), most(abs(step)), math.inf)
+    for _ in range(ROUNDS):
+        h, J = STEP * np.maximum(most(abs(z)), 1e-150), np.empty((n, n, z.shape[1]))
+        for j in range(n):
+            up, down = z.copy(), z.copy()
+            up[j], down[j] = z[j] + h, z[j] - h
+            J[:, j] = (the_map.rates(parameters, up, side) - the_map.rates(parameters, down, side)) / (2.0 * h)
+        step = solved(J, the_map.rates(parameters, z, side)[:, None])[:, 0]
+        z = z - step
+    return z, np.where((eigenvalues(J)[0] < 0.0).all(axis=0), most(abs(step)), math.inf)
 
 
 class Search:
@@ -321,17 +317,14 @@ class Search:
                 taken(self.cycle, left),
                 taken(self.cells, left),
             )
-            with np.errstate(all="ignore"):
-                tangent, last = self._tangent(some, old, way[left]), reached[left] + by >= 1.0
-                some.parameters[self.swept[0]] = np.where(
-                    last, ends[left], begin[left] + (reached[left] + by) * way[left]
-                )
-                guess = old.z.copy()
-                guess[at] += by * np.where(np.isnan(tangent), 0.0, tangent)
-                cycle, moved, _ = self._newton(some, guess)
-                chord, off = ((cycle.z - z) / cycle.scale for z in (old.z, guess))
-                tangents = tangent, self._tangent(some, cycle, way[left])
-                bent = np.fmax(*(most(np.nan_to_num(abs(chord[at] - by * t / cycle.scale[at]))) for t in tangents))
+            tangent, last = self._tangent(some, old, way[left]), reached[left] + by >= 1.0
+            some.parameters[self.swept[0]] = np.where(last, ends[left], begin[left] + (reached[left] + by) * way[left])
+            guess = old.z.copy()
+            guess[at] += by * np.where(np.isnan(tangent), 0.0, tangent)
+            cycle, moved, _ = self._newton(some, guess)
+            chord, off = ((cycle.z - z) / cycle.scale for z in (old.z, guess))
+            tangents = tangent, self._tangent(some, cycle, way[left])
+            bent = np.fmax(*(most(np.nan_to_num(abs(chord[at] - by * t / cycle.scale[at]))) for t in tangents))
             near = (most(abs(off)) <= STRAIGHT) & (bent <= np.maximum(BENT * most(abs(chord[at])), FLAT))
             near &= (moved > NEAR) & (cycle.off <= NEAR * moved)
             status = np.where(abs(cycle.multiplier) <= 1.0, stable[left], Status.UNSTABLE)
