@@ -22,7 +22,7 @@ that starts on the surface and falls switches at once. What rounding alone may m
 import functools
 import keyword
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Required, TypedDict
 
@@ -175,20 +175,35 @@ def scene_kernel(
     SceneError
         Where the functions ask for what is not there, or do what cannot be recorded.
     """
-    scene = scene_of(SceneParts(
+    parts = SceneParts(
         name=name, doc=doc, states=states, parameters=parameters, rates=rates, start=start, surface=surface,
-        switch=switch, start_time=start_time,
-    ))  # fmt: skip
+        switch=switch, start_time=start_time, source=source, example=example,
+    )  # fmt: skip
     fields, outputs = (*parameters, flips_field(40.0, MOST_FLIPS)), (*TIMES, *states)
+    return declared(
+        parts, fields, outputs, _methods(scene_of(parts), [f.name for f in fields], [f.name for f in outputs])
+    )
+
+
+def declared(
+    parts: SceneParts,
+    parameters: Sequence[Field],
+    outputs: Sequence[Field],
+    methods: Iterable[Method],
+    along: Sequence[Field] = (),
+    check: OnColumns | None = None,
+) -> Kernel:
+    """The kernel of a scene; `check` refuses further cells, of those within their limits."""
     return Kernel(
-        name=name,
-        doc=doc,
-        source=source,
-        parameters=fields,
-        outputs=outputs,
-        check=limits_check(fields),
-        methods=_methods(scene, [f.name for f in fields], [f.name for f in outputs]),
-        example=dict(example or {}),
+        name=parts["name"],
+        doc=parts["doc"],
+        source=parts.get("source", "a study's own"),
+        parameters=tuple(parameters),
+        outputs=tuple(outputs),
+        check=limits_check(parameters, check),
+        methods=tuple(methods),
+        along=tuple(along),
+        example=dict(parts.get("example") or {}),
     )
 
 
@@ -265,7 +280,7 @@ def estimating_kernel(
     docs : {method: a line about it}
     solved : (method, columns of parameters, rtol, values along, names of outputs that are asked for) -> values of each
         output, (n_cells,) or (n_values, n_cells); error; status
-    check : further refusals, of cells within their limits
+    check : as in `declared`
     """
     count, names = len(parameters), [f.name for f in outputs]
 
@@ -287,17 +302,7 @@ def estimating_kernel(
         columns = [*(f.name for f in parameters), "rtol", *(f.name for f in along), "asked", *names, "error", "status"]
         return Method(name, docs[name], signed(solve, columns), estimates=True)
 
-    return Kernel(
-        name=parts["name"],
-        doc=parts["doc"],
-        source=parts.get("source", "a study's own"),
-        parameters=tuple(parameters),
-        outputs=tuple(outputs),
-        check=limits_check(parameters, check),
-        methods=tuple(map(method, docs)),
-        along=tuple(along),
-        example=dict(parts.get("example") or {}),
-    )
+    return declared(parts, parameters, outputs, map(method, docs), along, check)
 
 
 def limits_check(fields: Sequence[Field], further: OnColumns | None = None) -> OnColumns:

@@ -19,7 +19,7 @@ from kernels.expression.graph import INPUT
 from kernels.integrate.events import LOCATIONS, METHODS
 from kernels.interface import Field, Kernel, Method, Status
 from kernels.lanes.wiring import signed
-from kernels.scene import TIMES, Function, Scene, SceneError, SceneParts, flips_field, limits_check, scene_of
+from kernels.scene import TIMES, Function, Scene, SceneError, SceneParts, declared, flips_field, scene_of
 
 __all__ = ["METHODS", "stepped_kernel", "stepping_fields", "stepping_methods"]
 
@@ -116,7 +116,7 @@ def stepped_kernel(
     start: Function,
     switch: Function | None = None,
     start_time: Function | float | None = None,
-    source: str = "",
+    source: str = "a study's own",
     example: Mapping[str, float] | None = None,
 ) -> Kernel:
     """A kernel that follows a scene at a fixed step; the arguments are those of `kernels.scene.scene_kernel`.
@@ -129,18 +129,9 @@ def stepped_kernel(
     """
     if not callable(surface):
         raise SceneError(f"the scene {name}: at a fixed step there is one surface")
-    scene = scene_of(SceneParts(
+    parts = SceneParts(
         name=name, doc=doc, states=states, parameters=parameters, rates=rates, surface=surface, start=start,
-        switch=switch, start_time=start_time,
-    ))  # fmt: skip
+        switch=switch, start_time=start_time, source=source, example=example,
+    )  # fmt: skip
     fields, outputs = (*parameters, *stepping_fields()), (*TIMES, *states, *COST)
-    return Kernel(
-        name=name,
-        doc=doc,
-        source=source or "a study's own",
-        parameters=fields,
-        outputs=outputs,
-        check=limits_check(fields),
-        methods=stepping_methods(scene, fields, outputs, _fill_plainly),
-        example=dict(example or {}),
-    )
+    return declared(parts, fields, outputs, stepping_methods(scene_of(parts), fields, outputs, _fill_plainly))

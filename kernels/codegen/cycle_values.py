@@ -11,8 +11,8 @@ import math
 
 import numpy as np
 
-from kernels.codegen.columns_algebra import eigenvalues, identity, largest, most, solved, times
-from kernels.codegen.limit_cycle import CLOSED, FOUND, differences, push, taken
+from kernels.codegen.columns_algebra import eigenvalues, identity, largest, most, times
+from kernels.codegen.limit_cycle import CLOSED, FOUND, differences, settling, taken
 from kernels.codegen.return_map import TIGHT
 from kernels.interface import Status
 
@@ -29,8 +29,7 @@ modulus alone lets disturbances neither grow nor fade."""
 def closed(the_map, cells, cycle):
     """{name: values and errors} of period and states by (1), with the cycle's slopes; sizes of dT/dz (I - J)^-1/T."""
     at, n = the_map.directions, len(the_map.directions)
-    (T, *P), one = cycle.rows, identity(n, len(cells.r))
-    W = abs(solved(one - cycle.slopes[1:, :n], one))
+    (T, *P), W = cycle.rows, abs(settling(cycle.slopes, identity(n, len(cells.r))))
     rho = abs(((np.array(P) - cycle.z - cycle.shift) / cycle.scale)[at]) + cells.r
     spread, late = np.zeros(cycle.z.shape), times(abs(cycle.slopes[:1, :n]), W) / T
     spread[at] = SAFETY * times(W, rho[:, None])[:, 0]
@@ -56,7 +55,7 @@ def described(the_map, cells, cycle, swept, h):
     found["multipliers_real"] = real, SAFETY * unsure / np.maximum(1.0, modulus)
     found["multipliers_imaginary"] = imaginary, SAFETY * unsure / np.maximum(1.0, modulus)
     for k, name in enumerate(swept.values(), n):
-        pull, other = (push(D, k) for D in (high, low))
+        pull, other = (settling(D, D[1:, k : k + 1]) for D in (high, low))
         value, rough = ((D[0, k] + times(D[:1, :n], z)[0, 0]) / rows[0] for D, z in ((high, pull), (low, other)))
         doubt = noise * (1.0 + np.add.reduce(late)) * (1.0 + np.add.reduce(abs(pull[:, 0])))
         found[name] = value, SAFETY * (abs(value - rough) + doubt) / np.maximum(1.0, abs(value))

@@ -123,7 +123,7 @@ def newton(the_map, cells, cycle, parameters=()):
                     D[:, :, those] = new[:, :, 0]
         rho = ((found[1:] - z[:, left] - cycle.shift[:, left]) / scale)[at]
         now = np.where(right, np.maximum(most(abs(rho)), CLOSED * some.r), math.inf)
-        step = solved(identity(n, len(left)) - D[1:, :n], rho[:, None])[:, 0]
+        step = settling(D, rho[:, None])[:, 0]
         far = most(abs(step))
         step = scale[at] * step / np.maximum(1.0, far)
         better = now < off[left]
@@ -143,10 +143,10 @@ def newton(the_map, cells, cycle, parameters=()):
     return cycle._replace(z=best, off=off, rows=rows, slopes=slopes, multiplier=multiplier)
 
 
-def push(slopes, k):
-    """(I - J)^-1 dP/dp, (n, 1, cells), of the parameter whose slopes have the number k."""
+def settling(slopes, moved):
+    """(I - J)^-1 of what has been moved, (n, m, cells): by how much the cycle moves."""
     n = len(slopes) - 1
-    return solved(identity(n, slopes.shape[-1]) - slopes[1:, :n], slopes[1:, k : k + 1])
+    return solved(identity(n, slopes.shape[-1]) - slopes[1:, :n], moved)
 
 
 def equilibrium(the_map, parameters, z, side):
@@ -299,8 +299,8 @@ class Search:
 
     def _tangent(self, some, cycle, way):
         """By how much states change over the whole way of the parameter; NaN where that is 0."""
-        at = self.map.directions
-        return cycle.scale[at] * push(cycle.slopes, len(at))[:, 0] * way / some.parameters[self.swept[0]]
+        moved = settling(cycle.slopes, cycle.slopes[1:, -1:])[:, 0]
+        return cycle.scale[self.map.directions] * moved * way / some.parameters[self.swept[0]]
 
     def _continued(self, begin, ends):
         """Follows cycles at the values `begin` of the branch's parameter to those at the values `ends`."""

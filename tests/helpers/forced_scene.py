@@ -5,7 +5,7 @@ TABLE : a ball on a table at A sin(w t), which gives back the share e of the clo
 RESTING : x'' = -x - 2 zeta x' - mu sign(x') from x = 1
 WALLS : a body between walls; it leaves the left one at kick + e u, the right one at e u, and is j times as fast in the
     way of its mode j: 1 behind the left wall, 2 behind the right one, 3 from the middle on
-POPULATION : once a season u becomes gain u (1 - u)
+POPULATION : once a season u becomes gain u (1 - bend u) - cube u^3
 THROWN : a ball that lands at v and leaves at 2 + e sqrt(v^2 - 1)
 """
 
@@ -83,11 +83,16 @@ POPULATION = cycle_kernel(
     name="population",
     doc="what each season leaves of a population",
     states=(Field("u", "1", "share of the largest one"),),
-    parameters=(Field("gain", "1", "growth"),),
+    parameters=(
+        Field("gain", "1", "growth"),
+        Field("bend", "1", "how that falls", default=1.0),
+        Field("cube", "1", "", default=0.0),
+        Field("u0", "1", "at the start", default=0.3),
+    ),
     rates=lambda u: 0.0 * u,
     surface={"season": lambda t: 0.5 - t},
-    switch={"season": lambda u, gain: gain * u * (1.0 - u)},
-    start=lambda: 0.3,
+    switch={"season": lambda u, gain, bend, cube: gain * u * (1.0 - bend * u) - cube * u * u * u},
+    start=lambda u0: u0,
     drive=1.0,
     branch="gain",
 )

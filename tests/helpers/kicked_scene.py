@@ -5,7 +5,7 @@ x'' = -omega^2 x - 2 zeta omega x'; at x = 0 the speed's size u becomes kick + g
 
 from kernels.cycle import cycle_kernel
 from kernels.scene import Field
-from kernels.trajectory import motion_kernel, section_kernel
+from kernels.trajectory import section_kernel
 
 
 def rates(x, v, zeta, omega):
@@ -42,5 +42,5 @@ PARTS = {
     "switch": switch,
 }
 KICKED = cycle_kernel(name="kicked", **PARTS, example={"zeta": 0.1, "kick": 1.0})
-SECTION, MOTION = section_kernel(name="kicked_section", **PARTS), motion_kernel(name="kicked_motion", **PARTS)
+SECTION = section_kernel(name="kicked_section", **PARTS)
 BRANCHED = {name: cycle_kernel(name="kicked", **PARTS, branch=name) for name in ("gain", "kick")}

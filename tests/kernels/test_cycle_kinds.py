@@ -162,14 +162,9 @@ def test_what_cannot_be_a_cycle_is_refused():
 
 def test_a_branch_ends_where_it_meets_another_one_and_is_followed_where_others_fork_off():
     """u -> gain u - u^3: two cycles +-sqrt(gain - 1) fork off from u = 0 at gain = 1, and double at gain = 2."""
-    own = {"doc": "", "states": (Field("u", "1", "u"),), "parameters": (Field("gain", "1", ""), Field("u0", "1", ""))}
-    fork = cycle_kernel(
-        **own, name="fork", rates=lambda u: 0.0 * u, surface={"season": lambda t: 0.5 - t},
-        switch={"season": lambda u, gain: gain * u - u * u * u}, start=lambda u0: u0, drive=1.0, branch="gain",
-    )  # fmt: skip
     gain, begin = np.array([1.2, 1.001, 0.999, 0.8, 1.4, 0.9]), np.array([1.5, 1.5, 1.5, 1.5, 0.5, 0.5])
-    cells = {"gain": gain, "gain_from": begin, "u0": np.where(begin > 1.0, 0.7, 0.0), "flips": 1.0}
-    found, status = solve(fork, "taylor", **cells, asked=("period", "multiplier"), rtol=1e-7)
+    cells = {"gain": gain, "gain_from": begin, "u0": np.where(begin > 1.0, 0.7, 0.0), "bend": 0.0, "cube": 1.0}
+    found, status = solve(POPULATION, "taylor", **cells, flips=1.0, asked=("period", "multiplier"), rtol=1e-7)
     assert list(status) == [Status.OK, Status.OK, Status.NO_CYCLE, Status.NO_CYCLE, Status.UNSTABLE, Status.OK]
     assert abs(found["u"][[0, 1, 4, 5]] - [np.sqrt(0.2), np.sqrt(0.001), 0.0, 0.0]).max() < 1e-7
     assert abs(found["multiplier"][[0, 1, 4, 5]] - [0.6, 0.998, 1.4, 0.9]).max() < 1e-7
