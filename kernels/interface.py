@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 
 class Status(IntEnum):
@@ -104,16 +104,10 @@ BoundCell = Callable[[Any], Any]
 """`bound(p) -> error`: relative, a number for all outputs, or a record with one for each."""
 
 
-class SolveCell(Protocol):
-    """`solve(p, rtol, *buffers) -> outputs, status`; of a method that estimates, `-> outputs, errors, status`."""
-
-    def __call__(self, p: Any, rtol: Any, /, *buffers: Any, **named: Any) -> tuple[Any, Any] | tuple[Any, Any, Any]: ...
-
-
-class FillCells(Protocol):
-    """`fill(i, columns, *buffers)`: writes the rows of cell i, or of the group that begins with it, itself."""
-
-    def __call__(self, i: Any, columns: Any, /, *buffers: Any, **named: Any) -> None: ...
+SolveCell = Callable[..., tuple[Any, ...]]
+"""`solve(p, rtol, *buffers) -> outputs, status`; of a method that estimates, `-> outputs, errors, status`."""
+FillCells = Callable[..., None]
+"""`fill(i, columns, *buffers)`: writes the rows of cell i, or of the group that begins with it, itself."""
 
 
 @dataclass(frozen=True)

@@ -12,17 +12,15 @@ Python a row holds the functions themselves.
 """
 
 import functools
-import inspect
 
 import numpy as np
 from llvmlite import ir
 from numba import typeof, types
-from numba.core.typing import signature
-from numba.extending import lower_builtin, type_callable
 
 from kernels.lanes.cache import enable
 from kernels.lanes.inlining import aligned
 from kernels.lanes.jit import COMPILED, OPTIONS
+from kernels.lanes.vectors import in_place
 
 
 def jit_by_address(function):
@@ -42,29 +40,17 @@ def part(place, result, *arguments):
 
     call.place, call.gives, call.kinds = place, typeof(result), tuple(map(typeof, arguments))
     if COMPILED:
-        type_callable(call)(functools.partial(_typer, call))
-        lower_builtin(call, *[types.Any] * (1 + len(arguments)))(functools.partial(_lower, call))
+        in_place(call, 1 + len(arguments), lambda *kinds: call.gives, functools.partial(_lower, call))
     return call
-
-
-def _typer(call, context):
-    def typer(row, *values):
-        return signature(call.gives, row, *call.kinds)
-
-    kind = inspect.Parameter.POSITIONAL_ONLY
-    typer.pysig = inspect.Signature([inspect.Parameter(f"x{i}", kind) for i in range(1 + len(call.kinds))])
-    return typer
 
 
 def _lower(call, context, builder, signature, values):
     row = context.make_array(signature.args[0])(context, builder, values[0])
-    address = builder.load(builder.gep(row.data, [ir.IntType(64)(call.place)]))
-    convention = context.call_conv
-    function = convention.get_function_type(call.gives, call.kinds).as_pointer()
-    _, result = convention.call_function(
-        builder, builder.inttoptr(address, function), call.gives, call.kinds, values[1:]
-    )
-    return result
+    convention, address = context.call_conv, builder.load(builder.gep(row.data, [ir.IntType(64)(call.place)]))
+    function = builder.inttoptr(address, convention.get_function_type(call.gives, call.kinds).as_pointer())
+    given = zip(values[1:], signature.args[1:], call.kinds, strict=True)
+    values = [context.cast(builder, value, one, kind) for value, one, kind in given]
+    return convention.call_function(builder, function, call.gives, call.kinds, values)[1]
 
 
 def _address(call, function):

@@ -12,6 +12,7 @@ frozen by `where(active, new, old)`, or its bits would depend on its neighbours.
 Under NUMBA_DISABLE_JIT=1 only the one-cell form exists. `columns` has the loops.
 """
 
+import inspect
 import math
 import operator
 from fractions import Fraction
@@ -132,14 +133,15 @@ def _operator(python_operator, build, operand=_lanes, result=_lanes):
             lower_builtin(python_operator, *operands)(_emit(build, operand))
 
 
-def _function(python_function, arity, result, lower):
+def in_place(python_function, arity, result, lower):
     """Gives a Python function a compiled meaning, emitted where it is called; `result(*types)` is what it returns."""
-    typers = (
-        lambda x: result(x),
-        lambda x, y: result(x, y),
-        lambda x, y, z: result(x, y, z),
-    )
-    type_callable(python_function)(lambda context: typers[arity - 1])
+
+    def typer(*kinds):
+        return result(*kinds)
+
+    kind = inspect.Parameter.POSITIONAL_ONLY
+    typer.pysig = inspect.Signature([inspect.Parameter(f"x{i}", kind) for i in range(arity)])
+    type_callable(python_function)(lambda context: typer)
     lower_builtin(python_function, *[types.Any] * arity)(lower)
 
 
@@ -197,9 +199,9 @@ def magnitude(x):
     return abs(x)
 
 
-_function(fma, 3, _number, _emit(_called("fma")))
-_function(sqrt, 1, _number, _emit(_called("sqrt")))
-_function(magnitude, 1, _number, _emit(_called("fabs")))
+in_place(fma, 3, _number, _emit(_called("fma")))
+in_place(sqrt, 1, _number, _emit(_called("sqrt")))
+in_place(magnitude, 1, _number, _emit(_called("fabs")))
 
 
 @symbolic
@@ -253,8 +255,8 @@ def _build_exponent(builder, x):
     return builder.fsub(shifted, _constant(x.type, 2.0**52 + 1023.0))
 
 
-_function(pow2, 1, _number, _emit(_build_pow2))
-_function(exponent, 1, _number, _emit(_build_exponent))
+in_place(pow2, 1, _number, _emit(_build_pow2))
+in_place(exponent, 1, _number, _emit(_build_exponent))
 
 
 @jit
@@ -306,9 +308,9 @@ def not_(condition):
     return not condition
 
 
-_function(where, 3, lambda condition, x, y: _number(condition, x, y), _lower_where)
-_function(any_lane, 1, lambda condition: types.boolean, _lower_any_lane)
-_function(not_, 1, lambda condition: condition, lambda context, builder, signature, values: builder.not_(values[0]))
+in_place(where, 3, lambda condition, x, y: _number(condition, x, y), _lower_where)
+in_place(any_lane, 1, lambda condition: types.boolean, _lower_any_lane)
+in_place(not_, 1, lambda condition: condition, lambda context, builder, signature, values: builder.not_(values[0]))
 
 
 def lanes_at(i):
@@ -316,7 +318,7 @@ def lanes_at(i):
     raise NotImplementedError
 
 
-_function(lanes_at, 1, lambda i: _lane_index, lambda context, builder, signature, values: values[0])
+in_place(lanes_at, 1, lambda i: _lane_index, lambda context, builder, signature, values: values[0])
 
 
 def _is_column(array, i):
