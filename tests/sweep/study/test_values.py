@@ -175,11 +175,11 @@ def test_blocks_are_a_product_of_designs():
 
 
 def test_arrays_go_into_a_block_of_their_own():
-    arrays = {"design": "zip", "axes": {"J": [[1.0, 2.0], [3.0, 4.0]], "k": [[1.0, 1.0], [2.0, 2.0]]}}
-    keys = {"kernel": "drivetrain", "outputs": ["frequency"], "fixed": {"f_max": 1.0}}
-    found, alone = sweep.run(**keys, blocks=[{"axes": {"tol": [0.0, 0.01]}}, arrays]), sweep.run(**keys, **arrays)
-    assert found.J.dims == ("point", "mass")
-    np.testing.assert_array_equal(found.frequency.isel(tol=0), alone.frequency)
+    arrays = {"design": "zip", "axes": {"mass": [[1.0, 2.0], [3.0, 4.0]], "place": [[1.0, 1.0], [2.0, 2.0]]}}
+    keys = {"kernel": "beads:KERNEL", "outputs": ["moment"], "allow_import": True}
+    found = sweep.run(**keys, blocks=[{"axes": {"g": [9.80665, 1.6]}}, arrays])
+    assert found.mass.dims == ("point", "bead")
+    np.testing.assert_array_equal(found.moment.isel(g=0), sweep.run(**keys, **arrays).moment)
 
 
 @pytest.mark.parametrize(
