@@ -7,16 +7,16 @@ Gauss-Newton steps of q the end. All laws of all lines are fitted at once.
 from __future__ import annotations
 
 import functools
-import itertools
 import math
 from collections.abc import Iterable, Sequence
+from itertools import pairwise, product
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sweep.laws.loglog import Array
-from sweep.laws.noise import ROUNDING, corrected, line_deviance, regress
+from sweep.laws.loglog import Array, alike
+from sweep.laws.noise import ROUNDING, corrected, inliers, regress
 from sweep.laws.shapes import ONE, Law
 
 DAMPINGS = np.array([1e-7, 1e-2, 0.3, 10.0, 1e3])
@@ -26,6 +26,8 @@ FURTHER = np.array([1.0, 4.0, 16.0])
 STEPS, ENOUGH = 10, 2e-3
 """Steps at most, three times as many of a law that is wanted; and what a step must take away of a deviance for
 another one: so much of 0.5 and of what it is above the best, or the square for a law that is wanted."""
+STEP = 1e-6
+"""Of q, for derivatives."""
 MOST_LINES, MOST_Q, MOST_KEPT = 16, 3, 300
 """Lines that are fitted at once, so that what is held stays below some 50 MB; q of a law at most; and points at most
 of which the grid is kept for the next line."""
@@ -109,8 +111,8 @@ def fitted(
     """For each line of z (m, n) the laws, by name, that are nearest to it, t rising; not those that have not two more
     points than numbers, at more places than numbers. `errors` (m, n) are standard errors, where they are known.
 
-    The law ONE is of the noise that suits it best, where that is not known. Laws that are far from the points beside
-    others are not fitted to the last digit, but for that which is `wanted`.
+    The law ONE is of the noise that suits it best, where that is not known; points far off count as a number each.
+    Laws that are far from the points beside others are not fitted to the last digit, but for that which is `wanted`.
     """
     places = np.unique(t).size
     laws = [law for law in laws if t.size >= law.numbers + 2 and places > law.numbers]
@@ -120,17 +122,21 @@ def fitted(
         part = z[first : first + most]
         search = _Search(laws, t, part, None if errors is None else errors[first], wanted)
         moving = np.flatnonzero(search.high[:, 0] > search.low[:, 0])
-        while moving.size:
-            for _ in range(STEPS if wanted is None else 3 * STEPS):
-                if moving.size:
-                    moving = search.step(moving)
-            moving = search.restart()
+        for _ in range(STEPS if wanted is None else 3 * STEPS):
+            if moving.size:
+                moving = search.step(moving)
+        search.take_cases()
         for k, one in enumerate(search.found()):
             found[first + k % len(part)][one.law.name] = one
     if ONE in laws and errors is None:
-        for line, row in zip(found, z, strict=True):
-            one = line[ONE.name]
-            line[ONE.name] = min(one, one._replace(deviance=line_deviance(t, row), more=2), key=lambda fit: fit.aicc)
+        columns = np.stack([np.ones_like(t), t - t.mean()], axis=1)
+        for pattern, rows in alike(inliers(t, columns, z)):
+            share = pattern.mean()
+            line = regress(t[pattern], columns[pattern], z[rows][:, pattern])
+            for row, deviance in zip(rows, line.deviance / share + t.size * math.log(share), strict=True):
+                one = found[row][ONE.name]
+                other = one._replace(deviance=float(deviance), more=2 + int((~pattern).sum()))
+                found[row][ONE.name] = min(one, other, key=lambda fit: fit.aicc)
     return found
 
 
@@ -147,19 +153,13 @@ class _Search:
         self.low, self.high = limits[:, self.law]
         self.wanted = np.array([law is wanted for law in laws])[self.law]
         self.rounding = (ROUNDING * (1 + abs(self.z).max(axis=1))) ** 2
-        # the nearest of a grid of q; of a bend with a shape that of the bend without
-        own = [law for law in laws if not law.starts_as]
+        # the nearest of a grid of q
         kept = _grid if t.size <= MOST_KEPT else _grid.__wrapped__
-        edges, grid, shift, basis = kept(tuple(own), t.tobytes(), self.root.tobytes())
+        edges, grid, shift, basis = kept(tuple(laws), t.tobytes(), self.root.tobytes())
         off = z[:, None] * self.root - shift
         square = (off**2).sum(axis=2) - (np.einsum("gnk,mgn->mgk", basis, off) ** 2).sum(axis=2)
-        ends = zip(own, edges, edges[1:], strict=False)
-        best = {law.name: grid[a + np.nanargmin(square[:, a:b], axis=1)] for law, a, b in ends}
-        starts = [best[law.starts_as or law.name].copy() for law in laws]
-        for law, start in zip(laws, starts, strict=True):
-            if law.starts_as:
-                start[:, len(law.q) - 1] = law.q[-1].starts[0]
-        self.q, self.before = np.concatenate(starts), np.zeros((len(self.law), MOST_Q))
+        self.q = np.concatenate([grid[a + np.nanargmin(square[:, a:b], axis=1)] for a, b in pairwise(edges)])
+        self.before = np.zeros_like(self.q)
         self.square = self._squares(np.arange(len(self.q)), self.q)
 
     def deviance(self) -> Array:
@@ -170,7 +170,7 @@ class _Search:
     def _squares(self, rows: NDArray[np.intp], q: Array) -> Array:
         """Weighted sums of squares about the curves of some q; infinite where there is no curve."""
         every, basis, _ = _columns(self.laws, self.law[rows], q, self.t, self.root)
-        off = self.z[rows] * self.root - every[0, 0]
+        off = self.z[rows] * self.root - every[0]
         off = off - (basis @ (off[:, None] @ basis).transpose(0, 2, 1))[..., 0]
         square = (off**2).sum(axis=1)
         return np.where(np.isnan(square), np.inf, square)
@@ -178,13 +178,17 @@ class _Search:
     def derivatives(self, rows: NDArray[np.intp]) -> tuple[Array, Array, Array, Array, Array]:
         """Weighted distances (r, n), b (r, k), weighted derivatives by q (r, q, n) at fixed b and columns (k, r, n),
         and an orthonormal basis of these (r, n, k)."""
-        every, basis, back = _columns(self.laws, self.law[rows], self.q[rows], self.t, self.root, MOST_Q)
-        off = self.z[rows] * self.root - every[0, 0]
+        every, basis, back = _columns(self.laws, self.law[rows], self.q[rows], self.t, self.root)
+        off = self.z[rows] * self.root - every[0]
         along = (off[:, None] @ basis).transpose(0, 2, 1)
         b = np.linalg.solve(back, along)[..., 0]
-        every = np.nan_to_num(every, posinf=0.0, neginf=0.0)
-        by_q = every[1:, 0] + np.einsum("qkrn,rk->qrn", every[1:, 1:], b)
-        return off - (basis @ along)[..., 0], b, by_q.transpose(1, 0, 2), every[0, 1:], basis
+        by_q = np.zeros((rows.size, MOST_Q, self.t.size))
+        for k in np.flatnonzero((self.high > self.low)[rows].any(axis=0)):
+            there, step = self.q[rows].copy(), np.where(self.q[rows, k] > 0, -STEP, STEP)  # away from the limits
+            there[:, k] += step
+            change = (_curves(self.laws, self.law[rows], there, self.t, self.root) - every) / step[:, None]
+            by_q[:, k] = np.nan_to_num(change[0] + np.einsum("krn,rk->rn", change[1:], b), posinf=0.0, neginf=0.0)
+        return off - (basis @ along)[..., 0], b, by_q, np.nan_to_num(every[1:]), basis
 
     def step(self, rows: NDArray[np.intp]) -> NDArray[np.intp]:
         """Moves the q of rows by a damped Gauss-Newton step; those for which another one is worth it."""
@@ -215,16 +219,14 @@ class _Search:
         enough = np.where(self.wanted, ENOUGH**2, ENOUGH * (0.5 + above.reshape(-1)))
         return np.asarray(rows[(before - after >= enough)[rows]])
 
-    def restart(self) -> NDArray[np.intp]:
-        """Rows of laws that are further from the points than the law that they have as a case, begun there again."""
-        names, m, again = [law.name for law in self.laws], len(self.q) // len(self.laws), [np.arange(0)]
-        for k, law in enumerate(self.laws):
-            if law.starts_as in names:
-                case, own = (np.arange(m) + j * m for j in (names.index(law.starts_as), k))
-                case, own = (part[self.square[own] > self.square[case]] for part in (case, own))
-                self.q[own], self.square[own], self.before[own] = self.q[case], self.square[case], 0.0
-                again.append(own)
-        return np.concatenate(again)
+    def take_cases(self) -> None:
+        """Rows of laws that are further from the points than the law that they have as a case become that."""
+        names = [law.name for law in self.laws]
+        for name, law in zip(names, self.laws, strict=True):
+            if law.case in names:
+                own, case = (np.flatnonzero(self.law == names.index(one)) for one in (name, law.case))
+                worse = self.square[own] > self.square[case]
+                self.q[own[worse]], self.square[own[worse]] = self.q[case[worse]], self.square[case[worse]]
 
     def found(self) -> list[Found]:
         """Each law of each line."""
@@ -247,37 +249,39 @@ class _Search:
 def _grid(laws: tuple[Law, ...], t: bytes, root: bytes) -> tuple[Array, Array, Array, Array]:
     """Starts of the q of all laws, law by law: first and past-the-last of each, q, and shift and Q of `_columns`. Lines
     over the same x share them."""
-    tries = [np.array(list(itertools.product(*(number.starts for number in law.q)))) for law in laws]
+    tries = [np.array(list(product(*(number.starts for number in law.q)))) for law in laws]
     edges = np.cumsum([0, *map(len, tries)])
     grid = np.zeros((edges[-1], MOST_Q))
     for first, some in zip(edges, tries, strict=False):
         grid[first : first + len(some), : some.shape[1]] = some
     places, weights = np.frombuffer(t), np.frombuffer(root)
     every, basis, _ = _columns(laws, np.repeat(np.arange(len(laws)), np.diff(edges)), grid, places, weights)
-    return edges, grid, every[0, 0], basis
+    return edges, grid, every[0], basis
 
 
-def _columns(
-    laws: Sequence[Law], law: NDArray[np.intp], q: Array, t: Array, root: Array, derivatives: int = 0
-) -> tuple[Array, Array, Array]:
-    """Shift and columns of (1) of shapes (1 + derivatives, 1 + k, r, n), weighted, of rows, which rise, each of a law
-    with its q; behind them derivatives by q. Q (r, n, k) and R of the columns; of those that add nothing to the ones
-    before, and where there is no curve and the shift is NaN, 0 and 1."""
+def _curves(laws: Sequence[Law], law: NDArray[np.intp], q: Array, t: Array, root: Array) -> Array:
+    """Shift and columns of (1), weighted (1 + k, r, n), of rows, which rise, each of a law with its q; what a law does
+    not have is 0."""
     span, edges = float(t[-1] - t[0]), np.searchsorted(law, np.arange(len(laws) + 1))
-    every, s = np.zeros((1 + derivatives, 1 + max(one.columns for one in laws), len(q), t.size)), (t - t[0]) / span
-    alike = [k for k, one in enumerate(laws) if not k or one.curve is not laws[k - 1].curve]
-    for one, a, b in zip(alike, edges[alike], [*edges[alike[1:]], len(q)], strict=True):
+    every, s = np.zeros((1 + max(one.columns for one in laws), len(q), t.size)), (t - t[0]) / span
+    for one, a, b in zip(laws, edges, edges[1:], strict=False):
         if b > a:
-            for to, parts in zip(every, laws[one].curve(q[a:b].T[:, :, None], s, span), strict=False):
-                for k, part in enumerate(parts):
-                    to[k, a:b] = part
-    none = ~np.isfinite(every[0].sum(axis=0)).all(axis=1)
-    every[0][:, none], every[0, 0, none] = 0.0, np.nan
+            for k, part in enumerate(one.curve(q[a:b].T[:, :, None], s, span)):
+                every[k, a:b] = part
     every *= root
-    basis, back = np.linalg.qr(np.moveaxis(every[0, 1:], 0, -1))
+    return every
+
+
+def _columns(laws: Sequence[Law], law: NDArray[np.intp], q: Array, t: Array, root: Array) -> tuple[Array, Array, Array]:
+    """`_curves`, and Q (r, n, k) and R of the columns; of those that add nothing to the ones before, and where there is
+    no curve and the shift is NaN, 0 and 1."""
+    every = _curves(laws, law, q, t, root)
+    none = ~np.isfinite(every.sum(axis=0)).all(axis=1)
+    every[:, none], every[0, none] = 0.0, np.nan
+    basis, back = np.linalg.qr(np.moveaxis(every[1:], 0, -1))
     size = abs(np.diagonal(back, axis1=-2, axis2=-1))
     told = size > 1e-13 * size.max(axis=-1, keepdims=True)
-    back = np.where(told[..., :, None] & told[..., None, :], back, np.eye(len(every[0]) - 1))
+    back = np.where(told[..., :, None] & told[..., None, :], back, np.eye(len(every) - 1))
     return every, np.where(told[..., None, :], basis, 0.0), back
 
 

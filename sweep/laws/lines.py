@@ -14,15 +14,14 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.polynomial import chebyshev
-from scipy.special import gammaincc, ndtri, stdtrit
+from scipy.special import gammaincc, ndtri
 
 from sweep.errors import SweepError
 from sweep.laws.curves import Window, fit_lines, stated_bound
 from sweep.laws.fits import Found, fitted, union
 from sweep.laws.loglog import EPSILON, FEWEST, Array, alike, slope_bounds, slopes, tends
-from sweep.laws.noise import BEYOND_DOUBT, RARE, corrected, inliers, regress, roughness, shaped
-from sweep.laws.shapes import CORRECTION, LOG_CORRECTION, ONE, Law
+from sweep.laws.noise import BEYOND_DOUBT, RARE, inliers, regress, roughness, shaped
+from sweep.laws.shapes import CORRECTION, LOG_CORRECTION, ONE, Number
 
 SMOOTH = 0.12
 """Share of the distances from a line that is noise, below which they are a bend and no noise."""
@@ -165,9 +164,12 @@ def fit_line(
 
 def _noisy(t: Array, z: Array, centre: Array, word: str, confidence: float) -> dict[str, Any]:
     """Lines beside noise: their numbers, or the range of the slope where they bend."""
-    powers = 4 if word == "noise" and t.size >= FEWEST_FOR_BEND else 2
-    columns = chebyshev.chebvander(2 * (t - t[0]) / (t[-1] - t[0]) - 1, powers - 1)
-    columns[:, 1] = t - centre[0]
+    u, half = 2 * (t - t[0]) / (t[-1] - t[0]) - 1, (t[-1] - t[0]) / 2
+    columns = np.stack([np.ones_like(t), t - centre[0], u**2, u**3], axis=1)
+    # the numbers of a cubic that are its slopes at the middle and at the ends
+    ends = half * np.stack([u - u**3 / 3, u**3 / 6 - u**2 / 4, u**3 / 6 + u**2 / 4], axis=1)
+    bends = word == "noise" and t.size >= FEWEST_FOR_BEND
+    columns = columns if bends else columns[:, :2]
     inside = inliers(t, columns[:, :2], z) if word in ("noise", "outliers") else np.ones(z.shape, bool)
     kind, fits, numbers = np.full(len(z), word, "U10"), np.ones(len(z)), np.empty((6, len(z)))
     for pattern, rows in alike(inside, plain=word == "even"):
@@ -175,25 +177,14 @@ def _noisy(t: Array, z: Array, centre: Array, word: str, confidence: float) -> d
         # a point that is left out counts as one that is not known
         wider = t.size / pattern.sum()
         value, error = (part.T for part in line.mean())
-        ends = value[1] + wider * (line.interval(1, confidence) - value[1])
-        numbers[:, rows], fits[rows] = np.concatenate([value, wider * error, ends]), ~line.denied
-        for row in rows[line.denied] if powers > 2 else ():
-            kind[row], numbers[4:, row] = "bent", _range(t[pattern], z[row, pattern], confidence)
+        reach = value[1] + wider * (line.interval(1, confidence) - value[1])
+        numbers[:, rows], fits[rows] = np.concatenate([value, wider * error, reach]), ~line.denied
+        if bends and (bent := rows[line.denied]).size:
+            cubic = regress(t[pattern], np.column_stack([columns[:, 0], ends])[pattern], z[bent][:, pattern], word)
+            low, high = np.array([cubic.interval(k, confidence) for k in (1, 2, 3)]).transpose(1, 0, 2)
+            kind[bent], numbers[4, bent], numbers[5, bent] = "bent", low.min(axis=0), high.max(axis=0)
     names = ("level", "exponent", "level_error", "exponent_error", "exponent_low", "exponent_high", "fits", "kind")
     return dict(zip(names, (*numbers, fits, kind), strict=True))
-
-
-def _range(t: Array, z: Array, confidence: float) -> tuple[float, float]:
-    """Least and largest slope of a curve among noise, with its interval, by the best polynomial up to degree six."""
-    u, n, most = 2 * (t - t[0]) / (t[-1] - t[0]) - 1, t.size, min(6, t.size - 4)
-    basis, back = np.linalg.qr(chebyshev.chebvander(u, most))
-    along = basis.T @ z
-    squares = {k: float(((z - basis[:, :k] @ along[:k]) ** 2).sum()) for k in range(3, most + 2)}
-    k = min(squares, key=lambda k: float(corrected(n * math.log(squares[k]), n, k + 1)))
-    steep = np.linalg.solve(back[:k, :k].T, chebyshev.chebval(u, chebyshev.chebder(np.eye(k)))) * 2 / (t[-1] - t[0])
-    slope = along[:k] @ steep
-    reach = stdtrit(n - k, (1 + confidence) / 2) * np.sqrt((steep**2).sum(axis=0) * squares[k] / (n - k))
-    return float((slope - reach).min()), float((slope + reach).max())
 
 
 def _exact(t: Array, z: Array, off: Array, bound: Array, slope: Array) -> dict[str, Any]:
@@ -212,8 +203,7 @@ def _exact(t: Array, z: Array, off: Array, bound: Array, slope: Array) -> dict[s
         doubt = (abs(local - rough) + by_error).max(axis=1)
         low[bent], high[bent] = local.min(axis=1) - doubt, local.max(axis=1) + doubt
         for i, row in enumerate(bent):
-            limits[0][row] = tends(t, local[i], by_error[i, 0])[1]
-            limits[1][row] = tends(-t[::-1], local[i, ::-1], by_error[i, -1])[1]
+            (_, limits[0][row]), (_, limits[1][row]) = tends(t, local[i], by_error[i, [0, -1]])
     names = ("exponent_low", "exponent_high", "limit_low", "limit_high", "fits", "kind", "noisy")
     return dict(zip(names, (low, high, *limits, straight, kind, 0.0), strict=True))
 
@@ -290,7 +280,8 @@ def _corrected(
             best, known = float(np.clip(abs(found.numbers[1]), least, most)), found.sigma
             doubt = 0.5 * np.ptp(found.interval(t, [1], word, confidence)[0])
             far = np.clip(np.nan_to_num(doubt, posinf=most) / best, 0.02, 0.6)
-            laws = [_fading(fade) for fade in np.clip(best * steps**far, least, most)]
+            strength, fades = CORRECTION.q[0], np.clip(best * steps**far, least, most).tolist()
+            laws = [CORRECTION._replace(name=str(d), q=(strength, Number(d, d, (d,)))) for d in fades]
             own, *others = fitted(laws, t, row[None], None if known is None else known[None])[0].values()
             others += [law for law in (one, tried[LOG_CORRECTION.name]) if law.aicc < found.aicc + AS_WELL / 2]
             ends = [*union(t, own, others, [-1], word, confidence, AS_WELL)[1][:, 0] / np.ptp(t), exponent]
@@ -322,12 +313,3 @@ def _by_half(t: Array, z: Array, exponent: float) -> float:
     other = fitted((CORRECTION,), t[half], z[None, half])[0]
     local = _outer(other[CORRECTION.name], t[half])[0] if other else slopes(t, z, 5)[-1]
     return 3 * abs(float(local) - exponent) + float(slope_bounds(t, np.full(t.size, 8 * rounding(t, z)), 5)[-1])
-
-
-def _fading(fade: float) -> Law:
-    """(1) with a given D."""
-
-    def curve(q: Array, s: Array, span: float) -> Any:
-        return CORRECTION.curve(np.stack([q[0], np.full_like(q[0], fade)]), s, span)
-
-    return CORRECTION._replace(name=str(fade), curve=curve, q=CORRECTION.q[:1])

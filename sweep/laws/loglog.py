@@ -176,19 +176,21 @@ def differences(nodes: Array) -> tuple[Array, Array]:
     return apart, 1.0 / apart.prod(axis=2)
 
 
-def tends(t: Array, local: Array, doubt: float) -> tuple[float, float]:
-    """The exponent at the start of a window, and the limit beyond it, three times over.
+def tends(t: Array, local: Array, doubts: Any) -> list[tuple[float, float]]:
+    """At each end of a window the exponent there, and the limit beyond it, three times over.
 
     Its change from third to second to first of three points a step apart goes on geometrically, which is a third of the
     way for a bend that fades as 1/ln^2; where it does not slow down towards the end, ten times the last change stands
-    for an unknown limit. What is within `doubt` is no change.
+    for an unknown limit. What is within the doubt of that end is no change.
     """
-    step = min(np.log(10), (t[-1] - t[0]) / 8)
-    first, second, third = np.interp(t[0] + step * np.arange(3), t, local)
-    last, before = first - second, second - third
-    slows = last * before > 0 and abs(last) < (1 - SLOWER) * abs(before)
-    left = last * last / (before - last) if slows else 10 * last
-    return float(first), float(first + 3 * left) if abs(last) > doubt else float(first)
+    step, found = min(np.log(10), (t[-1] - t[0]) / 8), []
+    for end, inwards, doubt in zip(t[[0, -1]], (step, -step), doubts, strict=True):
+        first, second, third = np.interp(end + inwards * np.arange(3), t, local).tolist()
+        last, before = first - second, second - third
+        slows = last * before > 0 and abs(last) < (1 - SLOWER) * abs(before)
+        left = last * last / (before - last) if slows else 10 * last
+        found.append((first, first + 3 * left if abs(last) > doubt else first))
+    return found
 
 
 def brackets(c: Array, value: float) -> list[int]:

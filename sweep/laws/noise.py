@@ -247,22 +247,3 @@ def corrected(deviance: Any, points: int, numbers: int) -> Any:
     """AICc from minus twice the logarithm of the likelihood; inf where there are too few points for so many numbers."""
     left = points - numbers - 1
     return deviance + (2 * numbers + 2 * numbers * (numbers + 1) / left if left > 0 else math.inf)
-
-
-def line_deviance(t: Array, z: Array) -> float:
-    """`Regression.deviance` of the straight line through one line (n,), whatever its noise: that of `regress`, or with
-    outliers, by Student's t of three degrees of freedom, reweighted until nothing changes."""
-    weights, scale, off = np.ones(z.size), math.inf, z
-    for _ in range(50):
-        share, before = weights / weights.sum(), scale
-        u, off = t - share @ t, z - share @ z
-        off = off - (share * u) @ off / ((share * u) @ u) * u
-        scale = max(float(np.mean(weights * off**2)), 1e-300)
-        weights = 4 / (3 + off**2 / scale)
-        if abs(scale - before) <= 1e-4 * scale:  # its square counts
-            break
-    scale = max(scale, float((ROUNDING * (1 + abs(z).max())) ** 2))
-    constant = 2 * math.log(2 / (math.pi * math.sqrt(3))) + 1 + math.log(2 * math.pi)
-    outlying = 4 * np.log1p(off**2 / (3 * scale)).sum() + z.size * (math.log(scale) - constant)
-    columns = np.stack([np.ones_like(t), t - t.mean()], axis=1)
-    return min(float(regress(t, columns, z[None]).deviance[0]), float(outlying))

@@ -30,10 +30,6 @@ TELLING_MEMORY, ROUGH = 40, 0.15
 bends have 0.08 at most, correlations of 0.95 at least 0.19."""
 SCATTERED = 0.5
 """Share that independent noise leaves at least."""
-SMOOTH_TO = 1e-5
-"""Share up to which the points are smooth, and no noise moves the limits to which local exponents tend."""
-SMALLER = 0.2
-"""Share of the distances from two laws that three must leave, where there is no noise, to be believed."""
 OTHER_SHAPES = 20.0
 """Difference of AICc from which on a bend of another shape is ruled out; more than for a second law, since the truth
 may be between the shapes that are tried."""
@@ -135,14 +131,12 @@ def _one(t: Array, z: Array, tried: dict[str, Found], confidence: float, noise: 
     # both exponents, and where the laws meet
     which, units, zero = [-2, -1, 0], np.array([1 / span, 1 / span, span]), np.array([0.0, 0.0, t[0]])
     best = two.numbers[which] * units + zero
-    (low, high), every = union(t, two, others, which, word, confidence, OTHER_SHAPES) * units + zero
-    if noisy or roughness(t, two.off)[0] > SMOOTH_TO * size:
-        further = BEYOND_SHAPES * np.nan_to_num(max(low[2] - every[0, 2], every[1, 2] - high[2]))
-        low, high = every
-        low[2], high[2] = low[2] - further, high[2] + further
+    own, (low, high) = union(t, two, others, which, word, confidence, OTHER_SHAPES) * units + zero
+    further = BEYOND_SHAPES * np.nan_to_num(max(own[0, 2] - low[2], high[2] - own[1, 2]))
+    low[2], high[2] = low[2] - further, high[2] + further
     if not noisy:
         low, high = _widened(t, z, best, low, high)
-    verdict, evidence = _verdict(t, z, tried, noisy)
+    verdict, evidence = _verdict(t, z, tried)
     width, level = math.exp(two.numbers[1]) * span / math.log(10), np.exp(two.numbers[2])
     if evidence <= 0 and not noisy:  # straight to rounding: nothing meets anywhere
         best[2], low[2], high[2], width, level = math.nan, -np.inf, np.inf, math.nan, math.nan
@@ -175,22 +169,20 @@ def _widened(t: Array, z: Array, best: Array, low: Array, high: Array) -> tuple[
     laws and to where the tangents at the ends of the window meet."""
     first = np.append(True, np.diff(t) > 0)
     t, z = t[first], z[first]
-    local, noise, ends = slopes(t, z, 5), 2.5 * float(roughness(t, z)[0]), []
+    local = slopes(t, z, 5)
     half = np.flatnonzero(np.diff(np.sign(local - (best[0] + best[1]) / 2)))
     places = [t[half[np.argmin(abs(t[half] - best[2]))]] if half.size else best[2]]
-    for at, of in ((t, local), (-t[::-1], local[::-1])):
-        # what noise there is moves the local exponent at the end
-        doubt = noise * math.sqrt((slopes(at[:5], np.eye(min(5, t.size)), 5)[:, 0] ** 2).sum())
-        end, limit = tends(at, of, doubt)
-        ends.append((end, limit, end - doubt, end + doubt, limit - doubt, limit + doubt))
+    # what noise there is moves the local exponents
+    doubts = 2.5 * roughness(t, z)[0] * np.sqrt((slopes(t, np.eye(t.size), 5)[:, [0, -1]] ** 2).sum(axis=0))
+    ends = [np.add.outer(two, (0, -by, by)) for two, by in zip(tends(t, local, doubts), doubts, strict=True)]
     # where lines of these slopes through the first and the last point meet
-    steep = itertools.product(*(one[:4] for one in ends))
+    steep = itertools.product(*([*one[:, 0], *one[0, 1:]] for one in ends))
     places += [(z[-1] - z[0] + p * t[0] - q * t[-1]) / (p - q) for p, q in steep if p != q]
-    reach = np.array([(min(one), max(one)) for one in (*ends, places)]).T
+    reach = np.array([(np.min(one), np.max(one)) for one in (*ends, places)]).T
     return np.minimum(low, reach[0]), np.maximum(high, reach[1])
 
 
-def _verdict(t: Array, z: Array, tried: dict[str, Found], noisy: bool) -> tuple[str, float]:
+def _verdict(t: Array, z: Array, tried: dict[str, Found]) -> tuple[str, float]:
     """One of VERDICTS, and by how much two laws are better than a line and than other functions.
 
     By AICc, and BIC for many points. The noise of the line may be of any kind, that of all others is even.
@@ -203,13 +195,10 @@ def _verdict(t: Array, z: Array, tried: dict[str, Found], noisy: bool) -> tuple[
 
     evidence = min(gain(one, two) for one in (line, *others))
     nearest = min((*bends, *others), key=lambda fit: fit.aicc)
-    if three and three.aicc < nearest.aicc - OTHER_SHAPES and gain(line, three) > BEYOND_DOUBT:
-        if not noisy:
-            better = three.deviance < min(fit.deviance for fit in bends) + 2 * t.size * math.log(SMALLER)
-        else:  # nor with noise of any kind beside two
-            better = three.aicc < nearest.interval(t, [], "noise", 0.5)[1] - BEYOND_DOUBT
-        if better:
-            return "three laws", evidence
+    # three, if with a bend more even beside what noise of any kind leaves of fewer
+    rivals = nearest.aicc - OTHER_SHAPES, nearest.interval(t, [], "noise", 0.5)[1] - BEYOND_DOUBT
+    if three and three.aicc < min(rivals) and gain(line, three) > BEYOND_DOUBT:
+        return "three laws", evidence
     if evidence > BEYOND_DOUBT:
         return "two laws" if 0 <= two.numbers[0] <= 1 else "no meeting in the window", evidence
     if any(gain(line, one) > BEYOND_DOUBT and min(gain(law, one) for law in bends) > -BEYOND_DOUBT for one in others):

@@ -131,22 +131,6 @@ def test_the_laws_that_lines_are_made_of_are_found_to_rounding(seed):
     assert np.log(float(place.abscissa) / middle) == pytest.approx(0.15 / b, rel=1e-8)
 
 
-def test_a_weight_is_a_repetition():
-    """A point of half the standard error counts as four points do; of equal ones, as those without errors."""
-    y = curves("scatters", 4).isel(size=0)
-    sigma = 0.02 * y * np.where(np.arange(40) % 3, 1.0, 0.5)
-    weighted = sweep.fit_exponent(y, "x", sigma=sigma)
-    t, z = np.log(y.x.values), np.log(y.values)
-    times = np.where(np.arange(40) % 3, 1, 4)
-    slope = np.polyfit(np.repeat(t, times), np.repeat(z, times), 1)[0]
-    assert float(weighted.exponent) == pytest.approx(slope, rel=1e-12)
-    even = sweep.fit_exponent(y, "x", sigma=0.02 * y)
-    assert float(even.exponent) == pytest.approx(np.polyfit(t, z, 1)[0], rel=1e-12)
-    assert float(sweep.fit_exponent(y, "x", sigma=sigma.where(y.x > y.x[7])).exponent) == pytest.approx(
-        float(sweep.fit_exponent(y[8:], "x", sigma=sigma[8:]).exponent), rel=1e-12
-    )
-
-
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_collapse_does_not_depend_on_units_or_order(seed):
     rng = np.random.default_rng(seed)
