@@ -33,6 +33,7 @@ def test_chaos_is_given_and_not_called_right():
     found, status = solve(SECTION, "taylor", gain=[3.9], bend=1.0, along=[np.arange(1.0, 121.0)])
     assert status[0] == Status.INACCURATE
     assert (abs(found["v"][0]) < 1.0).all()
+    assert solve(SECTION, "taylor", gain=[3.9], along=[np.array([2.0, 1.0])])[1][0] == Status.BAD_INPUT
 
 
 def test_a_motion_is_known_at_any_time_until_its_bounces_accumulate():
