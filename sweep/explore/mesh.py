@@ -1,7 +1,8 @@
 """Cells joined to simplices; how far straight lines between them are off, and which edge to cut for it.
 
-Simplices (intervals, triangles, tetrahedra) are those of Delaunay's triangulation. Over one with barycentric
-coordinates l_i a parabola is off its straight interpolation by
+Simplices (intervals, triangles, tetrahedra) are those of Delaunay's triangulation.
+
+Over a simplex with barycentric coordinates l_i a parabola is off its straight interpolation by
 
     E(l) = sum_{i<j} c_ij l_i l_j                                 (1)
 
@@ -9,9 +10,9 @@ so a quarter of c_ij is the error in the middle of the edge from i to j. The c_i
 are off the simplex continued to them; what such a parabola leaves of these distances tells kinks, peaks and whatever
 else is no parabola, and counts too.
 
-The box is stretched before cells are joined, so that they are joined along what outputs do not depend on. Over an edge
-e straight lines are off by e |H| e / 8 at most, H the matrix of second derivatives. Multiplied by the square root of
-the mean of |H|, a box bends alike in all directions; an axis that matters nothing, or a direction along which a
+A box is stretched to where an output bends, so that cells are joined along what it does not depend on. Over an edge e
+straight lines are off by e |H| e / 8 at most, H the matrix of second derivatives. Multiplied by the square root of the
+mean of |H|, a box bends alike in all directions; an axis that matters nothing, or a direction along which a
 dimensionless group stays as it is, shrinks. Source: A. Loseille, F. Alauzet, SIAM J. Numer. Anal. 49 (2011) 38.
 """
 
@@ -19,160 +20,230 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import LinearNDInterpolator
 from scipy.spatial import Delaunay, cKDTree
-from threadpoolctl import threadpool_limits
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 SHEAR = 0.013
-"""By which axes are tilted: corners of a box lie on a sphere, so there are many ways to join them; tilted there is one,
-and it is alike in all boxes."""
+"""By which axes are tilted before cells are joined: corners of a box lie on a sphere, so there are many ways to join
+them; tilted there is one, and it is alike in all boxes."""
 FLAT = 1e-9
 """Volume, in products of its edges, below which a simplex is none."""
-SAFETY, MISFIT = 1.6, 2.5
-"""Times the parabola's error, and times what the parabola leaves."""
+AROUND = {1: 6, 2: 12, 3: 20}
+"""Cells around a simplex that are taken, of one axis with its two; with more axes twice the unknowns."""
+SAFETY, MISFIT = 1.6, {1: 5.0}
+"""Times the parabola's error; and times what the parabola leaves, 2.5 with more axes: a kink in the middle between
+cells of one axis is told at half its size from either side."""
 LEAST_BASIS, RIDGE, BATCH = 0.3, 1e-12, 2_000
 """Of the fit: a cell's weight is the inverse of (1) with all c_ij = 1, or of the first; simplices at a time."""
 ROUNDS, MOST = 3, 3000
 """Of a stretch: the first joins the cells of the box as it is, where simplices reach across more of the bends; and
 simplices whose mean it takes."""
+LESSENING = 0.5
+"""A cut along each axis leaves a quarter of the distance from a straight line, where an output is smooth; of noise, and
+of the volume that is to be cut in it, more than this share."""
+CUTS, STAYS, JUMP = 6, 0.9, 0.2
+"""At a pole the change from cell to cell stays above a share of what it was so many cuts before, and lies on both sides
+of a new cell: at a jump one of them has less than a share of the other."""
+LATEST = 128
+"""Cells added last, which tell noise."""
 FLATTEST, STRAIGHT = 1e-5, 1e-9
 """Least share of the mean bend that a direction has: by 300 a box is stretched at most; what is taken for rounding."""
 
 
-class Mesh:
-    """Points (n, axes) of heights (n, outputs) joined to simplices.
+def simplices(points: Array) -> Indices:
+    """Numbers (m, axes + 1) of the points at the corners of each simplex; those without a volume are left out."""
+    if points.shape[1] == 1:
+        order = np.argsort(points[:, 0], kind="stable")
+        return np.column_stack([order[:-1], order[1:]])
+    found = np.sort(Delaunay(tilted(points)).simplices.astype(np.intp), axis=1)
+    return found[are_solid(points, found)]
+
+
+def are_solid(points: Array, corners: Indices) -> NDArray[np.bool_]:
+    """Whether simplices have a volume."""
+    sides = points[corners[:, 1:]] - points[corners[:, :1]]
+    found: NDArray[np.bool_] = abs(np.linalg.det(sides)) > FLAT * np.linalg.norm(sides, axis=2).prod(axis=1)
+    return found
+
+
+def tilted(points: Array) -> Array:
+    """Points as they are joined."""
+    axes = points.shape[1]
+    found: Array = points @ (np.eye(axes) + SHEAR * np.tril(1.0 + 0.3 * np.arange(axes), -1))
+    return found
+
+
+def edges(axes: int) -> Indices:
+    """Pairs of corners of a simplex."""
+    return np.array(list(itertools.combinations(range(axes + 1), 2)), dtype=np.intp)
+
+
+def largest(corners: Indices, of_edges: Array) -> Indices:
+    """The edges (m, 2) where something (m, pairs) is largest."""
+    return np.take_along_axis(corners, edges(corners.shape[1] - 1)[of_edges.argmax(axis=1)], 1)
+
+
+def fewest(axes: int) -> int:
+    """Points that tell a parabola over a simplex."""
+    return (axes + 1) * (axes + 2) // 2
+
+
+def errors_inside(points: Array, heights: Array, kind: Indices, corners: Indices) -> tuple[Array, Indices]:
+    """How far straight lines between points (n, axes) of heights (n,) are off, as the points around tell.
 
     Parameters
     ----------
     kind : ndarray of int, shape (n,)
         Of which kind points are, -1 of none: a simplex is judged by points of its own kind alone.
-    matrix : ndarray, optional
-        By which points are multiplied before they are joined; default: `stretch` tells it.
-
-    Attributes
-    ----------
     corners : ndarray of int, shape (m, axes + 1)
-        Points at the corners of each simplex.
+        Simplices.
+
+    Returns
+    -------
+    tuple of ndarray
+        Of each simplex the error, shape (m,), and the edge that needs a cut most, shape (m, 2). Where its corners are
+        of several kinds, or those of its kind too few, the error is infinite and the edge the longest one.
     """
-
-    def __init__(self, points: Array, heights: Array, kind: Indices, matrix: Array | None = None) -> None:
-        self.matrix = stretch(points, heights, kind) if matrix is None else matrix
-        self.places, self.heights, self.kind = points @ self.matrix, heights, kind
-        if points.shape[1] == 1:
-            order = np.argsort(self.places[:, 0], kind="stable")
-            self.corners = np.column_stack([order[:-1], order[1:]])
-            return
-        self._joined = Delaunay(self.places)
-        corners = np.sort(self._joined.simplices.astype(np.intp), axis=1)
-        sides = self.places[corners[:, 1:]] - self.places[corners[:, :1]]
-        solid = abs(np.linalg.det(sides)) > FLAT * np.linalg.norm(sides, axis=2).prod(axis=1)
-        self.corners, self._numbers = corners[solid], np.where(solid, np.cumsum(solid) - 1, -1)
-
-    @property
-    def edges(self) -> Indices:
-        """Ends (m, pairs, 2) of the edges of each simplex."""
-        return self.corners[:, _pairs(self.places.shape[1])]
-
-    def errors(self) -> tuple[Array, Array, Indices]:
-        """How far straight lines are off in each simplex, as the points around tell, and which edge to cut for it.
-
-        Returns
-        -------
-        tuple of ndarray
-            Errors (m, outputs); what a parabola does not explain of them; and of each simplex the number of the edge
-            that needs a cut most. Where its corners are of several kinds, or those of its kind too few, the error is
-            infinite and the edge the longest one.
-        """
-        axes, ends = self.places.shape[1], self.places[self.edges]
-        size, rough = np.full((2, len(self.corners), self.heights.shape[1]), np.inf)
-        cut = np.linalg.norm(ends[:, :, 0] - ends[:, :, 1], axis=2).argmax(axis=1)
-        for number in np.unique(self.kind[self.kind >= 0]):
-            members, here = self.kind == number, np.flatnonzero((self.kind[self.corners] == number).all(axis=1))
-            if members.sum() >= (axes + 1) * (axes + 2) // 2 and len(here):
-                bend, misfit = _parabolas(self.places, self.heights, members, self.corners[here])
-                middle, inside = abs(bend) / 4, abs(bend.sum(axis=1)) / (axes + 1) ** 2
-                rough[here] = MISFIT * misfit
-                size[here] = SAFETY * np.maximum(middle.max(axis=1), inside) + rough[here]
-                cut[here] = middle[np.arange(len(here)), :, size[here].argmax(axis=1)].argmax(axis=1)
-        return size, rough, cut
-
-    def between(self, at: Array, heights: Array) -> tuple[Array, Indices]:
-        """Heights (n, ...) on straight lines at places, NaN outside; and the simplex of each, -1 outside."""
-        places = at @ self.matrix
-        with threadpool_limits(1, "blas"):  # on busy cores its threads wait some milliseconds for each other, each time
-            where = self._joined.find_simplex(places)
-            found: Array = LinearNDInterpolator(self._joined, heights)(places)
-        return found, np.where(where < 0, -1, self._numbers[where])
+    axes = points.shape[1]
+    ends = points[corners[:, edges(axes)]]
+    lengths = np.linalg.norm(ends[:, :, 0] - ends[:, :, 1], axis=2)
+    size, cut = np.full(len(corners), np.inf), largest(corners, lengths)
+    for number in np.unique(kind[kind >= 0]):
+        members, here = np.flatnonzero(kind == number), np.flatnonzero((kind[corners] == number).all(axis=1))
+        if not len(here) or len(members) < fewest(axes):
+            continue
+        around, sizes = np.searchsorted(members, corners[here]), []
+        for side in (-1, 1) if axes == 1 else (0,):
+            bend, misfit = _parabolas(points[members], heights[members], around, side)
+            middle, inside = abs(bend) / 4, abs(bend.sum(axis=1)) / (axes + 1) ** 2
+            sizes.append(SAFETY * np.maximum(middle.max(axis=1, initial=0.0), inside) + MISFIT.get(axes, 2.5) * misfit)
+        # the mean of logarithms: from one side of an interval alone a jump is seen that lies beyond it, not in it
+        with np.errstate(divide="ignore"):
+            size[here] = np.exp(np.nanmean(np.log(sizes), axis=0))
+        cut[here] = largest(corners[here], middle)
+    return size, cut
 
 
-def _pairs(axes: int) -> Indices:
-    """Corners at the ends of each edge of a simplex."""
-    return np.array(list(itertools.combinations(range(axes + 1), 2)), dtype=np.intp)
+def _parabolas(points: Array, heights: Array, corners: Indices, side: int = 0) -> tuple[Array, Array]:
+    """The c_ij (m, pairs) of (1) over simplices, and what they leave (m,), a mean square's root.
 
-
-def _parabolas(points: Array, heights: Array, members: NDArray[np.bool_], corners: Indices) -> tuple[Array, Array]:
-    """The c_ij (m, pairs, outputs) of (1) over simplices, and what they leave (m, outputs), a mean square's root.
-
-    They are fitted by least squares to how far those of the points around that are members are off.
+    They are fitted by least squares to how far the points around a simplex are off its straight continuation; of one
+    axis, maybe to those on one side alone, -1 or 1, and NaN where there are none.
     """
-    points, heights, corners = points[members], heights[members], np.searchsorted(np.flatnonzero(members), corners)
-    tree, pairs = cKDTree(points), _pairs(points.shape[1])
-    number = min(len(points), corners.shape[1] + 4 * len(pairs))
-    bends = np.empty((len(corners), len(pairs), heights.shape[1]))
-    misfits = np.empty((len(corners), heights.shape[1]))
+    axes = points.shape[1]
+    tree, pairs = cKDTree(points), edges(axes)
+    order = np.argsort(points[:, 0], kind="stable")
+    ranks = np.argsort(order)
+    number = min(len(points), axes + 1 + AROUND.get(axes, 2 * len(pairs)))
+    bends, misfits = np.empty((len(corners), len(pairs))), np.empty(len(corners))
     for start in range(0, len(corners), BATCH):
         rows = slice(start, start + BATCH)
         place = points[corners[rows]]
-        near = tree.query(place.mean(axis=1), number)[1]
+        if axes == 1:  # as many on both sides
+            aside = np.arange(1 - AROUND[1] // 2, AROUND[1] // 2 + 1)
+            near = order[np.clip(ranks[corners[rows, :1]] + aside, 0, len(points) - 1)]
+        else:
+            near = tree.query(place.mean(axis=1), number)[1]
         rest = (points[near] - place[:, :1]) @ np.linalg.inv(place[:, 1:] - place[:, :1])
         shares = np.concatenate([1 - rest.sum(axis=2, keepdims=True), rest], axis=2)  # barycentric coordinates
-        off = heights[near] - shares @ heights[corners[rows]]
+        off = heights[near] - (shares @ heights[corners[rows]][:, :, None])[:, :, 0]
         basis = shares[:, :, pairs[:, 0]] * shares[:, :, pairs[:, 1]]
-        weight = 1 / np.maximum(abs(basis).sum(axis=2, keepdims=True), LEAST_BASIS)
+        weight = 1 / np.maximum(abs(basis).sum(axis=2), LEAST_BASIS)
         weight[(near[:, :, None] == corners[rows][:, None, :]).any(axis=2)] = 0.0
-        left, right = basis * weight, off * weight
+        if side:
+            weight[side * (shares[:, :, 0] - 0.5) > 0] = 0.0
+        left, right = basis * weight[:, :, None], (off * weight)[:, :, None]
         turned = left.transpose(0, 2, 1)
         square = turned @ left
         ridge = RIDGE * np.trace(square, axis1=1, axis2=2)[:, None, None] / len(pairs) + 1e-300
-        bends[rows] = np.linalg.solve(square + ridge * np.eye(len(pairs)), turned @ right)
-        unexplained = ((right - left @ bends[rows]) ** 2).sum(axis=1)
-        misfits[rows] = np.sqrt(unexplained / np.maximum((weight > 0).sum(axis=1), 1))
+        bend = np.linalg.solve(square + ridge * np.eye(len(pairs)), turned @ right)
+        bends[rows] = bend[:, :, 0]
+        unexplained, count = ((right - left @ bend)[:, :, 0] ** 2).sum(axis=1), (weight > 0).sum(axis=1)
+        misfits[rows] = np.sqrt(unexplained / np.where(count > 0, count, np.nan))
     return bends, misfits
 
 
-def stretch(points: Array, heights: Array, kind: Indices) -> Array:
+def stretch(points: Array, heights: Array) -> Array:
     """The matrix (axes, axes) by which points are multiplied before those of these heights are joined."""
-    axes, valued = points.shape[1], kind >= 0
-    tilt = np.eye(axes) + SHEAR * np.tril(1.0 + 0.3 * np.arange(axes), -1)
-    found, inside = np.eye(axes), valued.sum() >= (axes + 1) * (axes + 2) // 2 and axes > 1
-    for _ in range(ROUNDS if inside else 0):
-        mesh = Mesh(points, heights, kind, found @ tilt)
-        corners = mesh.corners[valued[mesh.corners].all(axis=1)]
+    axes, valued = points.shape[1], np.isfinite(heights)
+    inside, found = points[valued], np.eye(axes)
+    if axes == 1 or len(inside) < fewest(axes):
+        return found
+    (row, column), pairs = np.triu_indices(axes), edges(axes)
+    for _ in range(ROUNDS):
+        corners = simplices(points @ found)
+        corners = np.searchsorted(np.flatnonzero(valued), corners[valued[corners].all(axis=1)])
         if not len(corners):
-            return tilt
+            return np.eye(axes)
         some = corners[:: len(corners) // MOST + 1]
-        bend = _parabolas(mesh.places, heights, valued, some)[0]
-        # second derivatives by places from 0 to 1: of (1), with the gradients of its l_i
-        sides = points[some[:, 1:]] - points[some[:, :1]]
-        rest = np.linalg.inv(sides)
-        gradients = np.concatenate([-rest.sum(axis=2, keepdims=True), rest], axis=2)
-        first, second = _pairs(axes).T
-        products = np.einsum("map,mbp,mpo->moab", gradients[:, :, first], gradients[:, :, second], bend)
-        sizes, directions = np.linalg.eigh(products + products.swapaxes(-1, -2))
-        bends = ((directions * abs(sizes)[..., None, :]) @ directions.swapaxes(-1, -2)).sum(axis=1)
+        # second derivatives over each simplex, from c_ij = -e_ij H e_ij / 2 of its edges
+        places = inside @ found
+        edge = places[some[:, pairs[:, 0]]] - places[some[:, pairs[:, 1]]]
+        products = -edge[:, :, row] * edge[:, :, column] * np.where(row == column, 0.5, 1.0)
+        scale = abs(products).max(axis=(1, 2))[:, None]
+        bend = _parabolas(places, heights[valued], some)[0] / scale
+        second = np.empty((len(some), axes, axes))
+        second[:, row, column] = np.linalg.solve(products / scale[:, :, None], bend[:, :, None])[:, :, 0]
+        second[:, column, row] = second[:, row, column]
+        sizes, directions = np.linalg.eigh(second)
+        bends = (directions * abs(sizes)[:, None]) @ directions.transpose(0, 2, 1)
+        volumes = abs(np.linalg.det(inside[some[:, 1:]] - inside[some[:, :1]]))
         # the square root of the mean, over its largest eigenvalue
-        sizes, directions = np.linalg.eigh(np.average(bends, axis=0, weights=abs(np.linalg.det(sides))))
+        sizes, directions = np.linalg.eigh(found @ np.average(bends, axis=0, weights=volumes) @ found.T)
         if sizes.max() <= STRAIGHT:
-            return tilt
+            return np.eye(axes)
         found = (directions * np.sqrt(np.maximum(sizes / sizes.max(), FLATTEST))) @ directions.T
         # to six digits of the largest: the last ones of what LAPACK gives are not alike on every machine, and cells
         # differ ever more once one edge was cut or joined otherwise
         unit = 10.0 ** math.floor(math.log10(float(abs(found).max())) - 6)
         found = np.round(found / unit) * unit
-    return found @ tilt
+    return found
+
+
+def _ancestors(origins: Indices, axes: int, cells: Indices) -> Indices:
+    """The younger ends of the edges that were cut for cells, as many cuts ago as there are axes."""
+    for _ in range(axes):
+        cells = origins[cells].max(axis=1)
+    return cells
+
+
+def at_pole(heights: Array, origins: Indices, axes: int) -> NDArray[np.bool_]:
+    """Whether cuts have lessened nothing on the way to a cell, although there is no jump.
+
+    The first cells, which were put between none, count as jumps: nothing is known yet. `origins` (n, 2) are the two
+    cells that each was put between; of the first ones, itself.
+    """
+    cells, found = np.arange(len(heights)), []
+    with np.errstate(invalid="ignore"):
+        halves = np.sort(abs(heights[:, None] - heights[origins]), axis=1)
+        for _ in range(CUTS):
+            found.append(halves[cells])
+            cells = _ancestors(origins, axes, cells)
+        small, large = np.moveaxis(np.array(found), 2, 0)
+        before, after = (np.median(part, axis=0) for part in (large[CUTS // 2 :], large[: CUTS // 2]))
+        stays: NDArray[np.bool_] = (after > STAYS * before) & ((small <= JUMP * large).sum(axis=0) <= 1)
+    return stays
+
+
+def scatter(heights: Array, origins: Indices, axes: int, to_cut: Sequence[tuple[int, float]]) -> float:
+    """How far the latest cells are off the line between the two that each was put between, where more cells do not
+    lessen that; `to_cut` has the number of cells, and the volume of what is too far off, of all rounds."""
+    cells, volume = to_cut[-1]
+    earlier = [v for count, v in to_cut if count * 2**axes <= cells]
+    if not earlier or volume <= LESSENING * earlier[-1]:
+        return 0.0
+    with np.errstate(invalid="ignore"):
+        off = abs(heights - heights[origins].mean(axis=1))
+    off[origins[:, 0] == origins[:, 1]] = np.nan
+    latest = np.arange(max(0, cells - LATEST), cells)
+    before = off[_ancestors(origins, axes, latest)]
+    known = np.isfinite(off[latest] + before)
+    if known.sum() <= 0.75 * LATEST or np.median((off[latest] - LESSENING * before)[known]) <= 0:
+        return 0.0
+    return float(np.median(off[latest][known]))

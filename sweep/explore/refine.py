@@ -1,10 +1,11 @@
 """Cells where they are needed: a finished sweep refined until straight lines between cells are accurate to a tolerance.
 
-In every round cells are joined to simplices, intervals along one axis (`mesh`). Each is judged: inside of one status by
-the cells around it, across a border between statuses by the length of its edges. Where that is not good enough an edge
-is cut in the middle, down to a fixed share of the first grid's step. Where errors stay as they are all over a region,
-values are noisy, and no more cells are added. Errors are those of logarithms where values are positive, as a scaling
-law wants it; elsewhere they are relative to the largest value.
+In every round cells are joined to simplices, intervals along one axis, in a box stretched to where an output bends.
+Each is judged: inside of one status by the cells around it (`mesh`), across a border between statuses by the length of
+its edges. Where that is not good enough an edge is cut in the middle, down to a fixed share of the first grid's step,
+but not beside a pole, where cuts lessen nothing. Where errors stay as they are all over a region, values are noisy, and
+no more cells are added. Errors are those of logarithms where values are positive, as a scaling law wants it; elsewhere
+they are relative to the largest value.
 
 Cells of one axis are a sweep over its values like any other. Cells of more axes lie anywhere, as those of a zip design.
 """
@@ -20,16 +21,17 @@ import shutil
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from kernels.interface import Status
 from sweep.cells.schema import ANCILLARY, STATUS, cell_schema
 from sweep.errors import SweepError
-from sweep.explore.mesh import Array, Indices, Mesh
-from sweep.explore.scattered import MOST_AXES, REFINED_TO, Box, axes_of, mesh_of
+from sweep.explore.mesh import Array, Indices, at_pole, edges, errors_inside, largest, scatter, simplices, stretch
+from sweep.explore.scattered import MOST_AXES, REFINED_TO, Box, axes_of, heights, kinds
 from sweep.file import disk
 from sweep.file.disk import check_target
 from sweep.file.open import in_memory
@@ -47,12 +49,10 @@ FURTHER_LEVELS = (4, 2, 2)
 """How often a step of the first grid may be halved, by number of axes: inside of a status, for a jump has no straight
 line; across a border between statuses; and beside one, where values may go to infinity."""
 GROWTH, SETTLED = 1.5, 1.02
-"""Factors of the number of cells after which the box is stretched anew; and at the end, as for who reads the result."""
-LESSENING, ENOUGH = 0.75, 128
-"""Where further cells, 2 times as many for each axis as there were, at least so many, leave more than this share of the
-volume in which no parabola fits, values are noisy."""
-USUAL, NOISE_SIZE = 3.0, 12.0
-"""The usual error of a simplex in noise, and the largest, as multiples of how far values scatter."""
+"""Factors of the number of cells after which boxes are stretched anew: on the way, and at the end, since those who
+read the result stretch it by all of its cells."""
+NOISE_SIZE = 8.0
+"""The error of a simplex in noise, as a multiple of how far cells are off, at most."""
 SAME = 2.0**-40
 """Distance of places along an axis, from 0 to 1, that are the same."""
 
@@ -76,8 +76,8 @@ class Refinement:
     complete : bool
         Whether the tolerance is met; not so where `most_cells` ran out, an output jumps, goes to infinity or is noisy.
     jumps : int
-        Places where the tolerance is not met although edges are cut as often as is allowed: at a jump, or where values
-        go to infinity, as near borders of statuses.
+        Places where the tolerance is not met although edges are cut as often as is allowed, or cuts lessen nothing: at
+        a jump, or where values go to infinity, as near borders of statuses.
     unseen : dict of str to str
         How far apart cells are along each axis, at most: nothing tells of a peak narrower than that.
     noise : float
@@ -229,6 +229,17 @@ def _folder_of_rounds(path: str | os.PathLike[str] | None, dataset: xr.Dataset, 
     return rounds
 
 
+class Judged(NamedTuple):
+    """Simplices, and what is to become of them."""
+
+    corners: Indices
+    size: Array  # the error of straight lines in each
+    ends: Indices  # of the edge to cut, (m, 2)
+    wanted: NDArray[np.bool_]  # the error is too large
+    finest: NDArray[np.bool_]  # but the edge is not to be cut
+    valued: NDArray[np.bool_]  # inside of one status
+
+
 class Refiner:
     """Cells joined to simplices, whose edges are cut until outputs can be interpolated.
 
@@ -244,7 +255,7 @@ class Refiner:
         most_cells: int,
         solve: Callable[[Mapping[str, Array]], xr.Dataset],
     ) -> None:
-        self.names, self.tolerance, self.most, self._solve = names, tolerance, most_cells, solve
+        self.tolerance, self.most, self._solve = tolerance, most_cells, solve
         self.axes, even = list(study.axes), study.design != "product"
         cells = dataset.load()
         if cells[STATUS].ndim > 1:
@@ -253,81 +264,42 @@ class Refiner:
         self.parts, self.box = [cells], Box.of(cells, self.axes)
         self.points = self.box.points(cells)  # from 0 to 1, shape (cells, axes)
         self.first = len(self.points)
+        # the two cells that each was put between; of the first ones, itself
+        self.origins = np.stack([np.arange(self.first)] * 2, axis=1)
         lengths = (len(axis) - 1 for axis in study.axes.values())
         self._steps = np.array([self.first ** (1 / len(self.axes)) if even else length for length in lengths])
-        # how far values of each output scatter, which more cells do not lessen; 0 where they do
-        self.noise = np.zeros(len(names))
-        self._rounds: list[tuple[int, Array]] = []
+        # how far values of an output scatter, which more cells do not lessen; 0 where they do
+        self.noise = dict.fromkeys(names, 0.0)
+        self._to_cut: dict[str, list[tuple[int, float]]] = {name: [] for name in names}
 
     def refine(self) -> None:
-        """Rounds of cuts, each of edges that share no end, until nothing is to be cut."""
+        """Rounds of cuts, each of edges that share no end, until nothing is to be cut however outputs are judged."""
+        # between two values nothing tells whether an output bends
         for k in range(len(self.axes)):
-            if np.isin(self.points[:, k], (0, 1)).all():  # between two values nothing tells whether an output bends
+            if np.isin(self.points[:, k], (0, 1)).all():
                 middle = self.points[self.points[:, k] == 0]
                 middle[:, k] = 0.5
                 self._add(middle)
         stretched_at = 0
         while True:
-            anew = len(self.points) >= GROWTH * stretched_at
-            stretched_at = len(self.points) if anew else stretched_at
-            outputs, matrix = [self.column(name) for name in self.names], None if anew else self.mesh.matrix
-            self.mesh: Mesh = mesh_of(self.points, outputs, self.column(STATUS), matrix)
-            cut = self._judge()
+            if len(self.points) >= GROWTH * stretched_at:
+                stretches = {name: stretch(self.points, heights(self.column(name))) for name in self.noise}
+                stretched_at = len(self.points)
+            parts = [self._judged(name, stretches[name]) for name in self.noise]
+            self.found = found = Judged(*(np.concatenate(column) for column in zip(*parts, strict=True)))
             # worst first, as many as are allowed; none shares an end with one before: a cut changes what is known there
             used, cuts = np.zeros(len(self.points), dtype=bool), []
-            todo = np.flatnonzero(self.wanted & ~self.finest)
-            for ends in cut[todo[np.argsort(np.round(-np.log(self.size[todo]), 6), kind="stable")]]:
+            todo = np.flatnonzero(found.wanted & ~found.finest)
+            for ends in found.ends[todo[np.argsort(np.round(-np.log(found.size[todo]), 6), kind="stable")]]:
                 if not used[ends].any():
                     used[ends] = True
                     cuts.append(ends)
             if cuts := cuts[: max(0, self.most - len(self.points))]:
-                self._add(self.points[np.array(cuts)].mean(axis=1))
+                self._add(self.points[np.array(cuts)].mean(axis=1), np.array(cuts))
             elif len(self.points) > SETTLED * stretched_at:
                 stretched_at = 0
             else:
                 return
-
-    def _judge(self) -> Indices:
-        """Tells the `size` of each simplex's error, which are `wanted` smaller, which have been cut to the `finest`,
-        and which are `valued`, inside of one status; returns the ends of the edges to cut."""
-        mesh, axes, ends = self.mesh, len(self.axes), self.mesh.edges
-        inside, border, beside = (2.0**-level for level in LEVELS.get(axes, FURTHER_LEVELS))
-        of_corners, of_ends = mesh.kind[mesh.corners], mesh.kind[ends]
-        alike = (of_corners == of_corners[:, :1]).all(axis=1)
-        self.valued = alike & (of_corners[:, 0] >= 0)
-        # of edges, in steps of the first grid along the axis where they are longest
-        extent = (abs(self.points[ends[:, :, 0]] - self.points[ends[:, :, 1]]) * self._steps).max(axis=2)
-
-        # inside of one status as the cells around tell; across a border infinite while edges are longer than they may
-        # stay; beside one they are cut as often as values that may go to infinity want it
-        sizes, rough, cut = mesh.errors()
-        across = np.where(of_ends[:, :, 0] != of_ends[:, :, 1], extent, 0.0)
-        cut = np.where(alike, cut, across.argmax(axis=1))
-        sizes[~self.valued] = np.where(across.max(axis=1) > border, math.inf, 0.0)[~self.valued, None]
-        least = np.full(len(ends), inside)
-        if not alike.all():
-            tree = cKDTree(self.points[np.unique(mesh.corners[~alike])] * self._steps)
-            apart = tree.query(self.points * self._steps, p=math.inf)[0]
-            least[alike & (apart <= border)[mesh.corners].any(axis=1)] = beside
-        rows = np.arange(len(ends))
-        self.finest = extent[rows, cut] <= least
-
-        # noise: more cells have not lessened the volume in which the error is too large and no parabola fits
-        corners = self.points[mesh.corners]
-        volume = abs(np.linalg.det(corners[:, 1:] - corners[:, :1]))
-        large = (sizes > np.maximum(self.tolerance, NOISE_SIZE * self.noise)) & (rough > sizes / 2)
-        large &= ~self.finest[:, None]
-        if len(self.points) >= ENOUGH:
-            self._rounds.append((len(self.points), volume @ large))
-            if self._rounds[0][0] <= len(self.points) / 2**axes:
-                most = np.max([found for _, found in self._rounds], axis=0)
-                for k in np.flatnonzero(volume @ large > LESSENING * most):
-                    self.noise[k] = max(self.noise[k], float(np.median(sizes[large[:, k], k])) / USUAL)
-
-        self.wanted = (sizes > np.maximum(self.tolerance, NOISE_SIZE * self.noise)).any(axis=1)
-        self.size = sizes.max(axis=1)
-        found: Indices = ends[rows, cut]
-        return found
 
     def column(self, name: str) -> Any:
         """An axis, an output, or what is said of it, of all cells."""
@@ -335,27 +307,31 @@ class Refiner:
 
     def report(self, dataset: xr.Dataset) -> Refinement:
         """What came of it, with the dataset of all cells."""
-        box, left = self.box, self.valued & self.finest & self.wanted
+        found, box = self.found, self.box
+        left = found.valued & found.finest & found.wanted
         steps = [np.diff(np.unique(column)) for column in self.points.T]
-        widths = np.ptp(self.points[self.mesh.corners[self.valued]], axis=1).max(axis=0, initial=0.0)
+        widths = np.ptp(self.points[found.corners[found.valued]], axis=1).max(axis=0, initial=0.0)
         apart = zip(self.axes, widths, box.low, box.high, box.logarithmic, strict=True)
         return Refinement(
             dataset=dataset,
             added=len(self.points) - self.first,
             uniform=int(math.prod(round(1 / step[step > SAME].min()) + 1 for step in steps)),
-            error=float(self.size[self.valued & ~left].max(initial=0.0)),
+            error=float(found.size[found.valued & ~left].max(initial=0.0)),
             tolerance=self.tolerance,
-            complete=not (self.size > self.tolerance).any(),
+            complete=not (found.size > self.tolerance).any(),
             jumps=int(left.sum()),
             unseen={
                 name: f"a factor {(high / low) ** width:.3g}" if logarithmic else f"{width * (high - low):.3g}"
                 for name, width, low, high, logarithmic in apart
             },
-            noise=float(self.noise.max()),
+            noise=max(self.noise.values()),
         )
 
-    def _add(self, points: Array) -> None:
-        """Solves further cells; of places along an axis that rounding alone tells apart, all get the first's value."""
+    def _add(self, points: Array, ends: Indices | None = None) -> None:
+        """Solves further cells, maybe in the middles between two others.
+
+        Of places along an axis that rounding alone tells apart, all get the value of the first.
+        """
         values = {}
         for k, name in enumerate(self.axes):
             places = np.round(np.concatenate([self.points[:, k], points[:, k]]) / SAME)
@@ -363,4 +339,48 @@ class Refiner:
             known = np.concatenate([self.column(name), self.box.values(k, points[:, k])])
             values[name] = known[first[same[len(self.points) :]]]
         self.parts.append(self._solve(values))
+        itself = len(self.points) + np.arange(len(points))
         self.points = np.concatenate([self.points, points])
+        self.origins = np.concatenate([self.origins, np.stack([itself] * 2, axis=1) if ends is None else ends])
+
+    def _judged(self, name: str, stretched: Array) -> Judged:
+        """Errors of an output's straight lines between cells, and borders between statuses that are to be cut."""
+        points, axes, height = self.points, len(self.axes), heights(self.column(name))
+        finite = np.isfinite(np.stack([self.column(each) for each in self.noise])).all(axis=0)
+        places, kind = points @ stretched, kinds(self.column(STATUS), finite)
+        corners = simplices(places)
+        of_corners, pairs = kind[corners], edges(axes)
+        alike = (of_corners == of_corners[:, :1]).all(axis=1)
+        inside, border, beside_border = (2.0**-level for level in LEVELS.get(axes, FURTHER_LEVELS))
+
+        def extent(ends: Indices) -> Array:
+            """Of edges (..., 2), in steps of the first grid along the axis where they are longest."""
+            found: Array = (abs(points[ends[..., 0]] - points[ends[..., 1]]) * self._steps).max(axis=-1)
+            return found
+
+        # inside of one status: as the cells of that status tell
+        size, ends = errors_inside(places, height, kind, corners)
+        size[~alike | (of_corners[:, 0] < 0)] = 0.0
+
+        # across a border: infinite while edges are longer than they may stay
+        mixed = np.flatnonzero(~alike & (of_corners >= 0).any(axis=1))
+        across = of_corners[mixed][:, pairs[:, 0]] != of_corners[mixed][:, pairs[:, 1]]
+        length = np.where(across, extent(corners[mixed][:, pairs]), -1.0)
+        size[mixed] = np.where(length.max(axis=1, initial=-1.0) > border, math.inf, 0.0)
+        ends[mixed] = largest(corners[mixed], length)
+
+        # beside one: as near as the simplices across it may stay wide
+        least = np.full(len(corners), inside)
+        if not alike.all():
+            tree = cKDTree(points[np.unique(corners[~alike])] * self._steps)
+            apart = tree.query(points * self._steps, p=math.inf)[0]
+            least[alike & (apart <= border)[corners].any(axis=1)] = beside_border
+        valued = alike & (of_corners[:, 0] >= 0)
+        stuck = at_pole(height, self.origins, axes)[ends.max(axis=1)]
+        finest = (extent(ends) <= least) | (valued & np.isfinite(size) & stuck)
+        wide = corners[valued & (size > max(self.tolerance, NOISE_SIZE * self.noise[name]))]
+        volume = float(abs(np.linalg.det(points[wide[:, 1:]] - points[wide[:, :1]])).sum())
+        self._to_cut[name].append((len(points), volume))
+        self.noise[name] = max(self.noise[name], scatter(height, self.origins, axes, self._to_cut[name]))
+        wanted = size > max(self.tolerance, NOISE_SIZE * self.noise[name])
+        return Judged(corners, size, ends, wanted, finest, valued)

@@ -1,7 +1,9 @@
 """Values between cells that lie anywhere in a box: straight lines between neighbours, as pictures draw them.
 
-Neighbours are the corners of simplices (`mesh`) in coordinates in which each axis reaches from 0 to 1, in logarithms
-where it reaches from a positive value to twice that. Outputs that are positive everywhere are taken in logarithms too.
+Neighbours are the corners of the simplices (intervals, triangles, tetrahedra) of Delaunay's triangulation of the cells,
+in coordinates in which each axis reaches from 0 to 1, in logarithms where it reaches from a positive value to twice
+that. Outputs that are positive everywhere are taken in logarithms too. For each output the box is first stretched to
+where it bends (`mesh`), so that cells are joined along what it does not depend on.
 """
 
 from __future__ import annotations
@@ -15,18 +17,19 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
+from scipy.spatial import Delaunay, cKDTree
+from threadpoolctl import threadpool_limits
 
 from kernels.interface import FIRST_REFUSAL, Status
 from sweep.cells.schema import ERROR_BOUND, STATUS
 from sweep.errors import SweepError
-from sweep.explore.mesh import Array, Mesh
+from sweep.explore.mesh import Array, Indices, are_solid, errors_inside, stretch, tilted
 from sweep.words import require_dataset
 
 LOGARITHMIC = 1.999
 """Ratio of its ends from which on a positive axis is taken in logarithms; below, it makes no difference."""
-SAME = 1e-9
-"""Distance from a cell within which its own values are taken."""
+OUTSIDE = 1e-9
+"""How far out of a simplex a point may be by rounding."""
 FEWEST_ON_A_LINE = 5
 MOST_AXES = 5
 REFINED_TO = "refined_to"
@@ -65,13 +68,13 @@ class Box:
 
 def heights(values: Array) -> Array:
     """An output as it is interpolated: in logarithms where it is positive everywhere, else over its largest size."""
-    size = size_of(values)
+    size = _size(values)
     with np.errstate(invalid="ignore"):
         found: Array = values / size if size else np.log(values)
     return found
 
 
-def size_of(values: Array) -> float:
+def _size(values: Array) -> float:
     """The largest size of values, to which errors are relative; 0 of positive ones, which are taken in logarithms."""
     finite = values[np.isfinite(values)]
     return 0.0 if finite.size and finite.min() > 0 else float(abs(finite).max(initial=0.0)) or 1.0
@@ -134,36 +137,57 @@ def interpolated(dataset: xr.Dataset, at: Mapping[str, Sequence[float] | Array])
     box, status, shape = Box.of(dataset, names), dataset[STATUS], whole[0].shape
     points = box.points(dataset)
     places = box.points({name: column.ravel() for name, column in zip(grids, whole, strict=True)})
-    places = np.where(abs(places - 0.5) < 0.5 + SAME, np.clip(places, 0.0, 1.0), places)  # out of it by rounding
-    distance, index = cKDTree(points).query(places)
-    nearest, there = dataset.isel({status.dims[0]: index}), distance < SAME
-
-    # cells are joined as outputs that were refined want it; their error counts
-    numbers = [n for n, v in dataset.data_vars.items() if v.dims == status.dims and v.dtype.kind == "f"]
-    numbers = [str(name) for name in numbers if name != ERROR_BOUND]
-    refined = {name: t for name, t in json.loads(dataset.attrs.get(REFINED_TO, "{}")).items() if name in numbers}
-    mesh = mesh_of(points, [dataset[name].values for name in refined or numbers], status.values)
-    between, number = mesh.between(places, np.stack([heights(dataset[name].values) for name in numbers], axis=1))
-    off = np.where(there, 0.0, np.where(number < 0, np.inf, mesh.errors()[0][number].T))
-    most = np.array([[tolerance] for tolerance in refined.values()] or sys.float_info.max)
-    valued, inaccurate = nearest[STATUS].values < FIRST_REFUSAL, nearest[STATUS].values == Status.INACCURATE
-    inaccurate |= ~(off <= most).all(axis=0)
-    columns = dict[Any, Any]()
-    for name, height in zip(numbers, between.T, strict=True):
-        size, own = size_of(dataset[name].values), nearest[name].values
-        columns[name] = np.where(there | np.isnan(own), own, height * size if size else np.exp(height))
+    nearest = dataset.isel({status.dims[0]: cKDTree(points).query(places)[1]})
+    valued, refined = nearest[STATUS].values < FIRST_REFUSAL, json.loads(dataset.attrs.get(REFINED_TO, "{}"))
+    columns, error = dict[Any, Any](), np.zeros(len(places))
+    inaccurate = nearest[STATUS].values == Status.INACCURATE
+    for name, variable in dataset.data_vars.items():
+        if variable.dims == status.dims and variable.dtype.kind == "f" and name != ERROR_BOUND:
+            between, off = _between(variable.values, points, places, status.values)
+            columns[name] = np.where(nearest[name].isnull(), np.nan, between)
+            if name in refined or not refined:
+                error = np.maximum(error, off)
+                inaccurate |= ~(off <= refined.get(name, sys.float_info.max))
     columns[STATUS] = np.where(inaccurate & valued, np.int8(Status.INACCURATE), nearest[STATUS])
     if ERROR_BOUND in dataset:
-        columns[ERROR_BOUND] = np.where(valued, np.fmax(off.max(axis=0), nearest[ERROR_BOUND]), np.nan)
+        columns[ERROR_BOUND] = np.where(valued, np.fmax(error, nearest[ERROR_BOUND]), np.nan)
     found = {name: (tuple(grids), values.reshape(shape), dataset[name].attrs) for name, values in columns.items()}
     return xr.Dataset(found, {name: (name, v, dataset[name].attrs) for name, v in grids.items()}, dataset.attrs)
 
 
-def mesh_of(points: Array, outputs: Sequence[Array], status: Any, matrix: Array | None = None) -> Mesh:
-    """Cells joined as some outputs want it; kinds are statuses, with those that rounding decides alike."""
-    valued = np.isfinite(outputs).all(axis=0) & (status < FIRST_REFUSAL)
-    kind = np.where(valued, np.where(status == Status.INACCURATE, int(Status.OK), status.astype(np.intp)), -1)
-    return Mesh(points, np.stack([heights(values) for values in outputs], axis=1), kind, matrix)
+def kinds(status: Indices, valued: NDArray[np.bool_]) -> Indices:
+    """Statuses, with those that rounding decides alike; -1 without a value."""
+    kind = np.where(status == Status.INACCURATE, int(Status.OK), status.astype(np.intp))
+    return np.where((status < FIRST_REFUSAL) & valued, kind, -1)
+
+
+def _between(values: Array, points: Array, places: Array, status: Indices) -> tuple[Array, Array]:
+    """An output's values at places, and how far they are off, as the cells around tell; inf across borders."""
+    height, kind = heights(values), kinds(status, np.isfinite(values))
+    stretched = stretch(points, height)
+    points, places = points @ stretched, places @ stretched
+    corners, shares, where, mesh = located(points, places)
+    # a corner that takes no part need have no value
+    total: Array = np.where(shares == 0, 0.0, shares * height[corners]).sum(axis=1)
+    size, solid = np.full(len(mesh), np.inf), are_solid(points, mesh)
+    size[solid] = errors_inside(points, height, kind, mesh[solid])[0]
+    off = np.where(shares.max(axis=1) == 1, 0.0, np.where(where < 0, np.inf, size[where]))
+    return total * _size(values) if _size(values) else np.exp(total), off
+
+
+def located(points: Array, at: Array) -> tuple[Indices, Array, Indices, Indices]:
+    """Corners of the simplex of each place, and their shares in its value, NaN outside; its number, -1 outside;
+    and the corners of all simplices."""
+    found = Delaunay(tilted(points))
+    mesh, places = np.sort(found.simplices.astype(np.intp), axis=1), tilted(at)
+    with threadpool_limits(1, "blas"):  # on busy cores its threads wait some milliseconds for each other, each time
+        where = found.find_simplex(places, tol=OUTSIDE).astype(np.intp)
+    inverse = found.transform[where]
+    shares = np.einsum("nij,nj->ni", inverse[:, :-1], places - inverse[:, -1])
+    shares = np.column_stack([shares, 1 - shares.sum(axis=1)])
+    shares = np.where(abs(shares) < OUTSIDE, 0.0, shares)
+    shares[where < 0] = np.nan
+    return found.simplices[where].astype(np.intp), shares, where, mesh
 
 
 def on_lines(dataset: xr.Dataset, x: str) -> xr.Dataset:

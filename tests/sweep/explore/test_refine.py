@@ -113,7 +113,7 @@ def test_a_jump_is_told_apart_and_followed_to_a_millionth_of_a_step():
     found = sweep.refine(**shaped(curve, np.linspace(1.0, 2.0, 9)), tolerance=1e-3)
     assert not found.complete
     assert 1 <= found.jumps < 10
-    assert found.added < 120
+    assert found.added < 80
     assert found.error <= 1e-3
     assert 0.125 * 2.0**-21 < np.diff(found.dataset.height).min() < 0.125 * 2.0**-19
 
@@ -141,9 +141,9 @@ def test_where_values_scatter_no_more_cells_are_added_and_the_scatter_is_told():
 
 
 @pytest.mark.parametrize("pole", [lambda x: 1 / abs(x), lambda x: 1 / x, lambda x: 1 / x**2])
-def test_beside_a_pole_the_tolerance_is_met_elsewhere(pole):
+def test_beside_a_pole_cells_are_few_and_elsewhere_the_tolerance_is_met(pole):
     found = sweep.refine(**shaped(lambda height: pole(height - 1.3719), np.linspace(1, 2, 9)), tolerance=1e-2)
-    assert found.added < 400
+    assert found.added < 180  # of one sign 250 to 320 where edges are cut as often as at a jump
     assert found.jumps > 0
     assert not found.complete
     assert (found.noise, found.error <= 1e-2) == (0, True)
