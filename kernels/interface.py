@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 
 class Status(IntEnum):
@@ -104,10 +104,16 @@ BoundCell = Callable[[Any], Any]
 """`bound(p) -> error`: relative, a number for all outputs, or a record with one for each."""
 
 
-SolveCell = Callable[..., tuple[Any, ...]]
-"""`solve(p, rtol, *buffers) -> outputs, status`; of a method that estimates, `-> outputs, errors, status`."""
-FillCells = Callable[..., None]
-"""`fill(i, columns, *buffers)`: writes the rows of cell i, or of the group that begins with it, itself."""
+class SolveCell(Protocol):
+    """`solve(p, rtol, *buffers) -> outputs, status`; of a method that estimates, `-> outputs, errors, status`."""
+
+    def __call__(self, p: Any, rtol: Any, /, *buffers: Any, **named: Any) -> tuple[Any, Any] | tuple[Any, Any, Any]: ...
+
+
+class FillCells(Protocol):
+    """`fill(i, columns, *buffers)`: writes the rows of cell i, or of the group that begins with it, itself."""
+
+    def __call__(self, i: Any, columns: Any, /, *buffers: Any, **named: Any) -> None: ...
 
 
 @dataclass(frozen=True)
