@@ -18,7 +18,7 @@ import numba
 from llvmlite.binding import Linkage
 from numba import njit, types
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import Compiler, Flags
+from numba.core.compiler import Compiler
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.compiler_machinery import register_pass
 from numba.core.errors import TypingError
@@ -31,16 +31,6 @@ TRIED = ("0.68",)
 """Versions of numba whose compiler is known to work so."""
 LINE = 64
 """Bytes of a cache line, and of the widest register."""
-
-
-class _Flags(Flags):
-    """numba's, of one function; compared by what was set. numba's own compare all thirty, with every call it types."""
-
-    def __eq__(self, other):
-        return self._values == other._values
-
-    def __hash__(self):
-        return hash((self.forceinline, self.error_model, len(self._values)))
 
 
 class _AlignedLibrary(JITCodeLibrary):
@@ -165,7 +155,6 @@ class _PartCompiler(Compiler):
     def __init__(self, typing_context, target_context, library, *rest):
         library = library or _PartLibrary(target_context.codegen(), "part")
         super().__init__(typing_context, target_context, library, *rest)
-        self.state.flags = _Flags(self.state.flags)
         self.state.flags.no_cpython_wrapper = True
         self.state.flags.no_cfunc_wrapper = True
 
@@ -174,11 +163,12 @@ class _EntryLibrary(_AlignedLibrary):
     """Code of a function that Python calls, and of all inlined functions below it, each linked in once."""
 
     def finalize(self):
-        below = _all_below(self)
-        self._reload_init.update(*(called._reload_init for called in below))
-        if below:
-            self._final_module.link_in(_linked([called._get_module_for_linking().clone() for called in below]))
-            _set_linkage(self._final_module, Linkage.weak_odr, Linkage.linkonce_odr)
+        for called in _all_below(self):
+            self._reload_init.update(called._reload_init)
+            part = called._get_module_for_linking().clone()
+            _set_linkage(part, Linkage.linkonce_odr, Linkage.weak_odr)  # or what is not called from here were lost
+            self._final_module.link_in(part)
+        _set_linkage(self._final_module, Linkage.weak_odr, Linkage.linkonce_odr)
         self._linking_libraries = []
         super().finalize()
 
@@ -191,17 +181,6 @@ def _all_below(library, found=None):
             found[called] = True
             _all_below(called, found)
     return list(found)
-
-
-def _linked(modules):
-    """One module of all. By halves: LLVM looks through both of two modules to link them."""
-    if len(modules) == 1:
-        _set_linkage(modules[0], Linkage.linkonce_odr, Linkage.weak_odr)  # or what is not called from here were lost
-        return modules[0]
-    half = len(modules) // 2
-    first = _linked(modules[:half])
-    first.link_in(_linked(modules[half:]))
-    return first
 
 
 def _set_linkage(module, old, new):
@@ -253,7 +232,6 @@ class _EntryCompiler(Compiler):
             library = _EntryLibrary(target_context.codegen(), "entry")
             library.enable_object_caching()
         super().__init__(typing_context, target_context, library, *rest)
-        self.state.flags = _Flags(self.state.flags)
 
 
 def _is_tried():
