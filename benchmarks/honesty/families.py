@@ -1,4 +1,4 @@
-"""Is a scene of one's own that says OK right, over sixteen families of scenes that mislead integrators?
+"""Is a scene of one's own that says OK right, over seventeen families of scenes that mislead integrators?
 
 Prints, by family and method, how many cells were OK, remarked and refused, and the largest error of an OK cell over its
 rtol; exit status 1 where one is off by more than its rtol, or where too few of those that can be solved are OK:
@@ -363,6 +363,26 @@ def _growth_truth(x0, T):
 def growth(random, n):
     """x' = x from next to the least float64 on."""
     return {"x0": 10.0 ** random.uniform(-307, 0, n), "T": 10.0 ** random.uniform(0, 2.84, n)}
+
+
+def _relay_oscillation_truth(x0, T):
+    """Parabolas, a quarter of a period q = sqrt(2 x0) long; what a turn is off by in time goes on in the amplitude."""
+    x0, T = REAL(1) * x0, REAL(1) * T
+    q = np.sqrt(2 * x0)
+    quarter = np.floor(T / q + 1)  # of a period from the last turn but one, in halves
+    half = np.floor(quarter / 2)
+    way, s = 1 - 2 * np.mod(half, 2), T - 2 * half * q
+    return Truth(T, [T, way * (x0 - s * s / 2), -way * s], [T, x0, q], (T / q) ** 2)
+
+
+@family(
+    scene("relay_oscillation", "t x v", "x0 T", lambda v, x: (1.0, v, -sign(x)), lambda t, T: T - t,
+        lambda x0: (0.0, x0, 0.0)), _relay_oscillation_truth,
+)  # fmt: skip
+def relay_oscillation(random, n):
+    """A relay that switches up to 700 times, at times that are numbers."""
+    x0 = 10.0 ** random.uniform(-4, 1, n)
+    return {"x0": x0, "T": random.uniform(3.0, 10.0, n)}
 
 
 def _relay_truth(M, T, y0, a):

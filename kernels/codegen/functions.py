@@ -24,7 +24,10 @@ from kernels.integrate.taylor import BY_SERIES, BY_SUM
 from kernels.integrate.taylor_leg import Series
 from kernels.lanes.jit import jit_call
 from kernels.lanes.symbols import ANY, written
-from kernels.lanes.vectors import fma, where
+from kernels.lanes.vectors import fma, magnitude, where
+
+NEXT_TO = 1.0 / 16.0
+"""Of a step, what it may be changed by so that a clock is not rounded; a shorter one is taken as it is."""
 
 
 def cell_of(states, parameters, kinks, tells=False):
@@ -185,8 +188,8 @@ class Functions:
 
         def on_clock(state, unit, h):
             for u in itertools.compress(state, clocks):
-                gone_on = fma(h, unit, u) - u
-                h = where(gone_on > 0.0, gone_on / unit, h)
+                gone_on = (fma(h, unit, u) - u) / unit
+                h = where(magnitude(gone_on - h) <= NEXT_TO * h, gone_on, h)
             return h
 
         def clocks_off(state, by):
@@ -280,7 +283,7 @@ class Functions:
         return Written(
             **of_state,
             most_kinks=KINK_LIMIT if scene.most_kinks is None else float(scene.most_kinks), cell=cell_of(*self.size),
-            roundings=ROUNDINGS,
+            roundings=ROUNDINGS, biased=0.0,
             speeds=speeds, onto=onto, surfaces=surfaces, hiding=hiding, passable=passable,
             deciding=deciding if any(deciding) else None, **self._of_clocks(), factored=None, solved=None,
         )  # fmt: skip

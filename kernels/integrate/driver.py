@@ -70,8 +70,11 @@ def settled(m, state, side, parameters, unit, near):
 
 @symbolic
 def missed_by(m, shake):
-    """Roundings that an event is missed by; `shake` is 0 for none, else a sign, and 1 and the part of all of it."""
-    by = m.roundings * (2.0 * magnitude(shake) - 3.0)
+    """Roundings that an event is missed by; `shake` is 0 for none, else a sign, and 1 and the part of all of it.
+
+    Where a method is biased all are to one side in a run.
+    """
+    by = m.roundings * (2.0 * magnitude(shake) - 3.0 + m.biased)
     return where(magnitude(shake) > 0.5, where(shake < 0.0, -by, by), 0.0)
 
 
@@ -218,13 +221,15 @@ def arrived(m, cell, found, late, active, tells):
         verdict = where(active & sliding & (found.lost | found.broken), STICKS, verdict)
     moving = active & (cell.verdict < REFUSED) & (verdict < REFUSED) & not_(found.grazing)
     state, mode = choose(moving, found.state, cell.state), mode_of(cell)
-    longest, rates = 0.0 * mode.side, m.rates(state, mode)  # for how long rounding may keep open what fires
+    # for how long rounding may keep open what fires, or lengthens the way to it
+    longest, rates = m.biased * ONE_ULP * found.t * cell.unit, m.rates(state, mode)
     for o, (extent, rate) in zip(found.on, m.made(state, mode), strict=True):
         blur = where(o > 0.5, ONE_ULP * extent / magnitude(rate), 0.0)
         longest = where(blur > longest, blur, longest)
     shakes, shake = moving & (magnitude(cell.shake) > 0.0), shaken_on(cell.shake)
     by = missed_by(m, shake)
-    off, clocks_off = by * longest, where(by < 0.0, -CLOCK_OFF * ONE_ULP, CLOCK_OFF * ONE_ULP)
+    off, way = by * longest, shake * (magnitude(shake) - 1.5)  # clocks go to either side
+    clocks_off = where(way < 0.0, -CLOCK_OFF * ONE_ULP, CLOCK_OFF * ONE_ULP)
     shaken = shakes
     if m.speeds is not None:  # a slide ends late: before its end the motion is still pressed onto it, and would stick
         slides = zip(cell.signs[:-1], found.on[1:], strict=True)

@@ -120,7 +120,6 @@ def met_at(m, state_at, mode, step, terms, which, part, enough, seeking):
         change = magnitude(new - part)
         part, trials = where(seeking, new, part), where(seeking, trials + 1.0, trials)
         seeking = seeking & (change > enough * part)
-    part = m.on_clock(step.state, h, part)
     return part, state_at(m, step.state, terms, mode, h, part), slope, trials
 
 

@@ -156,14 +156,13 @@ def first_root(found, number, way, curve, event, facts, passed, met, span, toler
 
 
 @symbolic
-def ended(m, pieces, facts, passed, met, span, tolerance, state, unit):
+def ended(m, pieces, facts, passed, met, span, tolerance, state):
     """The end of a leg in its last step, by which event, whether only just; what fires, and others too; the states."""
     numbers = tuple(map(float, range(len(passed))))
     end, which, hangs = fold(
         first_root, (span, -1.0 - 0.0 * span, met & not_(met)), (met, span, tolerance),
         numbers, m.watched, pieces.of_events, pieces.events, facts, passed,
     )  # fmt: skip
-    end = m.scene.on_clock(state, unit, end)
     own = tuple(met & (which > j - 0.5) & (which < j + 0.5) for j in numbers)
     near = fma(SAME, tolerance, ROUNDING)
     beside = tuple(
@@ -284,7 +283,7 @@ def to_event(m, cell, mode, active, hides, at_kink):
             break
     lost = moving
     met = active & not_(lost | stuck | broken | grazing)
-    end, which, hangs, fires, others, ends = ended(m, pieces, facts, passed, met, span, tolerance, state, unit)
+    end, which, hangs, fires, others, ends = ended(m, pieces, facts, passed, met, span, tolerance, state)
     t = where(met, t + end, t)
     h = where(met & (t > 0.0) & (h > LONGEST * t), LONGEST * t, h)
     late = carried.at_event(
