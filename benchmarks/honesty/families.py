@@ -369,8 +369,7 @@ def _relay_oscillation_truth(x0, T):
     """Parabolas, a quarter of a period q = sqrt(2 x0) long; what a turn is off by in time goes on in the amplitude."""
     x0, T = REAL(1) * x0, REAL(1) * T
     q = np.sqrt(2 * x0)
-    quarter = np.floor(T / q + 1)  # of a period from the last turn but one, in halves
-    half = np.floor(quarter / 2)
+    half = np.floor((T / q + 1) / 2)  # turns so far: x is largest at the times 2 q half
     way, s = 1 - 2 * np.mod(half, 2), T - 2 * half * q
     return Truth(T, [T, way * (x0 - s * s / 2), -way * s], [T, x0, q], (T / q) ** 2)
 
@@ -380,7 +379,7 @@ def _relay_oscillation_truth(x0, T):
         lambda x0: (0.0, x0, 0.0)), _relay_oscillation_truth,
 )  # fmt: skip
 def relay_oscillation(random, n):
-    """A relay that switches up to 700 times, at times that are numbers."""
+    """A relay that switches up to 700 times."""
     x0 = 10.0 ** random.uniform(-4, 1, n)
     return {"x0": x0, "T": random.uniform(3.0, 10.0, n)}
 

@@ -114,6 +114,6 @@ def status_of(results, verdict, outputs):
     """The verdict; OUT_OF_RANGE where one of so many outputs is no normal number, or a state is never above FAINT."""
     values, sizes, status = abs(results[:outputs]), results[outputs:-1], verdict.astype(np.int8)
     normal = (values == 0) | ((values >= NORMAL_LOW) & (values <= NORMAL_HIGH))
-    told = normal.all(axis=0) & ((sizes == 0) | (sizes >= FAINT)).all(axis=0)
-    status[~told & (status == Status.OK)] = Status.OUT_OF_RANGE
+    in_range = normal.all(axis=0) & ((sizes == 0) | (sizes >= FAINT)).all(axis=0)
+    status[~in_range & (status == Status.OK)] = Status.OUT_OF_RANGE
     return status
