@@ -128,11 +128,10 @@ def _draw_lines(axes: Any, shown: View) -> None:
         if not shown.joined:
             look |= {"linestyle": "", "marker": MARKS[i % len(MARKS)], "markersize": 2.5}
         axes.plot(x, y, label=setting(shown.axis(shown.across)[i]) if shown.across else None, **look)
-    drawn = (lambda y: y > 0) if axes.get_yscale() == "log" else np.isfinite
     for code, mark, colour in zip(shown.codes(), cycle(MARKS), cycle(FLAGGED), strict=False):
         look = {"linestyle": "", "marker": mark, "color": colour, "markerfacecolor": "none", "clip_on": False}
         for y, here in zip(lines, status == code, strict=True):
-            valued, empty = here & drawn(y), here & ~drawn(y)
+            valued, empty = here & np.isfinite(y), here & np.isnan(y)
             axes.plot(x[valued], y[valued], **look)
             axes.plot(x[empty], np.zeros(empty.sum()), transform=axes.get_xaxis_transform(), **look)
         axes.plot([], [], mark, color=colour, markerfacecolor="none", label=shown.name(code))

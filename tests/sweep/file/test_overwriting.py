@@ -72,6 +72,13 @@ def test_what_is_read_is_never_overwritten(here, argv, force, capsys):
     assert [Path(name).read_bytes() for name in ("r.h5", "s.toml")] == before
 
 
+def test_what_an_export_reads_is_never_overwritten_from_python_either(here):
+    os.link("r.h5", "r.nc")
+    with sweep.open_result("r.h5") as ds, pytest.raises(SweepError, match="is what is read"):
+        sweep.export(ds, "r.nc", force=True)
+    assert sweep.verify("r.h5").whole
+
+
 def test_a_result_is_no_earlier_export_of_itself(here):
     """A result may be called .nc; exported over, it would lose its digests."""
     Path("other.nc").write_bytes(Path("r.h5").read_bytes())
