@@ -256,12 +256,15 @@ def relative_sigma(y: xr.DataArray, sigma: Any) -> xr.DataArray:
 
 
 def stated_bound(y: xr.DataArray, bound: Any = None) -> xr.DataArray:
-    """Largest relative error of each value: as given, or as a result states it for y; else y's `rtol`, else 0."""
+    """Largest relative error of each value: as given, or as a result states it for y; else y's `rtol`, else 0; and what
+    rounding to fewer digits than double precision adds."""
     check_output(y)
     if isinstance(bound, xr.Dataset):
         bound = stated_error(bound, title(y))
     found = like(y.attrs.get("rtol", 0.0) if bound is None else bound, y, "bound")
-    return found.where(np.isfinite(found), 1.0)  # of an error that is not known a value is worth nothing
+    few_digits = y.dtype.kind == "f" and y.dtype.itemsize < 8
+    rounded = float(np.finfo(y.dtype).eps) / 2 if few_digits else 0.0
+    return found.where(np.isfinite(found), 1.0) + rounded  # of an error that is not known a value is worth nothing
 
 
 def stated_error(dataset: xr.Dataset, name: str) -> xr.DataArray:

@@ -77,7 +77,8 @@ def fit_exponent(
         Standard errors of the values, in the unit of y; they say all of the noise, so `noise` is not given.
     bound : number, DataArray or Dataset, optional
         Largest relative error of the values, which is not noise; of the result that y is an output of, what it states
-        for each cell. Default: the `rtol` in the attributes of y.
+        for each cell. Default: the `rtol` in the attributes of y. Rounding to single precision is added; of values
+        that are rounded to fewer digits otherwise, such as those of a text, give half of the last one.
 
     Returns
     -------
