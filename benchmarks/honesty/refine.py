@@ -26,9 +26,9 @@ import xarray as xr
 
 from kernels.interface import Status
 from sweep.cells.schema import ANCILLARY
-from sweep.explore.mesh import simplices, stretch
+from sweep.explore.mesh import Mesh, stretch
 from sweep.explore.refine import LEVELS, Refiner
-from sweep.explore.scattered import heights, located
+from sweep.explore.scattered import heights
 from sweep.study.model import Axis
 
 NAMES = ("x", "y", "z")
@@ -90,20 +90,16 @@ def refined(function, axes, tolerance):
 def true_error(function, points, values):
     """Largest error of straight lines, over the largest value; of borders the share of places beside unlike corners."""
     places = np.random.default_rng(5).random((PLACES[points.shape[1]], points.shape[1]))
+    border = np.isnan(values).any()
+    drawn = np.isnan(values).astype(float) if border else values
     if points.shape[1] == 1:
-        right = np.clip(np.searchsorted(np.sort(points[:, 0]), places[:, 0]), 1, len(points) - 1)
-        corners = simplices(points)[right - 1]
-        ends = points[corners, 0]
-        share = (places[:, 0] - ends[:, 0]) / (ends[:, 1] - ends[:, 0])
-        shares = np.stack([1 - share, share], axis=1)
+        order = np.argsort(points[:, 0])
+        found = np.interp(places[:, 0], points[order, 0], drawn[order])
     else:
-        stretched = stretch(points, heights(values))
-        corners, shares, *_ = located(points @ stretched, places @ stretched)
-    if np.isnan(values).any():
-        missing = np.isnan(values[corners]).sum(axis=1)
-        return float(np.mean((missing > 0) & (missing < corners.shape[1])))
-    off = abs((shares * values[corners]).sum(axis=1) - function(places))
-    return float(np.nanmax(off) / abs(values).max())
+        found = Mesh(points, drawn, matrix=stretch(points, heights(values))).between(places)[0]
+    if border:
+        return float(np.mean((found > 0) & (found < 1)))
+    return float(np.nanmax(abs(found - function(places))) / abs(values).max())
 
 
 def adaptive_cells(function, axes, wanted, most):
@@ -190,9 +186,7 @@ def holds_beside_infinity(axes):
     wide = axes**0.5 * 2.0 ** -LEVELS[axes][1] / (START[axes] - 1)
     places = places[np.linalg.norm(places, axis=1) < POLE - 2 * wide]
     logs = heights(values)
-    stretched = stretch(points, logs)
-    corners, shares, *_ = located(points @ stretched, places @ stretched)
-    error = abs(np.where(shares == 0, 0.0, shares * logs[corners]).sum(axis=1) - np.log(pole(places))).max()
+    error = abs(Mesh(points, logs).between(places)[0] - np.log(pole(places))).max()
     cells = f"{axes} pole      {len(points):6} cells, {1e3 * spent / len(points):.2f} ms each"
     cells += f"; {found.jumps} left beside the border"
     print(f"{cells}; error told {found.error:.1e}, true {error:.1e}", flush=True)

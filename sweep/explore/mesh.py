@@ -25,6 +25,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay, cKDTree
+from threadpoolctl import threadpool_limits
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -32,8 +33,8 @@ Indices = NDArray[np.intp]
 SHEAR = 0.013
 """By which axes are tilted before cells are joined: corners of a box lie on a sphere, so there are many ways to join
 them; tilted there is one, and it is alike in all boxes."""
-FLAT = 1e-9
-"""Volume, in products of its edges, below which a simplex is none."""
+FLAT, OUTSIDE = 1e-9, 1e-9
+"""Volume, in products of its edges, below which a simplex is none; how far out of one a point may be by rounding."""
 AROUND = {1: 6, 2: 12, 3: 20}
 """Cells around a simplex that are taken, of one axis with its two; with more axes twice the unknowns."""
 SAFETY, MISFIT = 1.6, {1: 5.0}
@@ -56,144 +57,152 @@ FLATTEST, STRAIGHT = 1e-5, 1e-9
 """Least share of the mean bend that a direction has: by 300 a box is stretched at most; what is taken for rounding."""
 
 
-def simplices(points: Array) -> Indices:
-    """Numbers (m, axes + 1) of the points at the corners of each simplex; those without a volume are left out."""
-    if points.shape[1] == 1:
-        order = np.argsort(points[:, 0], kind="stable")
-        return np.column_stack([order[:-1], order[1:]])
-    found = np.sort(Delaunay(tilted(points)).simplices.astype(np.intp), axis=1)
-    return found[are_solid(points, found)]
-
-
-def are_solid(points: Array, corners: Indices) -> NDArray[np.bool_]:
-    """Whether simplices have a volume."""
-    sides = points[corners[:, 1:]] - points[corners[:, :1]]
-    found: NDArray[np.bool_] = abs(np.linalg.det(sides)) > FLAT * np.linalg.norm(sides, axis=2).prod(axis=1)
-    return found
-
-
-def tilted(points: Array) -> Array:
-    """Points as they are joined."""
-    axes = points.shape[1]
-    found: Array = points @ (np.eye(axes) + SHEAR * np.tril(1.0 + 0.3 * np.arange(axes), -1))
-    return found
-
-
-def edges(axes: int) -> Indices:
-    """Pairs of corners of a simplex."""
-    return np.array(list(itertools.combinations(range(axes + 1), 2)), dtype=np.intp)
-
-
-def largest(corners: Indices, of_edges: Array) -> Indices:
-    """The edges (m, 2) where something (m, pairs) is largest."""
-    return np.take_along_axis(corners, edges(corners.shape[1] - 1)[of_edges.argmax(axis=1)], 1)
-
-
-def fewest(axes: int) -> int:
-    """Points that tell a parabola over a simplex."""
-    return (axes + 1) * (axes + 2) // 2
-
-
-def errors_inside(points: Array, heights: Array, kind: Indices, corners: Indices) -> tuple[Array, Indices]:
-    """How far straight lines between points (n, axes) of heights (n,) are off, as the points around tell.
+class Mesh:
+    """Cells joined to simplices as an output wants it.
 
     Parameters
     ----------
-    kind : ndarray of int, shape (n,)
-        Of which kind points are, -1 of none: a simplex is judged by points of its own kind alone.
+    points : ndarray, shape (n, axes)
+        Where cells lie in a box.
+    heights : ndarray, shape (n,)
+        The output there, NaN where it has no value.
+    kind : ndarray of int, shape (n,), optional
+        Of which kind cells are, -1 of none: a simplex is judged by cells of its own kind alone. Default: all with a
+        value are of one.
+    matrix : ndarray, optional
+        By which points are multiplied before they are joined; default: what `stretch` tells.
+
+    Attributes
+    ----------
     corners : ndarray of int, shape (m, axes + 1)
-        Simplices.
-
-    Returns
-    -------
-    tuple of ndarray
-        Of each simplex the error, shape (m,), and the edge that needs a cut most, shape (m, 2). Where its corners are
-        of several kinds, or those of its kind too few, the error is infinite and the edge the longest one.
+        Cells at the corners of each simplex; one without a volume is left out.
+    edges : ndarray of int, shape (m, pairs, 2)
+        Cells at the ends of its edges.
+    places : ndarray, shape (n, axes)
+        Where cells lie when they are joined.
     """
-    axes = points.shape[1]
-    ends = points[corners[:, edges(axes)]]
-    lengths = np.linalg.norm(ends[:, :, 0] - ends[:, :, 1], axis=2)
-    size, cut = np.full(len(corners), np.inf), largest(corners, lengths)
-    for number in np.unique(kind[kind >= 0]):
-        members, here = np.flatnonzero(kind == number), np.flatnonzero((kind[corners] == number).all(axis=1))
-        if not len(here) or len(members) < fewest(axes):
-            continue
-        around, sizes = np.searchsorted(members, corners[here]), []
-        for side in (-1, 1) if axes == 1 else (0,):
-            bend, misfit = _parabolas(points[members], heights[members], around, side)
-            middle, inside = abs(bend) / 4, abs(bend.sum(axis=1)) / (axes + 1) ** 2
-            sizes.append(SAFETY * np.maximum(middle.max(axis=1, initial=0.0), inside) + MISFIT.get(axes, 2.5) * misfit)
-        # the mean of logarithms: from one side of an interval alone a jump is seen that lies beyond it, not in it
-        with np.errstate(divide="ignore"):
-            size[here] = np.exp(np.nanmean(np.log(sizes), axis=0))
-        cut[here] = largest(corners[here], middle)
-    return size, cut
 
-
-def _parabolas(points: Array, heights: Array, corners: Indices, side: int = 0) -> tuple[Array, Array]:
-    """The c_ij (m, pairs) of (1) over simplices, and what they leave (m,), a mean square's root.
-
-    They are fitted by least squares to how far the points around a simplex are off its straight continuation; of one
-    axis, maybe to those on one side alone, -1 or 1, and NaN where there are none.
-    """
-    axes = points.shape[1]
-    tree, pairs = cKDTree(points), edges(axes)
-    order = np.argsort(points[:, 0], kind="stable")
-    ranks = np.argsort(order)
-    number = min(len(points), axes + 1 + AROUND.get(axes, 2 * len(pairs)))
-    bends, misfits = np.empty((len(corners), len(pairs))), np.empty(len(corners))
-    for start in range(0, len(corners), BATCH):
-        rows = slice(start, start + BATCH)
-        place = points[corners[rows]]
-        if axes == 1:  # as many on both sides
-            aside = np.arange(1 - AROUND[1] // 2, AROUND[1] // 2 + 1)
-            near = order[np.clip(ranks[corners[rows, :1]] + aside, 0, len(points) - 1)]
+    def __init__(self, points: Array, heights: Array, kind: Indices | None = None, matrix: Array | None = None) -> None:
+        self.axes, self.heights = points.shape[1], heights
+        self.kind = np.isfinite(heights).astype(np.intp) - 1 if kind is None else kind
+        self._matrix = stretch(points, heights) if matrix is None else matrix
+        self._tilt = np.eye(self.axes) + SHEAR * np.tril(1.0 + 0.3 * np.arange(self.axes), -1)
+        self.places = points @ self._matrix
+        if self.axes == 1:
+            order = np.argsort(self.places[:, 0], kind="stable")
+            self.corners = np.column_stack([order[:-1], order[1:]])
         else:
-            near = tree.query(place.mean(axis=1), number)[1]
-        rest = (points[near] - place[:, :1]) @ np.linalg.inv(place[:, 1:] - place[:, :1])
-        shares = np.concatenate([1 - rest.sum(axis=2, keepdims=True), rest], axis=2)  # barycentric coordinates
-        off = heights[near] - (shares @ heights[corners[rows]][:, :, None])[:, :, 0]
-        basis = shares[:, :, pairs[:, 0]] * shares[:, :, pairs[:, 1]]
-        weight = 1 / np.maximum(abs(basis).sum(axis=2), LEAST_BASIS)
-        weight[(near[:, :, None] == corners[rows][:, None, :]).any(axis=2)] = 0.0
-        if side:
-            weight[side * (shares[:, :, 0] - 0.5) > 0] = 0.0
-        left, right = basis * weight[:, :, None], (off * weight)[:, :, None]
-        turned = left.transpose(0, 2, 1)
-        square = turned @ left
-        ridge = RIDGE * np.trace(square, axis1=1, axis2=2)[:, None, None] / len(pairs) + 1e-300
-        bend = np.linalg.solve(square + ridge * np.eye(len(pairs)), turned @ right)
-        bends[rows] = bend[:, :, 0]
-        unexplained, count = ((right - left @ bend)[:, :, 0] ** 2).sum(axis=1), (weight > 0).sum(axis=1)
-        misfits[rows] = np.sqrt(unexplained / np.where(count > 0, count, np.nan))
-    return bends, misfits
+            self._joined = Delaunay(self.places @ self._tilt)
+            corners = np.sort(self._joined.simplices.astype(np.intp), axis=1)
+            sides = self.places[corners[:, 1:]] - self.places[corners[:, :1]]
+            self._solid = abs(np.linalg.det(sides)) > FLAT * np.linalg.norm(sides, axis=2).prod(axis=1)
+            self.corners = corners[self._solid]
+        self.edges: Indices = self.corners[:, _pairs(self.axes)]
+
+    def errors(self) -> tuple[Array, Indices]:
+        """How far straight lines are off in each simplex, as the cells around tell, and which of its edges to cut.
+
+        Where its corners are of several kinds, or those of its kind too few, the error is infinite and the edge the
+        longest one.
+        """
+        ends = self.places[self.edges]
+        size, cut = np.full(len(ends), np.inf), np.linalg.norm(ends[:, :, 0] - ends[:, :, 1], axis=2).argmax(axis=1)
+        for number in np.unique(self.kind[self.kind >= 0]):
+            members, here = self.kind == number, np.flatnonzero((self.kind[self.corners] == number).all(axis=1))
+            if not len(here) or members.sum() < len(_pairs(self.axes)) + self.axes + 1:
+                continue
+            sizes = []
+            for side in (-1, 1) if self.axes == 1 else (0,):
+                bend, misfit = self.parabolas(members, self.corners[here], side)
+                middle, inside = abs(bend) / 4, abs(bend.sum(axis=1)) / (self.axes + 1) ** 2
+                largest = np.maximum(middle.max(axis=1, initial=0.0), inside)
+                sizes.append(SAFETY * largest + MISFIT.get(self.axes, 2.5) * misfit)
+            # the mean of logarithms: from one side of an interval alone a jump is seen that lies beyond it, not in it
+            with np.errstate(divide="ignore"):
+                size[here] = np.exp(np.nanmean(np.log(sizes), axis=0))
+            cut[here] = middle.argmax(axis=1)
+        return size, cut
+
+    def parabolas(self, members: NDArray[np.bool_], corners: Indices, side: int = 0) -> tuple[Array, Array]:
+        """The c_ij (k, pairs) of (1) over some simplices, and what they leave (k,), a mean square's root.
+
+        They are fitted by least squares to how far those of the cells around that are members are off the straight
+        continuation of a simplex; of one axis, maybe to those on one side alone, -1 or 1, and NaN where there are none.
+        """
+        points, heights, axes = self.places[members], self.heights[members], self.axes
+        corners, pairs = np.searchsorted(np.flatnonzero(members), corners), _pairs(axes)
+        tree, order = cKDTree(points), np.argsort(points[:, 0], kind="stable")
+        ranks = np.argsort(order)
+        number = min(len(points), axes + 1 + AROUND.get(axes, 2 * len(pairs)))
+        bends, misfits = np.empty((len(corners), len(pairs))), np.empty(len(corners))
+        for start in range(0, len(corners), BATCH):
+            rows = slice(start, start + BATCH)
+            place = points[corners[rows]]
+            if axes == 1:  # as many on both sides
+                aside = np.arange(1 - AROUND[1] // 2, AROUND[1] // 2 + 1)
+                near = order[np.clip(ranks[corners[rows, :1]] + aside, 0, len(points) - 1)]
+            else:
+                near = tree.query(place.mean(axis=1), number)[1]
+            rest = (points[near] - place[:, :1]) @ np.linalg.inv(place[:, 1:] - place[:, :1])
+            shares = np.concatenate([1 - rest.sum(axis=2, keepdims=True), rest], axis=2)  # barycentric coordinates
+            off = heights[near] - (shares @ heights[corners[rows]][:, :, None])[:, :, 0]
+            basis = shares[:, :, pairs[:, 0]] * shares[:, :, pairs[:, 1]]
+            weight = 1 / np.maximum(abs(basis).sum(axis=2), LEAST_BASIS)
+            weight[(near[:, :, None] == corners[rows][:, None, :]).any(axis=2)] = 0.0
+            if side:
+                weight[side * (shares[:, :, 0] - 0.5) > 0] = 0.0
+            left, right = basis * weight[:, :, None], (off * weight)[:, :, None]
+            turned = left.transpose(0, 2, 1)
+            square = turned @ left
+            ridge = RIDGE * np.trace(square, axis1=1, axis2=2)[:, None, None] / len(pairs) + 1e-300
+            bend = np.linalg.solve(square + ridge * np.eye(len(pairs)), turned @ right)
+            bends[rows] = bend[:, :, 0]
+            unexplained, count = ((right - left @ bend)[:, :, 0] ** 2).sum(axis=1), (weight > 0).sum(axis=1)
+            misfits[rows] = np.sqrt(unexplained / np.where(count > 0, count, np.nan))
+        return bends, misfits
+
+    def between(self, points: Array) -> tuple[Array, Array]:
+        """Heights on straight lines between cells, NaN outside of all simplices; and how far they may be off.
+
+        That is infinite outside, and across kinds.
+        """
+        places = points @ self._matrix @ self._tilt
+        with threadpool_limits(1, "blas"):  # on busy cores its threads wait some milliseconds for each other, each time
+            where = self._joined.find_simplex(places, tol=OUTSIDE).astype(np.intp)
+        inverse = self._joined.transform[where]
+        shares = np.einsum("nij,nj->ni", inverse[:, :-1], places - inverse[:, -1])
+        shares = np.column_stack([shares, 1 - shares.sum(axis=1)])
+        shares = np.where(abs(shares) < OUTSIDE, 0.0, shares)
+        shares[where < 0] = np.nan
+        # a corner that takes no part need have no value
+        found = np.where(shares == 0, 0.0, shares * self.heights[self._joined.simplices[where]]).sum(axis=1)
+        size = np.full(len(self._solid), np.inf)
+        size[self._solid] = self.errors()[0]
+        off = np.where(shares.max(axis=1) == 1, 0.0, np.where(where < 0, np.inf, size[where]))
+        return found, off
 
 
 def stretch(points: Array, heights: Array) -> Array:
     """The matrix (axes, axes) by which points are multiplied before those of these heights are joined."""
     axes, valued = points.shape[1], np.isfinite(heights)
-    inside, found = points[valued], np.eye(axes)
-    if axes == 1 or len(inside) < fewest(axes):
-        return found
-    (row, column), pairs = np.triu_indices(axes), edges(axes)
-    for _ in range(ROUNDS):
-        corners = simplices(points @ found)
-        corners = np.searchsorted(np.flatnonzero(valued), corners[valued[corners].all(axis=1)])
+    (row, column), pairs, found = np.triu_indices(axes), _pairs(axes), np.eye(axes)
+    for _ in range(ROUNDS if axes > 1 and valued.sum() > len(pairs) + axes else 0):
+        mesh = Mesh(points, heights, matrix=found)
+        corners = mesh.corners[valued[mesh.corners].all(axis=1)]
         if not len(corners):
             return np.eye(axes)
         some = corners[:: len(corners) // MOST + 1]
         # second derivatives over each simplex, from c_ij = -e_ij H e_ij / 2 of its edges
-        places = inside @ found
-        edge = places[some[:, pairs[:, 0]]] - places[some[:, pairs[:, 1]]]
+        edge = mesh.places[some[:, pairs[:, 0]]] - mesh.places[some[:, pairs[:, 1]]]
         products = -edge[:, :, row] * edge[:, :, column] * np.where(row == column, 0.5, 1.0)
         scale = abs(products).max(axis=(1, 2))[:, None]
-        bend = _parabolas(places, heights[valued], some)[0] / scale
+        bend = mesh.parabolas(valued, some)[0] / scale
         second = np.empty((len(some), axes, axes))
         second[:, row, column] = np.linalg.solve(products / scale[:, :, None], bend[:, :, None])[:, :, 0]
         second[:, column, row] = second[:, row, column]
         sizes, directions = np.linalg.eigh(second)
         bends = (directions * abs(sizes)[:, None]) @ directions.transpose(0, 2, 1)
-        volumes = abs(np.linalg.det(inside[some[:, 1:]] - inside[some[:, :1]]))
+        volumes = abs(np.linalg.det(points[some[:, 1:]] - points[some[:, :1]]))
         # the square root of the mean, over its largest eigenvalue
         sizes, directions = np.linalg.eigh(found @ np.average(bends, axis=0, weights=volumes) @ found.T)
         if sizes.max() <= STRAIGHT:
@@ -204,6 +213,11 @@ def stretch(points: Array, heights: Array) -> Array:
         unit = 10.0 ** math.floor(math.log10(float(abs(found).max())) - 6)
         found = np.round(found / unit) * unit
     return found
+
+
+def _pairs(axes: int) -> Indices:
+    """Corners of a simplex at the ends of its edges."""
+    return np.array(list(itertools.combinations(range(axes + 1), 2)), dtype=np.intp)
 
 
 def _ancestors(origins: Indices, axes: int, cells: Indices) -> Indices:

@@ -30,7 +30,7 @@ from scipy.spatial import cKDTree
 from kernels.interface import Status
 from sweep.cells.schema import ANCILLARY, STATUS, cell_schema
 from sweep.errors import SweepError
-from sweep.explore.mesh import Array, Indices, at_pole, edges, errors_inside, largest, scatter, simplices, stretch
+from sweep.explore.mesh import Array, Indices, Mesh, at_pole, scatter, stretch
 from sweep.explore.scattered import MOST_AXES, REFINED_TO, Box, axes_of, heights, kinds
 from sweep.file import disk
 from sweep.file.disk import check_target
@@ -343,44 +343,39 @@ class Refiner:
         self.points = np.concatenate([self.points, points])
         self.origins = np.concatenate([self.origins, np.stack([itself] * 2, axis=1) if ends is None else ends])
 
-    def _judged(self, name: str, stretched: Array) -> Judged:
+    def _judged(self, name: str, matrix: Array) -> Judged:
         """Errors of an output's straight lines between cells, and borders between statuses that are to be cut."""
         points, axes, height = self.points, len(self.axes), heights(self.column(name))
         finite = np.isfinite(np.stack([self.column(each) for each in self.noise])).all(axis=0)
-        places, kind = points @ stretched, kinds(self.column(STATUS), finite)
-        corners = simplices(places)
-        of_corners, pairs = kind[corners], edges(axes)
+        mesh = Mesh(points, height, kinds(self.column(STATUS), finite), matrix)
+        of_corners, of_ends, rows = mesh.kind[mesh.corners], mesh.kind[mesh.edges], np.arange(len(mesh.corners))
         alike = (of_corners == of_corners[:, :1]).all(axis=1)
-        inside, border, beside_border = (2.0**-level for level in LEVELS.get(axes, FURTHER_LEVELS))
+        valued = alike & (of_corners[:, 0] >= 0)
+        inside, border, beside = (2.0**-level for level in LEVELS.get(axes, FURTHER_LEVELS))
+        # of edges, in steps of the first grid along the axis where they are longest
+        extent = (abs(points[mesh.edges[:, :, 0]] - points[mesh.edges[:, :, 1]]) * self._steps).max(axis=2)
 
-        def extent(ends: Indices) -> Array:
-            """Of edges (..., 2), in steps of the first grid along the axis where they are longest."""
-            found: Array = (abs(points[ends[..., 0]] - points[ends[..., 1]]) * self._steps).max(axis=-1)
-            return found
-
-        # inside of one status: as the cells of that status tell
-        size, ends = errors_inside(places, height, kind, corners)
-        size[~alike | (of_corners[:, 0] < 0)] = 0.0
-
-        # across a border: infinite while edges are longer than they may stay
-        mixed = np.flatnonzero(~alike & (of_corners >= 0).any(axis=1))
-        across = of_corners[mixed][:, pairs[:, 0]] != of_corners[mixed][:, pairs[:, 1]]
-        length = np.where(across, extent(corners[mixed][:, pairs]), -1.0)
-        size[mixed] = np.where(length.max(axis=1, initial=-1.0) > border, math.inf, 0.0)
-        ends[mixed] = largest(corners[mixed], length)
+        # inside of one status as the cells of that status tell; across a border infinite while edges are longer than
+        # they may stay
+        size, cut = mesh.errors()
+        across = np.where(of_ends[:, :, 0] != of_ends[:, :, 1], extent, -1.0)
+        size[~valued] = np.where(across.max(axis=1) > border, math.inf, 0.0)[~valued]
+        cut = np.where(alike, cut, across.argmax(axis=1))
+        ends = mesh.edges[rows, cut]
 
         # beside one: as near as the simplices across it may stay wide
-        least = np.full(len(corners), inside)
+        least = np.full(len(rows), inside)
         if not alike.all():
-            tree = cKDTree(points[np.unique(corners[~alike])] * self._steps)
+            tree = cKDTree(points[np.unique(mesh.corners[~alike])] * self._steps)
             apart = tree.query(points * self._steps, p=math.inf)[0]
-            least[alike & (apart <= border)[corners].any(axis=1)] = beside_border
-        valued = alike & (of_corners[:, 0] >= 0)
+            least[alike & (apart <= border)[mesh.corners].any(axis=1)] = beside
         stuck = at_pole(height, self.origins, axes)[ends.max(axis=1)]
-        finest = (extent(ends) <= least) | (valued & np.isfinite(size) & stuck)
-        wide = corners[valued & (size > max(self.tolerance, NOISE_SIZE * self.noise[name]))]
+        finest = (extent[rows, cut] <= least) | (valued & np.isfinite(size) & stuck)
+
+        # where values are noisy, errors are those of the noise
+        wide = mesh.corners[valued & (size > max(self.tolerance, NOISE_SIZE * self.noise[name]))]
         volume = float(abs(np.linalg.det(points[wide[:, 1:]] - points[wide[:, :1]])).sum())
         self._to_cut[name].append((len(points), volume))
         self.noise[name] = max(self.noise[name], scatter(height, self.origins, axes, self._to_cut[name]))
         wanted = size > max(self.tolerance, NOISE_SIZE * self.noise[name])
-        return Judged(corners, size, ends, wanted, finest, valued)
+        return Judged(mesh.corners, size, ends, wanted, finest, valued)

@@ -17,19 +17,16 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
-from scipy.spatial import Delaunay, cKDTree
-from threadpoolctl import threadpool_limits
+from scipy.spatial import cKDTree
 
 from kernels.interface import FIRST_REFUSAL, Status
 from sweep.cells.schema import ERROR_BOUND, STATUS
 from sweep.errors import SweepError
-from sweep.explore.mesh import Array, Indices, are_solid, errors_inside, stretch, tilted
+from sweep.explore.mesh import Array, Indices, Mesh
 from sweep.words import require_dataset
 
 LOGARITHMIC = 1.999
 """Ratio of its ends from which on a positive axis is taken in logarithms; below, it makes no difference."""
-OUTSIDE = 1e-9
-"""How far out of a simplex a point may be by rounding."""
 FEWEST_ON_A_LINE = 5
 MOST_AXES = 5
 REFINED_TO = "refined_to"
@@ -143,7 +140,10 @@ def interpolated(dataset: xr.Dataset, at: Mapping[str, Sequence[float] | Array])
     inaccurate = nearest[STATUS].values == Status.INACCURATE
     for name, variable in dataset.data_vars.items():
         if variable.dims == status.dims and variable.dtype.kind == "f" and name != ERROR_BOUND:
-            between, off = _between(variable.values, points, places, status.values)
+            height, size = heights(variable.values), _size(variable.values)
+            kind = kinds(status.values, np.isfinite(height))
+            between, off = Mesh(points, height, kind).between(places)
+            between = between * size if size else np.exp(between)
             columns[name] = np.where(nearest[name].isnull(), np.nan, between)
             if name in refined or not refined:
                 error = np.maximum(error, off)
@@ -159,35 +159,6 @@ def kinds(status: Indices, valued: NDArray[np.bool_]) -> Indices:
     """Statuses, with those that rounding decides alike; -1 without a value."""
     kind = np.where(status == Status.INACCURATE, int(Status.OK), status.astype(np.intp))
     return np.where((status < FIRST_REFUSAL) & valued, kind, -1)
-
-
-def _between(values: Array, points: Array, places: Array, status: Indices) -> tuple[Array, Array]:
-    """An output's values at places, and how far they are off, as the cells around tell; inf across borders."""
-    height, kind = heights(values), kinds(status, np.isfinite(values))
-    stretched = stretch(points, height)
-    points, places = points @ stretched, places @ stretched
-    corners, shares, where, mesh = located(points, places)
-    # a corner that takes no part need have no value
-    total: Array = np.where(shares == 0, 0.0, shares * height[corners]).sum(axis=1)
-    size, solid = np.full(len(mesh), np.inf), are_solid(points, mesh)
-    size[solid] = errors_inside(points, height, kind, mesh[solid])[0]
-    off = np.where(shares.max(axis=1) == 1, 0.0, np.where(where < 0, np.inf, size[where]))
-    return total * _size(values) if _size(values) else np.exp(total), off
-
-
-def located(points: Array, at: Array) -> tuple[Indices, Array, Indices, Indices]:
-    """Corners of the simplex of each place, and their shares in its value, NaN outside; its number, -1 outside;
-    and the corners of all simplices."""
-    found = Delaunay(tilted(points))
-    mesh, places = np.sort(found.simplices.astype(np.intp), axis=1), tilted(at)
-    with threadpool_limits(1, "blas"):  # on busy cores its threads wait some milliseconds for each other, each time
-        where = found.find_simplex(places, tol=OUTSIDE).astype(np.intp)
-    inverse = found.transform[where]
-    shares = np.einsum("nij,nj->ni", inverse[:, :-1], places - inverse[:, -1])
-    shares = np.column_stack([shares, 1 - shares.sum(axis=1)])
-    shares = np.where(abs(shares) < OUTSIDE, 0.0, shares)
-    shares[where < 0] = np.nan
-    return found.simplices[where].astype(np.intp), shares, where, mesh
 
 
 def on_lines(dataset: xr.Dataset, x: str) -> xr.Dataset:
