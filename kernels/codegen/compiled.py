@@ -100,7 +100,7 @@ def runner(scene, method):
         return Runner(scene, m, run, run)
     pair = kept_on_kink(PAIRS[method]) if scene.slides else PAIRS[method]
     factored, solved = functions.linear()
-    m = m._replace(factored=factored, solved=solved, roundings=pair.roundings, biased=float(method != "rodas5p"))
+    m = m._replace(factored=factored, solved=solved, roundings=pair.roundings, biased=1.0)
 
     @jit_call
     def leg(cell, mode, active):

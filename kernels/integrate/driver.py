@@ -29,6 +29,8 @@ ONE_ULP = 2.0**-52
 CLOCK_OFF = 8.0
 """Roundings that a clock is off by from one event to the next in a shaken run: what is near an event in time hangs on
 the time that has gone by since then, of which what is left of a clock's rounding is much more than of the clock."""
+REMEMBERED = 4.0
+"""Of the time in which a state changes by all of its size, how much of the way to an event may lengthen by roundings."""
 GOLDEN = 0.6180339887498949
 """What the share of the roundings that an event is missed by goes on by from one event to the next, so that no two of
 some events one behind the other are missed alike: what is between them would not show it."""
@@ -221,8 +223,12 @@ def arrived(m, cell, found, late, active, tells):
         verdict = where(active & sliding & (found.lost | found.broken), STICKS, verdict)
     moving = active & (cell.verdict < REFUSED) & (verdict < REFUSED) & not_(found.grazing)
     state, mode = choose(moving, found.state, cell.state), mode_of(cell)
-    # for how long rounding may keep open what fires, or lengthens the way to it
-    longest, rates = m.biased * ONE_ULP * found.t * cell.unit, m.rates(state, mode)
+    # for how long rounding may keep open what fires, or lengthens the way to it, of which what is fast forgets the most
+    longest, rates, size = found.t * cell.unit, m.rates(state, mode), reached(cell.size, found.reach)
+    for extent, rate in zip(size, rates, strict=True):
+        memory = REMEMBERED * extent / magnitude(rate)
+        longest = where((memory > 0.0) & (memory < longest), memory, longest)
+    longest = m.biased * ONE_ULP * longest
     for o, (extent, rate) in zip(found.on, m.made(state, mode), strict=True):
         blur = where(o > 0.5, ONE_ULP * extent / magnitude(rate), 0.0)
         longest = where(blur > longest, blur, longest)
@@ -237,7 +243,7 @@ def arrived(m, cell, found, late, active, tells):
         shaken, off = shaken | ends, where(ends & (longest < math.inf), magnitude(off) + longest, off)
     missed = tuple(where(shaken, fma(off, rate, u), u) for rate, u in zip(rates, state, strict=True))
     return cell._replace(
-        shake=shake, verdict=verdict, h=found.h, on=found.on, size=reached(cell.size, found.reach),
+        shake=shake, verdict=verdict, h=found.h, on=found.on, size=size,
         state=choose(shakes, m.clocks_off(missed, clocks_off), missed),
         time=where(moving, fma(found.t, cell.unit, cell.time), cell.time),
         since=where(moving, fma(found.t, cell.unit, cell.since), cell.since),

@@ -33,8 +33,7 @@ class Written(NamedTuple):
     most_kinks : between two switches, after which a cell is given up
     cell : a `Cell` of zeros
     roundings : that an event is missed by at most, by the method
-    biased : 1 where compared runs miss all events to one side, as the weights of explicit steps round; else 0. By
-        rodas5p too they do, but as many of its roundings in a row would leave nothing of what is stiff
+    biased : 1 where compared runs miss all events to one side, as the weights of steps round; else 0
     speeds : of each kink's u ahead of it and behind it, the other signs as they are; None where no motion slides
     onto : the state put back onto the kink that it slides along, or None
     surfaces : 1 for each kink that is a further surface, at which the motion switches too, 2 where such switches do
