@@ -104,8 +104,8 @@ def by_runs(one, columns, rtol, tightest=0.0):
     """Rows and status by three runs; INACCURATE where they differ by more than the finest one could mend.
 
     Where they do, or a run breaks off, the cell is followed by three again, with a tighter tolerance, of at least
-    `tightest`; where that breaks off too, as of what is stiff, with one between. Runs that were LOST, and then differ by
-    much less than their tolerances say, may have met again only where motions of all sorts end: INACCURATE.
+    `tightest`; where that breaks off too, as of what is stiff, with one between. Runs that were LOST, and then differ
+    by much less than their tolerances say, may have met again only where motions of all sorts end: INACCURATE.
     """
     rows, status, doubt = _compared(one, columns, rtol, rtol)
     again, last = np.flatnonzero(np.isin(status, TRIED_AGAIN) & (rtol >= ROUNDING)), 0.0 * rtol

@@ -30,7 +30,7 @@ CLOCK_OFF = 8.0
 """Roundings that a clock is off by from one event to the next in a shaken run: what is near an event in time hangs on
 the time that has gone by since then, of which what is left of a clock's rounding is much more than of the clock."""
 REMEMBERED = 4.0
-"""Of the time in which a state changes by all of its size, how much of the way to an event may lengthen by roundings."""
+"""Times in which a state changes by all of its size that count of the way to an event, for what roundings lengthen."""
 GOLDEN = 0.6180339887498949
 """What the share of the roundings that an event is missed by goes on by from one event to the next, so that no two of
 some events one behind the other are missed alike: what is between them would not show it."""
