@@ -111,8 +111,8 @@ def positive_axis(y: xr.DataArray, dim: str, repeated: bool = False) -> tuple[st
         raise SweepError(f"{title(y)} has no axis {dim!r}" + (did_you_mean(dim, known) or there))
     values = y.coords[dim].values
     if values.dtype.kind in "mM":
-        times = f"{dim} - {dim}[0]" if values.dtype.kind == "M" else dim
-        raise SweepError(f"{dim} holds times, not numbers; take seconds, ({times}) / np.timedelta64(1, 's')")
+        since = f" since a moment before the first, ({dim} - MOMENT)" if values.dtype.kind == "M" else f", {dim}"
+        raise SweepError(f"{dim} holds times, not numbers; take seconds{since} / np.timedelta64(1, 's')")
     if values.dtype.kind not in "fiu":
         raise SweepError(f"{dim} holds words, not numbers; a power law needs a number axis")
     x = values.astype(np.float64)

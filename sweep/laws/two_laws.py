@@ -328,7 +328,7 @@ def _table(t: Array, z: Array, tried: list[Found]) -> xr.Dataset:
     chosen = min(alive, key=lambda f: (f.law.numbers, not f.law.power, f.aicc))
     margin = min((f.aicc for f in tried if f is not chosen), default=math.inf) - chosen.aicc
     text = f"{chosen.law.name} ({chosen.law.formula}): " + "no power law; " * (not any(f.law.power for f in alive))
-    if rivals := [f.law.name for f in alive if f is not chosen]:
+    if rivals := [f'"{f.law.name}"' for f in alive if f is not chosen]:
         text += f"not ruled out beside it: {', '.join(rivals)}"
     else:
         text += f"all others are ruled out, the next by {margin:.3g} in AICc"
