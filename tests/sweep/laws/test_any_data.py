@@ -138,11 +138,6 @@ def test_what_is_no_output_no_dataset_or_no_study_is_refused(given):
         sweep.scaling(given)
 
 
-def test_a_bound_of_a_result_without_the_output_is_refused():
-    with pytest.raises(sweep.SweepError, match="Dataset has no "):
-        sweep.fit_exponent(LINE, "x", bound=LINE.rename("other").to_dataset())
-
-
 @pytest.mark.parametrize("sigma", [0.0, 1e-20, 1e9, LINE * 0])
 def test_standard_errors_of_nothing_or_beyond_all_sense_are_refused(sigma):
     for fit in (sweep.fit_exponent, sweep.compare_laws):

@@ -356,3 +356,6 @@ def test_the_error_bar_of_a_local_exponent_covers_what_stated_errors_can_do():
     assert (abs(found.exponent + 1 - (2 / 3) / (1 + np.exp(-t))) <= found.exponent_error).all()
     # (1, -8, 0, 8, -1)/12h: errors of the worst signs move a slope by 18/12h
     np.testing.assert_allclose((found.exponent_error - blind.exponent_error)[2:-2], 1.5e-3 / 0.07, rtol=1e-6)
+    plateau = curve(t - 18.0, -np.exp(t - 18.0)).astype(np.float32)  # which rounding makes level
+    found = sweep.local_exponent(plateau, "mu", error=True)
+    assert (abs(found.exponent + plateau.mu) <= found.exponent_error).all()

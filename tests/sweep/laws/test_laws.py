@@ -295,6 +295,7 @@ def test_eight_points_are_enough_and_may_fall_or_have_gaps():
         (lambda y: sweep.compare_laws(-y, "x"), "positive values"),
         (lambda y: sweep.fit_correction(y.assign_coords(x=np.repeat([1.0, 9.0], 31)[:61]), "x"), "2 places"),
         (lambda y: sweep.local_exponent(y.assign_coords(x=np.maximum(X, 3.0)), "x"), "3 stands there more than once"),
+        (lambda y: sweep.fit_exponent(y, "x", bound=y.rename("other").to_dataset()), "Dataset has no "),
         (lambda y: sweep.fit_two_laws(y, "nu"), "no axis 'nu'"),
         (lambda y: sweep.fit_two_laws(y, "x", (1.0, 5.0)), "at least 8 points.* window 1 to 5 of x"),
         (lambda y: sweep.fit_exponent(y, "x", (None, 0.5)), "found 0 of y in the window open to 0.5 of x"),
