@@ -81,3 +81,23 @@ def test_what_rounding_alone_decides_is_not_ok():
     outputs, status = solve(kernel, "rodas5p", rtol=rtol, flips=np.ones(4000), **cells)
     assert (judged(kernel, truth_of(**cells), outputs, status, rtol) <= 1.0).all()
     assert (status == Status.INACCURATE).mean() > 0.5
+
+
+@pytest.mark.skipif(not COMPILED, reason="thousands of steps")
+def test_steps_that_all_round_to_one_side_are_not_believed():
+    """A relay over hundreds of switches: runs that miss them to either side are OK and up to 30 rtol off."""
+    kernel, draw, truth_of = FAMILIES["relay_oscillation"]
+    random = np.random.default_rng(21)
+    cells, rtol = draw(random, 1000), 10.0 ** random.uniform(-12, -9, 1000)
+    truth = truth_of(**cells)
+    outputs, status = solve(kernel, "rodas5p", rtol=rtol, flips=np.ones(1000), **cells)
+    assert (judged(kernel, truth, outputs, status, rtol) <= 1.0).all()
+    assert (status[truth.condition * 1e-14 < rtol] == Status.OK).mean() > 0.6
+
+
+@pytest.mark.skipif(not COMPILED, reason="thousands of steps")
+def test_runs_that_meet_again_behind_chaos_are_not_believed():
+    """Duffing's oscillator: all three are on one cycle of several, and the truth is on another, x = 1.14."""
+    cell = {"g": np.array([0.48296410607714096]), "T": np.array([182.57927549973576]), "flips": np.ones(1)}
+    outputs, status = solve(FAMILIES["chaos"].kernel, "dopri5", rtol=np.array([4.5711548553949307e-4]), **cell)
+    assert status[0] == Status.INACCURATE or abs(outputs["x"][0] - 1.13833503) < 1e-3
