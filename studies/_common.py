@@ -1,16 +1,16 @@
-"""What the scripts of the studies share: opening a result, and the table of statements; `_figures` has their figures.
+"""What the scripts of the studies share: results, statements and their table; `_figures` has what figures share.
 
-A script `<question>.py` stands beside its `<question>.toml`, reads the dataset that `sweep run` made of it, compares
-theory with what comes out, and draws `<question>.png` beside the dataset.
+A script `<question>.py` stands beside its `<question>.toml`. Its head has the question and the theory; `claims` yields
+headings and statements about the result that `sweep run` made, and `figure` draws `<question>.png` beside it. `script`
+makes a program of these.
 """
 
 import re
 import sys
 import textwrap
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -55,15 +55,15 @@ class Statement:
         return "NO" if self.failed else "no, known" if self.refuted else "yes"
 
 
-Claims = Iterator[Statement]
-"""What a part of a script says, statement after statement: it works out numbers and yields what they are held to."""
-Groups = dict[str, Iterable[Statement]]
+Claims = Iterator[Statement | str]
+"""What a script says: headings, and the statements below each."""
+Groups = dict[str, list[Statement]]
 """Statements by heading."""
 Conclusion = tuple[Groups, list[str], Callable[[], Any]]
-"""What a script concludes: statements; how their table is to be read, and further results as lines of text; and what
-draws the figure."""
+"""What a script concludes: statements, further results as lines of text, and what draws the figure."""
 OPTIONS = ("--all", "--force")
 """Of every script."""
+STUDIES = Path(__file__).parent
 
 
 def compared(what: str, theory: str, here: Any, value: float, allowed: float, digits: int = 8) -> Statement:
@@ -198,50 +198,94 @@ def _number(off: float | None) -> str:
     return "" if off is None else f"{off:+.1e}"
 
 
-def read_result(path: str, kernel: str, dims: Sequence[str], toml: str) -> xr.Dataset:
-    """The finished sweep of a kernel over these axes, in memory. Raises SweepError where it is none."""
-    ds = sweep.open_result(path, strict=True)
-    if ds.attrs.get("kernel") != kernel or ds.status.dims != tuple(dims):
+def study_of(name: str) -> Any:
+    """The study whose result, as it is or refined, has this name."""
+    return sweep.study(STUDIES / f"{Path(name).stem.removesuffix('_fine')}.toml", allow_import=True)
+
+
+def read_result(path: str, name: str) -> xr.Dataset:
+    """The finished result of this name, in memory. Raises SweepError where it is of another kernel or other axes."""
+    study, ds = study_of(name), sweep.open_result(path, strict=True)
+    dims = tuple(study.grid_shape)[: -len(study.summary.over) if study.summary else None]
+    there = next(iter(ds.data_vars.values())).dims if study.summary else ds.status.dims
+    if ds.attrs.get("kernel") != study.kernel_name or (there != dims and "_fine" not in name):
         over = " and ".join(dims) + (" alone" if len(dims) == 1 else "")
-        raise sweep.SweepError(f"{path} is no sweep of the {kernel} over {over}; make it from {toml}")
+        raise sweep.SweepError(f"{path} is no sweep of the {study.kernel_name} over {over}; make it by {run_of(name)}")
     return ds.load()
 
 
-def report(
-    script: str,
-    inputs: Sequence[str],
-    arguments: Sequence[str],
-    conclude: Callable[..., Conclusion],
-    source: str = "theory",
-) -> int:
-    """Prints what a study concludes from the results named, and saves its figure beside the first of them.
+def run_of(name: str) -> str:
+    """The command that makes the result of this name."""
+    study = study_of(name)
+    return f"sweep run studies/{Path(name).stem.removesuffix('_fine')}.toml" + " --allow-import" * (
+        ":" in study.kernel_name
+    )
 
-    How many claims hold, and which do not, is printed by default; with `--all` each with its numbers. A figure that is
-    there is replaced with `--force` alone.
+
+def grouped(claims: Claims) -> Groups:
+    """Statements by the heading before them."""
+    found: Groups = {}
+    for one in claims:
+        if isinstance(one, str):
+            found[one] = []
+        else:
+            next(reversed(found.values())).append(one)
+    return found
+
+
+@dataclass(frozen=True)
+class Script:
+    """A program that prints what a study concludes from its results, and saves its figure beside the first of them.
+
+    How many claims hold, and which do not, is printed by default; with `--all` each with its numbers, below the head
+    of the script. A figure that is there is replaced with `--force` alone.
 
     Parameters
     ----------
-    script : path of the script, for the line on its use
-    inputs : what its arguments are called there
-    conclude : gives the statements, further lines of text, and a function that draws the figure, from the paths
+    file, head : path of the script, and its docstring
+    inputs : names of the results that it takes, each of the study file of that name; or of the study file itself
+    claims, figure : statements, and a figure, of what `prepared` makes of the results
+    prepared : by default, the results as they are
+    notes : further results as lines of text, of the same
     source : heading of what the numbers are compared with
-
-    Returns
-    -------
-    int
-        Exit status: 1 if a statement does not hold, 2 if the results are not there or not of this study.
     """
-    paths = [argument for argument in arguments if argument not in OPTIONS]
-    if len(paths) != len(inputs):
-        print(f"use: python {Path(script).name} {' '.join(inputs)} [{'] ['.join(OPTIONS)}]", file=sys.stderr)
-        return 2
-    target = Path(paths[0]).with_suffix(".png")
-    return shown(Path(script).stem, target, lambda: conclude(*paths), arguments, source)
+
+    file: str
+    head: str
+    inputs: tuple[str, ...]
+    claims: Callable[..., Claims]
+    figure: Callable[..., Any]
+    prepared: Callable[..., Any] | None
+    notes: Callable[..., list[str]]
+    source: str
+
+    def conclude(self, *paths: str, **options: Any) -> Conclusion:
+        """Statements, notes and what draws the figure, from the results at these paths."""
+        given = [
+            read_result(*one) if one[1].endswith(".h5") else one[0] for one in zip(paths, self.inputs, strict=True)
+        ]
+        found = tuple(given) if self.prepared is None else self.prepared(*given, **options)
+        made = found if isinstance(found, tuple) else (found,)
+        return grouped(self.claims(*made)), self.notes(*made), lambda: self.figure(*made)
+
+    def __call__(self, arguments: Sequence[str]) -> int:
+        """Exit status: 1 if a statement does not hold, 2 if the results are not there or not of this study."""
+        paths = [argument for argument in arguments if argument not in OPTIONS]
+        if len(paths) != len(self.inputs):
+            use = f"use: python {Path(self.file).name} {' '.join(self.inputs)} [{'] ['.join(OPTIONS)}]"
+            print(use, *(run_of(name) for name in self.inputs if name.endswith(".h5")), sep="\n", file=sys.stderr)
+            return 2
+        return self.report(arguments, lambda: self.conclude(*paths))
+
+    def report(self, arguments: Sequence[str], conclude: Callable[[], Conclusion]) -> int:
+        """The same of what is concluded."""
+        target = Path(arguments[0]).with_suffix(".png")
+        return shown(Path(self.file).stem, target, conclude, arguments, self.source, self.head)
 
 
 def what_came_out(name: str) -> list[str]:
     """The closing paragraph of a study as it is shipped: its row of the page "What came out", if that is there."""
-    page = Path(__file__).parents[1] / "docs" / "what_came_out.md"
+    page = STUDIES.parent / "docs" / "what_came_out.md"
     for row in page.read_text(encoding="utf-8").splitlines() if page.exists() else ():
         if row.startswith(f"| `{name}` |"):
             _, _, question, answer, checked, _ = row.split("|")
@@ -250,26 +294,41 @@ def what_came_out(name: str) -> list[str]:
     return []
 
 
-def script(name: str, inputs: str, conclude: Callable[..., Conclusion], source: str = "theory") -> Callable[..., int]:
-    """`main` of the script that concludes so, with its inputs as `report` has them; it runs if `name` is "__main__"."""
-    main = partial(report, conclude.__code__.co_filename, inputs.split(), conclude=conclude, source=source)
+def script(
+    name: str,
+    inputs: str,
+    claims: Callable[..., Claims],
+    figure: Callable[..., Any],
+    prepared: Callable[..., Any] | None = None,
+    notes: Callable[..., list[str]] = lambda *_: [],
+    source: str = "theory",
+) -> Script:
+    """`main` of the script of this name, as `Script` has it; it runs if the name is "__main__"."""
+    module = sys.modules[name]
+    main = Script(
+        str(module.__file__), str(module.__doc__), tuple(inputs.split()), claims, figure, prepared, notes, source
+    )
     if name == "__main__":
         sys.exit(main(sys.argv[1:]))
     return main
 
 
 def shown(
-    name: str, target: Path, conclude: Callable[[], Conclusion], arguments: Sequence[str], source: str = "theory"
+    name: str,
+    target: Path,
+    conclude: Callable[[], Conclusion],
+    arguments: Sequence[str],
+    source: str = "theory",
+    head: str = "",
 ) -> int:
-    """Prints what the study of this name concludes and saves its figure; the exit status of `report`."""
+    """Prints what the study of this name concludes and saves its figure; the exit status of `Script`."""
     complete = "--all" in arguments
     try:
         check_target(target, force="--force" in arguments)
-        found, notes, draw = conclude()
-        groups = {heading: list(lines) for heading, lines in found.items()}
+        groups, notes, draw = conclude()
         page = draw()
         claims = table(groups, source) if complete else summary(groups, source)
-        parts = ("\n".join(lines).strip("\n") for lines in (claims, notes[not complete :], what_came_out(name)))
+        parts = ("\n".join(lines).strip("\n") for lines in ([head] * complete, claims, notes, what_came_out(name)))
         print("\n\n".join(filter(None, parts)), end="\n\n")
         print(f"figure: {charts.save(page, target)}" + "; every claim with its numbers: --all" * (not complete))
     except sweep.SweepError as error:

@@ -1,17 +1,25 @@
 """What the figures of the studies share: the page, maps and their bars, labels, ticks."""
 
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
+from functools import wraps
 from typing import Any
 
 import numpy as np
 import xarray as xr
+from matplotlib.colors import ListedColormap as ListedColormap
 
 import sweep
 
 try:
     from sweep.show import charts
+    from sweep.show.charts import COLOURS as COLOURS
+    from sweep.show.charts import DASHES as DASHES
+    from sweep.show.charts import MARKS as MARKS
+    from sweep.show.charts import LogNorm as LogNorm
+    from sweep.show.charts import Patch as Patch
+    from sweep.show.charts import draw_precision as draw_precision
+    from sweep.show.charts import method_look as method_look
 except sweep.SweepError as error:  # no matplotlib
     sys.exit(str(error))
 
@@ -22,15 +30,26 @@ HOLLOW = {"linestyle": "", "markerfacecolor": "white", "markersize": 3.6}
 """Marks of what is computed, beside lines of theory."""
 
 
-@contextmanager
-def page_of(height: float, *shape: int, width: float = charts.PAGE, **how: Any) -> Iterator[tuple[Any, Any]]:
-    """A figure for print of so many mm, and its panels as `subplots` gives them, lettered in the end if several."""
-    with charts.style():
-        page = charts.new_figure(width, height)
-        panels = page.subplots(*shape, **how)
-        yield page, panels
-        for axes, text in zip(np.ravel(panels), "abcdefghi", strict=False) if np.size(panels) > 1 else ():
-            charts.letter(axes, text)
+def panels(height: float, *shape: int, width: float = NARROW, **how: Any) -> Callable[..., Callable[..., Any]]:
+    """Makes a figure for print, of so many mm, of a function that draws into its panels.
+
+    The function takes the panels of `subplots`, lettered in the end if there are several, and what is drawn.
+    """
+
+    def decorated(draw: Callable[..., None]) -> Callable[..., Any]:
+        @wraps(draw)
+        def figure(*made: Any) -> Any:
+            with charts.style():
+                page = charts.new_figure(width, height)
+                axes = np.ravel(page.subplots(*shape, **how))
+                draw(*axes, *made)
+                for one, text in zip(axes, "abcdefghi", strict=False) if axes.size > 1 else ():
+                    charts.letter(one, text)
+            return page
+
+        return figure
+
+    return decorated
 
 
 def colour_map(axes: Any, x: Any, y: Any, values: Any, label: str, bar: Any = None, **how: Any) -> Any:

@@ -1,34 +1,26 @@
 """How much less does the period of a pendulum with an anchor depend on its drive torque than a verge and foliot's?
 
-    sweep run studies/anchor.toml --allow-import
     python studies/anchor.py anchor.h5
 
-draws anchor.png. The verge's law with a pendulum's restoring force. Theory, by averaging (Airy): phi = A sin wt; the
+The verge's law with a pendulum's restoring force. Theory, by averaging (Airy): phi = A sin wt; the
 torque, a square wave that lags by d = asin(phi0/A), gives 4 mu phi0 a cycle, which friction pi w0 w A^2/Q takes; its
 part against the displacement, (4 mu/pi) cos d, adds to gravity's. So, with P0 = 2 pi/w0 and s = -dlnP/dlnmu,
     A^2 = 4 mu phi0 Q/(pi w0^2),                                                                       (1)
     P/P0 = 1 + A^2/16 + 11 A^4/3072 - e,     e = 2 mu cos(d)/(pi w0^2 A) = (A^2 - phi0^2)^(1/2)/(2 phi0 Q),   (2)
     s = e/(2 cos(d)^2) - A^2/16 - 11 A^4/1536.                                                         (3)
 A stronger drive hastens by recoil and retards by the wider swing; both balance near A^2 = phi0^2 + (4/(phi0 Q))^2.
+
+s = -dlnP/dlnmu; e is the escapement's error (2); theory is of first order in the torque; the next order is of the
+size of e A^2 and e^2, and deviations may be e (A^2/4 + 2 e). A verge and foliot has s = 1/3 under strong drive against
+friction, 1/2 where a switch takes all its speed, more under weak drive (study foliot_scaling).
 """
-
-from __future__ import annotations
-
-from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Claims, Conclusion, Statement, all_ok, compared, read_result, script
-from _figures import NARROW, direct_label, page_of, plain_ticks
-
-from sweep.show.charts import COLOURS
+from _common import Claims, Statement, all_ok, compared, script
+from _figures import COLOURS, direct_label, panels, plain_ticks
 
 DAY = 86400.0
-
-NOTES = """\
-s = -dlnP/dlnmu; e is the escapement's error (2); theory is of first order in the torque; the next order is of the
-size of e A^2 and e^2, and deviations may be e (A^2/4 + 2 e). A verge and foliot has s = 1/3 under strong drive against
-friction, 1/2 where a switch takes all its speed, more under weak drive (study foliot_scaling)."""
 
 
 def with_theory(ds: xr.Dataset) -> xr.Dataset:
@@ -46,8 +38,9 @@ def near(what: str, theory: str, off: xr.DataArray, allowed: xr.DataArray) -> St
     return Statement(what, theory, f"{share:.2f} of the next order", float(abs(off).max()), share <= 1)
 
 
-def cells(ds: xr.Dataset) -> Claims:
-    """Theory beside each cell; the verge."""
+def claims(ds) -> Claims:
+    """What theory says, and what comes out."""
+    yield "Every cell"
     yield all_ok(ds)
     yield near("amplitude/A - 1, next order A^2/16 + e", "(1)", ds.angle_size / ds.A - 1, ds.A**2 / 16 + ds.e)
     yield near("P/P0 - 1", "(2)", ds.error - ds.error_theory, ds.next)
@@ -55,9 +48,7 @@ def cells(ds: xr.Dataset) -> Claims:
     worst, theory = (1 / 3 / float(abs(s).where(np.degrees(ds.A) < 5).max()) for s in (ds.s, ds.s_theory))
     yield compared("the verge's 1/3 over the largest abs(s), A < 5 degrees", f"{theory:.4g}", worst, theory, 0.01, 5)
 
-
-def balances(ds: xr.Dataset) -> Claims:
-    """The swing at which a change of the drive changes nothing."""
+    yield "Recoil and circular error in balance"
     for line in (ds.isel(phi0=k) for k in range(ds.sizes["phi0"])):
         A = np.degrees(np.hypot(line.phi0, 4 / (line.phi0 * line.Q)).item())
         here = np.degrees(np.interp(0.0, line.period_by_mu, line.angle_size))
@@ -65,36 +56,28 @@ def balances(ds: xr.Dataset) -> Claims:
         yield compared(what, f"{A:.5g}", here, A, 0.005, 5)
 
 
-def figure(ds: xr.Dataset) -> Any:
+@panels(132.0, 2)
+def figure(a, b, ds):
     """How the period depends on the drive, and the period itself, over the swing."""
-    with page_of(132.0, 2, 1, width=NARROW) as (page, (a, b)):
-        a.axhspan(1 / 3, 1 / 2, color="0.8", linewidth=0)
-        direct_label(a, 6.0, 0.13, "verge and foliot", "0.4")
-        for k, colour in enumerate(COLOURS[:3]):
-            line = ds.isel(phi0=k)
-            swing, name = np.degrees(line.angle_size), rf"$\varphi_0 = {np.degrees(line.phi0.item()):g}°$"
-            a.plot(swing, line.s.where(line.s > 0), color=colour, label=name)
-            a.plot(swing, -line.s.where(line.s < 0), color=colour, linestyle="--")
-            b.plot(swing, DAY * line.error, color=colour)
-            for axes, theory in ((a, abs(line.s_theory)), (b, DAY * line.error_theory)):
-                axes.plot(np.degrees(line.A)[::3], theory[::3], "x", color="black", markersize=3.5, markeredgewidth=0.7)
-        free = np.linspace(0.0, 8.0, 50)
-        b.plot(free, DAY * np.radians(free) ** 2 / 16, color="0.5", linestyle=":")
-        direct_label(b, 5.2, 62.0, "circular error", "0.4", ha="right")
-        a.set(xlabel="amplitude [degrees]", ylabel=r"$|s|$, $s=-$d ln $P$/d ln $\mu$")
-        a.set(xscale="log", yscale="log", ylim=(2e-6, 1.0))
-        b.set(xlabel="amplitude [degrees]", ylabel="lost beside small free swings [s/day]")
-        b.set(xlim=(0.0, 8.0), ylim=(-35.0, 90.0))
-        plain_ticks(a.xaxis, [1.5, 2, 3, 5, 10, 20])
-        a.legend(loc="lower right")
-    return page
+    a.axhspan(1 / 3, 1 / 2, color="0.8", linewidth=0)
+    direct_label(a, 6.0, 0.13, "verge and foliot", "0.4")
+    for k, colour in enumerate(COLOURS[:3]):
+        line = ds.isel(phi0=k)
+        swing, name = np.degrees(line.angle_size), rf"$\varphi_0 = {np.degrees(line.phi0.item()):g}°$"
+        a.plot(swing, line.s.where(line.s > 0), color=colour, label=name)
+        a.plot(swing, -line.s.where(line.s < 0), color=colour, linestyle="--")
+        b.plot(swing, DAY * line.error, color=colour)
+        for axes, theory in ((a, abs(line.s_theory)), (b, DAY * line.error_theory)):
+            axes.plot(np.degrees(line.A)[::3], theory[::3], "x", color="black", markersize=3.5, markeredgewidth=0.7)
+    free = np.linspace(0.0, 8.0, 50)
+    b.plot(free, DAY * np.radians(free) ** 2 / 16, color="0.5", linestyle=":")
+    direct_label(b, 5.2, 62.0, "circular error", "0.4", ha="right")
+    a.set(xlabel="amplitude [degrees]", ylabel=r"$|s|$, $s=-$d ln $P$/d ln $\mu$")
+    a.set(xscale="log", yscale="log", ylim=(2e-6, 1.0))
+    b.set(xlabel="amplitude [degrees]", ylabel="lost beside small free swings [s/day]")
+    b.set(xlim=(0.0, 8.0), ylim=(-35.0, 90.0))
+    plain_ticks(a.xaxis, [1.5, 2, 3, 5, 10, 20])
+    a.legend(loc="lower right")
 
 
-def conclude(path: str) -> Conclusion:
-    """Statements and the figure."""
-    ds = with_theory(read_result(path, "anchor_scene:KERNEL", ["phi0", "mu"], "anchor.toml"))
-    groups = {"Every cell": cells(ds), "Recoil and circular error in balance": balances(ds)}
-    return groups, [NOTES], lambda: figure(ds)
-
-
-main = script(__name__, "anchor.h5", conclude)
+main = script(__name__, "anchor.h5", claims, figure, with_theory)

@@ -1,20 +1,21 @@
 """At which amplitude does the rate of a driven balance not depend on its drive?
 
-    sweep run studies/balance_isochronism.toml --allow-import
-    sweep run studies/balance_isochronism_lift.toml
-    sweep run studies/balance_isochronism_positions.toml --allow-import
     python studies/balance_isochronism.py balance_isochronism.h5 balance_isochronism_lift.h5 \\
         balance_isochronism_positions.h5
 
-draws balance_isochronism.png and compares theory with what comes out. Theory, derived here: on its way to the right
-solid friction shifts the centre of the swing to -r, and about it the motion is linear. An impulse there changes the
-speed and not the phase (Airy's condition), so the period is 2 pi/omega_d whatever drive, amplitude and friction.
-Elsewhere, the impulse being w = 2 r a + pi zeta a^2 and turning the phase by -(at + r) w/(a^2 v), light losses lose
+Theory, derived here: on its way to the right solid friction shifts the centre of the swing to -r, and about it the
+motion is linear. An impulse there changes the speed and not the phase (Airy's condition), so the period is 2
+pi/omega_d whatever drive, amplitude and friction. Elsewhere, the impulse being w = 2 r a + pi zeta a^2 and turning the
+phase by -(at + r) w/(a^2 v), light losses lose
 
     dP/P = (r + at)(2 r/(pi a) + zeta)/a,  a the amplitude,                                              (1)
 
 which falls with the amplitude for any other `at`. What is out of poise adds dP/P = -poise cos(hang) J1(a)/a, without
 the sign of `at` or the drive in it, and vanishes where J1 does, at a = 3.832 rad, 220 degree.
+
+loss: how much slower than 2 pi/omega_d, in s a day; deviation: relative, of losses the largest difference in s/day
+allowed: 1e-3 s/day where there is no loss; 2 % of (1) at amplitudes over 20 r and 20 abs(at), 1e-6 between the scene
+and the kernel `balance_driven`; 2 % of the least drive for what grids of m can tell; 0.005 rad of 3.8317
 """
 
 import math
@@ -22,12 +23,11 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Claims, Conclusion, differing, most, read_result, said, script
-from _figures import HOLLOW, NARROW, direct_label, page_of, plain_ticks
+from _common import Claims, differing, most, said, script
+from _figures import COLOURS, DASHES, HOLLOW, MARKS, direct_label, panels, plain_ticks
 from scipy.special import j1, jn_zeros
 
 import sweep
-from sweep.show.charts import COLOURS, DASHES, MARKS
 
 DAY = 86400.0
 LARGE = 20.0
@@ -35,12 +35,6 @@ LARGE = 20.0
 FIRST = 0.02
 FLAT = 1e-3
 """Loss [s/day] that counts as none; the sweep is right to rtol 1e-11 of a period, 1e-6 s/day."""
-
-NOTES = """\
-loss: how much slower than 2 pi/omega_d, in s a day; deviation: relative, of losses the largest difference in s/day
-allowed: 1e-3 s/day where there is no loss; 2 % of (1) at amplitudes over 20 r and 20 abs(at), 1e-6 between the scene
-and the kernel `balance_driven`; 2 % of the least drive for what grids of m can tell; 0.005 rad of 3.8317\
-"""
 
 
 def reach(ds: xr.Dataset) -> xr.DataArray:
@@ -64,8 +58,22 @@ def theory(ds: xr.Dataset) -> xr.DataArray:
     return DAY * (ds.r + ds["at"]) * (2 * ds.r / (math.pi * ds.a) + ds.zeta) / ds.a
 
 
-def impulses(ds: xr.Dataset) -> Claims:
-    """Where impulses do not touch the rate, by how much they do elsewhere, and `balance_driven` at the centre."""
+def driven(axes: dict[str, Any], fixed: dict[str, float], rtol: float) -> xr.Dataset:
+    """A balance that is pushed at the centre, by the kernel."""
+    return sweep.run(kernel="balance_driven", axes=axes, fixed=fixed, rtol=rtol)
+
+
+def prepared(ds, lift, hung):
+    """The three sweeps with the amplitude `a` behind an impulse and the loss."""
+    ds, hung = (part.assign(a=reach(part), loss=lost(part, part.clock)) for part in (ds, hung))
+    lift = lift.assign(loss=lost(lift, lift.period))
+    hung = hung.assign_coords(a0=("w", hung.a.isel(hang=1).values))
+    return ds, lift, hung
+
+
+def claims(ds, lift, hung) -> Claims:
+    """What theory says, and what comes out."""
+    yield "Impulses before, at and behind the centre"
     there = abs(ds["at"] + ds.r) < 1e-12
     still, span = float(abs(ds.loss).where(there).max()), ds.a.where(there & ds.loss.notnull())
     away = ds.where(abs(ds["at"] + ds.r) > 1e-3)
@@ -81,95 +89,65 @@ def impulses(ds: xr.Dataset) -> Claims:
     yield said("  amplitudes at which the loss is stationary", turns == 0, f"{turns} of the grid", "none")
     yield most("at = 0: period and amplitude by `balance_driven`", "the same", off, 1e-6, "largest")
 
-
-def driven(axes: dict[str, Any], fixed: dict[str, float], rtol: float) -> xr.Dataset:
-    """A balance that is pushed at the centre, by the kernel."""
-    return sweep.run(kernel="balance_driven", axes=axes, fixed=fixed, rtol=rtol)
-
-
-def lifts(ds: xr.Dataset) -> Claims:
-    """Where the rate of a balance on a lift does not depend on the torque: at its greatest loss."""
-    for beta in ds.beta.values:
-        line = ds.sel(beta=beta).isel(r=-1)
+    yield "A lift"
+    for beta in lift.beta.values:
+        line = lift.sel(beta=beta).isel(r=-1)
         k = int(line.loss.fillna(-1.0).argmax("m"))
         a, least = float(line.amplitude[k]), float(line.m[int(line.amplitude.notnull().argmax("m"))])
         here = f"{float(line.loss[k]):.0f} at {math.degrees(a):.0f} degree = {a / beta:.2f} lifts"
         what = f"lift +-{math.degrees(beta):.0f} degree: greatest loss [s/day] at amplitude"
         holds = 0 < k < line.m.size - 1 and 1.1 * beta < a < 2.0 * beta
         yield said(what, holds, f"{here}, m {float(line.m[k]) / least:.2f} times the least", "1 to 2 lifts")
-    free = ds.sel(r=0).loss
+    free = lift.sel(r=0).loss
     gains = (free.where(free.notnull(), -1.0) < 0).all()
     here = f"{float(free.min()):.2f} at most [s/day]"
     yield said("no solid friction: a lift gains, at every torque", gains, here, "< 0")
 
-
-def positions(ds: xr.Dataset) -> Claims:
-    """The amplitude at which positions agree, and what poise does elsewhere."""
-    spread, a, first = ds.loss.isel(hang=0) - ds.loss.isel(hang=2), ds.a.isel(hang=0), jn_zeros(1, 1)[0]
+    yield "Positions, out of poise"
+    spread, a, first = hung.loss.isel(hang=0) - hung.loss.isel(hang=2), hung.a.isel(hang=0), jn_zeros(1, 1)[0]
     zero = float(sweep.where_exponent(spread.swap_dims(w="a0"), "a0", 0.0, values=True).abscissa)
-    rate = -2 * DAY * float(ds.poise) * j1(a) / a
-    off, level = (abs(x).max() / abs(spread).max() for x in (spread - rate, ds.loss.isel(hang=1)))
+    rate = -2 * DAY * float(hung.poise) * j1(a) / a
+    off, level = (abs(x).max() / abs(spread).max() for x in (spread - rate, hung.loss.isel(hang=1)))
     yield differing("positions agree at the amplitude [rad]", f"{first:.4f}", zero, first, 5e-3, 5)
     yield most("top heavy against bottom heavy, by J1(a)/a", "the same", off, 5e-3, "of the largest")
     yield most("heavy at the side: of that", "0", level, 5e-3, "")
 
 
-def draw_lines(axes: Any, ds: xr.Dataset) -> None:
-    """Loss over amplitude, impulse by impulse, with (1)."""
+@panels(138.0, 2)
+def figure(lines, lifted, ds, lift, *_):
+    """Loss against amplitude, for impulses and for lifts."""
     for k, at in enumerate((-0.05, -0.025, -0.0125, 0.0, 0.05)):
-        line = ds.sel(at=at, method="nearest").sortby("w")
-        axes.plot(line.a, theory(line), color=COLOURS[k], linewidth=0.9)
-        axes.plot(line.a[::4], line.loss[::4], MARKS[k], color=COLOURS[k], **HOLLOW)
+        line = ds.isel(r=1).sel(at=at, method="nearest").sortby("w")
+        lines.plot(line.a, theory(line), color=COLOURS[k], linewidth=0.9)
+        lines.plot(line.a[::4], line.loss[::4], MARKS[k], color=COLOURS[k], **HOLLOW)
         text = f"${1e3 * at:+.3g}$ mrad" if at else "centre"
         x, y = 1.15 * float(line.a.max()), float(theory(line)[int(line.a.argmax("w"))])
         place = {"ha": "left", "va": "top" if at == -0.0125 else "center"}
-        direct_label(axes, x, y, text, COLOURS[k], fontsize=6.5, **place)
-    axes.plot([], [], "o", color="0.3", label="computed", **HOLLOW)
-    axes.plot([], [], color="0.3", linewidth=0.9, label="theory, light losses")
-    axes.set_yscale("symlog", linthresh=1.0, linscale=0.6)
-    axes.set_yticks([-1000, -100, -10, -1, 0, 1, 10, 100, 1000])
-    axes.set_yticks([], minor=True)
-    axes.set(xscale="log", xlabel="amplitude, $a$ [rad]", ylabel="loss [s/day]", ylim=(-4e3, 1e4), xlim=(0.2, 22))
-    axes.legend(fontsize=7, loc="upper right")
-    plain_ticks(axes.xaxis, (0.2, 0.5, 1, 2, 5))
-
-
-def draw_lifts(axes: Any, ds: xr.Dataset) -> None:
-    """Loss over amplitude by lift; the mark is where the rate does not depend on the torque."""
-    for k, beta in enumerate(ds.beta.values):
-        line = ds.sel(beta=beta)
+        direct_label(lines, x, y, text, COLOURS[k], fontsize=6.5, **place)
+    lines.plot([], [], "o", color="0.3", label="computed", **HOLLOW)
+    lines.plot([], [], color="0.3", linewidth=0.9, label="theory, light losses")
+    lines.set_yscale("symlog", linthresh=1.0, linscale=0.6)
+    lines.set_yticks([-1000, -100, -10, -1, 0, 1, 10, 100, 1000])
+    lines.set_yticks([], minor=True)
+    lines.set(xscale="log", xlabel="amplitude, $a$ [rad]", ylabel="loss [s/day]", ylim=(-4e3, 1e4), xlim=(0.2, 22))
+    lines.legend(fontsize=7, loc="upper right")
+    plain_ticks(lines.xaxis, (0.2, 0.5, 1, 2, 5))
+    for k, beta in enumerate(lift.isel(r=-1).beta.values):
+        line = lift.isel(r=-1).sel(beta=beta)
         text = f"lift ±{math.degrees(beta):.0f} degree"
-        axes.loglog(line.amplitude, line.loss, color=COLOURS[k], linestyle=DASHES[k], label=text)
+        lifted.loglog(line.amplitude, line.loss, color=COLOURS[k], linestyle=DASHES[k], label=text)
         top = line.isel(m=int(line.loss.fillna(-1.0).argmax("m")))
-        axes.plot(float(top.amplitude), float(top.loss), "o", color=COLOURS[k])
-    axes.plot([], [], "o", color="black", label="rate independent of the torque")
-    axes.set(xlabel="amplitude, $a$ [rad]", ylabel="loss [s/day]", xlim=(0.15, 8), ylim=(0.1, 1000))
-    axes.legend(fontsize=7, loc="upper right")
-    plain_ticks(axes.xaxis, (0.2, 0.5, 1, 2, 5))
+        lifted.plot(float(top.amplitude), float(top.loss), "o", color=COLOURS[k])
+    lifted.plot([], [], "o", color="black", label="rate independent of the torque")
+    lifted.set(xlabel="amplitude, $a$ [rad]", ylabel="loss [s/day]", xlim=(0.15, 8), ylim=(0.1, 1000))
+    lifted.legend(fontsize=7, loc="upper right")
+    plain_ticks(lifted.xaxis, (0.2, 0.5, 1, 2, 5))
 
 
-def figure(ds: xr.Dataset, lift: xr.Dataset) -> Any:
-    """Loss against amplitude, for impulses and for lifts."""
-    with page_of(138.0, 2, 1, width=NARROW) as (page, (lines, lifted)):
-        draw_lines(lines, ds.isel(r=1))
-        draw_lifts(lifted, lift.isel(r=-1))
-    return page
-
-
-def conclude(path: str, lift_path: str, hung_path: str) -> Conclusion:
-    """Statements and the figure."""
-    ds = read_result(path, "balance_scene:KERNEL", ["r", "at", "w"], "balance_isochronism.toml")
-    lift = read_result(lift_path, "balance_driven", ["r", "beta", "m"], "balance_isochronism_lift.toml")
-    hung = read_result(hung_path, "balance_scene:KERNEL", ["hang", "w"], "balance_isochronism_positions.toml")
-    ds, hung = (part.assign(a=reach(part), loss=lost(part, part.clock)) for part in (ds, hung))
-    lift = lift.assign(loss=lost(lift, lift.period))
-    hung = hung.assign_coords(a0=("w", hung.a.isel(hang=1).values))
-    groups = {
-        "Impulses before, at and behind the centre": impulses(ds),
-        "A lift": lifts(lift),
-        "Positions, out of poise": positions(hung),
-    }
-    return groups, [NOTES], lambda: figure(ds, lift)
-
-
-main = script(__name__, "balance_isochronism.h5 balance_isochronism_lift.h5 balance_isochronism_positions.h5", conclude)
+main = script(
+    __name__,
+    "balance_isochronism.h5 balance_isochronism_lift.h5 balance_isochronism_positions.h5",
+    claims,
+    figure,
+    prepared,
+)

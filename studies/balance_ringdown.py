@@ -1,44 +1,39 @@
 """How many half swings does a balance make before friction holds it, and does friction change its period?
 
-    sweep run studies/balance_ringdown.toml
     python studies/balance_ringdown.py balance_ringdown.h5
 
-draws balance_ringdown.png and compares theory with what comes out. For light damping theory is one function: with
-x = pi zeta theta0/(2 r), what viscous friction takes from the first half swing over what solid friction takes,
-N = ln(1 + x)/(pi zeta). The kernel counts half swings of pi/omega_d each, as the page has it, and cannot say
-otherwise; the time of a half swing and the motion are therefore measured by DOP853 on the page's (3). What is said of
-the period is so of the free balance alone: driven, it loses (study `balance_isochronism`).
+For light damping theory is one function: with x = pi zeta theta0/(2 r), what viscous friction takes from the first
+half swing over what solid friction takes, N = ln(1 + x)/(pi zeta). The kernel counts half swings of pi/omega_d each,
+as the page has it, and cannot say otherwise; the time of a half swing and the motion are therefore measured by DOP853
+on the page's (3). What is said of the period is so of the free balance alone: driven, it loses (study
+`balance_isochronism`).
+
+theory: the balance rests at the first turning point within r of the spring's zero; x = pi zeta theta0/(2 r)
+deviation: relative. Counts are whole, so they hold to one half swing, and to the next term of theory, 0.5 zeta^2 and
+r/theta0 of themselves. Allowed: 1e-8 of what DOP853 gives at rtol 1e-12; 1e-3 of zeta^2/2
+the page: "vibration stops when A = theta +- r becomes smaller than r", A the amplitude about the shifted centre
 """
 
 import math
-from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Claims, Conclusion, compared, most, read_result, said, script
-from _figures import HOLLOW, NARROW, direct_label, hatch, page_of
-from matplotlib.colors import LogNorm
+from _common import Claims, compared, most, said, script
+from _figures import COLOURS, HOLLOW, MARKS, LogNorm, direct_label, hatch, panels
 from scipy.integrate import solve_ivp
 
 from kernels.interface import Status
-from sweep.show.charts import COLOURS, MARKS
 
 LIGHT = 0.01
 """Damping up to which delta = pi zeta to 5e-5."""
 CELLS = ((0.005, 0.002), (0.02, 0.06), (0.1, 0.02), (0.3, 0.1), (1e-3, 0.14))
 """zeta, r [rad] that are followed by DOP853 from 1 rad, with omega_n = 1/s."""
 
-NOTES = """\
-theory: the balance rests at the first turning point within r of the spring's zero; x = pi zeta theta0/(2 r)
-deviation: relative. Counts are whole, so they hold to one half swing, and to the next term of theory, 0.5 zeta^2 and
-r/theta0 of themselves. Allowed: 1e-8 of what DOP853 gives at rtol 1e-12; 1e-3 of zeta^2/2
-the page: "vibration stops when A = theta +- r becomes smaller than r", A the amplitude about the shifted centre"""
-
 
 def turning_points(zeta: float, r: float, start: float, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Times of rest and the angles there, by integrating (3) from rest to rest; `omega_n` is 1/s."""
 
-    def rest(t: float, y: Any) -> float:
+    def rest(t: float, y) -> float:
         return float(y[1])
 
     rest.terminal = True  # type: ignore[attr-defined]
@@ -46,7 +41,7 @@ def turning_points(zeta: float, r: float, start: float, count: int) -> tuple[np.
     for _ in range(count):
         side = -math.copysign(1.0, angles[-1])  # of the speed
 
-        def equation(t: float, y: Any, side: float = side) -> tuple[float, float]:
+        def equation(t: float, y, side: float = side) -> tuple[float, float]:
             return y[1], -2 * zeta * y[1] - y[0] - side * r
 
         push = -angles[-1] - side * r
@@ -65,15 +60,6 @@ def scaled(ds: xr.Dataset) -> xr.Dataset:
     return ds.assign(law=np.log1p(ds.x) / (math.pi * ds.zeta))
 
 
-def counts(ds: xr.Dataset) -> Claims:
-    """How many half swings, in the two limits and between."""
-    light = ds.where((ds.zeta <= LIGHT) & (ds.N > 0))
-    off = abs(light.N - light.law)
-    allowed = 1 + light.law * (0.5 * light.zeta**2 + light.r / abs(ds.theta0))
-    most = f"off by {float(off.max()):.2f} at most"
-    yield said(f"N = ln(1 + x)/(pi zeta), zeta <= {LIGHT:g}", (off / allowed).max() < 1, most, "all cells")
-
-
 def rest(ds: xr.Dataset) -> Claims:
     """Where and when it rests, also by the page's rule as it stands: at the first rest with abs(theta) - r < r."""
     far = float((abs(ds.stop_angle) / ds.r).max())
@@ -82,18 +68,29 @@ def rest(ds: xr.Dataset) -> Claims:
     C = (1 + E) / (1 - E)
     need = np.ceil(np.log((abs(swings.theta0) + swings.r * C) / (2 * swings.r + swings.r * C)) / -np.log(E))
     early = (swings.N - np.maximum(need, 0)).where(swings.N > 0)
-    share, most = float((early > 0).sum() / early.notnull().sum()), float(early.max())
+    share, longest = float((early > 0).sum() / early.notnull().sum()), float(early.max())
     zeta, r = CELLS[-1]
     third, fourth = abs(turning_points(zeta, r, 1.0, 4)[1][3:])
-    stops = f"{share:.0%} of cells, by {most:.0f} half swing"
+    stops = f"{share:.0%} of cells, by {longest:.0f} half swing"
     words = f"rests at {fourth:.3f} rad, after 4; by the page at {third:.3f} > r, after 3"
     yield said("it rests within r of the spring's zero", far <= 1, f"largest abs(theta)/r {far:.6f}", "yes")
-    yield said("the page's rule stops too early", 0.2 < share < 0.8 and most == 1, stops, "-")
+    yield said("the page's rule stops too early", 0.2 < share < 0.8 and longest == 1, stops, "-")
     yield said(f"  zeta = {zeta:g}, r = {r:g} rad, DOP853", fourth <= r < third < 2 * r, words, "abs(theta) <= r")
 
 
-def isochronism(ds: xr.Dataset) -> Claims:
-    """What friction does to the period of the free balance, followed by integration, and by the kernel."""
+def claims(ds) -> Claims:
+    """What theory says, and what comes out."""
+    yield "Half swings"
+    light = ds.where((ds.zeta <= LIGHT) & (ds.N > 0))
+    off = abs(light.N - light.law)
+    allowed = 1 + light.law * (0.5 * light.zeta**2 + light.r / abs(ds.theta0))
+    text = f"off by {float(off.max()):.2f} at most"
+    yield said(f"N = ln(1 + x)/(pi zeta), zeta <= {LIGHT:g}", (off / allowed).max() < 1, text, "all cells")
+
+    yield "Rest"
+    yield from rest(ds)
+
+    yield "Isochronism of the free balance"
     swings = {(zeta, r): np.diff(turning_points(zeta, r, 1.0, 3)[0]) for zeta, r in CELLS}
     half = max(abs(swing * math.sqrt(1 - zeta**2) / math.pi - 1).max() for (zeta, _), swing in swings.items())
     radii = [r for _, r in CELLS]
@@ -106,49 +103,31 @@ def isochronism(ds: xr.Dataset) -> Claims:
     yield compared(loses, "86400 zeta^2/2", 86400 * light.slow[0], 43200 * damped**2, 1e-3, 4)
 
 
-def figure(ds: xr.Dataset) -> Any:
+@panels(138.0, 2, height_ratios=(1.4, 1))
+def figure(plane, law, ds):
     """The count over both frictions, and its collapse on one law."""
-    with page_of(138.0, 2, 1, width=NARROW, height_ratios=(1.4, 1)) as (page, (plane, law)):
-        draw_map(page, plane, ds)
-        draw_law(law, ds)
-    return page
-
-
-def draw_map(page: Any, axes: Any, ds: xr.Dataset) -> None:
-    """N over zeta and r/theta0; below the broken line viscous friction takes more from the first swing."""
     n = ds.N.where(ds.swings & (ds.N > 0)).transpose("r", "zeta")
     zeta, r = ds.zeta.values, ds.r.values / abs(float(ds.theta0))
-    mesh = axes.pcolormesh(zeta, r, n, norm=LogNorm(1, 1e4), cmap="cividis", shading="nearest", rasterized=True)
-    page.colorbar(mesh, ax=axes, label=r"half swings until rest, $N$ [1]", pad=0.02)
-    axes.contour(zeta, r, n, levels=[10, 100, 1000], colors="white", linewidths=0.7)
+    mesh = plane.pcolormesh(zeta, r, n, norm=LogNorm(1, 1e4), cmap="cividis", shading="nearest", rasterized=True)
+    plane.figure.colorbar(mesh, ax=plane, label=r"half swings until rest, $N$ [1]", pad=0.02)
+    plane.contour(zeta, r, n, levels=[10, 100, 1000], colors="white", linewidths=0.7)
     for count, place in ((10, 0.051), (100, 5.4e-3), (1000, 4.8e-4)):
-        axes.text(1.2e-4, place, f"{count}", color="white", fontsize=8, va="bottom")
-    hatch(axes, zeta, r, (~ds.swings).transpose("r", "zeta").values, "////")
-    axes.plot(zeta, math.pi * zeta / 2, color="white", linestyle=(0, (4, 2)), linewidth=0.9)
-    axes.text(3e-2, 6e-2, r"$x=1$", color="white", fontsize=8, ha="right")
-    direct_label(axes, 1.41, 9e-3, "creeps", fontsize=7.5, rotation=90)
-    axes.set(xscale="log", yscale="log", xlim=(zeta[0], zeta[-1]), ylim=(r[0], r[-1]))
-    axes.set(xlabel=r"viscous damping, $\zeta$ [1]", ylabel=r"solid friction, $r/\theta_0$ [1]")
-
-
-def draw_law(axes: Any, ds: xr.Dataset) -> None:
-    """pi zeta N against x: one curve for all light damping."""
+        plane.text(1.2e-4, place, f"{count}", color="white", fontsize=8, va="bottom")
+    hatch(plane, zeta, r, (~ds.swings).transpose("r", "zeta").values, "////")
+    plane.plot(zeta, math.pi * zeta / 2, color="white", linestyle=(0, (4, 2)), linewidth=0.9)
+    plane.text(3e-2, 6e-2, r"$x=1$", color="white", fontsize=8, ha="right")
+    direct_label(plane, 1.41, 9e-3, "creeps", fontsize=7.5, rotation=90)
+    plane.set(xscale="log", yscale="log", xlim=(zeta[0], zeta[-1]), ylim=(r[0], r[-1]))
+    plane.set(xlabel=r"viscous damping, $\zeta$ [1]", ylabel=r"solid friction, $r/\theta_0$ [1]")
     x = np.geomspace(1e-4, 1e4, 200)
-    axes.loglog(x, np.log1p(x), color="black", label=r"$\ln(1+x)$")
+    law.loglog(x, np.log1p(x), color="black", label=r"$\ln(1+x)$")
     for k, (text, zeta) in enumerate({"10^{-4}": 1e-4, "10^{-3}": 1e-3, "10^{-2}": 1e-2, "0.3": 0.3}.items()):
         row = ds.sel(zeta=zeta, method="nearest")
         row = row.where(row.N > 0, drop=True).isel(r=slice(None, None, 8))
-        axes.plot(row.x, math.pi * row.zeta * row.N, MARKS[k], color=COLOURS[k], label=rf"$\zeta={text}$", **HOLLOW)
-    axes.set(xlim=(1e-4, 1e4), ylabel=r"$\pi\zeta N$ [1]")
-    axes.set_xlabel(r"viscous over solid friction, $x=\pi\zeta\theta_0/(2r)$ [1]")
-    axes.legend(loc="lower right", ncols=1, borderaxespad=0.3, labelspacing=0.25)
+        law.plot(row.x, math.pi * row.zeta * row.N, MARKS[k], color=COLOURS[k], label=rf"$\zeta={text}$", **HOLLOW)
+    law.set(xlim=(1e-4, 1e4), ylabel=r"$\pi\zeta N$ [1]")
+    law.set_xlabel(r"viscous over solid friction, $x=\pi\zeta\theta_0/(2r)$ [1]")
+    law.legend(loc="lower right", ncols=1, borderaxespad=0.3, labelspacing=0.25)
 
 
-def conclude(path: str) -> Conclusion:
-    """Statements and the figure."""
-    ds = scaled(read_result(path, "balance", ["zeta", "r"], "balance_ringdown.toml"))
-    groups = {"Half swings": counts(ds), "Rest": rest(ds), "Isochronism of the free balance": isochronism(ds)}
-    return groups, [NOTES], lambda: figure(ds)
-
-
-main = script(__name__, "balance_ringdown.h5", conclude)
+main = script(__name__, "balance_ringdown.h5", claims, figure, scaled)

@@ -1,10 +1,8 @@
 """How does a ball on a shaken table go over from even bounces to chaos?
 
-    sweep run studies/bouncing_ball.toml --allow-import
-    sweep plot bouncing_ball.h5 --y x
     python studies/bouncing_ball.py bouncing_ball.h5
 
-draws bouncing_ball.png, and the second line the diagram alone. A ball that bounces once a period leaves the table at
+`sweep plot bouncing_ball.h5 --y x` draws the diagram alone. A ball that bounces once a period leaves the table at
 half of the speed that gravity takes from it in that time, so that it arrives at -pi, and the table moves at
 
     push cos t = pi (1 - e)/(1 + e)                                                                      (1)
@@ -12,22 +10,20 @@ half of the speed that gravity takes from it in that time, so that it arrives at
 there. The map from bounce to bounce has the determinant e^4, and the trace that follows from (1) is -1 - e^4, where
 every second bounce begins to differ, at (push sin t) (1 + e)^2 = 2 (1 + e^2). Both together are the least push of even
 bounces, and the push at which they double; from there on the two differ as the square root of what goes beyond it.
+
+INACCURATE bounces lie on the attractor, and are not those of this very start; TOO_SHORT: the ball comes to rest on the
+table before
 """
 
 import math
-from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Claims, Conclusion, compared, most, read_result, said, script
-from _figures import NARROW, direct_label, page_of
+from _common import Claims, compared, most, said, script
+from _figures import COLOURS, direct_label, panels
 
 from kernels.interface import Status
-from sweep.show.charts import COLOURS
 
-NOTES = """\
-INACCURATE bounces lie on the attractor, and are not those of this very start; TOO_SHORT: the ball comes to rest on the
-table before"""
 SAME = 1e-3
 """Bounces at heights that differ by less are the same."""
 
@@ -38,13 +34,14 @@ def borders(e: float) -> tuple[float, float]:
     return least, math.hypot(least, 2.0 * (1.0 + e * e) / (1.0 + e) ** 2)
 
 
-def heights(x: Any) -> int:
+def heights(x) -> int:
     """How many different ones there are."""
     return 1 + int((np.diff(np.sort(x)) > SAME).sum())
 
 
-def statements(ds: xr.Dataset) -> Claims:
-    """Even bounces, and where they double."""
+def claims(ds) -> Claims:
+    """What theory says, and what comes out."""
+    yield "Bounces"
     least, doubles = borders(float(ds.e))
     ok = ds.where(ds.status == Status.OK, drop=True)
     even, odd = ok.where(ok.push < doubles - 1e-2, drop=True), ok.where(ok.push > doubles + 1e-3, drop=True)
@@ -64,28 +61,21 @@ def statements(ds: xr.Dataset) -> Claims:
     yield said("heights beyond it, to 1.7", {2, 4} <= found <= {2, 4, 8}, counted, "2, 4, 8")
 
 
-def figure(ds: xr.Dataset) -> Any:
+@panels(132.0, 2)
+def figure(whole, part, ds):
     """The diagram of bifurcations, and beside it where bounces begin to be chaotic."""
     least, doubles = borders(float(ds.e))
-    with page_of(132.0, 2, 1, width=NARROW) as (page, (whole, part)):
-        for axes, size in ((whole, 1.2), (part, 2.0)):
-            for status, colour in ((Status.OK, "black"), (Status.INACCURATE, COLOURS[1])):
-                some = ds.x.where(ds.status == status)
-                axes.plot(ds.push, some, ".", color=colour, markersize=size, markeredgewidth=0.0)
-            axes.set(xlabel="acceleration of the table over $g$ [1]", ylabel="height of the bounce [$g/\\omega^2$]")
-        push = np.linspace(least, 1.8, 200)
-        whole.plot(push, np.sqrt(push**2 - least**2), color=COLOURS[0], linewidth=0.7, linestyle="--")
-        whole.axvline(doubles, color="0.5", linewidth=0.7, linestyle=":")
-        direct_label(whole, 1.2, 0.95, "once a period, theory", COLOURS[0])
-        direct_label(whole, doubles - 0.005, -0.3, "doubles", "0.35", ha="right")
-        part.set(xlim=(1.66, 1.78))
-    return page
+    for axes, size in ((whole, 1.2), (part, 2.0)):
+        for status, colour in ((Status.OK, "black"), (Status.INACCURATE, COLOURS[1])):
+            some = ds.x.where(ds.status == status)
+            axes.plot(ds.push, some, ".", color=colour, markersize=size, markeredgewidth=0.0)
+        axes.set(xlabel="acceleration of the table over $g$ [1]", ylabel="height of the bounce [$g/\\omega^2$]")
+    push = np.linspace(least, 1.8, 200)
+    whole.plot(push, np.sqrt(push**2 - least**2), color=COLOURS[0], linewidth=0.7, linestyle="--")
+    whole.axvline(doubles, color="0.5", linewidth=0.7, linestyle=":")
+    direct_label(whole, 1.2, 0.95, "once a period, theory", COLOURS[0])
+    direct_label(whole, doubles - 0.005, -0.3, "doubles", "0.35", ha="right")
+    part.set(xlim=(1.66, 1.78))
 
 
-def conclude(path: str) -> Conclusion:
-    """Statements and the figure."""
-    ds = read_result(path, "ball_scene:KERNEL", ["push"], "bouncing_ball.toml")
-    return {"Bounces": statements(ds)}, [NOTES], lambda: figure(ds)
-
-
-main = script(__name__, "bouncing_ball.h5", conclude)
+main = script(__name__, "bouncing_ball.h5", claims, figure)

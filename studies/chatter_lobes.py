@@ -1,28 +1,30 @@
 """Does the reduction of a milling machine's drive move the speeds and cuts at which it chatters?
 
-    sweep run studies/chatter_lobes.toml
     python studies/chatter_lobes.py chatter_lobes.h5
 
-draws chatter_lobes.png and compares theory with what comes out. A tooth cuts what the tooth before it left, a time tau
-ago, so the cut's torque at the spindle is -K (theta(t) - theta(t - tau)), and with the spindle's receptance H
+A tooth cuts what the tooth before it left, a time tau ago, so the cut's torque at the spindle is -K (theta(t) -
+theta(t - tau)), and with the spindle's receptance H
 
     1 + K (1 - exp(-i w tau)) H(w) = 0                                                                  (1)
 
 is the border of stability. With Tobias and Tlusty: K = -1/(2 Re H), wherever Re H < 0, at the tooth frequencies
 1/tau = f/(k + eps), k = 0, 1, ..., eps = atan2(-Re H, Im H)/pi. A cut is stable below the lowest of these lobes.
+
+tooth frequency: teeth of the cutter times its turns a second; K in N m/rad; the border is the lowest of all lobes
+allowed: 1e-5 of the least K had to 50 digits, of which the grid
+of frequencies takes 1e-6; 1 % and 5 % of K where the reduction is said to hold it. Roots are counted 1 % below and
+above the border, by the turns of the left side of (1) about 0 (Nyquist): none below, two or more above
 """
 
 import math
-from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Claims, Conclusion, compared, read_result, said, script
-from _figures import direct_label, page_of, plain_ticks
+from _common import Claims, compared, said, script
+from _figures import COLOURS, direct_label, panels, plain_ticks
 from fula_milling_machine import SPAN, chain, response
 
 import sweep
-from sweep.show.charts import COLOURS
 
 FREQUENCIES = np.concatenate([np.geomspace(15, 60, 6001), np.geomspace(60, 3000, 12001)[1:]])
 """Where H is taken [Hz]."""
@@ -40,13 +42,6 @@ TURNS, CUTTER = 3.0, 8
 """Turns of the spindle a second in the source, 180 a minute; teeth of a cutter, chosen here."""
 LOOK = {8: ("-", 0), 7: ("-", 2), 6: ((0, (6, 1.5, 1.2, 1.5)), 3), 5: ((0, (5, 1.5)), 1), 4: ((0, (1.2, 1.2)), 4)}
 """Dashes and colour of a chain, by its masses."""
-
-NOTES = """\
-tooth frequency: teeth of the cutter times its turns a second; K in N m/rad; the border is the lowest of all lobes
-allowed: 1e-5 of the least K had to 50 digits, of which the grid
-of frequencies takes 1e-6; 1 % and 5 % of K where the reduction is said to hold it. Roots are counted 1 % below and
-above the border, by the turns of the left side of (1) about 0 (Nyquist): none below, two or more above\
-"""
 
 
 def lobe(H: np.ndarray, k: int) -> tuple[np.ndarray, np.ndarray]:
@@ -86,7 +81,7 @@ def prepared(ds: xr.Dataset) -> xr.Dataset:
     return ds.assign(H=H, border=lowest, K=-0.5 / H.real.where(H.real < 0))
 
 
-def characteristic(of: dict[str, np.ndarray], f: np.ndarray, tooth: Any, K: Any) -> np.ndarray:
+def characteristic(of: dict[str, np.ndarray], f: np.ndarray, tooth, K) -> np.ndarray:
     """The left side of (1), H by the script, spring by spring from the ground."""
     return 1 + K * (1 - np.exp(-2j * np.pi * f / tooth)) * response(of, f)
 
@@ -107,8 +102,9 @@ def least(ds: xr.Dataset, n: int, mode: str) -> tuple[float, float]:
     return float(there.f[i]), float(there[i])
 
 
-def lobes(ds: xr.Dataset) -> Claims:
-    """The least K, and whether the lobes are the border of stability."""
+def claims(ds) -> Claims:
+    """What theory says, and what comes out."""
+    yield "Lobes of the chains"
     below, above = 0, 99
     for n in ds.n_keep.values:
         of = chain(ds, n)
@@ -125,9 +121,7 @@ def lobes(ds: xr.Dataset) -> Claims:
     yield said("roots to the right, 1 % below the border", below == 0, here, "none")
     yield said("  1 % above it", above >= 2, f"{above} at least", "2 or more")
 
-
-def moved(ds: xr.Dataset) -> Claims:
-    """What five masses make of the lobes of eight."""
+    yield "What the reduction moves"
     (f8, K8), (f5, K5) = (least(ds, n, "main mode") for n in (8, 5))
     (g8, M8), (g5, M5) = (least(ds, n, "fifth mode") for n in (8, 5))
     eight, off = ds.border.sel(n_keep=8), ds.border / ds.border.sel(n_keep=8) - 1
@@ -154,36 +148,28 @@ def moved(ds: xr.Dataset) -> Claims:
     yield said("border held to 5 % up to a tooth frequency of, by masses", falls, text, "more with more")
 
 
-def figure(ds: xr.Dataset) -> Any:
+@panels(140.0, 2)
+def figure(usual, error, ds):
     """The lobes at usual tooth frequencies, and by how much the reductions move the border; for a column of print."""
-    with page_of(140.0, 2, width=110.0) as (page, (usual, error)):
-        moved_by = 100 * (ds.border / ds.border.sel(n_keep=8) - 1)
-        for axes, lines, chains in ((usual, ds.border, (8, 5, 4)), (error, moved_by, (7, 6, 5, 4))):
-            for n in chains:
-                dashes, colour = LOOK[n]
-                y, look = lines.sel(n_keep=n), {"color": COLOURS[colour], "linestyle": dashes}
-                axes.plot(ds.tooth, y, label=f"{n} masses", **look)
-            axes.set(xscale="log", xlabel="tooth frequency [Hz]")
-        usual.axvline(CUTTER * TURNS, color="0.5", linewidth=0.7)
-        direct_label(usual, CUTTER * TURNS, 4300, "180 rev/min,\n8 teeth", ha="left")
-        usual.set(yscale="log", xlim=(2, 60), ylim=(350, 9000), ylabel="torque by thickness, $K$ [N m/rad]")
-        plain_ticks(usual.xaxis, (2, 5, 10, 20, 50))
-        plain_ticks(usual.yaxis, (500, 1000, 2000, 5000))
-        error.axhspan(-100 * HELD, 100 * HELD, color="0.92", linewidth=0, zorder=0, label="5 %")
-        error.axvline(SPAN, color="0.5", linewidth=0.7)
-        direct_label(error, SPAN, -20, "1000 rad/s")
-        error.set(xlim=(2, 1000), ylim=(-25, 25), ylabel="border moved by [%]")
-        plain_ticks(error.xaxis, (2, 5, 10, 20, 50, 100, 200, 500, 1000))
-        for axes in (usual, error):
-            axes.legend(loc="upper left", ncols=2)
-    return page
+    moved_by = 100 * (ds.border / ds.border.sel(n_keep=8) - 1)
+    for axes, lines, chains in ((usual, ds.border, (8, 5, 4)), (error, moved_by, (7, 6, 5, 4))):
+        for n in chains:
+            dashes, colour = LOOK[n]
+            y, look = lines.sel(n_keep=n), {"color": COLOURS[colour], "linestyle": dashes}
+            axes.plot(ds.tooth, y, label=f"{n} masses", **look)
+        axes.set(xscale="log", xlabel="tooth frequency [Hz]")
+    usual.axvline(CUTTER * TURNS, color="0.5", linewidth=0.7)
+    direct_label(usual, CUTTER * TURNS, 4300, "180 rev/min,\n8 teeth", ha="left")
+    usual.set(yscale="log", xlim=(2, 60), ylim=(350, 9000), ylabel="torque by thickness, $K$ [N m/rad]")
+    plain_ticks(usual.xaxis, (2, 5, 10, 20, 50))
+    plain_ticks(usual.yaxis, (500, 1000, 2000, 5000))
+    error.axhspan(-100 * HELD, 100 * HELD, color="0.92", linewidth=0, zorder=0, label="5 %")
+    error.axvline(SPAN, color="0.5", linewidth=0.7)
+    direct_label(error, SPAN, -20, "1000 rad/s")
+    error.set(xlim=(2, 1000), ylim=(-25, 25), ylabel="border moved by [%]")
+    plain_ticks(error.xaxis, (2, 5, 10, 20, 50, 100, 200, 500, 1000))
+    for axes in (usual, error):
+        axes.legend(loc="upper left", ncols=2)
 
 
-def conclude(path: str) -> Conclusion:
-    """Statements and the figure."""
-    ds = prepared(read_result(path, "drivetrain", ["n_keep"], "chatter_lobes.toml"))
-    groups = {"Lobes of the chains": lobes(ds), "What the reduction moves": moved(ds)}
-    return groups, [NOTES], lambda: figure(ds)
-
-
-main = script(__name__, "chatter_lobes.h5", conclude)
+main = script(__name__, "chatter_lobes.h5", claims, figure, prepared)

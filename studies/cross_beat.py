@@ -1,10 +1,9 @@
 """What does Bürgi's cross-beat, two geared foliots instead of one, do to the period and its exponents?
 
-    sweep run studies/cross_beat.toml --allow-import
     python studies/cross_beat.py cross_beat.h5
 
-draws cross_beat.png and compares theory with what comes out. Hoyng & Nieuwenhuizen ("the paper") call it a detail.
-Theory, derived here: rigid gears leave one angle, and (1) + (2) of `cross_beat_scene` is a single foliot with
+Hoyng & Nieuwenhuizen ("the paper") call it a detail. Theory, derived here: rigid gears leave one angle, and (1) + (2)
+of `cross_beat_scene` is a single foliot with
 
     I = I_l + I_r,  c = c_l + c_r,  R = R_l + R_r,  the torque of one,                                   (1)
 
@@ -16,6 +15,11 @@ both is tau/(4 k) short of phi0, and P depends on phi0 as phi0^s:
 
 A case that turns with the acceleration w pushes the two against each other: -(I_l - I_r) w is left of the -I w that
 shakes one foliot, nothing if they are equal.                                                            (3)
+
+s = -dlnP/dlntau; deviation: relative, of exponents the difference
+allowed: 1 % of (2) where the wind-up is under 1e-3, and 0.01 of its power of k; 0.005 of s, of which (2) explains
+0.002; 1e-3 of other periods and slopes, whose gear of 1 N m/rad winds up by 7e-4; 1 % of (3), and 1e-3 of one foliot's
+scatter for equal ones, whose gear gives way a little
 """
 
 import math
@@ -23,10 +27,8 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Claims, Conclusion, compared, count, differing, most, power, read_result, said, script, solved
-from _figures import NARROW, page_of
-
-from sweep.show.charts import COLOURS, MARKS
+from _common import Claims, compared, count, differing, most, power, said, script, solved
+from _figures import COLOURS, MARKS, panels
 
 SMALL = 1e-3
 """Wind-up tau/(4 k phi0) up to which (2) is held to `FIRST` of itself."""
@@ -38,15 +40,8 @@ SWAY, NU = 0.1, 1.3
 SHARES = (0.0, 0.2, 0.5, 0.9)
 """(I_l - I_r)/(I_l + I_r) of the clocks that are shaken."""
 
-NOTES = """\
-s = -dlnP/dlntau; deviation: relative, of exponents the difference
-allowed: 1 % of (2) where the wind-up is under 1e-3, and 0.01 of its power of k; 0.005 of s, of which (2) explains
-0.002; 1e-3 of other periods and slopes, whose gear of 1 N m/rad winds up by 7e-4; 1 % of (3), and 1e-3 of one foliot's
-scatter for equal ones, whose gear gives way a little\
-"""
 
-
-def single(tau: Any, inertia: float, c: float, phi0: float, R: float = 0.0) -> xr.Dataset:
+def single(tau, inertia: float, c: float, phi0: float, R: float = 0.0) -> xr.Dataset:
     """`foliot` with this moment of inertia and frictions c and R."""
     tau = np.atleast_1d(tau)
     fixed = {"a": c / inertia, "phi0": phi0, "R": R / inertia}
@@ -66,7 +61,7 @@ def prepared(ds: xr.Dataset) -> xr.Dataset:
     return ds.assign(off=ds.period / ds.sums - 1, wound=ds.tau / (4 * ds.stiffness * ds.phi0))
 
 
-def pair(ds: xr.Dataset, **changed: Any) -> xr.Dataset:
+def pair(ds: xr.Dataset, **changed) -> xr.Dataset:
     """Bürgi's clock with the stiffest gear and what is changed of it; lists are axes of a zip design."""
     known: dict[str, Any] = {name: ds[name] for name in ("I_l", "I_r", "c_l", "c_r", "phi0", "damper", "flips")}
     known |= {"stiffness": ds.stiffness[-1], "tau": ALPHA * (ds.c_l + ds.c_r) ** 2 * ds.phi0 / (ds.I_l + ds.I_r)}
@@ -74,11 +69,10 @@ def pair(ds: xr.Dataset, **changed: Any) -> xr.Dataset:
     return solved("cross_beat_scene:KERNEL", **(known | changed), **study)
 
 
-def as_one(ds: xr.Dataset) -> Claims:
-    """The pair beside one foliot of the sums, and beside one of the two alone.
-
-    A second foliot like the first halves alpha at the same torque, so P grows by 2^s, s between both.
-    """
+def claims(ds) -> Claims:
+    """What theory says, and what comes out."""
+    yield "Two as one"
+    # A second foliot like the first halves alpha at the same torque, so P grows by 2^s, s between both.
     first = (ds.off / (-ds.s * ds.wound)).where(ds.wound < SMALL)
     stiff = ds.isel(stiffness=-1)
     turned = np.gradient(stiff.off, np.log(ds.tau.values))
@@ -91,9 +85,7 @@ def as_one(ds: xr.Dataset) -> Claims:
     yield most(detail, "a detail (paper)", turned, 5e-3, "largest difference from (1)")
     yield said("a second foliot like the first: P grows by", inside, text, "2^s")
 
-
-def sums(ds: xr.Dataset) -> Claims:
-    """Only the sums count: friction of one or of both, weights moved on one."""
+    yield "Only the sums count (alpha = 30)"
     inertia, c, phi0 = float(ds.I_l + ds.I_r), float(ds.c_l + ds.c_r), float(ds.phi0)
     tau = ALPHA * c**2 * phi0 / inertia
     R = 0.2 * tau
@@ -109,9 +101,7 @@ def sums(ds: xr.Dataset) -> Claims:
     yield compared("  half of it of each", f"{rough:.5f}", P[2], rough, 1e-3, 6)
     yield differing("weights moved on one: dlnP/dlnI_l", f"(1 - s)/2 = {(1 - s) / 2:.4f}", rise, (1 - s) / 2, 1e-3, 4)
 
-
-def steadied(ds: xr.Dataset) -> Claims:
-    """(3): scatter of forty half swings of clocks on a swaying case."""
+    yield f"A case that sways by {SWAY:g} rad/s^2"
     half, swings = 0.5 * float(ds.I_l + ds.I_r), list(range(61, 101))
     clocks = [pair(ds, flips=swings, I_l=half * (1 + x), I_r=half * (1 - x), sway=SWAY, nu=NU) for x in SHARES]
     scatter = np.array([float(clock.interval.std()) for clock in clocks])
@@ -121,35 +111,23 @@ def steadied(ds: xr.Dataset) -> Claims:
     yield most("  of equal foliots, over that", "0", scatter[0] / unit.mean(), 1e-3, f"{scatter[0]:.1e} s")
 
 
-def figure(ds: xr.Dataset) -> Any:
+@panels(132.0, 2, sharex=True)
+def figure(period, wound, ds):
     """Period, and what the gear's wind-up does to it."""
     hollow = {"markerfacecolor": "white", "linestyle": ""}
-    with page_of(132.0, 2, 1, width=NARROW, sharex=True) as (page, (period, wound)):
-        period.loglog(ds.alpha, ds.sums, color=COLOURS[0], label="one foliot, (1)")
-        period.loglog(ds.alpha, ds.alone, "--", color=COLOURS[1], label="one of the two alone")
-        period.plot(ds.alpha, ds.period.isel(stiffness=-1), "o", color="black", label="cross-beat", **hollow)
-        period.set(ylabel="period, $P$ [s]", ylim=(0.5, 60))
-        period.legend(loc="upper right")
-        for k, stiffness in enumerate(ds.stiffness.values):
-            line = ds.sel(stiffness=stiffness)
-            wound.loglog(ds.alpha, line.s * line.wound, color=COLOURS[k], label=f"{stiffness:g}")
-            wound.plot(ds.alpha, -line.off, MARKS[k], color=COLOURS[k], **hollow)
-        wound.plot([], [], color="black", label="(2)")
-        wound.plot([], [], "o", color="black", label="scene", **hollow)
-        wound.set(xlabel=r"drive, $\alpha$ [1]", ylabel=r"gain, $-\Delta P/P$ [1]")
-        wound.legend(title="gear [N m/rad]", loc="upper left", ncols=2)
-    return page
+    period.loglog(ds.alpha, ds.sums, color=COLOURS[0], label="one foliot, (1)")
+    period.loglog(ds.alpha, ds.alone, "--", color=COLOURS[1], label="one of the two alone")
+    period.plot(ds.alpha, ds.period.isel(stiffness=-1), "o", color="black", label="cross-beat", **hollow)
+    period.set(ylabel="period, $P$ [s]", ylim=(0.5, 60))
+    period.legend(loc="upper right")
+    for k, stiffness in enumerate(ds.stiffness.values):
+        line = ds.sel(stiffness=stiffness)
+        wound.loglog(ds.alpha, line.s * line.wound, color=COLOURS[k], label=f"{stiffness:g}")
+        wound.plot(ds.alpha, -line.off, MARKS[k], color=COLOURS[k], **hollow)
+    wound.plot([], [], color="black", label="(2)")
+    wound.plot([], [], "o", color="black", label="scene", **hollow)
+    wound.set(xlabel=r"drive, $\alpha$ [1]", ylabel=r"gain, $-\Delta P/P$ [1]")
+    wound.legend(title="gear [N m/rad]", loc="upper left", ncols=2)
 
 
-def conclude(path: str) -> Conclusion:
-    """Statements and the figure."""
-    ds = prepared(read_result(path, "cross_beat_scene:KERNEL", ["stiffness", "tau"], "cross_beat.toml"))
-    groups = {
-        "Two as one": as_one(ds),
-        "Only the sums count (alpha = 30)": sums(ds),
-        f"A case that sways by {SWAY:g} rad/s^2": steadied(ds),
-    }
-    return groups, [NOTES], lambda: figure(ds)
-
-
-main = script(__name__, "cross_beat.h5", conclude)
+main = script(__name__, "cross_beat.h5", claims, figure, prepared)

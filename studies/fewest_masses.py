@@ -2,9 +2,8 @@
 
     python studies/fewest_masses.py [drivetrains]
 
-takes the 2000 random drivetrains of ten masses that fewest_masses.csv holds (or as many as told), reduces each by every
-method for bands that hold its first 1 to 8 frequencies, prints what they need, and draws fewest_masses.png here. What
-comes out:
+Takes the 2000 random drivetrains of ten masses that fewest_masses.csv holds (or as many as told), reduces each by every
+method for bands that hold its first 1 to 8 frequencies, and draws fewest_masses.png here. What comes out:
 
 - modal reduction needs as many masses as there are frequencies in the band;
 - IRS needs 0.3 more in the mean, Craig-Bampton 0.6 more (one more in a narrow band), Guyan 1.5 more;
@@ -21,10 +20,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from _common import OPTIONS, Groups, columns, said, shown
-from _figures import page_of
+from _figures import COLOURS, MARKS, panels
 
 import sweep
-from sweep.show.charts import COLOURS, MARKS
 
 METHODS = ("rivin", "guyan", "irs", "craig_bampton", "modal")
 MASSES, SPREAD, DAMPER, TOLERANCE = 10, 100.0, 0.1, 0.01
@@ -40,7 +38,7 @@ def drivetrains(count: int, seed: int = 1) -> dict[str, np.ndarray]:
     return {name: np.vectorize(lambda x: float(f"{x:.4g}"))(values) for name, values in (("J", J), ("k", k))}
 
 
-def swept(chains: dict[str, np.ndarray], outputs: list[str], reduction: str = "none", **more: Any) -> xr.Dataset:
+def swept(chains: dict[str, np.ndarray], outputs: list[str], reduction: str = "none", **more) -> xr.Dataset:
     """One cell a chain; what else differs from cell to cell, or is the same of all, is in `more`."""
     fixed = {"reduction": reduction, "h": DAMPER} | {name: v for name, v in more.items() if np.ndim(v) == 0}
     axes = {name: v.tolist() for name, v in (chains | more).items() if np.ndim(v) > 0}
@@ -107,30 +105,27 @@ def notes(ds: xr.Dataset) -> list[str]:
     ]
 
 
-def figure(ds: xr.Dataset) -> Any:
-    """Masses needed over the frequencies in the band, and the error of the receptance; for a column of print."""
-    with page_of(136.0, 2, width=110.0) as (page, (masses, receptance)):
-        masses.axhline(MASSES, color="0.5", linewidth=0.7)
-        masses.text(0.6, MASSES + 0.15, "the full chain", color="0.3")
-        for axes, values in ((masses, ds.kept), (receptance, ds.off)):
-            for i, name in enumerate(METHODS):
-                low, middle, high = (
-                    values.sel(reduction=name).quantile(q, "drivetrain").values for q in (0.1, 0.5, 0.9)
-                )
-                look = {"marker": MARKS[i], "color": COLOURS[i], "elinewidth": 0.6, "capsize": 1.5}
-                place, label = ds.inside + 0.08 * (i - 2), name.replace("_", "-")
-                axes.errorbar(place, middle, (middle - low, high - middle), label=label, **look)
-            axes.set(xlabel="frequencies in the band [1]", xticks=INSIDE)
-        masses.set(ylabel="masses needed for 1 % [1]", ylim=(0, MASSES + 0.9))
-        masses.legend(loc="lower right", ncols=2)
-        receptance.set(ylabel="error of the receptance [1]", yscale="log", ylim=(1e-6, 3))
-    return page
+@panels(136.0, 2)
+def figure(masses, receptance, ds):
+    """Masses needed over the frequencies in the band, and the error of the receptance."""
+    masses.axhline(MASSES, color="0.5", linewidth=0.7)
+    masses.text(0.6, MASSES + 0.15, "the full chain", color="0.3")
+    for axes, values in ((masses, ds.kept), (receptance, ds.off)):
+        for i, name in enumerate(METHODS):
+            low, middle, high = (values.sel(reduction=name).quantile(q, "drivetrain").values for q in (0.1, 0.5, 0.9))
+            look = {"marker": MARKS[i], "color": COLOURS[i], "elinewidth": 0.6, "capsize": 1.5}
+            place, label = ds.inside + 0.08 * (i - 2), name.replace("_", "-")
+            axes.errorbar(place, middle, (middle - low, high - middle), label=label, **look)
+        axes.set(xlabel="frequencies in the band [1]", xticks=INSIDE)
+    masses.set(ylabel="masses needed for 1 % [1]", ylim=(0, MASSES + 0.9))
+    masses.legend(loc="lower right", ncols=2)
+    receptance.set(ylabel="error of the receptance [1]", yscale="log", ylim=(1e-6, 3))
 
 
-def conclusions(count: int) -> Any:
+def conclusions(count: int):
     """Statements, table and the figure of so many drivetrains."""
     ds = needed(drivetrains(count))
-    return statements(ds), ["", *notes(ds)], lambda: figure(ds)
+    return statements(ds), notes(ds), lambda: figure(ds)
 
 
 def main(arguments: Sequence[str]) -> int:

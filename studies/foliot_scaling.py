@@ -1,22 +1,28 @@
 """How does the period of a foliot fall with its drive torque, from weak to strong drive?
 
-    sweep run studies/foliot_scaling.toml
     python studies/foliot_scaling.py foliot_scaling.h5
 
-draws foliot_scaling.png and compares what Hoyng & Nieuwenhuizen ("the paper", arXiv:1604.06681) say with what comes
-out here. Only alpha = mu/(a^2 phi0) counts: a P and A = phi_max/phi0 are functions of it alone.
+Compares what Hoyng & Nieuwenhuizen ("the paper", arXiv:1604.06681) say with what comes out here. Only alpha = mu/(a^2
+phi0) counts: a P and A = phi_max/phi0 are functions of it alone.
+
+(...) is exact, and not in the paper
+*: masked in the text at hand; here as it follows from the paper's equations
+deviation: relative; of exponents the difference. A limit holds if the next term of its series accounts for it; the
+point of -1/2 to 1e-12 of 50 digits; torques to 1e-3 of the rate they change
+±: the standard error of least squares. Nothing here is noisy, so it measures the curvature of the truth in the window,
+and is no bound on the distance to the limit
+why -1: inertia does not count, v = mu/a all the way, and P = 4 phi0/v; why -1/3: the work 2 mu phi0 of half a swing is
+lost over the way A ~ v^2/mu as a v A, so v^3 ~ mu^2 phi0/a, and P ~ v/mu = (phi0/(a mu))^(1/3)
 """
 
 import math
-from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Claims, Conclusion, Statement, compared, most, read_result, said, script, solved
-from _figures import NARROW, page_of
+from _common import Claims, Statement, compared, most, said, script, solved
+from _figures import COLOURS, panels
 
 import sweep
-from sweep.show.charts import COLOURS
 
 WEAK: tuple[float | None, float | None] = (None, 1e-5)
 STRONG: tuple[float | None, float | None] = (1e5, None)
@@ -31,15 +37,6 @@ HALF = (1.46299058758010465706, 6.42446119521106945636, 1.39341841440363426389)
 STRONG_P, STRONG_A = 4 * 3 ** (1 / 3), 3 ** (2 / 3) / 2
 """At strong drive a P = STRONG_P alpha^(-1/3) and A = STRONG_A alpha^(1/3)."""
 
-NOTES = """\
-paper: Hoyng & Nieuwenhuizen, arXiv:1604.06681; A = phi_max/phi0; (...) is exact, and not in the paper
-*: masked in the text at hand; here as it follows from the paper's equations
-deviation: relative; of exponents the difference. A limit holds if the next term of its series accounts for it; the
-point of -1/2 to 1e-12 of 50 digits; torques to 1e-3 of the rate they change
-±: the standard error of least squares. Nothing here is noisy, so it measures the curvature of the truth in the window,
-and is no bound on the distance to the limit
-why -1: inertia does not count, v = mu/a all the way, and P = 4 phi0/v; why -1/3: the work 2 mu phi0 of half a swing is
-lost over the way A ~ v^2/mu as a v A, so v^3 ~ mu^2 phi0/a, and P ~ v/mu = (phi0/(a mu))^(1/3)"""
 
 DAY = 24 * 60.0
 """Minutes in a day."""
@@ -51,7 +48,7 @@ def scaled(ds: xr.Dataset) -> xr.Dataset:
     return ds.assign(aP=ds.a * ds.period, A=ds.amplitude / ds.phi0, s=ds.sensitivity)
 
 
-def sweep_of_alpha(ds: xr.Dataset, alpha: Any) -> xr.Dataset:
+def sweep_of_alpha(ds: xr.Dataset, alpha) -> xr.Dataset:
     """`foliot` at other alpha, with the friction and the switching angle of `ds`."""
     mu = float(ds.a**2 * ds.phi0) * np.asarray(alpha, float)
     return scaled(solved("foliot", method="closed", mu=mu, a=ds.a, phi0=ds.phi0))
@@ -65,83 +62,7 @@ def half_point(ds: xr.Dataset) -> xr.Dataset:
     return sweep_of_alpha(ds, [float(found.abscissa)]).isel(mu=0)
 
 
-def limits(ds: xr.Dataset) -> Claims:
-    """Leading terms, at the two ends of the sweep."""
-    first, last = ds.isel(mu=0), ds.isel(mu=-1)
-    weak, strong = float(first.alpha), float(last.alpha)
-    b2 = (3 / strong) ** (2 / 3)  # square of the strong drive's small parameter
-    at_weak, at_strong = f"alpha = {weak:.2g}", f"alpha = {strong:.2g}"
-    third, period, swing = strong ** (1 / 3), f"4 3^(1/3) = {STRONG_P:.5f} *", f"3^(2/3)/2 = {STRONG_A:.5f} *"
-    yield compared(f"weak drive: a P alpha at {at_weak}", "4 *", first.aP * weak, 4.0, 1.01 * weak)
-    yield compared(f"weak drive: A at {at_weak}", "1 *", first.A, 1.0, 0.31 * weak)
-    yield compared(f"strong drive: a P alpha^(1/3) at {at_strong}", period, last.aP * third, STRONG_P, 0.14 * b2)
-    yield compared(f"strong drive: A alpha^(-1/3) at {at_strong}", swing, last.A / third, STRONG_A, 0.11 * b2)
-
-
-def straight_lines(ds: xr.Dataset) -> Claims:
-    """Exponents over the two windows, and where the two laws of the period meet.
-
-    A limit is allowed the distance of the local exponent at the inner end of its window, by the series' next term.
-    """
-    for name, y, window, paper, limit in (
-        ("a P", ds.aP, WEAK, "-1 *", -1.0),
-        ("a P", ds.aP, STRONG, "-1/3 *", -1 / 3),
-        ("A", ds.A, WEAK, "0 *", 0.0),
-        ("A", ds.A, STRONG, "1/3 *", 1 / 3),
-    ):
-        fit = sweep.fit_exponent(y, "alpha", window)
-        off, next_term = fit.exponent - limit, fit.high if window == WEAK else 4 / 45 * (3 / fit.low) ** (2 / 3)
-        here = f"{fit.exponent:.7f} ± {fit.exponent_error:.1g}, prefactor {fit.prefactor:.5f}"
-        what = f"exponent of {name}, alpha = {fit.low:.1e} to {fit.high:.1e} ({fit.points:d} points)"
-        yield most(what, paper, off, next_term, here)
-    meet = sweep.fit_two_laws(ds.aP, "alpha", windows=(WEAK, STRONG))
-    here = f"alpha = {meet.crossover:.5f} ± {meet.crossover_error:.1g}, a P = {meet.level:.4f}"
-    off, exact = meet.crossover * math.sqrt(3) - 1, "(3^(-1/2) = 0.57735, 6.9282)"
-    yield most("the two laws of a P meet at", exact, off, 0.01, here)
-
-
-def sliding(ds: xr.Dataset, half: xr.Dataset) -> Claims:
-    """What becomes of the exponent in between."""
-    slope = sweep.local_exponent(ds.aP, "alpha")
-    rough = float(np.diff(np.log(ds.alpha)).max() ** 4)  # differences are of fourth order
-    low, high = float(slope.min()), float(slope.max())
-    slides = (slope.diff("mu") > -rough).all() and abs(low + 1) < 0.01 and abs(high + 1 / 3) < 0.01
-    near = (abs(slope + 0.5) < 0.01).mean()
-    read, roup = "read off a figure", "exponent -1/2 (Roup et al. and Denny: at all torques)"
-    yield said("exponent of P changes gradually", slides, f"{low:.7f} to {high:.7f}", "-1 to -1/3 *")
-    yield said(roup, near < 0.02, f"{near:.1%} of alpha within 0.01", "at one alpha")
-    for name, here, true in zip(("at alpha", "a P there", "A there"), (half.alpha, half.aP, half.A), HALF, strict=True):
-        yield compared(f"  {name}", read, here, true, 1e-12, 14)
-
-
-def general(ds: xr.Dataset, half: xr.Dataset) -> Claims:
-    """Statements about all drives: a weak one is followed from rest in SI units, swing by swing.
-
-    Weaker ones take steps in proportion to 1/alpha.
-    """
-    weak = ds.isel(mu=int(np.argmin(abs(np.log(ds.alpha.values / 1e-3)))))
-    rest = solved("foliot_scene:KERNEL", mu=[float(weak.mu)], a=ds.a, phi0=ds.phi0, flips=4, rtol=1e-10)
-    friction, mu = float(ds.a) * np.exp(np.linspace(-0.02, 0.02, 9)), half.alpha * ds.a**2 * ds.phi0
-    near = solved("foliot", method="closed", outputs=["period"], a=friction, mu=mu, phi0=ds.phi0)
-    blind, least = sweep.local_exponent(near.period, "a")[4], ds.A.min() - 1
-    followed = f"from rest to 4 switches at alpha = {weak.alpha:.1e}: P"
-    yield most("self-starting, no least torque", "yes", 2 * rest.interval[0] / weak.period - 1, 1e-8, followed)
-    yield said("A is always larger than 1", least > 0, f"smallest A - 1 = {least:.2g}", "yes")
-    yield most("at exponent -1/2 friction does not count", "yes *", blind, 1e-8, "dlnP/dlna = 0")
-
-
-def torque(ds: xr.Dataset) -> Claims:
-    """What change of the torque makes 15 minutes a day, by s and by the periods at both ends of it."""
-    for drive, alpha, percent in (("weak", float(ds.alpha[0]), 1), ("strong", float(ds.alpha[-1]), 3)):
-        part = 15 / DAY / float(sweep_of_alpha(ds, [alpha]).s[0])
-        changed = sweep_of_alpha(ds, [alpha * math.exp(-part / 2), alpha * math.exp(part / 2)]).period.values
-        off = float(math.log(changed[0] / changed[1])) * DAY / 15 - 1
-        holds = abs(off) < 1e-3 and round(100 * part) == percent
-        what = f"change of the torque for 15 min/day, {drive} drive"
-        yield Statement(what, f"{percent} % *", f"{100 * part:.4g} %", off, holds)
-
-
-def shape(ds: xr.Dataset) -> Claims:
+def shape(ds) -> Claims:
     """The peaks recline, and at strong drive they are rounder than a sine's: weak, moderate and strong drive."""
     phase, faster, out, back = np.linspace(0, 1, 8001), [], [], []
     mu, how = SHOWN * float(ds.a**2 * ds.phi0), {"method": "closed", "outputs": ["angle", "speed"]}
@@ -163,8 +84,78 @@ def shape(ds: xr.Dataset) -> Claims:
     yield said(rounder, high > 2 / 3 + 0.01, f"{high:.3f} P, sine 0.667", "yes")
 
 
-def energy(ds: xr.Dataset) -> Claims:
-    """Why -1 and why -1/3: the speed at the switch is the final one at weak drive; at strong, work and loss make it."""
+def prepared(ds):
+    """The sweep with its groups, and where its exponent is -1/2."""
+    ds = scaled(ds)
+    return ds, half_point(ds)
+
+
+def claims(ds, half) -> Claims:
+    """What theory says, and what comes out."""
+    yield "Limits"
+    first, last = ds.isel(mu=0), ds.isel(mu=-1)
+    weak, strong = float(first.alpha), float(last.alpha)
+    b2 = (3 / strong) ** (2 / 3)  # square of the strong drive's small parameter
+    at_weak, at_strong = f"alpha = {weak:.2g}", f"alpha = {strong:.2g}"
+    third, period, swing = strong ** (1 / 3), f"4 3^(1/3) = {STRONG_P:.5f} *", f"3^(2/3)/2 = {STRONG_A:.5f} *"
+    yield compared(f"weak drive: a P alpha at {at_weak}", "4 *", first.aP * weak, 4.0, 1.01 * weak)
+    yield compared(f"weak drive: A at {at_weak}", "1 *", first.A, 1.0, 0.31 * weak)
+    yield compared(f"strong drive: a P alpha^(1/3) at {at_strong}", period, last.aP * third, STRONG_P, 0.14 * b2)
+    yield compared(f"strong drive: A alpha^(-1/3) at {at_strong}", swing, last.A / third, STRONG_A, 0.11 * b2)
+    # A limit is allowed the distance of the local exponent at the inner end of its window, by the series' next term.
+    for name, y, window, paper, limit in (
+        ("a P", ds.aP, WEAK, "-1 *", -1.0),
+        ("a P", ds.aP, STRONG, "-1/3 *", -1 / 3),
+        ("A", ds.A, WEAK, "0 *", 0.0),
+        ("A", ds.A, STRONG, "1/3 *", 1 / 3),
+    ):
+        fit = sweep.fit_exponent(y, "alpha", window)
+        off, next_term = fit.exponent - limit, fit.high if window == WEAK else 4 / 45 * (3 / fit.low) ** (2 / 3)
+        here = f"{fit.exponent:.7f} ± {fit.exponent_error:.1g}, prefactor {fit.prefactor:.5f}"
+        what = f"exponent of {name}, alpha = {fit.low:.1e} to {fit.high:.1e} ({fit.points:d} points)"
+        yield most(what, paper, off, next_term, here)
+    meet = sweep.fit_two_laws(ds.aP, "alpha", windows=(WEAK, STRONG))
+    here = f"alpha = {meet.crossover:.5f} ± {meet.crossover_error:.1g}, a P = {meet.level:.4f}"
+    off, exact = meet.crossover * math.sqrt(3) - 1, "(3^(-1/2) = 0.57735, 6.9282)"
+    yield most("the two laws of a P meet at", exact, off, 0.01, here)
+
+    yield "In between"
+    slope = sweep.local_exponent(ds.aP, "alpha")
+    rough = float(np.diff(np.log(ds.alpha)).max() ** 4)  # differences are of fourth order
+    low, high = float(slope.min()), float(slope.max())
+    slides = (slope.diff("mu") > -rough).all() and abs(low + 1) < 0.01 and abs(high + 1 / 3) < 0.01
+    near = (abs(slope + 0.5) < 0.01).mean()
+    read, roup = "read off a figure", "exponent -1/2 (Roup et al. and Denny: at all torques)"
+    yield said("exponent of P changes gradually", slides, f"{low:.7f} to {high:.7f}", "-1 to -1/3 *")
+    yield said(roup, near < 0.02, f"{near:.1%} of alpha within 0.01", "at one alpha")
+    for name, here, true in zip(("at alpha", "a P there", "A there"), (half.alpha, half.aP, half.A), HALF, strict=True):
+        yield compared(f"  {name}", read, here, true, 1e-12, 14)
+
+    yield "At every drive"
+    # Weaker ones take steps in proportion to 1/alpha.
+    weak = ds.isel(mu=int(np.argmin(abs(np.log(ds.alpha.values / 1e-3)))))
+    rest = solved("foliot_scene:KERNEL", mu=[float(weak.mu)], a=ds.a, phi0=ds.phi0, flips=4, rtol=1e-10)
+    friction, mu = float(ds.a) * np.exp(np.linspace(-0.02, 0.02, 9)), half.alpha * ds.a**2 * ds.phi0
+    near = solved("foliot", method="closed", outputs=["period"], a=friction, mu=mu, phi0=ds.phi0)
+    blind, least = sweep.local_exponent(near.period, "a")[4], ds.A.min() - 1
+    followed = f"from rest to 4 switches at alpha = {weak.alpha:.1e}: P"
+    yield most("self-starting, no least torque", "yes", 2 * rest.interval[0] / weak.period - 1, 1e-8, followed)
+    yield said("A is always larger than 1", least > 0, f"smallest A - 1 = {least:.2g}", "yes")
+    yield most("at exponent -1/2 friction does not count", "yes *", blind, 1e-8, "dlnP/dlna = 0")
+
+    yield "Torque"
+    for drive, alpha, percent in (("weak", float(ds.alpha[0]), 1), ("strong", float(ds.alpha[-1]), 3)):
+        part = 15 / DAY / float(sweep_of_alpha(ds, [alpha]).s[0])
+        changed = sweep_of_alpha(ds, [alpha * math.exp(-part / 2), alpha * math.exp(part / 2)]).period.values
+        off = float(math.log(changed[0] / changed[1])) * DAY / 15 - 1
+        holds = abs(off) < 1e-3 and round(100 * part) == percent
+        what = f"change of the torque for 15 min/day, {drive} drive"
+        yield Statement(what, f"{percent} % *", f"{100 * part:.4g} %", off, holds)
+
+    yield "Shape of the swing"
+    yield from shape(ds)
+
+    yield "Energy"
     weak, strong = ds.isel(mu=0), ds.isel(mu=-1)
     kept = float(ds.multiplier.where(ds.alpha < 0.1).max())
     cube = strong.crossing_speed**3 * strong.a / (strong.mu**2 * strong.phi0)
@@ -174,19 +165,14 @@ def energy(ds: xr.Dataset) -> Claims:
     yield compared("why -1/3: v^3 a/(mu^2 phi0), strong drive", "(3) order 1", cube, 3.0, b2)
 
 
-def figure(ds: xr.Dataset, half: xr.Dataset) -> Any:
+@panels(118.0, 2, sharex=True, height_ratios=(1.15, 1))
+def figure(scaling, exponent, ds, half):
     """Period and amplitude over the drive, and the exponent that slides."""
-    with page_of(118.0, 2, 1, width=NARROW, sharex=True, height_ratios=(1.15, 1)) as (page, (scaling, exponent)):
-        draw_scaling(scaling, ds, half)
-        draw_exponent(exponent, ds, half)
-    return page
-
-
-def draw_scaling(axes: Any, ds: xr.Dataset, half: xr.Dataset) -> None:
-    """a P and A against alpha, with the asymptotes of both."""
     alpha = ds.alpha.values
-    axes.loglog(alpha, ds.aP, color=COLOURS[0], label=r"period, $aP$")
-    axes.loglog(alpha, ds.A, color=COLOURS[1], linestyle=(0, (6, 1.5)), label=r"amplitude, $\varphi_{\max}/\varphi_0$")
+    scaling.loglog(alpha, ds.aP, color=COLOURS[0], label=r"period, $aP$")
+    scaling.loglog(
+        alpha, ds.A, color=COLOURS[1], linestyle=(0, (6, 1.5)), label=r"amplitude, $\varphi_{\max}/\varphi_0$"
+    )
     weak, strong = alpha[alpha < 30], alpha[alpha > 0.02]
     for x, prefactor, power, place, text in (
         (weak, 4, -1, (2e-5, 1.5e6), r"$4/\alpha$"),
@@ -194,45 +180,26 @@ def draw_scaling(axes: Any, ds: xr.Dataset, half: xr.Dataset) -> None:
         (weak, 1, 0, (2e-5, 2.2), "1"),
         (strong, STRONG_A, 1 / 3, (1e4, 1.2e2), r"$\frac{1}{2}\,3^{2/3}\,\alpha^{1/3}$"),
     ):
-        (line,) = axes.loglog(x, prefactor * x**power, color="black", linewidth=0.8, linestyle=(0, (1, 1.5)))
-        axes.text(*place, text)
+        (line,) = scaling.loglog(x, prefactor * x**power, color="black", linewidth=0.8, linestyle=(0, (1, 1.5)))
+        scaling.text(*place, text)
     line.set_label("asymptotes")
-    axes.plot(half.alpha, half.aP, "o", color="black", label=r"exponent $-1/2$")
-    axes.set(ylabel=r"$aP$ and $\varphi_{\max}/\varphi_0$ [1]")
-    axes.legend(loc="upper right")
-
-
-def draw_exponent(axes: Any, ds: xr.Dataset, half: xr.Dataset) -> None:
-    """Local exponent by differences of ln P, the exact -s, and the drive at which it is -1/2."""
+    scaling.plot(half.alpha, half.aP, "o", color="black", label=r"exponent $-1/2$")
+    scaling.set(ylabel=r"$aP$ and $\varphi_{\max}/\varphi_0$ [1]")
+    scaling.legend(loc="upper right")
     slope = sweep.local_exponent(ds.aP, "alpha")
     few = slice(None, None, max(1, slope.size // 56))
     for value in (-1, -1 / 2, -1 / 3):
-        axes.axhline(value, color="0.6", linewidth=0.6, linestyle=(0, (4, 2)))
-    axes.semilogx(ds.alpha, -ds.s, color=COLOURS[0], label=r"exact, $-s$")
+        exponent.axhline(value, color="0.6", linewidth=0.6, linestyle=(0, (4, 2)))
+    exponent.semilogx(ds.alpha, -ds.s, color=COLOURS[0], label=r"exact, $-s$")
     look = {"color": COLOURS[1], "markersize": 3, "markerfacecolor": "white", "label": r"differences of $\ln P$"}
-    axes.plot(ds.alpha[few], slope[few], "o", **look)
-    axes.plot(half.alpha, -0.5, "o", color="black")
-    axes.annotate(rf"$\alpha = {float(half.alpha):.6f}$", (half.alpha, -0.5), (8, -12), textcoords="offset points")
-    axes.set(xlabel=r"drive torque, $\alpha = \mu/(a^2\varphi_0)$ [1]", ylim=(-1.06, -0.27))
-    axes.set_ylabel(r"exponent, $\mathrm{d}\ln P/\mathrm{d}\ln\mu$ [1]")
-    axes.set_yticks([-1, -1 / 2, -1 / 3], labels=["$-1$", r"$-\frac{1}{2}$", r"$-\frac{1}{3}$"])
-    axes.set_yticks([-0.9, -0.8, -0.7, -0.6, -0.4], minor=True)
-    axes.legend(loc="center right", bbox_to_anchor=(1, 0.35))
+    exponent.plot(ds.alpha[few], slope[few], "o", **look)
+    exponent.plot(half.alpha, -0.5, "o", color="black")
+    exponent.annotate(rf"$\alpha = {float(half.alpha):.6f}$", (half.alpha, -0.5), (8, -12), textcoords="offset points")
+    exponent.set(xlabel=r"drive torque, $\alpha = \mu/(a^2\varphi_0)$ [1]", ylim=(-1.06, -0.27))
+    exponent.set_ylabel(r"exponent, $\mathrm{d}\ln P/\mathrm{d}\ln\mu$ [1]")
+    exponent.set_yticks([-1, -1 / 2, -1 / 3], labels=["$-1$", r"$-\frac{1}{2}$", r"$-\frac{1}{3}$"])
+    exponent.set_yticks([-0.9, -0.8, -0.7, -0.6, -0.4], minor=True)
+    exponent.legend(loc="center right", bbox_to_anchor=(1, 0.35))
 
 
-def conclude(path: str) -> Conclusion:
-    """Statements of the paper, and the figure."""
-    ds = scaled(read_result(path, "foliot", ["mu"], "foliot_scaling.toml"))
-    half = half_point(ds)
-    groups = {
-        "Limits": [*limits(ds), *straight_lines(ds)],
-        "In between": sliding(ds, half),
-        "At every drive": general(ds, half),
-        "Torque": torque(ds),
-        "Shape of the swing": shape(ds),
-        "Energy": energy(ds),
-    }
-    return groups, [NOTES], lambda: figure(ds, half)
-
-
-main = script(__name__, "foliot_scaling.h5", conclude, source="paper")
+main = script(__name__, "foliot_scaling.h5", claims, figure, prepared, source="paper")

@@ -1,46 +1,50 @@
 """By what law does the period of a foliot fall with its drive torque when friction is c |v|^n, or a v + R?
 
-    sweep run studies/friction_laws.toml
-    sweep run studies/friction_laws_map.toml
     python studies/friction_laws.py friction_laws.h5 friction_laws_map.h5
 
-draws friction_laws.png and compares theory with what comes out, s = -dlnP/dlnmu. Friction c |v|^n alone leaves one
-group, alpha_n = mu^(2/n-1) c^(-2/n)/phi0, so that dlnP/dlnc = (2s - 1)/(2 - n), and
+s = -dlnP/dlnmu. Friction c |v|^n alone leaves one group, alpha_n = mu^(2/n-1) c^(-2/n)/phi0, so that dlnP/dlnc = (2s -
+1)/(2 - n), and
     slow swings, which friction holds at its terminal speed:  s = 1/n,      at small mu for n < 2, at large for n > 2;
     free swings, which friction hardly slows:                 s = n/(n+2),  the other way round.             (1)
 With a v + R at strong drive, x = v0/mu obeys R x^2 + (2/3) a mu x^3 = 2 phi0, P = 4 x. For R >> a^2 phi0, R/mu << 1:
     s = (1/3) y/(1 + y) + (R/mu)^2,  y = (2 phi0/R)^(1/2) a mu/R, least at mu/R = (18 R/(a^2 phi0))^(1/6),   (2)
 there s = (3 a^2 phi0/(2 R))^(1/3). As mu grows without end, s - 1/3 goes as 4/45 - R/(9 a^2 phi0).  Derived here.
-"""
 
-from typing import Any
+mu, R in units of a^2 phi0; deviations of exponents are differences, others relative; a limit holds if
+the next term of its series accounts for the deviation
+paper: Hoyng & Nieuwenhuizen, arXiv:1604.06681, has n = 1 and says that strong drive is best: there s = 1/3
+"""
 
 import numpy as np
 import xarray as xr
-from _common import Claims, Conclusion, Statement, compared, differing, most, read_result, said, script, solved
-from _figures import NARROW, direct_label, hatch, page_of
+from _common import Claims, Statement, compared, differing, most, said, script, solved
+from _figures import COLOURS, direct_label, hatch, panels
 
 import sweep
 from kernels.interface import Status
-from sweep.show.charts import COLOURS
 
 KNOWN = {10.0: (8.719, 0.27318), 100.0: (6.098, 0.17768)}
 """mu/R and s in the valley at R/(a^2 phi0), in 50-digit arithmetic."""
 HEIGHTS = {0.0: -0.06, 1.0: -0.94, 2.0: -0.45, 3.0: -0.55, 4.0: -0.72}
 """By degree, where the name of a line stands."""
 
-NOTES = """\
-s = -dlnP/dlnmu; mu, R in units of a^2 phi0; deviations of exponents are differences, others relative; a limit holds if
-the next term of its series accounts for the deviation
-paper: Hoyng & Nieuwenhuizen, arXiv:1604.06681, has n = 1 and says that strong drive is best: there s = 1/3\
-"""
+
+def valley(grid: xr.Dataset) -> xr.Dataset:
+    """The best torque at every R of the map above the threshold: `mu`, `R`, `sensitivity` along `cell`."""
+    place = sweep.where_exponent(grid.sensitivity.where(grid.R > 1, drop=True), "mu", 0.0).abscissa
+    place = place.where(place.notnull(), drop=True)
+    return solved("foliot", design="zip", mu=place, R=place.R, a=1, phi0=1)
 
 
-def ends(laws: xr.Dataset) -> Claims:
-    """Exponents of the period over the outermost three decades, slow swings at small mu for n < 2, at large for n > 2.
+def prepared(laws, grid):
+    """The two sweeps, and the best torque along the map."""
+    return laws, grid, valley(grid)
 
-    Allowed is the distance of s from its limit at the inner end: alpha_n, or 2n/(n+2) powers of (n+2)/alpha_n.
-    """
+
+def claims(laws, grid, line) -> Claims:
+    """What theory says, and what comes out."""
+    yield "Far out"
+    # Allowed is the distance of s from its limit at the inner end: alpha_n, or 2n/(n+2) powers of (n+2)/alpha_n.
     for n in laws.n.values[laws.n.values > 0]:
         free = "-1/2" if n == 2 else f"-{n:g}/{n + 2:g}"
         limits = ((1 / n, f"-1/{n:g}"), (n / (n + 2), free))[:: 1 if n <= 2 else -1]
@@ -54,12 +58,8 @@ def ends(laws: xr.Dataset) -> Claims:
             what = f"n = {n:g}: exponent of P, {drive} mu"
             yield differing(what, text, exponent, -limit, 1e-9 + next_term, 9)
 
-
-def exact(laws: xr.Dataset) -> Claims:
-    """What holds at every drive; dlnP/dlnc by differences over a sweep of the friction alone.
-
-    Steps in ln alpha_n are 2/n - 1 times those in ln mu, so differences of ln P are of n >= 1.
-    """
+    yield "At every drive"
+    # Steps in ln alpha_n are 2/n - 1 times those in ln mu, so differences of ln P are of n >= 1.
     dry, air, some = laws.sel(n=0), laws.sel(n=2), laws.sel(n=laws.n[laws.n >= 1])
     rho2 = (1 / dry.mu) ** 2
     held, silent = int((dry.mu <= 1).sum()), int((dry.status == Status.NEVER_STARTS).sum())
@@ -79,19 +79,8 @@ def exact(laws: xr.Dataset) -> Claims:
         what, theory = f"n = {n:g}: dlnP/dlnc at s = {here.sensitivity:.4f}", float(here.theory)
         yield differing(what, f"(2s-1)/(2-n) = {theory:.6f}", here.slope, theory, 1e-6)
 
-
-def valley(grid: xr.Dataset) -> xr.Dataset:
-    """The best torque at every R of the map above the threshold: `mu`, `R`, `sensitivity` along `cell`."""
-    place = sweep.where_exponent(grid.sensitivity.where(grid.R > 1, drop=True), "mu", 0.0).abscissa
-    place = place.where(place.notnull(), drop=True)
-    return solved("foliot", design="zip", mu=place, R=place.R, a=1, phi0=1)
-
-
-def best(grid: xr.Dataset, line: xr.Dataset) -> Claims:
-    """Where strong drive is best, and where it is not: R at which s leaves 1/3 upwards and downwards alike.
-
-    And the power laws of the valley at large R.
-    """
+    yield "Viscous and Coulomb friction"
+    # And the power laws of the valley at large R.
     first, below = grid.R[grid.R > 0.8].min(), grid.R.where((grid.sensitivity < 1 / 3 - 1e-9).any("mu")).min()
     s = solved("foliot", mu=1e8, R=np.linspace(0.7, 0.9, 9), a=1, phi0=1).sensitivity
     threshold = sweep.where_exponent(s, "R", 1 / 3, values=True).abscissa
@@ -113,45 +102,30 @@ def best(grid: xr.Dataset, line: xr.Dataset) -> Claims:
         yield Statement(what, text, f"{exponent:.4f}, {last:.4f}", off, fits)
 
 
-def figure(laws: xr.Dataset, grid: xr.Dataset, line: xr.Dataset) -> Any:
+@panels(142.0, 2, height_ratios=(1, 1.15))
+def figure(exponents, valley, laws, grid, line):
     """Exponents against torque, and the map with its valley."""
-    with page_of(142.0, 2, 1, width=NARROW, height_ratios=(1, 1.15)) as (page, (exponents, valley)):
-        for i, (n, height) in enumerate(HEIGHTS.items()):
-            exponents.semilogx(laws.mu, -laws.sensitivity.sel(n=n), color=COLOURS[i])
-            direct_label(exponents, 3e-7 if n else 2e6, height, f"$n={n:g}$", COLOURS[i])
-        exponents.set(xlim=(1e-9, 1e9), ylim=(-1.05, 0.05), xlabel=r"torque, $\mu$ [rad/s$^2$]")
-        exponents.set_ylabel(r"exponent, $\mathrm{d}\ln P/\mathrm{d}\ln\mu$ [1]")
-        draw_map(valley, grid, line)
-    return page
-
-
-def draw_map(axes: Any, grid: xr.Dataset, line: xr.Dataset) -> None:
-    """s over torque and Coulomb friction at fixed viscous friction, and the best torque."""
+    for i, (n, height) in enumerate(HEIGHTS.items()):
+        exponents.semilogx(laws.mu, -laws.sensitivity.sel(n=n), color=COLOURS[i])
+        direct_label(exponents, 3e-7 if n else 2e6, height, f"$n={n:g}$", COLOURS[i])
+    exponents.set(xlim=(1e-9, 1e9), ylim=(-1.05, 0.05), xlabel=r"torque, $\mu$ [rad/s$^2$]")
+    exponents.set_ylabel(r"exponent, $\mathrm{d}\ln P/\mathrm{d}\ln\mu$ [1]")
     part = grid.sel(R=slice(1e-2, 1e5), mu=slice(1e-2, 1e7))
     mu, R, s = part.mu.values, part.R.values, part.sensitivity.values
-    axes.set(xscale="log", yscale="log", xlabel=r"torque, $\mu/(a^2\varphi_0)$ [1]", xlim=(mu[0], mu[-1]))
-    axes.set_title(r"$s = -\mathrm{d}\ln P/\mathrm{d}\ln\mu$", loc="right")
-    axes.set(ylabel=r"Coulomb friction, $R/(a^2\varphi_0)$ [1]", ylim=(R[0], R[-1]))
+    valley.set(xscale="log", yscale="log", xlabel=r"torque, $\mu/(a^2\varphi_0)$ [1]", xlim=(mu[0], mu[-1]))
+    valley.set_title(r"$s = -\mathrm{d}\ln P/\mathrm{d}\ln\mu$", loc="right")
+    valley.set(ylabel=r"Coulomb friction, $R/(a^2\varphi_0)$ [1]", ylim=(R[0], R[-1]))
     shown = np.ma.masked_invalid(np.minimum(s, 1.0))
-    axes.pcolormesh(mu, R, shown, cmap="viridis", vmin=0, vmax=1, alpha=0.75, rasterized=True)
+    valley.pcolormesh(mu, R, shown, cmap="viridis", vmin=0, vmax=1, alpha=0.75, rasterized=True)
     levels = (0.1, 0.2, 0.3, 1 / 3, 0.4, 0.5, 0.7, 1)
-    lines = axes.contour(mu, R, s, levels=levels, colors="black", linewidths=0.6)
+    lines = valley.contour(mu, R, s, levels=levels, colors="black", linewidths=0.6)
     places = [(3.0, 0.05), (1.1, 0.05), (0.5, 0.05), (0.1, 0.02), (1e6, 600), (1e6, 3500), (1e6, 1.5e4)]
-    axes.clabel(lines, fmt=lambda x: f"{x:g}", fontsize=7, manual=places)
-    hatch(axes, mu, R, (part.status == Status.NEVER_STARTS).values, "////")
-    axes.plot(line.mu, line.R, color="white", linestyle=(0, (5, 1.5)))
-    direct_label(axes, 0.6, 2e3, r"never starts, $\mu \leq R$")
-    direct_label(axes, 2e4, 0.35, r"$s = 1/3$: $R = 0.8\,a^2\varphi_0$")
-    direct_label(axes, 2e5, 8, "best torque (dashed)")
+    valley.clabel(lines, fmt=lambda x: f"{x:g}", fontsize=7, manual=places)
+    hatch(valley, mu, R, (part.status == Status.NEVER_STARTS).values, "////")
+    valley.plot(line.mu, line.R, color="white", linestyle=(0, (5, 1.5)))
+    direct_label(valley, 0.6, 2e3, r"never starts, $\mu \leq R$")
+    direct_label(valley, 2e4, 0.35, r"$s = 1/3$: $R = 0.8\,a^2\varphi_0$")
+    direct_label(valley, 2e5, 8, "best torque (dashed)")
 
 
-def conclude(laws_path: str, map_path: str) -> Conclusion:
-    """Statements and the figure."""
-    laws = read_result(laws_path, "foliot", ["n", "mu"], "friction_laws.toml")
-    grid = read_result(map_path, "foliot", ["R", "mu"], "friction_laws_map.toml")
-    line = valley(grid)
-    groups = {"Far out": ends(laws), "At every drive": exact(laws), "Viscous and Coulomb friction": best(grid, line)}
-    return groups, [NOTES], lambda: figure(laws, grid, line)
-
-
-main = script(__name__, "friction_laws.h5 friction_laws_map.h5", conclude)
+main = script(__name__, "friction_laws.h5 friction_laws_map.h5", claims, figure, prepared)

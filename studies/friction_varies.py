@@ -1,11 +1,9 @@
 """What does friction that varies over the swing, by season or from swing to swing do to a foliot's rate?
 
-    sweep run studies/friction_varies.toml --allow-import
-    sweep run studies/friction_varies_noise.toml
     python studies/friction_varies.py friction_varies.h5 friction_varies_noise.h5
 
-draws friction_varies.png and compares theory with what comes out. The paper supposes that only the averages of torque
-and friction over a period count. Theory, derived here, with s = -dlnP/dlnmu and dlnP/dlna = 2s - 1:
+The paper supposes that only the averages of torque and friction over a period count. Theory, derived here, with s =
+-dlnP/dlnmu and dlnP/dlna = 2s - 1:
 
 weak drive: the way takes its mean over the angle, the turn the friction at the switch,
     P/2 = (2/alpha + 2 a/a(phi0))/a;                                                      (1)
@@ -16,18 +14,20 @@ ln mu, since alpha = mu/(a^2 phi0) and so ds/dx = -2 s':
 A power mean of a, of exponent 1 - 2s, is the first term alone, and wrong, since s changes with the season;
 noise from swing to swing: sigma of the torque scatters the rate as s sigma, of the friction as abs(2s - 1) sigma,
 both by sqrt(T/tau), and the two at once, of one noise, as (1 - s) sigma (`shared` = 0: as two of their own). (4)
+
+rates in s/day; deviation: relative, of rates the difference
+allowed: 1e-2 of (1), 5 % of (2), whose foliot swings but 5 phi0; 1 % of (3) to
+its fourth term; of (4) three standard errors of 64 seeds, and 2 %. The oil is three times as
+thick at 0 degree C as at 20, chosen here; the room swings by 8 K over the year and 2 K over the day, about 15 degree C
 """
 
 import math
-from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Claims, Conclusion, compared, most, read_result, said, script, solved
-from _figures import page_of
+from _common import Claims, compared, most, said, script, solved
+from _figures import COLOURS, MARKS, panels
 from scipy.optimize import brentq
-
-from sweep.show.charts import COLOURS, MARKS
 
 DAY = 86400.0
 SMALL = 0.125
@@ -47,26 +47,19 @@ NOISES = {
 }
 """Cells of noise of 5 %, and what of it (4) has in the rate."""
 
-NOTES = """\
-rates in s/day; deviation: relative, of rates the difference
-allowed: 1e-2 of (1), 5 % of (2), whose foliot swings but 5 phi0; 1 % of (3) to
-its fourth term; of (4) three standard errors of 64 seeds, and 2 %. The oil is three times as
-thick at 0 degree C as at 20, chosen here; the room swings by 8 K over the year and 2 K over the day, about 15 degree C
-"""
 
-
-def viscosity(temperature: Any) -> Any:
+def viscosity(temperature):
     """Viscosity over that at 20 degree C, exp(B/(T + C)) through the three points of `OIL` (Vogel)."""
     (low, thick), (mid, _), (high, thin) = OIL
 
-    def at(t: Any, C: float) -> Any:
+    def at(t, C: float):
         return math.log(thick) * (1 / (t + C) - 1 / (mid + C)) / (1 / (low + C) - 1 / (mid + C))
 
     C = brentq(lambda C: at(high, C) - math.log(thin), 60.0, 1000.0)
     return np.exp(at(np.asarray(temperature), C))
 
 
-def cycles(mu: Any) -> xr.Dataset:
+def cycles(mu) -> xr.Dataset:
     """The foliot with even friction."""
     return solved("foliot", mu=np.atleast_1d(mu), a=1, phi0=1, rtol=1e-12)
 
@@ -82,17 +75,6 @@ def averages(ds: xr.Dataset) -> xr.Dataset:
     means = {"angle": speed, "time": 0 * speed + 1, "energy": speed**2}
     found = {name: (2 * s - 1) * (wave * w).mean("phase") / w.mean("phase") for name, w in means.items()}
     return xr.Dataset({"effect": effect.reset_coords(drop=True), **found})
-
-
-def over_the_swing(ds: xr.Dataset, means: xr.Dataset) -> Claims:
-    """What average of a(phi) gives the half periods."""
-    weak, strong = ds.sel(mu=0.04, harmonic=1), means.sel(mu=100.0, harmonic=1)
-    off = (weak.interval / (2 / 0.04 + 2 / (1 - weak.depth)) - 1).where(abs(weak.depth) < 0.6)
-    energy, worst = float(strong.energy), float(DAY * SMALL * abs(means.effect).max())
-    by_energy, here = "strong drive: mean by the energy, (2): effect of depth", f"up to {worst:.0f} s/day at depth"
-    yield most("weak drive: the mean and the turn, (1), alpha = .04", "1e-2", off, 1e-2)
-    yield compared(by_energy, f"{energy:.5f}", strong.effect, energy, 0.05, 4)
-    yield said("the paper: only the mean over a period counts", worst < 1.0, f"{here} {SMALL:g}", "0", True)
 
 
 def seasons(mu: float) -> tuple[np.ndarray, np.ndarray]:
@@ -117,21 +99,6 @@ def year_by_slopes(mu: float, x: np.ndarray) -> float:
     return DAY * float(np.mean(np.exp(rate)) - 1)
 
 
-def by_season() -> Claims:
-    """Rates over a year, and their mean from the sensitivity and its slopes."""
-    span = {}
-    for mu in SEASONS:
-        s, (rate, oil) = float(cycles(mu).sensitivity[0]), seasons(mu)
-        theory, power = year_by_slopes(mu, np.log(oil)), DAY * float(np.mean(oil ** (1 - 2 * s)) - 1)
-        year, span[mu] = float(rate.mean()), np.ptp(rate)
-        slopes = f"alpha = {mu:.3g}: mean rate of the year by s and three slopes of it, (3)"
-        mean, near = f"  by a power mean of a, exponent {1 - 2 * s:+.2f}", abs(power - year) < 0.1 * abs(year)
-        yield compared(slopes, f"{theory:.1f}", year, theory, 0.01, 5)
-        yield said(mean, near, f"{year:.1f}", f"{power:.1f}", True)
-    least, here = min(span, key=lambda mu: span[mu]) == HALF, ", ".join(f"{x:.4g}" for x in span.values())
-    yield said("daily rates differ over the year, least where s = 1/2, by", least, here)
-
-
 def scatters(noisy: xr.Dataset) -> xr.Dataset:
     """Scatter of the rate by each noise, over its unit, and the `s` and half period `T` of each clock."""
     clock = cycles(noisy.mu)
@@ -144,8 +111,36 @@ def scatters(noisy: xr.Dataset) -> xr.Dataset:
     return xr.Dataset({name: y.reset_coords(drop=True) for name, y in found.items()}).assign(s=s, T=T)
 
 
-def by_noise(scatter: xr.Dataset) -> Claims:
-    """(4), clock by clock."""
+def prepared(ds, noisy):
+    """What means of the friction are worth, the sweep that they are of, and scatters by noise."""
+    return averages(ds), ds, scatters(noisy)
+
+
+def claims(means, ds, scatter) -> Claims:
+    """What theory says, and what comes out."""
+    yield "Friction over the swing"
+    weak, strong = ds.sel(mu=0.04, harmonic=1), means.sel(mu=100.0, harmonic=1)
+    off = (weak.interval / (2 / 0.04 + 2 / (1 - weak.depth)) - 1).where(abs(weak.depth) < 0.6)
+    energy, worst = float(strong.energy), float(DAY * SMALL * abs(means.effect).max())
+    by_energy, here = "strong drive: mean by the energy, (2): effect of depth", f"up to {worst:.0f} s/day at depth"
+    yield most("weak drive: the mean and the turn, (1), alpha = .04", "1e-2", off, 1e-2)
+    yield compared(by_energy, f"{energy:.5f}", strong.effect, energy, 0.05, 4)
+    yield said("the paper: only the mean over a period counts", worst < 1.0, f"{here} {SMALL:g}", "0", True)
+
+    yield "Friction by season"
+    span = {}
+    for mu in SEASONS:
+        s, (rate, oil) = float(cycles(mu).sensitivity[0]), seasons(mu)
+        theory, power = year_by_slopes(mu, np.log(oil)), DAY * float(np.mean(oil ** (1 - 2 * s)) - 1)
+        year, span[mu] = float(rate.mean()), np.ptp(rate)
+        slopes = f"alpha = {mu:.3g}: mean rate of the year by s and three slopes of it, (3)"
+        mean, near = f"  by a power mean of a, exponent {1 - 2 * s:+.2f}", abs(power - year) < 0.1 * abs(year)
+        yield compared(slopes, f"{theory:.1f}", year, theory, 0.01, 5)
+        yield said(mean, near, f"{year:.1f}", f"{power:.1f}", True)
+    least, here = min(span, key=lambda mu: span[mu]) == HALF, ", ".join(f"{x:.4g}" for x in span.values())
+    yield said("daily rates differ over the year, least where s = 1/2, by", least, here)
+
+    yield "Noise of friction and torque"
     for mu in scatter.mu.values:
         clock = scatter.sel(mu=mu)
         hours = 20000 * float(clock["T"]) / 3600
@@ -159,35 +154,21 @@ def by_noise(scatter: xr.Dataset) -> Claims:
                 yield compared(what, f"(4) {share:.4f} +- {allowed:.0%}", here, share, allowed, 4)
 
 
-def figure(means: xr.Dataset) -> Any:
+@panels(130.0, 2)
+def figure(mean, year, means, *_):
     """What averages of friction over the swing are worth, and the rate over a year; for a column of print."""
-    with page_of(130.0, 2, width=110.0) as (page, (mean, year)):
-        first = means.sel(harmonic=1)
-        mean.semilogx(first.mu, first.effect, "o", color="black", label="true")
-        for k, name in enumerate(("angle", "time", "energy")):
-            look = {"linestyle": "", "color": COLOURS[k], "markerfacecolor": "none"}
-            mean.semilogx(first.mu, first[name], MARKS[k + 1], label=f"mean over {name}", **look)
-        mean.axhline(0, color="0.7", linewidth=0.6)
-        mean.set(xlabel=r"drive, $\alpha$ [1]", ylabel=r"$\mathrm{d}\ln P/\mathrm{d}d$ [1]")
-        for colour, (mu, name) in zip(COLOURS, SEASONS.items(), strict=False):
-            year.plot(seasons(mu)[0] / 60, color=colour, label=rf"$\alpha={name}$")
-        year.set(xlabel="day of the year, from the coldest [day]", ylabel="rate [min/day]", xlim=(0, 364))
-        for axes in (mean, year):
-            axes.legend(loc="best")
-    return page
+    first = means.sel(harmonic=1)
+    mean.semilogx(first.mu, first.effect, "o", color="black", label="true")
+    for k, name in enumerate(("angle", "time", "energy")):
+        look = {"linestyle": "", "color": COLOURS[k], "markerfacecolor": "none"}
+        mean.semilogx(first.mu, first[name], MARKS[k + 1], label=f"mean over {name}", **look)
+    mean.axhline(0, color="0.7", linewidth=0.6)
+    mean.set(xlabel=r"drive, $\alpha$ [1]", ylabel=r"$\mathrm{d}\ln P/\mathrm{d}d$ [1]")
+    for colour, (mu, name) in zip(COLOURS, SEASONS.items(), strict=False):
+        year.plot(seasons(mu)[0] / 60, color=colour, label=rf"$\alpha={name}$")
+    year.set(xlabel="day of the year, from the coldest [day]", ylabel="rate [min/day]", xlim=(0, 364))
+    for axes in (mean, year):
+        axes.legend(loc="best")
 
 
-def conclude(path: str, noise_path: str) -> Conclusion:
-    """Statements and the figure."""
-    ds = read_result(path, "friction_scene:KERNEL", ["mu", "harmonic", "depth"], "friction_varies.toml")
-    noisy = read_result(noise_path, "foliot_noise", ["mu", "sigma", "sigma_a", "seed"], "friction_varies_noise.toml")
-    means, scatter = averages(ds), scatters(noisy)
-    groups = {
-        "Friction over the swing": over_the_swing(ds, means),
-        "Friction by season": by_season(),
-        "Noise of friction and torque": by_noise(scatter),
-    }
-    return groups, [NOTES], lambda: figure(means)
-
-
-main = script(__name__, "friction_varies.h5 friction_varies_noise.h5", conclude)
+main = script(__name__, "friction_varies.h5 friction_varies_noise.h5", claims, figure, prepared)

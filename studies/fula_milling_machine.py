@@ -1,29 +1,30 @@
 """Is the milling machine's drive of five masses as good as that of eight, and what makes it worse above 1000 rad/s?
 
-    sweep run studies/fula_milling_machine.toml
     python studies/fula_milling_machine.py fula_milling_machine.h5
 
-Rebuilds tables 2 to 6 of Baran & Marchelek (1971), draws fula_milling_machine.png and says of every
-printed number whether it is reproduced, rounded, carried from a slip or misprinted, and of each of its four conclusions
-whether it holds. Conclusions:
+Rebuilds tables 2 to 6 of Baran & Marchelek (1971), and says of every printed number
+whether it is reproduced, rounded, carried from a slip or misprinted, and of each of its four conclusions whether it
+holds. Conclusions:
 
 - Rivin's five masses hold the first four frequencies to 0.2 % and put the fifth 17.5 % low; the source prints that.
 - "387.6" in the row of five masses is the seventh frequency of the EIGHT: five masses have no sixth.
 - The source's first conclusion names the wrong cause. With the dampers kept exactly, K = k + i w h, nothing changes;
   with mu = 1 - (w/w0)^2 kept, the error vanishes. What is neglected is the inertia of what was taken out.
 - At the same size Guyan is 8 times, IRS 50 times, Craig-Bampton 1400 times better at the fifth frequency.
+
+reproduced: within half a unit of the last digit printed; near: within 0.5 %, what three digits carried along explain;
+slip: within 3 % and not to be had from the source's own numbers (50.2, 9.55, 0.148 and what follows; h2 of Table 5,
+from e* = 0.98 squared); misprinted: farther. A number holds if it is what is expected of it; "no, known": the source
+is wrong there. J8 is 99.44 in Table 1 and 99.40 in all others. What the scan hides of tables 2 to 4 is left out.
 """
 
 import math
-from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Claims, Conclusion, differing, read_result, said, script
-from _figures import page_of
+from _common import Claims, differing, said, script
+from _figures import COLOURS, panels
 from _fula_source import KGF, TABLE_6, in_source_units, judged, tables_2_to_4, tables_3_to_5
-
-from sweep.show.charts import COLOURS
 
 FIVE = {
     "rivin": (0.2, 17.45), "guyan": (0.914, 2.21), "irs": (0.007, 0.329), "craig_bampton": (0.004, 0.012),
@@ -32,11 +33,6 @@ FIVE = {
 """Largest error of f1 to f4 and error of f5 [%] of five by each method, once in 50 digits; allowed 5 % and 0.001 %."""
 SPAN = 1000 / (2 * math.pi)
 """1000 rad/s in Hz."""
-NOTES = """\
-reproduced: within half a unit of the last digit printed; near: within 0.5 %, what three digits carried along explain;
-slip: within 3 % and not to be had from the source's own numbers (50.2, 9.55, 0.148 and what follows; h2 of Table 5,
-from e* = 0.98 squared); misprinted: farther. A number holds if it is what is expected of it; "no, known": the source
-is wrong there. J8 is 99.44 in Table 1 and 99.40 in all others. What the scan hides of tables 2 to 4 is left out."""
 
 
 def chain(ds: xr.Dataset, n: int) -> dict[str, np.ndarray]:
@@ -45,7 +41,7 @@ def chain(ds: xr.Dataset, n: int) -> dict[str, np.ndarray]:
     return {name: cell[f"{name}_kept"].values[: int(n)] for name in "Jkh"}
 
 
-def receptance(J: Any, K: Any, w: Any) -> Any:
+def receptance(J, K, w):
     """Of the spindle [rad/(N m)], from complex stiffnesses, at one or many angular frequencies."""
     below = K[-1] - w * w * J[-1]
     for j in range(len(J) - 2, -1, -1):
@@ -59,7 +55,7 @@ def response(chain: dict[str, np.ndarray], f: np.ndarray, kind: type = float) ->
     return receptance(J, k[:, None] + np.result_type(kind, np.complex64).type(1j) * w * h[:, None], w)
 
 
-def error_of_five(ds: xr.Dataset, f: np.ndarray, how: str = "source") -> Any:
+def error_of_five(ds: xr.Dataset, f: np.ndarray, how: str = "source"):
     """abs(H5/H8 - 1) by the source's formulas; with exact `dampers`; or with these and `mu`, its 1 - (w/w0)^2."""
     full, w = chain(ds, 8), 2 * np.pi * f
     if how == "source":
@@ -74,8 +70,16 @@ def error_of_five(ds: xr.Dataset, f: np.ndarray, how: str = "source") -> Any:
     return abs(receptance(J, K, w) / response(full, f) - 1)
 
 
-def frequencies(ds: xr.Dataset) -> Claims:
-    """Table 6, with what does not belong there."""
+def claims(ds) -> Claims:
+    """What theory says, and what comes out."""
+    chains = {n: in_source_units(chain(ds, n)) for n in (8, 7, 6, 5)}
+    yield "Tables 2 to 4"
+    yield from tables_2_to_4(chains)
+
+    yield "Tables 3 to 5"
+    yield from tables_3_to_5(chains)
+
+    yield "Table 6"
     here = ds.isel(reduction=0)
     f = {n: here.frequency.sel(n_keep=n).values for n in TABLE_6}
     fifth = float(here.frequency_error.sel(n_keep=5)[4])
@@ -87,9 +91,7 @@ def frequencies(ds: xr.Dataset) -> Claims:
     yield judged('  "f6" of 5 masses is f7 of the 8', 387.6, f[8][6])
     yield differing("f5 of 5 masses against that of 8, as printed", "-0.1761", fifth, 187.2 / 227.2 - 1, 2e-3, 4)
 
-
-def cause(ds: xr.Dataset) -> Claims:
-    """Which neglect makes the five masses wrong."""
+    yield "The cause"
     f = np.array([187.3, 200.0, 226.9])
     errors = (error_of_five(ds, f, how) for how in ("source", "dampers", "mu"))
     for at, real, dampers, mu in zip(f, *errors, strict=True):
@@ -97,9 +99,7 @@ def cause(ds: xr.Dataset) -> Claims:
         yield said(f"error at {at:g} Hz: dampers exact", dampers < 0.1 * real, here, "would vanish", True)
         yield said("  with mu = 1 - (w/w0)^2", mu < 1e-12, f"{mu:.0e}")
 
-
-def conclusions(ds: xr.Dataset) -> Claims:
-    """The source's four conclusions, each with its numbers."""
+    yield "Conclusions"
     f, five = np.linspace(0.5, 400, 4000), ds.sel(n_keep=5).isel(reduction=0)
     H8, H5, short = response(chain(ds, 8), f), response(chain(ds, 5), f), response(chain(ds, 8), f, np.float32)
     worst, first = abs(H5 / H8 - 1)[f <= SPAN].max(), float(abs(five.frequency_error[:4]).max())
@@ -121,14 +121,12 @@ def conclusions(ds: xr.Dataset) -> Claims:
     peaks = ", ".join(f"1/{ratio:.0f} at {place:.0f} Hz" for place, ratio in lower.items())
     yield said("3. high resonances against the main one", min(lower.values()) > 100, peaks, "to some 1/100")
     true, zeta = ds.damping.sel(n_keep=8).isel(reduction=0).values[:5], five.damping.values[:5]
-    off, main = zeta / true - 1, f"1/(2 zeta) = {math.sqrt(1 - zeta[1] ** 2) / (2 * zeta[1]):.1f}"
+    off, high = zeta / true - 1, f"1/(2 zeta) = {math.sqrt(1 - zeta[1] ** 2) / (2 * zeta[1]):.1f}"
     merged, here = abs(off[:4]).max(), f"{abs(off[:4]).max():.1%}, of f5 {off[4]:.0%}"
     yield said("4. dampers merged by (34): error of the damping of f1 to f4", merged < 0.011, here, "matters")
-    yield said("   without dampers resonances are infinite; of the main one", np.all(true > 0), main, "finite")
+    yield said("   without dampers resonances are infinite; of the main one", np.all(true > 0), high, "finite")
 
-
-def others(ds: xr.Dataset) -> Claims:
-    """Five modes by every method."""
+    yield "Five by other methods"
     five, true = ds.sel(n_keep=5), ds.damping.sel(n_keep=8).isel(reduction=0)
     off, lost = 100 * abs(five.frequency_error.values[:, :5]), 100 * abs((five.damping / true - 1).values[:, :4])
     for (name, (first, fifth)), row, damping in zip(FIVE.items(), off, lost, strict=True):
@@ -141,32 +139,20 @@ def others(ds: xr.Dataset) -> Claims:
     yield said("all hold f1-f4 to 1 %; damping by Guyan, by others", held, f"{guyan:.2g} %, {rest:.2g} %", "2.1 %, 1 %")
 
 
-def figure(ds: xr.Dataset) -> Any:
+@panels(128.0, 2, sharex=True)
+def figure(amplitude, error, ds):
     """Receptance of eight and of five masses, and the error of five with its cause; for a column of print."""
     f = np.concatenate([np.linspace(0.2, 60, 600), np.linspace(60, 500, 1400)])
-    with page_of(128.0, 2, width=110.0, sharex=True) as (page, (amplitude, error)):
-        for n, colour, line in ((8, COLOURS[0], "-"), (5, COLOURS[1], "--")):
-            size = abs(response(chain(ds, n), f)) * KGF * 1e3
-            amplitude.semilogy(f, size, line, color=colour, label=f"{n} masses")
-        amplitude.set(ylabel="$|H|$ [10$^{-3}$ rad/(kgf m)]", xlim=(0, 500))
-        error.semilogy(f, error_of_five(ds, f), color=COLOURS[1], label="as the source reduces")
-        error.semilogy(f, error_of_five(ds, f, "dampers"), ":", color="black", label="dampers exact")
-        error.axvline(SPAN, color="0.5", linewidth=0.7, label="1000 rad/s")
-        error.set(xlabel="frequency [Hz]", ylabel="$|H_5/H_8 - 1|$ [1]", ylim=(1e-4, 3))
-        amplitude.legend(loc="upper right")
-        error.legend(loc="lower right")
-    return page
+    for n, colour, line in ((8, COLOURS[0], "-"), (5, COLOURS[1], "--")):
+        size = abs(response(chain(ds, n), f)) * KGF * 1e3
+        amplitude.semilogy(f, size, line, color=colour, label=f"{n} masses")
+    amplitude.set(ylabel="$|H|$ [10$^{-3}$ rad/(kgf m)]", xlim=(0, 500))
+    error.semilogy(f, error_of_five(ds, f), color=COLOURS[1], label="as the source reduces")
+    error.semilogy(f, error_of_five(ds, f, "dampers"), ":", color="black", label="dampers exact")
+    error.axvline(SPAN, color="0.5", linewidth=0.7, label="1000 rad/s")
+    error.set(xlabel="frequency [Hz]", ylabel="$|H_5/H_8 - 1|$ [1]", ylim=(1e-4, 3))
+    amplitude.legend(loc="upper right")
+    error.legend(loc="lower right")
 
 
-def conclude(path: str) -> Conclusion:
-    """Statements and the figure."""
-    ds = read_result(path, "drivetrain", ["reduction", "n_keep"], "fula_milling_machine.toml")
-    chains = {n: in_source_units(chain(ds, n)) for n in (8, 7, 6, 5)}
-    groups = {
-        "Tables 2 to 4": tables_2_to_4(chains), "Tables 3 to 5": tables_3_to_5(chains), "Table 6": frequencies(ds),
-        "The cause": cause(ds), "Conclusions": conclusions(ds), "Five by other methods": others(ds),
-    }  # fmt: skip
-    return groups, [NOTES], lambda: figure(ds)
-
-
-main = script(__name__, "fula_milling_machine.h5", conclude)
+main = script(__name__, "fula_milling_machine.h5", claims, figure)

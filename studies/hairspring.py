@@ -1,42 +1,36 @@
 """By how much does a balance spring steady a foliot against changes of its drive torque, and at what price?
 
-    sweep run studies/hairspring.toml
     python studies/hairspring.py hairspring.h5
 
-draws hairspring.png and compares theory with what comes out. kappa = k phi0/mu is the spring's torque at the switching
-angle over the drive, alpha = mu/(a^2 phi0) the drive as Hoyng & Nieuwenhuizen have it, Q = sqrt(k)/a.
+kappa = k phi0/mu is the spring's torque at the switching angle over the drive, alpha = mu/(a^2 phi0) the drive as
+Hoyng & Nieuwenhuizen have it, Q = sqrt(k)/a.
 
 Theory, to first order in the torque: phi = A sin wt, w = sqrt(k), and the torque, which lags by asin(phi0/A), pushes
 against the displacement with first harmonic (4 mu/pi) cos(asin(phi0/A)), while friction pi a w A^2/2 takes 2 mu phi0:
     P = (2 pi/w) (1 - (2 mu/(pi k A)) sqrt(1 - y)),  y = (phi0/A)^2 = (pi/4) a sqrt(k) phi0/mu,
     s = kappa^(-3/4) alpha^(-1/4) / (2 sqrt(pi)) / sqrt(1 - y).                                        (1)
 At given drive and friction (1) is least at y = 3/4; at given Q it is least at y = 1/2; y = 1 is the end. Derived here.
+
+s = -dlnP/dlnmu; theory is of first order in the torque, exact for alpha and kappa large; deviations are relative, of
+exponents the difference; a number holds if the next order in 1/alpha^(1/2) or 1/kappa, or interpolation, explains it
+paper: Hoyng & Nieuwenhuizen, arXiv:1604.06681, "if they had only mounted some kind of a spring on the foliot"
 """
 
 import math
-from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Claims, Conclusion, compared, count, most, read_result, said, script
-from _figures import NARROW, direct_label, hatch, page_of
-from matplotlib.colors import LogNorm
+from _common import Claims, compared, count, most, said, script
+from _figures import COLOURS, LogNorm, direct_label, hatch, panels
 
 import sweep
 from kernels.interface import Status
-from sweep.show.charts import COLOURS
 
 SHOWN = (1e6, 1e4, 1e2, 1.0)
 """alpha of the lines in the figure."""
 WINDOW = (10.0, 1000.0)
 """kappa at which s is held to (1)."""
 DAY = 86400.0
-
-NOTES = """\
-s = -dlnP/dlnmu; theory is of first order in the torque, exact for alpha and kappa large; deviations are relative, of
-exponents the difference; a number holds if the next order in 1/alpha^(1/2) or 1/kappa, or interpolation, explains it
-paper: Hoyng & Nieuwenhuizen, arXiv:1604.06681, "if they had only mounted some kind of a spring on the foliot"\
-"""
 
 
 def scaled(ds: xr.Dataset) -> xr.Dataset:
@@ -46,19 +40,19 @@ def scaled(ds: xr.Dataset) -> xr.Dataset:
     return ds.assign(s=ds.sensitivity, A=ds.amplitude / ds.phi0)
 
 
-def at(alpha: Any, kappa: Any, design: str = "product") -> xr.Dataset:
+def at(alpha, kappa, design: str = "product") -> xr.Dataset:
     """The same foliot at other alpha and kappa, by one method: near the last spring with a cycle it is INACCURATE."""
     axes = {"a": np.atleast_1d(alpha) ** -0.5, "k": np.atleast_1d(kappa)}
     fixed = {"mu": 1.0, "phi0": 1.0}
     return scaled(sweep.run(kernel="foliot", method="segments", rtol=1e-7, design=design, axes=axes, fixed=fixed))
 
 
-def line_of(ds: xr.Dataset, alpha: Any) -> xr.Dataset:
+def line_of(ds: xr.Dataset, alpha) -> xr.Dataset:
     """The sweep of the spring at the drive next to `alpha`."""
     return ds.isel({ds.alpha.dims[0]: int(np.argmin(abs(np.log(ds.alpha.values / float(alpha)))))})
 
 
-def first_order(alpha: Any, kappa: Any) -> Any:
+def first_order(alpha, kappa):
     """Equation (1); NaN where the spring cannot be thrown over."""
     y = math.pi / 4 * np.sqrt(kappa / alpha)
     return kappa**-0.75 * alpha**-0.25 / np.sqrt(4 * math.pi * np.where(y < 1, 1 - y, np.nan))
@@ -72,8 +66,15 @@ def best_springs(ds: xr.Dataset) -> xr.Dataset:
     return found.assign(blur=("cell", (place.abscissa_error / place.abscissa).values))
 
 
-def laws(ds: xr.Dataset) -> Claims:
-    """How the sensitivity falls with the spring, from that of the foliot to the line of (1)."""
+def prepared(ds):
+    """The sweep with its groups, and the springs of least sensitivity."""
+    ds = scaled(ds)
+    return ds, best_springs(ds)
+
+
+def claims(ds, springs) -> Claims:
+    """What theory says, and what comes out."""
+    yield "The law"
     strong, (low, high) = line_of(ds, ds.alpha.max()), WINDOW
     bare = at(strong.alpha.values, 0.0).s.item()
     part = ds.where((ds.alpha > 0.99e5) & (ds.kappa > low) & (ds.kappa < high), drop=True)
@@ -87,9 +88,7 @@ def laws(ds: xr.Dataset) -> Claims:
     yield most(what, "(1)", part.s / first_order(part.alpha, part.kappa) - 1, slack, count(part.s))
     yield most("differences of ln P against the exact s", "0", off, rough, "largest distance")
 
-
-def optimum(ds: xr.Dataset, springs: xr.Dataset) -> Claims:
-    """The best spring, by drive and at a given Q; where there is no cycle any more; and what is told from rest."""
+    yield "How far it goes"
     for alpha in (1e6, 1e4, 1e2):
         best, line = line_of(springs, alpha), line_of(ds, alpha)
         last = int(np.flatnonzero(line.s.notnull())[-1])  # the strongest spring with a cycle, to one part in 2000
@@ -115,76 +114,55 @@ def optimum(ds: xr.Dataset, springs: xr.Dataset) -> Claims:
     yield compared(what, "1/2", float(cell.s * cell.Q), 0.5, 3 / Q, 6)
     yield said(rule, not wrong, f"{wrong} of {int(cells.sum())} cells", "0 cells")
 
-
-def improvement(ds: xr.Dataset) -> Claims:
-    """What the paper expects of a spring: by what factor the sensitivity falls at best."""
+    yield "The paper's spring"
     for alpha, least, word in ((1e4, 10, "dramatically"), (1e2, 10, "dramatically"), (1.0, 1, ""), (1e-2, 1, "")):
         gain = at(alpha, 0.0).s.item() / float(line_of(ds, alpha).s.min())
         yield said(f"best spring, s of alpha = {alpha:g} falls by", gain > least, f"{gain:.4g}", word)
 
 
-def draw_lines(axes: Any, ds: xr.Dataset, springs: xr.Dataset) -> None:
-    """s against kappa at several drives: exact, by (1), and the best springs."""
+@panels(150.0, 2)
+def figure(lines, plane, ds, springs):
+    """Sensitivity against the spring, and a map of it over spring and drive."""
     for alpha, colour in zip(SHOWN, COLOURS, strict=False):
         line = line_of(ds, alpha)
         started = line.status == Status.OK
-        axes.loglog(line.kappa, line.s.where(started), color=colour)
-        axes.loglog(line.kappa, line.s.where(~started), color=colour, linestyle=(0, (2.5, 1)))
+        lines.loglog(line.kappa, line.s.where(started), color=colour)
+        lines.loglog(line.kappa, line.s.where(~started), color=colour, linestyle=(0, (2.5, 1)))
         if alpha == 1.0:
-            direct_label(axes, 3, 0.45, r"$\alpha = 1$", colour, ha="left")
+            direct_label(lines, 3, 0.45, r"$\alpha = 1$", colour, ha="left")
             continue
         cell, few = line_of(springs, alpha), line.kappa.values[::10]
         few = few[(few > alpha ** (-1 / 3)) & (few < 1.6 * alpha)]
-        axes.plot(few, first_order(alpha, few), "x", color="black", markersize=3.5, markeredgewidth=0.7)
-        axes.plot(cell.kappa, cell.s, "o", color=colour)
+        lines.plot(few, first_order(alpha, few), "x", color="black", markersize=3.5, markeredgewidth=0.7)
+        lines.plot(cell.kappa, cell.s, "o", color=colour)
         text = rf"$\alpha = 10^{{{round(math.log10(alpha))}}}$"
-        direct_label(axes, 2.4 * cell.kappa, cell.s, text, colour, ha="left")
-    axes.set(xlabel=r"spring, $\kappa = k\varphi_0/\mu$ [1]", ylabel=r"sensitivity to torque, $s$ [1]")
-    axes.set(xlim=(ds.kappa.min(), 10 * ds.kappa.max()), ylim=(2e-7, 1.5))
+        direct_label(lines, 2.4 * cell.kappa, cell.s, text, colour, ha="left")
+    lines.set(xlabel=r"spring, $\kappa = k\varphi_0/\mu$ [1]", ylabel=r"sensitivity to torque, $s$ [1]")
+    lines.set(xlim=(ds.kappa.min(), 10 * ds.kappa.max()), ylim=(2e-7, 1.5))
     looks = {"self-starting": {}, "not self-starting": {"linestyle": (0, (2.5, 1))}}
     looks |= {"theory of first order": {"marker": "x", "linestyle": ""}}
     looks |= {"best spring": {"marker": "o", "linestyle": ""}}
     for name, look in looks.items():
-        axes.plot([], [], color="black", label=name, **look)
-    axes.legend(loc="lower left")
-    day = axes.secondary_yaxis("right", functions=(lambda s: 0.01 * DAY * s, lambda rate: rate / (0.01 * DAY)))
+        lines.plot([], [], color="black", label=name, **look)
+    lines.legend(loc="lower left")
+    day = lines.secondary_yaxis("right", functions=(lambda s: 0.01 * DAY * s, lambda rate: rate / (0.01 * DAY)))
     day.set_ylabel("rate [s/day] by 1 % of torque")
-    axes.tick_params(axis="y", which="both", right=False)
-
-
-def draw_map(axes: Any, ds: xr.Dataset) -> None:
-    """s over spring and drive; hatched where there is no cycle, and where it does not start by itself."""
+    lines.tick_params(axis="y", which="both", right=False)
     kappa, alpha, rate = ds.kappa.values, ds.alpha.values, 0.01 * DAY * ds.s.values
-    axes.set(xscale="log", yscale="log", xlabel=r"spring, $\kappa = k\varphi_0/\mu$ [1]")
-    axes.set(ylabel=r"drive, $\alpha = \mu/(a^2\varphi_0)$ [1]", ylim=(alpha.min(), alpha.max()))
+    plane.set(xscale="log", yscale="log", xlabel=r"spring, $\kappa = k\varphi_0/\mu$ [1]")
+    plane.set(ylabel=r"drive, $\alpha = \mu/(a^2\varphi_0)$ [1]", ylim=(alpha.min(), alpha.max()))
     shown = np.ma.masked_invalid(rate)
-    axes.pcolormesh(kappa, alpha, shown, norm=LogNorm(1e-4, 1e3), cmap="viridis", alpha=0.75, rasterized=True)
+    plane.pcolormesh(kappa, alpha, shown, norm=LogNorm(1e-4, 1e3), cmap="viridis", alpha=0.75, rasterized=True)
     levels = (1e-3, 1e-2, 0.1, 1, 10, 100, 400)
-    axes.clabel(axes.contour(kappa, alpha, rate, levels=levels, colors="black", linewidths=0.7), fmt="%g", fontsize=7)
-    hatch(axes, kappa, alpha, (ds.status == Status.STICKS).values, "////")
-    hatch(axes, kappa, alpha, (ds.status == Status.NOT_SELF_STARTING).values, "..", "white")
+    plane.clabel(plane.contour(kappa, alpha, rate, levels=levels, colors="black", linewidths=0.7), fmt="%g", fontsize=7)
+    hatch(plane, kappa, alpha, (ds.status == Status.STICKS).values, "////")
+    hatch(plane, kappa, alpha, (ds.status == Status.NOT_SELF_STARTING).values, "..", "white")
     line = alpha[alpha > 9.9]
-    axes.plot(9 / math.pi**2 * line, line, color="white", linestyle=(0, (5, 1.5)))
-    direct_label(axes, 3e4, 0.3, "sticks: no cycle")
-    axes.set_title("rate [s/day] by 1 % of torque", loc="right")
-    direct_label(axes, 3e5, 3e2, "best spring (dashed)")
-    direct_label(axes, 3e2, 4e3, "not self-starting")
+    plane.plot(9 / math.pi**2 * line, line, color="white", linestyle=(0, (5, 1.5)))
+    direct_label(plane, 3e4, 0.3, "sticks: no cycle")
+    plane.set_title("rate [s/day] by 1 % of torque", loc="right")
+    direct_label(plane, 3e5, 3e2, "best spring (dashed)")
+    direct_label(plane, 3e2, 4e3, "not self-starting")
 
 
-def figure(ds: xr.Dataset, springs: xr.Dataset) -> Any:
-    """Sensitivity against the spring, and a map of it over spring and drive."""
-    with page_of(150.0, 2, 1, width=NARROW) as (page, (lines, plane)):
-        draw_lines(lines, ds, springs)
-        draw_map(plane, ds)
-    return page
-
-
-def conclude(path: str) -> Conclusion:
-    """Statements and the figure."""
-    ds = scaled(read_result(path, "foliot", ["a", "k"], "hairspring.toml"))
-    springs = best_springs(ds)
-    groups = {"The law": laws(ds), "How far it goes": optimum(ds, springs), "The paper's spring": improvement(ds)}
-    return groups, [NOTES], lambda: figure(ds, springs)
-
-
-main = script(__name__, "hairspring.h5", conclude)
+main = script(__name__, "hairspring.h5", claims, figure, prepared)

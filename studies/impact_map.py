@@ -1,30 +1,24 @@
 """When does a crown wheel that collides with a foliot keep a steady beat, and how far does it recoil?
 
-    sweep run studies/impact_map.toml
-    sweep run studies/impact_map_lever.toml
     python studies/impact_map.py impact_map.h5 impact_map_lever.h5
 
-draws impact_map.png and compares theory with what comes out. Two bodies of masses M and m at the pallet, kappa = M/m,
+Two bodies of masses M and m at the pallet, kappa = M/m,
 under the force F = m g kappa, with one impact per half period T:
     T^2 = p(1 + e)/(g(1 - e)(1 + kappa)),  swing Y = kappa g T^2/4,  recoil if kappa < 2e/(1 - e),
 where no tooth is met in between; stable for kappa > 1. The models of Lepschy and Roup are of this kind.
+
+theory: kappa = M/m, the mass of the wheel over that of the foliot, both at the pallet; deviation: relative, in the
+worst cell; allowed 1e-9 of what is followed contact by contact
 """
 
 import math
-from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Claims, Conclusion, Statement, count, most, read_result, said, script
-from _figures import NARROW, colour_map, direct_label, hatch, page_of
-from matplotlib.colors import ListedColormap
-from matplotlib.patches import Patch
+from _common import Claims, Statement, count, most, said, script
+from _figures import ListedColormap, Patch, colour_map, direct_label, hatch, panels
 
 from kernels.interface import Status
-
-NOTES = """\
-theory: kappa = M/m, the mass of the wheel over that of the foliot, both at the pallet; deviation: relative, in the
-worst cell; allowed 1e-9 of what is followed contact by contact"""
 
 EXISTS = (Status.OK, Status.UNSTABLE, Status.GRAZING)
 
@@ -37,7 +31,7 @@ KINDS = {
 LEVER_E = 0.6
 
 
-def prepared(ds: xr.Dataset) -> xr.Dataset:
+def scaled(ds: xr.Dataset) -> xr.Dataset:
     """`ds` with kappa, the pitch p and the swing over it."""
     pitch = 2 * math.pi * ds.r_c / ds.teeth
     kappa = (ds.I_c / ds.r_c**2) / (ds.I_v / ds.r_v**2)
@@ -47,15 +41,6 @@ def prepared(ds: xr.Dataset) -> xr.Dataset:
 def exceptions(what: str, wrong: xr.DataArray) -> Statement:
     """That something is so in every cell."""
     return said(what, not wrong.any(), count(wrong, "exceptions"), "no exception")
-
-
-def cycle(closed: xr.Dataset) -> Claims:
-    """The symmetric cycle where it exists; e = 0 is another one, with the tooth resting on the pallet."""
-    free = closed.where(closed.status.isin(EXISTS) & (closed.e > 0))
-    here = free.period.notnull() & (free.status != Status.GRAZING) & (abs(free.kappa - 1) > 1e-12)
-    back = free.kappa < 2 * free.e / (1 - free.e)
-    yield exceptions("stable for kappa > 1 and no other", here & ((free.multiplier < 1) != (free.kappa > 1)))
-    yield exceptions("recoil for kappa < 2e/(1 - e)", here & ((free.recoil > 0) != back))
 
 
 def kinds(motion: xr.Dataset) -> xr.DataArray:
@@ -76,25 +61,7 @@ def kinds(motion: xr.Dataset) -> xr.DataArray:
     return kind
 
 
-def motions(closed: xr.Dataset, motion: xr.Dataset) -> Claims:
-    """What the clock does, followed contact by contact."""
-    both = (closed.status == Status.OK) & (motion.status == Status.OK) & (motion.impacts == 1)
-    same = motion.where(both & (closed.e > 0))
-    lost = (closed.status == Status.OK) & (motion.status != Status.OK)
-    force = closed.torque * closed.r_c / closed.I_c
-    twice = 2 * np.sqrt(closed.pitch * (1 + closed.e) / (force * (1 - closed.e) * (1 + closed.kappa)))
-    way = same.kappa * (1 + same.e) / (4 * (1 - same.e) * (1 + same.kappa))
-    kind = kinds(motion)
-    census = {name: count(kind == i) for i, name in enumerate(KINDS)}
-    few = (kind == list(KINDS).index("open")).mean() < 0.02
-    yield most("period by events = 2T", "1e-9", same.period / twice - 1, 1e-9, count(both))
-    yield most("swing by events = Y, whatever the torque", "1e-9", same.Y / way - 1, 1e-9, count(both))
-    yield said("stable cycles that events does not settle on", lost.mean() < 0.01, count(lost), "1 %")
-    yield from (Statement(f"  {name}", "", cells) for name, cells in census.items() if name != "open")
-    yield said("  none of these", few, census["open"], "2 %")
-
-
-def flip_border(kappa: Any, e: float) -> Any:
+def flip_border(kappa, e: float):
     """nu at which a multiplier is -1, for any kappa; so it is at kappa = 1 for any nu."""
     return -4 * (1 + e) ** 2 / ((1 - e) ** 2 * kappa + 2 * (1 + e * e))
 
@@ -114,44 +81,65 @@ def lever(bent: xr.Dataset) -> Claims:
     yield said("heavy foliots steady with a flat lever", not flat.any(), count(flat), "none")
 
 
-def figure(motion: xr.Dataset, bent: xr.Dataset) -> Any:
+def prepared(ds, lever):
+    """What the clock does contact by contact, the curved lever, and the symmetric cycle."""
+    closed, motion = (scaled(ds).sel({"method": name}) for name in ("closed", "events"))
+    return motion, scaled(lever), closed
+
+
+def claims(motion, bent, closed) -> Claims:
+    """What theory says, and what comes out."""
+    yield "The symmetric cycle"
+    free = closed.where(closed.status.isin(EXISTS) & (closed.e > 0))
+    here = free.period.notnull() & (free.status != Status.GRAZING) & (abs(free.kappa - 1) > 1e-12)
+    back = free.kappa < 2 * free.e / (1 - free.e)
+    yield exceptions("stable for kappa > 1 and no other", here & ((free.multiplier < 1) != (free.kappa > 1)))
+    yield exceptions("recoil for kappa < 2e/(1 - e)", here & ((free.recoil > 0) != back))
+
+    yield "What the clock does"
+    both = (closed.status == Status.OK) & (motion.status == Status.OK) & (motion.impacts == 1)
+    same = motion.where(both & (closed.e > 0))
+    lost = (closed.status == Status.OK) & (motion.status != Status.OK)
+    force = closed.torque * closed.r_c / closed.I_c
+    twice = 2 * np.sqrt(closed.pitch * (1 + closed.e) / (force * (1 - closed.e) * (1 + closed.kappa)))
+    way = same.kappa * (1 + same.e) / (4 * (1 - same.e) * (1 + same.kappa))
+    kind = kinds(motion)
+    census = {name: count(kind == i) for i, name in enumerate(KINDS)}
+    few = (kind == list(KINDS).index("open")).mean() < 0.02
+    yield most("period by events = 2T", "1e-9", same.period / twice - 1, 1e-9, count(both))
+    yield most("swing by events = Y, whatever the torque", "1e-9", same.Y / way - 1, 1e-9, count(both))
+    yield said("stable cycles that events does not settle on", lost.mean() < 0.01, count(lost), "1 %")
+    yield from (Statement(f"  {name}", "", cells) for name, cells in census.items() if name != "open")
+    yield said("  none of these", few, census["open"], "2 %")
+
+    yield "A curved lever"
+    yield from lever(bent)
+
+
+@panels(158.0, 2)
+def figure(clock, lever, motion, bent, *_):
     """What the clock does, with the borders of its symmetric cycle, and what a curved lever does."""
     kappa, e, kind = motion.kappa.values, motion.e.values, kinds(motion).transpose("e", "I_c").values
     look = {"cmap": ListedColormap(list(KINDS.values())), "vmin": -0.5, "vmax": len(KINDS) - 0.5}
-    with page_of(158.0, 2, 1, width=NARROW) as (page, (clock, lever)):
-        clock.pcolormesh(kappa, e, kind, shading="nearest", rasterized=True, **look)
-        for border, name, dashes in ((np.ones_like(e), r"$\kappa=1$", "-"), (2 * e[:-1] / (1 - e[:-1]), "", "--")):
-            clock.plot(border, e[: border.size], dashes, color="black", label=name or r"$\kappa=2e/(1-e)$")
-        clock.set(xlim=(kappa[0], kappa[-1]), ylim=(e[0], e[-1]), ylabel="restitution, $e$ [1]")
-        keys = [Patch(color=KINDS[name], label=name) for i, name in enumerate(KINDS) if (kind == i).any()]
-        page.legend(handles=[*keys, *clock.lines], loc="outside upper center", ncols=2)
+    clock.pcolormesh(kappa, e, kind, shading="nearest", rasterized=True, **look)
+    for border, name, dashes in ((np.ones_like(e), r"$\kappa=1$", "-"), (2 * e[:-1] / (1 - e[:-1]), "", "--")):
+        clock.plot(border, e[: border.size], dashes, color="black", label=name or r"$\kappa=2e/(1-e)$")
+    clock.set(xlim=(kappa[0], kappa[-1]), ylim=(e[0], e[-1]), ylabel="restitution, $e$ [1]")
+    keys = [Patch(color=KINDS[name], label=name) for i, name in enumerate(KINDS) if (kind == i).any()]
+    clock.figure.legend(handles=[*keys, *clock.lines], loc="outside upper center", ncols=2)
 
-        kappa, values = bent.kappa.values, bent.multiplier.transpose("nu", "I_c").values
-        colour_map(lever, kappa, bent.nu.values, values, "multiplier [1]", {"extend": "max"}, vmin=0.5, vmax=1.5,
-                   cmap="RdBu_r")  # fmt: skip
-        hatch(lever, kappa, bent.nu.values, np.isnan(values), "////")
-        inside = kappa[~np.isnan(values).all(axis=0)]
-        lever.plot(inside, flip_border(inside, LEVER_E), color="black", linewidth=0.9)
-        lever.axvline(1.0, color="black", linewidth=0.9)
-        lever.set_ylabel(r"curvature of the lever, $\nu$ [1]")
-        direct_label(lever, 0.3, -7, "stable")
-        direct_label(lever, 0.22, 3, "unstable")
-        for axes in (clock, lever):
-            axes.set(xscale="log", xlabel=r"wheel over foliot, $\kappa$ [1]")
-    return page
+    kappa, values = bent.kappa.values, bent.multiplier.transpose("nu", "I_c").values
+    colour_map(lever, kappa, bent.nu.values, values, "multiplier [1]", {"extend": "max"}, vmin=0.5, vmax=1.5,
+               cmap="RdBu_r")  # fmt: skip
+    hatch(lever, kappa, bent.nu.values, np.isnan(values), "////")
+    inside = kappa[~np.isnan(values).all(axis=0)]
+    lever.plot(inside, flip_border(inside, LEVER_E), color="black", linewidth=0.9)
+    lever.axvline(1.0, color="black", linewidth=0.9)
+    lever.set_ylabel(r"curvature of the lever, $\nu$ [1]")
+    direct_label(lever, 0.3, -7, "stable")
+    direct_label(lever, 0.22, 3, "unstable")
+    for axes in (clock, lever):
+        axes.set(xscale="log", xlabel=r"wheel over foliot, $\kappa$ [1]")
 
 
-def conclude(path: str, lever_path: str) -> Conclusion:
-    """Statements and the figure."""
-    ds = prepared(read_result(path, "impact", ["method", "I_c", "e"], "impact_map.toml"))
-    bent = prepared(read_result(lever_path, "impact", ["I_c", "nu"], "impact_map_lever.toml"))
-    closed, motion = (ds.sel({"method": name}) for name in ("closed", "events"))
-    groups = {
-        "The symmetric cycle": cycle(closed),
-        "What the clock does": motions(closed, motion),
-        "A curved lever": lever(bent),
-    }
-    return groups, [NOTES], lambda: figure(motion, bent)
-
-
-main = script(__name__, "impact_map.h5 impact_map_lever.h5", conclude)
+main = script(__name__, "impact_map.h5 impact_map_lever.h5", claims, figure, prepared)

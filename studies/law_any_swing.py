@@ -1,9 +1,8 @@
 """What is the exponent of a foliot's period, P ~ torque^(-s), at any swing and any shares of its losses?
 
-    sweep run studies/law_any_swing.toml
     python studies/law_any_swing.py law_any_swing.h5
 
-draws law_any_swing.png and compares theory with what comes out. Let friction of degree n (0 dry, 1 viscous, n drag)
+Let friction of degree n (0 dry, 1 viscous, n drag)
 take the share lambda_n of the energy of half a swing, impacts the share lambda_e; N = sum of n lambda_n, and A is the
 amplitude over phi0. At large swings s = L = (N + lambda_e)/(N + 2). At small ones the foliot goes at its final speed,
 or starts from rest after an impact, and s = 1/M, M = N + 2 lambda_e. Between them, with x = k (A^2 - 1),
@@ -13,19 +12,20 @@ as friction of degree 2, k_2 = 5. Exact: dry friction alone at any swing, 1/(A^2
 or impacts alone, 1/2, and both limits.
 Exact for every clock, since no other quantity has a time in it: with p_n = dlnP/dlnc_n for each friction c_n v^n,
     s = 1/2 + 1/2 sum of (2 - n) p_n.                                                                            (2)
+
+deviation: of s, as a share of it, or the difference where an exponent is beside a number. Allowed: of (1)
+what the line says, of (2) the error of differences. Clocks: 1280 drawn over a, R, c and n, with e = 1, .99, .9, .5, 0
 """
 
 import itertools
-from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Claims, Conclusion, Statement, count, most, read_result, said, script, solved
-from _figures import NARROW, page_of
+from _common import Claims, Statement, count, most, said, script, solved
+from _figures import COLOURS, panels
 from _losses import any_swing, shares
 
 import sweep
-from sweep.show.charts import COLOURS
 
 BANDS = ((1.0, 1.1, 0.25), (1.1, 2.0, 0.20), (2.0, 10.0, 0.09), (10.0, np.inf, 0.005))
 """Swings over phi0, and the most that (1) may be off there, as a share of s."""
@@ -33,10 +33,6 @@ SAMPLE = 32
 STEP = 1e-3
 """Of ln c_n, in the differences of (2); their error is the square of it."""
 
-NOTES = """\
-deviation: of s, as a share of it, or the difference where an exponent is beside a number. Allowed: of (1)
-what the line says, of (2) the error of differences. Clocks: 1280 drawn over a, R, c and n, with e = 1, .99, .9, .5, 0
-"""
 LOSSES: dict[str, tuple[dict[str, float], float]] = {
     "dry": ({"R": 1.0}, 1e-8), "viscous": ({"a": 1.0}, 0.05), "degree 3": ({"c": 1.0, "n": 3.0}, 0.05),
     "degree 2": ({"c": 1e-2, "n": 2.0}, 1e-8), "impacts": ({"e": 0.7}, 1e-8),
@@ -44,8 +40,22 @@ LOSSES: dict[str, tuple[dict[str, float], float]] = {
 """Clocks of one loss, and the most that (1) may be off."""
 
 
-def everywhere(ds: xr.Dataset) -> Claims:
-    """(1) against every clock, by its swing."""
+def alone(name: str) -> xr.Dataset:
+    """One loss at many torques, with its laws."""
+    clock = {"a": 0.0, "c": 0.0, "phi0": 1.0, **LOSSES[name][0]}
+    mu = 1.0 + np.geomspace(1e-3, 1e3, 40) if "R" in clock else np.geomspace(1e-8, 1e8, 50)
+    outputs = ["amplitude", "crossing_speed", "sensitivity"]
+    return any_swing(shares(solved("foliot", mu=mu, **clock, outputs=outputs, rtol=1e-10)))
+
+
+def prepared(ds):
+    """The clocks with their laws, and those of one loss alone, by its name."""
+    return any_swing(shares(ds)), {name: alone(name) for name in LOSSES}
+
+
+def claims(ds, single) -> Claims:
+    """What theory says, and what comes out."""
+    yield "Any losses, any swing"
     off = abs(ds.law / ds.sensitivity - 1.0)
     half, nearly = off.quantile([0.5, 0.95]).values
     usual, text = bool(half < 0.004 and nearly < 0.1), f"{half:.2%}, {nearly:.1%}"
@@ -59,25 +69,13 @@ def everywhere(ds: xr.Dataset) -> Claims:
     text, better = ", ".join(f"{share:.0%}" for share in near), near[0] > 0.9 > 0.75 > max(near[1:])
     yield said("within 10 %: by (1), by large swings, by small", better, text)
 
-
-def alone(name: str) -> xr.Dataset:
-    """One loss at many torques, with its laws."""
-    clock = {"a": 0.0, "c": 0.0, "phi0": 1.0, **LOSSES[name][0]}
-    mu = 1.0 + np.geomspace(1e-3, 1e3, 40) if "R" in clock else np.geomspace(1e-8, 1e8, 50)
-    outputs = ["amplitude", "crossing_speed", "sensitivity"]
-    return any_swing(shares(solved("foliot", mu=mu, **clock, outputs=outputs, rtol=1e-10)))
-
-
-def one_loss(single: dict[str, xr.Dataset]) -> Claims:
-    """(1) where it is exact, and of two losses where it is not."""
-    for name, ds in single.items():
+    yield "One loss alone"
+    for name, line in single.items():
         allowed = LOSSES[name][1]
-        text = f"s from {ds.sensitivity.max():.4g} to {ds.sensitivity.min():.4g}"
-        yield most(f"{name} alone", f"(1) to {allowed:g}", ds.law / ds.sensitivity - 1, allowed, text)
+        text = f"s from {line.sensitivity.max():.4g} to {line.sensitivity.min():.4g}"
+        yield most(f"{name} alone", f"(1) to {allowed:g}", line.law / line.sensitivity - 1, allowed, text)
 
-
-def by_periods(ds: xr.Dataset) -> Claims:
-    """(2) with the periods of some of the clocks at other friction."""
+    yield "By the period at other friction"
     few = ds.isel(point=slice(0, SAMPLE), e=slice(0, 4)).stack(clock=("point", "e"))
     clock = {name: few[name].values for name in ("a", "R", "c", "n", "e")}
     study = {"kernel": "foliot", "outputs": ["period"], "rtol": 1e-12, "axes": {name: [0.5] for name in clock}}
@@ -93,39 +91,26 @@ def by_periods(ds: xr.Dataset) -> Claims:
     yield most(f"(2), {SAMPLE * 4} clocks", "1e-4", s / few.sensitivity - 1, 1e-4, text)
 
 
-def figure(ds: xr.Dataset, single: dict[str, xr.Dataset]) -> Any:
+@panels(132.0, 2, sharex=True)
+def figure(one, off, ds, single):
     """One loss alone over the swing, and how far (1) is off for every clock."""
     beyond, s = r"swing beyond the switch, $A-1$ [1]", ds.sensitivity.values.ravel()
-    with page_of(132.0, 2, 1, width=NARROW, sharex=True) as (page, (one, off)):
-        for colour, (name, line) in zip(COLOURS, list(single.items())[:3], strict=False):
-            one.loglog(line.swing - 1, line.law, color=colour, label=name)
-            one.loglog(line.swing - 1, line.sensitivity, "o", color=colour, markersize=2.5, markerfacecolor="white")
-        one.plot([], [], "ko", markersize=2.5, markerfacecolor="white", label="kernel")
-        one.set(ylabel="exponent, $s$ [1]", xlim=(1e-3, 1e2), ylim=(0.02, 30))
-        one.legend(loc="upper right")
+    for colour, (name, line) in zip(COLOURS, list(single.items())[:3], strict=False):
+        one.loglog(line.swing - 1, line.law, color=colour, label=name)
+        one.loglog(line.swing - 1, line.sensitivity, "o", color=colour, markersize=2.5, markerfacecolor="white")
+    one.plot([], [], "ko", markersize=2.5, markerfacecolor="white", label="kernel")
+    one.set(ylabel="exponent, $s$ [1]", xlim=(1e-3, 1e2), ylim=(0.02, 30))
+    one.legend(loc="upper right")
 
-        swing, far = ds.swing.values.ravel() - 1, 100 * abs(ds.law.values.ravel() / s - 1)
-        off.loglog(swing, far, ".", color="0.75", markersize=1, rasterized=True)
-        edges = np.geomspace(1e-3, 20, 10)
-        bins = [far[(swing >= low) & (swing < high)] for low, high in itertools.pairwise(edges)]
-        for share, dashes in ((95, "-"), (50, "--")):
-            kept, look = [np.percentile(b, share) for b in bins], {"color": COLOURS[0], "label": f"{share} % of them"}
-            off.plot(np.sqrt(edges[1:] * edges[:-1]), kept, dashes, **look)
-        off.set(xlabel=beyond, ylabel="deviation of (1) [% of $s$]", ylim=(1e-3, 100))
-        off.legend(loc="lower left")
-    return page
+    swing, far = ds.swing.values.ravel() - 1, 100 * abs(ds.law.values.ravel() / s - 1)
+    off.loglog(swing, far, ".", color="0.75", markersize=1, rasterized=True)
+    edges = np.geomspace(1e-3, 20, 10)
+    bins = [far[(swing >= low) & (swing < high)] for low, high in itertools.pairwise(edges)]
+    for share, dashes in ((95, "-"), (50, "--")):
+        kept, look = [np.percentile(b, share) for b in bins], {"color": COLOURS[0], "label": f"{share} % of them"}
+        off.plot(np.sqrt(edges[1:] * edges[:-1]), kept, dashes, **look)
+    off.set(xlabel=beyond, ylabel="deviation of (1) [% of $s$]", ylim=(1e-3, 100))
+    off.legend(loc="lower left")
 
 
-def conclude(path: str) -> Conclusion:
-    """Statements and the figure."""
-    ds = any_swing(shares(read_result(path, "foliot", ["point", "e"], "law_any_swing.toml")))
-    single = {name: alone(name) for name in LOSSES}
-    groups = {
-        "Any losses, any swing": everywhere(ds),
-        "One loss alone": one_loss(single),
-        "By the period at other friction": by_periods(ds),
-    }
-    return groups, [NOTES], lambda: figure(ds, single)
-
-
-main = script(__name__, "law_any_swing.h5", conclude)
+main = script(__name__, "law_any_swing.h5", claims, figure, prepared)

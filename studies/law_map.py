@@ -1,31 +1,31 @@
 """Which law does a foliot's period follow, P ~ torque^(-s), by the shares of its losses?
 
-    sweep run studies/law_map.toml
     python studies/law_map.py law_map.h5
 
-draws law_map.png and compares theory with what comes out. The general law, derived here by dominant balance: let
-friction of degree n take the share lambda_n of the energy 2 mu phi0 of half a swing, n = 0 dry, 1 viscous, n drag c
-abs(v)^n, and impacts at the switch the share lambda_e; N = sum of n lambda_n. Large swings (light losses): the way is
-v^2/mu, so friction takes c v^(n + 2)/mu, impacts (1 - e^2) v^2/2, and P ~ v/mu. The differential of the balance, sum
-lambda_n ((n + 2) dlnv - dlnmu) + 2 lambda_e dlnv = dlnmu, gives s = (N + lambda_e)/(N + 2),
-(1) which is n/(n + 2) for one friction, 1/2 for impacts alone. Small swings (heavy losses): the foliot goes at its
-final speed, f(v) = mu, and P ~ phi0/v, so s = 1/(N + 2 lambda_e), 1/n for one friction; impacts take little there. From
-rest after each impact, e = 0, with dry friction alone this is exact at any share of impacts, s = mu/(2 (mu - R)).
-(2) The ratio of the shares of two frictions goes as v^(n - n'), that of impacts to a friction as mu/v^n, and
-dlnv = (1 - s) dlnmu: with (1) this says how many decades of torque an exponent takes to turn into another.      (3)
+The general law, derived here by dominant balance: let friction of degree n take the share lambda_n of the energy 2 mu
+phi0 of half a swing, n = 0 dry, 1 viscous, n drag c abs(v)^n, and impacts at the switch the share lambda_e; N = sum of
+n lambda_n. Large swings (light losses): the way is v^2/mu, so friction takes c v^(n + 2)/mu, impacts (1 - e^2) v^2/2,
+and P ~ v/mu. The differential of the balance, sum lambda_n ((n + 2) dlnv - dlnmu) + 2 lambda_e dlnv = dlnmu, gives s =
+(N + lambda_e)/(N + 2), (1) which is n/(n + 2) for one friction, 1/2 for impacts alone. Small swings (heavy losses):
+the foliot goes at its final speed, f(v) = mu, and P ~ phi0/v, so s = 1/(N + 2 lambda_e), 1/n for one friction; impacts
+take little there. From rest after each impact, e = 0, with dry friction alone this is exact at any share of impacts, s
+= mu/(2 (mu - R)). (2) The ratio of the shares of two frictions goes as v^(n - n'), that of impacts to a friction as
+mu/v^n, and dlnv = (1 - s) dlnmu: with (1) this says how many decades of torque an exponent takes to turn into another.
+(3)
+
+s = -dlnP/dlnmu; deviation: the difference of exponents, others relative. Shares by quadrature of the losses over the
+speed. Allowed: 1e-6 of the energy; 0.001 of (1) at swings over 100 phi0, 0.011 of (2) at swings under 1.0003 phi0, 1e-8
+from rest
 """
 
 import math
-from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Claims, Conclusion, compared, count, last_passage, most, read_result, script, solved
-from _figures import NARROW, page_of
+from _common import Claims, compared, count, last_passage, most, script, solved
+from _figures import COLOURS, panels
 from _losses import any_swing, shares
 from scipy.optimize import brentq
-
-from sweep.show.charts import COLOURS
 
 LARGE, SMALL = 100.0, 1.0003
 """Amplitudes over phi0 from which, and up to which, losses are called light and heavy."""
@@ -33,12 +33,6 @@ AT_ONCE = 4000
 """Cells whose losses are summed up together: 6 MB an array."""
 SPEEDS = ["amplitude", "crossing_speed", "sensitivity"]
 """Outputs that shares of the losses are made of."""
-
-NOTES = """\
-s = -dlnP/dlnmu; deviation: the difference of exponents, others relative. Shares by quadrature of the losses over the
-speed. Allowed: 1e-6 of the energy; 0.001 of (1) at swings over 100 phi0, 0.011 of (2) at swings under 1.0003 phi0, 1e-8
-from rest
-"""
 
 
 def prepared(ds: xr.Dataset) -> xr.Dataset:
@@ -48,37 +42,6 @@ def prepared(ds: xr.Dataset) -> xr.Dataset:
     parts = [shares(ds.isel(mu=slice(i, i + width))) for i in range(0, ds.sizes["mu"], width)]
     ds = xr.concat(parts, "mu", data_vars="minimal", coords="minimal", compat="override", join="outer")
     return any_swing(ds).transpose(*order)
-
-
-def laws(ds: xr.Dataset) -> Claims:
-    """(1) and (2) against every cell of large and of small swings."""
-    large, small = ds.where(ds.swing > LARGE), ds.where(ds.swing < SMALL)
-    light, heavy = large.sensitivity - large.large, small.sensitivity / small.small - 1
-    whole = abs(ds.law / ds.sensitivity - 1)
-    usual = whole.quantile(0.95)
-    yield most("the shares are the work, swings over 2 phi0", "1", ds.deficit.where(ds.swing > 2), 1e-6)
-    yield most(f"(1), swings over {LARGE:g} phi0", "s", light, 1e-3, count(light))
-    yield most(f"(2), swings under {SMALL:g} phi0", "s to 1.1 %", heavy, 0.011, count(heavy))
-    rest = shares(solved("foliot", mu=1 + np.geomspace(1e-2, 1e2, 9), R=1, e=0, phi0=1, rtol=1e-10, outputs=SPEEDS))
-    struck = f"impacts take {float(rest.impacts.min()):.0%} to {float(rest.impacts.max()):.0%}"
-    exact = 2 * rest.impacts * rest.sensitivity - 1
-    yield most("  from rest (e = 0), dry friction", "1/(2 lambda_e)", exact, 1e-8, struck)
-    yield most("any swing, (1) of law_any_swing.py: 95 % of all cells", "s to 5 %", usual, 0.05, f"within {usual:.2%}")
-    yield most(f"  all {count(whole)} that cycle", "s to 25 %", whole, 0.25, f"within {whole.max():.1%}")
-
-
-def widths(ds: xr.Dataset) -> Claims:
-    """How many decades of torque the exponent takes for the middle half of its way from law to law, a = 1/s."""
-    smooth = ds.sensitivity.sel(n=3, a=1, R=0)
-    known = (
-        ("1 to 1/3, viscous, small to large swings", smooth.sel(c=0, e=1), (1.0, 1 / 3), by_q()),
-        ("1/3 to 1/2, viscous to impacts (e = .99)", smooth.sel(c=0, e=0.99), (1 / 3, 1 / 2), by_shares(1, None)),
-        ("1/3 to 3/5, viscous to drag of degree 3", smooth.sel(c=1e-6, e=1), (1 / 3, 3 / 5), by_shares(1, 3)),
-    )
-    for what, s, (start, end), theory in known:
-        places = [last_passage(s.mu, s, start + part * (end - start)) for part in (0.25, 0.75)]
-        width = abs(np.log10(places[1] / places[0]))
-        yield compared(f"{what}: decades", f"{theory:.3f}", width, theory, 0.03, 4)
 
 
 def by_q() -> float:
@@ -120,50 +83,67 @@ def all_over() -> xr.Dataset:
     return shares(solved("foliot", design="zip", **losses, mu=mu, c=0, n=3, phi0=1, rtol=1e-9, outputs=SPEEDS))
 
 
-def figure(ds: xr.Dataset) -> Any:
+def claims(ds) -> Claims:
+    """What theory says, and what comes out."""
+    yield "The general law"
+    large, small = ds.where(ds.swing > LARGE), ds.where(ds.swing < SMALL)
+    light, heavy = large.sensitivity - large.large, small.sensitivity / small.small - 1
+    whole = abs(ds.law / ds.sensitivity - 1)
+    usual = whole.quantile(0.95)
+    yield most("the shares are the work, swings over 2 phi0", "1", ds.deficit.where(ds.swing > 2), 1e-6)
+    yield most(f"(1), swings over {LARGE:g} phi0", "s", light, 1e-3, count(light))
+    yield most(f"(2), swings under {SMALL:g} phi0", "s to 1.1 %", heavy, 0.011, count(heavy))
+    rest = shares(solved("foliot", mu=1 + np.geomspace(1e-2, 1e2, 9), R=1, e=0, phi0=1, rtol=1e-10, outputs=SPEEDS))
+    struck = f"impacts take {float(rest.impacts.min()):.0%} to {float(rest.impacts.max()):.0%}"
+    exact = 2 * rest.impacts * rest.sensitivity - 1
+    yield most("  from rest (e = 0), dry friction", "1/(2 lambda_e)", exact, 1e-8, struck)
+    yield most("any swing, (1) of law_any_swing.py: 95 % of all cells", "s to 5 %", usual, 0.05, f"within {usual:.2%}")
+    yield most(f"  all {count(whole)} that cycle", "s to 25 %", whole, 0.25, f"within {whole.max():.1%}")
+
+    yield "Width of the crossovers (25 to 75 %)"
+    smooth = ds.sensitivity.sel(n=3, a=1, R=0)
+    known = (
+        ("1 to 1/3, viscous, small to large swings", smooth.sel(c=0, e=1), (1.0, 1 / 3), by_q()),
+        ("1/3 to 1/2, viscous to impacts (e = .99)", smooth.sel(c=0, e=0.99), (1 / 3, 1 / 2), by_shares(1, None)),
+        ("1/3 to 3/5, viscous to drag of degree 3", smooth.sel(c=1e-6, e=1), (1 / 3, 3 / 5), by_shares(1, 3)),
+    )
+    for what, s, (start, end), theory in known:
+        places = [last_passage(s.mu, s, start + part * (end - start)) for part in (0.25, 0.75)]
+        width = abs(np.log10(places[1] / places[0]))
+        yield compared(f"{what}: decades", f"{theory:.3f}", width, theory, 0.03, 4)
+
+
+@panels(150.0, 2, height_ratios=(1.05, 1))
+def figure(triangle, check, ds):
     """The law over shares, and against every cell."""
-    with page_of(150.0, 2, 1, width=NARROW, height_ratios=(1.05, 1)) as (page, (triangle, check)):
-        draw_triangle(page, triangle)
-        bands = ((1.5, 3, "0.8"), (3, 10, COLOURS[5]), (10, 100, COLOURS[1]), (100, math.inf, COLOURS[0]))
-        for low, high, colour in bands:
-            part = ds.where((ds.swing > low) & (ds.swing <= high))
-            look = {"color": colour, "markersize": 1.6, "rasterized": True}
-            look["label"] = f"{low:g} to {high:g}" if math.isfinite(high) else f"over {low:g}"
-            check.plot(part.large.values.ravel(), part.sensitivity.values.ravel(), ".", **look)
-        check.plot([0, 0.6], [0, 0.6], color="black", linewidth=0.8, label="theory (1)")
-        check.set(xlabel=r"$(N+\lambda_e)/(N+2)$ [1]", ylabel="exponent, $s$ [1]", xlim=(0, 0.62), ylim=(0, 1.0))
-        check.legend(title=r"swing, $A/\varphi_0$", loc="upper left", markerscale=5, ncols=2)
-    return page
-
-
-def draw_triangle(page: Any, axes: Any) -> None:
-    """(1) over the shares of viscous, dry and impact losses; rings are clocks, filled with their own s."""
     steps = 60
     corner = np.array([(i / steps, j / steps) for i in range(steps + 1) for j in range(steps + 1 - i)])
     viscous, struck = corner.T
     s = (viscous + struck) / (viscous + 2)
     look = {"vmin": 0, "vmax": 0.5, "cmap": "cividis"}
     x, y = struck + 0.5 * viscous, viscous * math.sqrt(3) / 2
-    filled = axes.tripcolor(x, y, s, shading="gouraud", rasterized=True, **look)
-    lines = axes.tricontour(x, y, s, levels=[0.1, 0.2, 0.3, 0.4], colors="white", linewidths=0.7)
-    axes.clabel(lines, fmt="%.1f", fontsize=7, manual=[(0.17, 0.1), (0.36, 0.1), (0.56, 0.1), (0.76, 0.1)])
+    filled = triangle.tripcolor(x, y, s, shading="gouraud", rasterized=True, **look)
+    lines = triangle.tricontour(x, y, s, levels=[0.1, 0.2, 0.3, 0.4], colors="white", linewidths=0.7)
+    triangle.clabel(lines, fmt="%.1f", fontsize=7, manual=[(0.17, 0.1), (0.36, 0.1), (0.56, 0.1), (0.76, 0.1)])
     clocks = all_over()
     place = clocks.impacts + 0.5 * clocks.viscous, clocks.viscous * math.sqrt(3) / 2
     ring = {"edgecolors": "black", "linewidths": 0.5, "s": 12, "label": "clocks of the kernel"}
-    axes.scatter(*place, c=clocks.sensitivity, **look, **ring)
-    page.colorbar(filled, ax=axes, label="exponent, $s$ [1]", pad=0.02, shrink=0.85)
+    triangle.scatter(*place, c=clocks.sensitivity, **look, **ring)
+    triangle.figure.colorbar(filled, ax=triangle, label="exponent, $s$ [1]", pad=0.02, shrink=0.85)
     for where, text in (((0, -0.02), "dry, 0"), ((1, -0.02), "impacts, 1/2"), ((0.5, 0.89), "viscous, 1/3")):
-        axes.text(*where, text, ha="center", va="bottom" if where[1] > 0 else "top", fontsize=8)
-    axes.set(xlim=(-0.08, 1.08), ylim=(-0.12, 1.0), aspect="equal")
-    axes.axis("off")
-    axes.legend(loc="lower center", fontsize=7, borderaxespad=0)
+        triangle.text(*where, text, ha="center", va="bottom" if where[1] > 0 else "top", fontsize=8)
+    triangle.set(xlim=(-0.08, 1.08), ylim=(-0.12, 1.0), aspect="equal")
+    triangle.axis("off")
+    triangle.legend(loc="lower center", fontsize=7, borderaxespad=0)
+    bands = ((1.5, 3, "0.8"), (3, 10, COLOURS[5]), (10, 100, COLOURS[1]), (100, math.inf, COLOURS[0]))
+    for low, high, colour in bands:
+        part = ds.where((ds.swing > low) & (ds.swing <= high))
+        look = {"color": colour, "markersize": 1.6, "rasterized": True}
+        look["label"] = f"{low:g} to {high:g}" if math.isfinite(high) else f"over {low:g}"
+        check.plot(part.large.values.ravel(), part.sensitivity.values.ravel(), ".", **look)
+    check.plot([0, 0.6], [0, 0.6], color="black", linewidth=0.8, label="theory (1)")
+    check.set(xlabel=r"$(N+\lambda_e)/(N+2)$ [1]", ylabel="exponent, $s$ [1]", xlim=(0, 0.62), ylim=(0, 1.0))
+    check.legend(title=r"swing, $A/\varphi_0$", loc="upper left", markerscale=5, ncols=2)
 
 
-def conclude(path: str) -> Conclusion:
-    """Statements and the figure."""
-    ds = prepared(read_result(path, "foliot", ["n", "e", "a", "R", "c", "mu"], "law_map.toml"))
-    groups = {"The general law": laws(ds), "Width of the crossovers (25 to 75 %)": widths(ds)}
-    return groups, [NOTES], lambda: figure(ds)
-
-
-main = script(__name__, "law_map.h5", conclude)
+main = script(__name__, "law_map.h5", claims, figure, prepared)

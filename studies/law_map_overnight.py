@@ -1,12 +1,9 @@
 """At which torque is a foliot with four losses the steadiest, and along which borders do its laws meet?
 
-    sweep run studies/law_map_overnight.toml
-    sweep run studies/law_map_borders.toml
     sweep refine law_map_borders.h5 --y sensitivity --tolerance 0.02 -o law_map_borders_fine.h5
     python studies/law_map_overnight.py law_map_overnight.h5 law_map_borders_fine.h5
 
-draws law_map_overnight.png and compares theory with what comes out, of 1e8 clocks and torques. At large swings the
-speed v at the switch follows from the energy of half a swing,
+About 1e8 clocks and torques. At large swings the speed v at the switch follows from the energy of half a swing,
 
     2 mu phi0 = R v^2/mu + 2 a v^3/(3 mu) + 2 c v^(n+2)/((n+2) mu) + (1 - e^2) v^2/2,                    (1)
 
@@ -16,6 +13,10 @@ first more: between them lies the best torque. With light viscous friction and n
 mu = R (18 R/(a^2 phi0))^(1/6), and
 
     s = 3 (18 R/(a^2 phi0))^(-1/3).                                                                      (2)
+
+s = -dlnP/dlnmu; deviation: of exponents the difference; (1) is solved for every third friction R and fourth drag c
+allowed: 0.01 of s and two steps of 12 % of the torque where the foliot swings 5 phi0 beyond the switch; 8 % of (2), a
+limit; 0.06 of its power -1/3; 2 %, the tolerance of the refinement, between its cells
 """
 
 import math
@@ -23,12 +24,11 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Claims, Conclusion, compared, count, differing, most, power, said, script, solved
-from _figures import NARROW, colour_map, direct_label, page_of, plain_ticks
+from _common import Claims, compared, count, differing, most, power, said, script, solved
+from _figures import COLOURS, MARKS, colour_map, direct_label, panels, plain_ticks
 from scipy.optimize.elementwise import find_root
 
 import sweep
-from sweep.show.charts import COLOURS, MARKS
 
 LARGE = 5.0
 """Way beyond the switch over phi0, by (1), from which (1) is held to `CLOSE` of s."""
@@ -39,22 +39,16 @@ POINTS = 2000
 SHOWN = (1.0, 0.99, 0.9, 0.5)
 """Restitutions that are drawn."""
 
-NOTES = """\
-s = -dlnP/dlnmu; deviation: of exponents the difference; (1) is solved for every third friction R and fourth drag c
-allowed: 0.01 of s and two steps of 12 % of the torque where the foliot swings 5 phi0 beyond the switch; 8 % of (2), a
-limit; 0.06 of its power -1/3; 2 %, the tolerance of the refinement, between its cells\
-"""
-
 
 def balanced(clocks: xr.Dataset, mu: xr.DataArray) -> xr.Dataset:
     """By (1), for each clock: the least `s`, its torque `mu`, and the way beyond the switch over phi0 there."""
     a, phi0 = float(clocks.a), float(clocks.phi0)
 
-    def losses(v: Any, n: Any, e: Any, R: Any, c: Any, mu: Any) -> tuple[Any, ...]:
+    def losses(v, n, e, R, c, mu) -> tuple[Any, ...]:
         drag = 2 * c * v ** (n + 2) / ((n + 2) * mu)
         return R * v**2 / mu, 2 * a * v**3 / (3 * mu), drag, 0.5 * (1 - e**2) * v**2
 
-    def unpaid(log_v: Any, *terms: Any) -> Any:
+    def unpaid(log_v, *terms):
         return sum(losses(np.exp(log_v), *terms)) - 2 * terms[-1] * phi0
 
     terms = xr.broadcast(*(clocks[name] for name in ("n", "e", "R", "c")), mu)
@@ -67,30 +61,6 @@ def balanced(clocks: xr.Dataset, mu: xr.DataArray) -> xr.Dataset:
     best = s.argmin("mu")
     beyond = v**2 / (2 * mu * phi0)
     return xr.Dataset({"s": s, "mu": mu.drop_vars("mu"), "beyond": beyond}).isel(mu=best)
-
-
-def best_torques(ds: xr.Dataset) -> Claims:
-    """Where s is least, against (1), (2) and what the paper says of strong drive."""
-    some = {name: slice(None, None, k) for name, k in (("R", 3), ("c", 4)) if ds.sizes[name] > 40}
-    clocks = ds[["sensitivity_min", "sensitivity_argmin_mu"]].isel(some).load()
-    theory = balanced(clocks, ds.mu)
-    far = theory.beyond > LARGE
-    off = (clocks.sensitivity_min - theory.s).where(far)
-    step = float(np.diff(np.log(ds.mu.values)).mean())
-    steps = (abs(np.log(clocks.sensitivity_argmin_mu / theory.mu)).where(far) / step).max()
-    least = ds.sensitivity_min.load()
-    place = ds.sensitivity_argmin_mu.load()
-    inside = float(((place > ds.mu[0]) & (place < ds.mu[-1])).mean())
-    line = least.sel(e=1).isel(n=0, c=0)
-    high = line.where(line.R > 1e3, drop=True)
-    limit, light = 3 * (18 * float(high.R[-1])) ** (-1 / 3), f"light viscous friction, R = {high.R[-1]:g}: least s"
-    beyond, missed = f"least s by (1), {LARGE:g} phi0 beyond the switch", f"{1 - inside:.0%} of {least.size}"
-    paper = "strong drive is best (paper, of viscous friction)"
-    yield most(beyond, "s", off, CLOSE, count(far, "clocks"))
-    yield said("  the torque where it is", steps < STEPS + 0.5, f"within {steps:.0f} steps", "(1)")
-    yield compared(light, f"(2) {limit:.4f}", high[-1], limit, 0.08, 4)
-    yield differing("  its power of R, R > 1000", "-1/3", power(high), -1 / 3, 0.06, 4)
-    yield said(paper, inside < 0.01, missed, "every clock", True)
 
 
 def borders(fine: xr.Dataset) -> Claims:
@@ -112,43 +82,60 @@ def borders(fine: xr.Dataset) -> Claims:
     yield said("  of the cells near a border, s changing", near > 0.5, f"{near:.0%}", "most")
 
 
-def figure(ds: xr.Dataset, fine: xr.Dataset) -> Any:
+def claims(ds, fine) -> Claims:
+    """What theory says, and what comes out."""
+    yield "The best torque"
+    some = {name: slice(None, None, k) for name, k in (("R", 3), ("c", 4)) if ds.sizes[name] > 40}
+    clocks = ds[["sensitivity_min", "sensitivity_argmin_mu"]].isel(some).load()
+    theory = balanced(clocks, ds.mu)
+    far = theory.beyond > LARGE
+    off = (clocks.sensitivity_min - theory.s).where(far)
+    step = float(np.diff(np.log(ds.mu.values)).mean())
+    steps = (abs(np.log(clocks.sensitivity_argmin_mu / theory.mu)).where(far) / step).max()
+    least = ds.sensitivity_min.load()
+    place = ds.sensitivity_argmin_mu.load()
+    inside = float(((place > ds.mu[0]) & (place < ds.mu[-1])).mean())
+    line = least.sel(e=1).isel(n=0, c=0)
+    high = line.where(line.R > 1e3, drop=True)
+    limit, light = 3 * (18 * float(high.R[-1])) ** (-1 / 3), f"light viscous friction, R = {high.R[-1]:g}: least s"
+    beyond, missed = f"least s by (1), {LARGE:g} phi0 beyond the switch", f"{1 - inside:.0%} of {least.size}"
+    paper = "strong drive is best (paper, of viscous friction)"
+    yield most(beyond, "s", off, CLOSE, count(far, "clocks"))
+    yield said("  the torque where it is", steps < STEPS + 0.5, f"within {steps:.0f} steps", "(1)")
+    yield compared(light, f"(2) {limit:.4f}", high[-1], limit, 0.08, 4)
+    yield differing("  its power of R, R > 1000", "-1/3", power(high), -1 / 3, 0.06, 4)
+    yield said(paper, inside < 0.01, missed, "every clock", True)
+
+    yield "Along the borders"
+    yield from borders(fine)
+
+
+@panels(138.0, 2)
+def figure(least, borders, ds, fine):
     """The least s over dry friction with hardly any drag, with (1) and (2), and the refined borders."""
     part = ds[["sensitivity_min"]].isel(c=[0]).sel(n=[3.0]).isel(R=slice(None, None, 3)).load()
     part = part.where(part.R > 1, drop=True)
     theory = balanced(part, ds.mu)
-    with page_of(138.0, 2, 1, width=NARROW) as (page, (least, borders)):
-        for k, e in enumerate(SHOWN):
-            here, line = (x.sel(e=e, method="nearest").isel(n=0, c=0) for x in (part.sensitivity_min, theory))
-            look = {"color": COLOURS[k], "linestyle": "", "markerfacecolor": "white", "markersize": 3}
-            least.loglog(here.R, here, MARKS[k], label=f"$e={e:g}$", **look)
-            least.plot(line.R, line.s.where(line.beyond > LARGE), color=COLOURS[k])
-        R = np.geomspace(10, 1e4, 20)
-        least.plot(R, 3 * (18 * R) ** (-1 / 3), color="black", linewidth=0.8, linestyle=":", label="(2)")
-        least.plot([], [], color="black", label="(1)")
-        least.set(xlabel=r"dry friction, $R/(a^2\varphi_0)$ [1]", ylabel="least $s$ [1]", ylim=(0.04, 0.7))
-        plain_ticks(least.yaxis, (0.05, 0.1, 0.2, 0.5))
-        least.legend(loc="lower left")
+    for k, e in enumerate(SHOWN):
+        here, line = (x.sel(e=e, method="nearest").isel(n=0, c=0) for x in (part.sensitivity_min, theory))
+        look = {"color": COLOURS[k], "linestyle": "", "markerfacecolor": "white", "markersize": 3}
+        least.loglog(here.R, here, MARKS[k], label=f"$e={e:g}$", **look)
+        least.plot(line.R, line.s.where(line.beyond > LARGE), color=COLOURS[k])
+    R = np.geomspace(10, 1e4, 20)
+    least.plot(R, 3 * (18 * R) ** (-1 / 3), color="black", linewidth=0.8, linestyle=":", label="(2)")
+    least.plot([], [], color="black", label="(1)")
+    least.set(xlabel=r"dry friction, $R/(a^2\varphi_0)$ [1]", ylabel="least $s$ [1]", ylim=(0.04, 0.7))
+    plain_ticks(least.yaxis, (0.05, 0.1, 0.2, 0.5))
+    least.legend(loc="lower left")
 
-        at = {name: np.geomspace(float(fine[name].min()), float(fine[name].max()), 120) for name in ("c", "mu")}
-        s = sweep.interpolated(fine, at).sensitivity.transpose("c", "mu")
-        colour_map(borders, s.mu, s.c, s, "exponent, $s$ [1]", vmin=1 / 3, vmax=1)
-        borders.plot(fine.mu.values.ravel(), fine.c.values.ravel(), ".", color="white", markersize=1.2)
-        for x, y, text in ((3e-2, 1e-6, "1"), (3e2, 1e-6, "1/3"), (1e6, 3e-6, "3/5"), (1e6, 1e-1, "1/3, drag")):
-            direct_label(borders, x, y, text)
-        borders.set(xscale="log", xlabel=r"torque, $\mu/(a^2\varphi_0)$ [1]")
-        borders.set(yscale="log", ylabel=r"drag, $c\,a\varphi_0^2$ [1]")
-    return page
+    at = {name: np.geomspace(float(fine[name].min()), float(fine[name].max()), 120) for name in ("c", "mu")}
+    s = sweep.interpolated(fine, at).sensitivity.transpose("c", "mu")
+    colour_map(borders, s.mu, s.c, s, "exponent, $s$ [1]", vmin=1 / 3, vmax=1)
+    borders.plot(fine.mu.values.ravel(), fine.c.values.ravel(), ".", color="white", markersize=1.2)
+    for x, y, text in ((3e-2, 1e-6, "1"), (3e2, 1e-6, "1/3"), (1e6, 3e-6, "3/5"), (1e6, 1e-1, "1/3, drag")):
+        direct_label(borders, x, y, text)
+    borders.set(xscale="log", xlabel=r"torque, $\mu/(a^2\varphi_0)$ [1]")
+    borders.set(yscale="log", ylabel=r"drag, $c\,a\varphi_0^2$ [1]")
 
 
-def conclude(path: str, borders_path: str) -> Conclusion:
-    """Statements and the figure."""
-    ds, fine = (sweep.open_result(one, strict=True) for one in (path, borders_path))
-    if "sensitivity_argmin_mu" not in ds or set(ds.sensitivity_min.dims) != {"n", "e", "R", "c"}:
-        raise sweep.SweepError(f"{path} is not of this study; make it from law_map_overnight.toml")
-    fine = fine.load()
-    groups = {"The best torque": best_torques(ds), "Along the borders": borders(fine)}
-    return groups, [NOTES], lambda: figure(ds, fine)
-
-
-main = script(__name__, "law_map_overnight.h5 law_map_borders_fine.h5", conclude)
+main = script(__name__, "law_map_overnight.h5 law_map_borders_fine.h5", claims, figure)

@@ -1,39 +1,32 @@
 """What does a clock's period at twelve torques, to a per cent, say of the shares of its losses?
 
-    sweep run studies/losses_from_periods.toml
     python studies/losses_from_periods.py losses_from_periods.h5
 
-draws losses_from_periods.png and prints what comes out. `clock_losses` fits the kernel to measured periods, and to
-amplitudes where there are any, and gives intervals of the shares; here it is tried on clocks whose losses are known.
-What noise can do at all follows from the sensitivity matrix J, dlnP/du and dlnA/du over the noise, of the losses u:
-what the numbers say of u is worth the singular values of J, and (J^T J)^-1 is the covariance of u; a direction of small
-singular value cannot be measured. With s by the shares alone, L = (N + lambda_e)/(N + 2) at large swings, drag of
-degree 2 and impacts have the same exponent, 1/2, and half dry friction, half of these nearly that of viscous friction,
-so a period tells dry friction from the rest, and the amplitude, v^2/(2 mu), has to tell these apart.
-"""
+`clock_losses` fits the kernel to measured periods, and to amplitudes where there are any, and gives intervals of the
+shares; here it is tried on clocks whose losses are known. What noise can do at all follows from the sensitivity matrix
+J, dlnP/du and dlnA/du over the noise, of the losses u: what the numbers say of u is worth the singular values of J,
+and (J^T J)^-1 is the covariance of u; a direction of small singular value cannot be measured. With s by the shares
+alone, L = (N + lambda_e)/(N + 2) at large swings, drag of degree 2 and impacts have the same exponent, 1/2, and half
+dry friction, half of these nearly that of viscous friction, so a period tells dry friction from the rest, and the
+amplitude, v^2/(2 mu), has to tell these apart.
 
-from __future__ import annotations
+noise of 1 % of each period and amplitude; errors are standard errors of shares, forecast by the sensitivity matrix. An
+interval of 95 % misses where the best fit with the true share is more than 3.84 worse than the best of all; counted for
+a thousand clocks by benchmarks/honesty/losses_coverage.py
+"""
 
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Claims, Conclusion, Statement, most, read_result, said, script, solved
-from _figures import NARROW, page_of, plain_ticks
+from _common import Claims, Statement, most, said, script, solved
+from _figures import COLOURS, panels, plain_ticks
 from clock_losses import SHARES, SUM, THRESHOLD, Measured, forecast
-
-from sweep.show.charts import COLOURS
 
 NOISE = 0.01
 SPREADS = (3.0, 10.0, 30.0)
 """Largest over least torque."""
 SEED = 1
-
-NOTES = """\
-noise of 1 % of each period and amplitude; errors are standard errors of shares, forecast by the sensitivity matrix. An
-interval of 95 % misses where the best fit with the true share is more than 3.84 worse than the best of all; counted for
-a thousand clocks by benchmarks/honesty/losses_coverage.py
-"""
 
 
 def measured(ds: xr.Dataset, clock: int, amplitude: bool, noise: float = 0.0, seed: int = SEED) -> Measured:
@@ -43,7 +36,7 @@ def measured(ds: xr.Dataset, clock: int, amplitude: bool, noise: float = 0.0, se
     return Measured(ds.mu.values, period.values, swing.values if amplitude else None, float(ds.phi0), NOISE)
 
 
-def losses(ds: xr.Dataset, clock: int, like: Measured) -> Any:
+def losses(ds: xr.Dataset, clock: int, like: Measured):
     """The true losses, in the units of a measurement."""
     one = ds.isel(point=clock)
     return np.array([one.R, one.a, one.c, 1.0 - one.e**2], float) / like.units
@@ -62,8 +55,14 @@ def matrices(ds: xr.Dataset, over: float, amplitude: bool, number: int = 12) -> 
     return mu[:-1], np.delete(J, [number, 2 * number + 1] if amplitude else [number], axis=0), by_u
 
 
-def knowable(ds: xr.Dataset) -> Claims:
-    """Forecast errors by spread of the torques, with and without amplitudes, for the clock of equal shares."""
+def prepared(ds, tell=True):
+    """The result, and how many clocks are fitted: all of them, or two shares of the first where not to `tell`."""
+    return ds, ds.sizes["point"] if tell else 1
+
+
+def claims(ds, clocks) -> Claims:
+    """What theory says, and what comes out."""
+    yield "What can be known"
     for over in SPREADS:
         (alone, weak), (both, strong) = (forecast(*matrices(ds, over, amplitude)[1:]) for amplitude in (False, True))
         if over < 20.0:
@@ -77,16 +76,13 @@ def knowable(ds: xr.Dataset) -> Claims:
         least = "  least singular value, by periods alone, over that with amplitudes"
         yield most(least, "< 1/5", weak[-1] / strong[-1], 0.2, f"{weak[-1]:.3g} / {strong[-1]:.3g}")
 
-
-def chosen(ds: xr.Dataset) -> Claims:
-    """Which 12 torques to measure of 25 within a factor of 10, some more than once: where the shares vary least.
-
-    By exchange; compared are the sums of the variances of the four shares, square rooted, and 12 torques spread evenly.
-    """
+    yield "Which torques to measure"
+    # By exchange; compared are the sums of the variances of the four shares, square rooted, and 12 torques spread
+    # evenly.
     mu, J, by_u = matrices(ds, 10.0, True, 25)
     pairs = J.reshape(2, 25, 4).transpose(1, 0, 2)
 
-    def error(places: Any) -> float:
+    def error(places) -> float:
         return float(np.linalg.norm(forecast(pairs[places].reshape(-1, 4), by_u)[0][:4]))
 
     places, least = np.round(np.linspace(0, 24, 12)).astype(int), np.inf
@@ -103,9 +99,7 @@ def chosen(ds: xr.Dataset) -> Claims:
     yield said("12 best torques within a factor 10, by exchange", len(values) < 7, text)
     yield Statement(together, "< 0.95", f"{least:.3f} / {even:.3f}", ratio, ratio < 0.95)
 
-
-def covered(ds: xr.Dataset, clocks: int) -> Claims:
-    """One noisy measurement of each clock: whether the best fit comes back, and intervals hold the true shares."""
+    yield "Clocks of known losses"
     held, off, sums = [], [], []
     for clock in range(clocks):
         exact, noisy = measured(ds, clock, True), measured(ds, clock, True, NOISE)
@@ -124,32 +118,19 @@ def covered(ds: xr.Dataset, clocks: int) -> Claims:
     yield Statement(over, "20", f"{mean:.1f}", mean / 20 - 1, bool(enough))
 
 
-def figure(ds: xr.Dataset) -> Any:
+@panels(84.0)
+def figure(axes, ds, *_):
     """Forecast errors of the shares over the spread of the torques."""
-    with page_of(84.0, width=NARROW) as (page, axes):
-        spreads = np.geomspace(2.0, 60.0, 12)
-        for dashes, amplitude in (("--", False), ("-", True)):
-            errors = np.array([forecast(*matrices(ds, over, amplitude)[1:])[0] for over in spreads])
-            for k, name in enumerate(SHARES):
-                axes.loglog(spreads, errors[:, k], dashes, color=COLOURS[k], label=name if amplitude else None)
-        axes.plot([], [], "--", color="black", label="periods alone")
-        axes.axhline(0.25, color="0.6", linewidth=0.6)
-        axes.set(xlabel="largest over least torque [1]", ylabel="standard error of a share [1]", ylim=(2e-3, 5))
-        plain_ticks(axes.xaxis, (2, 5, 10, 20, 50))
-        axes.legend(ncols=2, loc="lower left")
-    return page
+    spreads = np.geomspace(2.0, 60.0, 12)
+    for dashes, amplitude in (("--", False), ("-", True)):
+        errors = np.array([forecast(*matrices(ds, over, amplitude)[1:])[0] for over in spreads])
+        for k, name in enumerate(SHARES):
+            axes.loglog(spreads, errors[:, k], dashes, color=COLOURS[k], label=name if amplitude else None)
+    axes.plot([], [], "--", color="black", label="periods alone")
+    axes.axhline(0.25, color="0.6", linewidth=0.6)
+    axes.set(xlabel="largest over least torque [1]", ylabel="standard error of a share [1]", ylim=(2e-3, 5))
+    plain_ticks(axes.xaxis, (2, 5, 10, 20, 50))
+    axes.legend(ncols=2, loc="lower left")
 
 
-def conclude(path: str, tell: bool = True) -> Conclusion:
-    """Statements and the figure; `tell`: all shares of all clocks are fitted, not two of the first."""
-    ds = read_result(path, "foliot", ["point", "mu"], "losses_from_periods.toml")
-    clocks = ds.sizes["point"] if tell else 1
-    groups = {
-        "What can be known": knowable(ds),
-        "Which torques to measure": chosen(ds),
-        "Clocks of known losses": covered(ds, clocks),
-    }
-    return groups, [NOTES], lambda: figure(ds)
-
-
-main = script(__name__, "losses_from_periods.h5", conclude)
+main = script(__name__, "losses_from_periods.h5", claims, figure, prepared)

@@ -1,9 +1,8 @@
 """Which losses give P ~ mu^(-1/2) at every drive torque, the law that Roup and Denny find?
 
-    sweep run studies/origin_of_half.toml
     python studies/origin_of_half.py origin_of_half.h5
 
-draws origin_of_half.png and compares theory with what comes out. Theory: where
+Theory: where
     (i)   every torque of the model is proportional to the drive,
     (ii)  every reset of speeds is of degree 1 in them (restitution, ratios of inertias), and
     (iii) every other force that depends on speed is of degree 2 in it (or there is none),
@@ -12,19 +11,24 @@ does not depend on the torque. Impacts are one way to meet this, not the only on
 exponent: viscous from -1 to -1/3, Coulomb of fixed strength to 0. Derived here; that the exponent -1/2 at every torque
 needs (i) to (iii) is not claimed. The kernel solves such a foliot in units of its torque, so it can say nothing else:
 the exponents and prefactors of these mixtures are measured on `foliot_scene`, followed from rest in SI units.
+
+s = -dlnP/dlnmu; deviations of exponents are differences, others relative. Allowed: 1e-8 of what was followed in SI
+units at rtol 1e-10; 0.01 of an exponent at the ends of the grid, 0.02 where impacts or drag act beside friction
+proportional Coulomb friction changes with the drive: its exponent is that of differences of ln P, s being at fixed R
+Roup et al., Int. J. Control 76, 1685 (2003), and Denny, Eur. J. Phys. 23, 449 (2002), as Hoyng & Nieuwenhuizen,
+arXiv:1604.06681, report them: both mu^(-1/2); Roup et al. have motion without friction between inelastic impacts,
+which meets (i) to (iii). What Denny's model loses is not said there
 """
 
 import itertools
 import math
-from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Claims, Conclusion, Statement, compared, differing, most, read_result, said, script, solved
-from _figures import NARROW, page_of
+from _common import Claims, Statement, compared, differing, most, said, script, solved
+from _figures import COLOURS, DASHES, panels
 
 import sweep
-from sweep.show.charts import COLOURS, DASHES
 
 E = 0.8
 """Restitution of impacts."""
@@ -34,15 +38,6 @@ FIXED = 0.5
 """R [rad/s^2] of Coulomb friction of fixed strength."""
 TORQUES = (1e-4, 1.0, 1e4)
 """Torques [rad/s^2] at which mixtures are followed in SI units."""
-
-NOTES = """\
-s = -dlnP/dlnmu; deviations of exponents are differences, others relative. Allowed: 1e-8 of what was followed in SI
-units at rtol 1e-10; 0.01 of an exponent at the ends of the grid, 0.02 where impacts or drag act beside friction
-proportional Coulomb friction changes with the drive: its exponent is that of differences of ln P, s being at fixed R
-Roup et al., Int. J. Control 76, 1685 (2003), and Denny, Eur. J. Phys. 23, 449 (2002), as Hoyng & Nieuwenhuizen,
-arXiv:1604.06681, report them: both mu^(-1/2); Roup et al. have motion without friction between inelastic impacts,
-which meets (i) to (iii). What Denny's model loses is not said there\
-"""
 
 
 LOSSES = {"impact": {"e": E}, "v^2": {"c": 1.0}, "viscous": {"a": 1.0}, "Coulomb ~ drive": {}, "Coulomb": {}}
@@ -105,8 +100,10 @@ def followed() -> dict[str, xr.Dataset]:
     return found
 
 
-def always_half(found: dict[str, xr.Dataset]) -> Claims:
-    """The mixtures that meet (i) to (iii): exponent and, by the speed at the switch, amplitude at all torques."""
+def claims(ds) -> Claims:
+    """What theory says, and what comes out."""
+    found = followed()
+    yield "Exponent -1/2 at every torque"
     for mixture, line in found.items():
         slopes = np.diff(np.log(line.period)) / np.diff(np.log(line.mu))
         off, energy = float(abs(slopes + 0.5).max()), line.speed**2 / line.mu
@@ -114,9 +111,7 @@ def always_half(found: dict[str, xr.Dataset]) -> Claims:
         here = f"-1/2 off by at most; A's spread {spread:.0e}"
         yield Statement(mixture, "-1/2, A constant", here, off, off < 1e-8 and spread < 1e-8)
 
-
-def prefactors(found: dict[str, xr.Dataset]) -> Claims:
-    """C of P = C (phi0/mu)^(1/2) where one loss of degree two acts alone."""
+    yield "Prefactors"
     flat = (1 - math.exp(-4)) ** 0.25  # c phi0 = 1
     drag = 2 * (math.atanh(flat) + math.atan(flat))
     impact, dry = 4 * math.sqrt((1 + E) / (1 - E)), 8 / math.sqrt(0.75)
@@ -129,9 +124,7 @@ def prefactors(found: dict[str, xr.Dataset]) -> Claims:
         period = line.period * np.sqrt(line.mu)
         yield compared(f"{mixture}: P (mu/phi0)^(1/2)", f"{text} = {value:.8g}", period, value, 1e-8)
 
-
-def never_half(ds: xr.Dataset) -> Claims:
-    """All others: how far from -1/2 their exponent comes, and where it tends to; the exact s against differences."""
+    yield "Other exponents"
     others = {m: part(ds, m) for m in MIXTURES if not of_degree_two(m)}
     greatest = {name: float(abs(line.slope + 0.5).max()) for name, line in others.items()}
     nearest = min(greatest, key=lambda name: greatest[name])
@@ -155,31 +148,19 @@ def never_half(ds: xr.Dataset) -> Claims:
     yield differing(f"{what}: ~ (1 - e^2)^x", "-3", fit.exponent, -3, 0.02, 5)
 
 
-def figure(ds: xr.Dataset) -> Any:
+@panels(88.0)
+def figure(axes, ds):
     """Local exponents over the torque; lines, and points."""
-    with page_of(88.0, width=NARROW) as (page, axes):
-        for i, (mixture, name) in enumerate(SHOWN.items()):
-            line, look = part(ds, mixture), {"linestyle": DASHES[i % 4]}
-            if "~ drive" in mixture:
-                look = {"marker": "o", "linestyle": "", "markerfacecolor": "white"}
-            axes.semilogx(line.mu, line.slope, color=COLOURS[i], label=name, **look)
-        axes.set(xlim=(ds.mu.min(), ds.mu.max()), xlabel=r"torque, $\mu/(a^2\varphi_0)$ [1]")
-        axes.set(ylim=(-1.06, 0.06), ylabel=r"exponent, $\mathrm{d}\ln P/\mathrm{d}\ln\mu$ [1]")
-        axes.set_yticks([-1, -1 / 2, -1 / 3, 0], labels=["$-1$", r"$-\frac{1}{2}$", r"$-\frac{1}{3}$", "0"])
-        axes.set_yticks([], minor=True)
-        axes.legend(loc="lower right")
-    return page
+    for i, (mixture, name) in enumerate(SHOWN.items()):
+        line, look = part(ds, mixture), {"linestyle": DASHES[i % 4]}
+        if "~ drive" in mixture:
+            look = {"marker": "o", "linestyle": "", "markerfacecolor": "white"}
+        axes.semilogx(line.mu, line.slope, color=COLOURS[i], label=name, **look)
+    axes.set(xlim=(ds.mu.min(), ds.mu.max()), xlabel=r"torque, $\mu/(a^2\varphi_0)$ [1]")
+    axes.set(ylim=(-1.06, 0.06), ylabel=r"exponent, $\mathrm{d}\ln P/\mathrm{d}\ln\mu$ [1]")
+    axes.set_yticks([-1, -1 / 2, -1 / 3, 0], labels=["$-1$", r"$-\frac{1}{2}$", r"$-\frac{1}{3}$", "0"])
+    axes.set_yticks([], minor=True)
+    axes.legend(loc="lower right")
 
 
-def conclude(path: str) -> Conclusion:
-    """Statements and the figure."""
-    ds, found = read_result(path, "foliot", ["e", "c", "a", "R", "mu"], "origin_of_half.toml"), followed()
-    groups = {
-        "Exponent -1/2 at every torque": always_half(found),
-        "Prefactors": prefactors(found),
-        "Other exponents": never_half(ds),
-    }
-    return groups, [NOTES], lambda: figure(ds)
-
-
-main = script(__name__, "origin_of_half.h5", conclude)
+main = script(__name__, "origin_of_half.h5", claims, figure)

@@ -1,12 +1,16 @@
 """Which polishing machine of a wanted amplitude swings most nearly harmonically, and how far is it from locking?
 
-    sweep run studies/polisher_design.toml
     python studies/polisher_design.py polisher_design.h5
 
-draws polisher_design.png and prints what is concluded. For each b, d, f the crank e that makes the amplitude A1 is
-found between two cranks of the sweep. A machine of that amplitude exists where A1 passes it before the crank locks; at
-the border eta_minus = 0 or eta_plus = 180 degree, so that sin^2 A1 = e f/(b d) with e = d+f-b, b+f-d or b+d-f. For the
-figure the crank is the root of an equation of second degree in e^2, so that no grid of cranks is seen in it.
+For each b, d, f the crank e that makes the amplitude A1 is found between two cranks of the sweep. A machine of that
+amplitude exists where A1 passes it before the crank locks; at the border eta_minus = 0 or eta_plus = 180 degree, so
+that sin^2 A1 = e f/(b d) with e = d+f-b, b+f-d or b+d-f. For the figure the crank is the root of an equation of second
+degree in e^2, so that no grid of cranks is seen in it.
+
+distortion: root of the sum of squares of the harmonics from the second on, over the first; best: least over f
+allowed: 1e-3 of a distortion interpolated between cranks; the shares are of the grid;
+the paper's machine holds if it runs well, each of the others if it has less distortion than the one before
+transmission angle: least angle of coupler and arm over the turn; below 40 degree a linkage is held to run badly
 """
 
 import math
@@ -14,11 +18,8 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Claims, Conclusion, Statement, compared, read_result, said, script, solved
-from _figures import direct_label, hatch, page_of, plain_ticks, quality_bar
-from matplotlib.colors import LogNorm
-
-from sweep.show.charts import COLOURS, DASHES
+from _common import Claims, Statement, compared, said, script, solved
+from _figures import COLOURS, DASHES, LogNorm, direct_label, hatch, panels, plain_ticks, quality_bar
 
 WANTED = math.radians(15.0)
 ARM = 0.38
@@ -27,13 +28,6 @@ PAPER = {"b": 0.6201, "f": 0.405}
 """The paper's machine with that arm [m]."""
 FINE = 2e-3
 """Steps of the figure along motor and coupler [m]."""
-
-NOTES = """\
-distortion: root of the sum of squares of the harmonics from the second on, over the first; best: least over f
-allowed: 1e-3 of a distortion interpolated between cranks; the shares are of the grid;
-the paper's machine holds if it runs well, each of the others if it has less distortion than the one before
-transmission angle: least angle of coupler and arm over the turn; below 40 degree a linkage is held to run badly
-"""
 
 
 def of_amplitude(ds: xr.Dataset, wanted: float = WANTED) -> xr.Dataset:
@@ -49,13 +43,13 @@ def of_amplitude(ds: xr.Dataset, wanted: float = WANTED) -> xr.Dataset:
     return made.where(there).drop_vars("e").transpose("d", "b", "f")
 
 
-def to_spare(b: Any, d: Any, f: Any, wanted: float = WANTED) -> tuple[Any, Any]:
+def to_spare(b, d, f, wanted: float = WANTED) -> tuple[Any, Any]:
     """The longest crank that turns, and whether the amplitude is passed before it locks."""
     longest = np.minimum(np.minimum(d + f - b, b + f - d), b + d - f)
     return longest, (longest * f > b * d * math.sin(wanted) ** 2) & (longest > 0)
 
 
-def crank_of(b: Any, d: Any, f: Any, wanted: float = WANTED) -> Any:
+def crank_of(b, d, f, wanted: float = WANTED):
     """The crank of one amplitude, where one reaches it.
 
     cos(A0 +- A1) = (b^2 + d^2 - (f +- e)^2)/(2 b d): sum and difference give cos A0 and sin A0, and the sum of their
@@ -67,7 +61,7 @@ def crank_of(b: Any, d: Any, f: Any, wanted: float = WANTED) -> Any:
     return np.sqrt(rest / (np.sqrt(half * half + rest) - half))
 
 
-def machines_on(b: Any, d: float, f: Any) -> xr.Dataset:
+def machines_on(b, d: float, f) -> xr.Dataset:
     """The machines of the wanted amplitude over b and f, as `of_amplitude`, with the crank of `crank_of`."""
     motor, coupler = np.meshgrid(b, f, indexing="ij")
     there = to_spare(motor, d, coupler)[1]
@@ -87,56 +81,7 @@ def best(machines: xr.Dataset) -> xr.Dataset:
     return machines.isel(f=machines.thd.fillna(math.inf).argmin("f")).where(known)
 
 
-def existence(machines: xr.Dataset) -> Claims:
-    """Which machines of the amplitude there are."""
-    within = to_spare(machines.b, machines.d, machines.f)[1].transpose("d", "b", "f")
-    found = machines.thd.notnull()
-    strangers, share = int((found & ~within).sum()), float(found.sum() / within.sum())
-    yield said("machines beyond the border", strangers == 0, f"{strangers} of {int(found.sum())}", "none")
-    yield said("of those within it, in the sweep's cranks", share > 0.5, f"{share:.1%}", "most")
-
-
-def quality(machines: xr.Dataset) -> Claims:
-    """How harmonic, and at what price: distortion, transmission angle and crank."""
-    arm = machines.sel(d=ARM, method="nearest")
-    top, paper = best(arm), arm.interp(b=PAPER["b"], f=PAPER["f"])
-    same, widest = top.interp(b=PAPER["b"]), top.isel(b=-1)
-    reach = float(top.b[top.thd.notnull()][-1] / arm.d)
-    falls = (top.thd.dropna("b").diff("b").tail(b=20) < 0).all()
-    lengths = {"b": float(widest.b), "d": float(arm.d), "f": float(widest.f), "e": float(widest.crank)}
-    exact = solved("polisher", outputs=["A1", "thd"], rtol=1e-10, **{**lengths, "e": [lengths["e"]]}).isel(e=0)
-
-    def described(what: str, machine: xr.Dataset, holds: Any) -> Statement:
-        angle, crank = math.degrees(machine.transmission_angle), 1e3 * float(machine.crank)
-        return said(what, holds, f"{float(machine.thd):.2%}, {angle:.0f} degree, e = {crank:.1f} mm")
-
-    far = f"best of the sweep, b = {1e3 * float(widest.b):.0f}, f = {1e3 * float(widest.f):.0f} mm"
-    to_edge, again = f"falls to the edge, b/d = {reach:.3g}: no best", f"{float(widest.thd):.5f}"
-    yield described("the paper's machine", paper, np.degrees(paper.transmission_angle) > 40)
-    yield described("best coupler for its motor's place", same, same.thd < paper.thd)
-    yield said("the farther the motor, in arms, the less distortion", falls, to_edge, "-")
-    yield described(far, widest, widest.thd < same.thd)
-    yield compared("its amplitude, degree", "15", math.degrees(exact.A1), 15.0, 1e-4, 6)
-    yield compared("its distortion, once more", again, float(exact.thd), float(widest.thd), 1e-3, 5)
-
-
-def figure(ds: xr.Dataset) -> Any:
-    """Distortion over motor and coupler, with the border of lock-up; the best coupler; for a column of print."""
-    b, f = (np.arange(float(x[0]), float(x[-1]) + 1e-9, FINE) for x in (ds.b, ds.f))
-    with page_of(156.0, 2, width=110.0, height_ratios=(1.5, 1)) as (page, (plane, best_of)):
-        for k, d in enumerate(ds.d.values):
-            arm = machines_on(b, float(d), f)
-            top, look = best(arm), {"color": COLOURS[k], "linestyle": DASHES[k]}
-            best_of.plot(1e3 * b, 100 * top.thd, label=f"$d={1e3 * d:.0f}$ mm", **look)
-            if abs(d - ARM) < 1e-9:
-                draw_map(plane, arm, top)
-        best_of.set(xlabel="motor from pivot, $b$ [mm]", ylabel="least distortion [%]", yscale="log", ylim=(1.5, 15))
-        plain_ticks(best_of.yaxis, (2, 5, 10))
-        best_of.legend(loc="upper right")
-    return page
-
-
-def draw_map(axes: Any, arm: xr.Dataset, top: xr.Dataset) -> None:
+def draw_map(axes, arm: xr.Dataset, top: xr.Dataset) -> None:
     """Distortion over b and f for one arm, the crank it takes, and where the motor locks instead."""
     b, f, thd = 1e3 * arm.b.values, 1e3 * arm.f.values, 100 * arm.thd.transpose("f", "b").values
     mesh = axes.pcolormesh(b, f, thd, norm=LogNorm(2, 40), cmap="cividis_r", shading="nearest", rasterized=True)
@@ -154,15 +99,52 @@ def draw_map(axes: Any, arm: xr.Dataset, top: xr.Dataset) -> None:
     axes.set(xlabel="motor from pivot, $b$ [mm]", ylabel="coupler, $f$ [mm]", xlim=(b[0], b[-1]), ylim=(f[0], f[-1]))
 
 
-def conclude(path: str) -> Conclusion:
-    """Statements and the figure."""
-    ds = read_result(path, "polisher", ["d", "b", "f", "e"], "polisher_design.toml")
+def claims(ds) -> Claims:
+    """What theory says, and what comes out."""
     machines = of_amplitude(ds)
-    groups = {
-        "Machines of 15 degree": existence(machines),
-        "Distortion, transmission angle, crank (arm 380 mm)": quality(machines),
-    }
-    return groups, [NOTES], lambda: figure(ds)
+    yield "Machines of 15 degree"
+    within = to_spare(machines.b, machines.d, machines.f)[1].transpose("d", "b", "f")
+    found = machines.thd.notnull()
+    strangers, share = int((found & ~within).sum()), float(found.sum() / within.sum())
+    yield said("machines beyond the border", strangers == 0, f"{strangers} of {int(found.sum())}", "none")
+    yield said("of those within it, in the sweep's cranks", share > 0.5, f"{share:.1%}", "most")
+
+    yield "Distortion, transmission angle, crank (arm 380 mm)"
+    arm = machines.sel(d=ARM, method="nearest")
+    top, paper = best(arm), arm.interp(b=PAPER["b"], f=PAPER["f"])
+    same, widest = top.interp(b=PAPER["b"]), top.isel(b=-1)
+    reach = float(top.b[top.thd.notnull()][-1] / arm.d)
+    falls = (top.thd.dropna("b").diff("b").tail(b=20) < 0).all()
+    lengths = {"b": float(widest.b), "d": float(arm.d), "f": float(widest.f), "e": float(widest.crank)}
+    exact = solved("polisher", outputs=["A1", "thd"], rtol=1e-10, **{**lengths, "e": [lengths["e"]]}).isel(e=0)
+
+    def described(what: str, machine: xr.Dataset, holds) -> Statement:
+        angle, crank = math.degrees(machine.transmission_angle), 1e3 * float(machine.crank)
+        return said(what, holds, f"{float(machine.thd):.2%}, {angle:.0f} degree, e = {crank:.1f} mm")
+
+    far = f"best of the sweep, b = {1e3 * float(widest.b):.0f}, f = {1e3 * float(widest.f):.0f} mm"
+    to_edge, again = f"falls to the edge, b/d = {reach:.3g}: no best", f"{float(widest.thd):.5f}"
+    yield described("the paper's machine", paper, np.degrees(paper.transmission_angle) > 40)
+    yield described("best coupler for its motor's place", same, same.thd < paper.thd)
+    yield said("the farther the motor, in arms, the less distortion", falls, to_edge, "-")
+    yield described(far, widest, widest.thd < same.thd)
+    yield compared("its amplitude, degree", "15", math.degrees(exact.A1), 15.0, 1e-4, 6)
+    yield compared("its distortion, once more", again, float(exact.thd), float(widest.thd), 1e-3, 5)
 
 
-main = script(__name__, "polisher_design.h5", conclude, "expected")
+@panels(156.0, 2, height_ratios=(1.5, 1))
+def figure(plane, best_of, ds):
+    """Distortion over motor and coupler, with the border of lock-up; the best coupler; for a column of print."""
+    b, f = (np.arange(float(x[0]), float(x[-1]) + 1e-9, FINE) for x in (ds.b, ds.f))
+    for k, d in enumerate(ds.d.values):
+        arm = machines_on(b, float(d), f)
+        top, look = best(arm), {"color": COLOURS[k], "linestyle": DASHES[k]}
+        best_of.plot(1e3 * b, 100 * top.thd, label=f"$d={1e3 * d:.0f}$ mm", **look)
+        if abs(d - ARM) < 1e-9:
+            draw_map(plane, arm, top)
+    best_of.set(xlabel="motor from pivot, $b$ [mm]", ylabel="least distortion [%]", yscale="log", ylim=(1.5, 15))
+    plain_ticks(best_of.yaxis, (2, 5, 10))
+    best_of.legend(loc="upper right")
+
+
+main = script(__name__, "polisher_design.h5", claims, figure, source="expected")

@@ -1,22 +1,24 @@
 """How do middle and amplitude of a polishing arm go with the motor's eccentricity, and up to which does the motor turn?
 
-    sweep run studies/polisher_extrema.toml
     python studies/polisher_extrema.py polisher_extrema.h5
 
-draws polisher_extrema.png, what the paper's figures 4, 6 and 7 show, and compares its statements with what comes out.
-b = (49, -38) cm has the length and makes the range of angles of the paper's figure 4, which does not give it.
+The figure is what the paper's figures 4, 6 and 7 show. b = (49, -38) cm has the length and makes the range of angles
+of the paper's figure 4, which does not give it.
+
+paper: Cordero-Davila et al., Opticheskii Zhurnal 78(3):55 (2011); where "-" stands it says nothing, and the formula is
+named in the line. Allowed: 1e-12 of a formula, 1.5 degree for "does not move"; "no, known" is a statement of the
+source that its own equations refute: degrees of the crank count from b, and with the paper's equations for type A
+(upper signs) the minimum of alpha moves, and later. Its figure 4 is the same arm with alpha counted clockwise.
 """
 
 import math
-from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Claims, Conclusion, compared, differing, most, read_result, said, script, solved
-from _figures import direct_label, page_of
+from _common import Claims, compared, differing, most, said, script, solved
+from _figures import COLOURS, direct_label, panels
 
 from kernels.interface import Status
-from sweep.show.charts import COLOURS
 
 SHOWN = (0.01, 0.05, 0.1, 0.15)
 """Eccentricities in m whose motion is drawn."""
@@ -24,24 +26,17 @@ LAST = 0.15
 """Where the paper's figures end, in m."""
 B_ANGLE = math.atan2(-38.0, 49.0)
 
-NOTES = """\
-paper: Cordero-Davila et al., Opticheskii Zhurnal 78(3):55 (2011); where "-" stands it says nothing, and the formula is
-named in the line. Allowed: 1e-12 of a formula, 1.5 degree for "does not move"; "no, known" is a statement of the
-source that its own equations refute: degrees of the crank count from b, and with the paper's equations for type A
-(upper signs) the minimum of alpha moves, and later. Its figure 4 is the same arm with alpha counted clockwise.
-"""
-
 
 def at(ds: xr.Dataset, e: float) -> xr.Dataset:
     """The cell of one eccentricity [m]."""
     return ds.sel(e=e, method="nearest")
 
 
-def degrees(x: Any) -> float:
+def degrees(x) -> float:
     return math.degrees(float(x))
 
 
-def aligned(ds: xr.Dataset) -> Any:
+def aligned(ds: xr.Dataset):
     """e x f over e f at both extremes: crank and coupler lie on one line there, the paper's theorem."""
     found = []
     for turn, eta in ((ds.theta_plus, ds.eta_plus), (ds.theta_minus, ds.eta_minus)):
@@ -64,8 +59,12 @@ def size(ds: xr.Dataset) -> Claims:
     yield most("alignment: the extremes have e x f = 0, over e f", "0", aligned(full), 1e-9, "largest of both")
 
 
-def times(ds: xr.Dataset) -> Claims:
-    """When the extremes come, as crank angles."""
+def claims(ds) -> Claims:
+    """What theory says, and what comes out."""
+    yield "Size of the swing"
+    yield from size(ds)
+
+    yield "Times of the extremes (figure 4)"
     paper, last, start = ds.sel(e=slice(0, LAST + 1e-6)), at(ds, LAST), ds.isel(e=0)
     plus = degrees(paper.theta_plus.max() - paper.theta_plus.min())
     minus, later = degrees(last.theta_minus - start.theta_minus), (paper.theta_minus.diff("e") > 0).all()
@@ -78,9 +77,7 @@ def times(ds: xr.Dataset) -> Claims:
     yield said(clockwise, later and minus > 10, f"{minus:.1f} degree", "yes")
     yield said("  minima, the maxima here, do not move", plus < 1.5, f"within {plus:.2f} degree", "yes")
 
-
-def border(ds: xr.Dataset) -> Claims:
-    """Up to which eccentricity the motor turns."""
+    yield "The border"
     limit, last = float(ds.d + ds.f - ds.b), at(ds, LAST)
     turns, flat, locked = (
         ds.where(ds.status == status, drop=True) for status in (Status.OK, Status.CHANGE_POINT, Status.LOCK_UP)
@@ -98,41 +95,31 @@ def border(ds: xr.Dataset) -> Claims:
     yield said("harmonic motion", thd < 0.01, f"distortion {100 * thd:.1f} % at 15 cm", "held so elsewhere", True)
 
 
-def figure(ds: xr.Dataset) -> Any:
+@panels(136.0, 2)
+def figure(motion, size, ds):
     """alpha over a turn with the path of its extremes; A0 and A1 over their first order; for a column of print."""
-    with page_of(136.0, 2, width=110.0) as (page, (motion, size)):
-        machine = {name: float(ds[name]) for name in "bdf"} | {"omega": 1.0, "b_angle": B_ANGLE}
-        along = {"crank_angle": np.linspace(B_ANGLE - math.pi, B_ANGLE + math.pi, 721)}
-        alpha = solved("polisher_motion", e=SHOWN, along=along, outputs=["alpha"], **machine).alpha
-        for e, colour in zip(SHOWN, COLOURS, strict=False):
-            turn = np.linspace(-180.0, 180.0, 721)
-            motion.plot(turn, np.degrees(alpha.sel(e=e)), color=colour, label=f"{100 * e:g} cm")
-        paper, dashed = ds.sel(e=slice(0, LAST + 1e-6)), {"color": "black", "linewidth": 0.9, "linestyle": (0, (4, 2))}
-        for end, label in (("plus", "extremes"), ("minus", None)):
-            motion.plot(
-                np.degrees(paper[f"theta_{end}"]), np.degrees(paper[f"eta_{end}"] + B_ANGLE), label=label, **dashed
-            )
-        motion.set(xlabel="crank angle from $b$ [degree]", ylabel=r"angle of the arm, $\alpha$ [degree]")
-        motion.set(xlim=(-180, 180), xticks=range(-180, 181, 90))
-        motion.legend(title="eccentricity, $e$", loc="lower right")
-        limit, full = 100 * float(ds.d + ds.f - ds.b), ds.where(ds.A0.notnull() & (ds.e > 0), drop=True)
-        size.plot(100 * full.e, full.A1 / (full.e * ds.A1_e[0]), color=COLOURS[0], label="amplitude, $A_1$")
-        size.plot(100 * full.e, full.A0 / ds.A0[0], "--", color=COLOURS[1], label="middle, $A_0$")
-        size.axhline(1.0, color="0.5", linewidth=0.8)
-        size.axvline(100 * LAST, color="0.5", linewidth=0.8, linestyle=":", label="the paper ends")
-        # where the motor locks
-        size.axvspan(limit, 18, facecolor="none", edgecolor="0.6", hatch="////", linewidth=0)
-        direct_label(size, (limit + 18) / 2, 1.0, "motor locks", rotation=90)
-        size.set(xlabel="eccentricity, $e$ [cm]", ylabel="over its first order in $e$ [1]", xlim=(0, 18))
-        size.legend(loc="upper left")
-    return page
+    machine = {name: float(ds[name]) for name in "bdf"} | {"omega": 1.0, "b_angle": B_ANGLE}
+    along = {"crank_angle": np.linspace(B_ANGLE - math.pi, B_ANGLE + math.pi, 721)}
+    alpha = solved("polisher_motion", e=SHOWN, along=along, outputs=["alpha"], **machine).alpha
+    for e, colour in zip(SHOWN, COLOURS, strict=False):
+        turn = np.linspace(-180.0, 180.0, 721)
+        motion.plot(turn, np.degrees(alpha.sel(e=e)), color=colour, label=f"{100 * e:g} cm")
+    paper, dashed = ds.sel(e=slice(0, LAST + 1e-6)), {"color": "black", "linewidth": 0.9, "linestyle": (0, (4, 2))}
+    for end, label in (("plus", "extremes"), ("minus", None)):
+        motion.plot(np.degrees(paper[f"theta_{end}"]), np.degrees(paper[f"eta_{end}"] + B_ANGLE), label=label, **dashed)
+    motion.set(xlabel="crank angle from $b$ [degree]", ylabel=r"angle of the arm, $\alpha$ [degree]")
+    motion.set(xlim=(-180, 180), xticks=range(-180, 181, 90))
+    motion.legend(title="eccentricity, $e$", loc="lower right")
+    limit, full = 100 * float(ds.d + ds.f - ds.b), ds.where(ds.A0.notnull() & (ds.e > 0), drop=True)
+    size.plot(100 * full.e, full.A1 / (full.e * ds.A1_e[0]), color=COLOURS[0], label="amplitude, $A_1$")
+    size.plot(100 * full.e, full.A0 / ds.A0[0], "--", color=COLOURS[1], label="middle, $A_0$")
+    size.axhline(1.0, color="0.5", linewidth=0.8)
+    size.axvline(100 * LAST, color="0.5", linewidth=0.8, linestyle=":", label="the paper ends")
+    # where the motor locks
+    size.axvspan(limit, 18, facecolor="none", edgecolor="0.6", hatch="////", linewidth=0)
+    direct_label(size, (limit + 18) / 2, 1.0, "motor locks", rotation=90)
+    size.set(xlabel="eccentricity, $e$ [cm]", ylabel="over its first order in $e$ [1]", xlim=(0, 18))
+    size.legend(loc="upper left")
 
 
-def conclude(path: str) -> Conclusion:
-    """Statements and the figure."""
-    ds = read_result(path, "polisher", ["e"], "polisher_extrema.toml")
-    groups = {"Size of the swing": size(ds), "Times of the extremes (figure 4)": times(ds), "The border": border(ds)}
-    return groups, [NOTES], lambda: figure(ds)
-
-
-main = script(__name__, "polisher_extrema.h5", conclude, "paper")
+main = script(__name__, "polisher_extrema.h5", claims, figure, source="paper")

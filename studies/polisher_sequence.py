@@ -1,24 +1,21 @@
 """Which sequence of settings polishes evenly, and how does a machine keep its middle when its throw changes?
 
-    sweep run studies/polisher_sequence.toml
     python studies/polisher_sequence.py polisher_sequence.h5
 
-draws polisher_sequence.png and prints what comes out. Wear adds up, so the time t_i >= 0 spent at setting i of the
-sweep wears the sum of t_i h_i(r); the most even sum of given mean is a least-squares problem over the area with t >=
-0.
+Wear adds up, so the time t_i >= 0 spent at setting i of the sweep wears the sum of t_i h_i(r); the most even sum of
+given mean is a least-squares problem over the area with t >= 0.
+
+unevenness: standard deviation over the area, over the mean; allowed: 1e-6 of the conditions of an optimum, 1e-9 m of a
+length found by roots, 2 % of A0's slopes over 1 mm of throw
 """
 
 import math
-from typing import Any
 
 import numpy as np
-import xarray as xr
-from _common import Claims, Conclusion, Statement, compared, most, read_result, said, script, solved
-from _figures import colour_map, page_of
-from _polishing import KEPT, Profiles, area, best_settings, least, machine, profiles, unevenness
+from _common import Claims, Statement, compared, most, said, script, solved
+from _figures import COLOURS, colour_map, panels
+from _polishing import KEPT, area, best_settings, least, machine, profiles, unevenness
 from scipy.optimize import brentq
-
-from sweep.show.charts import COLOURS
 
 TOOLS = (
     (2, 2, 1, 1), (2, 2, 1, 2), (1, 1, 1, 2), (0.5, 0.5, 1, 2), (100, 100, 1, 2),
@@ -26,14 +23,21 @@ TOOLS = (
 )  # fmt: skip
 """n, m, a, b of the paper's figure 5, abs(X/a)^n + abs(Y/b)^m <= 1: five known tools, three unknown ones."""
 
-NOTES = """\
-unevenness: standard deviation over the area, over the mean; allowed: 1e-6 of the conditions of an optimum, 1e-9 m of a
-length found by roots, 2 % of A0's slopes over 1 mm of throw
-"""
+
+def middle(d: float, e: float, b: float, f: float) -> float:
+    """A0 [rad] by (39)."""
+    return 0.5 * sum(math.acos((b * b + d * d - (f + s * e) ** 2) / (2 * b * d)) for s in (1, -1))
 
 
-def optimum(ds: xr.Dataset, p: Profiles, shares: Any) -> Claims:
-    """What a sequence gains over one setting, and whether it is the best."""
+def prepared(ds):
+    """The sweep, its profiles, and the shares of the most even sequence."""
+    p = profiles(ds)
+    return ds, p, p.times(range(len(p.rows)), 0.0)
+
+
+def claims(ds, p, shares) -> Claims:
+    """What theory says, and what comes out."""
+    yield "Sequences of settings"
     mixed, best, single = shares @ p.rows, p.nominal(range(len(p.rows)), shares), best_settings(ds)[0].uneven
     holds = best < single / 35 and least(mixed, p.weight, p.radius) > KEPT
     here = f"{best:.1%} for {single:.1%}, centre {mixed[0]:.2f}, {np.sum(shares > 1e-9)} settings"
@@ -43,9 +47,7 @@ def optimum(ds: xr.Dataset, p: Profiles, shares: Any) -> Claims:
         e, offset = (100 * x for x in p.places[i])
         yield Statement(f"  {shares[i]:.0%} of the wear at", "", f"e = {e:g} cm, offset {offset:.0f} cm")
 
-
-def eight_tools(ds: xr.Dataset) -> Claims:
-    """Unevenness by each tool of the paper's figure 5, its half widths 4 cm times a and b."""
+    yield "The eight tools at e = 10 cm, offset 3 cm"
     n, m, a, b = np.array(TOOLS).T
     sizes = {"tool_n": n, "tool_m": m, "tool_a": 0.04 * a, "tool_b": 0.04 * b}
     given, along = machine(ds) | sizes | {"e": 0.1, "w_x": float(ds.w_x[3])}, {"radius": ds.radius.values}
@@ -56,14 +58,7 @@ def eight_tools(ds: xr.Dataset) -> Claims:
         yield Statement("n, m = {:g}, {:g}, a, b = {:g}, {:g}: uneven by".format(*row), "", f"{uneven:.0%}")
     yield said("the disc is the most even of them", found.argmin() == 0, f"{found[0]:.0%}")
 
-
-def middle(d: float, e: float, b: float, f: float) -> float:
-    """A0 [rad] by (39)."""
-    return 0.5 * sum(math.acos((b * b + d * d - (f + s * e) ** 2) / (2 * b * d)) for s in (1, -1))
-
-
-def correction(ds: xr.Dataset) -> Claims:
-    """How far O_DH moves on the arm so that the middle stays when the throw goes from 10 to 15 cm."""
+    yield "Another throw about the same middle"
     b, d, f = (float(ds[name]) for name in "bdf")
     kept = middle(d, 0.10, b, f)
     exact, small = (brentq(lambda x, e=e: middle(x, e, b, f) - kept, 0.37, 0.45, xtol=1e-15) for e in (0.15, 0.101))
@@ -78,36 +73,22 @@ def correction(ds: xr.Dataset) -> Claims:
     )
 
 
-def figure(ds: xr.Dataset, p: Profiles, shares: Any) -> Any:
+@panels(128.0, 2)
+def figure(profile, share, ds, p, shares):
     """The best profiles of one setting, and of the sequence, whose shares are mapped; for a column of print."""
     bored, best = best_settings(ds)
     shown = {"one setting": bored.profile, "one, without a hole": best.profile, "sequence": shares @ p.rows}
-    with page_of(128.0, 2, width=110.0) as (page, (profile, share)):
-        for colour, (name, row) in zip(COLOURS, shown.items(), strict=False):
-            radius = np.linspace(0.0, p.radius[-1], row.size)
-            weight = area(radius)
-            text = f"{name}, {100 * float(unevenness(row, weight)):.1f} %"
-            profile.plot(1e3 * radius, row / (row * weight).sum(), color=colour, label=text)
-        profile.set(xlabel="radius [mm]", ylabel="wear over its mean [1]", xlim=(0, 100), ylim=(0, 2))
-        profile.legend(loc="upper right")
-        grid, offset, e = 100 * shares.reshape(ds.status.shape), 1e3 * (ds.w_x - ds.L).values, 1e3 * ds.e.values
-        colour_map(share, offset, e, np.where(grid > 1e-7, grid, np.nan), "share of the wear [%]")
-        share.set(xlabel="offset [mm]", ylabel="eccentricity, $e$ [mm]", facecolor="0.92")
-        share.set(xlim=(-5, 105), ylim=(10, 170))
-    return page
+    for colour, (name, row) in zip(COLOURS, shown.items(), strict=False):
+        radius = np.linspace(0.0, p.radius[-1], row.size)
+        weight = area(radius)
+        text = f"{name}, {100 * float(unevenness(row, weight)):.1f} %"
+        profile.plot(1e3 * radius, row / (row * weight).sum(), color=colour, label=text)
+    profile.set(xlabel="radius [mm]", ylabel="wear over its mean [1]", xlim=(0, 100), ylim=(0, 2))
+    profile.legend(loc="upper right")
+    grid, offset, e = 100 * shares.reshape(ds.status.shape), 1e3 * (ds.w_x - ds.L).values, 1e3 * ds.e.values
+    colour_map(share, offset, e, np.where(grid > 1e-7, grid, np.nan), "share of the wear [%]")
+    share.set(xlabel="offset [mm]", ylabel="eccentricity, $e$ [mm]", facecolor="0.92")
+    share.set(xlim=(-5, 105), ylim=(10, 170))
 
 
-def conclude(path: str) -> Conclusion:
-    """Statements and the figure."""
-    ds = read_result(path, "polisher_wear", ["e", "w_x"], "polisher_sequence.toml")
-    p = profiles(ds)
-    shares = p.times(range(len(p.rows)), 0.0)
-    groups = {
-        "Sequences of settings": optimum(ds, p, shares),
-        "The eight tools at e = 10 cm, offset 3 cm": eight_tools(ds),
-        "Another throw about the same middle": correction(ds),
-    }
-    return groups, [NOTES], lambda: figure(ds, p, shares)
-
-
-main = script(__name__, "polisher_sequence.h5", conclude)
+main = script(__name__, "polisher_sequence.h5", claims, figure, prepared)

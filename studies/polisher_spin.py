@@ -1,27 +1,28 @@
 """Does a tool that spins polish more evenly, and how many settings does it need where times of dwell are off by 5 %?
 
-    sweep run studies/polisher_spin.toml
     python studies/polisher_spin.py polisher_spin.h5
 
-draws polisher_spin.png and prints what comes out. A disc at the arm's end c turns at the rate k Omega, Omega that of
+A disc at the arm's end c turns at the rate k Omega, Omega that of
 the work about w; rigid on the arm it turns as the arm does. A point of the work at w + r n moves under it with
     v = J ((alpha' - k Omega) c + k Omega w + (k - 1) Omega r n),                                             (1)
 J a right angle, so a tool that turns as the work, k = 1, has one speed everywhere. Under an even pressure friction
 then has no moment about its centre, so a free tool turns so while it lies wholly on the work. Times of dwell, their
 errors and the unevenness to be expected are those of `polisher_robust`.
 Where it hangs over the rim a free tool turns otherwise, which is left out here, as is friction of its bearing.
+
+unevenness: standard deviation over the area, over the mean; expected: with errors of 5 % of the times of dwell.
+Allowed: 0.5 % of the largest wear from 2 mm on, 720 crank angles; 0.5 % of unevenness; 0.2 % of the wear in all; 3 %
+of 4000 draws. Sets of up to three settings are the best of all; more are what exchanging finds from 25 starts
 """
 
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Claims, Conclusion, compared, differing, most, read_result, said, script
-from _figures import page_of
+from _common import Claims, compared, differing, most, said, script
+from _figures import COLOURS, DASHES, panels
 from _polishing import KEPT, WANTED, Profiles, disc_points, fewest, machine, profiles, reached, swings, tool_wear
 from scipy.optimize import brentq
-
-from sweep.show.charts import COLOURS, DASHES
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
 """Of an arc of contact, from -1 to 1."""
@@ -34,14 +35,9 @@ FEWEST = {
 """Settings for `WANTED`, and what all settings reach [%], by twice as many crank angles."""
 MORE = (-20.0, -10.0, -5.0, -2.0, 0.0, 2.0, 10.0)
 """k of further ones that are drawn."""
-NOTES = """\
-unevenness: standard deviation over the area, over the mean; expected: with errors of 5 % of the times of dwell.
-Allowed: 0.5 % of the largest wear from 2 mm on, 720 crank angles; 0.5 % of unevenness; 0.2 % of the wear in all; 3 %
-of 4000 draws. Sets of up to three settings are the best of all; more are what exchanging finds from 25 starts
-"""
 
 
-def wear(ds: xr.Dataset, motion: xr.Dataset, w: float, k: float | None, radius: Any) -> Any:
+def wear(ds: xr.Dataset, motion: xr.Dataset, w: float, k: float | None, radius):
     """Mean wear of rings [m/s] by (1), over the arc of each that the disc covers, at one throw; k None: rigid."""
     a, work, rate = float(ds.tool_a), float(ds.Omega), motion.alpha_rate.values
     turn = rate if k is None else k * work + 0 * rate
@@ -91,8 +87,17 @@ def free_turn(ds: xr.Dataset, pace: float) -> float:
     return brentq(moment, -3, 6)
 
 
-def physics(ds: xr.Dataset, kernel: Profiles) -> Claims:
-    """(1) against the kernel, against the wear in all, and the moment of friction."""
+def prepared(ds):
+    """The sweep, and by tool the profiles of all settings and the best few of them."""
+    tools = {"rigid": profiles(ds)} | {name: spun(ds, k) for name, k in SPINS.items()}
+    sets = {"rigid": fewest(tools["rigid"])} | {name: sets_of(ds, k) for name, k in SPINS.items()}
+    return ds, tools, sets
+
+
+def claims(ds, tools, sets) -> Claims:
+    """What theory says, and what comes out."""
+    yield "A tool that spins"
+    kernel = tools["rigid"]
     off = abs(spun(ds, None).rows - kernel.rows)[:, 1:] / kernel.rows.max(1, keepdims=True)
     yield most("rigid tool by (1), against the kernel: profiles", "0.5 %", off, 0.005)
     # what the work loses in all is what the points of the tool lose
@@ -106,9 +111,7 @@ def physics(ds: xr.Dataset, kernel: Profiles) -> Claims:
         yield compared(f"turns {name}: wear in all by the tool's points", f"{theory:.5g}", here, theory, 2e-3, 5)
     yield differing("free disc wholly on the work: k", "1", free_turn(ds, 0.3), 1.0, 1e-6, 7)
 
-
-def evenness(tools: dict[str, Profiles], sets: dict[str, dict[int, list[int]]]) -> Claims:
-    """The fewest settings for a wanted unevenness, and what all of them reach."""
+    yield "Few settings"
     wanted, errors = ", ".join(f"{100 * x:g}" for x in WANTED), []
     for name, p in tools.items():
         (needed, kept, drawn), (known, everything) = reached(p, sets[name]), FEWEST[name]
@@ -120,32 +123,22 @@ def evenness(tools: dict[str, Profiles], sets: dict[str, dict[int, list[int]]]) 
     yield most("errors drawn: largest deviation", "3 %", max(errors, key=abs), 0.03)
 
 
-def figure(ds: xr.Dataset, tools: dict[str, Profiles], sets: dict[str, dict[int, list[int]]]) -> Any:
+@panels(124.0, 2)
+def figure(number, spin, ds, tools, sets):
     """Unevenness over the number of settings and over the spin; for a column of print."""
-    with page_of(124.0, 2, width=110.0) as (page, (number, spin)):
-        for colour, dash, (name, p) in zip(COLOURS, DASHES, tools.items(), strict=False):
-            few, look = sets[name], {"linestyle": dash, "markersize": 3, "color": colour, "label": name}
-            number.plot(list(few), [100 * p.best(s) for s in few.values()], "o", **look)
-        number.set(xlabel="settings [1]", ylabel="expected unevenness [%]", ylim=(0, 4))
-        turns = sorted({*MORE, *SPINS.values()})
-        for delta, look, colour in ((0.05, "o-", COLOURS[0]), (0.0, "s--", COLOURS[1])):
-            made = [(p, p.times(range(len(p.rows)), delta)) for p in (spun(ds, k) for k in turns)]
-            found = [100 * p.expected(range(len(p.rows)), times, delta) for p, times in made]
-            name = f"errors of {100 * delta:g} %" if delta else "exact times"
-            spin.plot(turns, found, look, color=colour, markersize=3, label=name)
-        spin.set(xlabel=r"rate of the tool over $\Omega$, $k$ [1]", ylabel="unevenness, all settings [%]", ylim=(0, 1))
-        for axes in (number, spin):
-            axes.legend()
-    return page
+    for colour, dash, (name, p) in zip(COLOURS, DASHES, tools.items(), strict=False):
+        few, look = sets[name], {"linestyle": dash, "markersize": 3, "color": colour, "label": name}
+        number.plot(list(few), [100 * p.best(s) for s in few.values()], "o", **look)
+    number.set(xlabel="settings [1]", ylabel="expected unevenness [%]", ylim=(0, 4))
+    turns = sorted({*MORE, *SPINS.values()})
+    for delta, look, colour in ((0.05, "o-", COLOURS[0]), (0.0, "s--", COLOURS[1])):
+        made = [(p, p.times(range(len(p.rows)), delta)) for p in (spun(ds, k) for k in turns)]
+        found = [100 * p.expected(range(len(p.rows)), times, delta) for p, times in made]
+        name = f"errors of {100 * delta:g} %" if delta else "exact times"
+        spin.plot(turns, found, look, color=colour, markersize=3, label=name)
+    spin.set(xlabel=r"rate of the tool over $\Omega$, $k$ [1]", ylabel="unevenness, all settings [%]", ylim=(0, 1))
+    for axes in (number, spin):
+        axes.legend()
 
 
-def conclude(path: str) -> Conclusion:
-    """Statements and the figure."""
-    ds = read_result(path, "polisher_wear", ["e", "w_x"], "polisher_spin.toml")
-    tools = {"rigid": profiles(ds)} | {name: spun(ds, k) for name, k in SPINS.items()}
-    sets = {"rigid": fewest(tools["rigid"])} | {name: sets_of(ds, k) for name, k in SPINS.items()}
-    groups = {"A tool that spins": physics(ds, tools["rigid"]), "Few settings": evenness(tools, sets)}
-    return groups, [NOTES], lambda: figure(ds, tools, sets)
-
-
-main = script(__name__, "polisher_spin.h5", conclude)
+main = script(__name__, "polisher_spin.h5", claims, figure, prepared)

@@ -1,24 +1,21 @@
 """How evenly does a polishing machine wear a turning workpiece, and what do eccentricity and offset do for it?
 
-    sweep run studies/polisher_wear.toml
-    sweep run studies/polisher_wear_load.toml
     python studies/polisher_wear.py polisher_wear.h5 polisher_wear_load.h5
 
-draws polisher_wear.png and prints conclusions. The unevenness of a profile is the standard deviation of the wear over
-the area of the workpiece, over its mean; 0 is even. It weighs by area, so it hardly sees a middle that the tool never
-reaches: the least wear of the inner half of the radius over the mean is told beside it, and below a half of the mean
-the workpiece is said to have a hole.
-"""
+The unevenness of a profile is the standard deviation of the wear over the area of the workpiece, over its mean; 0 is
+even. It weighs by area, so it hardly sees a middle that the tool never reaches: the least wear of the inner half of
+the radius over the mean is told beside it, and below a half of the mean the workpiece is said to have a hole.
 
-from typing import Any
+uneven: standard deviation over the area over the mean; a hole: least wear of the inner half below half the mean.
+Optimised: over throw and offset, not on the grid. Offset: how much farther from the pivot the workpiece's centre lies
+than the tool's; place of tool and workpiece, rates, pressure and Preston's coefficient are chosen here
+"""
 
 import numpy as np
 import xarray as xr
-from _common import Claims, Conclusion, compared, read_result, said, script
-from _figures import hatch, page_of, quality_bar
+from _common import Claims, compared, said, script
+from _figures import COLOURS, hatch, panels, quality_bar
 from _polishing import KEPT, POINTS, area, best_settings, disc, least, unevenness
-
-from sweep.show.charts import COLOURS
 
 UM_PER_HOUR = 3.6e9
 """1 m/s."""
@@ -29,11 +26,6 @@ USUAL = 0.10
 """Eccentricity [m] of the profiles."""
 SHAPES = {"disc": (2, 0.04), "ellipse": (2, 0.08), "rhombus 1:2": (1, 0.08), "rhombus 1:1": (1, 0.04)}
 """Exponent and half width [m] of the tools."""
-
-NOTES = """\
-uneven: standard deviation over the area over the mean; a hole: least wear of the inner half below half the mean.
-Optimised: over throw and offset, not on the grid. Offset: how much farther from the pivot the workpiece's centre lies
-than the tool's; place of tool and workpiece, rates, pressure and Preston's coefficient are chosen here"""
 
 
 def scaled(ds: xr.Dataset) -> xr.Dataset:
@@ -53,19 +45,6 @@ def tool(ds: xr.Dataset, name: str) -> xr.Dataset:
     return ds.sel(tool_n=n).sel(tool_b=b, method="nearest")
 
 
-def edge(ds: xr.Dataset, load: xr.Dataset) -> Claims:
-    """What a constant load does where the tool hangs over the edge, 2 mm inside it.
-
-    The load is that of the constant pressure on the whole tool: where the tool hangs over the edge the pressure rises
-    by its area over that in contact, 3 to 5 times on this grid.
-    """
-    pressed = tool(ds, "disc").wear.sel(e=USUAL, method="nearest")
-    ratio = load.wear.isel(radius=-1) / pressed.interp(radius=load.radius[-1]).sel(w_x=load.w_x, method="nearest")
-    here = ", ".join(f"{float(r):.3g} at {MM * float(r.w_x - ds.L):.0f} mm" for r in ratio)
-    within = ((ratio > 3) & (ratio < 5)).all()
-    yield said("disc: wear by load over that by pressure, 2 mm from the edge", within, here, "3 to 5")
-
-
 def least_uneven(ds: xr.Dataset, *over: str, hole: bool = False) -> xr.Dataset:
     """The cell of least unevenness, of all, or of those without a hole."""
     uneven = ds.uneven if hole else ds.uneven.where(ds.least >= KEPT)
@@ -76,17 +55,6 @@ def described(cell: xr.Dataset) -> str:
     """Unevenness, place and hole of a cell."""
     place = f"{100 * float(cell.uneven):.1f} % at e = {CM * float(cell.e):g} cm, "
     return f"{place}offset {CM * float(cell.w_x - cell.L):.3g} cm, least {float(cell.least):.2f}"
-
-
-def offsets(ds: xr.Dataset) -> Claims:
-    """What moving the workpiece does, tool by tool: the least uneven profile has a hole, so holes are left out."""
-    for name in SHAPES:
-        usual = tool(ds, name).sel(e=USUAL, method="nearest")
-        aligned = float(usual.uneven.sel(w_x=float(ds.L), method="nearest"))
-        bored, best = least_uneven(usual, "w_x", hole=True), least_uneven(usual, "w_x")
-        here = f"{described(best)}; no offset {100 * aligned:.0f} %"
-        yield said(f"{name}, e = 10 cm: the least uneven has a hole", bored.least < KEPT, described(bored))
-        yield said("  without a hole an offset evens by a third at least", best.uneven / aligned < 2 / 3, here)
 
 
 def one_setting(ds: xr.Dataset) -> Claims:
@@ -110,56 +78,67 @@ def one_setting(ds: xr.Dataset) -> Claims:
     yield compared("disc, most even setting of the grid, solved again", f"{again:.5f}", found.uneven, again, 1e-4, 5)
 
 
-def eccentricities(ds: xr.Dataset) -> Claims:
-    """What the eccentricity does."""
-    disc = ds.sel(tool_n=2).isel(tool_b=0)
-    aligned, lost = (disc[name].isel(w_x=0) for name in ("uneven", "average"))
+def prepared(ds, load):
+    """Both sweeps, the first with how uneven its profiles are."""
+    return scaled(ds), load
+
+
+def claims(ds, load) -> Claims:
+    """What theory says, and what comes out."""
+    yield "Offset"
+    for name in SHAPES:
+        usual = tool(ds, name).sel(e=USUAL, method="nearest")
+        aligned = float(usual.uneven.sel(w_x=float(ds.L), method="nearest"))
+        bored, best = least_uneven(usual, "w_x", hole=True), least_uneven(usual, "w_x")
+        here = f"{described(best)}; no offset {100 * aligned:.0f} %"
+        yield said(f"{name}, e = 10 cm: the least uneven has a hole", bored.least < KEPT, described(bored))
+        yield said("  without a hole an offset evens by a third at least", best.uneven / aligned < 2 / 3, here)
+
+    yield "Eccentricity"
+    round_tool = ds.sel(tool_n=2).isel(tool_b=0)
+    aligned, lost = (round_tool[name].isel(w_x=0) for name in ("uneven", "average"))
     even = aligned.isel(e=int(aligned.argmin("e")))
     here = f"{100 * float(aligned[0]):.0f} % at 2 cm, least {100 * float(even):.0f} % at {CM * float(even.e):g} cm"
     text = f"{UM_PER_HOUR * float(lost[0]):.3g} at 2 cm, at most {UM_PER_HOUR * float(lost.max()):.3g}"
     grows = "disc, no offset: mean wear more than doubles with throw [um/h]"
     yield said("disc, no offset: throw halves the unevenness", even < 0.5 * aligned[0], here)
-    yield from one_setting(disc)
+    yield from one_setting(round_tool)
     yield said(grows, lost.max() > 2 * lost[0], text)
 
+    yield "Constant load"
+    # The load is that of the constant pressure on the whole tool: where the tool hangs over the edge the pressure
+    # rises by its area over that in contact, 3 to 5 times on this grid.
+    pressed = tool(ds, "disc").wear.sel(e=USUAL, method="nearest")
+    ratio = load.wear.isel(radius=-1) / pressed.interp(radius=load.radius[-1]).sel(w_x=load.w_x, method="nearest")
+    here = ", ".join(f"{float(r):.3g} at {MM * float(r.w_x - ds.L):.0f} mm" for r in ratio)
+    within = ((ratio > 3) & (ratio < 5)).all()
+    yield said("disc: wear by load over that by pressure, 2 mm from the edge", within, here, "3 to 5")
 
-def figure(ds: xr.Dataset, load: xr.Dataset) -> Any:
+
+@panels(136.0, 2)
+def figure(profile, plane, ds, load):
     """Profiles of the disc, and how uneven they are over offset and eccentricity; for a column of print."""
     disc = tool(ds, "disc")
-    with page_of(136.0, 2, width=110.0) as (page, (profile, plane)):
-        for place, colour in zip(PROFILES, COLOURS, strict=False):
-            pressed = disc.wear.sel(e=USUAL, method="nearest").sel(w_x=place, method="nearest")
-            dashed, text = load.wear.sel(w_x=place, method="nearest"), f"{MM * float(pressed.w_x - ds.L):.0f} mm"
-            profile.plot(MM * pressed.radius, UM_PER_HOUR * pressed, color=colour, label=text)
-            profile.plot(MM * dashed.radius, UM_PER_HOUR * dashed, "--", color=colour, linewidth=0.9)
-        profile.plot([], [], "k--", linewidth=0.9, label="constant load")
-        profile.set(xlabel="radius [mm]", ylabel="wear [µm/h]", xlim=(0, 100), ylim=(0, 0.24))
-        profile.legend(title="offset at $e=100$ mm", loc="upper left", ncols=2)
-        x, y, uneven = MM * (ds.w_x - ds.L).values, MM * ds.e.values, disc.uneven.transpose("e", "w_x")
-        mesh = plane.pcolormesh(x, y, uneven, vmin=0, vmax=1.2, cmap="cividis_r", shading="gouraud", rasterized=True)
-        quality_bar(page, mesh, plane, "unevenness of the wear [1]", pad=0.02)
-        hatch(plane, x, y, (disc.least < KEPT).transpose("e", "w_x").values, "////", "white")
-        lines = plane.contour(x, y, uneven, levels=[0.3, 0.5], colors="white", linewidths=0.7)
-        for text in plane.clabel(lines, fmt="%g", fontsize=8):
-            text.set_bbox({"facecolor": "0.35", "edgecolor": "none", "pad": 0.5})
-        best = least_uneven(disc, "e", "w_x")
-        plane.plot(
-            MM * float(best.w_x - ds.L), MM * float(best.e), "*", color="white", markeredgecolor="black", markersize=9
-        )
-        plane.set(xlabel="offset [mm]", ylabel="eccentricity, $e$ [mm]")
-    return page
+    for place, colour in zip(PROFILES, COLOURS, strict=False):
+        pressed = disc.wear.sel(e=USUAL, method="nearest").sel(w_x=place, method="nearest")
+        dashed, text = load.wear.sel(w_x=place, method="nearest"), f"{MM * float(pressed.w_x - ds.L):.0f} mm"
+        profile.plot(MM * pressed.radius, UM_PER_HOUR * pressed, color=colour, label=text)
+        profile.plot(MM * dashed.radius, UM_PER_HOUR * dashed, "--", color=colour, linewidth=0.9)
+    profile.plot([], [], "k--", linewidth=0.9, label="constant load")
+    profile.set(xlabel="radius [mm]", ylabel="wear [µm/h]", xlim=(0, 100), ylim=(0, 0.24))
+    profile.legend(title="offset at $e=100$ mm", loc="upper left", ncols=2)
+    x, y, uneven = MM * (ds.w_x - ds.L).values, MM * ds.e.values, disc.uneven.transpose("e", "w_x")
+    mesh = plane.pcolormesh(x, y, uneven, vmin=0, vmax=1.2, cmap="cividis_r", shading="gouraud", rasterized=True)
+    quality_bar(profile.figure, mesh, plane, "unevenness of the wear [1]", pad=0.02)
+    hatch(plane, x, y, (disc.least < KEPT).transpose("e", "w_x").values, "////", "white")
+    lines = plane.contour(x, y, uneven, levels=[0.3, 0.5], colors="white", linewidths=0.7)
+    for text in plane.clabel(lines, fmt="%g", fontsize=8):
+        text.set_bbox({"facecolor": "0.35", "edgecolor": "none", "pad": 0.5})
+    best = least_uneven(disc, "e", "w_x")
+    plane.plot(
+        MM * float(best.w_x - ds.L), MM * float(best.e), "*", color="white", markeredgecolor="black", markersize=9
+    )
+    plane.set(xlabel="offset [mm]", ylabel="eccentricity, $e$ [mm]")
 
 
-def conclude(path: str, loaded: str) -> Conclusion:
-    """Statements and the figure."""
-    ds = scaled(read_result(path, "polisher_wear", ["tool_n", "tool_b", "e", "w_x"], "polisher_wear.toml"))
-    load = read_result(loaded, "polisher_wear", ["w_x"], "polisher_wear_load.toml")
-    groups = {
-        "Offset": offsets(ds),
-        "Eccentricity": eccentricities(ds),
-        "Constant load": edge(ds, load),
-    }
-    return groups, [NOTES], lambda: figure(ds, load)
-
-
-main = script(__name__, "polisher_wear.h5 polisher_wear_load.h5", conclude)
+main = script(__name__, "polisher_wear.h5 polisher_wear_load.h5", claims, figure, prepared)

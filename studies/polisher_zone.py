@@ -1,11 +1,9 @@
 """Which zone of the work does an operator choose by moving O_DH on its arc, and how does the tool wear meanwhile?
 
-    sweep run studies/polisher_zone.toml
     python studies/polisher_zone.py polisher_zone.h5
 
-draws polisher_zone.png and compares theory with what comes out. O_DH on its arc turns the tool's centre by beta, to
-L (cos(alpha + beta), sin(alpha + beta)); so the tool, of half width a, covers the work's centre, at distance L, in some
-part of the swing if
+O_DH on its arc turns the tool's centre by beta, to L (cos(alpha + beta), sin(alpha + beta)); so the tool, of half
+width a, covers the work's centre, at distance L, in some part of the swing if
 
     alpha_min - q <= -beta <= alpha_max + q,  sin(q/2) = a/(2 L),                                        (1)
 
@@ -14,24 +12,19 @@ law as the work does, A p times its speed against it. On the arm it does not spi
 mean speed, and all that the tool loses the work loses too,
 
     integral of the wear over the tool = 2 pi integral of the wear over r dr.                            (2)
+
+zone: mean radius of what is worn off, by volume; outer, inner: the tool's rim farthest from and nearest to the pivot
+allowed: no exception to (1), beside which no cell lies; 2e-3 of (2), what trapezoids of 2.5 mm in the radius leave;
+2e-3 degree of the middle, found on 720 crank angles
 """
 
 import math
-from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Claims, Conclusion, most, read_result, said, script, solved
-from _figures import page_of
+from _common import Claims, most, said, script, solved
+from _figures import COLOURS, DASHES, MARKS, panels
 from _polishing import disc_points, swings, tool_wear
-
-from sweep.show.charts import COLOURS, DASHES, MARKS
-
-NOTES = """\
-zone: mean radius of what is worn off, by volume; outer, inner: the tool's rim farthest from and nearest to the pivot
-allowed: no exception to (1), beside which no cell lies; 2e-3 of (2), what trapezoids of 2.5 mm in the radius leave;
-2e-3 degree of the middle, found on 720 crank angles\
-"""
 
 
 def prepared(ds: xr.Dataset) -> xr.Dataset:
@@ -50,8 +43,9 @@ def prepared(ds: xr.Dataset) -> xr.Dataset:
     )  # fmt: skip
 
 
-def zones(ds: xr.Dataset) -> Claims:
-    """Where the work wears, by beta; O_DH turned so that the middle stays when the throw goes from 10 to 15 cm."""
+def claims(ds) -> Claims:
+    """What theory says, and what comes out."""
+    yield "The zone by O_DH"
     q = 2 * math.asin(float(ds.tool_a) / (2 * float(ds.L)))
     theory = (ds.low - q <= -ds.beta) & (-ds.beta <= ds.high + q)
     worn, zone = ds.wear.isel(radius=0) > 0, 100 * ds.zone.sel(e=0.04, method="nearest")
@@ -71,9 +65,7 @@ def zones(ds: xr.Dataset) -> Claims:
     )
     yield said("  zone with and without it, e = 15 cm", abs(shift) > 0.1, f"by {10 * shift:.1f} mm", "moves")
 
-
-def tools(ds: xr.Dataset) -> Claims:
-    """What the tool loses."""
+    yield "Wear of the tool"
     usual = ds.sel(e=0.10, method="nearest").sel(beta=0, method="nearest")
     ratio = float(usual.tool) / (math.pi * float(ds.tool_a) ** 2) / float(usual.wear.isel(radius=0))
     uneven = ds.across.isel(X=-1) / ds.across.isel(X=0)
@@ -83,28 +75,20 @@ def tools(ds: xr.Dataset) -> Claims:
     yield said("outer rim over inner rim", (uneven > 1).all(), here, "> 1 at every throw")
 
 
-def figure(ds: xr.Dataset) -> Any:
+@panels(128.0, 2)
+def figure(zone, tool, ds):
     """Zones by beta, filled where the centre wears, and the tool's wear; for a column of print."""
-    with page_of(128.0, 2, width=110.0) as (page, (zone, tool)):
-        for k, e in enumerate(ds.e.values):
-            line, look = ds.sel(e=e), {"color": COLOURS[k], "label": f"{100 * e:.0f}"}
-            beta, place, worn = np.degrees(line.beta), 100 * line.zone, line.wear.isel(radius=0) > 0
-            zone.plot(beta, place, MARKS[k] + "-", markerfacecolor="white", linewidth=0.8, color=COLOURS[k])
-            zone.plot(beta, place.where(worn), MARKS[k], linestyle="", **look)
-            tool.plot(100 * ds.X, line.across / line.across.mean(), linestyle=DASHES[k], **look)
-        zone.plot([], [], "o", color="black", markerfacecolor="white", label="centre not worn")
-        zone.set(xlabel=r"O$_\mathrm{DH}$ turned by $\beta$ [degree]", ylabel="zone, mean radius [cm]", ylim=(0, 27))
-        zone.legend(title="throw, $e$ [cm]", loc="upper center", ncols=4)
-        tool.set(xlabel="place on the tool, outwards [cm]", ylabel="wear of the tool over its mean [1]")
-        tool.legend(title="throw, $e$ [cm]", loc="upper left", ncols=3)
-    return page
+    for k, e in enumerate(ds.e.values):
+        line, look = ds.sel(e=e), {"color": COLOURS[k], "label": f"{100 * e:.0f}"}
+        beta, place, worn = np.degrees(line.beta), 100 * line.zone, line.wear.isel(radius=0) > 0
+        zone.plot(beta, place, MARKS[k] + "-", markerfacecolor="white", linewidth=0.8, color=COLOURS[k])
+        zone.plot(beta, place.where(worn), MARKS[k], linestyle="", **look)
+        tool.plot(100 * ds.X, line.across / line.across.mean(), linestyle=DASHES[k], **look)
+    zone.plot([], [], "o", color="black", markerfacecolor="white", label="centre not worn")
+    zone.set(xlabel=r"O$_\mathrm{DH}$ turned by $\beta$ [degree]", ylabel="zone, mean radius [cm]", ylim=(0, 27))
+    zone.legend(title="throw, $e$ [cm]", loc="upper center", ncols=4)
+    tool.set(xlabel="place on the tool, outwards [cm]", ylabel="wear of the tool over its mean [1]")
+    tool.legend(title="throw, $e$ [cm]", loc="upper left", ncols=3)
 
 
-def conclude(path: str) -> Conclusion:
-    """Statements and the figure."""
-    ds = prepared(read_result(path, "polisher_wear", ["e", "beta"], "polisher_zone.toml"))
-    groups = {"The zone by O_DH": zones(ds), "Wear of the tool": tools(ds)}
-    return groups, [NOTES], lambda: figure(ds)
-
-
-main = script(__name__, "polisher_zone.h5", conclude)
+main = script(__name__, "polisher_zone.h5", claims, figure, prepared)

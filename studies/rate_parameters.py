@@ -2,22 +2,23 @@
 
     python studies/rate_parameters.py rate_parameters.h5
 
-compares Sobol' indices of torque, friction, switching angle and restitution on ln(period), by SALib, with what the
-exponents say, and draws them against the drive: rate_parameters.png.
+Compares Sobol' indices of torque, friction, switching angle and restitution on ln(period), by SALib, with what the
+exponents say.
 
 P = F(alpha)/a with alpha = mu/(a^2 phi0), so with s = -d ln P/d ln mu the exponents are -s for mu, s for phi0 and
 2 s - 1 for a. Where all are known equally well, the shares of the variance are their squares over the sum of these.
-"""
 
-from typing import Any
+Friction decides nothing where the period falls as mu^(-1/2): more of it lowers the speed and the amplitude alike, so
+that a shorter way is gone more slowly in the same time. Who wants a steady rate there looks after the torque and the
+pallets, not after the oil.
+"""
 
 import numpy as np
 import xarray as xr
-from _common import Claims, Conclusion, differing, read_result, script
-from _figures import direct_label, page_of
+from _common import Claims, differing, script
+from _figures import COLOURS, MARKS, direct_label, panels
 
 import sweep
-from sweep.show.charts import COLOURS, MARKS
 
 ALLOWED = 0.03
 """Of a share: what 1024 points and a curve over 10 % leave."""
@@ -26,11 +27,6 @@ RANGES = {name: {"spacing": "log", "start": 0.9048, "stop": 1.1052} for name in 
 KEPT = {"e": {"spacing": "linear", "start": 0.99, "stop": 1.0}}
 POINTS = 128
 NAMES = {"mu": "torque", "a": "friction", "phi0": "switching angle", "e": "restitution"}
-
-NOTES = """\
-Friction decides nothing where the period falls as mu^(-1/2): more of it lowers the speed and the amplitude alike, so
-that a shorter way is gone more slowly in the same time. Who wants a steady rate there looks after the torque and the
-pallets, not after the oil."""
 
 
 def shares(s: float) -> dict[str, float]:
@@ -57,35 +53,33 @@ def against_drive() -> xr.Dataset:
     return xr.concat(found, dim=xr.DataArray(DRIVES, dims="alpha", name="alpha"))
 
 
-def statements(ds: xr.Dataset) -> Claims:
-    """What the indices are beside what the exponents say."""
+def prepared(ds):
+    """The result, and the indices along the drive."""
+    return ds, against_drive()
+
+
+def claims(ds, _) -> Claims:
+    """What theory says, and what comes out."""
+    yield f"Sobol' index, total, alpha = {ds.mu.min():.3g} to {ds.mu.max():.3g}"
     total = sweep.sensitivity(ds, np.log(ds.period)).total.to_series()
     for name, share in shares(exponent(np.sqrt(ds.mu.min() * ds.mu.max()))).items():
         yield differing(NAMES[name], f"{share:.4f}", total[name] / (1 - total["e"]), share, ALLOWED, 4)
 
 
-def figure(found: xr.Dataset) -> Any:
+@panels(82.0, width=120.0)
+def figure(axes, _, found):
     """Total indices against the drive, with the shares that the exponents give."""
-    with page_of(82.0, width=120.0) as (page, axes):
-        law = [shares(exponent(float(drive))) for drive in found.alpha.values]
-        labels = {"mu": (0.1, 0.44, "torque"), "phi0": (22.0, 0.48, "switching angle, alike")}
-        labels |= {"a": (25.0, 0.13, "friction"), "e": (250.0, 0.09, "restitution")}
-        for k, (name, (x, y, text)) in enumerate(labels.items()):
-            some = found.isel(alpha=slice(k % 2 if name in ("mu", "phi0") else 0, None, 2 if k < 2 else 1))
-            axes.plot(some.alpha, some.total.sel(parameter=name), MARKS[k], color=COLOURS[k], label=text)
-            if name in law[0]:
-                axes.plot(found.alpha, [row[name] for row in law], "-", color=COLOURS[k], zorder=0, linewidth=0.8)
-            direct_label(axes, x, y, text, COLOURS[k])
-        axes.set(xscale="log", ylim=(-0.02, 0.58), ylabel=r"share of the variance of $\ln P$ [1]")
-        axes.set_xlabel(r"drive, $\alpha = \mu/(a^2 \varphi_0)$ [1]")
-    return page
+    law = [shares(exponent(float(drive))) for drive in found.alpha.values]
+    labels = {"mu": (0.1, 0.44, "torque"), "phi0": (22.0, 0.48, "switching angle, alike")}
+    labels |= {"a": (25.0, 0.13, "friction"), "e": (250.0, 0.09, "restitution")}
+    for k, (name, (x, y, text)) in enumerate(labels.items()):
+        some = found.isel(alpha=slice(k % 2 if name in ("mu", "phi0") else 0, None, 2 if k < 2 else 1))
+        axes.plot(some.alpha, some.total.sel(parameter=name), MARKS[k], color=COLOURS[k], label=text)
+        if name in law[0]:
+            axes.plot(found.alpha, [row[name] for row in law], "-", color=COLOURS[k], zorder=0, linewidth=0.8)
+        direct_label(axes, x, y, text, COLOURS[k])
+    axes.set(xscale="log", ylim=(-0.02, 0.58), ylabel=r"share of the variance of $\ln P$ [1]")
+    axes.set_xlabel(r"drive, $\alpha = \mu/(a^2 \varphi_0)$ [1]")
 
 
-def conclude(path: str) -> Conclusion:
-    """Statements and the figure."""
-    ds = read_result(path, "foliot", ["cell"], "rate_parameters.toml")
-    groups = {f"Sobol' index, total, alpha = {ds.mu.min():.3g} to {ds.mu.max():.3g}": statements(ds)}
-    return groups, [NOTES], lambda: figure(against_drive())
-
-
-main = script(__name__, "rate_parameters.h5", conclude)
+main = script(__name__, "rate_parameters.h5", claims, figure, prepared)

@@ -1,23 +1,16 @@
 """How does van der Pol's oscillator go over from a sine to a relaxation oscillation?
 
-    sweep run studies/relaxation.toml --allow-import
     python studies/relaxation.py relaxation.h5
 
-draws relaxation.png. Weak friction leaves a sine of amplitude 2; strong friction makes x creep and jump, with a period
-that grows as the friction. Both limits and what comes next to them are known.
+Weak friction leaves a sine of amplitude 2; strong friction makes x creep and jump, with a period that grows as the
+friction. Both limits and what comes next to them are known.
 """
 
-from __future__ import annotations
-
 import math
-from typing import Any
 
 import numpy as np
-import xarray as xr
-from _common import Claims, Conclusion, all_ok, compared, differing, read_result, script
-from _figures import NARROW, direct_label, page_of
-
-from sweep.show.charts import COLOURS
+from _common import Claims, all_ok, compared, differing, script
+from _figures import COLOURS, direct_label, panels
 
 SLOW = 3.0 - 2.0 * math.log(2.0)
 """Period over mu of strong friction."""
@@ -31,17 +24,21 @@ Weak: T = 2 pi (1 + mu^2/16), largest x 2 + mu^2/96, multiplier exp(-2 pi mu).
 Strong (Dorodnicyn 1947): T = (3 - 2 ln 2) mu + 7.0143 mu^-1/3."""
 
 
-def weak(ds: xr.Dataset) -> Claims:
-    """The limit of weak friction; x by a cell in which what it exceeds 2 by is more than the error that rtol allows."""
+def claims(ds) -> Claims:
+    """What theory says, and what comes out."""
+    yield "Cells"
+    near = float(ds.period.sel(mu=1.0, method="nearest"))
+    yield all_ok(ds)
+    yield compared("T at mu = 1", "6.66328686", near, AT_ONE, 1e-8)
+
+    yield "Weak friction"
     here, near = ds.isel(mu=0), ds.sel(mu=0.018, method="nearest")
     mu, larger = float(here.mu), (near.x_size - 2.0) / near.mu**2
     yield compared("(T/2 pi - 1)/mu^2", "1/16", (here.period / (2.0 * math.pi) - 1.0) / mu**2, 1.0 / 16.0, 1e-3)
     yield compared("(largest x - 2)/mu^2 at mu = 0.018", "1/96", larger, 1.0 / 96.0, 1e-3)
     yield compared("multiplier at the weakest", "exp(-2 pi mu)", here.multiplier, math.exp(-2 * math.pi * mu), 1e-4)
 
-
-def strong(ds: xr.Dataset) -> Claims:
-    """The limit of strong friction."""
+    yield "Strong friction"
     late, last, mu = ds.where(ds.mu >= 1e3, drop=True), ds.isel(mu=-1), float(ds.mu[-1])
     slope = np.polyfit(np.log(late.mu), np.log(late.period - SLOW * late.mu), 1)[0]
     theory = SLOW * mu + NEXT * mu ** (-1 / 3)
@@ -50,29 +47,19 @@ def strong(ds: xr.Dataset) -> Claims:
     yield differing("d ln T/d ln mu at the strongest", "1", last.period_by_mu, 1.0, 1e-4)
 
 
-def figure(ds: xr.Dataset) -> Any:
+@panels(120.0, 2, sharex=True)
+def figure(period, rest, ds):
     """Period with its limits; what is left of it beyond the strong one."""
-    with page_of(120.0, 2, 1, width=NARROW, sharex=True) as (page, (period, rest)):
-        period.loglog(ds.mu, ds.period, color=COLOURS[0])
-        period.plot(ds.mu, SLOW * ds.mu, color="0.5", linestyle="--", linewidth=0.8)
-        period.axhline(2.0 * math.pi, color="0.5", linestyle=":", linewidth=0.8)
-        period.set(ylabel="period $T$ [1]", ylim=(3.0, 3e4))
-        direct_label(period, 1500.0, 200.0, r"$(3-2\,\ln 2)\,\mu$", "0.4")
-        direct_label(period, 0.1, 4.4, r"$2\pi$", "0.4")
-        rest.loglog(ds.mu, ds.period - SLOW * ds.mu, color=COLOURS[0])
-        rest.plot(ds.mu, NEXT * ds.mu ** (-1 / 3), color="0.5", linestyle="--", linewidth=0.8)
-        rest.set(xlabel=r"friction $\mu$ [1]", ylabel=r"$T-(3-2\,\ln 2)\,\mu$ [1]")
-        direct_label(rest, 400.0, 4.0, r"$7.0143\,\mu^{-1/3}$", "0.4")
-    return page
+    period.loglog(ds.mu, ds.period, color=COLOURS[0])
+    period.plot(ds.mu, SLOW * ds.mu, color="0.5", linestyle="--", linewidth=0.8)
+    period.axhline(2.0 * math.pi, color="0.5", linestyle=":", linewidth=0.8)
+    period.set(ylabel="period $T$ [1]", ylim=(3.0, 3e4))
+    direct_label(period, 1500.0, 200.0, r"$(3-2\,\ln 2)\,\mu$", "0.4")
+    direct_label(period, 0.1, 4.4, r"$2\pi$", "0.4")
+    rest.loglog(ds.mu, ds.period - SLOW * ds.mu, color=COLOURS[0])
+    rest.plot(ds.mu, NEXT * ds.mu ** (-1 / 3), color="0.5", linestyle="--", linewidth=0.8)
+    rest.set(xlabel=r"friction $\mu$ [1]", ylabel=r"$T-(3-2\,\ln 2)\,\mu$ [1]")
+    direct_label(rest, 400.0, 4.0, r"$7.0143\,\mu^{-1/3}$", "0.4")
 
 
-def conclude(path: str) -> Conclusion:
-    """Statements and the figure."""
-    ds = read_result(path, "relaxation_scene:KERNEL", ["mu"], "relaxation.toml")
-    near = float(ds.period.sel(mu=1.0, method="nearest"))
-    cells = [all_ok(ds), compared("T at mu = 1", "6.66328686", near, AT_ONE, 1e-8)]
-    groups = {"Cells": cells, "Weak friction": weak(ds), "Strong friction": strong(ds)}
-    return groups, [NOTES], lambda: figure(ds)
-
-
-main = script(__name__, "relaxation.h5", conclude)
+main = script(__name__, "relaxation.h5", claims, figure)

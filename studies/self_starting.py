@@ -1,30 +1,21 @@
 """From which torque on does a foliot start itself, by friction, stiction, hairspring and where it rests?
 
-    sweep run studies/self_starting.toml
     python studies/self_starting.py self_starting.h5
 
-draws self_starting.png and compares theory with what comes out. Released at phi_s < phi0 the foliot moves if the torque
-beats stiction and spring, mu > R_s + k phi_s, and without viscous friction comes to the switch if the energy is enough,
+Released at phi_s < phi0 the foliot moves if the torque beats stiction and spring, mu > R_s + k phi_s, and without
+viscous friction comes to the switch if the energy is enough,
 
     mu > max(R_s + k phi_s, R + k (phi0 + phi_s)/2);                                                     (1)
 
 viscous friction takes more, at most so much that the foliot must be able to rest at the switch, mu > R + k phi0.
-"""
 
-from typing import Any
+theory is sharp, and no cell is on its border: exceptions are counted; the share of cells is right to one step of mu
+"""
 
 import numpy as np
 import xarray as xr
-from _common import Claims, Conclusion, read_result, said, script, solved
-from _figures import NARROW, page_of
-from matplotlib.colors import ListedColormap
-from matplotlib.patches import Patch
-
-from sweep.show.charts import COLOURS
-
-NOTES = """\
-theory is sharp, and no cell is on its border: exceptions are counted; the share of cells is right to one step of mu
-"""
+from _common import Claims, said, script, solved
+from _figures import COLOURS, ListedColormap, Patch, panels
 
 
 def started(ds: xr.Dataset) -> xr.DataArray:
@@ -38,8 +29,14 @@ def least(ds: xr.Dataset) -> xr.DataArray:
     return np.maximum(moves, ds.R + ds.k * (ds.phi0 + ds.phi_start) / 2)
 
 
-def statements(ds: xr.Dataset) -> Claims:
-    """Coulomb friction, stiction and hairspring, without and with viscous friction."""
+def claims(ds) -> Claims:
+    """What theory says, and what comes out."""
+    yield "Viscous friction alone"
+    places = {"mu": np.geomspace(1e-6, 1e2, 9), "phi_start": [-0.9, 0.0, 0.9]}
+    bare = solved("foliot_start", **places, phi0=1.0, a=1.0, along={"flip": [1, 2]}, rtol=1e-9).flip_time
+    yield said("starts itself at any torque, from anywhere", bare.notnull().all(), "27 cells", "yes (paper)")
+
+    yield "Coulomb friction, stiction and hairspring"
     smooth, rough = started(ds).sel(a=0), started(ds).sel(a=1)
     wrong = int((smooth != (ds.mu > least(ds)).transpose(*smooth.dims)).sum())
     lost, gained = smooth & ~rough, int((rough & ~smooth).sum())
@@ -54,39 +51,24 @@ def statements(ds: xr.Dataset) -> Claims:
     yield said(what, abs(share - 0.23) < 0.015, f"{share:.3f}", "mu <= R_s: 23/100")
 
 
-def alone() -> Claims:
-    """Viscous friction alone."""
-    places = {"mu": np.geomspace(1e-6, 1e2, 9), "phi_start": [-0.9, 0.0, 0.9]}
-    bare = solved("foliot_start", **places, phi0=1.0, a=1.0, along={"flip": [1, 2]}, rtol=1e-9).flip_time
-    yield said("starts itself at any torque, from anywhere", bare.notnull().all(), "27 cells", "yes (paper)")
-
-
-def figure(ds: xr.Dataset) -> Any:
+@panels(86.0, 1, 2, sharey=True)
+def figure(left, right, ds):
     """Where it starts, by hairspring; lines are (1)."""
     palette = ("0.85", COLOURS[5], COLOURS[0])
-    with page_of(86.0, 1, 2, width=NARROW, sharey=True) as (page, panels):
-        for axes, k in zip(panels, ds.k.values[[0, -1]], strict=True):
-            part = ds.sel(k=k, R_s=0.6)
-            kind = started(part).sel(a=0).astype(int) + started(part).sel(a=1)
-            axes.pcolormesh(ds.phi_start, ds.mu, kind.transpose("mu", "phi_start"), cmap=ListedColormap(list(palette)),
-                            vmin=-0.5, vmax=2.5, shading="nearest", rasterized=True)  # fmt: skip
-            axes.plot(ds.phi_start, least(part), color="black", linewidth=0.9, label="theory")
-            enough = axes.axhline(float(ds.R + k * ds.phi0), color="black", linewidth=0.8, linestyle=(0, (4, 2)))
-            enough.set_label(r"$\mu=R+k\varphi_0$")
-            axes.set(xlabel=r"released at $\varphi_\mathrm{s}/\varphi_0$ [1]", ylim=(0, 2.5))
-            axes.set_title(f"$k={k:g}$ s$^{{-2}}$")
-        panels[0].set_ylabel(r"torque, $\mu/\varphi_0$ [s$^{-2}$]")
-        words = ("rests", "starts if $a=0$ only", "starts")
-        keys = [Patch(color=colour, label=text) for colour, text in zip(palette, words, strict=True)]
-        page.legend(handles=[*keys, *panels[0].lines], loc="outside lower center", ncols=3)
-    return page
+    for axes, k in zip((left, right), ds.k.values[[0, -1]], strict=True):
+        part = ds.sel(k=k, R_s=0.6)
+        kind = started(part).sel(a=0).astype(int) + started(part).sel(a=1)
+        axes.pcolormesh(ds.phi_start, ds.mu, kind.transpose("mu", "phi_start"), cmap=ListedColormap(list(palette)),
+                        vmin=-0.5, vmax=2.5, shading="nearest", rasterized=True)  # fmt: skip
+        axes.plot(ds.phi_start, least(part), color="black", linewidth=0.9, label="theory")
+        enough = axes.axhline(float(ds.R + k * ds.phi0), color="black", linewidth=0.8, linestyle=(0, (4, 2)))
+        enough.set_label(r"$\mu=R+k\varphi_0$")
+        axes.set(xlabel=r"released at $\varphi_\mathrm{s}/\varphi_0$ [1]", ylim=(0, 2.5))
+        axes.set_title(f"$k={k:g}$ s$^{{-2}}$")
+    left.set_ylabel(r"torque, $\mu/\varphi_0$ [s$^{-2}$]")
+    words = ("rests", "starts if $a=0$ only", "starts")
+    keys = [Patch(color=colour, label=text) for colour, text in zip(palette, words, strict=True)]
+    left.figure.legend(handles=[*keys, *left.lines], loc="outside lower center", ncols=3)
 
 
-def conclude(path: str) -> Conclusion:
-    """Statements and the figure."""
-    ds = read_result(path, "foliot_start", ["a", "k", "R_s", "phi_start", "mu"], "self_starting.toml")
-    groups = {"Viscous friction alone": alone(), "Coulomb friction, stiction and hairspring": statements(ds)}
-    return groups, [NOTES], lambda: figure(ds)
-
-
-main = script(__name__, "self_starting.h5", conclude)
+main = script(__name__, "self_starting.h5", claims, figure)

@@ -1,32 +1,28 @@
 """On which steps of voltage does a driven Josephson junction lock, and how wide are they?
 
-    sweep run studies/shapiro.toml --allow-import
     python studies/shapiro.py shapiro.h5
 
-draws shapiro.png. On step n the phase turns n times in a period of the drive, so that the voltage is n w whatever the
-current. Of a fast drive the phase follows the alternating current and turns slowly besides, by
+On step n the phase turns n times in a period of the drive, so that the voltage is n w whatever the current. Of a fast
+drive the phase follows the alternating current and turns slowly besides, by
 
     psi' = detuning - J_n(ac) sin(psi),                                                                  (1)
 
 J_n being Bessel's function: it is locked where abs(detuning) < abs(J_n(ac)), and a disturbance decays in a period of
 the drive by exp(-2 pi/w sqrt(J_n^2 - detuning^2)). Without the drive (ac = 0, n = 0) both are exact.
-"""
 
-from typing import Any
+decay: ln(multiplier) w/2 pi, squared; by (1) it is J_n^2 - detuning^2
+"""
 
 import numpy as np
 import xarray as xr
-from _common import Claims, Conclusion, Statement, differing, most, read_result, said, script
-from _figures import direct_label, page_of
-from matplotlib.colors import ListedColormap
+from _common import Claims, Statement, differing, most, said, script
+from _figures import COLOURS, ListedColormap, direct_label, panels
 from scipy.special import jv
 
 from kernels.interface import Status
-from sweep.show.charts import COLOURS
 
 BORDER = 0.5
 """Times 1/w, within which borders are not those of (1): a constant current sqrt(1 + (n w)^2) gives the voltage n w."""
-NOTES = "decay: ln(multiplier) w/2 pi, squared; by (1) it is J_n^2 - detuning^2"
 
 
 def scaled(ds: xr.Dataset) -> xr.Dataset:
@@ -36,8 +32,9 @@ def scaled(ds: xr.Dataset) -> xr.Dataset:
     return ds.assign(bessel=bessel, decay=rate**2, locked=ds.status == Status.OK)
 
 
-def statements(ds: xr.Dataset) -> Claims:
-    """Voltage, widths and decay."""
+def claims(ds) -> Claims:
+    """What theory says, and what comes out."""
+    yield "Shapiro steps"
     inside, clear = abs(ds.bessel) - abs(ds.detuning), BORDER / ds.w
     own = ds.locked & (ds.phase_turns == ds.order)
     right = [bool((own == (inside > 0)).where(abs(inside) > clear, True).sel(w=w).all()) for w in ds.w]
@@ -56,32 +53,25 @@ def statements(ds: xr.Dataset) -> Claims:
     yield differing("its deviation goes as w to the power", "-2", falls, -2.0, 0.2, 3)
 
 
-def figure(ds: xr.Dataset) -> Any:
+@panels(136.0, 2)
+def figure(plane, decay, ds):
     """The steps over both currents, their borders by (1), and the decay on one of them."""
-    with page_of(136.0, 2, width=110.0) as (page, (plane, decay)):
-        slow, fast = ds.sel(w=2.0), ds.sel(w=8.0)
-        fine = np.linspace(0.0, 6.0, 200)
-        for n in map(int, ds.order.values):
-            colour, here = COLOURS[n], slow.sel(order=n).transpose("ac", "detuning")
-            plane.pcolormesh(2.0 * n + here.detuning, here.ac, np.where(here.locked, 1.0, np.nan),
-                             cmap=ListedColormap([colour]), alpha=0.45, rasterized=True)  # fmt: skip
-            for sign in (1.0, -1.0):
-                plane.plot(2.0 * n + sign * abs(jv(n, fine)), fine, color=colour, linewidth=0.8)
-            direct_label(plane, 2.0 * n, 6.25, f"$n={n}$", colour)
-            line = fast.sel(order=n, detuning=0.0)
-            decay.plot(line.ac, np.sqrt(line.decay), "os^D"[n], color=colour, markersize=3, markerfacecolor="white")
-            decay.plot(fine, abs(jv(n, fine)), color=colour, linewidth=0.8, label=f"$n={n}$")
-        plane.set(xlabel="constant current over the critical one [1]", ylabel="alternating current over $w$ [1]",
-                  xlim=(-1, 7), ylim=(0, 6.5))  # fmt: skip
-        decay.set(xlabel="alternating current over $w$ [1]", ylabel="rate of decay in the middle [1]", ylim=(0, 1.05))
-        decay.legend(loc="upper right")
-    return page
+    slow, fast = ds.sel(w=2.0), ds.sel(w=8.0)
+    fine = np.linspace(0.0, 6.0, 200)
+    for n in map(int, ds.order.values):
+        colour, here = COLOURS[n], slow.sel(order=n).transpose("ac", "detuning")
+        plane.pcolormesh(2.0 * n + here.detuning, here.ac, np.where(here.locked, 1.0, np.nan),
+                         cmap=ListedColormap([colour]), alpha=0.45, rasterized=True)  # fmt: skip
+        for sign in (1.0, -1.0):
+            plane.plot(2.0 * n + sign * abs(jv(n, fine)), fine, color=colour, linewidth=0.8)
+        direct_label(plane, 2.0 * n, 6.25, f"$n={n}$", colour)
+        line = fast.sel(order=n, detuning=0.0)
+        decay.plot(line.ac, np.sqrt(line.decay), "os^D"[n], color=colour, markersize=3, markerfacecolor="white")
+        decay.plot(fine, abs(jv(n, fine)), color=colour, linewidth=0.8, label=f"$n={n}$")
+    plane.set(xlabel="constant current over the critical one [1]", ylabel="alternating current over $w$ [1]",
+              xlim=(-1, 7), ylim=(0, 6.5))  # fmt: skip
+    decay.set(xlabel="alternating current over $w$ [1]", ylabel="rate of decay in the middle [1]", ylim=(0, 1.05))
+    decay.legend(loc="upper right")
 
 
-def conclude(path: str) -> Conclusion:
-    """Statements and the figure."""
-    ds = scaled(read_result(path, "junction_scene:KERNEL", ["w", "order", "ac", "detuning"], "shapiro.toml"))
-    return {"Shapiro steps": statements(ds)}, [NOTES], lambda: figure(ds)
-
-
-main = script(__name__, "shapiro.h5", conclude)
+main = script(__name__, "shapiro.h5", claims, figure, scaled)

@@ -1,30 +1,29 @@
 """Where does each integrator grow, decay, or miss a switch, and does it say so?
 
-    sweep run studies/stability_maps.toml
-    sweep run studies/stability_maps_oscillator.toml --allow-import
-    sweep run studies/stability_maps_sticking.toml
-    sweep run studies/stability_maps_spring.toml
     python studies/stability_maps.py stability_maps.h5 stability_maps_oscillator.h5 stability_maps_sticking.h5 \\
         stability_maps_spring.h5
 
-draws stability_maps.png. The second sweep is of a damped oscillator x'' = -a x' - w^2 x, which a method makes grow
+The second sweep is of a damped oscillator x'' = -a x' - w^2 x, which a method makes grow
 where the largest eigenvalue of its step exceeds 1: for Runge-Kutta methods that is abs(R(z)), z the scene's
 eigenvalues times h, R(z) the result of one step of x' = z x. Of semi-implicit Euler and Verlet it is that of a 2 by 2
 matrix. The others are of a foliot's first flips from rest: a step h against its drive, against dry friction close to
 sticking, and against a hairspring that it hardly overcomes; truth is the kernel foliot_start.
+
+theory: the largest eigenvalue of one step of the linear oscillator; stated: what a method gives as its error
+truth: kernel foliot_start. A value is wrong in silence if it is off by more than ten times the larger of 1e-9
+and what is stated
 """
 
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Claims, Conclusion, Statement, read_result, said, script, solved
-from _figures import direct_label, page_of
+from _common import Claims, Statement, said, script, solved
+from _figures import direct_label, method_look, panels
 from scipy.integrate import DOP853, RK45
 
 from kernels.interface import FIRST_REFUSAL, Field
 from kernels.stepping import stepped_kernel
-from sweep.show.charts import method_look
 
 STEPS = 64
 """Of the oscillator, after which it is seen whether it has grown."""
@@ -65,14 +64,8 @@ KERNEL = stepped_kernel(
     example={"a": 0.1, "w": 1.0, "end": 6.35, "flips": 1.0, "step": 0.1, "location": 0.0},
 )
 
-NOTES = """\
-theory: the largest eigenvalue of one step of the linear oscillator; stated: what a method gives as its error
-truth: kernel foliot_start. A value is wrong in silence if it is off by more than ten times the larger of 1e-9
-and what is stated\
-"""
-
-GRIDS = {"stability_maps": "mu", "stability_maps_sticking": "R", "stability_maps_spring": "k"}
-"""Studies of a foliot, and what each is over: drive, friction close to sticking, a spring that it hardly overcomes."""
+GRIDS = {"mu": "Drive", "R": "Near sticking", "k": "Spring"}
+"""What the studies of a foliot are over."""
 
 RUNGE_KUTTA = {
     "euler": (np.zeros((1, 1)), np.ones(1)),
@@ -83,7 +76,7 @@ RUNGE_KUTTA = {
 """Weights of stages and result, the longer ones by scipy."""
 
 
-def stability_function(z: Any, method: str) -> Any:
+def stability_function(z, method: str):
     """What a step of x' = z x, of size 1 from x = 1, comes to."""
     weights, result = RUNGE_KUTTA[method]
     stages: list[Any] = []
@@ -92,7 +85,7 @@ def stability_function(z: Any, method: str) -> Any:
     return 1 + sum(w * k for w, k in zip(result, stages, strict=True))
 
 
-def eigenvalue(method: str, ah: Any, wh: Any) -> Any:
+def eigenvalue(method: str, ah, wh):
     """Modulus of the largest eigenvalue of a step, by theory."""
     ah, wh = np.broadcast_arrays(ah, wh)
     root = np.sqrt((ah**2 / 4 - wh**2).astype(complex))
@@ -130,51 +123,43 @@ def with_truth(ds: xr.Dataset, axis: str) -> xr.Dataset:
     return ds.assign(off=off, told=told, wrong=told & (off > WRONG)).transpose("method", "step", axis)
 
 
-def foliots(ds: xr.Dataset) -> Claims:
-    """What becomes of a foliot's cells."""
-    silent = ds.told & (ds.off > 10 * np.maximum(1e-9, ds.error))
-    here, what = f"{int(silent.sum())} of {ds.status.size}", "values off by more than ten times what is stated"
-    yield said(what, not silent.any(), here, "none")
-    for method in map(str, ds["method"].values):
-        one = ds.sel({"method": method})
-        here = f"{one.wrong.mean():.1%}; {1 - one.told.mean():.1%}"
-        yield Statement(f"{method}: off by {WRONG:.0%} and more, told; refused", "", here)
+def prepared(foliot, linear, *others):
+    """The oscillator, and the foliots by what they are over, with the truth."""
+    return linear, {axis: with_truth(ds, axis) for axis, ds in zip(GRIDS, (foliot, *others), strict=True)}
 
 
-def oscillators(ds: xr.Dataset) -> Claims:
-    """Growth against theory, well away from the border."""
-    for method, growth in zip(map(str, ds["method"].values), grown(ds).values, strict=True):
-        theory = eigenvalue(method, ds.a.values[:, None], ds.w.values)
+def claims(linear, foliots) -> Claims:
+    """Growth against theory, well away from the border; what becomes of a foliot's cells."""
+    yield "Oscillator"
+    for method, growth in zip(map(str, linear["method"].values), grown(linear).values, strict=True):
+        theory = eigenvalue(method, linear.a.values[:, None], linear.w.values)
         agrees = ((growth > 1) == (theory > 1))[abs(theory - 1) > 0.1].mean()
         yield said(f"{method} grows where abs(R) > 1", agrees == 1, f"{agrees:.4f} of them", "all cells")
+    for axis, ds in foliots.items():
+        yield GRIDS[axis]
+        silent = ds.told & (ds.off > 10 * np.maximum(1e-9, ds.error))
+        here, what = f"{int(silent.sum())} of {ds.status.size}", "values off by more than ten times what is stated"
+        yield said(what, not silent.any(), here, "none")
+        for method in map(str, ds["method"].values):
+            one = ds.sel({"method": method})
+            here = f"{one.wrong.mean():.1%}; {1 - one.told.mean():.1%}"
+            yield Statement(f"{method}: off by {WRONG:.0%} and more, told; refused", "", here)
 
 
-def figure(linear: xr.Dataset, foliot: xr.Dataset) -> Any:
-    """Where the oscillator grows; the longest step that holds a foliot's period to 10 %; for a column of print."""
-    with page_of(148.0, 2, width=110.0) as (page, (growth, steps)):
-        draw_growth(growth, linear)
-        draw_steps(steps, foliot)
-        border = growth.plot([], [], color="0.3", linewidth=0.9, label="(a) border by theory")
-        marks = [line for line in growth.lines if line.get_marker() not in ("None", "")]
-        page.legend(handles=[*marks, *border], loc="outside lower center", ncols=4, columnspacing=1.0)
-    return page
-
-
-def draw_growth(axes: Any, ds: xr.Dataset) -> None:
-    """The border above which the oscillator grows: lines by theory, marks as followed, at every so many-th damping."""
-    some = slice(2, None, max(1, ds.a.size // 10))
-    for method, growth in zip(map(str, ds["method"].values), grown(ds), strict=True):
-        look, theory = method_look(method), eigenvalue(method, ds.a.values, ds.w.values[:, None])
-        axes.contour(ds.a, ds.w, theory, levels=[1], colors=[look["color"]], linewidths=0.9)
-        grows = (growth > 1).isel(a=some)
-        shown = np.where(grows.any("w") & ~grows.isel(w=0), ds.w.values[grows.argmax("w").values], np.nan)
-        axes.plot(ds.a[some], shown, **{**look, "linestyle": ""}, markersize=4, label=method)
-    axes.set(xlabel="damping, $ah$ [1]", ylabel=r"frequency, $\omega h$ [1]", xlim=(0, 8), ylim=(0, 8))
-
-
-def draw_steps(axes: Any, ds: xr.Dataset) -> None:
-    """The longest step up to which all steps that are not refused give the period to 10 %, over the drive."""
-    ds = ds.sortby("step")
+@panels(148.0, 2)
+def figure(growth, steps, linear, foliots):
+    """Where the oscillator grows; the longest step that holds a foliot's period to 10 %."""
+    # lines by theory, marks as followed, at every so many-th damping
+    some = slice(2, None, max(1, linear.a.size // 10))
+    for method, factor in zip(map(str, linear["method"].values), grown(linear), strict=True):
+        look, theory = method_look(method), eigenvalue(method, linear.a.values, linear.w.values[:, None])
+        growth.contour(linear.a, linear.w, theory, levels=[1], colors=[look["color"]], linewidths=0.9)
+        grows = (factor > 1).isel(a=some)
+        shown = np.where(grows.any("w") & ~grows.isel(w=0), linear.w.values[grows.argmax("w").values], np.nan)
+        growth.plot(linear.a[some], shown, **{**look, "linestyle": ""}, markersize=4, label=method)
+    growth.set(xlabel="damping, $ah$ [1]", ylabel=r"frequency, $\omega h$ [1]", xlim=(0, 8), ylim=(0, 8))
+    # up to where all steps that are not refused give the period to 10 %
+    ds = foliots["mu"].sortby("step")
     place = xr.DataArray(np.arange(ds.step.size), dims="step")
     for method in map(str, ds["method"].values):
         one = ds.sel({"method": method})
@@ -182,23 +167,15 @@ def draw_steps(axes: Any, ds: xr.Dataset) -> None:
         ends = place.where((place > right.argmax("step")) & ~right).min("step").fillna(ds.step.size) - 1
         longest = np.where(right.any("step"), ds.step.values[ends.values.astype(int)], np.nan)
         look = {**method_look(method), "markersize": 4, "linewidth": 0.9, "markevery": max(1, ds.mu.size // 10)}
-        axes.plot(ds.mu, longest, **look)
-    axes.set(xscale="log", yscale="log", ylabel="longest step for 10 %, $h$ [s]", ylim=(0.015, 80))
-    axes.set_xlabel(r"torque, $\mu$ [rad/s$^2$]")
-    axes.axhline(float(ds.step.max()), color="0.7", linewidth=4.0, zorder=0)
-    direct_label(axes, 0.03, 0.93, "longest step tried", "0.35", ha="left", transform=axes.transAxes)
-
-
-def conclude(path: str, oscillator: str, *paths: str) -> Conclusion:
-    """Statements and the figure."""
-    linear = read_result(oscillator, "stability_maps:KERNEL", ["method", "a", "w"], "stability_maps_oscillator.toml")
-    grids = {}
-    for one, (name, axis) in zip((path, *paths), GRIDS.items(), strict=True):
-        grids[axis] = with_truth(read_result(one, "foliot_steps", ["method", axis, "step"], f"{name}.toml"), axis)
-    names = {"mu": "Drive", "R": "Near sticking", "k": "Spring"}
-    groups = {"Oscillator": oscillators(linear)} | {names[axis]: foliots(ds) for axis, ds in grids.items()}
-    return groups, [NOTES], lambda: figure(linear, grids["mu"])
+        steps.plot(ds.mu, longest, **look)
+    steps.set(xscale="log", yscale="log", ylabel="longest step for 10 %, $h$ [s]", ylim=(0.015, 80))
+    steps.set_xlabel(r"torque, $\mu$ [rad/s$^2$]")
+    steps.axhline(float(ds.step.max()), color="0.7", linewidth=4.0, zorder=0)
+    direct_label(steps, 0.03, 0.93, "longest step tried", "0.35", ha="left", transform=steps.transAxes)
+    border = growth.plot([], [], color="0.3", linewidth=0.9, label="(a) border by theory")
+    marks = [line for line in growth.lines if line.get_marker() not in ("None", "")]
+    growth.figure.legend(handles=[*marks, *border], loc="outside lower center", ncols=4, columnspacing=1.0)
 
 
 INPUTS = "stability_maps.h5 stability_maps_oscillator.h5 stability_maps_sticking.h5 stability_maps_spring.h5"
-main = script(__name__, INPUTS, conclude)
+main = script(__name__, INPUTS, claims, figure, prepared)

@@ -1,12 +1,15 @@
 """Where do methods that do not slide along a switch fail on stick and slip, and what does it cost to slide?
 
-    sweep run studies/stick_slip.toml --allow-import
     python studies/stick_slip.py stick_slip.h5
 
-draws stick_slip.png. A mass on a spring is dragged by a belt: it rides on the belt until the spring is stronger than
-friction, slips back, and is caught again. Truth is the closed form of both phases. The sweep follows twenty cycles by
-each method; others, which know nothing of the kink, follow two cycles, and so does our dopri5 at a fixed step that
-locates no kink. Last, the cost of a digit. Timings are noisy and for information only.
+A mass on a spring is dragged by a belt: it rides on the belt until the spring is stronger than friction, slips back,
+and is caught again. Truth is the closed form of both phases. The sweep follows twenty cycles by each method; others,
+which know nothing of the kink, follow two cycles, and so does our dopri5 at a fixed step that locates no kink. Last,
+the cost of a digit. Timings are noisy and for information only.
+
+error: of the time of the last count, relative to the closed form; of others by where they are at the true time
+Others get the sign as it is and 5 000 calls of the rates a cell; absolute tolerance is a thousandth of the relative
+one. They, and the fixed step of 0.01, follow two cycles. Times are of one core, CPU seconds
 """
 
 from functools import partial
@@ -14,14 +17,13 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Claims, Conclusion, Statement, cheapest, measured, read_result, said, script, solved_by
-from _figures import direct_label, draw_costs, page_of, plain_ticks
+from _common import Claims, Statement, cheapest, measured, said, script, solved_by
+from _figures import direct_label, draw_costs, method_look, panels, plain_ticks
 from _sliding_peers import FOLLOWERS
 from belt_scene import KERNEL, SCENE
 
 from kernels.interface import FIRST_REFUSAL, Status
 from kernels.stepping import stepped_kernel
-from sweep.show.charts import method_look
 
 TOLERANCES = 10.0 ** -np.arange(3.0, 10.5, 3.0)
 FLIPS = 5.0
@@ -34,17 +36,12 @@ LOOSE = 1e-6
 CELLS, FEW = 256, 64
 """Cells of our own in the cost; of the others every so many-th."""
 
-NOTES = f"""\
-error: of the time of the last count, relative to the closed form; of others by where they are at the true time
-Others get the sign as it is and 5 000 calls of the rates a cell; absolute tolerance is a thousandth of the relative
-one. They, and the fixed step of {STEP:g}, follow two cycles. Times are of one core, CPU seconds"""
 
-
-def slipped(fall: Any) -> tuple[Any, Any]:
+def slipped(fall) -> tuple[Any, Any]:
     """How long a slip takes, and how far it carries the mass, over the speed of the belt: one root, by bisection."""
     turn = np.sqrt(1.0 - 0.25 * fall**2)
 
-    def motion(t: Any) -> tuple[Any, Any]:
+    def motion(t) -> tuple[Any, Any]:
         grown, wave, other = np.exp(0.5 * fall * t), np.cos(turn * t), np.sin(turn * t) / turn
         return grown * (fall * wave + (1.0 - 0.5 * fall**2) * other), grown * (wave - 0.5 * fall * other)
 
@@ -56,20 +53,20 @@ def slipped(fall: Any) -> tuple[Any, Any]:
     return low, motion(low)[0]
 
 
-def last_count(flips: float, mu: Any, belt: Any, fall: Any) -> Any:
+def last_count(flips: float, mu, belt, fall):
     """The time of that count, an odd one: the mass rides past x = mu once a cycle."""
     fall = np.asarray(fall, float)
     slip, place = slipped(fall)
     return mu / belt + 0.5 * (flips - 1.0) * (slip + fall - place)
 
 
-def errors(name: str, belt: Any, fall: Any, rtol: float) -> Any:
+def errors(name: str, belt, fall, rtol: float):
     """How late others are, relative to the time: by how far the mass is from where it rides past; NaN: no answer."""
     true = last_count(FLIPS, 1.0, belt, fall)
     return abs(FOLLOWERS[name](belt, fall, true, rtol) - 1.0) / (belt * true)
 
 
-def errors_of_ours(kernel: Any, method: str, belt: Any, fall: Any, rtol: float, **more: Any) -> Any:
+def errors_of_ours(kernel, method: str, belt, fall, rtol: float, **more):
     """Of the time of the last count, relative; NaN where there is none."""
     time, status = solved_by(kernel, method, rtol, mu=1.0, flips=FLIPS, belt=belt, fall=fall, **more)
     given = status < FIRST_REFUSAL if more else status == Status.OK
@@ -97,8 +94,16 @@ def costs(tell: bool) -> dict[str, xr.Dataset]:
     return found
 
 
-def sliding(ds: xr.Dataset) -> Claims:
-    """What our methods do over twenty cycles."""
+def prepared(ds, tell=True):
+    """The sweep with its errors, those of others, and costs, of ours alone where others are not to be told."""
+    true = xr.apply_ufunc(last_count, float(ds.flips), 1.0, ds.belt, ds.fall)
+    ds = ds.assign(off=abs(ds.time / true - 1.0))
+    return ds, others(ds), costs(tell)
+
+
+def claims(ds, unslid, found) -> Claims:
+    """What theory says, and what comes out."""
+    yield "Twenty cycles"
     ok = ds.status == Status.OK
     for method in map(str, ds["method"].values):
         share = float(ok.sel({"method": method}).mean())
@@ -106,51 +111,37 @@ def sliding(ds: xr.Dataset) -> Claims:
     worst = float(ds.off.where(ok).max())
     yield said("worst error of what is OK", worst <= 1e-9, f"{worst:.1e}", "<= 1e-9")
 
-
-def unsliding(unslid: xr.Dataset) -> Claims:
-    """What those do that do not slide."""
+    yield f"Two cycles without sliding, rtol {LOOSE:g}"
     for name, off in unslid.items():
         here = f"{1.0 - float(off.notnull().mean()):.0%}, {float((off <= 1e-4).mean()):.0%}"
         yield Statement(f"{name}: cells given up, cells right to 1e-4", "", here)
 
+    yield "Cost of two cycles"
+    yield from cheapest(found)
 
-def figure(ds: xr.Dataset, unslid: xr.Dataset, found: dict[str, xr.Dataset]) -> Any:
+
+@panels(130.0, 2)
+def figure(error, cost, ds, unslid, found):
     """The error over the belt's speed, of a method that slides and of those that do not; costs; for a column."""
-    with page_of(130.0, 2, width=110.0) as (page, (error, cost)):
-        slides = ds.sel({"method": "taylor"})
-        shown = {"taylor, slides": slides.off.where(slides.status < FIRST_REFUSAL), "fixed step": unslid["fixed step"]}
-        looks, heights = (method_look("taylor")["color"], method_look("dopri5")["color"]), (1e-9, 3e-4)
-        for (name, off), colour, height in zip(shown.items(), looks, heights, strict=True):
-            off = off.clip(1e-16)
-            error.fill_between(off.belt, off.min("fall"), off.max("fall"), color=colour, alpha=0.25, linewidth=0)
-            error.plot(off.belt, off.median("fall"), color=colour)
-            direct_label(error, 0.06, height, name, colour)
-        for k, name in enumerate(("scipy Radau", "scipy LSODA")):
-            given = float(unslid[name].notnull().mean())
-            text = "no value in any cell" if given == 0 else f"a value in {given:.0%} of the cells"
-            direct_label(error, 0.063, 10.0 ** (2.6 - 1.9 * k), f"{name}: {text}", "0.35")
-        error.set(xscale="log", yscale="log", xlim=(0.01, 0.4), ylim=(1e-16, 1e4))
-        error.set(xlabel="speed of the belt [1]", ylabel="relative error of the time [1]")
-        plain_ticks(error.xaxis, (0.01, 0.03, 0.1, 0.3))
-        draw_costs(cost, found, {"dop853 (slides)": (2.0, 15.0), "scipy DOP853, modes by hand": (0.45, 20.0)})
-        none = "scipy Radau, BDF, LSODA,\ndiffrax Kvaerno5:\nno value in any cell"
-        direct_label(cost, 0.95, 0.2, none, "0.35", ha="right", transform=cost.transAxes)
-        cost.set(xlim=(5e-6, 2e-2), ylim=(1e-16, 10))
-    return page
+    slides = ds.sel({"method": "taylor"})
+    shown = {"taylor, slides": slides.off.where(slides.status < FIRST_REFUSAL), "fixed step": unslid["fixed step"]}
+    looks, heights = (method_look("taylor")["color"], method_look("dopri5")["color"]), (1e-9, 3e-4)
+    for (name, off), colour, height in zip(shown.items(), looks, heights, strict=True):
+        off = off.clip(1e-16)
+        error.fill_between(off.belt, off.min("fall"), off.max("fall"), color=colour, alpha=0.25, linewidth=0)
+        error.plot(off.belt, off.median("fall"), color=colour)
+        direct_label(error, 0.06, height, name, colour)
+    for k, name in enumerate(("scipy Radau", "scipy LSODA")):
+        given = float(unslid[name].notnull().mean())
+        text = "no value in any cell" if given == 0 else f"a value in {given:.0%} of the cells"
+        direct_label(error, 0.063, 10.0 ** (2.6 - 1.9 * k), f"{name}: {text}", "0.35")
+    error.set(xscale="log", yscale="log", xlim=(0.01, 0.4), ylim=(1e-16, 1e4))
+    error.set(xlabel="speed of the belt [1]", ylabel="relative error of the time [1]")
+    plain_ticks(error.xaxis, (0.01, 0.03, 0.1, 0.3))
+    draw_costs(cost, found, {"dop853 (slides)": (2.0, 15.0), "scipy DOP853, modes by hand": (0.45, 20.0)})
+    none = "scipy Radau, BDF, LSODA,\ndiffrax Kvaerno5:\nno value in any cell"
+    direct_label(cost, 0.95, 0.2, none, "0.35", ha="right", transform=cost.transAxes)
+    cost.set(xlim=(5e-6, 2e-2), ylim=(1e-16, 10))
 
 
-def conclude(path: str, tell: bool = True) -> Conclusion:
-    """Statements and the figure; costs of ours alone where those of others are not to be told."""
-    ds = read_result(path, "belt_scene:KERNEL", ["method", "belt", "fall"], "stick_slip.toml")
-    true = xr.apply_ufunc(last_count, float(ds.flips), 1.0, ds.belt, ds.fall)
-    ds = ds.assign(off=abs(ds.time / true - 1.0))
-    unslid, found = others(ds), costs(tell)
-    groups = {
-        "Twenty cycles": sliding(ds),
-        f"Two cycles without sliding, rtol {LOOSE:g}": unsliding(unslid),
-        "Cost of two cycles": cheapest(found),
-    }
-    return groups, [NOTES], lambda: figure(ds, unslid, found)
-
-
-main = script(__name__, "stick_slip.h5", conclude)
+main = script(__name__, "stick_slip.h5", claims, figure, prepared)

@@ -1,12 +1,10 @@
 """At which speed of its belt does a mass go over from stick and slip to steady sliding?
 
-    sweep run studies/stribeck.toml --allow-import
-    sweep run studies/stribeck_unstable.toml --allow-import
     python studies/stribeck.py stribeck.h5 stribeck_unstable.h5
 
-draws stribeck.png. Steady sliding is stable where friction falls by less than the damper takes, abs(F'(belt)) < 2 zeta.
-Above that speed an unstable oscillation divides what comes to rest there from what comes to stick and slip. Of small
-friction its amplitude A follows from the work of a period,
+Steady sliding is stable where friction falls by less than the damper takes, abs(F'(belt)) < 2 zeta. Above that speed
+an unstable oscillation divides what comes to rest there from what comes to stick and slip. Of small friction its
+amplitude A follows from the work of a period,
 
     zeta A = (still - 1) exp(-belt/fall) I1(A/fall),  I1 Bessel's function,                              (1)
 
@@ -14,26 +12,23 @@ and it ends with stick and slip where A comes to the belt's speed. Stick and sli
 alone, to which the ride on the belt adds a time of distance over speed.
 """
 
-from typing import Any
-
 import numpy as np
 import xarray as xr
-from _common import Claims, Conclusion, compared, most, read_result, said, script
-from _figures import direct_label, page_of
+from _common import Claims, compared, most, said, script
+from _figures import COLOURS, direct_label, panels
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from scipy.special import i1
 
 from kernels.interface import Status
-from sweep.show.charts import COLOURS
 
 
-def friction(ds: xr.Dataset, slip: Any) -> Any:
+def friction(ds: xr.Dataset, slip):
     """Of a belt that is faster by `slip`, over that at high speed."""
     return 1.0 + float(ds.still - 1.0) * np.exp(-slip / float(ds.fall))
 
 
-def averaged(ds: xr.Dataset, size: Any) -> Any:
+def averaged(ds: xr.Dataset, size):
     """The belt's speed at which (1) gives this amplitude."""
     return float(ds.fall) * np.log(float((ds.still - 1.0) / ds.zeta) * i1(size / float(ds.fall)) / size)
 
@@ -41,7 +36,7 @@ def averaged(ds: xr.Dataset, size: Any) -> Any:
 def by_hand(ds: xr.Dataset, belt: float) -> float:
     """The period of stick and slip, by scipy from where the spring tears the mass off."""
 
-    def caught(_: float, y: Any) -> float:
+    def caught(_: float, y) -> float:
         return float(y[1]) - belt
 
     caught.terminal, caught.direction = True, 1.0  # type: ignore[attr-defined]
@@ -52,8 +47,14 @@ def by_hand(ds: xr.Dataset, belt: float) -> float:
     return float(slip.t[-1] + (off - slip.y[0, -1]) / belt)
 
 
-def sticking(ds: xr.Dataset) -> Claims:
-    """Stick and slip, and where it ends."""
+def begins(ds: xr.Dataset) -> float:
+    """The belt's speed from which on steady sliding is stable."""
+    return float(ds.fall * np.log((ds.still - 1.0) / (2.0 * ds.zeta * ds.fall)))
+
+
+def claims(ds, unstable) -> Claims:
+    """What theory says, and what comes out."""
+    yield "Stick and slip"
     ok, rests = (ds.where(ds.status == status, drop=True) for status in (Status.OK, Status.COMES_TO_REST))
     off = max(abs(float(ok.period.sel(belt=belt)) / by_hand(ds, belt) - 1.0) for belt in ok.belt.values)
     end = brentq(lambda size: float(averaged(ds, size)) - size, 0.5, 5.0)
@@ -65,49 +66,33 @@ def sticking(ds: xr.Dataset) -> Claims:
     yield compared("fastest belt on which it sticks", "end of (1)", float(ok.belt.max()), end, 0.04, 4)
     yield most("place of steady sliding", "F(belt)", steady, 1e-8, "")
 
-
-def dividing(ds: xr.Dataset) -> Claims:
-    """The unstable oscillation, and where it begins."""
-    size = friction(ds, ds.belt.values) - ds.place.values
-    few, off = size < 0.45, float(abs(averaged(ds, size) / ds.belt.values - 1.0).max())
-    start = np.polyval(np.polyfit(size[few] ** 2, ds.belt.values[few], 2), 0.0) if few.sum() > 2 else np.nan
-    grows = float(ds.multiplier.min())
-    unstable = (ds.status == Status.UNSTABLE).all() and grows > 1.0
-    yield said("it is unstable", unstable, f"multiplier from {grows:.4f}", "all cells")
-    yield compared("belt where its amplitude is 0", "F'(belt) = -2 zeta", float(start), begins(ds), 2e-4, 5)
+    yield "The unstable oscillation"
+    size = friction(unstable, unstable.belt.values) - unstable.place.values
+    few, off = size < 0.45, float(abs(averaged(unstable, size) / unstable.belt.values - 1.0).max())
+    start = np.polyval(np.polyfit(size[few] ** 2, unstable.belt.values[few], 2), 0.0) if few.sum() > 2 else np.nan
+    grows = float(unstable.multiplier.min())
+    leaves = (unstable.status == Status.UNSTABLE).all() and grows > 1.0
+    yield said("it is unstable", leaves, f"multiplier from {grows:.4f}", "all cells")
+    yield compared("belt where its amplitude is 0", "F'(belt) = -2 zeta", float(start), begins(unstable), 2e-4, 5)
     yield most("speed of the belt beside (1), up to 5 %", "", off, 0.05, "")
 
 
-def begins(ds: xr.Dataset) -> float:
-    """The belt's speed from which on steady sliding is stable."""
-    return float(ds.fall * np.log((ds.still - 1.0) / (2.0 * ds.zeta * ds.fall)))
-
-
-def figure(ds: xr.Dataset, unstable: xr.Dataset) -> Any:
+@panels(80.0, width=120.0)
+def figure(axes, ds, unstable):
     """Amplitude over the belt's speed."""
-    with page_of(80.0, width=120.0) as (page, axes):
-        border, shown, place = begins(ds), np.linspace(1e-3, 2.0, 60), ds.place.where(ds.status == Status.OK)
-        axes.plot(ds.belt, friction(ds, ds.belt) - place, color=COLOURS[0])
-        axes.plot(unstable.belt, friction(ds, unstable.belt) - unstable.place, "o--", color=COLOURS[1], markersize=3)
-        axes.plot(averaged(ds, shown), shown, color="0.5", linewidth=0.8)
-        axes.plot([0.0, border], [0.0, 0.0], color=COLOURS[2], linestyle="--")
-        axes.plot([border, 2.3], [0.0, 0.0], color=COLOURS[2])
-        axes.set(xlabel="speed of the belt [1]", ylabel="amplitude [1]", xlim=(0, 2.3), ylim=(-0.15, 2.2))
-        for x, y, text, colour in (
-            (0.6, 1.2, "stick and slip", COLOURS[0]), (1.0, 0.55, "unstable", COLOURS[1]),
-            (0.55, 0.13, "sliding, unstable", COLOURS[2]), (1.85, 0.13, "sliding, stable", COLOURS[2]),
-            (1.75, 2.05, "averaging", "0.4"),
-        ):  # fmt: skip
-            direct_label(axes, x, y, text, colour)
-    return page
+    border, shown, place = begins(ds), np.linspace(1e-3, 2.0, 60), ds.place.where(ds.status == Status.OK)
+    axes.plot(ds.belt, friction(ds, ds.belt) - place, color=COLOURS[0])
+    axes.plot(unstable.belt, friction(ds, unstable.belt) - unstable.place, "o--", color=COLOURS[1], markersize=3)
+    axes.plot(averaged(ds, shown), shown, color="0.5", linewidth=0.8)
+    axes.plot([0.0, border], [0.0, 0.0], color=COLOURS[2], linestyle="--")
+    axes.plot([border, 2.3], [0.0, 0.0], color=COLOURS[2])
+    axes.set(xlabel="speed of the belt [1]", ylabel="amplitude [1]", xlim=(0, 2.3), ylim=(-0.15, 2.2))
+    for x, y, text, colour in (
+        (0.6, 1.2, "stick and slip", COLOURS[0]), (1.0, 0.55, "unstable", COLOURS[1]),
+        (0.55, 0.13, "sliding, unstable", COLOURS[2]), (1.85, 0.13, "sliding, stable", COLOURS[2]),
+        (1.75, 2.05, "averaging", "0.4"),
+    ):  # fmt: skip
+        direct_label(axes, x, y, text, colour)
 
 
-def conclude(path: str, other: str) -> Conclusion:
-    """Statements and the figure."""
-    ds = read_result(path, "stribeck_scene:KERNEL", ["belt"], "stribeck.toml")
-    unstable = read_result(other, "stribeck_scene:KERNEL", ["cell"], "stribeck_unstable.toml")
-    groups = {"Stick and slip": sticking(ds), "The unstable oscillation": dividing(unstable)}
-    return groups, [], lambda: figure(ds, unstable)
-
-
-main = script(__name__, "stribeck.h5 stribeck_unstable.h5", conclude)
+main = script(__name__, "stribeck.h5 stribeck_unstable.h5", claims, figure)

@@ -1,36 +1,31 @@
 """How does the period fall with the torque in the three models of a verge and foliot?
 
-    sweep run studies/three_models.toml
-    sweep run studies/three_models_denny.toml
-    sweep run studies/three_models_viscous.toml
     python studies/three_models.py three_models.h5 three_models_denny.h5 three_models_viscous.h5
 
-draws three_models.png, compares theory with what comes out, and writes the three models as one dataset,
-three_models_all.nc. Where every loss is a share of the motion (restitution, inertias) and nothing but the drive exerts
-a torque, time has no other unit than the one the torque gives, so P ~ torque^(-1/2) and the amplitude does not depend
-on it; viscous friction brings in a time 1/a, and with it P ~ torque^(-1) at weak and torque^(-1/3) at strong drive. The
-kernels solve the impacts in units of the torque, so what they say of -1/2 cannot be otherwise: the exponents printed
-are those of the scenes `verge_scene` and `foliot_scene`, followed from rest in SI units.
+Writes the three models as one dataset, three_models_all.nc. Where every loss is a share of the motion (restitution,
+inertias) and nothing but the drive exerts a torque, time has no other unit than the one the torque gives, so P ~
+torque^(-1/2) and the amplitude does not depend on it; viscous friction brings in a time 1/a, and with it P ~
+torque^(-1) at weak and torque^(-1/3) at strong drive. The kernels solve the impacts in units of the torque, so what
+they say of -1/2 cannot be otherwise: the exponents printed are those of the scenes `verge_scene` and `foliot_scene`,
+followed from rest in SI units.
+
+theory: P ~ torque^(-s); deviation: relative, of exponents and spreads the difference. Allowed: 1e-8 for what was
+followed in SI at rtol 1e-10, 1e-12 for multipliers, 0.01 for the ends of the viscous grid, the drop for what it leaves
+out. Without drop two plastic bodies are one that keeps the share (m - M)/(m + M)
 """
 
 import math
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Claims, Conclusion, compared, differing, most, read_result, script, solved
-from _figures import NARROW, direct_label, page_of, plain_ticks
+from _common import Claims, compared, differing, most, script, solved
+from _figures import COLOURS, DASHES, direct_label, panels, plain_ticks
 
 import sweep
-from sweep.show.charts import COLOURS, DASHES
 
 MODELS = ("two bodies", "kept share", "viscous")
 
-NOTES = """\
-theory: P ~ torque^(-s); deviation: relative, of exponents and spreads the difference. Allowed: 1e-8 for what was
-followed in SI at rtol 1e-10, 1e-12 for multipliers, 0.01 for the ends of the viscous grid, the drop for what it leaves
-out. Without drop two plastic bodies are one that keeps the share (m - M)/(m + M)"""
 
 IN_SI = (1e-5, 1e-3, 0.1, 10.0)
 """Torques [N m] at which the models with impacts are followed in SI units."""
@@ -80,8 +75,21 @@ def in_si(impact: xr.Dataset, denny: xr.Dataset) -> dict[str, xr.Dataset]:
     }
 
 
-def laws(ds: xr.Dataset, followed: dict[str, xr.Dataset]) -> Claims:
-    """Exponents of the three models; the kernels beside what was followed."""
+def prepared(impact, denny, viscous):
+    """The models in one dataset, those with impacts followed in SI units, and the two bodies alone."""
+    impact = two_bodies(impact)
+    return together(impact, denny, viscous), in_si(impact, denny), impact
+
+
+def export(ds, _, impact):
+    """Writes the three models as one dataset beside the result of the first."""
+    target = Path(impact.encoding["source"]).with_name("three_models_all.nc")
+    return [f"all three models: {sweep.export(ds, target, force=True)}"]
+
+
+def claims(ds, followed, impact) -> Claims:
+    """What theory says, and what comes out."""
+    yield "Period against torque"
     for name, one in followed.items():
         fit = sweep.fit_exponent(one.period, "torque")
         kernel = np.exp(np.interp(np.log(IN_SI), np.log(ds.torque), np.log(ds.period.sel(model=name))))
@@ -91,9 +99,7 @@ def laws(ds: xr.Dataset, followed: dict[str, xr.Dataset]) -> Claims:
     yield differing("exponent, viscous, weakest drive", "-1", viscous.exponent[0], -1.0, 0.01, 5)
     yield differing("exponent, viscous, strongest drive", "-1/3", viscous.exponent[-1], -1 / 3, 0.01, 5)
 
-
-def swings(ds: xr.Dataset, followed: dict[str, xr.Dataset]) -> Claims:
-    """Whether the swing depends on the torque."""
+    yield "Swing against torque"
     for name, one in followed.items():
         reach = one.speed**2 / one.torque  # the swing past the switch goes with it
         yield most(f"spread of the swing, {name}, in SI units", "0", reach.max() / reach.min() - 1, 1e-8, "")
@@ -102,9 +108,7 @@ def swings(ds: xr.Dataset, followed: dict[str, xr.Dataset]) -> Claims:
     text, grown = f"3^(2/3)/2 alpha^(1/3) = {growth:.4g}", viscous[-1] / viscous[0]
     yield compared("growth of the swing, viscous", text, grown, growth, 0.01, 4)
 
-
-def identity(ds: xr.Dataset, impact: xr.Dataset) -> Claims:
-    """How near the two-body clock is to one body that keeps (m - M)/(m + M) of its speed."""
+    yield "Two bodies as one that keeps a share"
     e = float((1 - impact.kappa) / (1 + impact.kappa))
     drop = 0.5 - 2 * float(impact.h / impact.pitch)
     two, one = (ds.sel(model=name).isel(torque=0) for name in MODELS[:2])
@@ -114,39 +118,30 @@ def identity(ds: xr.Dataset, impact: xr.Dataset) -> Claims:
     yield differing("multiplier, one body", "e^2", one.multiplier, e * e, 1e-12)
 
 
-def figure(ds: xr.Dataset) -> Any:
+@panels(132.0, 2, sharex=True)
+def figure(exponent, swing, ds, *_):
     """Exponent and swing over torque."""
-    with page_of(132.0, 2, 1, width=NARROW, sharex=True) as (page, (exponent, swing)):
-        for k, name in enumerate(MODELS):
-            one, look = ds.sel(model=name), {"color": COLOURS[k], "linestyle": DASHES[k]}
-            if k == 1:  # lies on the first: rings at every so many-th torque
-                one = one.isel(torque=slice(4, None, max(1, ds.torque.size // 9)))
-                look = {"color": COLOURS[k], "marker": "o", "linestyle": "", "markerfacecolor": "white"}
-            exponent.semilogx(one.torque, -one.exponent, label=name, **look)
-            swing.loglog(one.torque, one.amplitude, **look)
-        exponent.legend(loc="upper right", handlelength=3)
-        exponent.set(ylim=(0.28, 1.05), ylabel=r"exponent, $-\mathrm{d}\ln P/\mathrm{d}\ln\tau$ [1]")
-        exponent.set_yticks((1 / 3, 0.5, 1), labels=("1/3", "1/2", "1"))
-        exponent.set_yticks([], minor=True)
-        direct_label(exponent, 3e-4, 0.55, "impacts alone")
-        swing.set(xlabel=r"drive torque, $\tau$ [N m]", ylabel="swing [rad]", xlim=(ds.torque[0], ds.torque[-1]))
-        plain_ticks(swing.yaxis, (0.25, 0.5, 1, 2))
-    return page
+    for k, name in enumerate(MODELS):
+        one, look = ds.sel(model=name), {"color": COLOURS[k], "linestyle": DASHES[k]}
+        if k == 1:  # lies on the first: rings at every so many-th torque
+            one = one.isel(torque=slice(4, None, max(1, ds.torque.size // 9)))
+            look = {"color": COLOURS[k], "marker": "o", "linestyle": "", "markerfacecolor": "white"}
+        exponent.semilogx(one.torque, -one.exponent, label=name, **look)
+        swing.loglog(one.torque, one.amplitude, **look)
+    exponent.legend(loc="upper right", handlelength=3)
+    exponent.set(ylim=(0.28, 1.05), ylabel=r"exponent, $-\mathrm{d}\ln P/\mathrm{d}\ln\tau$ [1]")
+    exponent.set_yticks((1 / 3, 0.5, 1), labels=("1/3", "1/2", "1"))
+    exponent.set_yticks([], minor=True)
+    direct_label(exponent, 3e-4, 0.55, "impacts alone")
+    swing.set(xlabel=r"drive torque, $\tau$ [N m]", ylabel="swing [rad]", xlim=(ds.torque[0], ds.torque[-1]))
+    plain_ticks(swing.yaxis, (0.25, 0.5, 1, 2))
 
 
-def conclude(path: str, denny_path: str, viscous_path: str) -> Conclusion:
-    """Statements and the figure; writes the three in one dataset beside the first."""
-    impact = two_bodies(read_result(path, "impact", ["torque"], "three_models.toml"))
-    denny = read_result(denny_path, "foliot", ["mu"], "three_models_denny.toml")
-    viscous = read_result(viscous_path, "foliot", ["mu"], "three_models_viscous.toml")
-    ds, followed = together(impact, denny, viscous), in_si(impact, denny)
-    target = sweep.export(ds, Path(path).with_name("three_models_all.nc"), force=True)
-    groups = {
-        "Period against torque": laws(ds, followed),
-        "Swing against torque": swings(ds, followed),
-        "Two bodies as one that keeps a share": identity(ds, impact),
-    }
-    return groups, [NOTES, "", f"all three models: {target}"], lambda: figure(ds)
-
-
-main = script(__name__, "three_models.h5 three_models_denny.h5 three_models_viscous.h5", conclude)
+main = script(
+    __name__,
+    "three_models.h5 three_models_denny.h5 three_models_viscous.h5",
+    claims,
+    figure,
+    prepared,
+    export,
+)

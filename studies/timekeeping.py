@@ -1,12 +1,9 @@
 """How steady must a torque be: a verge and foliot's for 15 min/day, Bürgi's for 1 min/day, a balance's for 1 s/day?
 
-    sweep run studies/timekeeping.toml            the verge
-    sweep run studies/timekeeping_buergi.toml     Bürgi's foliot
-    sweep run studies/timekeeping_spring.toml     a foliot with a balance spring
     python studies/timekeeping.py timekeeping.h5 timekeeping_buergi.h5 timekeeping_spring.h5
 
-draws timekeeping.png and compares theory with what comes out. The torque of half swing i is mu (1 + sigma x_i), x of
-variance 1, white or forgotten as r^i, r = exp(-1/tau_c). s = -dlnP/dlnmu, T = P/2, m = day/T half swings a day.
+The second clock is Bürgi's foliot, the third has a balance spring. The torque of half swing i is mu (1 + sigma x_i), x
+of variance 1, white or forgotten as r^i, r = exp(-1/tau_c). s = -dlnP/dlnmu, T = P/2, m = day/T half swings a day.
 
 Theory, to first order: sigma x_i shifts the clock by s T sigma x_i in all, now and in the swings that remember it. The
 Allan deviation over a day is that of means of m = day/T successive x, S and S' being their sums:
@@ -20,6 +17,8 @@ m that begins with the speed u, and derivatives as indices, on the cycle,
     c = r U_m/(1 - r U_u),  V = (U_m^2 + 2 U_m U_u c)/(1 - U_u^2),
     loss/sigma^2 = (T_mm/2 + T_mu c + T_uu V/2 + T_u (U_mm/2 + U_mu c + U_uu V/2)/(1 - U_u))/T.        (2)
 Derived here.
+
++-: what a number may be off by, three standard errors of these seeds and days for a scatter, four for a loss
 """
 
 import math
@@ -29,22 +28,16 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Claims, Conclusion, columns, compared, differing, power, read_result, script, solved
-from _figures import NARROW, page_of
-
-from sweep.show.charts import COLOURS
+from _common import Claims, columns, compared, differing, power, script, solved
+from _figures import COLOURS, panels
 
 DAY = 86400.0
-CLOCKS = {"verge": "timekeeping", "Bürgi": "timekeeping_buergi", "spring": "timekeeping_spring"}
+CLOCKS = ("verge", "Bürgi", "spring")
 GOALS = {"15 min/day": 900.0, "1 min/day": 60.0, "1 s/day": 1.0}
 TIMES = ("white", "1 min", "1 h", "1 day")
 """Correlation of the torque, along `tau_c`."""
 LINEAR = 0.3
 """Noise beyond which torque would now and then vanish, and the linear law says no more than that."""
-Clocks = dict[str, xr.Dataset]
-NOTES = """\
-+-: what a number may be off by, three standard errors of these seeds and days for a scatter, four for a loss\
-"""
 
 
 def without_noise(ds: xr.Dataset) -> xr.Dataset:
@@ -52,9 +45,8 @@ def without_noise(ds: xr.Dataset) -> xr.Dataset:
     return solved("foliot", mu=[float(ds.mu)], phi0=ds.phi0, a=ds.a, k=ds.k, rtol=1e-9).isel(mu=0)
 
 
-def read(path: str, name: str) -> xr.Dataset:
+def scaled(ds):
     """One clock: its noisy runs with s, T, means over seeds and the scatter over sigma [s/day] at sigma = 0.01."""
-    ds = read_result(path, "foliot_noise", ["sigma", "tau_c", "seed"], f"{name}.toml")
     cycle = without_noise(ds)
     ds = ds.assign_coords(s=float(cycle.sensitivity), T=float(cycle.period) / 2)
     seeds, rate = ds.sizes["seed"], ds.rate_error_s_per_day
@@ -68,7 +60,7 @@ def read(path: str, name: str) -> xr.Dataset:
     )
 
 
-def law(ds: xr.Dataset, tau_c: Any) -> Any:
+def law(ds: xr.Dataset, tau_c):
     """Scatter over sigma [s/day] by (1)."""
     tau_c = np.asarray(tau_c, float)
     m, white = float(ds.averaging_time / ds["T"]), tau_c <= 0
@@ -78,7 +70,7 @@ def law(ds: xr.Dataset, tau_c: Any) -> Any:
     return DAY * float(ds.s) * np.sqrt(np.where(white, m, sums)) / m
 
 
-def half_swing(m: float, u: float, clock: tuple[float, float, float]) -> Any:
+def half_swing(m: float, u: float, clock: tuple[float, float, float]):
     """(T, U) of a half swing from x = 1 at speed u under torque -m, in units of phi0 and sqrt(phi0/mu)."""
     a, k, t = clock
     w = np.sqrt(k - a * a / 4 + 0j)
@@ -118,31 +110,44 @@ def second_order(ds: xr.Dataset, tau_c: float) -> float:
     return DAY * float(longer + d["u"][0] * faster / (1 - kept)) / time
 
 
-def clock_statements(name: str, ds: xr.Dataset) -> Claims:
-    """What theory says of one clock's runs.
+def lasts(ds: xr.Dataset, tau_c):
+    """Correlation time in days, T/2 (1 + r)/(1 - r): that of continuous noise alike over long times; T/2 if white."""
+    r = np.exp(-1 / np.where(tau_c > 0, tau_c, 1e-3))
+    return float(ds["T"]) / DAY / 2 * (1 + r) / (1 - r)
+
+
+def prepared(*sweeps):
+    """The clocks by name."""
+    return dict(zip(CLOCKS, map(scaled, sweeps), strict=True))
+
+
+def claims(clocks) -> Claims:
+    """What theory says of each clock's runs.
 
     The power of sigma has no error of sampling: the same noise at every sigma. The mean rate at the largest noise is
     held to (2) within four standard errors and the next order; where they are over a tenth of it, it is only told.
     """
-    (time, _), d = slopes(ds)
-    s, known = -(d["m"][0] + d["u"][0] * d["m"][1] / (1 - d["u"][1])) / time, float(ds.s)
-    yield compared(f"{name}: s from the half-swing map", f"{known:.6f} +- 1e-4", s, known, 1e-4, 6)
-    allowed = 3 * float(ds.blur)
-    for j, time_name in enumerate(TIMES):
-        theory, what = float(law(ds, ds.tau_c[j])), f"  scatter over sigma, {time_name} [s/day]"
-        yield compared(what, f"(1) = {theory:.4g} +- {allowed:.0%}", ds.per_sigma[j], theory, allowed, 4)
-    by_sigma = power(ds.scatter.isel(tau_c=0).sel(sigma=slice(None, 0.03)))
-    yield differing("  power of sigma in the scatter, white", "1 +- 0.01", by_sigma, 1, 0.01, 4)
-    for j in (0, 1):
-        part, sigma = ds.isel(tau_c=j, sigma=-1), float(ds.sigma[-1])
-        theory = sigma**2 * second_order(ds, float(ds.tau_c[j]))
-        error, what = float(part.gain_error) / theory, f"  loss at sigma = {sigma:g}, {TIMES[j]} [s/day]"
-        allowed = 4 * error + 5 * sigma**2
-        line = compared(what, f"(2) = {theory:.4g} +- {allowed:.0%}", -part.gain, theory, allowed, 4)
-        yield line if error < 0.1 else replace(line, here=f"{line.here} +- {part.gain_error:.1g}", holds=None)
+    for name, ds in clocks.items():
+        yield name
+        (time, _), d = slopes(ds)
+        s, known = -(d["m"][0] + d["u"][0] * d["m"][1] / (1 - d["u"][1])) / time, float(ds.s)
+        yield compared(f"{name}: s from the half-swing map", f"{known:.6f} +- 1e-4", s, known, 1e-4, 6)
+        allowed = 3 * float(ds.blur)
+        for j, time_name in enumerate(TIMES):
+            theory, what = float(law(ds, ds.tau_c[j])), f"  scatter over sigma, {time_name} [s/day]"
+            yield compared(what, f"(1) = {theory:.4g} +- {allowed:.0%}", ds.per_sigma[j], theory, allowed, 4)
+        by_sigma = power(ds.scatter.isel(tau_c=0).sel(sigma=slice(None, 0.03)))
+        yield differing("  power of sigma in the scatter, white", "1 +- 0.01", by_sigma, 1, 0.01, 4)
+        for j in (0, 1):
+            part, sigma = ds.isel(tau_c=j, sigma=-1), float(ds.sigma[-1])
+            theory = sigma**2 * second_order(ds, float(ds.tau_c[j]))
+            error, what = float(part.gain_error) / theory, f"  loss at sigma = {sigma:g}, {TIMES[j]} [s/day]"
+            allowed = 4 * error + 5 * sigma**2
+            line = compared(what, f"(2) = {theory:.4g} +- {allowed:.0%}", -part.gain, theory, allowed, 4)
+            yield line if error < 0.1 else replace(line, here=f"{line.here} +- {part.gain_error:.1g}", holds=None)
 
 
-def table(clocks: Clocks) -> list[str]:
+def table(clocks):
     """The torque noise, in % of the torque, that scatters a clock by each goal; the lasting change that shifts it."""
     rows = [("clock", "goal", *(f"noise, {x}" for x in TIMES), "lasting change")]
     for name, ds in clocks.items():
@@ -156,44 +161,30 @@ def table(clocks: Clocks) -> list[str]:
     ]
 
 
-def figure(clocks: Clocks) -> Any:
+@panels(142.0, 2)
+def figure(scatter, correlation, clocks):
     """Scatter against noise, white and of a day, and against the correlation of the noise, with (1)."""
     wide = np.geomspace(1e-3, 0.3, 2)
-    with page_of(142.0, 2, 1, width=NARROW) as (page, (scatter, correlation)):
-        for (name, ds), colour, mark in zip(clocks.items(), COLOURS, "os^", strict=False):
-            for j, dashes, fill in ((0, "-", "white"), (3, (0, (5, 1.5)), colour)):
-                scatter.loglog(wide, law(ds, ds.tau_c[j]) * wide, color=colour, linestyle=dashes)
-                scatter.plot(ds.sigma, ds.scatter.isel(tau_c=j), mark, color=colour, markerfacecolor=fill)
-            look = {"fmt": mark, "color": colour, "markerfacecolor": "white", "linewidth": 0.8}
-            unit, theta = DAY * float(ds.s), np.geomspace(0.1, 10 * DAY / float(ds["T"]), 300)
-            y = ds.per_sigma / unit
-            correlation.errorbar(lasts(ds, ds.tau_c), y, float(ds.blur) * y, label=name, **look)
-            correlation.loglog(lasts(ds, theta), law(ds, theta) / unit, color=colour, linewidth=0.8)
-        for goal, rate in GOALS.items():
-            scatter.axhline(rate, color="0.6", linewidth=0.6)
-            scatter.text(1.02, rate, goal, fontsize=8, va="center", transform=scatter.get_yaxis_transform())
-        scatter.set(xlim=(1e-3, 0.3), ylim=(1e-4, 1e4), xlabel=r"torque noise, $\sigma$ [1]")
-        scatter.set_ylabel("scatter of the rate from day to day [s/day]")
-        correlation.set(xlim=(1e-6, 10), ylim=(1e-3, 1.2), xlabel="correlation time of the torque [day]")
-        correlation.set_ylabel(r"scatter over $s\sigma$ [1]")
-        page.legend(*correlation.get_legend_handles_labels(), loc="outside upper center", ncols=3)
-        scatter.plot([], [], "o-", color="black", markerfacecolor="white", label="white")
-        scatter.plot([], [], "o", color="black", linestyle=(0, (5, 1.5)), label="of a day")
-        scatter.legend(loc="lower right", title="torque noise", borderaxespad=0.2)
-    return page
+    for (name, ds), colour, mark in zip(clocks.items(), COLOURS, "os^", strict=False):
+        for j, dashes, fill in ((0, "-", "white"), (3, (0, (5, 1.5)), colour)):
+            scatter.loglog(wide, law(ds, ds.tau_c[j]) * wide, color=colour, linestyle=dashes)
+            scatter.plot(ds.sigma, ds.scatter.isel(tau_c=j), mark, color=colour, markerfacecolor=fill)
+        look = {"fmt": mark, "color": colour, "markerfacecolor": "white", "linewidth": 0.8}
+        unit, theta = DAY * float(ds.s), np.geomspace(0.1, 10 * DAY / float(ds["T"]), 300)
+        y = ds.per_sigma / unit
+        correlation.errorbar(lasts(ds, ds.tau_c), y, float(ds.blur) * y, label=name, **look)
+        correlation.loglog(lasts(ds, theta), law(ds, theta) / unit, color=colour, linewidth=0.8)
+    for goal, rate in GOALS.items():
+        scatter.axhline(rate, color="0.6", linewidth=0.6)
+        scatter.text(1.02, rate, goal, fontsize=8, va="center", transform=scatter.get_yaxis_transform())
+    scatter.set(xlim=(1e-3, 0.3), ylim=(1e-4, 1e4), xlabel=r"torque noise, $\sigma$ [1]")
+    scatter.set_ylabel("scatter of the rate from day to day [s/day]")
+    correlation.set(xlim=(1e-6, 10), ylim=(1e-3, 1.2), xlabel="correlation time of the torque [day]")
+    correlation.set_ylabel(r"scatter over $s\sigma$ [1]")
+    scatter.figure.legend(*correlation.get_legend_handles_labels(), loc="outside upper center", ncols=3)
+    scatter.plot([], [], "o-", color="black", markerfacecolor="white", label="white")
+    scatter.plot([], [], "o", color="black", linestyle=(0, (5, 1.5)), label="of a day")
+    scatter.legend(loc="lower right", title="torque noise", borderaxespad=0.2)
 
 
-def lasts(ds: xr.Dataset, tau_c: Any) -> Any:
-    """Correlation time in days, T/2 (1 + r)/(1 - r): that of continuous noise alike over long times; T/2 if white."""
-    r = np.exp(-1 / np.where(tau_c > 0, tau_c, 1e-3))
-    return float(ds["T"]) / DAY / 2 * (1 + r) / (1 - r)
-
-
-def conclude(*paths: str) -> Conclusion:
-    """Statements, tables and the figure."""
-    clocks = {name: read(path, study) for (name, study), path in zip(CLOCKS.items(), paths, strict=True)}
-    groups = {name: clock_statements(name, ds) for name, ds in clocks.items()}
-    return groups, [NOTES, "", *table(clocks)], lambda: figure(clocks)
-
-
-main = script(__name__, "timekeeping.h5 timekeeping_buergi.h5 timekeeping_spring.h5", conclude)
+main = script(__name__, "timekeeping.h5 timekeeping_buergi.h5 timekeeping_spring.h5", claims, figure, prepared, table)

@@ -1,11 +1,10 @@
 """Is the period of a foliot blind to the fine structure of its torque?
 
-    sweep run studies/torque_ripple.toml
     python studies/torque_ripple.py torque_ripple.h5
 
-draws torque_ripple.png and compares theory with what comes out. The torque is mu (1 + depth f), f = cos(h pi s), s the
-way along the drive over 2 phi0 (0 at the last switch, 1 at the next, below 0 on the recoil), h the harmonic; it does
-the same work at any depth. alpha = mu/(a^2 phi0), A = phi_max/phi0 and q = a P/4 as in Hoyng & Nieuwenhuizen.
+The torque is mu (1 + depth f), f = cos(h pi s), s the way along the drive over 2 phi0 (0 at the last switch, 1 at the
+next, below 0 on the recoil), h the harmonic; it does the same work at any depth. alpha = mu/(a^2 phi0), A =
+phi_max/phi0 and q = a P/4 as in Hoyng & Nieuwenhuizen.
 
 Theory, to first order in the depth. With a = 1 the force -f(t) along the swing without ripple shifts its speed by
 -int exp(t' - t) f dt'; speed and angle at the next switch close the cycle if, T = 2q being the half period,
@@ -17,6 +16,9 @@ and ds/ddepth = -dK/dlnalpha grows as sqrt(h) by dA/dlnalpha = A - 1/tanh q. For
 follows the torque, and P/P0 is the mean of 1/(1 + depth f): 1/sqrt(1 - depth^2), with K = -2 alpha for odd h. For even
 h inertia alone shifts the period, in the layers behind the switches: K = -(5/24) alpha (h pi alpha)^2.
 Derived here.
+
+deviation: relative, or over 1 where the coefficient is smaller; of powers the difference; allowed: what the next order
+in the depth, in 1/h or in alpha explains
 """
 
 import math
@@ -24,20 +26,13 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Claims, Conclusion, compared, differing, most, power, read_result, script
-from _figures import HOLLOW, NARROW, direct_label, page_of
+from _common import Claims, compared, differing, most, power, script
+from _figures import COLOURS, HOLLOW, direct_label, panels
 from scipy.optimize import brentq
-
-from sweep.show.charts import COLOURS
 
 DRIVES = ("weak", "middle", "strong")
 SLACK = 1e-3
 """Of first-order coefficients: rtol over the depths they are taken from is 5e-5; the rest is of third order."""
-
-NOTES = """\
-deviation: relative, or over 1 where the coefficient is smaller; of powers the difference; allowed: what the next order
-in the depth, in 1/h or in alpha explains\
-"""
 
 
 def switch_time(alpha: float) -> float:
@@ -45,7 +40,7 @@ def switch_time(alpha: float) -> float:
     return float(brentq(lambda q: q - math.tanh(q) - 1 / alpha, 1e-3, 1e6, xtol=1e-15))
 
 
-def first_order(alpha: float, harmonics: Any, pieces: int = 1000) -> Any:
+def first_order(alpha: float, harmonics, pieces: int = 1000):
     """K of (1) for all harmonics, by 16-point Gauss rules."""
     q = switch_time(alpha)
     x, w = np.polynomial.legendre.leggauss(16)
@@ -56,7 +51,7 @@ def first_order(alpha: float, harmonics: Any, pieces: int = 1000) -> Any:
     return np.array([-(weight * np.cos(h * math.pi * s)).sum() for h in harmonics]) / (q * math.tanh(q) ** 2)
 
 
-def first_order_sensitivity(alpha: float, harmonics: Any, step: float = 1e-4) -> Any:
+def first_order_sensitivity(alpha: float, harmonics, step: float = 1e-4):
     """-dK/dlnalpha."""
     return (first_order(alpha * (1 - step), harmonics) - first_order(alpha * (1 + step), harmonics)) / (2 * step)
 
@@ -67,7 +62,7 @@ def amplitude(alpha: float) -> float:
     return alpha * (q + math.log1p(math.exp(-2 * q)) - math.log(2))
 
 
-def envelopes(alpha: float, harmonics: Any) -> tuple[Any, Any]:
+def envelopes(alpha: float, harmonics) -> tuple[Any, Any]:
     """Amplitude of K in (2), and that of ds/ddepth where the harmonic is high."""
     q = switch_time(alpha)
     of_period = 1 / (q * np.sqrt(harmonics * alpha))
@@ -91,8 +86,9 @@ def degree(line: xr.Dataset, harmonic: int) -> float:
     return power(line.change.sel(harmonic=harmonic, depth=slice(0.01, 0.05)))
 
 
-def linear(ds: xr.Dataset) -> Claims:
-    """First order in the depth: the coefficients against (1), and how far the period really is linear in the depth."""
+def claims(ds) -> Claims:
+    """What theory says, and what comes out."""
+    yield "First order in the depth"
     for i, name in enumerate(DRIVES):
         line, h = ds.isel(a=i), ds.harmonic.values
         alpha, text = float(line.alpha), f"{h.size} harmonics"
@@ -103,13 +99,9 @@ def linear(ds: xr.Dataset) -> Claims:
     for i in (1, 2):
         yield differing(f"{DRIVES[i]}: power of the depth, h = 1", "1", degree(ds.isel(a=i), 1), 1, 0.05, 4)
 
-
-def falls(ds: xr.Dataset) -> Claims:
-    """High harmonics: amplitudes, freed of their phases, against (2) and its slope in alpha.
-
-    They are K and ds/ddepth over cosine and sine of the phase in (2), from harmonic 16 on and away from zeros. The
-    power is NaN if signs differ.
-    """
+    yield "High harmonics"
+    # They are K and ds/ddepth over cosine and sine of the phase in (2), from harmonic 16 on and away from zeros. The
+    # power is NaN if signs differ.
     for i in (1, 2):
         line, h = ds.isel(a=i), ds.harmonic
         alpha = float(line.alpha)
@@ -125,9 +117,8 @@ def falls(ds: xr.Dataset) -> Claims:
             yield differing(f"{what} of the harmonic in {name}", theory, exponent, expected, 0.05, 4)
             yield compared(f"  {name} over its envelope", "1", (size / envelope).mean(), 1, 0.05, 4)
 
-
-def weak(line: xr.Dataset) -> Claims:
-    """Weak drive: the mean of 1/torque, quadratic and the same for all harmonics that inertia does not blur."""
+    yield "Weak drive"
+    line = ds.isel(a=0)
     alpha, even, whole = float(line.alpha), line.sel(harmonic=2), 1 / 0.75**0.5 - 1
     layers = -5 / 24 * (2 * math.pi * alpha) ** 2
     yield differing("power of the depth, h = 2", "2", degree(line, 2), 2, 0.1, 4)
@@ -137,38 +128,32 @@ def weak(line: xr.Dataset) -> Claims:
     yield compared("K/alpha, h = 2", f"-5/24 (2 pi alpha)^2 = {layers:.4f}", even.K / alpha, layers, 0.1, 4)
 
 
-def figure(ds: xr.Dataset) -> Any:
+@panels(142.0, 2, sharex=True)
+def figure(of_period, of_rate, ds):
     """First-order coefficients of period and sensitivity against the harmonic.
 
     Marks are the kernel's, a dot is theory, and dashes are the envelopes of (2).
     """
-    with page_of(142.0, 2, 1, width=NARROW, sharex=True) as (page, (of_period, of_rate)):
-        some = np.intersect1d(ds.harmonic, np.geomspace(1, 64, 30).round())
-        for which, (axes, found, theory) in enumerate(
-            ((of_period, ds.K, first_order), (of_rate, ds.L, first_order_sensitivity))
-        ):
-            for i, mark in enumerate("os^"):
-                alpha, name = float(ds.alpha[i]), rf"{DRIVES[i]}, $\alpha = {float(ds.alpha[i]):.3g}$"
-                axes.loglog(some, abs(found.isel(a=i).sel(harmonic=some)), mark, color=COLOURS[i], label=name, **HOLLOW)
-                axes.plot(some, abs(theory(alpha, some)), ".", color="black", markersize=1.5)
-                if i:
-                    axes.plot(some, envelopes(alpha, some)[which], "--", color=COLOURS[i], linewidth=0.8)
-            axes.plot([], [], ".", color="black", markersize=3, label="theory of first order")
-            axes.plot([], [], "--", color="0.3", linewidth=0.8, label="its envelope")
-        of_period.set(ylim=(2e-5, 2), ylabel=r"$|\mathrm{d}\ln P/\mathrm{d}\,\mathrm{depth}|$ at depth 0 [1]")
-        of_rate.set(ylim=(2e-3, 20), ylabel=r"$|\mathrm{d}s/\mathrm{d}\,\mathrm{depth}|$ at depth 0 [1]")
-        of_rate.set(xlim=(0.9, 72), xlabel="harmonic, $h$ [1]")
-        page.legend(*of_rate.get_legend_handles_labels(), loc="outside upper center", ncols=3, columnspacing=1.0)
-        direct_label(of_period, 20, 0.25, "$h^{-1/2}$")
-        direct_label(of_rate, 3, 2.6, "$h^{1/2}$")
-    return page
+    some = np.intersect1d(ds.harmonic, np.geomspace(1, 64, 30).round())
+    for which, (axes, found, theory) in enumerate(
+        ((of_period, ds.K, first_order), (of_rate, ds.L, first_order_sensitivity))
+    ):
+        for i, mark in enumerate("os^"):
+            alpha, name = float(ds.alpha[i]), rf"{DRIVES[i]}, $\alpha = {float(ds.alpha[i]):.3g}$"
+            axes.loglog(some, abs(found.isel(a=i).sel(harmonic=some)), mark, color=COLOURS[i], label=name, **HOLLOW)
+            axes.plot(some, abs(theory(alpha, some)), ".", color="black", markersize=1.5)
+            if i:
+                axes.plot(some, envelopes(alpha, some)[which], "--", color=COLOURS[i], linewidth=0.8)
+        axes.plot([], [], ".", color="black", markersize=3, label="theory of first order")
+        axes.plot([], [], "--", color="0.3", linewidth=0.8, label="its envelope")
+    of_period.set(ylim=(2e-5, 2), ylabel=r"$|\mathrm{d}\ln P/\mathrm{d}\,\mathrm{depth}|$ at depth 0 [1]")
+    of_rate.set(ylim=(2e-3, 20), ylabel=r"$|\mathrm{d}s/\mathrm{d}\,\mathrm{depth}|$ at depth 0 [1]")
+    of_rate.set(xlim=(0.9, 72), xlabel="harmonic, $h$ [1]")
+    of_period.figure.legend(
+        *of_rate.get_legend_handles_labels(), loc="outside upper center", ncols=3, columnspacing=1.0
+    )
+    direct_label(of_period, 20, 0.25, "$h^{-1/2}$")
+    direct_label(of_rate, 3, 2.6, "$h^{1/2}$")
 
 
-def conclude(path: str) -> Conclusion:
-    """Statements and the figure."""
-    ds = scaled(read_result(path, "foliot_ripple", ["a", "harmonic", "depth"], "torque_ripple.toml"))
-    groups = {"First order in the depth": linear(ds), "High harmonics": falls(ds), "Weak drive": weak(ds.isel(a=0))}
-    return groups, [NOTES], lambda: figure(ds)
-
-
-main = script(__name__, "torque_ripple.h5", conclude)
+main = script(__name__, "torque_ripple.h5", claims, figure, scaled)

@@ -1,10 +1,8 @@
 """Where does the exponent -1/2 of impacts turn into the -1 and -1/3 of friction?
 
-    sweep run studies/verge_losses.toml --allow-import
-    sweep run studies/verge_losses_wheel.toml --allow-import
     python studies/verge_losses.py verge_losses.h5 verge_losses_wheel.h5
 
-draws verge_losses.png and compares theory with what comes out, P ~ torque^(-s). kappa = n^2 I_c/I_v is the wheel's
+P ~ torque^(-s). kappa = n^2 I_c/I_v is the wheel's
 inertia over the foliot's, alpha = n tau/(I_v a^2 phi0) the drive over viscous friction, lambda the share of a loss in
 the energy of half a period: viscous, dry, and impact. Theory, derived here: where the swing is large the speed at the
 switch follows from the balance of energy, friction of degree n taking abs(v)^(n + 2)/torque and impacts v^2, so that
@@ -12,20 +10,19 @@ switch follows from the balance of energy, friction of degree n taking abs(v)^(n
     s = (sum n lambda_n + lambda_impact)/(2 + sum n lambda_n),                                           (1)
 
 n = 1 for viscous and 0 for dry friction: 1/3, 1/2 and 0 where one of them takes all. At weak drive s = 1/(1 + alpha).
+
+s: differences of ln P over ln torque, 8 points a decade; deviation: of exponents and shares the difference
+allowed: 1e-8 of the energy; 0.01 of an exponent at the ends of the grid, 0.015 of (1); 0.2 of the exponent -3; 0.02
+where friction moves to the wheel and s < 1/2; near the torque that just drives the clock the drop decides
 """
 
-from __future__ import annotations
-
 import math
-from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Claims, Conclusion, count, differing, last_passage, most, power, read_result, said, script
-from _figures import NARROW, exponent_map, page_of
+from _common import Claims, count, differing, last_passage, most, power, said, script
+from _figures import COLOURS, exponent_map, panels
 from _losses import verge
-
-from sweep.show.charts import COLOURS
 
 STRONG = 1e4
 """alpha from which (1) is held to 0.015, what is left of the drop and of a swing that is not endless."""
@@ -35,14 +32,8 @@ AT_BORDER = 0.3615
 """The least s in mesh of kappa = .01, at the border, alpha = 26.6, by the kernel `verge` at 1500 torques."""
 LOSSES = ("viscous", "dry", "impact")
 
-NOTES = """\
-s: differences of ln P over ln torque, 8 points a decade; deviation: of exponents and shares the difference
-allowed: 1e-8 of the energy; 0.01 of an exponent at the ends of the grid, 0.015 of (1); 0.2 of the exponent -3; 0.02
-where friction moves to the wheel and s < 1/2; near the torque that just drives the clock the drop decides
-"""
 
-
-def prepared(ds: xr.Dataset) -> xr.Dataset:
+def scaled(ds: xr.Dataset) -> xr.Dataset:
     """`ds` with its groups, and the shares of the losses."""
     period, work = 2 * ds.clock, ds.tau * (2 * ds.n * ds.phi0 + ds["drop"])
     together = (ds.n * ds.I_c * ds.wheel - ds.I_v * ds.speed) / (ds.I_v + ds.n**2 * ds.I_c)
@@ -52,15 +43,6 @@ def prepared(ds: xr.Dataset) -> xr.Dataset:
     return ds.assign(viscous=ds.drag / work, dry=ds.rubbing / work, impact=knocked / work)
 
 
-def ends(smooth: xr.Dataset) -> Claims:
-    """The exponents at the ends of the grid, without dry friction."""
-    light, heavy = smooth.isel(I_c=0), smooth.sel(I_c=2.5e-3, method="nearest")
-    first, weak = light.s.isel(tau=1), 1 / (1 + float(light.alpha[1]))
-    yield differing("kappa = .001, weakest drive", f"1/(1 + alpha) = {weak:.4f}", first, weak, 0.01, 4)
-    yield differing("kappa = .001: least s", "1/3", light.s.min(), 1 / 3, 0.01, 4)
-    yield differing("kappa = 1: strongest drive", "1/2", heavy.s.isel(tau=-2), 0.5, 0.01, 4)
-
-
 def passage(smooth: xr.Dataset, value: float) -> xr.DataArray:
     """For each kappa the alpha at which s falls through a value, or rises through one below 1/2 on its way to that."""
     way = -1.0 if value > 0.5 else 1.0
@@ -68,8 +50,27 @@ def passage(smooth: xr.Dataset, value: float) -> xr.DataArray:
     return xr.DataArray(found, {"kappa": smooth.kappa.values}, ("kappa",))
 
 
-def turns(smooth: xr.Dataset, upper: xr.DataArray, lower: xr.DataArray) -> Claims:
-    """Where one exponent turns into the other, without dry friction: at s = 3/4 and, farther on, at 5/12."""
+def prepared(ds, wheel):
+    """Friction on the foliot, and on the wheel."""
+    return scaled(ds), scaled(wheel)
+
+
+def claims(ds, wheel) -> Claims:
+    """What theory says, and what comes out."""
+    yield "Energy"
+    whole = ds.viscous + ds.dry + ds.impact
+    yield most("viscous, dry and impact losses are the work", "1", whole - 1, 1e-8)
+
+    yield "Ends"
+    smooth = ds.isel(R_v=0)
+    light, heavy = smooth.isel(I_c=0), smooth.sel(I_c=2.5e-3, method="nearest")
+    first, weak = light.s.isel(tau=1), 1 / (1 + float(light.alpha[1]))
+    yield differing("kappa = .001, weakest drive", f"1/(1 + alpha) = {weak:.4f}", first, weak, 0.01, 4)
+    yield differing("kappa = .001: least s", "1/3", light.s.min(), 1 / 3, 0.01, 4)
+    yield differing("kappa = 1: strongest drive", "1/2", heavy.s.isel(tau=-2), 0.5, 0.01, 4)
+
+    yield "Where exponents turn"
+    upper, lower = (passage(smooth, value) for value in (3 / 4, 5 / 12))
     there, deep = upper.dropna("kappa"), lower.where((lower.kappa > 0.008) & (lower.kappa < 0.05), drop=True)
     text = ", ".join(f"{float(x):.2g} at kappa = {float(x.kappa):.3g}" for x in deep)
     ranged = f"{float(there[0]):.2f} to {float(there[-1]):.2f}, kappa = .001 to {float(there.kappa[-1]):.0f}"
@@ -83,15 +84,13 @@ def turns(smooth: xr.Dataset, upper: xr.DataArray, lower: xr.DataArray) -> Claim
     yield differing("  alpha ~ (1 - e^2)^x, e = (1 - kappa)/(1 + kappa)", "-3", by_loss, -3, 0.2, 4)
     yield differing("  share of viscous losses there, kappa = .01", "2/5 by (1)", share, 0.4, 0.02, 4)
 
-
-def in_mesh(smooth: xr.Dataset, turn: xr.DataArray) -> Claims:
-    """How far the exponent goes, without dry friction, where the recoil leaves the wheel in mesh, kappa by kappa."""
+    yield f"In mesh: recoil of at most {MESH:g} pitch"
     s, logs = smooth.s.where(smooth.pitches <= MESH), np.log(smooth.alpha.values)
     least, where = s.min("tau"), s.fillna(np.inf).argmin("tau")
     back = float(s.where(s.tau >= s.tau.isel(tau=where)).max("tau").where(least < 0.38).max())
     recoil = [
         float(np.interp(math.log(alpha), logs, smooth.pitches.isel(I_c=k)))
-        for k, alpha in enumerate(turn.values)
+        for k, alpha in enumerate(lower.values)
         if alpha > 0 and smooth.kappa[k] < 0.05
     ] or [0.0]
     line = smooth.isel(I_c=int(abs(smooth.kappa - 0.01).argmin("I_c")))
@@ -108,12 +107,8 @@ def in_mesh(smooth: xr.Dataset, turn: xr.DataArray) -> Claims:
     yield said(heavy, dips > 0.43 and abs(end - 0.5) < 0.01, f"{dips:.3f}, {end:.3f}", ", 1/2")
     yield said(again, back < 0.38, f"at most {back:.3f}", "< .38")
 
-
-def answer(ds: xr.Dataset) -> Claims:
-    """What part of a clock's losses is which, and its exponent.
-
-    Its wheel is light (kappa = .01), its dry friction I_v a^2 phi0, its recoil a quarter of a pitch.
-    """
+    yield "A clock with a light wheel"
+    # Its wheel is light (kappa = .01), its dry friction I_v a^2 phi0, its recoil a quarter of a pitch.
     line = ds.isel(R_v=1).sel(I_c=2.5e-5, method="nearest")
     clock = line.isel(tau=int(abs(line.pitches - 0.25).argmin("tau")))
     text = ", ".join(f"{name} {clock[name]:.0%}" for name in LOSSES)
@@ -122,17 +117,13 @@ def answer(ds: xr.Dataset) -> Claims:
     yield said(f"{what}: losses", viscous, text, "viscous most, impact least")
     yield said("  its exponent", 1 / 3 < clock.s < 0.5, f"{clock.s:.3f}", "1/3 to 1/2")
 
-
-def by_shares(ds: xr.Dataset) -> Claims:
-    """Theory (1) at strong drive, and how far it is off at weaker."""
+    yield "By the shares of the losses"
     off = ds.s - (ds.viscous + ds.impact) / (2 + ds.viscous)
-    strong, smooth = off.where(ds.alpha > STRONG), off.isel(R_v=0).where(ds.alpha > 100)
+    strong, near = off.where(ds.alpha > STRONG), off.isel(R_v=0).where(ds.alpha > 100)
     yield most(f"s by the shares, (1), alpha > {STRONG:.0e}", "0.015", strong, 0.015, count(strong))
-    yield most("  the same, alpha > 100 without dry friction", "0.05", smooth, 0.05, count(smooth))
+    yield most("  the same, alpha > 100 without dry friction", "0.05", near, 0.05, count(near))
 
-
-def on_the_wheel(ds: xr.Dataset, wheel: xr.Dataset) -> Claims:
-    """The same friction on the wheel instead."""
+    yield "Friction on the wheel"
     for R_c, name in ((0.0, "viscous"), (float(wheel.R_c[-1]), "and dry")):
         moved = wheel.s.sel(R_c=R_c).values
         stayed = ds.s.sel(R_v=R_c * float(wheel.n), I_c=wheel.I_c, method="nearest").values
@@ -141,39 +132,20 @@ def on_the_wheel(ds: xr.Dataset, wheel: xr.Dataset) -> Claims:
         yield most(what, "as on the foliot", (moved - stayed)[both], 0.02, here)
 
 
-def figure(ds: xr.Dataset) -> Any:
+@panels(128.0, 2, height_ratios=(1.3, 1))
+def figure(plane, shares, ds, _):
     """The exponent over drive and wheel, and the shares of the losses of a clock with a light wheel."""
-    with page_of(128.0, 2, 1, width=NARROW, height_ratios=(1.3, 1)) as (page, (plane, shares)):
-        smooth = ds.isel(R_v=0)
-        exponent_map(plane, smooth, (smooth.pitches > MESH).values, "recoil over 1/2 pitch")
-        lines = plane.contour(ds.alpha, ds.kappa, smooth.s, levels=[0.36, 5 / 12, 0.75], colors="white", linewidths=0.8)
-        plane.clabel(lines, fmt={0.36: "0.36", 5 / 12: "5/12", 0.75: "3/4"}, fontsize=7, inline_spacing=2)
-        clock = ds.isel(R_v=1).sel(I_c=2.5e-5, method="nearest")
-        clock = clock.isel(tau=np.isfinite(clock.viscous.values))
-        parts = [clock[name].values for name in LOSSES]
-        shares.stackplot(clock.alpha.values, parts, colors=COLOURS[:3], labels=LOSSES, alpha=0.85)
-        shares.set(xscale="log", xlabel=r"drive, $\alpha$ [1]", ylabel="share of the energy [1]", ylim=(0, 1))
-        shares.set(xlim=(clock.alpha[0], clock.alpha[-1]))
-        shares.legend(loc="lower left", framealpha=0.9, frameon=True)
-    return page
+    smooth = ds.isel(R_v=0)
+    exponent_map(plane, smooth, (smooth.pitches > MESH).values, "recoil over 1/2 pitch")
+    lines = plane.contour(ds.alpha, ds.kappa, smooth.s, levels=[0.36, 5 / 12, 0.75], colors="white", linewidths=0.8)
+    plane.clabel(lines, fmt={0.36: "0.36", 5 / 12: "5/12", 0.75: "3/4"}, fontsize=7, inline_spacing=2)
+    clock = ds.isel(R_v=1).sel(I_c=2.5e-5, method="nearest")
+    clock = clock.isel(tau=np.isfinite(clock.viscous.values))
+    parts = [clock[name].values for name in LOSSES]
+    shares.stackplot(clock.alpha.values, parts, colors=COLOURS[:3], labels=LOSSES, alpha=0.85)
+    shares.set(xscale="log", xlabel=r"drive, $\alpha$ [1]", ylabel="share of the energy [1]", ylim=(0, 1))
+    shares.set(xlim=(clock.alpha[0], clock.alpha[-1]))
+    shares.legend(loc="lower left", framealpha=0.9, frameon=True)
 
 
-def conclude(path: str, wheel_path: str) -> Conclusion:
-    """Statements and the figure."""
-    ds = prepared(read_result(path, "verge_scene:KERNEL", ["R_v", "I_c", "tau"], "verge_losses.toml"))
-    wheel = prepared(read_result(wheel_path, "verge_scene:KERNEL", ["R_c", "I_c", "tau"], "verge_losses_wheel.toml"))
-    smooth, whole = ds.isel(R_v=0), ds.viscous + ds.dry + ds.impact
-    upper, lower = (passage(smooth, value) for value in (3 / 4, 5 / 12))
-    groups = {
-        "Energy": [most("viscous, dry and impact losses are the work", "1", whole - 1, 1e-8)],
-        "Ends": ends(smooth),
-        "Where exponents turn": turns(smooth, upper, lower),
-        f"In mesh: recoil of at most {MESH:g} pitch": in_mesh(smooth, lower),
-        "A clock with a light wheel": answer(ds),
-        "By the shares of the losses": by_shares(ds),
-        "Friction on the wheel": on_the_wheel(ds, wheel),
-    }
-    return groups, [NOTES], lambda: figure(ds)
-
-
-main = script(__name__, "verge_losses.h5 verge_losses_wheel.h5", conclude)
+main = script(__name__, "verge_losses.h5 verge_losses_wheel.h5", claims, figure, prepared)

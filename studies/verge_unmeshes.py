@@ -1,11 +1,10 @@
 """Which verges stay in mesh, with which exponent, and does any real clock show -1/2?
 
-    sweep run studies/verge_unmeshes.toml
     python studies/verge_unmeshes.py verge_unmeshes.h5
 
-draws verge_unmeshes.png and compares theory with what comes out, P ~ torque^(-s). kappa = n^2 I_c/I_v is the wheel's
-inertia over the foliot's, alpha = n tau/(I_v a^2 phi0) the drive over viscous friction, a = c_v/I_v. A wheel that is
-thrown back by more than half a pitch, 2 n phi0 + drop, is out of mesh. Theory, derived here for no drop and e = 0:
+P ~ torque^(-s). kappa = n^2 I_c/I_v is the wheel's inertia over the foliot's, alpha = n tau/(I_v a^2 phi0) the drive
+over viscous friction, a = c_v/I_v. A wheel that is thrown back by more than half a pitch, 2 n phi0 + drop, is out of
+mesh. Theory, derived here for no drop and e = 0:
 
 1. At strong drive impacts take all the work. A landing keeps (kappa - 1)/(kappa + 1) of the speed, so the balance
    (1 + kappa)/2 (v^2 - v0^2) = 2 gives v^2 = (1 + kappa)/kappa, and the recoil is (1 - kappa)^2/(2 kappa) in units of
@@ -16,34 +15,29 @@ thrown back by more than half a pitch, 2 n phi0 + drop, is out of mesh. Theory, 
    form alpha ln cosh q = 3, q - tanh q = 1/alpha, that is at alpha = 22.16, and there s = 0.3575.         (2)
 3. Bounces of a light wheel last about e kappa/(1 - e) of a half period. Where they die out in contact they take what
    a plastic impact takes at once: e does not matter.
-"""
 
-from __future__ import annotations
-
-import math
-from typing import Any
-
-import numpy as np
-import xarray as xr
-from _common import Claims, Conclusion, compared, count, differing, most, read_result, said, script, solved
-from _figures import NARROW, direct_label, exponent_map, page_of
-from _losses import verge
-from scipy.optimize import brentq
-
-from kernels.interface import Status
-from sweep.show.charts import COLOURS, DASHES
-
-BORDER = 3 - 2 * math.sqrt(2)
-NEAR = 0.02
-"""How near to 1/2 an exponent is called 1/2."""
-NOTES = """\
 s: differences of ln P over ln torque, 8 points a decade, between cells that run; deviation: of exponents the difference
 allowed: 1e-3 of the borders, found in steps of 6e-4; 0.01 of exponents and 10 % of the recoil at the strongest drive,
 as theory leaves out the drop, which is 5 % of n phi0
 """
 
+import math
 
-def prepared(ds: xr.Dataset) -> xr.Dataset:
+import numpy as np
+import xarray as xr
+from _common import Claims, compared, count, differing, most, said, script, solved
+from _figures import COLOURS, DASHES, direct_label, exponent_map, panels
+from _losses import verge
+from scipy.optimize import brentq
+
+from kernels.interface import Status
+
+BORDER = 3 - 2 * math.sqrt(2)
+NEAR = 0.02
+"""How near to 1/2 an exponent is called 1/2."""
+
+
+def scaled(ds: xr.Dataset) -> xr.Dataset:
     """`ds` with its groups, and which clocks come out of mesh."""
     return verge(ds, ds.period, ds.status == 0).assign(out=ds.status == Status.UNMESHES)
 
@@ -54,15 +48,22 @@ def one_body() -> tuple[float, float]:
     return 1 / (q - math.tanh(q)), (1 - math.tanh(q) / q) / math.tanh(q) ** 2
 
 
-def border(axis: str, values: Any, **changed: float) -> float:
+def border(axis: str, values, **changed: float) -> float:
     """Between which of these values a clock without drop stays in mesh on one side alone: their middle, else NaN."""
     clock = {"tau": 1.0, "I_v": 1.0, "n": 1.0, "phi0": 0.3, "drop": 3e-10} | changed | {axis: values}
     turns = np.flatnonzero(np.diff(solved("verge", **clock, rtol=1e-6).status == 0))
     return 0.5 * float(values[turns[0]] + values[turns[0] + 1]) if turns.size == 1 else math.nan
 
 
-def mesh(ds: xr.Dataset, smooth: xr.Dataset) -> Claims:
-    """Which clocks stay in mesh, and the recoil of those that do."""
+def prepared(ds):
+    """Clocks without dry friction and restitution, and all of them."""
+    ds = scaled(ds)
+    return ds.isel(R_v=0, e=0), ds
+
+
+def claims(smooth, ds) -> Claims:
+    """What theory says, and what comes out."""
+    yield "In mesh"
     light, leaves, (alpha, _) = smooth.isel(I_c=0), smooth.out.any("tau"), one_body()
     last, first = light.alpha.where(~light.out).max(), light.alpha.where(light.out).min()
     leaves_at = border("tau", 0.3 * np.arange(22.0, 22.4, 0.01), I_c=1e-9, c_v=1.0) / 0.3
@@ -82,9 +83,7 @@ def mesh(ds: xr.Dataset, smooth: xr.Dataset) -> Claims:
         "largest recoil of a clock that runs [pitches]", 0.45 < farthest <= 0.5, f"{farthest:.3f}", "1/2 at most"
     )
 
-
-def exponents(smooth: xr.Dataset) -> Claims:
-    """The exponent in mesh, beside that of one body that keeps (1 - kappa)/(1 + kappa) of its speed."""
+    yield "Exponents"
     off = []
     for i in np.flatnonzero(smooth.kappa.values < 0.7):
         line = smooth.isel(I_c=int(i))
@@ -98,9 +97,7 @@ def exponents(smooth: xr.Dataset) -> Claims:
     yield most(body, "foliot", xr.DataArray(off), 0.01, "largest difference")
     yield most("strongest drive, kappa > .17: s", "1/2", heavy - 0.5, 0.01, f"{heavy.min():.4f} to {heavy.max():.4f}")
 
-
-def halves(ds: xr.Dataset, smooth: xr.Dataset) -> Claims:
-    """Over which torques the exponent is 1/2."""
+    yield "Where s is 1/2"
     decades = (abs(smooth.s - 0.5) < NEAR).sum("tau") / 8
     light, heavy = (decades.sel(I_c=kappa * 2.5e-3, method="nearest") for kappa in (0.01, 1.0))
     dry = ds.isel(R_v=1, e=0).s.sel(I_c=2.5e-5, method="nearest")
@@ -109,9 +106,7 @@ def halves(ds: xr.Dataset, smooth: xr.Dataset) -> Claims:
     yield said("  kappa = 1", heavy > 3, f"{heavy:.2g}", "> 3")
     yield said(friction, dry.min() < 0.4, f"{dry.max():.3f} to {dry.min():.3f}", "below 1/2 at its end")
 
-
-def restitution(ds: xr.Dataset) -> Claims:
-    """What e changes."""
+    yield "Restitution"
     bounce, plastic = ds.e * ds.kappa / (1 - ds.e), ds.isel(e=0)
     short, longer = ((ds.period / plastic.period - 1).where(bounce < x) for x in (0.005, 0.1))
     light = (bounce < 0.25) & (ds.kappa < BORDER)
@@ -129,36 +124,22 @@ def restitution(ds: xr.Dataset) -> Claims:
     yield differing(f"e > 0, kappa > .17, alpha > 1e4: median s, {count(heavy)}", "1/2", heavy.median(), 0.5, 0.01, 4)
 
 
-def figure(smooth: xr.Dataset) -> Any:
+@panels(128.0, 2, height_ratios=(1.2, 1))
+def figure(plane, lines, smooth, *_):
     """A map of the exponent with plastic impacts, and the exponent over the drive."""
-    with page_of(128.0, 2, 1, width=NARROW, height_ratios=(1.2, 1)) as (page, (plane, lines)):
-        exponent_map(plane, smooth, smooth.out.values, "unmeshes")
-        plane.contour(smooth.alpha, smooth.kappa, smooth.s, levels=[0.5], colors="white", linewidths=0.8)
-        plane.axhline(BORDER, color="C3", linewidth=0.8, linestyle="--")
-        direct_label(plane, 2e3, 0.25, r"$3-2\sqrt{2}$", "C3")
-        for i, kappa in enumerate((0.01, 0.1, 0.18, 1.0)):
-            line, look = smooth.sel(I_c=kappa * 2.5e-3, method="nearest"), {"color": COLOURS[i]}
-            lines.semilogx(line.alpha, line.s, linestyle=DASHES[i], label=f"{line.kappa:.2g}", **look)
-            if line.out.any():
-                there = np.flatnonzero(np.isfinite(line.s.values))[-1]
-                lines.plot(line.alpha[there], line.s[there], "x", markersize=5, **look)
-        lines.axhline(0.5, color="0.7", linewidth=0.6)
-        lines.set(xlabel=r"drive, $\alpha$ [1]", ylabel="exponent, $s$ [1]", xlim=(0.1, 1e5), ylim=(0.3, 1.0))
-        lines.legend(title=r"$\kappa$", loc="upper right")
-    return page
+    exponent_map(plane, smooth, smooth.out.values, "unmeshes")
+    plane.contour(smooth.alpha, smooth.kappa, smooth.s, levels=[0.5], colors="white", linewidths=0.8)
+    plane.axhline(BORDER, color="C3", linewidth=0.8, linestyle="--")
+    direct_label(plane, 2e3, 0.25, r"$3-2\sqrt{2}$", "C3")
+    for i, kappa in enumerate((0.01, 0.1, 0.18, 1.0)):
+        line, look = smooth.sel(I_c=kappa * 2.5e-3, method="nearest"), {"color": COLOURS[i]}
+        lines.semilogx(line.alpha, line.s, linestyle=DASHES[i], label=f"{line.kappa:.2g}", **look)
+        if line.out.any():
+            there = np.flatnonzero(np.isfinite(line.s.values))[-1]
+            lines.plot(line.alpha[there], line.s[there], "x", markersize=5, **look)
+    lines.axhline(0.5, color="0.7", linewidth=0.6)
+    lines.set(xlabel=r"drive, $\alpha$ [1]", ylabel="exponent, $s$ [1]", xlim=(0.1, 1e5), ylim=(0.3, 1.0))
+    lines.legend(title=r"$\kappa$", loc="upper right")
 
 
-def conclude(path: str) -> Conclusion:
-    """Statements and the figure."""
-    ds = prepared(read_result(path, "verge", ["R_v", "e", "I_c", "tau"], "verge_unmeshes.toml"))
-    smooth = ds.isel(R_v=0, e=0)
-    groups = {
-        "In mesh": mesh(ds, smooth),
-        "Exponents": exponents(smooth),
-        "Where s is 1/2": halves(ds, smooth),
-        "Restitution": restitution(ds),
-    }
-    return groups, [NOTES], lambda: figure(smooth)
-
-
-main = script(__name__, "verge_unmeshes.h5", conclude)
+main = script(__name__, "verge_unmeshes.h5", claims, figure, prepared)

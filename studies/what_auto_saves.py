@@ -2,23 +2,25 @@
 
     python studies/what_auto_saves.py studies/what_auto_saves.toml
 
-measures `auto` and every method on the same cells, at rtol from 1e-3 to 1e-13, in one run on one core, and draws
-what_auto_saves.png. The best single method at an rtol is the fastest of those that give the most cells; errors are
-against the best reference among the methods. Timings are noisy and for information only; what is right is checked.
+Measures `auto` and every method on the same cells, at rtol from 1e-3 to 1e-13, in one run on one core. The best single
+method at an rtol is the fastest of those that give the most cells; errors are against the best reference among the
+methods. Timings are noisy and for information only; what is right is checked.
+
+saved: time of the best single method over that of auto, on the same cells; "gives" is the share of cells that come out
+and are not said to be inaccurate. Below 1 auto is the slower one: it asks the bounds of every cell, and pays for cells
+that the single method leaves unsolved. Where auto takes the reference itself its error is 0 by that alone: what auto
+calls right is judged against 50 digits by benchmarks/honesty/auto_honesty.py
 """
 
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Claims, Conclusion, Statement, said, script
-from _figures import page_of
+from _common import Claims, Statement, said, script
+from _figures import method_look, panels
 
 import sweep
 from sweep.explore.work_precision import TOLERANCES, precision_text, work_precision
-from sweep.show.charts import method_look
 
 PARTS = ("", "_viscous", "_drag", "_terms", "_balance", "_impact", "_polisher")
 """Ends of the names of the study files."""
@@ -27,14 +29,8 @@ AS_MANY = 1e-12
 SHOWN = 1e-7
 """The tolerance at which times are drawn."""
 
-NOTES = """\
-saved: time of the best single method over that of auto, on the same cells; "gives" is the share of cells that come out
-and are not said to be inaccurate. Below 1 auto is the slower one: it asks the bounds of every cell, and pays for cells
-that the single method leaves unsolved. Where auto takes the reference itself its error is 0 by that alone: what auto
-calls right is judged against 50 digits by benchmarks/honesty/auto_honesty.py"""
 
-
-def given(found: xr.Dataset) -> Any:
+def given(found: xr.Dataset):
     """Share of cells that a method gives and vouches for."""
     return found.ok + found.remarked - found.silent
 
@@ -64,26 +60,25 @@ def statements(found: xr.Dataset) -> Claims:
     yield from (Statement(what, "", here) for what, here in saved.items())
 
 
-def figure(parts: Sequence[xr.Dataset]) -> Any:
+@panels(118.0, width=178.0)
+def figure(axes, parts):
     """Time of every method over that of auto at one tolerance, a row for each study; the best single one is ringed."""
-    with page_of(20.0 + 14.0 * len(parts)) as (page, axes):
-        for k, found in enumerate(parts):
-            draw_row(axes, found, -k)
-        axes.axvline(1.0, color="black", linewidth=0.8)
-        axes.set(xscale="log", xlabel=f"time over that of auto, at rtol = $10^{{{np.log10(SHOWN):.0f}}}$ [1]")
-        axes.set_ylim(-len(parts) + 0.4, 0.6)
-        axes.set_yticks(range(0, -len(parts), -1), labels=[found.attrs["title"] for found in parts])
-        axes.set_yticks([], minor=True)
-        look = {"color": "0.3", "marker": "o", "linestyle": "", "markersize": 4}
-        axes.plot([], [], **look, label="gives every cell that auto gives")
-        axes.plot([], [], **look, markerfacecolor="white", label="gives fewer")
-        axes.plot([], [], **look | {"markersize": 9}, markerfacecolor="none", label="best single method")
-        keys = dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
-        page.legend(keys.values(), keys.keys(), loc="outside lower center", ncols=5, fontsize=7)
-    return page
+    for k, found in enumerate(parts):
+        draw_row(axes, found, -k)
+    axes.axvline(1.0, color="black", linewidth=0.8)
+    axes.set(xscale="log", xlabel=f"time over that of auto, at rtol = $10^{{{np.log10(SHOWN):.0f}}}$ [1]")
+    axes.set_ylim(-len(parts) + 0.4, 0.6)
+    axes.set_yticks(range(0, -len(parts), -1), labels=[found.attrs["title"] for found in parts])
+    axes.set_yticks([], minor=True)
+    look = {"color": "0.3", "marker": "o", "linestyle": "", "markersize": 4}
+    axes.plot([], [], **look, label="gives every cell that auto gives")
+    axes.plot([], [], **look, markerfacecolor="white", label="gives fewer")
+    axes.plot([], [], **look | {"markersize": 9}, markerfacecolor="none", label="best single method")
+    keys = dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
+    axes.figure.legend(keys.values(), keys.keys(), loc="outside lower center", ncols=5, fontsize=7)
 
 
-def draw_row(axes: Any, found: xr.Dataset, place: float) -> None:
+def draw_row(axes, found: xr.Dataset, place: float) -> None:
     """The methods of one study side by side at a height."""
     row = found.sel({"rtol": SHOWN}, method="nearest")
     auto, best = row.sel({"method": "auto"}), best_single(found, float(row.rtol))
@@ -98,13 +93,22 @@ def draw_row(axes: Any, found: xr.Dataset, place: float) -> None:
             axes.plot(ratio, place, "o", color="0.3", markerfacecolor="none", markersize=10, markeredgewidth=0.7)
 
 
-def conclude(path: str, cells: int = 1024, tolerances: Sequence[float] = TOLERANCES) -> Conclusion:
-    """Statements, tables and the figure."""
+def prepared(path, cells=1024, tolerances=TOLERANCES):
+    """The charts of all studies."""
     files = [Path(path).with_name(f"{Path(path).stem}{part}.toml") for part in PARTS]
-    parts = [work_precision(sweep.study(file), cells=cells, tolerances=tolerances) for file in files]
-    groups = {found.attrs["title"]: statements(found) for found in parts}
-    tables = [f"{found.attrs['title']}\n{precision_text(found, complete=True)}\n" for found in parts]
-    return groups, [NOTES, "", *tables], lambda: figure(parts)
+    return ([work_precision(sweep.study(file), cells=cells, tolerances=tolerances) for file in files],)
 
 
-main = script(__name__, "what_auto_saves.toml", conclude)
+def claims(parts) -> Claims:
+    """What is checked of each study, and what auto saves."""
+    for found in parts:
+        yield found.attrs["title"]
+        yield from statements(found)
+
+
+def tables(parts):
+    """The charts as tables."""
+    return [f"{found.attrs['title']}\n{precision_text(found, complete=True)}\n" for found in parts]
+
+
+main = script(__name__, "what_auto_saves.toml", claims, figure, prepared, tables)

@@ -1,10 +1,9 @@
 """Which average of torque and friction sets the yearly rate of a foliot, and how does noise from swing to swing add up?
 
-    sweep run studies/which_average.toml
     python studies/which_average.py which_average.h5
 
-draws which_average.png and compares theory with what comes out. m = ln(mu/mu0) and x = ln(a/a0) change over the season
-or from swing to swing; P = F(alpha)/a, alpha = mu/(a^2 phi0), s = -dlnP/dlnmu, s' = ds/dln alpha. Derived here:
+m = ln(mu/mu0) and x = ln(a/a0) change over the season or from swing to swing; P = F(alpha)/a, alpha = mu/(a^2 phi0), s
+= -dlnP/dlnmu, s' = ds/dln alpha. Derived here:
 
 seasons: ln<P0/P> = s <m> + (1 - 2s) <x> + s' var(m - 2x)/2 + var(s m + (1 - 2s) x)/2 + ...,             (1)
     so of the friction the power mean of the exponent p = 1 - 2s + 4s'/(1 - 2s) counts, of the torque p = s + s'/s;  (2)
@@ -15,27 +14,22 @@ noise: of a change of the torque in one half swing the clock gains R_k = r + (s 
 With lambda = a v/mu at the switch and h = lambda^2/(1 + lambda), all times 1/(2/alpha + 2 lambda):
     r = 2/alpha + lambda + (1/lambda - 1)(2/alpha + h),
     r_a = 2/alpha + 2 lambda - (4/alpha + lambda + (1/lambda - 1)(4/alpha + h)).                               (4)
+
+deviation: relative, of exponents p the difference. Allowed: 0.01 of p, measured with a season of 2 %; 5 % of (1) for
+seasons of 10 % and 5 %, the next order; of (3) 5 %, three standard errors of 2000 seeds, the same in every line
 """
 
 import math
-from typing import Any
 
 import numpy as np
-import xarray as xr
-from _common import Claims, Conclusion, compared, differing, most, read_result, script, solved
-from _figures import NARROW, direct_label, page_of
+from _common import Claims, compared, differing, most, script, solved
+from _figures import COLOURS, MARKS, direct_label, panels
 from scipy.optimize import brentq
-
-from sweep.show.charts import COLOURS, MARKS
 
 DAY, SIGMA, HALF = 86400.0, 1e-3, 1.46299058758010465706
 PHASE = np.linspace(0.0, 2.0 * np.pi, 64, endpoint=False)
 NOISES = ((SIGMA, 0, 0), (0, SIGMA, 0), (SIGMA, SIGMA, -1), (SIGMA, SIGMA, 0), (SIGMA, SIGMA, 1))
 """sigma, sigma_a and shared: noise of the torque, of the friction, of both."""
-NOTES = """\
-deviation: relative, of exponents p the difference. Allowed: 0.01 of p, measured with a season of 2 %; 5 % of (1) for
-seasons of 10 % and 5 %, the next order; of (3) 5 %, three standard errors of 2000 seeds, the same in every line
-"""
 
 
 def theory(alpha: float) -> tuple[float, float, float]:
@@ -52,7 +46,7 @@ def exponents(alpha: float) -> tuple[float, float]:
     return 1 - 2 * s + 4 * slope / (1 - 2 * s), s + slope / s
 
 
-def mean_rate(alpha: float, m: Any, x: Any) -> float:
+def mean_rate(alpha: float, m, x) -> float:
     """ln<P0/P> by the kernel."""
     mu, a = np.append(alpha * np.exp(m), alpha), np.append(np.exp(x), 1.0)
     P = solved("foliot", design="zip", mu=mu, a=a, phi0=1, rtol=1e-12, outputs=["period"]).period.values
@@ -66,8 +60,27 @@ def measured(alpha: float) -> tuple[float, float]:
     return 2 * friction / (1 - 2 * s) / np.var(season), 2 * torque / s / np.var(season)
 
 
-def seasons() -> Claims:
-    """(1) and (2)."""
+def scatter(alpha: float, n: int, sigma: float, sigma_a: float, shared: float) -> float:
+    """(3) times sqrt(n) over `SIGMA`."""
+    s, _, u = theory(alpha)
+    two, h, lost = 2 / alpha, u * u / (1 + u), 1 - np.exp(-(2 / alpha + 2 * u) * np.arange(n))  # K = exp(-a P/2)
+    r = (two + u + (1 / u - 1) * (two + h)) / (two + 2 * u)
+    r_a = 1 - (2 * two + u + (1 / u - 1) * (2 * two + h)) / (two + 2 * u)
+    R, R_a = sigma / SIGMA * (r + (s - r) * lost), sigma_a / SIGMA * (r_a + (1 - 2 * s - r_a) * lost)
+    return math.sqrt(np.mean(R**2 + R_a**2 + 2 * shared * R * R_a))
+
+
+def prepared(ds):
+    """The scatter of the rate over seeds, in units of sigma, by the noise."""
+    axes = ["sigma", "sigma_a", "shared"]
+    over = ds.rate_error_s_per_day.std("seed") / (DAY * SIGMA) * np.sqrt(ds.half_swings)
+    over = over.drop_vars([name for name in over.coords if name not in over.dims])
+    return {kind: over.sel(dict(zip(axes, kind, strict=True)), method="nearest") for kind in NOISES}
+
+
+def claims(spread) -> Claims:
+    """What theory says, and what comes out."""
+    yield "Which mean counts over the year"
     x = 0.1 * np.cos(PHASE)
     for alpha in (1e-3, 0.1, 1.0, 30.0, 1e6):
         for name, p, found in zip(("friction", "torque"), exponents(alpha), measured(alpha), strict=True):
@@ -81,19 +94,7 @@ def seasons() -> Claims:
     kept = mean_rate(30.0, 2 * x, x) - math.log(np.mean(np.exp(x)))
     yield most("torque as the square of the friction: its arithmetic mean", "exact", kept, 1e-10)
 
-
-def scatter(alpha: float, n: int, sigma: float, sigma_a: float, shared: float) -> float:
-    """(3) times sqrt(n) over `SIGMA`."""
-    s, _, u = theory(alpha)
-    two, h, lost = 2 / alpha, u * u / (1 + u), 1 - np.exp(-(2 / alpha + 2 * u) * np.arange(n))  # K = exp(-a P/2)
-    r = (two + u + (1 / u - 1) * (two + h)) / (two + 2 * u)
-    r_a = 1 - (2 * two + u + (1 / u - 1) * (2 * two + h)) / (two + 2 * u)
-    R, R_a = sigma / SIGMA * (r + (s - r) * lost), sigma_a / SIGMA * (r_a + (1 - 2 * s - r_a) * lost)
-    return math.sqrt(np.mean(R**2 + R_a**2 + 2 * shared * R * R_a))
-
-
-def noise(spread: dict[Any, xr.DataArray]) -> Claims:
-    """(3), kind by kind."""
+    yield "Noise from swing to swing"
     for kind, here in spread.items():
         expected = [[scatter(mu, int(n), *kind) for n in here.half_swings.values] for mu in here.mu.values]
         what = "sigma = {:g}, sigma_a = {:g}, shared = {:g}: scatter".format(*kind)
@@ -105,38 +106,26 @@ def noise(spread: dict[Any, xr.DataArray]) -> Claims:
     yield compared(what, f"{short:.3f}", first / last, short, 0.05, 4)
 
 
-def figure(spread: dict[Any, xr.DataArray]) -> Any:
+@panels(132.0, 2)
+def figure(means, memory, spread):
     """Exponents of the means, and memory."""
-    with page_of(132.0, 2, 1, width=NARROW) as (page, (means, memory)):
-        fine, marks = np.geomspace(1e-3, 1e5, 401), np.array([1e-3, 1e-2, 0.1, 0.5, 4, 30, 300, 1e4, 1e5])
-        lines, points = (np.array([f(a) for a in x]).T for f, x in ((exponents, fine), (measured, marks)))
-        lines[0][abs(np.log(fine / HALF)) < 0.03] = np.nan
-        for k, name in enumerate(("friction", "torque")):
-            means.semilogx(fine, lines[k], color=COLOURS[k])
-            means.plot(marks, points[k], MARKS[k], color=COLOURS[k], markerfacecolor="white", label=name)
-        means.axvline(HALF, color="0.6", linewidth=0.7, linestyle=":")
-        direct_label(means, 5.0, 4.2, "$s = 1/2$", "0.4", ha="left")
-        means.set(xlabel=r"drive, $\alpha$ [1]", ylabel="exponent of the mean, $p$ [1]", ylim=(-5, 5))
-        means.legend(loc="lower left", title="mean of")
-        n, torque = np.unique(np.geomspace(1, 100, 40).astype(int)), spread[NOISES[0]]
-        for k, alpha in enumerate(torque.mu.values):
-            look = {"color": COLOURS[k], "markerfacecolor": "white", "label": rf"$\alpha={alpha:g}$"}
-            memory.semilogx(n, [scatter(alpha, i, *NOISES[0]) for i in n], color=COLOURS[k])
-            memory.plot(torque.half_swings, torque.sel(mu=alpha), MARKS[k], **look)
-        memory.set(xlabel="half swings, $n$ [1]", ylabel=r"scatter of the rate, $\sqrt{n}/\sigma$ [1]", ylim=(0, 1))
-        memory.legend(loc="lower left")
-    return page
+    fine, marks = np.geomspace(1e-3, 1e5, 401), np.array([1e-3, 1e-2, 0.1, 0.5, 4, 30, 300, 1e4, 1e5])
+    lines, points = (np.array([f(a) for a in x]).T for f, x in ((exponents, fine), (measured, marks)))
+    lines[0][abs(np.log(fine / HALF)) < 0.03] = np.nan
+    for k, name in enumerate(("friction", "torque")):
+        means.semilogx(fine, lines[k], color=COLOURS[k])
+        means.plot(marks, points[k], MARKS[k], color=COLOURS[k], markerfacecolor="white", label=name)
+    means.axvline(HALF, color="0.6", linewidth=0.7, linestyle=":")
+    direct_label(means, 5.0, 4.2, "$s = 1/2$", "0.4", ha="left")
+    means.set(xlabel=r"drive, $\alpha$ [1]", ylabel="exponent of the mean, $p$ [1]", ylim=(-5, 5))
+    means.legend(loc="lower left", title="mean of")
+    n, torque = np.unique(np.geomspace(1, 100, 40).astype(int)), spread[NOISES[0]]
+    for k, alpha in enumerate(torque.mu.values):
+        look = {"color": COLOURS[k], "markerfacecolor": "white", "label": rf"$\alpha={alpha:g}$"}
+        memory.semilogx(n, [scatter(alpha, i, *NOISES[0]) for i in n], color=COLOURS[k])
+        memory.plot(torque.half_swings, torque.sel(mu=alpha), MARKS[k], **look)
+    memory.set(xlabel="half swings, $n$ [1]", ylabel=r"scatter of the rate, $\sqrt{n}/\sigma$ [1]", ylim=(0, 1))
+    memory.legend(loc="lower left")
 
 
-def conclude(path: str) -> Conclusion:
-    """Statements and the figure."""
-    axes = ["mu", "half_swings", "sigma", "sigma_a", "shared", "seed"]
-    ds = read_result(path, "foliot_noise", axes, "which_average.toml")
-    over = ds.rate_error_s_per_day.std("seed") / (DAY * SIGMA) * np.sqrt(ds.half_swings)
-    over = over.drop_vars([name for name in over.coords if name not in over.dims])
-    spread = {kind: over.sel(dict(zip(axes[2:5], kind, strict=True)), method="nearest") for kind in NOISES}
-    groups = {"Which mean counts over the year": seasons(), "Noise from swing to swing": noise(spread)}
-    return groups, [NOTES], lambda: figure(spread)
-
-
-main = script(__name__, "which_average.h5", conclude)
+main = script(__name__, "which_average.h5", claims, figure, prepared)

@@ -2,11 +2,15 @@
 
     python studies/work_precision.py studies/work_precision.toml
 
-sweeps ten thousand foliots with viscous and Coulomb friction by every method at every tolerance, on one core, follows
-some of the same foliots by heyoka.py, diffrax and scipy (the extra `peers`), and draws work_precision.png. The time is
-that of the whole `sweep.run`, over its cells. Errors are the largest among 400 of the cells, against 20 digits
-where mpmath is installed, else against the best method. A table for drag is printed beside it. Timings are noisy and
-for information only; errors and counts are checked.
+Sweeps ten thousand foliots with viscous and Coulomb friction by every method at every tolerance, on one core, follows
+some of the same foliots by heyoka.py, diffrax and scipy (the extra `peers`). The time is
+that of the whole `sweep.run`, over its cells. Errors are the largest among 400 of the cells, against 20 digits where
+mpmath is installed, else against the best method. A table for drag is printed beside it. Timings are noisy and for
+information only; errors and counts are checked.
+
+error: the largest of period, amplitude and speed at the switch, relative
+The other libraries are given how many half swings it takes until nothing is left of a start 10 % from the cycle;
+diffrax follows all clocks side by side, each for as many half swings as the slowest
 """
 
 import sys
@@ -20,15 +24,14 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Claims, Conclusion, Statement, cheapest, measured, said, script
-from _figures import direct_label, page_of
+from _common import Claims, Statement, cheapest, measured, said, script
+from _figures import direct_label, draw_precision, method_look, panels
 from _peers import FOLLOWERS, swings
 
 import sweep
 from sweep.cells.grid import Grid
 from sweep.cells.sample import sampled, solved
 from sweep.explore.work_precision import TOLERANCES, precision_cells, precision_text, work_precision
-from sweep.show.charts import draw_precision, method_look
 
 DIGITS = 20
 """Of the truth."""
@@ -39,11 +42,6 @@ PLACES = {
     "auto": (0.6, 1.0), "coulomb": (0.85, 9.0), "quadrature": (1.7, 9.0), "segments": (1.9, 1.0), "sdirk4": (1.9, 2.0),
 }  # fmt: skip
 """Where the names of methods stand whose marks are close: factors of time and error. Others stand above their marks."""
-
-NOTES = """\
-error: the largest of period, amplitude and speed at the switch, relative
-The other libraries are given how many half swings it takes until nothing is left of a start 10 % from the cycle;
-diffrax follows all clocks side by side, each for as many half swings as the slowest"""
 
 
 def cycles(study: sweep.study.read.Study, cells: int) -> dict[str, Any] | None:
@@ -82,7 +80,7 @@ def swept(study: sweep.study.read.Study, found: xr.Dataset) -> xr.Dataset:
     return found.assign(seconds=seconds)
 
 
-def peers(study: sweep.study.read.Study, true: Any, cells: int, tolerances: Sequence[float]) -> dict[str, xr.Dataset]:
+def peers(study: sweep.study.read.Study, true, cells: int, tolerances: Sequence[float]) -> dict[str, xr.Dataset]:
     """Other libraries on some of the cells, by name; none where the truth is not at hand."""
     if true is None:
         return {}
@@ -95,7 +93,7 @@ def peers(study: sweep.study.read.Study, true: Any, cells: int, tolerances: Sequ
     return found
 
 
-def errors_of(made: Any, rows: Any, rtol: float) -> Any:
+def errors_of(made, rows, rtol: float):
     """The largest relative error of each clock by a follower."""
     a, R, left, *true = rows.T
     found = made(rtol).settle(a, R, true[2], [swings(rtol, x) for x in left])
@@ -119,44 +117,55 @@ def whole(found: xr.Dataset) -> dict[str, xr.Dataset]:
     return {name: row.assign(worst=row.error_worst.where(row.unsolved + row.silent == 0)) for name, row in rows.items()}
 
 
-def figure(found: xr.Dataset, others: dict[str, xr.Dataset]) -> Any:
-    """The largest error over the time of a cell: a line for each method and library, through its tolerances."""
-    rows = {str(name): found.sel({"method": name}) for name in found["method"].values}
-    for name, row in rows.items():  # what a tolerance does not change is one mark
-        if float(row.error_worst.max()) < 2 * float(row.error_worst.min()):
-            rows[name] = row.isel(rtol=[int(row.seconds.argmin("rtol"))])
-    with page_of(100.0, width=150.0) as (page, axes):
-        for row in rows.values():
-            draw_precision(axes, row.expand_dims("method"), "error_worst")
-        for name, row in others.items():
-            axes.plot(row.seconds, row.worst, linewidth=0.8, markersize=4, label=name, **method_look(name))
-        for name, line in zip([*rows, *others], [x for x in axes.lines if x.get_label()[0] != "_"], strict=True):
-            top = int(np.nanargmax(line.get_ydata()))
-            right, up = PLACES.get(name, (1.0, 5.0))
-            x, y = right * line.get_xdata()[top], up * line.get_ydata()[top]
-            direct_label(axes, x, y, name, line.get_color())
-        text = "each mark a tolerance,\nfrom $10^{-3}$ (top) to $10^{-13}$"
-        axes.text(0.02, 0.97, text, va="top", fontsize=7, color="0.35", transform=axes.transAxes)
-        axes.set(xlabel="CPU time per cell [s]", ylabel="largest relative error of a cell [1]", ylim=(3e-17, 3))
-        axes.set_xlim(3e-7, 0.5)
-    return page
-
-
-def conclude(path: str, cells: int = 400, tolerances: Sequence[float] = TOLERANCES) -> Conclusion:
-    """Statements, tables and the figure."""
+def prepared(path, cells=400, tolerances=TOLERANCES):
+    """The two charts, and others beside the first."""
     study, drag = (sweep.study(Path(path).with_name(f"work_precision{end}.toml")) for end in ("", "_drag"))
     true, keys = cycles(study, cells), {"cells": cells, "tolerances": tolerances}
     coulomb = work_precision(study, truth=true, **keys)
     dragged = work_precision(drag, truth=cycles(drag, cells), **keys)
     coulomb, others = swept(study, coulomb), peers(study, true, cells, tolerances)
-    missing = [Statement(name, "", "not installed") for name in PEER_CELLS if name not in others]
-    groups = {
-        "Honesty": [*honesty("viscous and Coulomb", coulomb), *honesty("drag", dragged)],
-        "Cost, viscous and Coulomb": [*cheapest(whole(coulomb) | others), *missing],
-        "Cost, drag": cheapest(whole(dragged)),
-    }
-    tables = [f"{one.attrs['title']}\n{precision_text(one, complete=True)}\n" for one in (coulomb, dragged)]
-    return groups, [NOTES, "", *tables], lambda: figure(coulomb, others)
+    return coulomb, others, dragged
 
 
-main = script(__name__, "work_precision.toml", conclude)
+def tables(coulomb, _, dragged):
+    """The charts as tables."""
+    return [f"{one.attrs['title']}\n{precision_text(one, complete=True)}\n" for one in (coulomb, dragged)]
+
+
+def claims(coulomb, others, dragged) -> Claims:
+    """What theory says, and what comes out."""
+    yield "Honesty"
+    yield from honesty("viscous and Coulomb", coulomb)
+    yield from honesty("drag", dragged)
+
+    yield "Cost, viscous and Coulomb"
+    yield from cheapest(whole(coulomb) | others)
+    yield from (Statement(name, "", "not installed") for name in PEER_CELLS if name not in others)
+
+    yield "Cost, drag"
+    yield from cheapest(whole(dragged))
+
+
+@panels(100.0, width=150.0)
+def figure(axes, found, others, _):
+    """The largest error over the time of a cell: a line for each method and library, through its tolerances."""
+    rows = {str(name): found.sel({"method": name}) for name in found["method"].values}
+    for name, row in rows.items():  # what a tolerance does not change is one mark
+        if float(row.error_worst.max()) < 2 * float(row.error_worst.min()):
+            rows[name] = row.isel(rtol=[int(row.seconds.argmin("rtol"))])
+    for row in rows.values():
+        draw_precision(axes, row.expand_dims("method"), "error_worst")
+    for name, row in others.items():
+        axes.plot(row.seconds, row.worst, linewidth=0.8, markersize=4, label=name, **method_look(name))
+    for name, line in zip([*rows, *others], [x for x in axes.lines if x.get_label()[0] != "_"], strict=True):
+        top = int(np.nanargmax(line.get_ydata()))
+        right, up = PLACES.get(name, (1.0, 5.0))
+        x, y = right * line.get_xdata()[top], up * line.get_ydata()[top]
+        direct_label(axes, x, y, name, line.get_color())
+    text = "each mark a tolerance,\nfrom $10^{-3}$ (top) to $10^{-13}$"
+    axes.text(0.02, 0.97, text, va="top", fontsize=7, color="0.35", transform=axes.transAxes)
+    axes.set(xlabel="CPU time per cell [s]", ylabel="largest relative error of a cell [1]", ylim=(3e-17, 3))
+    axes.set_xlim(3e-7, 0.5)
+
+
+main = script(__name__, "work_precision.toml", claims, figure, prepared, tables)

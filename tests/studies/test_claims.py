@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 import xarray as xr
-from _common import Statement, report, summary, what_came_out
+from _common import Statement, summary, what_came_out
 
 import sweep
 from kernels.lanes.jit import COMPILED
@@ -205,8 +205,7 @@ class Told:
 
     def conclude(self):
         """All statements of the script, by heading; its notes; what draws its figure."""
-        groups, notes, draw = self.script.conclude(*self.paths, **self.options)
-        return {heading: list(lines) for heading, lines in groups.items()}, notes, draw
+        return self.script.main.conclude(*self.paths, **self.options)
 
     @cached_property
     def conclusion(self):
@@ -243,7 +242,7 @@ def told(request, tmp_path_factory):
 
 def test_the_script_draws_its_figure_and_every_statement_holds(told, capsys):
     arguments = [*told.paths, "--all"]
-    assert report(told.script.__file__, told.paths, arguments, lambda *_: told.conclusion) == 0
+    assert told.script.main.report(arguments, lambda: told.conclusion) == 0
     assert re.search(r"\| (yes|no, known)$", printed := capsys.readouterr().out, re.MULTILINE)
     picture = Path(told.paths[0]).with_suffix(".png")
     assert printed.rstrip().endswith(f"figure: {picture}")
@@ -331,7 +330,7 @@ def test_a_script_counts_what_holds_and_tells_in_full_what_does_not():
     assert "period" not in words
 
 
-SCRIPTS = sorted(p.stem for p in STUDIES.glob("[!_]*.py") if "def conclude(" in p.read_text(encoding="utf-8"))
+SCRIPTS = sorted(p.stem for p in STUDIES.glob("[!_]*.py") if "main = script(" in p.read_text(encoding="utf-8"))
 
 
 def test_every_script_that_concludes_is_in_the_table():
@@ -350,7 +349,14 @@ def other(tmp_path_factory):
 def test_a_script_is_used_as_its_head_and_its_study_say(name, other, tmp_path, capsys):
     module = import_module(name)
     assert module.main([]) == 2
-    words = capsys.readouterr().err.removeprefix("use: python ").removesuffix(" [--all] [--force]\n").split()[1:]
+    use, *runs = capsys.readouterr().err.splitlines()
+    words = use.removeprefix("use: python ").removesuffix(" [--all] [--force]").split()[1:]
+    for run, word in zip(runs, [word for word in words if word.endswith(".h5")], strict=True):
+        file = re.fullmatch(r"sweep run studies/(\w+)\.toml( --allow-import)?", run)
+        assert word.removesuffix(".h5").removesuffix("_fine") == file[1]
+        assert bool(file[2]) == (
+            ":" in tomllib.loads((STUDIES / f"{file[1]}.toml").read_text(encoding="utf-8"))["kernel"]
+        )
     for text in (module.__doc__, (STUDIES / f"{name}.toml").read_text(encoding="utf-8").replace("#", "")):
         used = re.search(rf"python studies/{name}\.py((?:\s+[\w./\\]+\.(?:h5|toml)|\s+\\\n)+)", text)
         assert [Path(word).name for word in used[1].replace("\\", "").split()] == words
