@@ -2,9 +2,9 @@
 
     python studies/anchor.py anchor.h5
 
-The verge's law with a pendulum's restoring force. Theory, by averaging (Airy): phi = A sin wt; the
-torque, a square wave that lags by d = asin(phi0/A), gives 4 mu phi0 a cycle, which friction pi w0 w A^2/Q takes; its
-part against the displacement, (4 mu/pi) cos d, adds to gravity's. So, with P0 = 2 pi/w0 and s = -dlnP/dlnmu,
+The verge's law with a pendulum's restoring force. Theory, by averaging (Airy): phi = A sin wt; the torque, a square
+wave that lags by d = asin(phi0/A), gives 4 mu phi0 a cycle, which friction pi w0 w A^2/Q takes; its part against the
+displacement, (4 mu/pi) cos d, adds to gravity's. So, with P0 = 2 pi/w0 and s = -dlnP/dlnmu,
     A^2 = 4 mu phi0 Q/(pi w0^2),                                                                       (1)
     P/P0 = 1 + A^2/16 + 11 A^4/3072 - e,     e = 2 mu cos(d)/(pi w0^2 A) = (A^2 - phi0^2)^(1/2)/(2 phi0 Q),   (2)
     s = e/(2 cos(d)^2) - A^2/16 - 11 A^4/1536.                                                         (3)

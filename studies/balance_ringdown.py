@@ -5,8 +5,8 @@
 For light damping theory is one function: with x = pi zeta theta0/(2 r), what viscous friction takes from the first
 half swing over what solid friction takes, N = ln(1 + x)/(pi zeta). The kernel counts half swings of pi/omega_d each,
 as the page has it, and cannot say otherwise; the time of a half swing and the motion are therefore measured by DOP853
-on the page's (3). What is said of the period is so of the free balance alone: driven, it loses (study
-`balance_isochronism`).
+on the page's (3). What is said of the period is so of the free balance alone: driven, it loses
+(study `balance_isochronism`).
 
 theory: the balance rests at the first turning point within r of the spring's zero; x = pi zeta theta0/(2 r)
 deviation: relative. Counts are whole, so they hold to one half swing, and to the next term of theory, 0.5 zeta^2 and

@@ -2,8 +2,8 @@
 
     python studies/chatter_lobes.py chatter_lobes.h5
 
-A tooth cuts what the tooth before it left, a time tau ago, so the cut's torque at the spindle is -K (theta(t) -
-theta(t - tau)), and with the spindle's receptance H
+A tooth cuts what the tooth before it left, a time tau ago, so the cut's torque at the spindle is -K
+(theta(t) - theta(t - tau)), and with the spindle's receptance H
 
     1 + K (1 - exp(-i w tau)) H(w) = 0                                                                  (1)
 
@@ -150,7 +150,7 @@ def claims(ds) -> Claims:
 
 @panels(140.0, 2)
 def figure(usual, error, ds):
-    """The lobes at usual tooth frequencies, and by how much the reductions move the border; for a column of print."""
+    """The lobes at usual tooth frequencies, and by how much the reductions move the border."""
     moved_by = 100 * (ds.border / ds.border.sel(n_keep=8) - 1)
     for axes, lines, chains in ((usual, ds.border, (8, 5, 4)), (error, moved_by, (7, 6, 5, 4))):
         for n in chains:

@@ -2,8 +2,8 @@
 
     python studies/foliot_scaling.py foliot_scaling.h5
 
-Compares what Hoyng & Nieuwenhuizen ("the paper", arXiv:1604.06681) say with what comes out here. Only alpha = mu/(a^2
-phi0) counts: a P and A = phi_max/phi0 are functions of it alone.
+Compares what Hoyng & Nieuwenhuizen ("the paper", arXiv:1604.06681) say with what comes out here. Only
+alpha = mu/(a^2 phi0) counts: a P and A = phi_max/phi0 are functions of it alone.
 
 (...) is exact, and not in the paper
 *: masked in the text at hand; here as it follows from the paper's equations
@@ -132,7 +132,7 @@ def claims(ds, half) -> Claims:
         yield compared(f"  {name}", read, here, true, 1e-12, 14)
 
     yield "At every drive"
-    # Weaker ones take steps in proportion to 1/alpha.
+    # a weak drive is followed from rest in SI units; weaker ones take steps in proportion to 1/alpha
     weak = ds.isel(mu=int(np.argmin(abs(np.log(ds.alpha.values / 1e-3)))))
     rest = solved("foliot_scene:KERNEL", mu=[float(weak.mu)], a=ds.a, phi0=ds.phi0, flips=4, rtol=1e-10)
     friction, mu = float(ds.a) * np.exp(np.linspace(-0.02, 0.02, 9)), half.alpha * ds.a**2 * ds.phi0

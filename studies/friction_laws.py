@@ -2,8 +2,8 @@
 
     python studies/friction_laws.py friction_laws.h5 friction_laws_map.h5
 
-s = -dlnP/dlnmu. Friction c |v|^n alone leaves one group, alpha_n = mu^(2/n-1) c^(-2/n)/phi0, so that dlnP/dlnc = (2s -
-1)/(2 - n), and
+s = -dlnP/dlnmu. Friction c |v|^n alone leaves one group, alpha_n = mu^(2/n-1) c^(-2/n)/phi0, so that
+dlnP/dlnc = (2s - 1)/(2 - n), and
     slow swings, which friction holds at its terminal speed:  s = 1/n,      at small mu for n < 2, at large for n > 2;
     free swings, which friction hardly slows:                 s = n/(n+2),  the other way round.             (1)
 With a v + R at strong drive, x = v0/mu obeys R x^2 + (2/3) a mu x^3 = 2 phi0, P = 4 x. For R >> a^2 phi0, R/mu << 1:
@@ -44,7 +44,8 @@ def prepared(laws, grid):
 def claims(laws, grid, line) -> Claims:
     """What theory says, and what comes out."""
     yield "Far out"
-    # Allowed is the distance of s from its limit at the inner end: alpha_n, or 2n/(n+2) powers of (n+2)/alpha_n.
+    # over three decades at each end; allowed: how far s is from its limit at their inner end, alpha_n, or
+    # 2n/(n+2) powers of (n+2)/alpha_n
     for n in laws.n.values[laws.n.values > 0]:
         free = "-1/2" if n == 2 else f"-{n:g}/{n + 2:g}"
         limits = ((1 / n, f"-1/{n:g}"), (n / (n + 2), free))[:: 1 if n <= 2 else -1]
@@ -80,7 +81,7 @@ def claims(laws, grid, line) -> Claims:
         yield differing(what, f"(2s-1)/(2-n) = {theory:.6f}", here.slope, theory, 1e-6)
 
     yield "Viscous and Coulomb friction"
-    # And the power laws of the valley at large R.
+    # R at which s leaves 1/3 upwards and downwards alike, and the power laws of the valley at large R
     first, below = grid.R[grid.R > 0.8].min(), grid.R.where((grid.sensitivity < 1 / 3 - 1e-9).any("mu")).min()
     s = solved("foliot", mu=1e8, R=np.linspace(0.7, 0.9, 9), a=1, phi0=1).sensitivity
     threshold = sweep.where_exponent(s, "R", 1 / 3, values=True).abscissa

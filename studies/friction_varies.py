@@ -2,8 +2,8 @@
 
     python studies/friction_varies.py friction_varies.h5 friction_varies_noise.h5
 
-The paper supposes that only the averages of torque and friction over a period count. Theory, derived here, with s =
--dlnP/dlnmu and dlnP/dlna = 2s - 1:
+The paper supposes that only the averages of torque and friction over a period count. Theory, derived here, with
+s = -dlnP/dlnmu and dlnP/dlna = 2s - 1:
 
 weak drive: the way takes its mean over the angle, the turn the friction at the switch,
     P/2 = (2/alpha + 2 a/a(phi0))/a;                                                      (1)
@@ -156,7 +156,7 @@ def claims(means, ds, scatter) -> Claims:
 
 @panels(130.0, 2)
 def figure(mean, year, means, *_):
-    """What averages of friction over the swing are worth, and the rate over a year; for a column of print."""
+    """What averages of friction over the swing are worth, and the rate over a year."""
     first = means.sel(harmonic=1)
     mean.semilogx(first.mu, first.effect, "o", color="black", label="true")
     for k, name in enumerate(("angle", "time", "energy")):

@@ -2,9 +2,8 @@
 
     python studies/fula_milling_machine.py fula_milling_machine.h5
 
-Rebuilds tables 2 to 6 of Baran & Marchelek (1971), and says of every printed number
-whether it is reproduced, rounded, carried from a slip or misprinted, and of each of its four conclusions whether it
-holds. Conclusions:
+Rebuilds tables 2 to 6 of Baran & Marchelek (1971), and says of every printed number whether it is reproduced, rounded,
+carried from a slip or misprinted, and of each of its four conclusions whether it holds. Conclusions:
 
 - Rivin's five masses hold the first four frequencies to 0.2 % and put the fifth 17.5 % low; the source prints that.
 - "387.6" in the row of five masses is the seventh frequency of the EIGHT: five masses have no sixth.
@@ -141,7 +140,7 @@ def claims(ds) -> Claims:
 
 @panels(128.0, 2, sharex=True)
 def figure(amplitude, error, ds):
-    """Receptance of eight and of five masses, and the error of five with its cause; for a column of print."""
+    """Receptance of eight and of five masses, and the error of five with its cause."""
     f = np.concatenate([np.linspace(0.2, 60, 600), np.linspace(60, 500, 1400)])
     for n, colour, line in ((8, COLOURS[0], "-"), (5, COLOURS[1], "--")):
         size = abs(response(chain(ds, n), f)) * KGF * 1e3

@@ -2,8 +2,8 @@
 
     python studies/impact_map.py impact_map.h5 impact_map_lever.h5
 
-Two bodies of masses M and m at the pallet, kappa = M/m,
-under the force F = m g kappa, with one impact per half period T:
+Two bodies of masses M and m at the pallet, kappa = M/m, under the force F = m g kappa, with one impact per half period
+T:
     T^2 = p(1 + e)/(g(1 - e)(1 + kappa)),  swing Y = kappa g T^2/4,  recoil if kappa < 2e/(1 - e),
 where no tooth is met in between; stable for kappa > 1. The models of Lepschy and Roup are of this kind.
 

@@ -2,10 +2,10 @@
 
     python studies/law_any_swing.py law_any_swing.h5
 
-Let friction of degree n (0 dry, 1 viscous, n drag)
-take the share lambda_n of the energy of half a swing, impacts the share lambda_e; N = sum of n lambda_n, and A is the
-amplitude over phi0. At large swings s = L = (N + lambda_e)/(N + 2). At small ones the foliot goes at its final speed,
-or starts from rest after an impact, and s = 1/M, M = N + 2 lambda_e. Between them, with x = k (A^2 - 1),
+Let friction of degree n (0 dry, 1 viscous, n drag) take the share lambda_n of the energy of half a swing, impacts the
+share lambda_e; N = sum of n lambda_n, and A is the amplitude over phi0. At large swings
+s = L = (N + lambda_e)/(N + 2). At small ones the foliot goes at its final speed, or starts from rest after an impact,
+and s = 1/M, M = N + 2 lambda_e. Between them, with x = k (A^2 - 1),
     s = (1 + L x)/(M + x),   1/k = sum of lambda_n/k_n + lambda_e/5,   k_n = 2 (2n + 1)(3n + 2)/(n + 2)^2.       (1)
 k_n makes (1) right to the order A^-2 for one friction, from the series of its integrals in v^n; impacts enter M and k
 as friction of degree 2, k_2 = 5. Exact: dry friction alone at any swing, 1/(A^2 - 1) as k_0 = 1, friction of degree 2

@@ -134,7 +134,7 @@ def claims(ds) -> Claims:
 
 @panels(156.0, 2, height_ratios=(1.5, 1))
 def figure(plane, best_of, ds):
-    """Distortion over motor and coupler, with the border of lock-up; the best coupler; for a column of print."""
+    """Distortion over motor and coupler, with the border of lock-up; the best coupler."""
     b, f = (np.arange(float(x[0]), float(x[-1]) + 1e-9, FINE) for x in (ds.b, ds.f))
     for k, d in enumerate(ds.d.values):
         arm = machines_on(b, float(d), f)

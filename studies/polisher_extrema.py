@@ -97,7 +97,7 @@ def claims(ds) -> Claims:
 
 @panels(136.0, 2)
 def figure(motion, size, ds):
-    """alpha over a turn with the path of its extremes; A0 and A1 over their first order; for a column of print."""
+    """alpha over a turn with the path of its extremes; A0 and A1 over their first order."""
     machine = {name: float(ds[name]) for name in "bdf"} | {"omega": 1.0, "b_angle": B_ANGLE}
     along = {"crank_angle": np.linspace(B_ANGLE - math.pi, B_ANGLE + math.pi, 721)}
     alpha = solved("polisher_motion", e=SHOWN, along=along, outputs=["alpha"], **machine).alpha

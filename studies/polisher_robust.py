@@ -2,9 +2,9 @@
 
     python studies/polisher_robust.py polisher_robust.h5
 
-Let h_i(r) be the profile of setting i over its own mean, t_i >= 0
-its share of the wear, of sum 1, and each time of dwell off by a factor 1 + delta z_i, z_i independent of variance 1.
-To the order of delta^2 the square of the unevenness to be expected is
+Let h_i(r) be the profile of setting i over its own mean, t_i >= 0 its share of the wear, of sum 1, and each time of
+dwell off by a factor 1 + delta z_i, z_i independent of variance 1. To the order of delta^2 the square of the
+unevenness to be expected is
     U^2 = |sum of t_i h_i - 1|^2 + delta^2 sum of t_i^2 |h_i - 1|^2,                                                 (1)
 |f|^2 the mean of f^2 over the area: what is left with exact times, and what errors add. Both are squares that are
 linear in t, so the t >= 0 that make U least are found by non-negative least squares at once. The best set of k settings
@@ -64,7 +64,7 @@ def claims(p, sets) -> Claims:
 
 @panels(124.0, 2)
 def figure(number, errors, p, sets):
-    """Unevenness by the number of settings and by the errors of dwell; for a column of print."""
+    """Unevenness by the number of settings and by the errors of dwell."""
     everything, delta = range(len(p.rows)), np.linspace(0.0, 0.15, 31)
     exact = [100 * p.nominal(s, p.times(s)) for s in sets.values()]
     number.plot(list(sets), [100 * p.best(s) for s in sets.values()], "o-", color=COLOURS[0], label="expected")

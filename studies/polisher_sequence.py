@@ -75,7 +75,7 @@ def claims(ds, p, shares) -> Claims:
 
 @panels(128.0, 2)
 def figure(profile, share, ds, p, shares):
-    """The best profiles of one setting, and of the sequence, whose shares are mapped; for a column of print."""
+    """The best profiles of one setting, and of the sequence, whose shares are mapped."""
     bored, best = best_settings(ds)
     shown = {"one setting": bored.profile, "one, without a hole": best.profile, "sequence": shares @ p.rows}
     for colour, (name, row) in zip(COLOURS, shown.items(), strict=False):

@@ -2,13 +2,13 @@
 
     python studies/polisher_spin.py polisher_spin.h5
 
-A disc at the arm's end c turns at the rate k Omega, Omega that of
-the work about w; rigid on the arm it turns as the arm does. A point of the work at w + r n moves under it with
+A disc at the arm's end c turns at the rate k Omega, Omega that of the work about w; rigid on the arm it turns as the
+arm does. A point of the work at w + r n moves under it with
     v = J ((alpha' - k Omega) c + k Omega w + (k - 1) Omega r n),                                             (1)
 J a right angle, so a tool that turns as the work, k = 1, has one speed everywhere. Under an even pressure friction
 then has no moment about its centre, so a free tool turns so while it lies wholly on the work. Times of dwell, their
-errors and the unevenness to be expected are those of `polisher_robust`.
-Where it hangs over the rim a free tool turns otherwise, which is left out here, as is friction of its bearing.
+errors and the unevenness to be expected are those of `polisher_robust`. Where it hangs over the rim a free tool turns
+otherwise, which is left out here, as is friction of its bearing.
 
 unevenness: standard deviation over the area, over the mean; expected: with errors of 5 % of the times of dwell.
 Allowed: 0.5 % of the largest wear from 2 mm on, 720 crank angles; 0.5 % of unevenness; 0.2 % of the wear in all; 3 %
@@ -125,7 +125,7 @@ def claims(ds, tools, sets) -> Claims:
 
 @panels(124.0, 2)
 def figure(number, spin, ds, tools, sets):
-    """Unevenness over the number of settings and over the spin; for a column of print."""
+    """Unevenness over the number of settings and over the spin."""
     for colour, dash, (name, p) in zip(COLOURS, DASHES, tools.items(), strict=False):
         few, look = sets[name], {"linestyle": dash, "markersize": 3, "color": colour, "label": name}
         number.plot(list(few), [100 * p.best(s) for s in few.values()], "o", **look)

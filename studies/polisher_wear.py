@@ -117,7 +117,7 @@ def claims(ds, load) -> Claims:
 
 @panels(136.0, 2)
 def figure(profile, plane, ds, load):
-    """Profiles of the disc, and how uneven they are over offset and eccentricity; for a column of print."""
+    """Profiles of the disc, and how uneven they are over offset and eccentricity."""
     disc = tool(ds, "disc")
     for place, colour in zip(PROFILES, COLOURS, strict=False):
         pressed = disc.wear.sel(e=USUAL, method="nearest").sel(w_x=place, method="nearest")

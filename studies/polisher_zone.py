@@ -77,7 +77,7 @@ def claims(ds) -> Claims:
 
 @panels(128.0, 2)
 def figure(zone, tool, ds):
-    """Zones by beta, filled where the centre wears, and the tool's wear; for a column of print."""
+    """Zones by beta, filled where the centre wears, and the tool's wear."""
     for k, e in enumerate(ds.e.values):
         line, look = ds.sel(e=e), {"color": COLOURS[k], "label": f"{100 * e:.0f}"}
         beta, place, worn = np.degrees(line.beta), 100 * line.zone, line.wear.isel(radius=0) > 0

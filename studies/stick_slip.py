@@ -122,7 +122,7 @@ def claims(ds, unslid, found) -> Claims:
 
 @panels(130.0, 2)
 def figure(error, cost, ds, unslid, found):
-    """The error over the belt's speed, of a method that slides and of those that do not; costs; for a column."""
+    """The error over the belt's speed, of a method that slides and of those that do not; costs."""
     slides = ds.sel({"method": "taylor"})
     shown = {"taylor, slides": slides.off.where(slides.status < FIRST_REFUSAL), "fixed step": unslid["fixed step"]}
     looks, heights = (method_look("taylor")["color"], method_look("dopri5")["color"]), (1e-9, 3e-4)

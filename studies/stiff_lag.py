@@ -106,7 +106,7 @@ def claims(lag, found, bounce) -> Claims:
 
 @panels(130.0, 2)
 def figure(share, cost, lag, found, *_):
-    """How many drives each method solves over the lag; what a digit costs; for a column of print."""
+    """How many drives each method solves over the lag; what a digit costs."""
     for method in map(str, lag["method"].values):
         given = lag.status.sel({"method": method}) < FIRST_REFUSAL
         share.plot(lag.eps, 100 * given.mean("mu"), markersize=3.5, label=method, **method_look(method))

@@ -3,8 +3,8 @@
     python studies/torque_ripple.py torque_ripple.h5
 
 The torque is mu (1 + depth f), f = cos(h pi s), s the way along the drive over 2 phi0 (0 at the last switch, 1 at the
-next, below 0 on the recoil), h the harmonic; it does the same work at any depth. alpha = mu/(a^2 phi0), A =
-phi_max/phi0 and q = a P/4 as in Hoyng & Nieuwenhuizen.
+next, below 0 on the recoil), h the harmonic; it does the same work at any depth. alpha = mu/(a^2 phi0),
+A = phi_max/phi0 and q = a P/4 as in Hoyng & Nieuwenhuizen.
 
 Theory, to first order in the depth. With a = 1 the force -f(t) along the swing without ripple shifts its speed by
 -int exp(t' - t) f dt'; speed and angle at the next switch close the cycle if, T = 2q being the half period,

@@ -108,7 +108,7 @@ def claims(ds, wheel) -> Claims:
     yield said(again, back < 0.38, f"at most {back:.3f}", "< .38")
 
     yield "A clock with a light wheel"
-    # Its wheel is light (kappa = .01), its dry friction I_v a^2 phi0, its recoil a quarter of a pitch.
+    # the wheel is light (kappa = .01), its dry friction I_v a^2 phi0, its recoil a quarter of a pitch.
     line = ds.isel(R_v=1).sel(I_c=2.5e-5, method="nearest")
     clock = line.isel(tau=int(abs(line.pitches - 0.25).argmin("tau")))
     text = ", ".join(f"{name} {clock[name]:.0%}" for name in LOSSES)

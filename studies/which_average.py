@@ -2,8 +2,8 @@
 
     python studies/which_average.py which_average.h5
 
-m = ln(mu/mu0) and x = ln(a/a0) change over the season or from swing to swing; P = F(alpha)/a, alpha = mu/(a^2 phi0), s
-= -dlnP/dlnmu, s' = ds/dln alpha. Derived here:
+m = ln(mu/mu0) and x = ln(a/a0) change over the season or from swing to swing; P = F(alpha)/a, alpha = mu/(a^2 phi0),
+s = -dlnP/dlnmu, s' = ds/dln alpha. Derived here:
 
 seasons: ln<P0/P> = s <m> + (1 - 2s) <x> + s' var(m - 2x)/2 + var(s m + (1 - 2s) x)/2 + ...,             (1)
     so of the friction the power mean of the exponent p = 1 - 2s + 4s'/(1 - 2s) counts, of the torque p = s + s'/s;  (2)

@@ -3,10 +3,10 @@
     python studies/work_precision.py studies/work_precision.toml
 
 Sweeps ten thousand foliots with viscous and Coulomb friction by every method at every tolerance, on one core, follows
-some of the same foliots by heyoka.py, diffrax and scipy (the extra `peers`). The time is
-that of the whole `sweep.run`, over its cells. Errors are the largest among 400 of the cells, against 20 digits where
-mpmath is installed, else against the best method. A table for drag is printed beside it. Timings are noisy and for
-information only; errors and counts are checked.
+some of the same foliots by heyoka.py, diffrax and scipy (the extra `peers`). The time is that of the whole
+`sweep.run`, over its cells. Errors are the largest among 400 of the cells, against 20 digits where mpmath is
+installed, else against the best method. A table for drag is printed beside it. Timings are noisy and for information
+only; errors and counts are checked.
 
 error: the largest of period, amplitude and speed at the switch, relative
 The other libraries are given how many half swings it takes until nothing is left of a start 10 % from the cycle;
