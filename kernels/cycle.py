@@ -17,7 +17,7 @@ from kernels.codegen.cycle_values import Described
 from kernels.codegen.limit_cycle import FOUND, RESTS, Cells, Search
 from kernels.codegen.return_map import ReturnMap
 from kernels.interface import Field, Kernel, Status
-from kernels.scene import Function, Scene, SceneError, SceneParts, estimating_kernel, scene_of
+from kernels.scene import Function, Scene, SceneError, SceneParts, estimating_kernel, flips_field, scene_of
 
 __all__ = ["cycle_kernel"]
 
@@ -30,12 +30,9 @@ SHARES, WIDEST = (1e-4, 3e-6), 0.01
 """Of rtol, the tolerance of the runs, whose differences are divided by thousandths; and where that is not enough. The
 widest one, of that of what is wanted roughly: a small cycle is told from rest by how well it closes."""
 MOST = 1000.0
-SEARCH = (
-    Field("flips", "1", "switches a cycle", default=2.0, lower=1.0, upper=MOST, integer=True),
-    Field("settle", "1", "cycles followed before Newton's method; 0: the start is a guess", default=4.0, lower=0.0,
-          upper=MOST, integer=True),
-)  # fmt: skip
-"""The last parameters of every cycle."""
+SETTLE = Field(
+    "settle", "1", "cycles followed before Newton's method; 0: the start is a guess", 4.0, 0.0, MOST, integer=True
+)
 
 
 def cycle_kernel(
@@ -60,13 +57,13 @@ def cycle_kernel(
     Returns
     -------
     Kernel
-        With two further parameters: `flips`, the switches a cycle, an even number where the scene hangs on its side,
-        and `settle`, the cycles that are followed before Newton's method begins. Its outputs: `period`; each state just
-        before the switch that ends a cycle; `NAME_size`, the largest size of each state in the cycle; `NAME_turns` of
-        what turns; `multiplier`, that of largest modulus, by which small disturbances are multiplied each cycle; where
-        there are several, `multipliers_real` and `multipliers_imaginary` along `floquet_mode`, the largest first, of
-        a complex pair both with the size of their imaginary part; `period_by_NAME`, d ln(period)/d ln(parameter), of
-        each parameter that is no whole number.
+        With two further parameters: `flips`, the switches or periods of the drive a cycle, 1, but where the scene hangs
+        on its side 2 or another even number, and `settle`, the cycles that are followed before Newton's method begins.
+        Its outputs: `period`; each state just before the switch that ends a cycle; `NAME_size`, the largest size of
+        each state in the cycle; `NAME_turns` of what turns; `multiplier`, that of largest modulus, by which small
+        disturbances are multiplied each cycle; where there are several, `multipliers_real` and `multipliers_imaginary`
+        along `floquet_mode`, the largest first, of a complex pair both with the size of their imaginary part;
+        `period_by_NAME`, d ln(period)/d ln(parameter), of each parameter that is no whole number.
 
     Raises
     ------
@@ -78,7 +75,9 @@ def cycle_kernel(
     scene, parameters = scene_of(parts), tuple(parts["parameters"])
     maps = {method: ReturnMap(scene, method, drive) for method in METHODS}
     turning = _turning(scene, turns or {}, maps["taylor"].held)
-    fields = (*parameters, *_begun(scene, parameters, branch), *SEARCH)
+    doc = "switches, or periods of the drive, a cycle"
+    flips = replace(flips_field(2.0 if maps["taylor"].sides else 1.0, MOST), doc=doc)
+    fields = (*parameters, *_begun(scene, parameters, branch), flips, SETTLE)
     outputs, modes = _outputs(parts, [scene.states[j] for j in turning], len(maps["taylor"].directions))
 
     def solved(method: str, columns: Any, rtol: Any, ranks: Any, asked: set[str]) -> Any:
@@ -92,7 +91,7 @@ def cycle_kernel(
         there = np.isin(search.status, FOUND)
         found, error = Described(search, swept, ranks.astype(int) - 1, asked).to(rtol, tight)
         error = np.where(search.status == Status.COMES_TO_REST, RESTS, np.where(there, error, 0.0))
-        return [found.get(f.name, np.full(len(rtol), math.nan)) for f in outputs], error, search.status
+        return [found.get(f.name) for f in outputs], error, search.status
 
     def check(*columns: Any) -> None:
         columns[-1][columns[-3] % 2.0 != 0.0] = Status.BAD_INPUT  # half a turn of the side is no cycle

@@ -279,7 +279,7 @@ def estimating_kernel(
     along : one coordinate, whose values have to rise, or none
     docs : {method: a line about it}
     solved : (method, columns of parameters, rtol, values along, names of outputs that are asked for) -> values of each
-        output, (n_cells,) or (n_values, n_cells); error; status
+        output, (n_cells,) or (n_values, n_cells), or None where there are none; error; status
     check : as in `declared`
     """
     count, names = len(parameters), [f.name for f in outputs]
@@ -290,14 +290,16 @@ def estimating_kernel(
             *found, error, status = columns[count + 2 + len(along) :]
             if not len(status):
                 return
-            if any(not (len(points) and (np.diff(points) > 0.0).all()) for points in values):
-                status[:], error[:] = Status.BAD_INPUT, math.nan
-                return
             wanted = {output for output, one in zip(names, asked, strict=True) if one}
+            used = {dim for field in outputs if field.name in wanted for dim in field.dims}
+            for field, points in zip(along, values, strict=True):
+                if (field.name in used and not len(points)) or not (np.diff(points) > 0.0).all():
+                    status[:], error[:] = Status.BAD_INPUT, math.nan
+                    return
             with compiling(parts["name"], name), np.errstate(all="ignore"):
                 rows, error[:], status[:] = solved(name, columns[:count], rtol, *(values or [np.empty(0)]), wanted)
             for column, row in zip(found, rows, strict=True):
-                column[:] = np.where(status >= FIRST_REFUSAL, np.nan, row).T
+                column[:] = math.nan if row is None else np.where(status >= FIRST_REFUSAL, math.nan, row).T
 
         columns = [*(f.name for f in parameters), "rtol", *(f.name for f in along), "asked", *names, "error", "status"]
         return Method(name, docs[name], signed(solve, columns), estimates=True)

@@ -18,7 +18,7 @@ from kernels.codegen.compiled import runner, running, written_of
 from kernels.codegen.followed import followed
 from kernels.codegen.record import named_functions, record
 from kernels.codegen.to_tolerance import solver
-from kernels.expression.graph import INPUT, NUMBER, Expression, SceneError, needed
+from kernels.expression.graph import ADD, INPUT, NUMBER, Expression, SceneError, needed
 from kernels.integrate.records import Mode
 from kernels.interface import Status
 from kernels.lanes.columns import DONE, fresh, to_the_end
@@ -67,7 +67,7 @@ class ReturnMap:
             raise SceneError(f"{scene.name}: `side` cannot occur here; take a state of rate 0 that switches set")
         if not (self.sides or self.driven or any(named_functions(scene.switch).get(name) for name in (first, ""))):
             raise SceneError(f"{scene.name}: the motion passes through the surface, but not through one as side * x")
-        self.held = [] if self.driven else [watched(scene)]
+        self.held = [] if self.driven else [watched(scene)[-1]]
         """The state that is put onto the surface."""
         self.directions = [j for j in range(n) if j not in self.held]
         """Of the states, those that the map depends on."""
@@ -137,11 +137,18 @@ class ReturnMap:
 
 
 def watched(scene):
-    """The number of the state that the first surface watches. Raises SceneError where that is not one alone."""
-    u = record(scene).events[0][2]
+    """offset, factor, and the number of the state u: the first surface is offset + factor u.
+
+    Raises SceneError where it watches more than one state.
+    """
+    offset, factor, u = record(scene).events[0]
+    while u.kind == ADD and not all(term.varies for term in u.args):
+        constant, term = sorted(u.args, key=lambda term: term.varies)
+        by, u = u.graph.parts(term)
+        offset, factor = offset + factor * constant, factor * by
     if u.kind != INPUT:
         raise SceneError(f"surface of the scene {scene.name}: of a cycle it has to be a state, but for constants")
-    return scene.states.index(u.args[0])
+    return offset, factor, scene.states.index(u.args[0])
 
 
 @functools.cache
@@ -157,9 +164,8 @@ def returning(scene, drive):
         before = {name: given[place] for name, place in zip(states, places, strict=True)}
         values = {**given, "side": -1.0, ".way": 1.0}
         if drive is None:
-            offset, factor, _ = record(scene).events[0]
-            graph = given[FRESH].graph
-            before[states[watched(scene)]] = -graph.again(offset, values) / graph.again(factor, values)
+            (offset, factor, number), graph = watched(scene), given[FRESH].graph
+            before[states[number]] = -graph.again(offset, values) / graph.again(factor, values)
         behind = before.values() if drive or jump is None else asked(jump, values | before)
         graph, begun = given[FRESH].graph, asked(scene.start, given)
         return tuple(graph.chosen(given[FRESH], graph.of(x), graph.of(y)) for x, y in zip(begun, behind, strict=True))

@@ -65,19 +65,20 @@ WALLS = cycle_kernel(
         Field("kick", "m/s", "speed that the left wall adds", default=1.0),
         Field("e", "1", "restitution", default=0.5),
         Field("length", "m", "between the walls", default=2.0),
+        Field("left", "m", "place of the left wall", default=0.0),
     ),
     rates=lambda v, mode: (where(mode > 2.5, 3.0, where(mode > 1.5, 2.0, 1.0)) * v, 0.0, 0.0),
     surface={
-        "left": lambda x: x,
-        "right": lambda x, length: length - x,
-        "middle": lambda x, length: x - 0.5 * length,
+        "left": lambda x, left: 2.0 * (x - left),
+        "right": lambda x, left, length: left + length - x,
+        "middle": lambda x, left, length: x - left - 0.5 * length,
     },
     switch={
         "left": lambda x, v, kick, e: (x, kick - e * v, 1.0),
         "right": lambda x, v, e: (x, -e * v, 2.0),
         "middle": lambda x, v: (x, v, 3.0),
     },
-    start=lambda length: (0.25 * length, 1.0, 1.0),
+    start=lambda left, length: (left + 0.25 * length, 1.0, 1.0),
 )
 POPULATION = cycle_kernel(
     name="population",

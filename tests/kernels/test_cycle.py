@@ -81,6 +81,7 @@ def test_a_cycle_that_doubles_its_period_is_told_by_its_multiplier():
     [
         ({"zeta": 0.1}, Status.COMES_TO_REST), ({"zeta": 0.0}, Status.NO_CYCLE),
         ({"zeta": -0.1, "kick": -1.0, "v0": 3.6}, Status.UNSTABLE), ({"zeta": 0.0, "kick": 1.0}, Status.NOT_CONVERGED),
+        ({"zeta": 0.05, "gain": 1.5}, Status.NOT_CONVERGED),  # it grows, about an equilibrium of the rates
     ],
 )  # fmt: skip
 def test_what_has_no_stable_cycle_says_so(cell, status):

@@ -39,6 +39,19 @@ def test_a_driven_oscillator_has_the_cycle_and_both_multipliers_of_the_closed_fo
     assert (second["multipliers_real"][:, 0] == found["multipliers_real"][:, 1]).all()
 
 
+def test_cells_of_several_multipliers_where_none_has_a_cycle_or_none_is_asked_for():
+    """At resonance without losses; and a study of the period alone, which gives no numbers of multipliers."""
+    resonant = {"zeta": 0.0, "omega": [1.3, 1.3, 1.3], "w": 1.3}
+    found, status = solve(FORCED, "taylor", along=RANKS, **resonant)
+    assert (status == Status.NOT_CONVERGED).all()
+    assert np.isnan(found["multipliers_real"]).all()
+    assert found["multipliers_real"].shape == (3, 2)
+    found, status = solve(FORCED, "taylor", along=[np.empty(0)], zeta=[0.05, 0.3, 2.0], asked=("period",))
+    assert (status == Status.OK).all()
+    assert abs(found["period"] * 1.3 / (2.0 * np.pi) - 1.0).max() < 1e-12
+    assert solve(FORCED, "taylor", along=[np.empty(0)], zeta=[0.05])[1][0] == Status.BAD_INPUT
+
+
 def test_a_cycle_without_losses_is_one_though_its_multipliers_have_modulus_1():
     omega, w = np.array([1.0, 3.0]), 1.3
     found, status = solve(
@@ -95,9 +108,10 @@ def test_what_winds_round_an_equilibrium_rests_there():
 
 
 def test_a_mode_of_three_values_and_three_surfaces():
-    kick, e, length = np.array([1.0, 2.0]), np.array([0.5, 0.8]), 2.0
-    found, status = solve(WALLS, "taylor", along=RANKS, kick=kick, e=e, length=length, flips=1.0)
+    kick, e, length, left = np.array([1.0, 2.0]), np.array([0.5, 0.8]), 2.0, np.array([0.0, -0.7])
+    found, status = solve(WALLS, "taylor", along=RANKS, kick=kick, e=e, length=length, left=left, flips=1.0)
     assert (status == Status.OK).all()
+    assert abs(found["x"] - left).max() < 1e-12
     slow = e * kick / (1.0 - e * e)
     assert abs(found["period"] / (length / (kick + e * slow) + length / slow * (1 / 4 + 1 / 6)) - 1.0).max() < 1e-9
     assert abs(found["v"] + slow).max() < 1e-9
