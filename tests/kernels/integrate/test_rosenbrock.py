@@ -1,5 +1,6 @@
 """Rodas5P of stiff scenes: against closed forms to 50 digits, where explicit methods give up."""
 
+from fractions import Fraction
 from functools import cache
 
 import numpy as np
@@ -14,6 +15,7 @@ import sweep
 from kernels.codegen.compiled import runner
 from kernels.integrate import rosenbrock
 from kernels.integrate.records import Mode
+from kernels.integrate.tableaux import RODAS5P, RODAS5P_COUPLED, RODAS5P_GAMMA
 from kernels.interface import Status
 from kernels.lanes.jit import COMPILED
 from kernels.scene import Scene, sin
@@ -107,3 +109,21 @@ def test_the_error_of_a_step_is_of_order_six_and_the_estimate_of_order_five():
     assert (abs(slopes - 6.0) < 0.5).all()
     estimates = np.diff(np.log2([trial.error for trial in found])) / -1.0
     assert (abs(estimates - 5.0) < 0.7).all()
+
+
+def test_the_weights_as_rounded_make_a_step_as_long_as_it_is():
+    """One step of x' = v, v' = 1 from 0 with h = 1, in exact numbers; by published digits v is 27 roundings off."""
+    gamma, rounding = Fraction(RODAS5P_GAMMA), 2.0**-52
+    increments, places = [], [(), *RODAS5P]
+    for stage, coupled in enumerate([(), *RODAS5P_COUPLED]):
+        if stage < len(places):
+            speed = sum(Fraction(a) * w[1] for a, w in zip(places[stage], increments, strict=True))
+        else:
+            speed += increments[-1][1]
+        x, v = (sum(Fraction(c) * w[j] for c, w in zip(coupled, increments, strict=True)) for j in (0, 1))
+        v = gamma * (1 + v)
+        increments.append((gamma * (speed + x + v), v))
+    weights = [*RODAS5P[-1], 1, 1, 1]
+    x, v = (sum(Fraction(a) * w[j] for a, w in zip(weights, increments, strict=True)) for j in (0, 1))
+    assert abs(v - 1) < rounding
+    assert abs(2 * x - 1) < rounding
