@@ -64,7 +64,7 @@ def slid(recorded, states):
     share = down / (1.0 - over - rise)
     off = sum((w * u for w, u in zip(slides, kinks, strict=True)), graph.of(0.0)) / (1.0 - over - rise)
     at = [graph.series(s) for s in states]
-    stays = [free[kinks.index(s)] if s in set(kinks) else graph.of(1.0) for s in at]
+    stays = [free[graph.kinks[s]] if s in graph.kinks else graph.of(1.0) for s in at]
     rates = tuple(k * (f + share * jump) for k, f, jump in zip(stays, below, jumps, strict=True))
     products = [w * (down + rise) * down for w in slides]
     events = [(graph.of(0.0), graph.of(1.0), _sign(graph, j) * u - products[j]) for j, u in enumerate(kinks)]

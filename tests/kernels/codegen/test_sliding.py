@@ -8,6 +8,7 @@ from sliding_scene import SLIDING
 
 from kernels.interface import Status
 from kernels.lanes.jit import COMPILED
+from kernels.scene import Field, maximum, scene_kernel, sign
 
 METHODS = ["taylor", "dop853", "dopri5", "rodas5p"] if COMPILED else ["dop853"]
 MANY = 24
@@ -196,3 +197,19 @@ def test_taylor_hands_what_slides_to_dop853_and_what_that_cannot_end_to_rodas5p(
 def test_stick_and_slip_that_never_comes_to_its_surface_meets_the_limit(method):
     cell = {"press": 1.0, "belt": 0.2, "speed0": 0.2, "drag": -0.1, "stiffness": 1.0, "mid": 9.0, "wall": [-1e9]}
     assert solve(SLIDING, method, **cell, flips=1.0)[1][0] == Status.STEP_LIMIT
+
+
+def test_a_body_that_dry_friction_holds_rests_there_whatever_other_kinks_its_rates_have():
+    """From x = 1 it swings about 0.75 to 0.5, which the spring cannot move; a stop beyond x = 9 is never met."""
+    kernel = scene_kernel(
+        name="held",
+        doc="a body on a spring, held by dry friction",
+        states=(Field("clock", "s", "time"), Field("x", "m", "place"), Field("v", "m/s", "speed")),
+        parameters=(Field("f", "1", "friction"),),
+        rates=lambda x, v, f: (1.0, v, -x - maximum(x - 9.0, 0.0) - f * sign(v)),
+        surface=lambda clock: 5.0 - clock,
+        start=lambda: (0.0, 1.0, 0.0),
+    )
+    outputs, status = solve(kernel, "dop853", f=np.array([0.75]), flips=1.0, rtol=1e-9)
+    assert status[0] == Status.OK
+    np.testing.assert_allclose([outputs["x"][0], outputs["v"][0]], [0.5, 0.0], atol=1e-9)
