@@ -10,9 +10,10 @@ displacement, (4 mu/pi) cos d, adds to gravity's. So, with P0 = 2 pi/w0 and s = 
     s = e/(2 cos(d)^2) - A^2/16 - 11 A^4/1536.                                                         (3)
 A stronger drive hastens by recoil and retards by the wider swing; both balance near A^2 = phi0^2 + (4/(phi0 Q))^2.
 
-s = -dlnP/dlnmu; e is the escapement's error (2); theory is of first order in the torque; the next order is of the
-size of e A^2 and e^2, and deviations may be e (A^2/4 + 2 e). A verge and foliot has s = 1/3 under strong drive against
-friction, 1/2 where a switch takes all its speed, more under weak drive (study foliot_scaling).
+Here s = -dlnP/dlnmu, and e is the error (2) of the escapement. The theory is of first order in the torque. The next
+order has the size of e A^2 and e^2, so that deviations up to e (A^2/4 + 2 e) are allowed. A verge and foliot has s =
+1/3 under strong drive against friction, 1/2 where a switch takes all its speed, and more under weak drive (study
+foliot_scaling).
 """
 
 import numpy as np

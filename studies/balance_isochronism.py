@@ -13,9 +13,10 @@ phase by -(at + r) w/(a^2 v), light losses lose
 which falls with the amplitude for any other `at`. What is out of poise adds dP/P = -poise cos(hang) J1(a)/a, without
 the sign of `at` or the drive in it, and vanishes where J1 does, at a = 3.832 rad, 220 degree.
 
-loss: how much slower than 2 pi/omega_d, in s a day; deviation: relative, of losses the largest difference in s/day
-allowed: 1e-3 s/day where there is no loss; 2 % of (1) at amplitudes over 20 r and 20 abs(at), 1e-6 between the scene
-and the kernel `balance_driven`; 2 % of the least drive for what grids of m can tell; 0.005 rad of 3.8317
+The loss is how much slower than 2 pi/omega_d the balance goes, in s a day. Deviations are relative; of losses they are
+the largest difference in s/day. Allowed are 1e-3 s/day where there is no loss; 2 % of (1) at amplitudes over 20 r and
+20 abs(at); 1e-6 between the scene and the kernel `balance_driven`; 2 % of the least drive, for what grids of m can
+tell; and 0.005 rad of 3.8317.
 """
 
 import math

@@ -8,10 +8,11 @@ as the page has it, and cannot say otherwise; the time of a half swing and the m
 on the page's (3). What is said of the period is so of the free balance alone: driven, it loses
 (study `balance_isochronism`).
 
-theory: the balance rests at the first turning point within r of the spring's zero; x = pi zeta theta0/(2 r)
-deviation: relative. Counts are whole, so they hold to one half swing, and to the next term of theory, 0.5 zeta^2 and
-r/theta0 of themselves. Allowed: 1e-8 of what DOP853 gives at rtol 1e-12; 1e-3 of zeta^2/2
-the page: "vibration stops when A = theta +- r becomes smaller than r", A the amplitude about the shifted centre
+By theory the balance rests at the first turning point within r of the spring's zero; x = pi zeta theta0/(2 r).
+Deviations are relative. Counts are whole numbers, so they hold to one half swing, and to the next term of the theory,
+0.5 zeta^2 and r/theta0 of themselves. Allowed are 1e-8 of what DOP853 gives at rtol 1e-12, and 1e-3 of zeta^2/2. "The
+page" says "vibration stops when A = theta +- r becomes smaller than r", where A is the amplitude about the shifted
+centre.
 """
 
 import math

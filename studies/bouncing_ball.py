@@ -11,8 +11,8 @@ there. The map from bounce to bounce has the determinant e^4, and the trace that
 every second bounce begins to differ, at (push sin t) (1 + e)^2 = 2 (1 + e^2). Both together are the least push of even
 bounces, and the push at which they double; from there on the two differ as the square root of what goes beyond it.
 
-INACCURATE bounces lie on the attractor, and are not those of this very start; TOO_SHORT: the ball comes to rest on the
-table before
+INACCURATE bounces lie on the attractor, but are not those of this very start. TOO_SHORT says that the ball comes to
+rest on the table before the last bounce that is asked for.
 """
 
 import math

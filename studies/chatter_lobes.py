@@ -10,10 +10,10 @@ A tooth cuts what the tooth before it left, a time tau ago, so the cut's torque 
 is the border of stability. With Tobias and Tlusty: K = -1/(2 Re H), wherever Re H < 0, at the tooth frequencies
 1/tau = f/(k + eps), k = 0, 1, ..., eps = atan2(-Re H, Im H)/pi. A cut is stable below the lowest of these lobes.
 
-tooth frequency: teeth of the cutter times its turns a second; K in N m/rad; the border is the lowest of all lobes
-allowed: 1e-5 of the least K had to 50 digits, of which the grid
-of frequencies takes 1e-6; 1 % and 5 % of K where the reduction is said to hold it. Roots are counted 1 % below and
-above the border, by the turns of the left side of (1) about 0 (Nyquist): none below, two or more above
+The tooth frequency is the number of teeth of the cutter times its turns a second, K is in N m/rad, and the border is
+the lowest of all lobes. Allowed are 1e-5 of the least K had to 50 digits, of which the grid of frequencies takes 1e-6,
+and 1 % and 5 % of K where the reduction is said to hold it. Roots are counted 1 % below and above the border, by the
+turns of the left side of (1) about 0 (Nyquist): none below, two or more above.
 """
 
 import math

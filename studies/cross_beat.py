@@ -16,10 +16,10 @@ both is tau/(4 k) short of phi0, and P depends on phi0 as phi0^s:
 A case that turns with the acceleration w pushes the two against each other: -(I_l - I_r) w is left of the -I w that
 shakes one foliot, nothing if they are equal.                                                            (3)
 
-s = -dlnP/dlntau; deviation: relative, of exponents the difference
-allowed: 1 % of (2) where the wind-up is under 1e-3, and 0.01 of its power of k; 0.005 of s, of which (2) explains
-0.002; 1e-3 of other periods and slopes, whose gear of 1 N m/rad winds up by 7e-4; 1 % of (3), and 1e-3 of one foliot's
-scatter for equal ones, whose gear gives way a little
+Here s = -dlnP/dlntau. Deviations are relative; of exponents they are the difference. Allowed are 1 % of (2) where the
+wind-up is under 1e-3, and 0.01 of its power of k; 0.005 of s, of which (2) explains 0.002; 1e-3 of other periods and
+slopes, whose gear of 1 N m/rad winds up by 7e-4; 1 % of (3); and 1e-3 of one foliot's scatter for equal foliots, whose
+gear gives way a little.
 """
 
 import math

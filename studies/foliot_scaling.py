@@ -5,14 +5,15 @@
 Compares what Hoyng & Nieuwenhuizen ("the paper", arXiv:1604.06681) say with what comes out here. Only
 alpha = mu/(a^2 phi0) counts: a P and A = phi_max/phi0 are functions of it alone.
 
-(...) is exact, and not in the paper
-*: masked in the text at hand; here as it follows from the paper's equations
-deviation: relative; of exponents the difference. A limit holds if the next term of its series accounts for it; the
-point of -1/2 to 1e-12 of 50 digits; torques to 1e-3 of the rate they change
-±: the standard error of least squares. Nothing here is noisy, so it measures the curvature of the truth in the window,
-and is no bound on the distance to the limit
-why -1: inertia does not count, v = mu/a all the way, and P = 4 phi0/v; why -1/3: the work 2 mu phi0 of half a swing is
-lost over the way A ~ v^2/mu as a v A, so v^3 ~ mu^2 phi0/a, and P ~ v/mu = (phi0/(a mu))^(1/3)
+What stands in (...) is exact, and not in the paper; * marks what is masked in the text at hand, and follows here from
+the paper's equations. Deviations are relative; of exponents they are the difference. A limit holds if the next term of
+its series accounts for the deviation; the point of -1/2 holds to 1e-12 of 50 digits, torques to 1e-3 of the rate they
+change. After ± stands the standard error of least squares. Nothing here is noisy, so it measures the curvature of the
+truth in the window, and is no bound on the distance to the limit.
+
+The exponent is -1 where inertia does not count: v = mu/a all the way, and P = 4 phi0/v. It is -1/3 where the work
+2 mu phi0 of half a swing is lost over the way A ~ v^2/mu as a v A, so that v^3 ~ mu^2 phi0/a, and
+P ~ v/mu = (phi0/(a mu))^(1/3).
 """
 
 import math

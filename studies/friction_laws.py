@@ -10,9 +10,9 @@ With a v + R at strong drive, x = v0/mu obeys R x^2 + (2/3) a mu x^3 = 2 phi0, P
     s = (1/3) y/(1 + y) + (R/mu)^2,  y = (2 phi0/R)^(1/2) a mu/R, least at mu/R = (18 R/(a^2 phi0))^(1/6),   (2)
 there s = (3 a^2 phi0/(2 R))^(1/3). As mu grows without end, s - 1/3 goes as 4/45 - R/(9 a^2 phi0).  Derived here.
 
-mu, R in units of a^2 phi0; deviations of exponents are differences, others relative; a limit holds if
-the next term of its series accounts for the deviation
-paper: Hoyng & Nieuwenhuizen, arXiv:1604.06681, has n = 1 and says that strong drive is best: there s = 1/3
+mu and R are in units of a^2 phi0. Deviations of exponents are differences, others are relative. A limit holds if the
+next term of its series accounts for the deviation. The paper, Hoyng & Nieuwenhuizen, arXiv:1604.06681, has n = 1 and
+says that strong drive is best: there s = 1/3.
 """
 
 import numpy as np

@@ -15,10 +15,10 @@ A power mean of a, of exponent 1 - 2s, is the first term alone, and wrong, since
 noise from swing to swing: sigma of the torque scatters the rate as s sigma, of the friction as abs(2s - 1) sigma,
 both by sqrt(T/tau), and the two at once, of one noise, as (1 - s) sigma (`shared` = 0: as two of their own). (4)
 
-rates in s/day; deviation: relative, of rates the difference
-allowed: 1e-2 of (1), 5 % of (2), whose foliot swings but 5 phi0; 1 % of (3) to
-its fourth term; of (4) three standard errors of 64 seeds, and 2 %. The oil is three times as
-thick at 0 degree C as at 20, chosen here; the room swings by 8 K over the year and 2 K over the day, about 15 degree C
+Rates are in s/day. Deviations are relative; of rates they are the difference. Allowed are 1e-2 of (1); 5 % of (2),
+whose foliot swings only 5 phi0; 1 % of (3) to its fourth term; and of (4) three standard errors of 64 seeds, and 2 %.
+The oil is three times as thick at 0 degree C as at 20, which is chosen here. The temperature of the room swings by 8 K
+over the year and 2 K over the day, about 15 degree C.
 """
 
 import math

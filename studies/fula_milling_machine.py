@@ -11,10 +11,11 @@ carried from a slip or misprinted, and of each of its four conclusions whether i
   with mu = 1 - (w/w0)^2 kept, the error vanishes. What is neglected is the inertia of what was taken out.
 - At the same size Guyan is 8 times, IRS 50 times, Craig-Bampton 1400 times better at the fifth frequency.
 
-reproduced: within half a unit of the last digit printed; near: within 0.5 %, what three digits carried along explain;
-slip: within 3 % and not to be had from the source's own numbers (50.2, 9.55, 0.148 and what follows; h2 of Table 5,
-from e* = 0.98 squared); misprinted: farther. A number holds if it is what is expected of it; "no, known": the source
-is wrong there. J8 is 99.44 in Table 1 and 99.40 in all others. What the scan hides of tables 2 to 4 is left out.
+A number is "reproduced" within half a unit of the last digit printed; "near" within 0.5 %, which three digits carried
+along explain; a "slip" within 3 %, where it cannot be had from the source's own numbers (50.2, 9.55, 0.148 and what
+follows; h2 of Table 5, from e* = 0.98 squared); and "misprinted" farther off. A number holds if it is what is expected
+of it; "no, known" says that the source is wrong there. J8 is 99.44 in Table 1 and 99.40 in all others. What the scan
+hides of tables 2 to 4 is left out.
 """
 
 import math

@@ -11,9 +11,10 @@ against the displacement with first harmonic (4 mu/pi) cos(asin(phi0/A)), while 
     s = kappa^(-3/4) alpha^(-1/4) / (2 sqrt(pi)) / sqrt(1 - y).                                        (1)
 At given drive and friction (1) is least at y = 3/4; at given Q it is least at y = 1/2; y = 1 is the end. Derived here.
 
-s = -dlnP/dlnmu; theory is of first order in the torque, exact for alpha and kappa large; deviations are relative, of
-exponents the difference; a number holds if the next order in 1/alpha^(1/2) or 1/kappa, or interpolation, explains it
-paper: Hoyng & Nieuwenhuizen, arXiv:1604.06681, "if they had only mounted some kind of a spring on the foliot"
+Here s = -dlnP/dlnmu. The theory is of first order in the torque, and exact for large alpha and kappa. Deviations are
+relative; of exponents they are the difference. A number holds if the next order in 1/alpha^(1/2) or 1/kappa, or
+interpolation, explains its deviation. The paper, Hoyng & Nieuwenhuizen, arXiv:1604.06681, says "if they had only
+mounted some kind of a spring on the foliot".
 """
 
 import math

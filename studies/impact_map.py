@@ -7,8 +7,8 @@ T:
     T^2 = p(1 + e)/(g(1 - e)(1 + kappa)),  swing Y = kappa g T^2/4,  recoil if kappa < 2e/(1 - e),
 where no tooth is met in between; stable for kappa > 1. The models of Lepschy and Roup are of this kind.
 
-theory: kappa = M/m, the mass of the wheel over that of the foliot, both at the pallet; deviation: relative, in the
-worst cell; allowed 1e-9 of what is followed contact by contact
+In the theory kappa = M/m, the mass of the wheel over that of the foliot, both at the pallet. Deviations are relative,
+in the worst cell. Allowed is 1e-9 of what is followed contact by contact.
 """
 
 import math

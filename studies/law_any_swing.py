@@ -13,8 +13,9 @@ or impacts alone, 1/2, and both limits.
 Exact for every clock, since no other quantity has a time in it: with p_n = dlnP/dlnc_n for each friction c_n v^n,
     s = 1/2 + 1/2 sum of (2 - n) p_n.                                                                            (2)
 
-deviation: of s, as a share of it, or the difference where an exponent is beside a number. Allowed: of (1)
-what the line says, of (2) the error of differences. Clocks: 1280 drawn over a, R, c and n, with e = 1, .99, .9, .5, 0
+The deviation of s is a share of it, or the difference where an exponent stands beside a number. Allowed is of (1) what
+the line says, and of (2) the error of differences. The clocks are 1280, drawn over a, R, c and n, with e = 1, .99, .9,
+.5, 0.
 """
 
 import itertools

@@ -13,9 +13,9 @@ take little there. From rest after each impact, e = 0, with dry friction alone t
 mu/v^n, and dlnv = (1 - s) dlnmu: with (1) this says how many decades of torque an exponent takes to turn into another.
 (3)
 
-s = -dlnP/dlnmu; deviation: the difference of exponents, others relative. Shares by quadrature of the losses over the
-speed. Allowed: 1e-6 of the energy; 0.001 of (1) at swings over 100 phi0, 0.011 of (2) at swings under 1.0003 phi0, 1e-8
-from rest
+Here s = -dlnP/dlnmu. Deviations of exponents are differences, others are relative. The shares are quadratures of the
+losses over the speed. Allowed are 1e-6 of the energy, 0.001 of (1) at swings over 100 phi0, 0.011 of (2) at swings
+under 1.0003 phi0, and 1e-8 from rest.
 """
 
 import math

@@ -14,9 +14,10 @@ mu = R (18 R/(a^2 phi0))^(1/6), and
 
     s = 3 (18 R/(a^2 phi0))^(-1/3).                                                                      (2)
 
-s = -dlnP/dlnmu; deviation: of exponents the difference; (1) is solved for every third friction R and fourth drag c
-allowed: 0.01 of s and two steps of 12 % of the torque where the foliot swings 5 phi0 beyond the switch; 8 % of (2), a
-limit; 0.06 of its power -1/3; 2 %, the tolerance of the refinement, between its cells
+Here s = -dlnP/dlnmu. Deviations of exponents are differences. Equation (1) is solved for every third friction R and
+every fourth drag c. Allowed are 0.01 of s and two steps of 12 % of the torque where the foliot swings 5 phi0 beyond the
+switch; 8 % of (2), which is a limit; 0.06 of its power -1/3; and 2 %, the tolerance of the refinement, between its
+cells.
 """
 
 import math

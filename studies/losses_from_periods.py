@@ -10,9 +10,9 @@ alone, L = (N + lambda_e)/(N + 2) at large swings, drag of degree 2 and impacts 
 dry friction, half of these nearly that of viscous friction, so a period tells dry friction from the rest, and the
 amplitude, v^2/(2 mu), has to tell these apart.
 
-noise of 1 % of each period and amplitude; errors are standard errors of shares, forecast by the sensitivity matrix. An
-interval of 95 % misses where the best fit with the true share is more than 3.84 worse than the best of all; counted for
-a thousand clocks by benchmarks/honesty/losses_coverage.py
+The noise is 1 % of each period and amplitude. Errors are standard errors of shares, predicted by the sensitivity
+matrix. An interval of 95 % misses the truth where the best fit with the true share is more than 3.84 worse than the
+best of all; benchmarks/honesty/losses_coverage.py counts this for a thousand clocks.
 """
 
 from typing import Any

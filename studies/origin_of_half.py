@@ -12,12 +12,12 @@ exponent: viscous from -1 to -1/3, Coulomb of fixed strength to 0. Derived here;
 needs (i) to (iii) is not claimed. The kernel solves such a foliot in units of its torque, so it can say nothing else:
 the exponents and prefactors of these mixtures are measured on `foliot_scene`, followed from rest in SI units.
 
-s = -dlnP/dlnmu; deviations of exponents are differences, others relative. Allowed: 1e-8 of what was followed in SI
-units at rtol 1e-10; 0.01 of an exponent at the ends of the grid, 0.02 where impacts or drag act beside friction
-proportional Coulomb friction changes with the drive: its exponent is that of differences of ln P, s being at fixed R
-Roup et al., Int. J. Control 76, 1685 (2003), and Denny, Eur. J. Phys. 23, 449 (2002), as Hoyng & Nieuwenhuizen,
-arXiv:1604.06681, report them: both mu^(-1/2); Roup et al. have motion without friction between inelastic impacts,
-which meets (i) to (iii). What Denny's model loses is not said there
+Here s = -dlnP/dlnmu. Deviations of exponents are differences, others are relative. Allowed are 1e-8 of what was
+followed in SI units at rtol 1e-10, 0.01 of an exponent at the ends of the grid, and 0.02 where impacts or drag act
+beside friction. Proportional Coulomb friction changes with the drive: its exponent is that of differences of ln P, and
+s is at fixed R. Roup et al., Int. J. Control 76, 1685 (2003), and Denny, Eur. J. Phys. 23, 449 (2002), as Hoyng &
+Nieuwenhuizen, arXiv:1604.06681, report them, have mu^(-1/2). Roup et al. have motion without friction between inelastic
+impacts, which meets (i) to (iii). What Denny's model loses is not said there.
 """
 
 import itertools

@@ -7,10 +7,10 @@ amplitude exists where A1 passes it before the crank locks; at the border eta_mi
 that sin^2 A1 = e f/(b d) with e = d+f-b, b+f-d or b+d-f. For the figure the crank is the root of an equation of second
 degree in e^2, so that no grid of cranks is seen in it.
 
-distortion: root of the sum of squares of the harmonics from the second on, over the first; best: least over f
-allowed: 1e-3 of a distortion interpolated between cranks; the shares are of the grid;
-the paper's machine holds if it runs well, each of the others if it has less distortion than the one before
-transmission angle: least angle of coupler and arm over the turn; below 40 degree a linkage is held to run badly
+The distortion is the root of the sum of squares of the harmonics from the second on, over the first; the best is the
+least over f. Allowed is 1e-3 of a distortion interpolated between cranks; the shares are those of the grid. The paper's
+machine holds if it runs well, and each of the others if it has less distortion than the one before. The transmission
+angle is the least angle of coupler and arm over the turn; below 40 degree a linkage is held to run badly.
 """
 
 import math

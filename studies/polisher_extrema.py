@@ -5,10 +5,11 @@
 The figure is what the paper's figures 4, 6 and 7 show. b = (49, -38) cm has the length and makes the range of angles
 of the paper's figure 4, which does not give it.
 
-paper: Cordero-Davila et al., Opticheskii Zhurnal 78(3):55 (2011); where "-" stands it says nothing, and the formula is
-named in the line. Allowed: 1e-12 of a formula, 1.5 degree for "does not move"; "no, known" is a statement of the
-source that its own equations refute: degrees of the crank count from b, and with the paper's equations for type A
-(upper signs) the minimum of alpha moves, and later. Its figure 4 is the same arm with alpha counted clockwise.
+The paper is Cordero-Davila et al., Opticheskii Zhurnal 78(3):55 (2011); where "-" stands it says nothing, and the
+formula is named in the line. Allowed are 1e-12 of a formula, and 1.5 degree for "does not move". "No, known" marks a
+statement of the source that its own equations refute: degrees of the crank count from b, and with the paper's equations
+for type A (upper signs) the minimum of alpha moves, and later. Its figure 4 shows the same arm with alpha counted
+clockwise.
 """
 
 import math

@@ -9,6 +9,9 @@ unevenness to be expected is
 |f|^2 the mean of f^2 over the area: what is left with exact times, and what errors add. Both are squares that are
 linear in t, so the t >= 0 that make U least are found by non-negative least squares at once. The best set of k settings
 is that of all pairs and threes, and of more it is looked for by exchanging one setting at a time, from 25 starts.
+
+The unevenness is the standard deviation over the area, over the mean; the expected one is the root of its mean square.
+Allowed are 3 % of (1) for 4000 draws of the errors, and 1e-6 of the conditions of an optimum.
 """
 
 import numpy as np
@@ -18,11 +21,6 @@ from _polishing import DWELL, KEPT, WANTED, fewest, of_sets, profiles, reached
 
 FEWEST = [4, 5, 7, 9]
 """Settings for 2, 1.5, 1.2 and 1 %; of three and four all sets were tried, for more there may be better ones."""
-
-NOTES = """\
-unevenness: standard deviation over the area, over the mean; expected: root of its mean square. Allowed: 3 % of (1) for
-4000 draws of the errors, 1e-6 of the conditions of an optimum
-"""
 
 
 def prepared(ds):

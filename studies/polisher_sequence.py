@@ -5,8 +5,8 @@
 Wear adds up, so the time t_i >= 0 spent at setting i of the sweep wears the sum of t_i h_i(r); the most even sum of
 given mean is a least-squares problem over the area with t >= 0.
 
-unevenness: standard deviation over the area, over the mean; allowed: 1e-6 of the conditions of an optimum, 1e-9 m of a
-length found by roots, 2 % of A0's slopes over 1 mm of throw
+The unevenness is the standard deviation over the area, over the mean. Allowed are 1e-6 of the conditions of an optimum,
+1e-9 m of a length found as a root, and 2 % of A0's slopes over 1 mm of throw.
 """
 
 import math

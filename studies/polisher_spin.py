@@ -10,9 +10,10 @@ then has no moment about its centre, so a free tool turns so while it lies wholl
 errors and the unevenness to be expected are those of `polisher_robust`. Where it hangs over the rim a free tool turns
 otherwise, which is left out here, as is friction of its bearing.
 
-unevenness: standard deviation over the area, over the mean; expected: with errors of 5 % of the times of dwell.
-Allowed: 0.5 % of the largest wear from 2 mm on, 720 crank angles; 0.5 % of unevenness; 0.2 % of the wear in all; 3 %
-of 4000 draws. Sets of up to three settings are the best of all; more are what exchanging finds from 25 starts
+The unevenness is the standard deviation over the area, over the mean; the expected one has errors of 5 % of the times
+of dwell. Allowed are 0.5 % of the largest wear from 2 mm on, with 720 crank angles; 0.5 % of unevenness; 0.2 % of the
+wear in all; and 3 % of 4000 draws. Sets of up to three settings are the best of all; larger ones are what exchanging
+finds from 25 starts.
 """
 
 from typing import Any

@@ -6,9 +6,10 @@ The unevenness of a profile is the standard deviation of the wear over the area 
 even. It weighs by area, so it hardly sees a middle that the tool never reaches: the least wear of the inner half of
 the radius over the mean is told beside it, and below a half of the mean the workpiece is said to have a hole.
 
-uneven: standard deviation over the area over the mean; a hole: least wear of the inner half below half the mean.
-Optimised: over throw and offset, not on the grid. Offset: how much farther from the pivot the workpiece's centre lies
-than the tool's; place of tool and workpiece, rates, pressure and Preston's coefficient are chosen here
+The unevenness is the standard deviation over the area, over the mean. There is a hole where the least wear of the inner
+half is below half the mean. The optimum is over throw and offset, not on the grid. The offset is how much farther from
+the pivot the workpiece's centre lies than the tool's. The places of tool and workpiece, the rates, the pressure and
+Preston's coefficient are chosen here.
 """
 
 import numpy as np

@@ -13,9 +13,9 @@ mean speed, and all that the tool loses the work loses too,
 
     integral of the wear over the tool = 2 pi integral of the wear over r dr.                            (2)
 
-zone: mean radius of what is worn off, by volume; outer, inner: the tool's rim farthest from and nearest to the pivot
-allowed: no exception to (1), beside which no cell lies; 2e-3 of (2), what trapezoids of 2.5 mm in the radius leave;
-2e-3 degree of the middle, found on 720 crank angles
+The zone is at the mean radius of what is worn off, by volume; outer and inner are the points of the tool's rim farthest
+from and nearest to the pivot. Allowed are no exception to (1), beside which no cell lies; 2e-3 of (2), which trapezoids
+of 2.5 mm in the radius leave; and 2e-3 degree of the middle, found on 720 crank angles.
 """
 
 import math

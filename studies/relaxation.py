@@ -2,8 +2,9 @@
 
     python studies/relaxation.py relaxation.h5
 
-Weak friction leaves a sine of amplitude 2; strong friction makes x creep and jump, with a period that grows as the
-friction. Both limits and what comes next to them are known.
+Weak friction leaves a sine of amplitude 2 and period T = 2 pi (1 + mu^2/16), with the largest x = 2 + mu^2/96 and the
+multiplier exp(-2 pi mu). Strong friction makes x creep and jump, with a period T = (3 - 2 ln 2) mu + 7.0143 mu^-1/3
+(Dorodnicyn 1947).
 """
 
 import math
@@ -18,10 +19,6 @@ NEXT = 7.0143
 """What comes next, times mu^-1/3: 3 times the first zero of Ai, 2.33811."""
 AT_ONE = 6.663286859323130
 """Period at mu = 1, by a Taylor series of order 24 at 25 digits."""
-
-NOTES = """\
-Weak: T = 2 pi (1 + mu^2/16), largest x 2 + mu^2/96, multiplier exp(-2 pi mu).
-Strong (Dorodnicyn 1947): T = (3 - 2 ln 2) mu + 7.0143 mu^-1/3."""
 
 
 def claims(ds) -> Claims:

@@ -9,7 +9,8 @@ viscous friction comes to the switch if the energy is enough,
 
 viscous friction takes more, at most so much that the foliot must be able to rest at the switch, mu > R + k phi0.
 
-theory is sharp, and no cell is on its border: exceptions are counted; the share of cells is right to one step of mu
+The theory is sharp, and no cell is on its border, so that exceptions are counted. The share of cells is accurate to one
+step of mu.
 """
 
 import numpy as np

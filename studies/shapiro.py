@@ -10,7 +10,7 @@ drive the phase follows the alternating current and turns slowly besides, by
 J_n being Bessel's function: it is locked where abs(detuning) < abs(J_n(ac)), and a disturbance decays in a period of
 the drive by exp(-2 pi/w sqrt(J_n^2 - detuning^2)). Without the drive (ac = 0, n = 0) both are exact.
 
-decay: ln(multiplier) w/2 pi, squared; by (1) it is J_n^2 - detuning^2
+The decay is (ln(multiplier) w/2 pi)^2, which by (1) is J_n^2 - detuning^2.
 """
 
 import numpy as np

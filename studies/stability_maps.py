@@ -9,9 +9,9 @@ eigenvalues times h, R(z) the result of one step of x' = z x. Of semi-implicit E
 matrix. The others are of a foliot's first flips from rest: a step h against its drive, against dry friction close to
 sticking, and against a hairspring that it hardly overcomes; truth is the kernel foliot_start.
 
-theory: the largest eigenvalue of one step of the linear oscillator; stated: what a method gives as its error
-truth: kernel foliot_start. A value is wrong in silence if it is off by more than ten times the larger of 1e-9
-and what is stated
+The theory is the largest eigenvalue of one step of the linear oscillator; "stated" is the error that a method gives.
+The truth is the kernel foliot_start. A value is silently wrong if it is off by more than ten times the larger of 1e-9
+and the stated error.
 """
 
 from typing import Any

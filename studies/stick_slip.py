@@ -7,9 +7,10 @@ and is caught again. Truth is the closed form of both phases. The sweep follows 
 which know nothing of the kink, follow two cycles, and so does our dopri5 at a fixed step that locates no kink. Last,
 the cost of a digit. Timings are noisy and for information only.
 
-error: of the time of the last count, relative to the closed form; of others by where they are at the true time
-Others get the sign as it is and 5 000 calls of the rates a cell; absolute tolerance is a thousandth of the relative
-one. They, and the fixed step of 0.01, follow two cycles. Times are of one core, CPU seconds
+The error is that of the time of the last count, relative to the closed form; for other programs it is that of where
+they are at the true time. These get the sign as it is and 5 000 calls of the rates a cell; their absolute tolerance is
+a thousandth of the relative one. They, and the fixed step of 0.01, follow two cycles. Times are CPU seconds of one
+core.
 """
 
 from functools import partial

@@ -7,9 +7,9 @@ first swing. The second is of a ball whose bounces accumulate: counted to 20 and
 time is sqrt(2 h/g) (1 + e)/(1 - e) without drag. Last, the cost of a digit beside scipy's Radau and BDF, and diffrax's
 Kvaerno5 where it is installed (the extra `peers`). Timings are noisy and for information only.
 
-error: of the time of the switch, or of rest, relative to the closed form. Times are of one core, CPU seconds
-Others start from rest as ours do, with the exact Jacobian (scipy) and an event that ends the run; absolute tolerance
-is a thousandth of the relative one. diffrax does all cells side by side; compiling is not counted
+The error is that of the time of the switch, or of rest, relative to the closed form. Times are CPU seconds of one core.
+Other programs start from rest too, with the exact Jacobian (scipy) and an event that ends the run; their absolute
+tolerance is a thousandth of the relative one. diffrax does all cells side by side; its compilation is not counted.
 """
 
 from functools import partial

@@ -9,9 +9,9 @@ torque^(-1) at weak and torque^(-1/3) at strong drive. The kernels solve the imp
 they say of -1/2 cannot be otherwise: the exponents printed are those of the scenes `verge_scene` and `foliot_scene`,
 followed from rest in SI units.
 
-theory: P ~ torque^(-s); deviation: relative, of exponents and spreads the difference. Allowed: 1e-8 for what was
-followed in SI at rtol 1e-10, 1e-12 for multipliers, 0.01 for the ends of the viscous grid, the drop for what it leaves
-out. Without drop two plastic bodies are one that keeps the share (m - M)/(m + M)
+By theory P ~ torque^(-s). Deviations are relative; of exponents and spreads they are the difference. Allowed are 1e-8
+for what was followed in SI at rtol 1e-10, 1e-12 for multipliers, 0.01 for the ends of the viscous grid, and the drop
+for what it leaves out. Without the drop two plastic bodies are one that keeps the share (m - M)/(m + M).
 """
 
 import math

@@ -18,7 +18,8 @@ m that begins with the speed u, and derivatives as indices, on the cycle,
     loss/sigma^2 = (T_mm/2 + T_mu c + T_uu V/2 + T_u (U_mm/2 + U_mu c + U_uu V/2)/(1 - U_u))/T.        (2)
 Derived here.
 
-+-: what a number may be off by, three standard errors of these seeds and days for a scatter, four for a loss
+After +- stands what a number may be off by: three standard errors of these seeds and days for a scatter, four for a
+loss.
 """
 
 import math

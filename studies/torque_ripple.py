@@ -17,8 +17,8 @@ follows the torque, and P/P0 is the mean of 1/(1 + depth f): 1/sqrt(1 - depth^2)
 h inertia alone shifts the period, in the layers behind the switches: K = -(5/24) alpha (h pi alpha)^2.
 Derived here.
 
-deviation: relative, or over 1 where the coefficient is smaller; of powers the difference; allowed: what the next order
-in the depth, in 1/h or in alpha explains
+Deviations are relative, or divided by 1 where the coefficient is smaller; of powers they are the difference. Allowed is
+what the next order in the depth, in 1/h or in alpha explains.
 """
 
 import math

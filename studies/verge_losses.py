@@ -11,9 +11,10 @@ switch follows from the balance of energy, friction of degree n taking abs(v)^(n
 
 n = 1 for viscous and 0 for dry friction: 1/3, 1/2 and 0 where one of them takes all. At weak drive s = 1/(1 + alpha).
 
-s: differences of ln P over ln torque, 8 points a decade; deviation: of exponents and shares the difference
-allowed: 1e-8 of the energy; 0.01 of an exponent at the ends of the grid, 0.015 of (1); 0.2 of the exponent -3; 0.02
-where friction moves to the wheel and s < 1/2; near the torque that just drives the clock the drop decides
+The exponent s is a difference of ln P over ln torque, with 8 points a decade. Deviations of exponents and shares are
+differences. Allowed are 1e-8 of the energy; 0.01 of an exponent at the ends of the grid, 0.015 of (1); 0.2 of the
+exponent -3; and 0.02 where friction moves to the wheel and s < 1/2. Near the torque that just drives the clock the drop
+decides.
 """
 
 import math

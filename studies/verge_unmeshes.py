@@ -16,9 +16,9 @@ mesh. Theory, derived here for no drop and e = 0:
 3. Bounces of a light wheel last about e kappa/(1 - e) of a half period. Where they die out in contact they take what
    a plastic impact takes at once: e does not matter.
 
-s: differences of ln P over ln torque, 8 points a decade, between cells that run; deviation: of exponents the difference
-allowed: 1e-3 of the borders, found in steps of 6e-4; 0.01 of exponents and 10 % of the recoil at the strongest drive,
-as theory leaves out the drop, which is 5 % of n phi0
+The exponent s is a difference of ln P over ln torque, with 8 points a decade, between cells that run. Deviations of
+exponents are differences. Allowed are 1e-3 of the borders, found in steps of 6e-4, and 0.01 of exponents and 10 % of
+the recoil at the strongest drive, as the theory leaves out the drop, which is 5 % of n phi0.
 """
 
 import math

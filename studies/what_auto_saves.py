@@ -6,10 +6,10 @@ Measures `auto` and every method on the same cells, at rtol from 1e-3 to 1e-13, 
 method at an rtol is the fastest of those that give the most cells; errors are against the best reference among the
 methods. Timings are noisy and for information only; what is right is checked.
 
-saved: time of the best single method over that of auto, on the same cells; "gives" is the share of cells that come out
-and are not said to be inaccurate. Below 1 auto is the slower one: it asks the bounds of every cell, and pays for cells
-that the single method leaves unsolved. Where auto takes the reference itself its error is 0 by that alone: what auto
-calls right is judged against 50 digits by benchmarks/honesty/auto_honesty.py
+What is saved is the time of the best single method over that of auto, on the same cells; "gives" is the share of cells
+that have a value and are not INACCURATE. Below 1 auto is the slower one: it asks for the bounds of every cell, and pays
+for cells that the single method leaves unsolved. Where auto takes the reference itself its error is 0 for that reason
+alone; benchmarks/honesty/auto_honesty.py compares what auto calls OK with 50 digits.
 """
 
 from pathlib import Path

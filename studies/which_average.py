@@ -15,8 +15,9 @@ With lambda = a v/mu at the switch and h = lambda^2/(1 + lambda), all times 1/(2
     r = 2/alpha + lambda + (1/lambda - 1)(2/alpha + h),
     r_a = 2/alpha + 2 lambda - (4/alpha + lambda + (1/lambda - 1)(4/alpha + h)).                               (4)
 
-deviation: relative, of exponents p the difference. Allowed: 0.01 of p, measured with a season of 2 %; 5 % of (1) for
-seasons of 10 % and 5 %, the next order; of (3) 5 %, three standard errors of 2000 seeds, the same in every line
+Deviations are relative; of exponents p they are the difference. Allowed are 0.01 of p, measured with a season of 2 %; 5
+% of (1) for seasons of 10 % and 5 %, the next order; and of (3) 5 %, three standard errors of 2000 seeds, which are the
+same in every line.
 """
 
 import math

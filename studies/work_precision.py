@@ -8,9 +8,9 @@ some of the same foliots by heyoka.py, diffrax and scipy (the extra `peers`). Th
 installed, else against the best method. A table for drag is printed beside it. Timings are noisy and for information
 only; errors and counts are checked.
 
-error: the largest of period, amplitude and speed at the switch, relative
-The other libraries are given how many half swings it takes until nothing is left of a start 10 % from the cycle;
-diffrax follows all clocks side by side, each for as many half swings as the slowest
+The error is the largest relative one of period, amplitude and speed at the switch. The other libraries are told how
+many half swings it takes until nothing is left of a start 10 % from the cycle; diffrax follows all clocks side by side,
+each for as many half swings as the slowest.
 """
 
 import sys
