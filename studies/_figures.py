@@ -7,12 +7,11 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from matplotlib.colors import ListedColormap as ListedColormap
 
 import sweep
 
 try:
-    from sweep.show import charts
+    from sweep.show import charts  # first: it says what to install where matplotlib is missing
     from sweep.show.charts import COLOURS as COLOURS
     from sweep.show.charts import DASHES as DASHES
     from sweep.show.charts import MARKS as MARKS
@@ -20,9 +19,9 @@ try:
     from sweep.show.charts import Patch as Patch
     from sweep.show.charts import draw_precision as draw_precision
     from sweep.show.charts import method_look as method_look
-except sweep.SweepError as error:  # no matplotlib
+except sweep.SweepError as error:
     sys.exit(str(error))
-
+from matplotlib.colors import ListedColormap as ListedColormap
 
 NARROW = 110.0
 """Width in mm of panels one above the other, which can be read at the width of a phone too."""

@@ -30,7 +30,8 @@ CLOCK_OFF = 8.0
 """Roundings that a clock is off by from one event to the next in a shaken run: what is near an event in time hangs on
 the time that has gone by since then, of which what is left of a clock's rounding is much more than of the clock."""
 REMEMBERED = 4.0
-"""Times in which a state changes by all of its size that count of the way to an event, for what roundings lengthen."""
+"""The way to an event, which roundings lengthen, counts for at most so many times the shortest time in which a state
+changes by all of its size: what is fast has forgotten the rest of the way."""
 GOLDEN = 0.6180339887498949
 """What the share of the roundings that an event is missed by goes on by from one event to the next, so that no two of
 some events one behind the other are missed alike: what is between them would not show it."""
@@ -223,7 +224,7 @@ def arrived(m, cell, found, late, active, tells):
         verdict = where(active & sliding & (found.lost | found.broken), STICKS, verdict)
     moving = active & (cell.verdict < REFUSED) & (verdict < REFUSED) & not_(found.grazing)
     state, mode = choose(moving, found.state, cell.state), mode_of(cell)
-    # for how long rounding may keep open what fires, or lengthens the way to it, of which what is fast forgets the most
+    # for how long rounding may keep open what fires, or by how much it lengthens the way to it
     longest, rates, size = found.t * cell.unit, m.rates(state, mode), reached(cell.size, found.reach)
     for extent, rate in zip(size, rates, strict=True):
         memory = REMEMBERED * extent / magnitude(rate)

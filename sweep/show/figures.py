@@ -131,7 +131,7 @@ def _draw_lines(axes: Any, shown: View) -> None:
     for code, mark, colour in zip(shown.codes(), cycle(MARKS), cycle(FLAGGED), strict=False):
         look = {"linestyle": "", "marker": mark, "color": colour, "markerfacecolor": "none", "clip_on": False}
         for y, here in zip(lines, status == code, strict=True):
-            valued, empty = here & np.isfinite(y), here & np.isnan(y)
+            valued, empty = here & np.isfinite(y), here & ~np.isfinite(y)
             axes.plot(x[valued], y[valued], **look)
             axes.plot(x[empty], np.zeros(empty.sum()), transform=axes.get_xaxis_transform(), **look)
         axes.plot([], [], mark, color=colour, markerfacecolor="none", label=shown.name(code))
