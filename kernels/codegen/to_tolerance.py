@@ -45,9 +45,9 @@ the third one, over the first one."""
 TIGHTEST = 1e-13
 """The tightest second tolerance of an embedded pair: below it rounding stops the steps."""
 LOST, MET_AGAIN = 1e-2, 1e-2
-"""Of a state's size, the doubt from which on runs have lost each other; and by how much less than the doubts' ratio
-that of tolerances may be. Behind a transient of chaos all runs may be on one cycle of several, and the truth not: of
-Duffing's oscillator in one cell of 400, with 5e-4 where motions that were not lost had 5e-2 and more."""
+"""The doubt, as a share of a state's size, from which on runs have lost each other; and the factor by which doubts may
+shrink more than tolerances do. Behind a transient of chaos all runs may be on one cycle of several, and the truth not:
+of Duffing's oscillator in one cell of 400, with a factor of 5e-4 where motions that were not lost had 5e-2 and more."""
 TRIED_AGAIN = Status.INACCURATE, Status.GRAZING, Status.STEP_LIMIT, Status.OUT_OF_RANGE
 STATED = 1.5
 """Stated error over the one carried along."""

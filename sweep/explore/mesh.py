@@ -164,7 +164,7 @@ class Mesh:
     def between(self, points: Array) -> tuple[Array, Array]:
         """Heights on straight lines between cells, NaN outside of all simplices; and how far they may be off.
 
-        That is infinite outside, and across kinds.
+        That is infinite outside, and across kinds. For two axes and more.
         """
         places = points @ self._matrix @ self._tilt
         with threadpool_limits(1, "blas"):  # on busy cores its threads wait some milliseconds for each other, each time
