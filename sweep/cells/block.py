@@ -195,12 +195,10 @@ class Done:
 
 
 class Bench:
-    """Computes blocks into a sink, in any thread; each makes a solver of its own, by default one of this process."""
+    """Computes blocks into a sink, in any thread, each by a solver of its own where `apart` does not solve for all."""
 
-    def __init__(
-        self, study: Study, blocks: Blocks, sink: Sink, solver: Callable[[], SolveCells] | None = None
-    ) -> None:
-        self._study, self._blocks, self._sink, self._solver = study, blocks, sink, solver or (lambda: Solver(study))
+    def __init__(self, study: Study, blocks: Blocks, sink: Sink, apart: SolveCells | None = None) -> None:
+        self._study, self._blocks, self._sink, self._apart = study, blocks, sink, apart
         self._here = threading.local()
 
     def block(self, job: int, wanted: Any = None) -> Done:
@@ -209,7 +207,7 @@ class Bench:
         with faults_reported(f"{self._blocks.label(job)} cannot be computed or kept"):
             if not hasattr(here, "guard"):
                 here.bad = []
-                here.guard = Guard(self._solver(), here.bad.append)
+                here.guard = Guard(self._apart or Solver(self._study), here.bad.append)
                 here.reducer = None if self._study.summary is None else Reducer(self._study, here.guard)
             here.bad.clear()
             begun = time.perf_counter()

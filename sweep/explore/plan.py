@@ -167,15 +167,15 @@ def plan(
     if not folder.is_dir():
         raise SweepError(f"{path}: there is no folder {folder}")
     apart, tell = isolate or cell_timeout is not None, note or (lambda text: None)
+    solver: SolveCells
     with ExitStack() as stack:
         before = work_clock.compiled
         if apart:
             begun = time.monotonic()
             processes = Processes(study, None if cell_timeout is None else seconds_of("cell_timeout", cell_timeout))
             stack.callback(processes.end)
-            sample, isolated = processes.sampled(tell), processes.solver()
-            starting = time.monotonic() - begun - isolated.seconds
-            solver: SolveCells = isolated
+            sample, solver = processes.sampled(tell), processes
+            starting = time.monotonic() - begun - processes.seconds
         else:
             sample = sampled_study(study, tell)
             solver = Guard(Solver(study), lambda cell: None)

@@ -201,20 +201,18 @@ class Remote:
                 f"{where}: its kernel or its libraries are not those here; install the same versions on every "
                 "machine" + "".join(f"\n  {line}" for line in changed)
             )
-        solver = None
-        if isolated is None:
+        processes = None if isolated is None else Processes(study, *isolated)
+        if processes is None:
             warm(Solver(study), study)
         else:
-            processes = Processes(study, *isolated)
             weakref.finalize(self, processes.end)
-            solver = processes.solver
         if shared is not None:
             path, key = shared
             with contextlib.suppress(OSError, SweepError):  # it is not seen here, or may not be written
                 self._file = again(path, key, os.O_RDWR)
         blocks = Blocks(study, partition)
         self.room = blocks.own
-        return Bench(study, blocks, weakref.proxy(self), solver)  # so that all ends when dask lets go of this
+        return Bench(study, blocks, weakref.proxy(self), processes)  # so that all ends when dask lets go of this
 
     def put(self, job: int, arrays: Mapping[str, Any]) -> Found:
         """The digests of what is written, and on the disk; or the numbers, which lie where nothing else will."""

@@ -1,6 +1,6 @@
 """Cells solved in processes of their own, which may die of them or be killed: for kernels that crash or never end.
 
-Each solver has one process, so that it is known which cells it died of. What a kernel does there comes back as an
+Each call has a process to itself, so that it is known which cells it died of. What a kernel does there comes back as an
 exception here, and `Guard` finds the cell.
 """
 
@@ -47,56 +47,24 @@ class Died(Unsolved):
 
 
 class Processes:
-    """The processes of a run on this machine.
+    """Does what `Solver` does, for any number of threads, in processes that are begun as they are needed.
 
     A cell may take `limit` seconds; None: `CELL_SECONDS`, or longer where cells do. `cost` is what the dearest cell
-    has taken; 0: none has ended yet.
+    has taken; 0: none has ended yet. So many `seconds` were spent on cells.
     """
 
     def __init__(self, study: Study, limit: float | None, cost: float = 0.0) -> None:
-        self.study, self.limit, self.cost, self.grid = study, limit, cost, Grid(study)
-        self.text = study.to_json()
-        self.over, self.alone, self._sampling = False, threading.Lock(), False
-        self._idle: list[Isolated] = []
-        self._solvers: list[Isolated] = []
+        self.study, self.grid, self.limit, self.cost, self.seconds = study, Grid(study), limit, cost, 0.0
+        self._over, self._sampling, self._alone = False, False, threading.Lock()
+        self._all, self._idle = set[Any](), list[Any]()
 
     def sampled(self, note: Callable[[str], None]) -> Sample:
         """A timed sample, as `sampled_study` takes it."""
-        solver, self._sampling = self.solver(), True
-        with compiling_told(self.study.kernel_name, note, solver.compiles):
-            found = sampled_by(solver, self.study, lambda: solver.seconds)
+        self._sampling = True
+        with compiling_told(self.study.kernel_name, note, lambda: any(p.compiling.value for p in list(self._all))):
+            found = sampled_by(self, self.study, lambda: self.seconds)
         self._sampling = False
-        self._idle.append(solver)
         return found
-
-    def seconds(self, cells: int) -> float:
-        """What some cells may take. One of a sample is not waited for to its end: it is left out, but never FAILED."""
-        one = self.limit or max(CELL_SECONDS, DEARER * self.cost)
-        if cells <= 1 and not (self._sampling and self.cost):
-            return one
-        return min(one, SEVERAL_SECONDS) + SLACK * self.cost * cells
-
-    def solver(self) -> Isolated:
-        """A solver with a process of its own, for one thread at a time; one that is idle, if there is any."""
-        with contextlib.suppress(IndexError):  # another thread may take the last one
-            return self._idle.pop()
-        self._solvers.append(Isolated(self))
-        return self._solvers[-1]
-
-    def end(self) -> None:
-        """Kills all; solvers raise SweepError from now on."""
-        self.over = True
-        for solver in list(self._solvers):
-            solver.end()
-
-
-class Isolated:
-    """Does what `Solver` does in a process of its own, which is begun anew whenever it is needed."""
-
-    def __init__(self, processes: Processes) -> None:
-        self._all, self.grid, self._lock = processes, processes.grid, threading.Lock()
-        self._process: Any = None
-        self.seconds = 0.0  # that its process has spent on cells
 
     def solve(self, start: int, cells: Cells, wanted: Any = None) -> None:
         """As `Solver.solve`. Raises Unsolved where the kernel raises, dies or takes too long; SweepError at the end.
@@ -104,30 +72,41 @@ class Isolated:
         One cell alone is tried again, for a process may die of what it did before, or with others; and then no other
         cell is tried so meanwhile, lest each be blamed for the other.
         """
-        crew = self._all
         for trial in range(1, TRIALS + 1):
             try:
-                with crew.alone if trial > 1 else contextlib.nullcontext():
+                with self._alone if trial > 1 else contextlib.nullcontext():
                     columns, seconds = self._solved(start, cells.number, wanted)
                 break
             except Died:
-                if crew.over:  # it was killed with the run, so the cell is not to blame, and stays PENDING
+                if self._over:  # it was killed with the run, so the cell is not to blame, and stays PENDING
                     raise SweepError("the run is being stopped") from None
                 if cells.number > 1 or trial == TRIALS:
                     raise
         self.seconds += seconds
-        crew.cost = max(crew.cost, seconds / cells.number)
+        self.cost = max(self.cost, seconds / cells.number)
         for column, values in zip(cells.columns, columns, strict=False):  # errors come last, and may not be wanted
             column[...] = values
 
+    def end(self) -> None:
+        """Kills all; what they are at raises SweepError."""
+        with _starting:
+            self._over = True
+        for process in list(self._all):
+            process.kill()
+
     def _solved(self, start: int, count: int, wanted: Any) -> tuple[list[Any], float]:
         """Columns of cells, and the seconds that they took. Raises Unsolved, Died, SweepError."""
-        process, limit, late = self._process or self._begin(), self._all.seconds(count), False
+        limit = self.limit or max(CELL_SECONDS, DEARER * self.cost)
+        if count > 1 or (self._sampling and self.cost):  # one of a sample is left out where it is late, but not FAILED
+            limit = min(limit, SEVERAL_SECONDS) + SLACK * self.cost * count
+        try:
+            process = self._idle.pop()
+        except IndexError:
+            process = self._begun()
         try:
             found, reason = _answer(process, limit, start, count, wanted)
-        except (OSError, EOFError, AttributeError) as fault:
-            late = isinstance(fault, TimeoutError)
-            code = self.end(1.0, process)
+        except (OSError, EOFError) as fault:
+            late, code = isinstance(fault, TimeoutError), self._killed(process)
             # one that died by itself, as late as that, is not late
             if late and code in (None, -signal.SIGKILL):
                 raise Unsolved(f"took longer than {limit:.3g} s") from None
@@ -135,20 +114,22 @@ class Isolated:
                 raise Died(f"its process died of {signal.Signals(-code).name}") from None
             raise Died("its process died" if code is None else f"its process ended with {code}") from None
         if reason.startswith(MemoryError.__name__):
-            self.end()
+            self._killed(process)
             raise Died(reason)
+        self._idle.append(process)
         if reason:
             raise Unsolved(reason)
         return found  # type: ignore[no-any-return]
 
-    def _begin(self) -> Any:
+    def _begun(self) -> Any:
         """A process that has loaded the kernel. Raises SweepError."""
         for _ in range(10):
+            process = None
             try:
-                with self._lock:
-                    if self._all.over:
+                with _starting:
+                    if self._over:
                         raise SweepError("the run is being stopped")
-                    process = self._process = _started(self._all.text)
+                    self._all.add(process := _started(self.study.to_json()))
                 reason = _answer(process, LOAD_SECONDS, 0, 0, None)[1]
                 if not reason:
                     return process
@@ -156,26 +137,19 @@ class Isolated:
                 raise
             except Exception as fault:
                 reason = told(fault)
-            self.end()
+            if process is not None:
+                self._killed(process)
             time.sleep(0.5)
         raise SweepError(
-            f"{self._all.study.kernel_name}: no process of its own can be started and load it ({reason}); what is "
+            f"{self.study.kernel_name}: no process of its own can be started and load it ({reason}); what is "
             "finished is kept. The name of the folder TMPDIR must be short, and ulimit -n and -u large enough"
         )
 
-    def compiles(self) -> bool:
-        """Whether its process compiles now."""
-        process = self._process
-        return process is not None and bool(process.compiling.value)
-
-    def end(self, seconds: float = 0.0, process: Any = None) -> int | None:
-        """Kills the process; its exit status, if that is known in so many seconds."""
-        with self._lock:
-            process, self._process = self._process or process, None
-        if process is None:
-            return None
+    def _killed(self, process: Any) -> int | None:
+        """The exit status of a process that is killed if it has not ended, where that is known in a second."""
         process.kill()
-        process.join(seconds)
+        process.join(1.0)
+        self._all.discard(process)
         return process.exitcode  # type: ignore[no-any-return]
 
 
@@ -194,7 +168,7 @@ def _answer(process: Any, limit: float, *words: Any) -> Any:
     raise TimeoutError
 
 
-_starting = threading.Lock()
+_starting = threading.Lock()  # what is done for that is seen by all threads
 
 
 def _started(text: str) -> Any:
@@ -207,18 +181,15 @@ def _started(text: str) -> Any:
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(["sweep.runs.isolate", *({"numba"} & sys.modules.keys())])
     flags: Any = multiprocessing.current_process()._config  # type: ignore[attr-defined]
-    with _starting:
-        main, daemon = sys.modules["__main__"], flags.get("daemon")
-        ours, theirs = context.Pipe()
-        try:
-            sys.modules["__main__"], flags["daemon"] = ModuleType("__main__"), False
-            process: Any = context.Process(
-                target=_serve, args=(theirs, flag := context.RawValue("i"), text), daemon=True
-            )
-            process.start()
-        finally:
-            sys.modules["__main__"], flags["daemon"] = main, daemon
-            theirs.close()
+    main, daemon = sys.modules["__main__"], flags.get("daemon")
+    (ours, theirs), flag = context.Pipe(), context.RawValue("i")
+    try:
+        sys.modules["__main__"], flags["daemon"] = ModuleType("__main__"), False
+        process: Any = context.Process(target=_serve, args=(theirs, flag, text), daemon=True)
+        process.start()
+    finally:
+        sys.modules["__main__"], flags["daemon"] = main, daemon
+        theirs.close()
     process.pipe, process.compiling = ours, flag
     return process
 

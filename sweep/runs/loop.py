@@ -205,7 +205,7 @@ class Loop:
             "begin", kernel=study.kernel_name, cells=done, of=total, cores=task.cores, process=os.getpid(),
             machine=machine.node, versions=versions,
         )  # fmt: skip
-        bench = Bench(study, self.blocks, sink, None if self._processes is None else self._processes.solver)
+        bench = Bench(study, self.blocks, sink, self._processes)
         if cluster is not None:
             isolated = None if self._processes is None else (self._processes.limit, self._processes.cost)
             words = study.to_json(), dict(task.fingerprint), self.blocks.partition

@@ -72,13 +72,12 @@ def test_a_process_that_died_by_itself_was_not_late(monkeypatch):
         return [pipe for pipe in real(pipes, 0.0) if pipe.poll() and not pipe.closed and not dead(pipe)]
 
     def dead(pipe):
-        return any(s._process is not None and s._process.pipe is pipe and not s._process.is_alive() for s in solvers)
+        return any(process.pipe is pipe and not process.is_alive() for process in processes._all)
 
     monkeypatch.setattr(isolate, "wait", blind)
     processes, seen = Processes(tall(40, "bad:DYING"), 1.5), []
-    solvers = processes._solvers
     arrays = {"fall_time": np.empty(40)}, np.empty(40, np.int8), np.empty(40, np.int8)
-    Guard(processes.solver(), seen.append).solve(0, Cells(*arrays))
+    Guard(processes, seen.append).solve(0, Cells(*arrays))
     processes.end()
     assert [cell.reason for cell in seen] == [
         "ZeroDivisionError: eleven",
@@ -90,7 +89,7 @@ def test_a_process_that_died_by_itself_was_not_late(monkeypatch):
 def test_a_cell_that_is_stopped_in_its_last_trial_is_not_blamed(monkeypatch):
     monkeypatch.setattr(isolate, "TRIALS", 1)
     processes, seen = Processes(tall(50, "bad:STUCK"), None), []
-    solver = Guard(processes.solver(), seen.append)
+    solver = Guard(processes, seen.append)
     cell = Cells({"fall_time": np.empty(1)}, np.empty(1, np.int8), np.empty(1, np.int8))
     solver.solve(0, cell)  # its process is there from now on
     with ThreadPoolExecutor(1) as thread:
