@@ -21,7 +21,7 @@ from sweep.cells.partition import Partition, boxes, row_blocks
 from sweep.cells.reduce import Reducer, part_columns, seconds_a_cell
 from sweep.cells.schema import cells_of, columns
 from sweep.cells.solve import NONE, Solver
-from sweep.cells.timing import LANES, Sample, compiling_told, partition, take_sample, tolerated, work_clock
+from sweep.cells.timing import LANES, Sample, block_cells, compiling_told, take_sample, tolerated, work_clock
 from sweep.errors import SweepError
 
 if TYPE_CHECKING:
@@ -69,15 +69,15 @@ class Blocks:
         return {name: column[: stop - start] for name, column in self._here.columns.items()}
 
 
-def cut(study: Study, workers: int, sample: Sample, block_cells: int | None = None, least: float = 0.0) -> Partition:
+def cut(study: Study, workers: int, sample: Sample, wanted: int | None = None, least: float = 0.0) -> Partition:
     """Blocks of about so many cells; by default of what a timed sample tells for so many workers, `least` seconds."""
     rows, lanes = row_blocks(study), 1
     shape = Grid(study).shape if study.summary is None else (rows.count,)
-    if block_cells is None:
+    if wanted is None:
         row_bytes = sum(column.cell_bytes for column in part_columns(study))
-        block_cells = partition(sample, rows.size, row_bytes / rows.mean, workers, least).cells
+        wanted = block_cells(sample, rows.size, row_bytes / rows.mean, workers, least)
         lanes = LANES if rows.mean == 1 else 1
-    return boxes(shape, math.ceil(block_cells / rows.mean), lanes)
+    return boxes(shape, math.ceil(wanted / rows.mean), lanes)
 
 
 def sampled_study(study: Study, note: Callable[[str], None] = lambda text: None) -> Sample:

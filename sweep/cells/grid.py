@@ -43,11 +43,6 @@ class Grid(Box):
         fixed = self.study.fixed
         return {k: fixed[field.name] for k, field in enumerate(self.study.kernel.parameters) if field.name in fixed}
 
-    def spreads(self) -> dict[int, Floats | None]:
-        """All values that the parameter at each position takes, shape (values, ...); None where that is not known."""
-        found: dict[int, Floats | None] = {k: np.asarray(value)[None] for k, value in self.constants().items()}
-        return found | {k: self.study.axes[name].values for k, name in self.varying.items()}
-
     def columns(self, start: int, stop: int, out: Sequence[Floats]) -> None:
         """Write the varying parameters of the cells `start` to `stop` into columns, one per parameter of the kernel."""
         for place, name in self.varying.items():

@@ -67,17 +67,9 @@ class Absent(NamedTuple):
         same = columns[self.place] == (self.default if self.like is None else columns[self.like])
         return np.asarray(same if same.ndim == 1 else same.all(axis=1))
 
-    def everywhere(self, spreads: Mapping[int, Any]) -> bool | None:
-        """Whether it holds in all cells of a grid, or in none; None: that depends on the cell."""
-        columns = {place: spreads[place] for place in (self.place, self.like) if place is not None}
-        if sum(2 if column is None else len(column) > 1 for column in columns.values()) > 1:
-            return None
-        found = self.holds(columns)
-        return bool(found[0]) if found.all() or not found.any() else None
-
 
 class Turn(NamedTuple):
-    """A method's turn: its position, and what must hold in a cell for it, but for what holds in all cells.
+    """A method's turn: its position, and what must hold in a cell for it, but for what no axis changes.
 
     Where it has two turns, by `Method.sooner`, also whether this is the first of the two.
     """
@@ -89,23 +81,21 @@ class Turn(NamedTuple):
 
 
 def turns(study: Study, grid: Grid) -> tuple[Turn, ...]:
-    """Turns of the methods that give every output asked for and can do some cell of the grid."""
+    """Turns of the methods that give every output asked for, and that no fixed parameter keeps out."""
     places = {field.name: place for place, field in enumerate(study.kernel.parameters)}
-    spreads, found = grid.spreads(), dict[float, Turn]()
+    constants = {place: np.asarray(value)[None] for place, value in grid.constants().items()}
+    found = dict[float, Turn]()
     for number, method in enumerate(study.kernel.methods):
-        defaults = {name: study.kernel.parameter(name).default for name in method.excludes}
-        terms = [
-            Absent(places[name], np.nan, places[d]) if isinstance(d, str)
-            else Absent(places[name], np.nan if d is None else d, None)
-            for name, d in defaults.items()
-        ]  # fmt: skip
-        known = [term.everywhere(spreads) for term in terms]
-        if False in known or not set(study.outputs).isdisjoint(method.lacks):
-            continue
-        open_ = tuple(term for term, holds in zip(terms, known, strict=True) if holds is None)
-        found[number] = Turn(number, open_, method.sooner)
-        if method.sooner is not None:
-            found[number - 1.5] = found[number]._replace(early=True)
+        terms: dict[bool, list[Absent]] = {True: [], False: []}  # those that an axis changes, and others
+        for name in method.excludes:
+            default = study.kernel.parameter(name).default
+            like = places[default] if isinstance(default, str) else None
+            term = Absent(places[name], np.nan if like is not None or default is None else float(default), like)
+            terms[not grid.varying.keys().isdisjoint((term.place, like))].append(term)
+        if set(study.outputs).isdisjoint(method.lacks) and all(term.holds(constants) for term in terms[False]):
+            found[number] = Turn(number, tuple(terms[True]), method.sooner)
+            if method.sooner is not None:
+                found[number - 1.5] = found[number]._replace(early=True)
     return tuple(found[place] for place in sorted(found))
 
 

@@ -141,8 +141,8 @@ def _places(size: int, count: int, cells: int) -> list[int]:
     return list(map(int, np.clip(middles - cells // 2, 0, size - cells)))
 
 
-def partition(sample: Sample, size: int, cell_bytes: float, workers: int, least: float = 0.0) -> Partition:
-    """Blocks of about 1/200 of each worker's share, within bounds of time (`least` seconds), bytes and number."""
+def block_cells(sample: Sample, size: int, cell_bytes: float, workers: int, least: float = 0.0) -> int:
+    """Cells of a block: 1/200 of each worker's share, within bounds of time (`least` seconds), bytes and number."""
     cost, (shortest, longest) = max(sample.cost, 1e-12), BLOCK_SECONDS
     seconds = max(cost * size / (200 * workers), shortest, least)
     # by the cheapest probe: on a busy machine some take ten times as long as they should, and blocks would be short
@@ -152,7 +152,7 @@ def partition(sample: Sample, size: int, cell_bytes: float, workers: int, least:
     if sample.lanes:
         cells = max(cells, min(LANES, math.ceil(size / workers)))
     cells = max(1, math.floor(cells), -(-size // MOST_BLOCKS))
-    return Partition(size, min(cells if cells < LANES else -(-cells // LANES) * LANES, size))
+    return min(cells if cells < LANES else -(-cells // LANES) * LANES, size)
 
 
 @contextlib.contextmanager
@@ -180,36 +180,24 @@ class WorkClock:
 
     def __init__(self) -> None:
         self.flag: Any = SimpleNamespace(value=0)
-        self.compiled, self._begun, self._watched = 0.0, 0.0, False
-        self._lock = threading.Lock()
+        self.compiled, self._begun, self._lock, self._watched = 0.0, 0.0, threading.Lock(), False
 
     def __call__(self) -> float:
-        self.watch()
-        with self._lock:
-            now = self._begun if self.flag.value else time.perf_counter()
-            return now - self.compiled
-
-    def watch(self) -> None:
-        """From now on, if numba is loaded."""
         event: Any = sys.modules.get("numba.core.event")
         if event is not None and not self._watched:
-            actions = {"on_start": self._start, "on_end": self._end}
-            listener = type("Listener", (event.Listener,), {name: staticmethod(f) for name, f in actions.items()})
-            event.register("numba:compiler_lock", listener())
+            steps = {"on_start": lambda *_: self._step(1), "on_end": lambda *_: self._step(-1)}
+            event.register("numba:compiler_lock", type("Listener", (event.Listener,), steps)())
             self._watched = True
-
-    def _start(self, event: Any) -> None:
         with self._lock:
-            self._begun = self._begun if self.flag.value else time.perf_counter()
-            self.flag.value += 1
+            return (self._begun if self.flag.value else time.perf_counter()) - self.compiled
 
-    def _end(self, event: Any) -> None:
+    def _step(self, by: int) -> None:
+        """A compilation begins, or ends."""
         with self._lock:
-            if not self.flag.value:
-                return  # it began before it was watched
-            self.flag.value -= 1
-            if not self.flag.value:
-                self.compiled += time.perf_counter() - self._begun
+            now = time.perf_counter()
+            self._begun = self._begun if self.flag.value else now
+            self.flag.value = max(0, self.flag.value + by)  # one may end that began before it was watched
+            self.compiled += 0.0 if self.flag.value else now - self._begun
 
 
 work_clock = WorkClock()
@@ -221,7 +209,7 @@ def compiling_told(
     name: str, note: Callable[[str], None], compiles: Callable[[], bool] = lambda: bool(work_clock.flag.value)
 ) -> Iterator[None]:
     """Notes that a kernel is compiled, once, where that takes long; `compiles` says whether it is now."""
-    work_clock.watch()
+    work_clock()  # which is watched from now on
     done = threading.Event()
 
     def tell() -> None:

@@ -88,9 +88,6 @@ class _Points(Grid):
         self.size, self.given = np.iinfo(np.int64).max, np.empty((len(study.axes), 0))
         self._places = {name: place for place, name in enumerate(study.axes)}
 
-    def spreads(self) -> dict[int, Any]:
-        return super().spreads() | dict.fromkeys(self.varying)
-
     def column(self, name: str, start: int, stop: int) -> Any:
         return self.given[self._places[name], start:stop]
 

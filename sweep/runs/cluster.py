@@ -51,8 +51,7 @@ class Cluster:
         self._client = _connected(address) if self._own else address
         if self._client.asynchronous:
             raise SweepError("cluster: the client is asynchronous; pass one that is not")
-        self.threads, self._looked, self._gone = -1, -math.inf, False
-        self._asked: Any = weakref.WeakSet()
+        self.threads, self._looked = -1, -math.inf
         self._suspects = asyncio.Lock()
 
     def __enter__(self) -> Cluster:
@@ -62,7 +61,7 @@ class Cluster:
     def __exit__(self, *fault: object) -> None:
         if self._own:
             with contextlib.suppress(Exception):
-                self._client.close(timeout=0.1 if self._gone else CONNECT_SECONDS)
+                self._client.close(timeout=CONNECT_SECONDS if self._client.status == "running" else 0.1)
 
     def look(self) -> None:
         """Counts the threads of all workers, now and then. Raises SweepError."""
@@ -71,7 +70,7 @@ class Cluster:
         try:
             threads = sum(self._client.nthreads().values())
         except Exception as fault:
-            raise self._lost(fault) from fault
+            raise _lost(fault) from fault
         if threads != self.threads:
             log(f"the cluster has {threads} threads", "workers", threads=threads)
             if not threads:
@@ -84,56 +83,42 @@ class Cluster:
         self._remote = self._client.submit(Remote, *words, paths, pure=False)
 
     def submit(self, job: int, wanted: Any, label: str) -> Future[Done]:
-        """A future of a block that a worker computes. Raises SweepError, now or when it is asked for its result.
+        """A future of a block that a worker computes, whose result may raise SweepError; cancelled, it is given up.
 
         That of `client.get_executor()` trips over a task that fails with its worker and is answered at that moment.
         dask blames a worker's death on every block that waited there, so those given up are tried again one by one.
         """
-        found = Future[Done]()
 
         def ask() -> Any:
-            asked = self._client.submit(Remote.compute, self._remote, job, wanted, pure=False)
-            self._asked.add(asked)
-            return asked
+            return self._client.submit(Remote.compute, self._remote, job, wanted, pure=False)
 
-        try:
-            asked = ask()
-        except Exception as fault:
-            raise self._lost(fault) from fault
-
-        async def settle() -> None:
+        async def settled(asked: Any) -> Done:
             try:
                 try:
-                    found.set_result(await asked)
+                    return await asked  # type: ignore[no-any-return]
                 except distributed.KilledWorker:
                     async with self._suspects:
-                        found.set_result(await ask())
-            except SweepError as fault:
-                found.set_exception(fault)
-            except (CancelledError, asyncio.CancelledError, OSError) as fault:
-                found.set_exception(self._lost(fault))
+                        return await ask()  # type: ignore[no-any-return]
+            except SweepError:
+                raise
+            except (CancelledError, OSError) as fault:
+                raise _lost(fault) from fault
             except Exception as fault:
                 what = f"{label} cannot be computed ({type(fault).__name__}: {fault}); what is finished is kept"
-                found.set_exception(
-                    SweepError(f"cluster: {what}; isolated, a cell of which its process dies is FAILED")
-                )
+                raise SweepError(f"cluster: {what}; isolated, a cell of which its process dies is FAILED") from fault
 
-        self._client.loop.add_callback(settle)
-        return found
+        try:
+            return asyncio.run_coroutine_threadsafe(settled(ask()), self._client.loop.asyncio_loop)
+        except Exception as fault:
+            raise _lost(fault) from fault
 
-    def cancel(self) -> None:
-        """Takes back what no worker has begun."""
-        if not self._gone:
-            with contextlib.suppress(Exception):
-                self._client.cancel(list(self._asked))
 
-    def _lost(self, fault: BaseException) -> Incomplete:
-        """What is reported where the scheduler does not answer any more; it is not asked again."""
-        self._gone = True
-        return Incomplete(
-            f"cluster: the scheduler is lost ({_reason(fault)}); what is finished is kept, run the same command again "
-            "to continue"
-        )
+def _lost(fault: BaseException) -> Incomplete:
+    """What is reported where the scheduler does not answer any more."""
+    return Incomplete(
+        f"cluster: the scheduler is lost ({_reason(fault)}); what is finished is kept, run the same command again to "
+        "continue"
+    )
 
 
 def _connected(address: Any) -> Any:
@@ -201,10 +186,11 @@ class Remote:
                 f"{where}: its kernel or its libraries are not those here; install the same versions on every "
                 "machine" + "".join(f"\n  {line}" for line in changed)
             )
-        processes = None if isolated is None else Processes(study, *isolated)
-        if processes is None:
+        processes = None
+        if isolated is None:
             warm(Solver(study), study)
         else:
+            processes = Processes(study, *isolated)
             weakref.finalize(self, processes.end)
         if shared is not None:
             path, key = shared

@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import os
 import platform
-import time
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ThreadPoolExecutor, wait
@@ -30,7 +29,7 @@ from sweep.errors import SweepError, missing
 from sweep.runs.extend import Precomputed, Reused
 from sweep.runs.isolate import Processes
 from sweep.runs.log import log
-from sweep.runs.pool import CtrlC, TimeUp, cores, deadline, endless, passed, whole_number
+from sweep.runs.pool import TimeUp, cores, deadline, endless, passed, signals_held, whole_number
 from sweep.runs.progress import Progress, from_everywhere
 from sweep.study.model import Study
 from sweep.words import as_path, seconds_of
@@ -130,7 +129,7 @@ class Loop:
     ) -> None:
         self.task, self._reused, study = task, reused, task.study
         self.began, self._failed, self.progress = _now(), 0, Progress(1, False)
-        self._ctrl_c = stack.enter_context(CtrlC())
+        self._check_signals = stack.enter_context(signals_held())
         self._cluster: Cluster | None = None
         if task.cluster is not None and to_do:
             try:
@@ -149,18 +148,14 @@ class Loop:
 
     def _sample(self) -> Sample:
         """The sample, taken in a thread, so that Ctrl-C and the time to stop are seen while a kernel is compiled."""
-        study, processes = self.task.study, self._processes
-
-        def take() -> Sample:
-            return sampled_study(study, self.task.note) if processes is None else processes.sampled(self.task.note)
-
-        begun, sample = time.monotonic(), self._threads.submit(take)
+        study, apart, note = self.task.study, self._processes, self.task.note
+        sample = self._threads.submit(lambda: sampled_study(study, note) if apart is None else apart.sampled(note))
         try:
-            while not wait([sample], TICK).done:
-                self._ctrl_c.check()
-                # it gives blocks a size by which the run is continued, so it has a second although the time is up
-                if time.monotonic() - begun > 1.0:
-                    self._check_time()
+            # it gives blocks a size by which the run is continued, so it has a second although the time is up
+            wait([sample], 1.0)
+            while not sample.done():
+                self._check()
+                wait([sample], TICK)
             return sample.result()
         except BaseException:
             self._stop([sample])
@@ -213,8 +208,7 @@ class Loop:
         queue, under_way = deque(from_everywhere(jobs)), set[Future[Done]]()
         try:
             while queue or under_way:
-                self._ctrl_c.check()
-                self._check_time()
+                self._check()
                 while queue and len(under_way) < 2 + 3 * self._crew:
                     job = queue.popleft()
                     wanted = None if known is None else known.missing(*self.blocks.bounds(job))
@@ -251,15 +245,13 @@ class Loop:
                 self.progress.note("more cells FAILED; from here on they are counted only")
         self.progress.add(self._cells(done.block), self._weights[done.block], done.seconds)
 
-    def _stop(self, computing: Iterable[Future[Any]]) -> None:
+    def _stop(self, futures: Iterable[Future[Any]]) -> None:
         """Lets what is computed here end within a second or so; then its process is killed, or its thread given up."""
-        if self._cluster is not None:
-            self._cluster.cancel()
         self._threads.shutdown(wait=False, cancel_futures=True)
-        computing = [future for future in computing if not future.cancelled()]
-        if wait(computing, 1.3 if self._cluster is None else 0.0).not_done and self._processes is not None:
+        computing = [future for future in futures if not future.cancel()]
+        if wait(computing, 1.3).not_done and self._processes is not None:
             self._processes.end()
-        if wait(computing, 0.3).not_done and self._cluster is None:
+        if wait(computing, 0.3).not_done:
             endless.set()
 
     def _close(self) -> None:
@@ -269,8 +261,9 @@ class Loop:
             self._processes.end()
         self.progress.stop()
 
-    def _check_time(self) -> None:
-        """Raises TimeUp when it is time to stop."""
+    def _check(self) -> None:
+        """Raises KeyboardInterrupt, Terminated or TimeUp where the run is to end."""
+        self._check_signals()
         if passed(self.task.end):
             raise TimeUp(f"it is {datetime.now():%H:%M}")
 

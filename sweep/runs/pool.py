@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import threading
+from collections.abc import Callable, Iterator
 from datetime import datetime, timedelta
 from datetime import time as day_time
 from typing import Any
@@ -25,38 +27,34 @@ class Terminated(SystemExit):
         super().__init__(128 + signal.SIGTERM)
 
 
-class CtrlC:
-    """Holds Ctrl-C and SIGTERM back until `check`, for Python's locks are left in disorder where they strike in them.
+@contextlib.contextmanager
+def signals_held() -> Iterator[Callable[[], None]]:
+    """Holds Ctrl-C and SIGTERM back, for Python's locks are left in disorder where they strike in them.
 
-    The second one strikes at once. Other handlers than Python's own are left alone.
+    What it gives raises KeyboardInterrupt or Terminated after one of them, and is called at the end. The second one
+    strikes at once. Other handlers than Python's own are left alone.
     """
+    pressed: list[int] = []
+    here = threading.current_thread() is threading.main_thread()
+    python: dict[int, Any] = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
+    own = {number: handler for number, handler in python.items() if here and signal.getsignal(number) is handler}
 
-    def __enter__(self) -> CtrlC:
-        self._pressed: int | None = None
-        here = threading.current_thread() is threading.main_thread()
-        own: dict[int, Any] = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
-        self._own = {number: python for number, python in own.items() if here and signal.getsignal(number) is python}
-        for number in self._own:
-            signal.signal(number, self._press)
-        return self
+    def give_back(*press: Any) -> None:
+        pressed.extend(press[:1])
+        for number, handler in own.items():
+            signal.signal(number, handler)
 
-    def __exit__(self, kind: type[BaseException] | None, *rest: object) -> None:
-        self._give_back()
-        if kind is None:
-            self.check()
+    def check() -> None:
+        if pressed:
+            raise Terminated if pressed[0] == signal.SIGTERM else KeyboardInterrupt
 
-    def check(self) -> None:
-        """Raises KeyboardInterrupt if Ctrl-C was pressed, Terminated after SIGTERM."""
-        if self._pressed is not None:
-            raise Terminated if self._pressed == signal.SIGTERM else KeyboardInterrupt
-
-    def _press(self, number: int, frame: object) -> None:
-        self._pressed = number
-        self._give_back()
-
-    def _give_back(self) -> None:
-        for number, own in self._own.items():
-            signal.signal(number, own)
+    for number in own:
+        signal.signal(number, give_back)
+    try:
+        yield check
+    finally:
+        give_back()
+    check()
 
 
 endless = threading.Event()

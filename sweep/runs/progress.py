@@ -20,8 +20,8 @@ from sweep.words import SHORTEST, duration, one_digit, printable, speed
 
 QUIET_SECONDS = 1.0
 """A run that ends sooner says nothing."""
-LINE_SECONDS, LOG_SECONDS = 30.0, 60.0
-"""How often a line is told where there is no bar, the first ones sooner if cells were done; and one is logged."""
+LINE_SECONDS = 30.0
+"""How often a line is logged, and told where there is no bar; the first ones sooner if cells were done."""
 
 
 def from_everywhere(jobs: Iterable[int]) -> list[int]:
@@ -64,14 +64,13 @@ class Progress:
         self._stream: Any = sys.stderr if stream is None or stream is True else stream or None
         self.total, self.done, self.crew = total, done, 1
         self._before, self._name, self._clock = done, printable(name), clock
-        self._bar: Any = None
         shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
         notebook = self._stream is sys.stderr and type(shell).__name__ == "ZMQInteractiveShell"
         self._live = self._stream is not None and (self._stream.isatty() or notebook)
-        self._begun = self._last = self._logged = clock()
-        self._said: float | None = None
-        self._told = done
-        self._work_left, self._blocks = work, 0
+        self._bar: Any = None
+        self._begun = self._said = clock()
+        self._told, self._shown = done, False
+        self._work_left, self._blocks, self._last = work, 0, self._begun
         self._spent = self._first_round = np.zeros(2)  # the work of blocks that are done, and their seconds
 
     @property
@@ -101,14 +100,14 @@ class Progress:
     def tick(self) -> None:
         """Says something if it is time to."""
         now = self._clock()
-        if now - self._logged >= LOG_SECONDS:
-            self._logged = now
+        if (since := now - self._begun) < QUIET_SECONDS:
+            return
+        due = now - self._said >= (min(LINE_SECONDS, since / 3) if self.done > self._told else LINE_SECONDS)
+        if due:
+            self._said, self._told = now, self.done
             self._log(self.line())
-        since = now - self._begun
-        pause = min(LINE_SECONDS, since / 3) if self.done > self._told else LINE_SECONDS
-        due = self._live or now - (self._begun if self._said is None else self._said) >= pause
-        if since >= QUIET_SECONDS and due:
-            self._say(self.line())
+        if due or self._live:
+            self._show(self.line())
 
     def note(self, text: str) -> None:
         """Says something out of turn."""
@@ -131,8 +130,8 @@ class Progress:
         """Says how it ended, where anything was said before."""
         took = self._clock() - self._begun
         self._log(text := f"{self._counts()}, {speed(self.rate)}, took {duration(took)}", seconds=round(took, 1))
-        if self._said is not None:
-            self._say(text)
+        if self._shown:
+            self._show(text)
         self.stop()
 
     def stop(self) -> None:
@@ -157,8 +156,8 @@ class Progress:
         fields = {"cells": self.done, "of": self.total, "cells_per_second": round(self.rate, 3), "seconds_left": left}
         log(text, "progress", **fields, **more)
 
-    def _say(self, text: str) -> None:
-        self._said, self._told = self._clock(), self.done
+    def _show(self, text: str) -> None:
+        self._shown = True
         if not self._live:
             self.tell(text)
             return

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from sweep.cells.partition import Partition, boxes
 from sweep.cells.schema import Column
-from sweep.cells.timing import BLOCK_BYTES, LANES, MOST_BLOCKS, Sample, partition, take_sample
+from sweep.cells.timing import BLOCK_BYTES, LANES, MOST_BLOCKS, Sample, block_cells, take_sample
 
 COLUMNS = tuple(Column(name, "i1", (), (), {}) for name in ("status", "method_used"))
 
@@ -24,12 +24,12 @@ def sample(costs, size):
 )
 @example(cost=1e-3, size=51, cell_bytes=10, workers=1)
 def test_blocks_keep_their_bounds_in_time_bytes_and_number(cost, size, cell_bytes, workers):
-    blocks = partition(sample(cost, size), size, cell_bytes, workers)
-    assert 1 <= blocks.cells <= size
-    assert blocks.count <= MOST_BLOCKS
-    if blocks.cells > max(LANES, 1.001 * size / MOST_BLOCKS + LANES):
-        assert (blocks.cells - LANES) * cell_bytes <= BLOCK_BYTES
-        assert (blocks.cells - LANES) * cost <= 1.0001
+    cells = block_cells(sample(cost, size), size, cell_bytes, workers)
+    assert 1 <= cells <= size
+    assert -(-size // cells) <= MOST_BLOCKS
+    if cells > max(LANES, 1.001 * size / MOST_BLOCKS + LANES):
+        assert (cells - LANES) * cell_bytes <= BLOCK_BYTES
+        assert (cells - LANES) * cost <= 1.0001
 
 
 @pytest.mark.parametrize("length", range(2, 40))

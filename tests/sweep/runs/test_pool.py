@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from sweep.runs.pool import CtrlC
+from sweep.runs.pool import signals_held
 
 
 def press():
@@ -17,10 +17,10 @@ def test_ctrl_c_waits_until_it_may_strike():
     reached = []
 
     def pressed():
-        with CtrlC() as ctrl_c:
+        with signals_held() as check:
             press()
             reached.append("the check")
-            ctrl_c.check()
+            check()
             reached.append("behind it")
 
     with pytest.raises(KeyboardInterrupt):
@@ -30,7 +30,7 @@ def test_ctrl_c_waits_until_it_may_strike():
 
 
 def test_ctrl_c_is_not_lost_where_nobody_checks():
-    with pytest.raises(KeyboardInterrupt), CtrlC():
+    with pytest.raises(KeyboardInterrupt), signals_held():
         press()
 
 
@@ -39,7 +39,7 @@ def test_a_second_ctrl_c_strikes_at_once():
 
     def twice():
         nonlocal struck
-        with CtrlC():
+        with signals_held():
             press()
             try:
                 press()
@@ -55,15 +55,15 @@ def test_handlers_of_others_and_other_threads_are_left_alone():
     seen = []
     before = signal.signal(signal.SIGINT, lambda *_: seen.append(1))
     try:
-        with CtrlC() as ctrl_c:
+        with signals_held() as check:
             press()
-            ctrl_c.check()
+            check()
     finally:
         signal.signal(signal.SIGINT, before)
     assert seen == [1]
 
     def elsewhere():
-        with CtrlC():
+        with signals_held():
             seen.append(2)
 
     thread = threading.Thread(target=elsewhere)
