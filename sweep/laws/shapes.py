@@ -70,6 +70,11 @@ def _logarithm(q: Array, s: Array, span: float) -> Parts:
     return np.log(1 + q[0] * (s - 0.5)), 1.0, s
 
 
+def _between(q: Array, s: Array, span: float) -> Parts:
+    """q: b per window; both exponents are of size 1 at their own end."""
+    return 0.0, 1.0, np.exp(q[0] * (s - 1)), np.exp(-q[0] * s), s
+
+
 def _stretched(q: Array, s: Array, span: float) -> Parts:
     """q: b per window; the exponent is of size 1 at its large end."""
     return 0.0, 1.0, np.exp(q[0] * (s - (q[0] > 0)))
@@ -154,6 +159,15 @@ OTHER_FUNCTIONS = (
     Law("exponential", "A exp(-x/X)", lambda q, s, span: (0.0, 1.0, np.exp(span * (s - 1))), 2, power=False),
     Law("stretched exponential", "A exp(-(x/X)^b)", _stretched, 2, (POWER,), power=False),
     Law("cut-off", "A exp(-x/X) x^p", lambda q, s, span: (0.0, 1.0, np.exp(span * (s - 1)), s), 3, (), P, False),
+    Law(
+        "cut-off at both ends",
+        "A exp(-(x/X)^b - (Y/x)^b) x^p",
+        _between,
+        4,
+        (Number(0.5, 60.0, (1.0, 2.5, 6.0, 12.0)),),
+        P,
+        power=False,
+    ),
     Law("lognormal", "A exp(-B ln(x/X)^2)", lambda q, s, span: (0.0, 1.0, s, s**2), 3, power=False),
     Law(
         "two exponentials",

@@ -263,8 +263,8 @@ def compare_laws(y: xr.DataArray, dim: str, window: Window | None = None, *, sig
     many times e^5 more likely, and a margin that correlated, uneven or outlying noise does not bridge, which one law is
     tried with. Beside a function that is no power law, a power law with as few numbers is taken where it is not ruled
     out. The laws are one, two (with bends of four shapes) and three power laws, an offset, a correction to
-    scaling; and functions that are none: logarithm, exponential, stretched exponential, cut-off, lognormal, two
-    exponentials.
+    scaling; and functions that are none: logarithm, exponential, stretched exponential, a cut-off at one end or
+    at both, lognormal, two exponentials.
 
     Parameters
     ----------

@@ -164,6 +164,7 @@ NO_POWER_LAWS = {
     "exponential": -LINEAR / 20,
     "stretched exponential": -((LINEAR / 20) ** 0.6),
     "cut-off": -0.5 * np.log(LINEAR) - LINEAR / 20,
+    "cut-off at both ends": -0.5 * np.log(LINEAR) - (LINEAR / 20) ** 0.8 - (5 / LINEAR) ** 0.8,
     "lognormal": -0.5 * np.log(LINEAR / 10) ** 2,
     "two exponentials": np.log(np.exp(-LINEAR / 5) + 0.1 * np.exp(-LINEAR / 40)),
 }
