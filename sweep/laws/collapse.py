@@ -92,8 +92,8 @@ def fit_collapse(y: xr.DataArray, dim: str, over: str, *, sigma: Any = None, con
     every, places = np.column_stack([columns, beside]), np.arange(float(off.size))
     told = regress(places, every, off[None], "correlated", k, None if sigma is None else 1 / points.root)
     fits = bool(not told.denied[0] or (sigma is None and abs(off).max() <= 1e-6 * (1 + np.ptp(points.z))))
-    for number, name in enumerate(("x_exponent", "y_exponent")):
-        low, high = told.interval(number, confidence)[:, 0] if fits else (math.nan, math.nan)
+    for name, ends in zip(("x_exponent", "y_exponent"), told.interval([0, 1], confidence)[:, :, 0].T, strict=True):
+        low, high = ends if fits else (math.nan, math.nan)
         found |= {f"{name}_low": found[name] + min(low, 0.0), f"{name}_high": found[name] + max(high, 0.0)}
     found |= {"dropped": count - points.t.size, "fits": int(fits)}
     result = xr.Dataset(found).assign(verdict="one curve" if fits else "not one curve")

@@ -70,9 +70,12 @@ class Found(NamedTuple):
         ends = np.array([[-np.inf] * len(which), [np.inf] * len(which)])
         if known:
             line = regress(t, self.jacobian[:, known], self.off[None], noise, sigma=self.sigma)
-            for place, number in enumerate(np.arange(self.numbers.size)[which]):
-                if number in known:
-                    ends[:, place] = line.interval(known.index(number), confidence)[:, 0]
+            told = [
+                (place, known.index(k)) for place, k in enumerate(np.arange(self.numbers.size)[which]) if k in known
+            ]
+            if told:
+                places, numbers = map(list, zip(*told, strict=True))
+                ends[:, places] = line.interval(numbers, confidence)[:, :, 0]
             if self.sigma is None and noise != "even":
                 best = self._replace(deviance=float(line.deviance[0]), more=2)
         return self.numbers[which] + np.clip(ends, [[-np.inf], [0.0]], [[0.0], [np.inf]]), best.aicc

@@ -178,11 +178,11 @@ def _noisy(t: Array, z: Array, centre: Array, word: str, confidence: float) -> d
         # a point that is left out counts as one that is not known
         wider = t.size / pattern.sum()
         value, error = (part.T for part in line.mean())
-        reach = value[1] + wider * (line.interval(1, confidence) - value[1])
+        reach = value[1] + wider * (line.interval([1], confidence)[:, 0] - value[1])
         numbers[:, rows], fits[rows] = np.concatenate([value, wider * error, reach]), ~line.denied
         if bends and (bent := rows[line.denied]).size:
             cubic = regress(t[pattern], np.column_stack([columns[:, 0], ends])[pattern], z[bent][:, pattern], word)
-            low, high = np.array([cubic.interval(k, confidence) for k in (1, 2, 3)]).transpose(1, 0, 2)
+            low, high = cubic.interval([1, 2, 3], confidence)
             kind[bent], numbers[4, bent], numbers[5, bent] = "bent", low.min(axis=0), high.max(axis=0)
     names = ("level", "exponent", "level_error", "exponent_error", "exponent_low", "exponent_high", "fits", "kind")
     return dict(zip(names, (*numbers, fits, kind), strict=True))
