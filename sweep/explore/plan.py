@@ -14,23 +14,19 @@ from typing import Any
 import numpy as np
 
 from kernels.interface import Status, machine_code_folder
-from sweep.cells.block import Blocks, Guard, cut, faults_reported, sampled_study
-from sweep.cells.fingerprint import fingerprint
+from sweep.cells.block import Guard, faults_reported
 from sweep.cells.grid import Grid, SolveCells, empty_cells
-from sweep.cells.reduce import output_schema, strip_bytes
-from sweep.cells.sample import require_asked
+from sweep.cells.reduce import strip_bytes
 from sweep.cells.solve import Solver
 from sweep.cells.timing import SILENT_SECONDS, tolerated, work_clock
-from sweep.errors import SweepError
 from sweep.explore.scaling import scaling
 from sweep.file.frame import cuts_of, expected_size
 from sweep.file.open import memory
-from sweep.runs.isolate import Processes
-from sweep.runs.pool import cores, whole_number
+from sweep.runs.loop import Loop, Task
 from sweep.study.model import Study
 from sweep.study.read import Given
 from sweep.study.read import study as as_study
-from sweep.words import Table, duration, paragraph, quantity, seconds_of
+from sweep.words import Table, duration, paragraph, quantity
 
 DRAWN = 64
 """Cells beside the ends of axes that are solved to see their methods and statuses,"""
@@ -160,27 +156,15 @@ def plan(
     >>> sweep.plan(study).cells
     2
     """
-    study = as_study(study)
-    require_asked(study)
-    crew = cores() if workers is None else whole_number("workers", workers)
-    folder = Path(path).absolute().parent if path is not None else Path.cwd()
-    if not folder.is_dir():
-        raise SweepError(f"{path}: there is no folder {folder}")
-    apart, tell = isolate or cell_timeout is not None, note or (lambda text: None)
-    solver: SolveCells
+    study, before, begun = as_study(study), work_clock.compiled, time.monotonic()
+    task = Task(study, path, workers, progress=False, isolate=isolate, cell_timeout=cell_timeout, note=note)
+    folder, crew = Path.cwd() if path is None else task.output.parent, task.cores
     with ExitStack() as stack:
-        before = work_clock.compiled
-        if apart:
-            begun = time.monotonic()
-            processes = Processes(study, None if cell_timeout is None else seconds_of("cell_timeout", cell_timeout))
-            stack.callback(processes.end)
-            sample, solver = processes.sampled(tell), processes
-            starting = time.monotonic() - begun - processes.seconds
-        else:
-            sample = sampled_study(study, tell)
-            solver = Guard(Solver(study), lambda cell: None)
-        blocks = Blocks(study, cut(study, crew, sample))
+        loop = Loop(task, stack, hold=False)
+        sample, blocks, apart = loop.sample, loop.blocks, loop.processes
+        starting = 0.0 if apart is None else time.monotonic() - begun - apart.seconds
         seconds = RUN_SECONDS + sample.cost * blocks.rows.size / min(crew, blocks.count)
+        solver = apart or Guard(Solver(study), lambda cell: None)
         methods, statuses, looked_at = _looked_at(study, solver, min(LOOK_SECONDS, SHARE * seconds))
     advice, allowed = NO_ADVICE, max(SHARE * seconds, ADVICE_SECONDS)
     if not apart and ADVICE_CELLS * sample.cost < allowed:
@@ -190,7 +174,7 @@ def plan(
     compiling = starting if apart else work_clock.compiled - before
     compiling = compiling if compiling > SILENT_SECONDS else 0.0
     seconds += starting if apart else 0.0 if _is_kept(study.kernel_name) else compiling
-    schema = output_schema(study, fingerprint(study))
+    schema = task.schema
     return Plan(
         title=study.title,
         kernel=study.kernel_name,

@@ -55,6 +55,8 @@ class Task:
         What `workers`, `until` and `cell_timeout` mean.
     fingerprint : mapping of str to str
         Of the study and of this program, or what is given instead.
+    note : callable
+        Says something at once; by default where the progress is told.
     """
 
     study: Study
@@ -71,6 +73,7 @@ class Task:
     cell_timeout: float | str | None = None
     retry_failed: bool = False
     fingerprint: Mapping[str, str] = field(default_factory=dict)
+    note: Any = None
 
     def __post_init__(self) -> None:
         self.fingerprint = dict(self.fingerprint or fingerprint(self.study))
@@ -90,15 +93,12 @@ class Task:
             raise SweepError("until: give a path as well, or what is computed by then would be lost")
         if self.extend and self.retry_failed:
             raise SweepError("extend, retry_failed: give one of the two; each continues another result")
+        self.note = self.note or Progress(1, self.progress, self.name).note
 
     @property
     def name(self) -> str:
         """What the run is called in its messages."""
         return self.study.title or "sweep" if self.path is None else self.output.name
-
-    def note(self, text: str) -> None:
-        """Says something at once."""
-        Progress(1, self.progress, self.name).note(text)
 
     @cached_property
     def schema(self) -> Schema:
@@ -115,7 +115,7 @@ class Loop:
 
     The workers of the task's cluster do so, where anything is `to_do`, or threads here. How the rows are cut may be
     settled already (`partition`), and some cells may be known (`reused`). Until `stack` ends, Ctrl-C and SIGTERM are
-    held back.
+    to be held back.
     """
 
     def __init__(
@@ -126,10 +126,11 @@ class Loop:
         to_do: bool = True,
         sampled: bool = True,
         reused: Reused | Precomputed | None = None,
+        hold: bool = True,
     ) -> None:
         self.task, self._reused, study = task, reused, task.study
         self.began, self._failed, self.progress = _now(), 0, Progress(1, False)
-        self._check_signals = stack.enter_context(signals_held())
+        self._check_signals = stack.enter_context(signals_held()) if hold else lambda: None
         self._cluster: Cluster | None = None
         if task.cluster is not None and to_do:
             try:
@@ -137,18 +138,18 @@ class Loop:
             except ImportError:
                 raise missing("a cluster needs distributed", "cluster") from None
             self._cluster = stack.enter_context(Cluster(task.cluster, task.note))
-        self._processes = Processes(study, task.limit) if task.isolate else None
+        self.processes = Processes(study, task.limit) if task.isolate else None
         self._threads = ThreadPoolExecutor(task.cores)
         stack.callback(self._close)
-        sample = self._sample() if to_do and sampled else UNSAMPLED
+        self.sample = self._sample() if to_do and sampled else UNSAMPLED
         # a block of a cluster takes so long that the scheduler's millisecond is nothing
         least = 0.0 if self._cluster is None else 0.5
-        self.blocks = Blocks(study, partition or cut(study, self._crew, sample, task.block_cells, least))
-        self._weights = sample.weights(self.blocks.partition, self.blocks.rows.first)
+        self.blocks = Blocks(study, partition or cut(study, self._crew, self.sample, task.block_cells, least))
+        self._weights = self.sample.weights(self.blocks.partition, self.blocks.rows.first)
 
     def _sample(self) -> Sample:
         """The sample, taken in a thread, so that Ctrl-C and the time to stop are seen while a kernel is compiled."""
-        study, apart, note = self.task.study, self._processes, self.task.note
+        study, apart, note = self.task.study, self.processes, self.task.note
         sample = self._threads.submit(lambda: sampled_study(study, note) if apart is None else apart.sampled(note))
         try:
             # it gives blocks a size by which the run is continued, so it has a second although the time is up
@@ -200,9 +201,9 @@ class Loop:
             "begin", kernel=study.kernel_name, cells=done, of=total, cores=task.cores, process=os.getpid(),
             machine=machine.node, versions=versions,
         )  # fmt: skip
-        bench = Bench(study, self.blocks, sink, self._processes)
+        bench = Bench(study, self.blocks, sink, self.processes)
         if cluster is not None:
-            isolated = None if self._processes is None else (self._processes.limit, self._processes.cost)
+            isolated = None if self.processes is None else (self.processes.limit, self.processes.cost)
             words = study.to_json(), dict(task.fingerprint), self.blocks.partition
             cluster.begin(*words, shared if known is None else None, isolated)
         queue, under_way = deque(from_everywhere(jobs)), set[Future[Done]]()
@@ -249,16 +250,16 @@ class Loop:
         """Lets what is computed here end within a second or so; then its process is killed, or its thread given up."""
         self._threads.shutdown(wait=False, cancel_futures=True)
         computing = [future for future in futures if not future.cancel()]
-        if wait(computing, 1.3).not_done and self._processes is not None:
-            self._processes.end()
+        if wait(computing, 1.3).not_done and self.processes is not None:
+            self.processes.end()
         if wait(computing, 0.3).not_done:
             endless.set()
 
     def _close(self) -> None:
         """Ends the progress line, all threads that can be ended, and all processes."""
         self._threads.shutdown(wait=False)
-        if self._processes is not None:
-            self._processes.end()
+        if self.processes is not None:
+            self.processes.end()
         self.progress.stop()
 
     def _check(self) -> None:
