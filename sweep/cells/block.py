@@ -21,7 +21,7 @@ from sweep.cells.partition import Partition, boxes, row_blocks
 from sweep.cells.reduce import Reducer, part_columns, seconds_a_cell
 from sweep.cells.schema import cells_of, columns
 from sweep.cells.solve import NONE, Solver
-from sweep.cells.timing import LANES, Sample, block_cells, compiling_told, take_sample, tolerated, work_clock
+from sweep.cells.timing import LANES, Sample, block_cells, take_sample, tolerated, work_clock
 from sweep.errors import SweepError
 
 if TYPE_CHECKING:
@@ -80,14 +80,13 @@ def cut(study: Study, workers: int, sample: Sample, wanted: int | None = None, l
     return boxes(shape, math.ceil(wanted / rows.mean), lanes)
 
 
-def sampled_study(study: Study, note: Callable[[str], None] = lambda text: None) -> Sample:
-    """Compiles the kernel, which is noted, and times a sample of the grid. Raises SweepError where it always fails."""
-    with compiling_told(study.kernel_name, note):
-        return sampled_by(Solver(study), study, work_clock)
+def sampled_study(study: Study, apart: SolveCells | None = None, clock: Callable[[], float] | None = None) -> Sample:
+    """Compiles the kernel and times a sample of the grid, here or `apart`, by a clock of its own.
 
-
-def sampled_by(solver: SolveCells, study: Study, clock: Callable[[], float]) -> Sample:
-    """A timed sample of the grid, by the seconds of a clock. Raises SweepError where the kernel always fails."""
+    Raises SweepError where the kernel always fails.
+    """
+    solver, clock = apart or Solver(study), clock or work_clock
+    clock()  # it counts what is compiled from now on
     with faults_reported(f"{study.kernel_name}: the kernel failed"):
         warm(solver, study)
         sample = take_sample(solver, columns(study), Grid(study).size, clock)

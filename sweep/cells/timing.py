@@ -1,7 +1,7 @@
 """A timed sample spread over the grid, and blocks of a size that follows from it.
 
-A function of columns is compiled when it is called first, which takes seconds: it is told while it lasts, and does not
-count. How long numba compiles, numba itself tells.
+A function of columns is compiled when it is called first, which takes seconds and does not count. How long numba
+compiles, numba itself tells.
 """
 
 from __future__ import annotations
@@ -46,8 +46,6 @@ LEAST_BLOCKS = 8
 BLOCK_BYTES, MOST_BLOCKS = 8 << 20, 100_000
 GOLDEN = 0.6180339887498949
 """Multiples of it, modulo 1, fill an interval evenly and fall into step with the length of no axis."""
-SILENT_SECONDS = 1.0
-"""What is compiled in less time is not told."""
 
 
 @dataclass(frozen=True)
@@ -202,24 +200,3 @@ class WorkClock:
 
 work_clock = WorkClock()
 """That of this process."""
-
-
-@contextlib.contextmanager
-def compiling_told(
-    name: str, note: Callable[[str], None], compiles: Callable[[], bool] = lambda: bool(work_clock.flag.value)
-) -> Iterator[None]:
-    """Notes that a kernel is compiled, once, where that takes long; `compiles` says whether it is now."""
-    work_clock()  # which is watched from now on
-    done = threading.Event()
-
-    def tell() -> None:
-        while not done.wait(SILENT_SECONDS):
-            if compiles():
-                note(f"compiling {name} ...")
-                return
-
-    threading.Thread(target=tell, daemon=True).start()
-    try:
-        yield
-    finally:
-        done.set()

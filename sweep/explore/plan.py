@@ -18,11 +18,11 @@ from sweep.cells.block import Guard, faults_reported
 from sweep.cells.grid import Grid, SolveCells, empty_cells
 from sweep.cells.reduce import strip_bytes
 from sweep.cells.solve import Solver
-from sweep.cells.timing import SILENT_SECONDS, tolerated, work_clock
+from sweep.cells.timing import tolerated, work_clock
 from sweep.explore.scaling import scaling
 from sweep.file.frame import cuts_of, expected_size
 from sweep.file.open import memory
-from sweep.runs.loop import Loop, Task
+from sweep.runs.loop import SILENT_SECONDS, Loop, Task
 from sweep.study.model import Study
 from sweep.study.read import Given
 from sweep.study.read import study as as_study

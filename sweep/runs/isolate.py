@@ -15,18 +15,17 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable
 from multiprocessing import forkserver
 from multiprocessing.connection import wait
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from sweep.cells.block import Unsolved, sampled_by, told
+from sweep.cells.block import Unsolved, sampled_study, told
 from sweep.cells.grid import Cells, Grid
 from sweep.cells.schema import cells_of, columns
 from sweep.cells.solve import Solver
-from sweep.cells.timing import Sample, compiling_told, work_clock
+from sweep.cells.timing import Sample, work_clock
 from sweep.errors import SweepError
 from sweep.study.model import Study
 
@@ -58,13 +57,16 @@ class Processes:
         self._over, self._sampling, self._alone = False, False, threading.Lock()
         self._all, self._idle = set[Any](), list[Any]()
 
-    def sampled(self, note: Callable[[str], None]) -> Sample:
+    def sampled(self) -> Sample:
         """A timed sample, as `sampled_study` takes it."""
         self._sampling = True
-        with compiling_told(self.study.kernel_name, note, lambda: any(p.compiling.value for p in list(self._all))):
-            found = sampled_by(self, self.study, lambda: self.seconds)
+        found = sampled_study(self.study, self, lambda: self.seconds)
         self._sampling = False
         return found
+
+    def compiles(self) -> bool:
+        """Whether one of them compiles now."""
+        return any(process.compiling.value for process in list(self._all))
 
     def solve(self, start: int, cells: Cells, wanted: Any = None) -> None:
         """As `Solver.solve`. Raises Unsolved where the kernel raises, dies or takes too long; SweepError at the end.

@@ -24,7 +24,7 @@ from sweep.cells.partition import Partition
 from sweep.cells.reduce import output_schema
 from sweep.cells.sample import require_asked
 from sweep.cells.schema import Schema
-from sweep.cells.timing import UNSAMPLED, Sample
+from sweep.cells.timing import UNSAMPLED, Sample, work_clock
 from sweep.errors import SweepError, missing
 from sweep.runs.extend import Precomputed, Reused
 from sweep.runs.isolate import Processes
@@ -39,6 +39,8 @@ if TYPE_CHECKING:
 
 TICK = 0.2
 """Seconds after which progress is told even if nothing has finished."""
+SILENT_SECONDS = 1.0
+"""What is compiled in less time is not told."""
 MOST_TOLD = 1000
 """Cells that FAILED which are told one by one."""
 
@@ -148,14 +150,19 @@ class Loop:
         self._weights = self.sample.weights(self.blocks.partition, self.blocks.rows.first)
 
     def _sample(self) -> Sample:
-        """The sample, taken in a thread, so that Ctrl-C and the time to stop are seen while a kernel is compiled."""
-        study, apart, note = self.task.study, self.processes, self.task.note
-        sample = self._threads.submit(lambda: sampled_study(study, note) if apart is None else apart.sampled(note))
+        """The sample, taken in a thread, so that Ctrl-C and the time to stop are seen while a kernel is compiled.
+
+        That is said. The sample gives blocks a size by which the run is continued, so it has a second in any case.
+        """
+        study, apart, said = self.task.study, self.processes, False
+        sample = self._threads.submit(lambda: sampled_study(study) if apart is None else apart.sampled())
         try:
-            # it gives blocks a size by which the run is continued, so it has a second although the time is up
-            wait([sample], 1.0)
+            wait([sample], SILENT_SECONDS)
             while not sample.done():
                 self._check()
+                if not said and (work_clock.flag.value if apart is None else apart.compiles()):
+                    self.task.note(f"compiling {study.kernel_name} ...")
+                    said = True
                 wait([sample], TICK)
             return sample.result()
         except BaseException:
@@ -240,8 +247,8 @@ class Loop:
         for cell in done.bad:
             self._failed += 1
             if self._failed <= MOST_TOLD:
-                log(str(cell), "failed", cell=cell.cell, values=dict(cell.values), reason=cell.reason)
-                self.progress.tell(str(cell))
+                fields = {"cell": cell.cell, "values": dict(cell.values), "reason": cell.reason}
+                self.progress.note(str(cell), "failed", **fields)
             elif self._failed == MOST_TOLD + 1:
                 self.progress.note("more cells FAILED; from here on they are counted only")
         self.progress.add(self._cells(done.block), self._weights[done.block], done.seconds)

@@ -109,13 +109,13 @@ class Progress:
         if due or self._live:
             self._show(self.line())
 
-    def note(self, text: str) -> None:
+    def note(self, text: str, event: str = "note", **fields: Any) -> None:
         """Says something out of turn."""
-        log(text)
-        self.tell(text)
+        log(text, event, **fields)
+        self._tell(text)
 
-    def tell(self, text: str) -> None:
-        """The same, but not in the log. A reader who has gone, or a full disk, does not stop the run."""
+    def _tell(self, text: str) -> None:
+        """Writes a line that is not in the log. A reader who has gone, or a full disk, does not stop the run."""
         if self._bar is not None:
             self._bar.clear()
         if self._stream is not None:
@@ -159,7 +159,7 @@ class Progress:
     def _show(self, text: str) -> None:
         self._shown = True
         if not self._live:
-            self.tell(text)
+            self._tell(text)
             return
         if self._bar is None:
             with warnings.catch_warnings():

@@ -9,8 +9,8 @@ import pytest
 from toy_studies import build
 
 import sweep
-from sweep.cells import timing
 from sweep.cells.timing import work_clock
+from sweep.runs import loop
 
 pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="plain Python compiles nothing")
 
@@ -28,7 +28,7 @@ def slow_to_compile():
 
 
 def test_compiling_is_told_once_while_it_lasts(monkeypatch):
-    monkeypatch.setattr(timing, "SILENT_SECONDS", 0.05)
+    monkeypatch.setattr(loop, "SILENT_SECONDS", 0.05)
     log = io.StringIO()
     sweep.run(slow_to_compile(), progress=log)
     assert log.getvalue().count("compiling toy:KERNEL ...\n") == 1
