@@ -16,7 +16,7 @@ _MODULES = {
     "solver": "explore.solver",
     "work_precision": "explore.work_precision",
     "open_result": "file.open",
-    "verify": "file.verify",
+    "verify": "file.open",
     "fit_correction": "laws.lines",
     "fit_collapse": "laws.collapse",
     "compare_laws": "laws.two_laws",

@@ -11,7 +11,7 @@ from sweep.explore.sensitivity import sensitivity as sensitivity
 from sweep.explore.solver import solver as solver
 from sweep.explore.work_precision import work_precision as work_precision
 from sweep.file.open import open_result as open_result
-from sweep.file.verify import verify as verify
+from sweep.file.open import verify as verify
 from sweep.laws.collapse import fit_collapse as fit_collapse
 from sweep.laws.exponents import exponent_map as exponent_map
 from sweep.laws.exponents import local_exponent as local_exponent

@@ -27,7 +27,7 @@ from sweep.file import disk
 from sweep.file.open import open_result
 from sweep.file.reading import StoredFile
 from sweep.file.store import Store, lock_of, unfinished_of
-from sweep.file.verify import verify
+from sweep.file.open import verify
 from sweep.runs.run import run
 
 KINDS = ("plain", "extend", "summary", "refine")

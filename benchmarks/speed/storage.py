@@ -174,7 +174,7 @@ def unchecked(file: StoredFile) -> None:
     table = file.tables["cells"]
     bounds = [table.blocks.bounds(block) for block in range(table.blocks.count)]
     for column in table.columns:
-        numbers = column.empty(table.blocks.size)
+        numbers = np.empty((table.blocks.size, *column.own), column.dtype)
         for block, found in enumerate(bounds):
             disk.read_all(file.fd, (numbers[slice(*found)],), int(column.at[block]))
 

@@ -94,9 +94,10 @@ def _computed(arguments: argparse.Namespace, study: Study, target: Path) -> Outc
 
         result: xr.Dataset | StoredFile = StoredFile(target)
     else:
-        from sweep.file.open import open_result, open_unfinished
+        from sweep.file.open import open_result
+        from sweep.file.store import unfinished_of
 
-        result = open_unfinished(target) if ending == "unfinished" else open_result(target)
+        result = open_result(unfinished_of(target) if ending == "unfinished" else target)
     with result as found:
         text = f"{target}: {'' if ending == 'complete' else f'{ending}; '}{summary_text(found)}"
         failed = account(found).failed

@@ -11,7 +11,7 @@ import errno
 import fcntl
 import os
 import shutil
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ from sweep.errors import SweepError
 
 NO_SUCH_CALL = (errno.EINVAL, errno.EOPNOTSUPP, errno.ENOSYS)
 """What a file system says that cannot reserve space."""
+FULL = (errno.ENOSPC, errno.EDQUOT)
 
 
 def open_file(path: Path | str, flags: int) -> int:
@@ -78,7 +79,7 @@ def read_all(fd: int, buffers: Sequence[Any], offset: int) -> None:
     _through(os.preadv, fd, buffers, offset)
 
 
-def _through(call: Any, fd: int, pieces: Sequence[Any], offset: int) -> None:
+def _through(call: Callable[..., int], fd: int, pieces: Sequence[Any], offset: int) -> None:
     left = [view for piece in pieces if (view := as_bytes(piece))]
     while left:
         count = call(fd, [*left], offset)
@@ -97,6 +98,12 @@ def as_bytes(piece: Any) -> memoryview:
     return view.cast("B") if view.nbytes else memoryview(b"")
 
 
+def sync_tree(path: Path) -> None:
+    """Returns when a file, or a folder and all that is in it, is on the disk. Raises OSError."""
+    for inner in (*path.rglob("*"), path):
+        sync_folder(inner)
+
+
 def sync_folder(path: Path) -> None:
     """Returns when the names in a folder, or the bytes of a file, are on the disk. Raises OSError."""
     fd = open_file(path, os.O_RDONLY)
@@ -106,52 +113,50 @@ def sync_folder(path: Path) -> None:
         os.close(fd)
 
 
-def sync_tree(path: Path) -> None:
-    """Returns when a file, or a folder and all that is in it, is on the disk. Raises OSError."""
-    for inner in path.iterdir() if path.is_dir() else ():
-        sync_tree(inner)
-    sync_folder(path)
+@contextlib.contextmanager
+def replacing(target: Path) -> Iterator[Path]:
+    """As `made`, for this process alone. Raises SweepError where the system refuses, or another process writes it."""
+    with refusing(target), locked(target.with_name(f".{target.name}.lock")) as ours:
+        if not ours:
+            raise SweepError(f"{target}: is being written by another process")
+        with made(target) as part:
+            yield part
 
 
 @contextlib.contextmanager
-def replacing(target: Path) -> Iterator[Path]:
+def made(target: Path) -> Iterator[Path]:
     """A file beside `target` to write to, or to put a folder at; synced, it takes the place of `target` at the end.
 
-    Raises SweepError where the system refuses, or another process writes it; what was there before then stays.
+    Raises OSError, and what was there before stays.
     """
-    part, lock = (target.with_name(f".{target.name}.{end}") for end in ("tmp", "lock"))
+    part, old = part_of(target), target.with_name(f".{target.name}.old")
+    discard(part)  # what one has left that was killed
     try:
-        with locked(lock) as ours, contextlib.ExitStack() as stack:
-            if not ours:
-                raise SweepError(f"{target}: is being written by another process")
-            _discard(part)  # what one has left that was killed
-            stack.callback(_discard, part)
-            part.touch()  # says in plain words that there is no such folder, or no permission
-            yield part
-            sync_tree(part)
-            _renamed(part, target)
-            sync_folder(target.parent)
-    except OSError as fault:
-        raise SweepError(f"{target} cannot be written: {fault.strerror or fault}") from None
+        part.touch()  # says in plain words that there is no such folder, or no permission
+        yield part
+        sync_tree(part)
+        # a folder cannot be replaced in one step, and stands aside meanwhile
+        if aside := target.exists() and (target.is_dir() or part.is_dir()):
+            discard(old)
+            rename(target, old)
+        try:
+            rename(part, target)
+        except OSError:
+            if aside:
+                rename(old, target)
+            raise
+        discard(old)
+        sync_folder(target.parent)
+    finally:
+        discard(part)
 
 
-def _renamed(part: Path, target: Path) -> None:
-    """Puts `part` at the place of `target`; a folder, which cannot be replaced in one step, stands aside meanwhile."""
-    old = target.with_name(f".{target.name}.old")
-    aside = target.exists() and (target.is_dir() or part.is_dir())
-    if aside:
-        _discard(old)
-        rename(target, old)
-    try:
-        rename(part, target)
-    except OSError:
-        if aside:
-            rename(old, target)
-        raise
-    _discard(old)
+def part_of(target: Path) -> Path:
+    """Where it is written before it takes its place."""
+    return target.with_name(f".{target.name}.tmp")
 
 
-def _discard(path: Path) -> None:
+def discard(path: Path) -> None:
     """Removes a file or a folder, if it is there."""
     if path.is_dir() and not path.is_symlink():
         shutil.rmtree(path, ignore_errors=True)
@@ -165,20 +170,19 @@ def locked(path: Path) -> Iterator[bool]:
 
     The file of that name is removed at the end. Raises OSError.
     """
-    fd, ours = open_file(path, os.O_CREAT | os.O_RDWR), False
-    try:
+    # closed also at Ctrl-C, or this process would hold the lock for ever
+    with os.fdopen(open_file(path, os.O_CREAT | os.O_RDWR)) as file:
+        ours = False
         # who held it may have removed the file meanwhile
         with contextlib.suppress(BlockingIOError, FileNotFoundError):
-            fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            ours = path.stat().st_ino == os.fstat(fd).st_ino
-        yield ours
-    finally:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            ours = path.stat().st_ino == os.fstat(file.fileno()).st_ino
         try:
-            if ours:
-                with contextlib.suppress(OSError):
+            yield ours
+        finally:
+            with contextlib.suppress(OSError):
+                if ours:
                     remove(path)
-        finally:  # also at Ctrl-C, or this process would hold the lock for ever
-            os.close(fd)
 
 
 def mark(path: Path) -> tuple[int, ...]:
@@ -201,19 +205,13 @@ def check_target(target: Path, *, force: bool = False, read: Sequence[Path] = ()
         )
 
 
-def free(path: Path) -> int:
-    """Bytes that are free in a folder. Raises OSError."""
-    return shutil.disk_usage(path).free
-
-
 @contextlib.contextmanager
 def refusing(path: Path) -> Iterator[None]:
     """What the system refuses is a SweepError of one line."""
     try:
         yield
     except OSError as fault:
-        if fault.errno in (errno.ENOSPC, errno.EDQUOT):
-            what = "the disk is full; free some space, then run the same command again to continue"
-        else:
-            what = f"cannot be written ({fault.strerror or str(fault).splitlines()[0]})"
-        raise SweepError(f"{path}: {what}") from fault
+        more = "; free some space, then run the same command again" if fault.errno in FULL else ""
+        raise SweepError(
+            f"{path}: cannot be written ({fault.strerror or str(fault).splitlines()[0]}){more}"
+        ) from fault

@@ -14,9 +14,8 @@ import json
 import math
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -25,8 +24,7 @@ from sweep.cells.partition import Partition, box_shape, boxes, row_blocks
 from sweep.cells.reduce import part_columns
 from sweep.cells.schema import STATUS, Column, Schema
 from sweep.file import disk
-from sweep.file.fletcher import checksum
-from sweep.file.reading import BYTES, FORMAT, StoredFile, digest_before
+from sweep.file.reading import BYTES, FORMAT, checksum, digest_before
 from sweep.study.model import ARRAY
 
 if TYPE_CHECKING:
@@ -50,17 +48,12 @@ GROUPS = {"cells": "", "rows": "rows/", "ending": "integrity/"}
 """Where the columns of each table stand."""
 
 
-@dataclass(frozen=True)
-class Cut:
+class Cut(NamedTuple):
     """Columns, the grid in which their cells stand, and how it is cut."""
 
     columns: tuple[Column, ...]
     grid: tuple[int, ...]
     blocks: Partition
-
-    def chunk(self, column: Column) -> tuple[int, ...]:
-        """Lengths of a chunk of a column; () of a single number."""
-        return (*box_shape(self.grid, self.blocks.cells), *column.shape)
 
 
 def cuts_of(study: Study, schema: Schema, blocks: Partition) -> dict[str, Cut]:
@@ -82,25 +75,22 @@ def expected_size(schema: Schema, cuts: Mapping[str, Cut]) -> int:
     return TEXT_BYTES + coordinates + numbers
 
 
-def create(path: Path, schema: Schema, cuts: Mapping[str, Cut], shared: bool = False) -> StoredFile:
-    """Makes a result of which nothing is computed yet, with room on the disk for all of it. Raises OSError.
+def create(path: Path, schema: Schema, cuts: Mapping[str, Cut], shared: bool = False) -> None:
+    """Writes a result of which nothing is computed yet, with room for all of it. Raises OSError.
 
     Of the output's `schema`, with tables as `cuts_of` gives them; `shared`, where several machines may write.
     """
     with _Skeleton(disk.open_file(path, os.O_CREAT | os.O_TRUNC | os.O_RDWR), "r+") as skeleton:
+        key_at, fd = 0, skeleton.fileno()
         try:
-            _lay_out(skeleton, schema, cuts, PAGE if shared else WORTH_A_PAGE)
+            key_at = _lay_out(skeleton, schema, cuts, PAGE if shared else WORTH_A_PAGE)
         except Exception:
             if not skeleton.refused:
                 raise
         if skeleton.refused:
             raise OSError(skeleton.refused, os.strerror(skeleton.refused))
-        disk.reserve(skeleton.fileno(), skeleton.seek(0, os.SEEK_END))
-    file = StoredFile(path, os.O_RDWR)
-    file.key = digest_before(file.fd, file.key_at)
-    disk.write_all(file.fd, (file.key,), file.key_at)
-    disk.fsync(file.fd)
-    return file
+        disk.reserve(fd, skeleton.seek(0, os.SEEK_END))
+        disk.write_all(fd, (digest_before(fd, key_at),), key_at)
 
 
 class _Skeleton(io.FileIO):
@@ -127,8 +117,11 @@ class _Skeleton(io.FileIO):
         return size
 
 
-def _lay_out(skeleton: _Skeleton, schema: Schema, cuts: Mapping[str, Cut], aligned: int) -> None:
-    """Has HDF5 write all that is no number, and then find a place for each; objects of so many bytes are aligned."""
+def _lay_out(skeleton: _Skeleton, schema: Schema, cuts: Mapping[str, Cut], aligned: int) -> int:
+    """Has HDF5 write all that is no number, and then find a place for each, that of the key first, which is returned.
+
+    Objects of so many bytes are aligned.
+    """
     import h5py
     from h5py import h5f, h5fd, h5p
 
@@ -143,21 +136,19 @@ def _lay_out(skeleton: _Skeleton, schema: Schema, cuts: Mapping[str, Cut], align
     made.set_attr_creation_order(h5p.CRT_ORDER_TRACKED | h5p.CRT_ORDER_INDEXED)
     made.set_link_creation_order(h5p.CRT_ORDER_TRACKED | h5p.CRT_ORDER_INDEXED)
     with h5py.File(h5f.create(b"result", h5f.ACC_TRUNC, made, access)) as file:
-        dims = _write_variables(file, schema, cuts["cells"])
-        tables: dict[str, dict[str, Any]] = {}
+        dims, tables = _write_variables(file, schema, cuts["cells"]), dict[str, dict[str, Any]]()
         for name, cut in cuts.items():
-            paths = [GROUPS[name] + column.name for column in cut.columns]
-            blocks = (cut.blocks.size, cut.blocks.cells, cut.blocks.row)
-            tables[name] = {"grid": cut.grid, "blocks": blocks, "paths": paths}
             for column in cut.columns if name != "cells" else ():
                 shape = (*cut.grid, *column.shape)
-                _make(file.require_group(GROUPS[name]), column.name, shape, column.dtype, cut.chunk(column))
+                file.create_dataset(GROUPS[name] + column.name, shape, column.dtype, **_chunked(cut, column))
+            blocks = (cut.blocks.size, cut.blocks.cells, cut.blocks.row)
+            tables[name] = {"grid": cut.grid, "blocks": blocks, "paths": [GROUPS[name] + c.name for c in cut.columns]}
         integrity = file["integrity"]
-        _say(integrity, {"format": FORMAT, "contents": json.dumps({"tables": tables, "dims": dims})})
+        _say(integrity.attrs, {"format": FORMAT, "contents": json.dumps({"tables": tables, "dims": dims})})
         shapes: dict[str, tuple[int, ...]] = {"key": (BYTES,)}
         shapes |= {f"{name}_digests": (cut.blocks.count, len(cut.columns), BYTES) for name, cut in cuts.items()}
         pieces = [integrity.create_dataset(name, shape, "u1") for name, shape in shapes.items()]
-        # from here on nothing is made, and places alone are found, that of the key first
+        # from here on nothing is made, and places alone are found
         file.flush()
         for data in pieces:
             data[...] = np.zeros(data.shape, "u1")
@@ -170,88 +161,71 @@ def _lay_out(skeleton: _Skeleton, schema: Schema, cuts: Mapping[str, Cut], align
             first = np.full(data.chunks, data.fillvalue, data.dtype).tobytes()
             skeleton.chunk = len(first) + len(WRONG)
             data.id.write_direct_chunk((0,) * data.ndim, first + checksum(first, len(first)))
+        return int(pieces[0].id.get_offset())
 
 
 def _write_variables(file: Any, schema: Schema, cut: Cut) -> dict[str, tuple[str, ...]]:
     """Dimensions, coordinates and columns as netCDF4 and xarray know them; gives the dimensions of each variable."""
-    sizes = dict(schema.sizes)
-    variables: list[tuple[str, tuple[str, ...], Any, Mapping[str, Any]]] = []  # and their numbers, or how to make them
-    for c in schema.coordinates:
-        values, over, attrs = np.asarray(c.values), c.dims, c.attrs
-        if values.dtype.kind == "U":  # as characters
-            texts = np.array([word.encode() for word in values.ravel()])
-            values = texts.view("S1").reshape(*values.shape, texts.dtype.itemsize)
-            over, attrs = (*over, f"string{texts.dtype.itemsize}"), {**attrs, "_Encoding": "utf-8"}
-            sizes[over[-1]] = texts.dtype.itemsize
-        variables.append((c.name, over, values, attrs))
-    own = {name for name, over, *_ in variables if over[:1] == (name,)}
-    for dim in (dim for dim in sizes if dim not in own):
-        variables.append((dim, (dim,), None, {}))
-    for column in schema.columns:
-        over = (*schema.grid.dims, *column.dims)
-        # xarray's way to mark what belongs to the coordinates of a variable, and of all
-        beside = [c.name for c in schema.coordinates if c.dims != (c.name,) and set(c.dims) <= set(over)]
-        variables.append((column.name, over, column, {**column.attrs, **_listed(beside)}))
-    away = [c.name for c in schema.coordinates if c.dims and not set(c.dims) & {c.name, *schema.grid.dims}]
-    study = schema.attrs["study_json"]
-    for c in schema.coordinates:
-        if np.asarray(c.values).nbytes >= LONG:  # the study refers to it
-            study = study.replace(ARRAY % c.values.tobytes().hex(), ARRAY % f"@{c.name}")
-    _say(file, {**schema.attrs, "study_json": study, **_listed(away)})
-    for name, over, what, attrs in sorted(variables, key=lambda found: found[1][:1] != (found[0],)):
-        if isinstance(what, Column):
-            data = _make(file, name, schema.shape(what), what.dtype, cut.chunk(what))
-        elif what is None:
-            data = _make(file, name, (sizes[name],), ">f4", ())
-        else:
-            data = _make(file, name, what.shape, what.dtype, what.shape or None)
-            data[...] = what
-        _say(data, attrs)
-        if over[:1] == (name,):
-            unnamed = f"This is a netCDF dimension but not a netCDF variable.{sizes[name]:10}"
-            data.make_scale(unnamed if what is None else name)
-            numbers = [np.int32(list(sizes).index(dim)) for dim in over]
-            data.attrs["_Netcdf4Dimid"] = numbers[0]
-            if len(over) > 1:
-                data.attrs["_Netcdf4Coordinates"] = np.array(numbers)
-        else:
-            for place, dim in enumerate(over):
-                data.dims[place].attach_scale(file[dim])
-    dims = {c.name: c.dims for c in schema.coordinates}
-    return dims | {c.name: (*schema.grid.dims, *c.dims) for c in schema.columns}
+    import h5netcdf
+
+    dims, study = dict[str, tuple[str, ...]](), schema.attrs["study_json"]
+    with h5netcdf.File(file, "r+") as netcdf:
+        netcdf.dimensions = schema.sizes
+        for c in schema.coordinates:
+            values, over, attrs, dims[c.name] = np.asarray(c.values), c.dims, c.attrs, c.dims
+            if values.nbytes >= LONG:  # the study refers to it
+                study = study.replace(ARRAY % c.values.tobytes().hex(), ARRAY % f"@{c.name}")
+            if values.dtype.kind == "U":  # as characters
+                texts = np.array([word.encode() for word in values.ravel()])
+                values = texts.view("S1").reshape(*values.shape, texts.dtype.itemsize)
+                over, attrs = (*over, f"{c.name}_letters"), {**attrs, "_Encoding": "utf-8"}
+                netcdf.dimensions[over[-1]] = texts.dtype.itemsize
+            variable = netcdf.create_variable(c.name, over, values.dtype, values, **_whole(values.shape))
+            _say(variable.attrs, attrs)
+        for column in schema.columns:
+            over = dims[column.name] = (*schema.grid.dims, *column.dims)
+            # xarray's way to mark what belongs to the coordinates of a variable, and of all
+            beside = [c.name for c in schema.coordinates if c.dims != (c.name,) and set(c.dims) <= set(over)]
+            variable = netcdf.create_variable(column.name, over, column.dtype, **_chunked(cut, column))
+            _say(variable.attrs, column.attrs, beside)
+        away = [c.name for c in schema.coordinates if c.dims and not set(c.dims) & {c.name, *schema.grid.dims}]
+        _say(netcdf.attrs, {**schema.attrs, "study_json": study}, away)
+    return dims
 
 
-def _listed(names: list[str]) -> dict[str, str]:
-    return {"coordinates": " ".join(names)} if names else {}
-
-
-def _make(group: Any, name: str, shape: tuple[int, ...], dtype: Any, chunk: tuple[int, ...] | None) -> Any:
-    """A dataset, in chunks with a checksum each; (): in one piece; None: in its object header."""
-    import h5py
+def _whole(shape: tuple[int, ...]) -> dict[str, Any]:
+    """How HDF5 keeps a coordinate: as one chunk with a checksum, a single number in its object header."""
     from h5py import h5d, h5p
 
     how = h5p.create(h5p.DATASET_CREATE)
     how.set_attr_phase_change(COMPACT, 0)
-    if chunk:
-        how.set_chunk(chunk)
-        how.set_fletcher32()
-        how.set_alloc_time(h5d.ALLOC_TIME_LATE)
-        how.set_fill_time(h5d.FILL_TIME_ALLOC if name == STATUS else h5d.FILL_TIME_NEVER)
-        if name == STATUS:
-            how.set_fill_value(np.array(Status.PENDING, dtype))
-    elif chunk is None:
+    if not shape:
         how.set_layout(h5d.COMPACT)
-    space = h5py.h5s.create_simple(shape) if shape else h5py.h5s.create(h5py.h5s.SCALAR)
-    kind = h5py.h5t.py_create(np.dtype(dtype), logical=True)
-    return h5py.Dataset(h5d.create(group.id, name.encode(), kind, space, how))
+    return {"chunks": shape or None, "fletcher32": bool(shape), "dcpl": how}
 
 
-def _say(thing: Any, attrs: Mapping[str, Any]) -> None:
+def _chunked(cut: Cut, column: Column) -> dict[str, Any]:
+    """How HDF5 keeps a column: in chunks with a checksum each, a single number as it is; without any numbers yet."""
+    from h5py import h5d
+
+    found = _whole(chunk := (*box_shape(cut.grid, cut.blocks.cells), *column.shape))
+    how = found["dcpl"]
+    if not chunk:
+        how.set_layout(h5d.CONTIGUOUS)
+    how.set_alloc_time(h5d.ALLOC_TIME_LATE)
+    how.set_fill_time(h5d.FILL_TIME_NEVER)
+    if column.name == STATUS:
+        how.set_fill_time(h5d.FILL_TIME_ALLOC)
+        how.set_fill_value(np.array(Status.PENDING, column.dtype))
+    return found
+
+
+def _say(place: Any, attrs: Mapping[str, Any], beside: list[str] | None = None) -> None:
     """Attributes of a variable or a group; texts of a fixed length, which netCDF4 and MATLAB know, too."""
     import h5py
 
-    for name, value in attrs.items():
+    for name, value in {**attrs, **({"coordinates": " ".join(beside)} if beside else {})}.items():
         if isinstance(value, str):
             text = value.encode()
             value = np.array(text, h5py.string_dtype("utf-8", max(2, len(text))))
-        thing.attrs[name] = value
+        place[name] = value

@@ -1,16 +1,20 @@
-"""Results as xarray Datasets: of a finished sweep, of one that still runs, or exported to HDF5."""
+"""Results as Datasets, of a finished sweep or of one that still runs, and whether they are what was written."""
 
 from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from sweep.cells.schema import Schema
 from sweep.errors import SweepError
 from sweep.file import disk
+from sweep.file.reading import Damaged, StoredFile, Table
 from sweep.file.store import unfinished_of
 from sweep.words import as_path
 
@@ -19,6 +23,8 @@ if TYPE_CHECKING:
 
 MEMORY_SHARE = 0.25
 """Results larger than this share of the memory are opened in pieces (dask)."""
+MOST_TOLD = 8
+"""Findings of one kind that are told one by one."""
 
 
 def open_result(path: str | os.PathLike[str], strict: bool = False, *, chunks: Any = None) -> xr.Dataset:
@@ -49,29 +55,18 @@ def open_result(path: str | os.PathLike[str], strict: bool = False, *, chunks: A
     ...     print(found.period.equals(ds.period), found.period.units)
     True s
     """
-    output = as_path(path)
-    # a sweep that ends meanwhile puts its file in another place
-    for place in (output, unfinished_of(output), output):
-        with contextlib.suppress(FileNotFoundError, NotADirectoryError):
-            return _open(place, strict, chunks)
-    raise SweepError(f"{output}: no such file, nor a run that is writing it")
-
-
-def open_unfinished(path: str | os.PathLike[str]) -> xr.Dataset:
-    """What there is of an unfinished sweep, also where its output holds an earlier result. Raises SweepError."""
-    return _open(unfinished_of(Path(path)))
-
-
-def _open(place: Path, strict: bool = False, chunks: Any = None) -> xr.Dataset:
-    """A file, whether it is finished or not. Raises SweepError, and FileNotFoundError and its like."""
     import xarray as xr
 
     from sweep.file.columns import Result
 
-    _, size, _ = disk.mark(place) or (0, 0, 0)
-    if chunks is None and size > MEMORY_SHARE * memory():
-        chunks = "auto"
-    return xr.open_dataset(os.fspath(place), engine=Result, chunks=chunks, strict=strict)
+    output = as_path(path)
+    # a sweep that ends meanwhile puts its file in another place
+    for place in (output, unfinished_of(output), output):
+        size = place.stat().st_size if disk.mark(place) else 0
+        pieces = "auto" if chunks is None and size > MEMORY_SHARE * memory() else chunks
+        with contextlib.suppress(FileNotFoundError, NotADirectoryError):
+            return xr.open_dataset(os.fspath(place), engine=Result, chunks=pieces, strict=strict)
+    raise SweepError(f"{output}: no such file, nor a run that is writing it")
 
 
 def in_memory(plan: Schema, arrays: Mapping[str, Any]) -> xr.Dataset:
@@ -88,3 +83,101 @@ def in_memory(plan: Schema, arrays: Mapping[str, Any]) -> xr.Dataset:
 def memory() -> int:
     """Bytes of memory of this machine."""
     return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What was found; `str` of it is what `sweep verify` prints.
+
+    Attributes
+    ----------
+    whole : bool
+        Finished, and all that it says is as it was written.
+    findings : tuple of str
+        What is wrong or missing, a line each; none where it is whole.
+    blocks : tuple of int or None
+        Damaged blocks of a finished result that can be computed again; None where that would not mend it.
+    state : str
+        What it is called: "undamaged", "damaged", or "not complete" where nothing is wrong with what there is.
+    """
+
+    path: Path
+    state: str
+    checked: str
+    findings: tuple[str, ...]
+    blocks: tuple[int, ...] | None = None
+
+    @property
+    def whole(self) -> bool:
+        return not self.findings
+
+    def __str__(self) -> str:
+        return "\n  ".join([f"{self.path}: {self.state}; {self.checked}", *self.findings])
+
+    def require_whole(self) -> None:
+        """Raises SweepError where anything is wrong."""
+        if not self.whole:
+            cure = "\n  sweep run --repair computes damaged cells again, and nothing else"
+            raise SweepError(f"{self}{'' if self.blocks is None else cure}")
+
+
+def verify(path: str | os.PathLike[str]) -> Verdict:
+    """Check all checksums of a result, finished or not.
+
+    All numbers, and all that stands before its key, are read and compared with their digests; HDF5 has checked texts
+    and coordinates, and tables of places behind the key. Where nothing stands is not compared.
+
+    Raises
+    ------
+    SweepError
+        There is nothing to verify, or it cannot be read.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> ds = sweep.run(kernel="foliot", outputs=["period"], axes={"mu": [0.5, 1.0, 2.0]}, fixed={"phi0": 1.0, "a": 1.0})
+    >>> sweep.run(sweep.study(ds), "verified.h5").close()
+    >>> sweep.verify("verified.h5").whole
+    True
+    """
+    output = as_path(path)
+    place = output if disk.mark(output) else unfinished_of(output)
+    try:
+        with StoredFile(place) as file:
+            return _verdict(output, file)
+    except (FileNotFoundError, NotADirectoryError):
+        raise SweepError(f"{output}: no such file, nor a run that is writing it") from None
+    except Damaged as fault:
+        checked = "its structure is damaged, or it is not the result of a sweep"
+        return Verdict(output, "damaged", checked, (str(fault),))
+
+
+def _verdict(output: Path, file: StoredFile) -> Verdict:
+    """Compares all digests."""
+    mendable, work, lost, findings = file.is_as_made(), file.tables[file.work], set[int](), list[str]()
+    if not mendable:
+        findings.append("its structure is not as it was made: damaged, or changed by another program")
+    # the columns of a summary are made at its end
+    for table in dict.fromkeys((work, file.tables["cells"] if file.finished else work)):
+        there = range(table.blocks.count) if file.finished else np.flatnonzero(table.done).tolist()
+        for name, bad in table.damaged(there).items():
+            lost.update(bad if table is work else ())
+            findings += _lines(f"{name}: damaged between its cells {{:,}} and {{:,}}", table, bad)
+    state = "damaged" if findings else "undamaged" if file.finished else "not complete"
+    if file.finished:
+        blocks = tuple(sorted(lost)) if findings and mendable else None
+        return Verdict(output, state, f"{file.path.stat().st_size:,} bytes checked", tuple(findings), blocks)
+    missing = np.flatnonzero(~work.done).tolist()
+    checked = f"unfinished, {work.blocks.count - len(missing):,} of {work.blocks.count:,} blocks there and checked"
+    findings += _lines(f"missing: {file.work} {{:,}} to {{:,}}", work, missing)
+    findings = findings or ["all blocks are there, but it has not ended; run the sweep again to finish"]
+    return Verdict(output, state, checked, tuple(findings))
+
+
+def _lines(text: str, table: Table, blocks: list[int]) -> Iterator[str]:
+    """A line for each run of blocks, with its first cell and the last but one; of many, how many there are more."""
+    runs = np.split(np.array(blocks, np.int64), np.flatnonzero(np.diff(blocks) > 1) + 1) if blocks else []
+    for run in runs[:MOST_TOLD]:
+        yield text.format(*table.blocks.bounds(int(run[0]), int(run[-1]) + 1))
+    if len(runs) > MOST_TOLD:
+        yield f"{text.partition(':')[0]}: {len(runs) - MOST_TOLD:,} more places"

@@ -8,14 +8,13 @@ thread. A table in the file has a digest of each chunk, a row of them for each b
 
 from __future__ import annotations
 
-import errno
-import itertools
 import json
 import math
 import operator
 import os
 import struct
 from collections.abc import Iterable, Mapping
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -23,12 +22,12 @@ import numpy as np
 import xxhash
 
 from kernels.interface import Status
-from sweep.cells.partition import Partition, box_shape
+from sweep.cells.partition import Partition, box_shape, box_slices, row_blocks
+from sweep.cells.reduce import gathered, pending
 from sweep.cells.schema import METHOD_USED, STATUS, Coordinate
 from sweep.errors import SweepError
 from sweep.file import disk
-from sweep.file.fletcher import checksum
-from sweep.study.model import study_together
+from sweep.study.model import Study, study_together
 
 FORMAT = 6
 UNFINISHED = ".unfinished"
@@ -41,8 +40,12 @@ OF_NETCDF = {"CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_Netcdf4Coord
 """Attributes that say nothing to a user."""
 DAMAGE = (OSError, EOFError, LookupError, ValueError, TypeError, AttributeError, RuntimeError)
 """What comes of reading a damaged file."""
-OF_DAMAGE = (errno.EINVAL, errno.EOVERFLOW)
-"""What the system says where a damaged file sends one to a place that cannot be."""
+MODULUS = 65535
+ROW = 4096
+"""Words of a row of a checksum."""
+MOST_ROWS = 1 << 12
+"""Rows summed at a time, so that 32 bits hold each sum."""
+NUMBERS = np.arange(ROW, dtype=np.uint64)
 
 
 class Damaged(SweepError):
@@ -52,56 +55,65 @@ class Damaged(SweepError):
 class StoredFile:
     """A result of this program, open for reading, or for writing by other `flags`. To be used with `with`.
 
-    Of a column or a coordinate `file[name]` gives `dims`, `attrs`, and its numbers as `values` or by indices. `tables`
-    are "cells", the output's columns, of a summary "rows", which they are made of, and "ending"; `work` names the one
-    that is computed. `attrs` are those of the file, texts as str. `ending` is what is known at the end, empty before:
-    then what is missing is handed out as NaN and PENDING. `key`, the digest of all that stands before it, tells this
-    file from any other. Raises Damaged where it is none of ours, or damaged beside the numbers; FileNotFoundError or
-    NotADirectoryError where there is none; SweepError where it cannot be read, or is of another format.
+    It is `finished` where its name does not say otherwise; where it is not, what is missing is handed out as NaN and
+    PENDING. Of a column or a coordinate `file[name]` gives `dims`, `attrs`, and its numbers as `values` or by indices.
+    `tables` are "cells", the output's columns, of a summary "rows", which they are made of, and "ending", what is known
+    at the end; `work` names the one that is computed. `attrs` are those of the file and of its end, texts as str.
+    `key`, the digest of all that stands before it, tells this file from any other. Raises Damaged where it is none of
+    ours, or damaged beside the numbers; FileNotFoundError or NotADirectoryError where there is none; SweepError where
+    it cannot be read, or is of another format.
     """
 
     def __init__(self, path: Path, flags: int = os.O_RDONLY) -> None:
-        self.path, self.fd = Path(path), -1
-        try:
-            self.fd = disk.open_file(path, flags)
-            self._read()
-            if not self.ending and flags == os.O_RDONLY and self.path.suffix != UNFINISHED:
-                raise ValueError("what was written at its end is damaged")
-        except (FileNotFoundError, NotADirectoryError):
-            raise
-        except DAMAGE as fault:
-            self.close()
-            raise _refusal(self.path, fault) from fault
-
-    def _read(self) -> None:
-        """All but numbers, by HDF5, which checks that, whatever has the file's name by now. Raises one of DAMAGE."""
         import h5py
 
-        with os.fdopen(os.dup(self.fd), "rb", 0) as raw, h5py.File(raw, "r") as h5:
-            integrity = _own(h5, "integrity").attrs
-            if (number := integrity.get("format")) != FORMAT:
-                raise SweepError(
-                    f"{self.path}: a result of another format ({number}); this version of foliot reads format {FORMAT} "
-                    "alone; open it with the version that wrote it, or compute it again under another name"
-                )
-            contents = json.loads(integrity["contents"])
-            self.dims = {name: tuple(dims) for name, dims in contents["dims"].items()}
-            self.key_at = _own(h5, "integrity/key").id.get_offset()
-            self.key = read_bytes(self.fd, self.key_at, BYTES)
-            self.tables = {name: Table(self, h5, name, **keys) for name, keys in contents["tables"].items()}
-            self.coords = {}
-            for name in (name for name in self.dims if name not in self.columns()):
-                data = _own(h5, name)
-                attrs, values = _attrs(data), data[()]
-                if attrs.pop("_Encoding", None):
-                    values = np.char.decode(values.view(f"S{values.shape[-1]}")[..., 0], "utf-8")
-                self.coords[name] = Coordinate(name, self.dims[name], values, attrs)
-            attrs = _attrs(h5)
+        self.path, self.fd = Path(path), -1
+        self.finished = self.path.suffix != UNFINISHED
+        try:
+            self.fd = disk.open_file(path, flags)
+        except (FileNotFoundError, NotADirectoryError):
+            raise
+        except OSError as fault:
+            raise SweepError(f"{path}: cannot be read ({fault.strerror})") from fault
+        try:
+            # whatever has the file's name by now
+            with os.fdopen(os.dup(self.fd), "rb", 0) as raw, h5py.File(raw, "r") as h5:
+                self._read(h5)
+        except DAMAGE as fault:
+            self.close()
+            reason = (str(fault).splitlines() or [type(fault).__name__])[0]
+            raise Damaged(
+                f"{path}: not the result of a sweep (exports are for xarray and other programs), or damaged ({reason}); "
+                "move it away or choose another name"
+            ) from fault
+
+    def _read(self, h5: Any) -> None:
+        """All but numbers. Raises one of DAMAGE."""
+        integrity = _own(h5, "integrity").attrs
+        if (number := integrity.get("format")) != FORMAT:
+            raise SweepError(
+                f"{self.path}: a result of another format ({number}); this version of foliot reads format {FORMAT} "
+                "alone; open it with the version that wrote it, or compute it again under another name"
+            )
+        contents, self.coords = json.loads(integrity["contents"]), dict[str, Coordinate]()
+        self.dims = {name: tuple(dims) for name, dims in contents["dims"].items()}
+        self.key_at = _own(h5, "integrity/key").id.get_offset()
+        self.key = read_bytes(self.fd, self.key_at, BYTES)
+        self.tables = {name: Table(self, h5, name, **keys) for name, keys in contents["tables"].items()}
         self.work = "rows" if "rows" in self.tables else "cells"
-        said = self.tables["ending"].columns[0].read(0)
-        self.ending: dict[str, str] = {} if said is None else json.loads(said[0])
-        self.attrs = {**attrs, "study_json": study_together(attrs["study_json"], self.coords), **self.ending}
-        self.fingerprint = dict(json.loads(attrs["fingerprint"]))
+        for name in (name for name in self.dims if name not in self.columns()):
+            data = _own(h5, name)
+            attrs, values = _attrs(data), data[()]
+            if attrs.pop("_Encoding", None):
+                values = np.char.decode(values.view(f"S{values.shape[-1]}")[..., 0], "utf-8")
+            self.coords[name] = Coordinate(name, self.dims[name], values, attrs)
+        self.attrs = _attrs(h5)
+        self.attrs["study_json"] = study_together(self.attrs["study_json"], self.coords)
+        self.fingerprint = dict(json.loads(self.attrs["fingerprint"]))
+        if self.finished:
+            if (ending := self.tables["ending"].columns[0].read(0)) is None:
+                raise ValueError("what was written at its end is damaged")
+            self.attrs |= json.loads(ending[0])
 
     def __enter__(self) -> StoredFile:
         return self
@@ -138,6 +150,22 @@ class StoredFile:
 
     def __getitem__(self, name: str) -> Any:
         return self.coords[name] if name in self.coords else self.columns()[name]
+
+    @cached_property
+    def study(self) -> Study:
+        """What it is the result of; its kernel is the one that it was, whatever has that name by now."""
+        return Study.from_json(self.attrs["study_json"], declared=True)
+
+    @cached_property
+    def pending(self) -> Mapping[str, Any]:
+        """The rows of a summary of which nothing is computed yet."""
+        return pending(self.study)
+
+    def gathered(self, block: int) -> Mapping[str, Any]:
+        """A block of the output of a summary, from its rows. Raises SweepError where they are damaged."""
+        per_row, (first, last) = row_blocks(self.study).per_row, self.tables["cells"].blocks.bounds(block)
+        rows = {name: column[first * per_row : last * per_row] for name, column in self.columns("rows").items()}
+        return gathered(self.study, rows)
 
 
 class Table:
@@ -211,10 +239,6 @@ class Numbers:
         """All its numbers."""
         return self[()]
 
-    def empty(self, cells: int) -> Any:
-        """An uninitialised array of so many cells."""
-        return np.empty((cells, *self.own), self.dtype)
-
     def digest(self, block: int, *pieces: Any) -> bytes:
         """Digest of a chunk: of all its bytes, and of whose and which it is."""
         state = xxhash.xxh3_128(self.table.file.key + self.table.name.encode() + struct.pack("<qi", block, self.number))
@@ -225,7 +249,7 @@ class Numbers:
     def read(self, block: int, out: Any = None) -> Any:
         """The cells of a block, into `out` where that is given; None where they are not what was written."""
         start, stop = self.table.blocks.bounds(block)
-        found = self.empty(stop - start) if out is None else out
+        found = np.empty((stop - start, *self.own), self.dtype) if out is None else out
         behind = bytearray(self.size + self.check - found.nbytes)
         try:
             disk.read_all(self.table.file.fd, (found, behind), int(self.at[block]))
@@ -236,43 +260,50 @@ class Numbers:
 
     def __getitem__(self, key: Any) -> Any:
         """By what is given for the first dimensions. Raises SweepError where damaged."""
-        key, grid, box = key if isinstance(key, tuple) else (key,), self.table.grid, self.table.box
+        key, table = key if isinstance(key, tuple) else (key,), self.table
         key += (slice(None),) * (len(self.shape) - len(key))
-        runs = [
-            range(n)[k if isinstance(k, slice) else slice(k, k + 1 or None)] for n, k in zip(grid, key, strict=False)
-        ]
+        keys = [k if isinstance(k, slice) else slice(k, k + 1 or None) for k in key[: len(table.grid)]]
+        runs = [range(n)[k] for n, k in zip(table.grid, keys, strict=True)]
         # all places from the first to the last one wanted, of which those wanted are a view
-        spans = [(run[0], run[-1] + 1) if run else (0, 0) for run in runs]
-        out = np.empty((*(stop - start for start, stop in spans), *self.own), self.dtype)
-        counts = [-(-n // m) for n, m in zip(grid, box, strict=True)]
-        for corner in itertools.product(*(range(a // m, -(-b // m)) for (a, b), m in zip(spans, box, strict=True))):
+        wanted = [slice(run[0], run[-1] + 1) if run else slice(0, 0) for run in runs]
+        out = np.empty((*(w.stop - w.start for w in wanted), *self.own), self.dtype)
+        counts = [-(-n // m) for n, m in zip(table.grid, table.box, strict=True)]
+        near = tuple(slice(w.start // m, -(-w.stop // m)) for w, m in zip(wanted, table.box, strict=True))
+        for block in np.ravel(np.arange(table.blocks.count).reshape(counts)[near]).tolist():
+            box = box_slices(table.grid, *table.blocks.bounds(block))
+            both = [slice(max(w.start, b.start), min(w.stop, b.stop)) for w, b in zip(wanted, box, strict=True)]
+            view = out[_within(both, wanted)]
+            shape = (*(b.stop - b.start for b in box), *self.own)
             # straight to its place where all of a block is wanted and lies in one piece
-            ends = [(c * m, min((c + 1) * m, n)) for c, m, n in zip(corner, box, grid, strict=True)]
-            both = [(max(a, start), min(b, stop)) for (a, b), (start, stop) in zip(ends, spans, strict=True)]
-            there: Any = [slice(a - start, b - start) for (a, b), (start, _) in zip(both, spans, strict=True)]
-            view = out[(*there, ...)]
-            shape = (*(b - a for a, b in ends), *self.own)
             cells = view if view.shape == shape and view.flags.c_contiguous else np.empty(shape, self.dtype)
-            self._fill(int(np.ravel_multi_index(corner, counts)) if grid else 0, cells)
+            self._fill(block, cells)
             if cells is not view:
-                view[...] = cells[tuple(slice(a - c, b - c) for (a, b), (c, _) in zip(both, ends, strict=True))]
-        wanted = (slice(None, None, k.step) if isinstance(k, slice) else 0 for k in key[: len(grid)])
-        return out[(*wanted, *key[len(grid) :])]
+                view[...] = cells[_within(both, box)]
+        steps = (slice(None, None, k.step) if isinstance(k, slice) else 0 for k in key[: len(table.grid)])
+        return out[(*steps, *key[len(table.grid) :])]
 
     def _fill(self, block: int, out: Any) -> None:
         """Fills in the cells of a block. Raises SweepError where it is damaged, or the file is closed."""
         file, table = self.table.file, self.table
+        start, stop = table.blocks.bounds(block)
         if file.fd < 0:
             raise SweepError(f"{file.path}: is closed; open it again to read {self.name}")
-        if not file.ending and not table.digests[block].any(axis=-1).all():
-            out[...] = {STATUS: int(Status.PENDING), METHOD_USED: -1}.get(self.name, math.nan)
+        if not file.finished and table.name != file.work:
+            out[...] = file.gathered(block)[self.name].reshape(out.shape)
+        elif not file.finished and not table.digests[block].any(axis=-1).all():
+            nothing = {STATUS: int(Status.PENDING), METHOD_USED: -1}.get(self.name, math.nan)
+            out[...] = file.pending[self.name][start:stop] if table.name == "rows" else nothing
         elif self.read(block, out) is None:
-            start, stop = table.blocks.bounds(block)
             raise SweepError(
                 f"{file.path}: {self.name} is damaged between its cells {start:,} and {stop:,}, or was changed by "
                 "another program; sweep verify tells of all damage, and "
-                f"{'sweep run --repair' if file.ending else 'the same run'} computes the damaged cells again"
+                f"{'sweep run --repair' if file.finished else 'the same run'} computes the damaged cells again"
             )
+
+
+def _within(inner: Iterable[slice], outer: Iterable[slice]) -> Any:
+    """The place of a box in one that holds it, as an index."""
+    return (*(slice(a.start - b.start, a.stop - b.start) for a, b in zip(inner, outer, strict=True)), ...)
 
 
 def again(path: Path, key: bytes, flags: int = os.O_RDONLY) -> StoredFile:
@@ -282,17 +313,6 @@ def again(path: Path, key: bytes, flags: int = os.O_RDONLY) -> StoredFile:
         file.close()
         raise SweepError(f"{path}: was replaced since it was opened; open it again")
     return file
-
-
-def _refusal(path: Path, fault: BaseException) -> SweepError:
-    """What a user is told of a file that cannot be read, or is no result."""
-    if isinstance(fault, OSError) and fault.errno and fault.errno not in OF_DAMAGE:
-        return SweepError(f"{path}: cannot be read ({os.strerror(fault.errno)})")
-    reason = (str(fault).splitlines() or [type(fault).__name__])[0]
-    return Damaged(
-        f"{path}: not the result of a sweep (exports are for xarray and other programs), or damaged ({reason}); "
-        "move it away or choose another name"
-    )
 
 
 def _own(h5: Any, path: str) -> Any:
@@ -318,6 +338,32 @@ def _attrs(thing: Any) -> dict[str, Any]:
         value = value.decode() if isinstance(value, bytes) else value
         found[name] = value[0] if getattr(value, "shape", ()) == (1,) else value
     return found
+
+
+def checksum(piece: Any, length: int) -> bytes:
+    """HDF5's checksum (its filter fletcher32), the four bytes behind a chunk of so many bytes: of `piece`, then zeros.
+
+    Of big-endian words w[0] .. w[n-1] of 16 bits it is (sum of w[i], sum of (n - i) w[i]) modulo 65535. As 2^16 is 1
+    there, a word with its bytes swapped is 256 times the word. And with the words in rows of K, sum of i w[i] is K
+    times the sum of row numbers by sums of rows, and the sum of column numbers by sums of columns.
+    """
+    raw = np.frombuffer(disk.as_bytes(piece), np.uint8)
+    whole, step = raw.size - raw.size % (2 * ROW), 2 * ROW * MOST_ROWS
+    last = np.zeros(2 * ROW, np.uint8)
+    last[: raw.size - whole] = raw[whole:]
+    low = high = 0
+    for part in (*(raw[at : min(at + step, whole)] for at in range(0, whole, step)), last):
+        rows = part.view("<u2").reshape(-1, ROW)
+        by_row = rows.sum(axis=1, dtype=np.uint32).astype(np.uint64)
+        by_column = rows.sum(axis=0, dtype=np.uint32).astype(np.uint64)
+        more = int(by_row.sum())
+        numbered = ROW * int(by_row @ NUMBERS[: len(rows)]) + int(by_column @ NUMBERS)
+        high += rows.size * (low + more) - numbered
+        low += more
+    high += (-(-length // 2) - whole // 2 - ROW) * low  # the words are counted from the end of the chunk
+    # 256 times a sum modulo 65535, as HDF5 has it: 0 stands for a sum that is zero itself
+    first, second = (256 * total % MODULUS or (MODULUS if total else 0) for total in (low, high))
+    return (second << 16 | first).to_bytes(4, "little")
 
 
 def read_bytes(fd: int, begin: int, count: int) -> bytes:

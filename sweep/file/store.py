@@ -1,8 +1,8 @@
 """OUT.h5.unfinished: a result that is written in place, block by block, and renamed when it is complete.
 
-    OUT.h5.unfinished      the result; its structure is whole before the first number is written, and stays as it is
-    OUT.h5.unfinished.tmp  for a moment, while that structure is written
-    OUT.h5.lock            held while a sweep runs; the system frees it when the process ends
+    OUT.h5.unfinished       the result; its structure is whole before the first number is written, and stays as it is
+    .OUT.h5.unfinished.tmp  for a moment, while that structure is written
+    OUT.h5.lock             held while a sweep runs; the system frees it when the process ends
 
 A block is acknowledged when its digests are in the file. They are written after its numbers are on the disk, for many
 blocks at a time: numbers, fdatasync, digests. The next sync brings the digests to the disk as well.
@@ -15,7 +15,7 @@ import json
 import os
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -31,9 +31,6 @@ from sweep.file.reading import BYTES, UNFINISHED, Damaged, StoredFile, Table, re
 SYNC_SECONDS = 0.2
 """How often blocks are brought to the disk, and it is looked whether the file is still in its place."""
 
-Gather = Callable[[StoredFile, int], Mapping[str, Any]]
-"""Makes a block of the output of a summary from its rows."""
-
 
 def unfinished_of(output: Path) -> Path:
     """Where a result is while its sweep runs."""
@@ -45,6 +42,20 @@ def lock_of(output: Path) -> Path:
     return output.with_name(output.name + ".lock")
 
 
+@contextlib.contextmanager
+def opened(output: Path) -> Iterator[Store]:
+    """The store of an output, held by this process alone. Raises SweepError."""
+    with disk.refusing(output), disk.locked(lock_of(output)) as ours:
+        if not ours:
+            raise SweepError(f"{output}: another run is at work on this output; wait for it, or choose another with -o")
+        store = Store(output)
+        disk.discard(disk.part_of(store.path))  # of a run that was killed
+        try:
+            yield store
+        finally:
+            store.close()
+
+
 class Store:
     """The result of one sweep while it is written, locked for this process. Made by `opened`.
 
@@ -52,15 +63,13 @@ class Store:
     """
 
     def __init__(self, output: Path) -> None:
-        self.output, self.path = output, unfinished_of(output)
-        self.temporary = self.path.with_name(self.path.name + ".tmp")
+        self.output, self.path, self.finished = output, unfinished_of(output), False
         self.file: StoredFile | None = None
         self._waiting: deque[tuple[int, bytes]] = deque()
         self._mark: tuple[int, ...] = ()  # of the file: it is still the one, and as long
         self._synced, self._elsewhere = time.monotonic(), False
         self._syncing, self._last = ThreadPoolExecutor(1), Future[None]()  # beside those that compute
         self._last.set_result(None)
-        self.finished = False
 
     @property
     def table(self) -> Table:
@@ -82,17 +91,16 @@ class Store:
 
     def begin(self, schema: Schema, cuts: Mapping[str, Cut], shared: bool = False) -> None:
         """Makes the file, with room on the disk for all of it. Raises SweepError."""
-        with disk.refusing(self.path):
-            try:
-                file = create(self.temporary, schema, cuts, shared)
-                disk.rename(self.temporary, self.path)
-                disk.sync_folder(self.path.parent)
-            except OSError:
-                with contextlib.suppress(OSError):
-                    disk.remove(self.temporary)
-                raise
-        file.path = self.path
-        self.resume(file, ())
+        with disk.refusing(self.path), disk.made(self.path) as part:
+            create(part, schema, cuts, shared)
+        self.resume(StoredFile(self.path, os.O_RDWR), ())
+
+    def reopen(self, damaged: Sequence[int]) -> None:
+        """Takes a finished result up again, some blocks of which are to be computed again. Raises SweepError."""
+        with disk.refusing(self.output):
+            disk.rename(self.output, self.path)
+            disk.sync_folder(self.output.parent)
+        self.resume(StoredFile(self.path, os.O_RDWR), damaged)
 
     def resume(self, file: StoredFile, damaged: Iterable[int] | None = None) -> list[int]:
         """Takes up what an earlier run left; its damaged blocks count as missing, and are returned.
@@ -103,21 +111,10 @@ class Store:
         self.file, status, table = file, os.fstat(file.fd), file.tables[file.work]
         self._mark = status.st_ino, status.st_size
         if damaged is None:
-            damaged = set[int]().union(*table.damaged(np.flatnonzero(table.done).tolist()).values())
+            damaged = set[int]().union(*table.damaged(np.flatnonzero(table.done)).values())
         with disk.refusing(self.path):
-            if file.ending:  # it was killed just before it was renamed, or is taken up again
-                file.ending = {}
-                ending = file.tables["ending"]
-                ending.write_digests({0: bytes(ending.row_bytes)})
-            table.write_digests({block: bytes(table.row_bytes) for block in damaged})
+            table.write_digests(dict.fromkeys(damaged, bytes(table.row_bytes)))
         return sorted(damaged)
-
-    def reopen(self, damaged: Sequence[int]) -> None:
-        """Takes a finished result up again, some blocks of which are to be computed again. Raises SweepError."""
-        with disk.refusing(self.output):
-            disk.rename(self.output, self.path)
-            disk.sync_folder(self.output.parent)
-        self.resume(StoredFile(self.path, os.O_RDWR), damaged)
 
     def missing(self) -> list[int]:
         """Numbers of the blocks that are not done, ascending."""
@@ -159,22 +156,22 @@ class Store:
                 disk.sync_numbers(file.fd)
                 self.table.write_digests(waiting)
 
-    def finish(self, texts: Mapping[str, str], gather: Gather | None) -> None:
+    def finish(self, texts: Mapping[str, str]) -> None:
         """Puts the result in its place, with what is known at the end; of a summary, its rows are gathered first.
 
         Raises SweepError where it cannot, and the result stays where it is.
         """
-        file, cells = self.table.file, self.table.file.tables["cells"]
         self.commit()
+        file, cells, ending = self.table.file, *(self.table.file.tables[name] for name in ("cells", "ending"))
         with disk.refusing(self.output):
             if self._elsewhere:
                 disk.forget(file.fd)
-            if gather is not None:
-                digests = {block: cells.write(block, gather(file, block)) for block in range(cells.blocks.count)}
-                disk.sync_numbers(file.fd)
-                cells.write_digests(digests)
-            ending = file.tables["ending"]
-            ending.write_digests({0: ending.write(0, {"ending": np.array([json.dumps(dict(texts))], "S240")})})
+            made = {ending: {0: ending.write(0, {"ending": np.array([json.dumps(dict(texts))], "S240")})}}
+            if cells is not self.table:
+                made[cells] = {b: cells.write(b, file.gathered(b)) for b in range(cells.blocks.count)}
+            disk.sync_numbers(file.fd)
+            for table, digests in made.items():
+                table.write_digests(digests)
             disk.fsync(file.fd)
             last = cells.blocks.count - 1
             if any(cells.damaged({0, last // 2, last}).values()):
@@ -198,17 +195,3 @@ class Store:
                 disk.sync_numbers(self.file.fd)
             self.file.close()
         self._syncing.shutdown()
-
-
-@contextlib.contextmanager
-def opened(output: Path) -> Iterator[Store]:
-    """The store of an output, held by this process alone. Raises SweepError."""
-    lock, store = lock_of(output), Store(output)
-    with disk.refusing(output), disk.locked(lock) as ours:
-        if not ours:
-            raise SweepError(f"{output}: another run is at work on this output; wait for it, or choose another with -o")
-        disk.remove(store.temporary)
-        try:
-            yield store
-        finally:
-            store.close()

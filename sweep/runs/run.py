@@ -14,7 +14,8 @@ from sweep.cells.block import Blocks
 from sweep.cells.partition import row_blocks
 from sweep.cells.reduce import gathered
 from sweep.errors import SweepError
-from sweep.file.open import in_memory, memory, open_result, open_unfinished
+from sweep.file.open import in_memory, memory, open_result
+from sweep.file.store import unfinished_of
 from sweep.runs.extend import Precomputed
 from sweep.runs.loop import Loop, Task
 from sweep.runs.to_file import Ending, run_to_file
@@ -111,7 +112,7 @@ def run(
         ending = run_to_file(task)
         if ending == "not begun":
             raise SweepError("until: the time was up before the first cell could be computed")
-        return open_unfinished(task.output) if ending == "unfinished" else open_result(task.output)
+        return open_result(unfinished_of(task.output) if ending == "unfinished" else task.output)
     with contextlib.ExitStack() as stack:
         loop = Loop(task, stack)
         sink = _Memory(loop.blocks)

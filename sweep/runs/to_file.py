@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import contextlib
+import shutil
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 from sweep.cells.block import Blocks
 from sweep.cells.fingerprint import difference
-from sweep.cells.partition import row_blocks
-from sweep.cells.reduce import gathered
 from sweep.errors import SweepError
 from sweep.file import disk
 from sweep.file.frame import cuts_of, expected_size
 from sweep.file.reading import StoredFile
 from sweep.file.store import Store, lock_of, opened, unfinished_of
-from sweep.file.verify import verify
+from sweep.file.open import verify
 from sweep.runs.extend import Precomputed, Reused, has_failed, obstacle
 from sweep.runs.loop import Loop, Task
 from sweep.runs.pool import Terminated, TimeUp
@@ -114,7 +113,7 @@ def _computed(
         if store.file is None:
             schema = task.said({"start": loop.began, **(known.attrs if isinstance(known, Precomputed) else {})})
             cuts = cuts_of(task.study, schema, loop.blocks.partition)
-            needed, free = expected_size(schema, cuts), disk.free(task.output.parent)
+            needed, free = expected_size(schema, cuts), shutil.disk_usage(task.output.parent).free
             if needed > free:
                 raise SweepError(
                     f"{task.output}: needs {quantity(needed)}, only {quantity(free)} are free here; free some space, "
@@ -125,15 +124,7 @@ def _computed(
             task.note(f"{loop.blocks.label(block)} were damaged on the disk and are computed again")
         shared = None if task.cluster is None else store.shared()
         loop.compute(store.missing(), _Stored(store, loop.blocks, known), shared, store.tick)
-
-        def gather(file: StoredFile, block: int) -> dict[str, Any]:
-            """A block of a summary's output, from its rows."""
-            first, last = file.tables["cells"].blocks.bounds(block)
-            per_row = row_blocks(task.study).per_row
-            rows = {name: c[first * per_row : last * per_row] for name, c in file.columns("rows").items()}
-            return gathered(task.study, rows)
-
-        store.finish(loop.endings(), None if task.study.summary is None else gather)
+        store.finish(loop.endings())
         loop.progress.end()
 
 

@@ -1,5 +1,6 @@
 """Studies of the toy kernel, run, interrupted, broken and compared."""
 
+import math
 import os
 import subprocess
 import sys
@@ -79,7 +80,7 @@ def place(output, name, cell, table="cells"):
         blocks = column.table.blocks
         block = next(number for number in range(blocks.count) if cell < blocks.bounds(number)[1])
         start = blocks.bounds(block)[0]
-        return int(column.at[block]) + (cell - start) * column.empty(1).nbytes
+        return int(column.at[block]) + (cell - start) * column.size // math.prod(column.table.box)
 
 
 def environment():

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sweep.file.fletcher import checksum
+from sweep.file.reading import checksum
 
 
 def by_hdf5(content):

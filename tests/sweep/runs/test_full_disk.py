@@ -12,10 +12,9 @@ from running import kept, quiet, same
 import sweep
 from sweep.cli import main
 from sweep.errors import COMPLETE, MISTAKE
-from sweep.file import disk
 from sweep.file.open import open_result
 from sweep.file.store import Store, unfinished_of
-from sweep.file.verify import verify
+from sweep.file.open import verify
 from sweep.study.read import to_toml
 
 MEGABYTES = 4
@@ -39,7 +38,7 @@ def fill(folder):
         with contextlib.suppress(OSError), path.open("ab", buffering=0) as file:
             while True:
                 file.write(b"\n" * 4096)
-    assert disk.free(folder) == 0
+    assert shutil.disk_usage(folder).free == 0
 
 
 def swept(folder, study, output, *more):
@@ -76,7 +75,7 @@ def test_a_disk_that_is_filled_meanwhile_does_not_matter(small, tmp_path, monkey
     monkeypatch.setattr(Store, "put", put)
     monkeypatch.setattr("sweep.cells.timing.BLOCK_SECONDS", (1e-4, 1e-4))
     assert swept(tmp_path, study, output) == COMPLETE, capsys.readouterr().err
-    assert disk.free(small) == 0
+    assert shutil.disk_usage(small).free == 0
     with open_result(output, strict=True) as found:
         same(found, quiet(study))
     assert verify(output).whole
