@@ -19,9 +19,9 @@ sys.path[:0] = [p for p in PATHS if p not in sys.path]
 
 import sweep  # noqa: E402
 from sweep.errors import SweepError  # noqa: E402
+from sweep.file.open import verify  # noqa: E402
 from sweep.file.reading import StoredFile  # noqa: E402
 from sweep.file.store import Store, unfinished_of  # noqa: E402
-from sweep.file.open import verify  # noqa: E402
 from sweep.runs.run import complete  # noqa: E402
 
 CELLS = 3000
@@ -72,9 +72,9 @@ def damage(rng, path, strange):
     """Damages a result, finished or not, in some way; `strange` is one of another study. Tells what it did."""
     kind, content = rng.choice(DAMAGES), bytearray(path.read_bytes())
     with StoredFile(path) as file:
-        table, ending, finished = file.tables[file.work], file.tables["ending"], file.finished
-        last = [span(ending.columns[0], 0), slice(ending.digests_at, ending.digests_at + ending.row_bytes)]
-        chunks = [[span(column, block) for column in table.columns] for block in range(table.blocks.count)]
+        table, ending, finished = file.work, file.tables["ending"], file.finished
+        last = [span(ending.columns["ending"], 0), slice(ending.digests_at, ending.digests_at + ending.row_bytes)]
+        chunks = [[span(column, block) for column in table.columns.values()] for block in range(table.blocks.count)]
         stands = [slice(0, table.digests_at + table.digests.size), *itertools.chain(*chunks, last)]
     block, other = rng.sample(range(table.blocks.count), 2)
     number = rng.randrange(len(table.columns))

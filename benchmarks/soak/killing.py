@@ -24,10 +24,9 @@ from havoc import numbers, study
 
 import sweep
 from sweep.file import disk
-from sweep.file.open import open_result
+from sweep.file.open import open_result, verify
 from sweep.file.reading import StoredFile
 from sweep.file.store import Store, lock_of, unfinished_of
-from sweep.file.open import verify
 from sweep.runs.run import run
 
 KINDS = ("plain", "extend", "summary", "refine")
@@ -85,7 +84,7 @@ def prepare(kind, output):
 def done(path):
     """Blocks of an unfinished result that are acknowledged, and how many there are."""
     with StoredFile(path) as file:
-        found = file.tables[file.work].done
+        found = file.work.done
         return set(np.flatnonzero(found).tolist()), len(found)
 
 
@@ -305,12 +304,11 @@ def _child(events, log, kind, output, workers, cells, cluster):
 
 
 def _note_phases(events, output):
-    resume, finish, rename, sync = Store.resume, Store.finish, disk.rename, disk.sync_folder
+    make, finish, rename, sync = Store.__init__, Store.finish, disk.rename, disk.sync_folder
 
     def at_work(self, *words):
-        damaged = resume(self, *words)
+        make(self, *words)
         events.note(WORK)
-        return damaged
 
     def at_its_end(self, *words):
         events.note(END)
@@ -326,7 +324,7 @@ def _note_phases(events, output):
         if events.found()[-1][0] == RENAME:
             events.note(AFTER if folder == output.parent else BETWEEN)
 
-    Store.resume, Store.finish, disk.rename, disk.sync_folder = at_work, at_its_end, renamed, synced
+    Store.__init__, Store.finish, disk.rename, disk.sync_folder = at_work, at_its_end, renamed, synced
 
 
 def _note_acknowledged(told):

@@ -33,7 +33,8 @@ from sweep.cells.solve import Solver
 from sweep.file import disk
 from sweep.file.frame import cuts_of
 from sweep.file.reading import StoredFile
-from sweep.file.store import opened, unfinished_of
+from sweep.file.store import alone, found, unfinished_of
+from sweep.file.store import begun as made
 from sweep.study.model import Study
 
 STEPS = ("kernel", "write once", "run")
@@ -130,15 +131,12 @@ def many(folder: Path, count: int) -> None:
     schema = output_schema(study, mark)
     cuts = cuts_of(study, schema, boxes(schema.grid.shape, 100))
     begun = time.perf_counter()
-    with opened(path) as store:
-        store.begin(schema, cuts)
-        framed, table = time.perf_counter() - begun, store.table
+    with alone(path), made(path, schema, cuts) as store:
+        framed, table = time.perf_counter() - begun, store.work
         table.write_digests(dict.fromkeys(range(table.blocks.count - 1), b"x" * table.row_bytes))
-    with opened(path) as store:
-        begun = time.perf_counter()
-        file = store.found()
-        assert file is not None
-        store.resume(file, ())
+    begun = time.perf_counter()
+    with alone(path), found(path) as store:
+        store.resume(())
         left = store.missing()
         taken = time.perf_counter() - begun
     assert left == [table.blocks.count - 1]
@@ -173,7 +171,7 @@ def unchecked(file: StoredFile) -> None:
     """The same chunks, read into arrays, and not looked at."""
     table = file.tables["cells"]
     bounds = [table.blocks.bounds(block) for block in range(table.blocks.count)]
-    for column in table.columns:
+    for column in table.columns.values():
         numbers = np.empty((table.blocks.size, *column.own), column.dtype)
         for block, found in enumerate(bounds):
             disk.read_all(file.fd, (numbers[slice(*found)],), int(column.at[block]))

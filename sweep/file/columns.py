@@ -32,11 +32,11 @@ class Result(BackendEntrypoint):
         """Raises as `StoredFile` does, and SweepError when damaged numbers are read."""
         file = StoredFile(Path(filename_or_obj))
         if strict and not file.finished:
-            done = file.tables[file.work].done
+            done = file.work.done
             left = f"{int((~done).sum())} of {done.size} blocks are missing"
             raise SweepError(f"{file.path}: unfinished, {left}; run its sweep again to continue")
         columns = {}
-        for name, numbers in file.columns().items():
+        for name, numbers in file.tables["cells"].columns.items():
             chunks = dict(zip(numbers.dims, (*numbers.table.box, *numbers.own), strict=True))
             lazy = indexing.LazilyIndexedArray(Column(numbers))
             columns[name] = xr.Variable(numbers.dims, lazy, dict(numbers.attrs), {"preferred_chunks": chunks})

@@ -27,19 +27,10 @@ def open_file(path: Path | str, flags: int) -> int:
     return os.open(path, flags | (os.O_NONBLOCK if flags == os.O_RDONLY else 0), 0o666)
 
 
-def write(fd: int, pieces: Sequence[memoryview], offset: int) -> int:
-    """Bytes of the pieces that were written at `offset`, one piece behind the other; maybe not all. Raises OSError."""
-    return os.pwritev(fd, pieces, offset)
-
-
-def fsync(fd: int) -> None:
-    """Returns when the file is on the disk. Raises OSError."""
-    os.fsync(fd)
-
-
-def sync_numbers(fd: int) -> None:
-    """Returns when the bytes of a file whose length stays are on the disk. Raises OSError."""
-    getattr(os, "fdatasync", os.fsync)(fd)
+write, rename, fsync = os.pwritev, os.replace, os.fsync
+"""`write(fd, pieces, offset)` says how many bytes were written, one piece behind the other; maybe not all."""
+sync_numbers = getattr(os, "fdatasync", os.fsync)
+"""Returns when the bytes of a file whose length stays are on the disk."""
 
 
 def forget(fd: int) -> None:
@@ -57,11 +48,6 @@ def reserve(fd: int, size: int) -> None:
             if fault.errno not in NO_SUCH_CALL:
                 raise
     os.ftruncate(fd, size)
-
-
-def rename(old: Path, new: Path) -> None:
-    """Takes the place of `new` in one step. Raises OSError."""
-    old.replace(new)
 
 
 def remove(path: Path) -> None:
@@ -114,41 +100,30 @@ def sync_folder(path: Path) -> None:
 
 
 @contextlib.contextmanager
-def replacing(target: Path) -> Iterator[Path]:
-    """As `made`, for this process alone. Raises SweepError where the system refuses, or another process writes it."""
-    with refusing(target), locked(target.with_name(f".{target.name}.lock")) as ours:
-        if not ours:
-            raise SweepError(f"{target}: is being written by another process")
-        with made(target) as part:
-            yield part
-
-
-@contextlib.contextmanager
-def made(target: Path) -> Iterator[Path]:
+def replacing(target: Path, held: bool = False) -> Iterator[Path]:
     """A file beside `target` to write to, or to put a folder at; synced, it takes the place of `target` at the end.
 
-    Raises OSError, and what was there before stays.
+    What was there before then stays where the system refuses, or, unless a lock is `held`, another process writes it:
+    raises SweepError.
     """
     part, old = part_of(target), target.with_name(f".{target.name}.old")
-    discard(part)  # what one has left that was killed
-    try:
+    lock = contextlib.nullcontext(True) if held else locked(target.with_name(f".{target.name}.lock"))
+    with refusing(target), lock as ours, contextlib.ExitStack() as stack:
+        if not ours:
+            raise SweepError(f"{target}: is being written by another process")
+        discard(part)  # what one has left that was killed
+        stack.callback(discard, part)
         part.touch()  # says in plain words that there is no such folder, or no permission
         yield part
         sync_tree(part)
-        # a folder cannot be replaced in one step, and stands aside meanwhile
-        if aside := target.exists() and (target.is_dir() or part.is_dir()):
+        if target.is_dir() or (part.is_dir() and target.exists()):
+            # a folder cannot be replaced in one step, and stands aside meanwhile
             discard(old)
             rename(target, old)
-        try:
-            rename(part, target)
-        except OSError:
-            if aside:
-                rename(old, target)
-            raise
-        discard(old)
+            stack.callback(discard, old)
+            stack.callback(lambda: target.exists() or rename(old, target))
+        rename(part, target)
         sync_folder(target.parent)
-    finally:
-        discard(part)
 
 
 def part_of(target: Path) -> Path:
@@ -212,6 +187,4 @@ def refusing(path: Path) -> Iterator[None]:
         yield
     except OSError as fault:
         more = "; free some space, then run the same command again" if fault.errno in FULL else ""
-        raise SweepError(
-            f"{path}: cannot be written ({fault.strerror or str(fault).splitlines()[0]}){more}"
-        ) from fault
+        raise SweepError(f"{path}: cannot be written ({fault.strerror or str(fault).splitlines()[0]}){more}") from fault

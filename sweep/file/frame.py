@@ -24,7 +24,7 @@ from sweep.cells.partition import Partition, box_shape, boxes, row_blocks
 from sweep.cells.reduce import part_columns
 from sweep.cells.schema import STATUS, Column, Schema
 from sweep.file import disk
-from sweep.file.reading import BYTES, FORMAT, checksum, digest_before
+from sweep.file.reading import BYTES, FORMAT, checksum, key_of
 from sweep.study.model import ARRAY
 
 if TYPE_CHECKING:
@@ -44,8 +44,6 @@ TEXT_BYTES = 30 << 10
 """Of the structure of a result, about."""
 WRONG = b"\xff" * 4
 """A checksum that zeros have not."""
-GROUPS = {"cells": "", "rows": "rows/", "ending": "integrity/"}
-"""Where the columns of each table stand."""
 
 
 class Cut(NamedTuple):
@@ -90,7 +88,7 @@ def create(path: Path, schema: Schema, cuts: Mapping[str, Cut], shared: bool = F
         if skeleton.refused:
             raise OSError(skeleton.refused, os.strerror(skeleton.refused))
         disk.reserve(fd, skeleton.seek(0, os.SEEK_END))
-        disk.write_all(fd, (digest_before(fd, key_at),), key_at)
+        disk.write_all(fd, (key_of(fd, key_at),), key_at)
 
 
 class _Skeleton(io.FileIO):
@@ -122,6 +120,7 @@ def _lay_out(skeleton: _Skeleton, schema: Schema, cuts: Mapping[str, Cut], align
 
     Objects of so many bytes are aligned.
     """
+    import h5netcdf
     import h5py
     from h5py import h5f, h5fd, h5p
 
@@ -135,25 +134,32 @@ def _lay_out(skeleton: _Skeleton, schema: Schema, cuts: Mapping[str, Cut], align
     made.set_attr_phase_change(COMPACT, 0)
     made.set_attr_creation_order(h5p.CRT_ORDER_TRACKED | h5p.CRT_ORDER_INDEXED)
     made.set_link_creation_order(h5p.CRT_ORDER_TRACKED | h5p.CRT_ORDER_INDEXED)
-    with h5py.File(h5f.create(b"result", h5f.ACC_TRUNC, made, access)) as file:
-        dims, tables = _write_variables(file, schema, cuts["cells"]), dict[str, dict[str, Any]]()
+    with h5py.File(h5f.create(b"result", h5f.ACC_TRUNC, made, access)) as file, h5netcdf.File(file, "r+") as netcdf:
+        dims, tables = _write_coordinates(netcdf, schema), dict[str, dict[str, Any]]()
         for name, cut in cuts.items():
-            for column in cut.columns if name != "cells" else ():
-                shape = (*cut.grid, *column.shape)
-                file.create_dataset(GROUPS[name] + column.name, shape, column.dtype, **_chunked(cut, column))
+            paths = [column.name if name == "cells" else f"{name}/{column.name}" for column in cut.columns]
             blocks = (cut.blocks.size, cut.blocks.cells, cut.blocks.row)
-            tables[name] = {"grid": cut.grid, "blocks": blocks, "paths": [GROUPS[name] + c.name for c in cut.columns]}
-        integrity = file["integrity"]
+            tables[name] = {"grid": cut.grid, "blocks": blocks, "paths": paths}
+            for path, column in zip(paths, cut.columns, strict=True):
+                how = _kept((*box_shape(cut.grid, cut.blocks.cells), *column.shape), column)
+                if name != "cells":
+                    file.create_dataset(path, (*cut.grid, *column.shape), column.dtype, **how)
+                    continue
+                over = dims[path] = (*schema.grid.dims, *column.dims)
+                # xarray's way to mark what belongs to the coordinates of a variable, and of all
+                beside = [c.name for c in schema.coordinates if c.dims != (c.name,) and set(c.dims) <= set(over)]
+                variable = netcdf.create_variable(path, over, column.dtype, **how)
+                _say(variable.attrs, {**column.attrs, "coordinates": " ".join(beside) or None})
+        integrity = file.create_group("integrity")
         _say(integrity.attrs, {"format": FORMAT, "contents": json.dumps({"tables": tables, "dims": dims})})
-        shapes: dict[str, tuple[int, ...]] = {"key": (BYTES,)}
-        shapes |= {f"{name}_digests": (cut.blocks.count, len(cut.columns), BYTES) for name, cut in cuts.items()}
-        pieces = [integrity.create_dataset(name, shape, "u1") for name, shape in shapes.items()]
+        pieces = [integrity.create_dataset("key", BYTES, "u1")]
+        for name, cut in cuts.items():
+            pieces.append(integrity.create_dataset(name, (cut.blocks.count, len(cut.columns), BYTES), "u1"))
         # from here on nothing is made, and places alone are found
         file.flush()
         for data in pieces:
             data[...] = np.zeros(data.shape, "u1")
-        for path in (path for table in tables.values() for path in table["paths"]):
-            data = file[path]
+        for data in (file[path] for table in tables.values() for path in table["paths"]):
             if data.chunks is None:
                 data[()] = np.nan if data.dtype.kind == "f" else -1
                 continue
@@ -164,67 +170,49 @@ def _lay_out(skeleton: _Skeleton, schema: Schema, cuts: Mapping[str, Cut], align
         return int(pieces[0].id.get_offset())
 
 
-def _write_variables(file: Any, schema: Schema, cut: Cut) -> dict[str, tuple[str, ...]]:
-    """Dimensions, coordinates and columns as netCDF4 and xarray know them; gives the dimensions of each variable."""
-    import h5netcdf
-
-    dims, study = dict[str, tuple[str, ...]](), schema.attrs["study_json"]
-    with h5netcdf.File(file, "r+") as netcdf:
-        netcdf.dimensions = schema.sizes
-        for c in schema.coordinates:
-            values, over, attrs, dims[c.name] = np.asarray(c.values), c.dims, c.attrs, c.dims
-            if values.nbytes >= LONG:  # the study refers to it
-                study = study.replace(ARRAY % c.values.tobytes().hex(), ARRAY % f"@{c.name}")
-            if values.dtype.kind == "U":  # as characters
-                texts = np.array([word.encode() for word in values.ravel()])
-                values = texts.view("S1").reshape(*values.shape, texts.dtype.itemsize)
-                over, attrs = (*over, f"{c.name}_letters"), {**attrs, "_Encoding": "utf-8"}
-                netcdf.dimensions[over[-1]] = texts.dtype.itemsize
-            variable = netcdf.create_variable(c.name, over, values.dtype, values, **_whole(values.shape))
-            _say(variable.attrs, attrs)
-        for column in schema.columns:
-            over = dims[column.name] = (*schema.grid.dims, *column.dims)
-            # xarray's way to mark what belongs to the coordinates of a variable, and of all
-            beside = [c.name for c in schema.coordinates if c.dims != (c.name,) and set(c.dims) <= set(over)]
-            variable = netcdf.create_variable(column.name, over, column.dtype, **_chunked(cut, column))
-            _say(variable.attrs, column.attrs, beside)
-        away = [c.name for c in schema.coordinates if c.dims and not set(c.dims) & {c.name, *schema.grid.dims}]
-        _say(netcdf.attrs, {**schema.attrs, "study_json": study}, away)
-    return dims
+def _write_coordinates(netcdf: Any, schema: Schema) -> dict[str, tuple[str, ...]]:
+    """All but the columns, as netCDF4 and xarray know it; gives the dimensions of each coordinate."""
+    study, netcdf.dimensions = schema.attrs["study_json"], schema.sizes
+    for c in schema.coordinates:
+        values, over, attrs = np.asarray(c.values), c.dims, c.attrs
+        if values.nbytes >= LONG:  # the study refers to it
+            study = study.replace(ARRAY % c.values.tobytes().hex(), ARRAY % f"@{c.name}")
+        if values.dtype.kind == "U":  # as characters
+            texts = np.array([word.encode() for word in values.ravel()])
+            values = texts.view("S1").reshape(*values.shape, texts.dtype.itemsize)
+            over, attrs = (*over, f"{c.name}_letters"), {**attrs, "_Encoding": "utf-8"}
+            netcdf.dimensions[over[-1]] = texts.dtype.itemsize
+        variable = netcdf.create_variable(c.name, over, values.dtype, values, **_kept(values.shape))
+        _say(variable.attrs, attrs)
+    away = [c.name for c in schema.coordinates if c.dims and not set(c.dims) & {c.name, *schema.grid.dims}]
+    _say(netcdf.attrs, {**schema.attrs, "study_json": study, "coordinates": " ".join(away) or None})
+    return {c.name: c.dims for c in schema.coordinates}
 
 
-def _whole(shape: tuple[int, ...]) -> dict[str, Any]:
-    """How HDF5 keeps a coordinate: as one chunk with a checksum, a single number in its object header."""
+def _kept(chunk: tuple[int, ...], column: Column | None = None) -> dict[str, Any]:
+    """How HDF5 keeps numbers: in chunks with a checksum each, a single one in its object header.
+
+    One of a column, which is written later, stands by itself; the chunks of a column have no places yet.
+    """
     from h5py import h5d, h5p
 
     how = h5p.create(h5p.DATASET_CREATE)
     how.set_attr_phase_change(COMPACT, 0)
-    if not shape:
+    if column is not None:
+        how.set_alloc_time(h5d.ALLOC_TIME_LATE)
+        how.set_fill_time(h5d.FILL_TIME_ALLOC if column.name == STATUS else h5d.FILL_TIME_NEVER)
+        if column.name == STATUS:
+            how.set_fill_value(np.array(Status.PENDING, column.dtype))
+    elif not chunk:
         how.set_layout(h5d.COMPACT)
-    return {"chunks": shape or None, "fletcher32": bool(shape), "dcpl": how}
+    return {"chunks": chunk or None, "fletcher32": bool(chunk), "dcpl": how}
 
 
-def _chunked(cut: Cut, column: Column) -> dict[str, Any]:
-    """How HDF5 keeps a column: in chunks with a checksum each, a single number as it is; without any numbers yet."""
-    from h5py import h5d
-
-    found = _whole(chunk := (*box_shape(cut.grid, cut.blocks.cells), *column.shape))
-    how = found["dcpl"]
-    if not chunk:
-        how.set_layout(h5d.CONTIGUOUS)
-    how.set_alloc_time(h5d.ALLOC_TIME_LATE)
-    how.set_fill_time(h5d.FILL_TIME_NEVER)
-    if column.name == STATUS:
-        how.set_fill_time(h5d.FILL_TIME_ALLOC)
-        how.set_fill_value(np.array(Status.PENDING, column.dtype))
-    return found
-
-
-def _say(place: Any, attrs: Mapping[str, Any], beside: list[str] | None = None) -> None:
+def _say(place: Any, attrs: Mapping[str, Any]) -> None:
     """Attributes of a variable or a group; texts of a fixed length, which netCDF4 and MATLAB know, too."""
     import h5py
 
-    for name, value in {**attrs, **({"coordinates": " ".join(beside)} if beside else {})}.items():
+    for name, value in ((name, value) for name, value in attrs.items() if value is not None):
         if isinstance(value, str):
             text = value.encode()
             value = np.array(text, h5py.string_dtype("utf-8", max(2, len(text))))

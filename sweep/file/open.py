@@ -154,7 +154,7 @@ def verify(path: str | os.PathLike[str]) -> Verdict:
 
 def _verdict(output: Path, file: StoredFile) -> Verdict:
     """Compares all digests."""
-    mendable, work, lost, findings = file.is_as_made(), file.tables[file.work], set[int](), list[str]()
+    mendable, work, lost, findings = file.is_as_made(), file.work, set[int](), list[str]()
     if not mendable:
         findings.append("its structure is not as it was made: damaged, or changed by another program")
     # the columns of a summary are made at its end
@@ -169,7 +169,7 @@ def _verdict(output: Path, file: StoredFile) -> Verdict:
         return Verdict(output, state, f"{file.path.stat().st_size:,} bytes checked", tuple(findings), blocks)
     missing = np.flatnonzero(~work.done).tolist()
     checked = f"unfinished, {work.blocks.count - len(missing):,} of {work.blocks.count:,} blocks there and checked"
-    findings += _lines(f"missing: {file.work} {{:,}} to {{:,}}", work, missing)
+    findings += _lines(f"missing: {work.name} {{:,}} to {{:,}}", work, missing)
     findings = findings or ["all blocks are there, but it has not ended; run the sweep again to finish"]
     return Verdict(output, state, checked, tuple(findings))
 

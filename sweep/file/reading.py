@@ -14,7 +14,6 @@ import operator
 import os
 import struct
 from collections.abc import Iterable, Mapping
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -29,23 +28,20 @@ from sweep.errors import SweepError
 from sweep.file import disk
 from sweep.study.model import Study, study_together
 
-FORMAT = 6
+FORMAT = 7
 UNFINISHED = ".unfinished"
 """How the name of a result ends while its sweep runs."""
 BYTES = 16
 """Of a digest."""
-FILE_END = 28, 8
-"""Where, and in how many bytes, files of HDF5 say how long they are."""
 OF_NETCDF = {"CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_Netcdf4Coordinates", "_Netcdf4Dimid", "coordinates"}
 """Attributes that say nothing to a user."""
 DAMAGE = (OSError, EOFError, LookupError, ValueError, TypeError, AttributeError, RuntimeError)
 """What comes of reading a damaged file."""
-MODULUS = 65535
-ROW = 4096
-"""Words of a row of a checksum."""
-MOST_ROWS = 1 << 12
-"""Rows summed at a time, so that 32 bits hold each sum."""
+NOTHING = {STATUS: int(Status.PENDING), METHOD_USED: -1}
+"""What is handed out of cells that are not computed yet, where that is not NaN."""
+MODULUS, ROW = 65535, 4096
 NUMBERS = np.arange(ROW, dtype=np.uint64)
+"""Of the words of a row, and of the rows, of which as many are summed at a time: 32 bits hold each sum."""
 
 
 class Damaged(SweepError):
@@ -55,13 +51,13 @@ class Damaged(SweepError):
 class StoredFile:
     """A result of this program, open for reading, or for writing by other `flags`. To be used with `with`.
 
-    It is `finished` where its name does not say otherwise; where it is not, what is missing is handed out as NaN and
-    PENDING. Of a column or a coordinate `file[name]` gives `dims`, `attrs`, and its numbers as `values` or by indices.
-    `tables` are "cells", the output's columns, of a summary "rows", which they are made of, and "ending", what is known
-    at the end; `work` names the one that is computed. `attrs` are those of the file and of its end, texts as str.
-    `key`, the digest of all that stands before it, tells this file from any other. Raises Damaged where it is none of
-    ours, or damaged beside the numbers; FileNotFoundError or NotADirectoryError where there is none; SweepError where
-    it cannot be read, or is of another format.
+    Where its name does not say that it is `finished`, what is missing is handed out as NaN and PENDING. Of a column or
+    a coordinate `file[name]` gives `dims`, `attrs`, and its numbers as `values` or by indices. `tables` are "cells", the
+    output's columns, of a summary "rows", which they are made of, and "ending", what is known at the end; `work` is the
+    one that is computed. `attrs` are those of the file and of its end, texts as str. `key`, a digest of all that stands
+    before it, tells this file from any other. Raises Damaged where it is none of ours, or damaged beside the numbers;
+    FileNotFoundError or NotADirectoryError where there is none; SweepError where it cannot be read, or is of another
+    format.
     """
 
     def __init__(self, path: Path, flags: int = os.O_RDONLY) -> None:
@@ -71,13 +67,13 @@ class StoredFile:
         self.finished = self.path.suffix != UNFINISHED
         try:
             self.fd = disk.open_file(path, flags)
+            raw = os.fdopen(os.dup(self.fd), "rb", 0)  # whatever has the file's name by now
         except (FileNotFoundError, NotADirectoryError):
             raise
         except OSError as fault:
             raise SweepError(f"{path}: cannot be read ({fault.strerror})") from fault
         try:
-            # whatever has the file's name by now
-            with os.fdopen(os.dup(self.fd), "rb", 0) as raw, h5py.File(raw, "r") as h5:
+            with raw, h5py.File(raw, "r") as h5:
                 self._read(h5)
         except DAMAGE as fault:
             self.close()
@@ -100,8 +96,8 @@ class StoredFile:
         self.key_at = _own(h5, "integrity/key").id.get_offset()
         self.key = read_bytes(self.fd, self.key_at, BYTES)
         self.tables = {name: Table(self, h5, name, **keys) for name, keys in contents["tables"].items()}
-        self.work = "rows" if "rows" in self.tables else "cells"
-        for name in (name for name in self.dims if name not in self.columns()):
+        self.work = self.tables.get("rows", self.tables["cells"])
+        for name in (name for name in self.dims if name not in self.tables["cells"].columns):
             data = _own(h5, name)
             attrs, values = _attrs(data), data[()]
             if attrs.pop("_Encoding", None):
@@ -111,7 +107,7 @@ class StoredFile:
         self.attrs["study_json"] = study_together(self.attrs["study_json"], self.coords)
         self.fingerprint = dict(json.loads(self.attrs["fingerprint"]))
         if self.finished:
-            if (ending := self.tables["ending"].columns[0].read(0)) is None:
+            if (ending := self.tables["ending"].columns["ending"].read(0)) is None:
                 raise ValueError("what was written at its end is damaged")
             self.attrs |= json.loads(ending[0])
 
@@ -136,36 +132,29 @@ class StoredFile:
     def is_as_made(self) -> bool:
         """Whether all but numbers can be read, is as it was made, and as long; HDF5 does not check all of it."""
         try:
-            size = int.from_bytes(read_bytes(self.fd, *FILE_END), "little")
-            return os.fstat(self.fd).st_size == size and digest_before(self.fd, self.key_at) == self.key
+            return key_of(self.fd, self.key_at) == self.key
         except (OSError, EOFError):
             return False
-
-    def columns(self, name: str = "cells") -> dict[str, Numbers]:
-        """The columns of a table."""
-        return {column.name: column for column in self.tables[name].columns}
 
     def __contains__(self, name: str) -> bool:
         return name in self.dims
 
     def __getitem__(self, name: str) -> Any:
-        return self.coords[name] if name in self.coords else self.columns()[name]
-
-    @cached_property
-    def study(self) -> Study:
-        """What it is the result of; its kernel is the one that it was, whatever has that name by now."""
-        return Study.from_json(self.attrs["study_json"], declared=True)
-
-    @cached_property
-    def pending(self) -> Mapping[str, Any]:
-        """The rows of a summary of which nothing is computed yet."""
-        return pending(self.study)
+        return self.coords[name] if name in self.coords else self.tables["cells"].columns[name]
 
     def gathered(self, block: int) -> Mapping[str, Any]:
-        """A block of the output of a summary, from its rows. Raises SweepError where they are damaged."""
-        per_row, (first, last) = row_blocks(self.study).per_row, self.tables["cells"].blocks.bounds(block)
-        rows = {name: column[first * per_row : last * per_row] for name, column in self.columns("rows").items()}
-        return gathered(self.study, rows)
+        """A block of the output of a summary, from its rows, of which some may be missing.
+
+        Raises SweepError where they are damaged.
+        """
+        study, rows = Study.from_json(self.attrs["study_json"], declared=True), self.tables["rows"]
+        per_row, blocks = row_blocks(study).per_row, rows.blocks
+        first, stop = (per_row * place for place in self.tables["cells"].blocks.bounds(block))
+        there = np.repeat(rows.done, np.diff(blocks.first(np.arange(blocks.count + 1))))[first:stop]
+        found = {name: column[first:stop] for name, column in pending(study).items()}
+        for name, column in rows.columns.items():
+            found[name][there] = column[first:stop][there]
+        return gathered(study, found)
 
 
 class Table:
@@ -178,8 +167,9 @@ class Table:
     def __init__(self, file: StoredFile, h5: Any, name: str, grid: list[int], blocks: list[int], paths: list[str]):
         self.file, self.name, self.grid, self.blocks = file, name, tuple(grid), Partition(*blocks)
         self.box = box_shape(self.grid, self.blocks.cells)
-        self.columns = tuple(Numbers(self, number, _own(h5, path)) for number, path in enumerate(paths))
-        self.digests_at = _own(h5, f"integrity/{name}_digests").id.get_offset()
+        columns = [Numbers(self, number, _own(h5, path)) for number, path in enumerate(paths)]
+        self.columns = {column.name: column for column in columns}
+        self.digests_at = _own(h5, f"integrity/{name}").id.get_offset()
         self.row_bytes, shape = BYTES * len(paths), (self.blocks.count, len(paths), BYTES)
         self.digests = np.empty(shape, "u1")
         disk.read_all(file.fd, (self.digests,), self.digests_at)
@@ -192,13 +182,13 @@ class Table:
     def damaged(self, blocks: Iterable[int]) -> dict[str, list[int]]:
         """Which of some blocks are not what was written, by the names of columns; all are read."""
         blocks = [*blocks]
-        return {column.name: [block for block in blocks if column.read(block) is None] for column in self.columns}
+        return {name: [b for b in blocks if column.read(b) is None] for name, column in self.columns.items()}
 
     def write(self, block: int, arrays: Mapping[str, Any]) -> bytes:
         """Writes the chunks of a block, and gives their digests. Raises OSError."""
         row = b""
-        for column in self.columns:
-            array, behind = np.ascontiguousarray(arrays[column.name], column.dtype), b""
+        for name, column in self.columns.items():
+            array, behind = np.ascontiguousarray(arrays[name], column.dtype), b""
             if column.check:
                 behind = bytes(column.size - array.nbytes) + checksum(array, column.size)
             disk.write_all(self.file.fd, (array, behind), int(column.at[block]))
@@ -260,15 +250,17 @@ class Numbers:
 
     def __getitem__(self, key: Any) -> Any:
         """By what is given for the first dimensions. Raises SweepError where damaged."""
-        key, table = key if isinstance(key, tuple) else (key,), self.table
-        key += (slice(None),) * (len(self.shape) - len(key))
-        keys = [k if isinstance(k, slice) else slice(k, k + 1 or None) for k in key[: len(table.grid)]]
-        runs = [range(n)[k] for n, k in zip(table.grid, keys, strict=True)]
+        table, key = self.table, key if isinstance(key, tuple) else (key,)
+        key += (slice(None),) * (len(table.grid) - len(key))
+        runs = [
+            range(n)[k if isinstance(k, slice) else slice(k, k + 1 or None)]
+            for n, k in zip(table.grid, key, strict=False)
+        ]
         # all places from the first to the last one wanted, of which those wanted are a view
         wanted = [slice(run[0], run[-1] + 1) if run else slice(0, 0) for run in runs]
         out = np.empty((*(w.stop - w.start for w in wanted), *self.own), self.dtype)
-        counts = [-(-n // m) for n, m in zip(table.grid, table.box, strict=True)]
         near = tuple(slice(w.start // m, -(-w.stop // m)) for w, m in zip(wanted, table.box, strict=True))
+        counts = [-(-n // m) for n, m in zip(table.grid, table.box, strict=True)]
         for block in np.ravel(np.arange(table.blocks.count).reshape(counts)[near]).tolist():
             box = box_slices(table.grid, *table.blocks.bounds(block))
             both = [slice(max(w.start, b.start), min(w.stop, b.stop)) for w, b in zip(wanted, box, strict=True)]
@@ -285,15 +277,14 @@ class Numbers:
     def _fill(self, block: int, out: Any) -> None:
         """Fills in the cells of a block. Raises SweepError where it is damaged, or the file is closed."""
         file, table = self.table.file, self.table
-        start, stop = table.blocks.bounds(block)
         if file.fd < 0:
             raise SweepError(f"{file.path}: is closed; open it again to read {self.name}")
-        if not file.finished and table.name != file.work:
+        if not file.finished and table is not file.work:
             out[...] = file.gathered(block)[self.name].reshape(out.shape)
         elif not file.finished and not table.digests[block].any(axis=-1).all():
-            nothing = {STATUS: int(Status.PENDING), METHOD_USED: -1}.get(self.name, math.nan)
-            out[...] = file.pending[self.name][start:stop] if table.name == "rows" else nothing
+            out[...] = NOTHING.get(self.name, math.nan if self.dtype.kind == "f" else 0)
         elif self.read(block, out) is None:
+            start, stop = table.blocks.bounds(block)
             raise SweepError(
                 f"{file.path}: {self.name} is damaged between its cells {start:,} and {stop:,}, or was changed by "
                 "another program; sweep verify tells of all damage, and "
@@ -340,19 +331,31 @@ def _attrs(thing: Any) -> dict[str, Any]:
     return found
 
 
+def read_bytes(fd: int, begin: int, count: int) -> bytes:
+    """So many bytes. Raises OSError, EOFError."""
+    found = bytearray(count)
+    disk.read_all(fd, (found,), begin)
+    return bytes(found)
+
+
+def key_of(fd: int, end: int) -> bytes:
+    """Digest of all bytes of a file before a place, and of its length. Raises OSError, EOFError."""
+    return xxhash.xxh3_128_digest(read_bytes(fd, 0, end) + struct.pack("<q", os.fstat(fd).st_size))
+
+
 def checksum(piece: Any, length: int) -> bytes:
-    """HDF5's checksum (its filter fletcher32), the four bytes behind a chunk of so many bytes: of `piece`, then zeros.
+    """HDF5's checksum of a chunk of so many bytes (its filter fletcher32), which are those of `piece`, then zeros.
 
     Of big-endian words w[0] .. w[n-1] of 16 bits it is (sum of w[i], sum of (n - i) w[i]) modulo 65535. As 2^16 is 1
     there, a word with its bytes swapped is 256 times the word. And with the words in rows of K, sum of i w[i] is K
     times the sum of row numbers by sums of rows, and the sum of column numbers by sums of columns.
     """
     raw = np.frombuffer(disk.as_bytes(piece), np.uint8)
-    whole, step = raw.size - raw.size % (2 * ROW), 2 * ROW * MOST_ROWS
+    whole = raw.size - raw.size % (2 * ROW)
     last = np.zeros(2 * ROW, np.uint8)
     last[: raw.size - whole] = raw[whole:]
     low = high = 0
-    for part in (*(raw[at : min(at + step, whole)] for at in range(0, whole, step)), last):
+    for part in (*np.split(raw[:whole], range(2 * ROW * ROW, whole, 2 * ROW * ROW)), last):
         rows = part.view("<u2").reshape(-1, ROW)
         by_row = rows.sum(axis=1, dtype=np.uint32).astype(np.uint64)
         by_column = rows.sum(axis=0, dtype=np.uint32).astype(np.uint64)
@@ -364,15 +367,3 @@ def checksum(piece: Any, length: int) -> bytes:
     # 256 times a sum modulo 65535, as HDF5 has it: 0 stands for a sum that is zero itself
     first, second = (256 * total % MODULUS or (MODULUS if total else 0) for total in (low, high))
     return (second << 16 | first).to_bytes(4, "little")
-
-
-def read_bytes(fd: int, begin: int, count: int) -> bytes:
-    """So many bytes. Raises OSError, EOFError."""
-    found = bytearray(count)
-    disk.read_all(fd, (found,), begin)
-    return bytes(found)
-
-
-def digest_before(fd: int, end: int) -> bytes:
-    """Digest of all bytes before a place. Raises OSError, EOFError."""
-    return xxhash.xxh3_128_digest(read_bytes(fd, 0, end))

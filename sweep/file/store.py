@@ -15,7 +15,7 @@ import json
 import os
 import time
 from collections import deque
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -26,7 +26,7 @@ from sweep.cells.schema import Schema
 from sweep.errors import Incomplete, SweepError
 from sweep.file import disk
 from sweep.file.frame import PAGE, Cut, create
-from sweep.file.reading import BYTES, UNFINISHED, Damaged, StoredFile, Table, read_bytes
+from sweep.file.reading import BYTES, UNFINISHED, Damaged, StoredFile, read_bytes
 
 SYNC_SECONDS = 0.2
 """How often blocks are brought to the disk, and it is looked whether the file is still in its place."""
@@ -43,82 +43,80 @@ def lock_of(output: Path) -> Path:
 
 
 @contextlib.contextmanager
-def opened(output: Path) -> Iterator[Store]:
-    """The store of an output, held by this process alone. Raises SweepError."""
+def alone(output: Path) -> Iterator[None]:
+    """No other run writes this output meanwhile. Raises SweepError."""
     with disk.refusing(output), disk.locked(lock_of(output)) as ours:
         if not ours:
             raise SweepError(f"{output}: another run is at work on this output; wait for it, or choose another with -o")
-        store = Store(output)
-        disk.discard(disk.part_of(store.path))  # of a run that was killed
-        try:
-            yield store
-        finally:
-            store.close()
+        disk.discard(disk.part_of(unfinished_of(output)))  # of a run that was killed
+        yield
 
 
-class Store:
-    """The result of one sweep while it is written, locked for this process. Made by `opened`.
+def begun(output: Path, schema: Schema, cuts: Mapping[str, Cut], shared: bool = False) -> Store:
+    """A result of which nothing is computed yet, with room on the disk for all of it. Raises SweepError."""
+    with disk.replacing(unfinished_of(output), held=True) as part:
+        create(part, schema, cuts, shared)
+    return Store(output)
 
-    It is at `path`, and will be at `output`, where it is when `finished`; `file` is None until `begin` or `resume`.
+
+def found(output: Path, give_up: bool = False) -> Store | None:
+    """What an earlier run left; None where there is nothing, or to `give_up` what is damaged. Raises SweepError."""
+    path = unfinished_of(output)
+    if not path.exists():
+        return None
+    with contextlib.suppress(SweepError if give_up else Damaged):
+        if (store := Store(output)).is_as_made():
+            return store
+    if give_up:
+        return None
+    raise SweepError(f"{path}: damaged beside its numbers; remove it, or give it up with --force")
+
+
+def reopened(output: Path) -> Store:
+    """A finished result that is taken up again. Raises SweepError."""
+    with disk.refusing(output):
+        disk.rename(output, unfinished_of(output))
+        disk.sync_folder(output.parent)
+    return Store(output)
+
+
+class Store(StoredFile):
+    """The result of one sweep while it is written, held by this process alone. To be used with `with`.
+
+    It is at `path`, and will be at `output`, where it is when `finished`.
     """
 
     def __init__(self, output: Path) -> None:
-        self.output, self.path, self.finished = output, unfinished_of(output), False
-        self.file: StoredFile | None = None
+        super().__init__(unfinished_of(output), os.O_RDWR)
+        self.output, self._mark = output, disk.mark(self.path)[:2]  # of the file: it is still the one, and as long
         self._waiting: deque[tuple[int, bytes]] = deque()
-        self._mark: tuple[int, ...] = ()  # of the file: it is still the one, and as long
         self._synced, self._elsewhere = time.monotonic(), False
         self._syncing, self._last = ThreadPoolExecutor(1), Future[None]()  # beside those that compute
         self._last.set_result(None)
 
-    @property
-    def table(self) -> Table:
-        """What is computed."""
-        assert self.file is not None, "the sweep has not begun"
-        return self.file.tables[self.file.work]
+    def __exit__(self, *fault: object) -> None:
+        """Acknowledges what is written, brings that to the disk if that can be, and gives the file back."""
+        with contextlib.suppress(SweepError), disk.refusing(self.path):
+            self.commit()
+            disk.sync_numbers(self.fd)
+        self.close()
+        self._syncing.shutdown()
 
-    def found(self, give_up: bool = False) -> StoredFile | None:
-        """What an earlier run left; None where there is nothing, or to `give_up` what is damaged. Raises SweepError."""
-        if not self.path.exists():
-            return None
-        with contextlib.suppress(SweepError if give_up else Damaged):
-            file = StoredFile(self.path, os.O_RDWR)
-            if file.is_as_made():
-                return file
-        if give_up:
-            return None
-        raise SweepError(f"{self.path}: damaged beside its numbers; remove it, or give it up with --force")
-
-    def begin(self, schema: Schema, cuts: Mapping[str, Cut], shared: bool = False) -> None:
-        """Makes the file, with room on the disk for all of it. Raises SweepError."""
-        with disk.refusing(self.path), disk.made(self.path) as part:
-            create(part, schema, cuts, shared)
-        self.resume(StoredFile(self.path, os.O_RDWR), ())
-
-    def reopen(self, damaged: Sequence[int]) -> None:
-        """Takes a finished result up again, some blocks of which are to be computed again. Raises SweepError."""
-        with disk.refusing(self.output):
-            disk.rename(self.output, self.path)
-            disk.sync_folder(self.output.parent)
-        self.resume(StoredFile(self.path, os.O_RDWR), damaged)
-
-    def resume(self, file: StoredFile, damaged: Iterable[int] | None = None) -> list[int]:
+    def resume(self, damaged: Iterable[int] | None = None) -> list[int]:
         """Takes up what an earlier run left; its damaged blocks count as missing, and are returned.
 
         `damaged` names them where that is known; None: all blocks that are done are read and compared with their
         digests. Raises SweepError.
         """
-        self.file, status, table = file, os.fstat(file.fd), file.tables[file.work]
-        self._mark = status.st_ino, status.st_size
         if damaged is None:
-            damaged = set[int]().union(*table.damaged(np.flatnonzero(table.done)).values())
+            damaged = set[int]().union(*self.work.damaged(np.flatnonzero(self.work.done).tolist()).values())
         with disk.refusing(self.path):
-            table.write_digests(dict.fromkeys(damaged, bytes(table.row_bytes)))
+            self.work.write_digests(dict.fromkeys(damaged, bytes(self.work.row_bytes)))
         return sorted(damaged)
 
     def missing(self) -> list[int]:
         """Numbers of the blocks that are not done, ascending."""
-        return np.flatnonzero(~self.table.done).tolist()
+        return np.flatnonzero(~self.work.done).tolist()
 
     def put(self, index: int, found: bytes | Mapping[str, Any]) -> None:
         """Writes a block, or takes the digests of one that another process has written and synced. Raises SweepError.
@@ -127,7 +125,7 @@ class Store:
         """
         with disk.refusing(self.path):
             self._elsewhere |= isinstance(found, bytes)
-            self._waiting.append((index, found if isinstance(found, bytes) else self.table.write(index, found)))
+            self._waiting.append((index, found if isinstance(found, bytes) else self.work.write(index, found)))
 
     def tick(self) -> None:
         """Has what is written acknowledged, if it is time to. Raises SweepError where that failed the last time."""
@@ -145,16 +143,16 @@ class Store:
 
         Raises SweepError; Incomplete where the file is not what it was, or not where it was: no block counts there.
         """
-        file, self._synced = self.table.file, time.monotonic()
+        self._synced = time.monotonic()
         with disk.refusing(self.path):
-            if disk.mark(self.path)[:2] != self._mark or read_bytes(file.fd, file.key_at, BYTES) != file.key:
+            if disk.mark(self.path)[:2] != self._mark or read_bytes(self.fd, self.key_at, BYTES) != self.key:
                 raise Incomplete(
                     f"{self.path}: was moved, removed, cut or overwritten while the run wrote to it; if it was moved, "
                     "move it back, and the same command continues; else remove what is left, and begin anew"
                 )
             if waiting := dict(self._waiting.popleft() for _ in range(len(self._waiting))):
-                disk.sync_numbers(file.fd)
-                self.table.write_digests(waiting)
+                disk.sync_numbers(self.fd)
+                self.work.write_digests(waiting)
 
     def finish(self, texts: Mapping[str, str]) -> None:
         """Puts the result in its place, with what is known at the end; of a summary, its rows are gathered first.
@@ -162,19 +160,19 @@ class Store:
         Raises SweepError where it cannot, and the result stays where it is.
         """
         self.commit()
-        file, cells, ending = self.table.file, *(self.table.file.tables[name] for name in ("cells", "ending"))
+        cells, ending = self.tables["cells"], self.tables["ending"]
         with disk.refusing(self.output):
             if self._elsewhere:
-                disk.forget(file.fd)
-            made = {ending: {0: ending.write(0, {"ending": np.array([json.dumps(dict(texts))], "S240")})}}
-            if cells is not self.table:
-                made[cells] = {b: cells.write(b, file.gathered(b)) for b in range(cells.blocks.count)}
-            disk.sync_numbers(file.fd)
-            for table, digests in made.items():
+                disk.forget(self.fd)
+            last = {ending: {0: ending.write(0, {"ending": np.array([json.dumps(dict(texts))], "S240")})}}
+            if cells is not self.work:
+                last[cells] = {b: cells.write(b, self.gathered(b)) for b in range(cells.blocks.count)}
+            disk.sync_numbers(self.fd)
+            for table, digests in last.items():
                 table.write_digests(digests)
-            disk.fsync(file.fd)
-            last = cells.blocks.count - 1
-            if any(cells.damaged({0, last // 2, last}).values()):
+            disk.fsync(self.fd)
+            count = cells.blocks.count
+            if any(cells.damaged({0, (count - 1) // 2, count - 1}).values()):
                 raise SweepError(
                     f"{self.output}: differs when read back from what was written; the disk may be failing"
                 )
@@ -184,14 +182,5 @@ class Store:
 
     def shared(self) -> tuple[Path, bytes] | None:
         """By what another process opens the file to write blocks; None where blocks of two would share a page."""
-        paged = not any((column.at % PAGE).any() for column in self.table.columns)
-        return (self.path, self.table.file.key) if paged else None
-
-    def close(self) -> None:
-        """Acknowledges what is written, brings that to the disk if that can be, and gives the file back."""
-        if self.file is not None:
-            with contextlib.suppress(SweepError), disk.refusing(self.path):
-                self.commit()
-                disk.sync_numbers(self.file.fd)
-            self.file.close()
-        self._syncing.shutdown()
+        paged = not any((column.at % PAGE).any() for column in self.work.columns.values())
+        return (self.path, self.key) if paged else None

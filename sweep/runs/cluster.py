@@ -206,6 +206,6 @@ class Remote:
         if file is None:
             return {name: column.copy() for name, column in arrays.items()}
         with disk.refusing(file.path):
-            digests = file.tables[file.work].write(job, arrays)
+            digests = file.work.write(job, arrays)
             disk.fsync(file.fd)
         return digests

@@ -35,7 +35,7 @@ def obstacle(old: Mapping[str, str], new: Mapping[str, str]) -> str:
 def has_failed(output: Path) -> bool:
     """Whether a cell of a finished result FAILED. Raises SweepError where it keeps no cells."""
     with StoredFile(output) as file:
-        if STATUS not in (columns := file.columns()):
+        if STATUS not in (columns := file.tables["cells"].columns):
             raise SweepError(f"{output}: a summary does not keep the cells that FAILED; compute it anew with --force")
         return any((piece == Status.FAILED).any() for piece in flat_pieces(columns[STATUS]))
 
@@ -51,7 +51,7 @@ class Reused:
         self._study, self._shape, self._retry = study, Grid(study).shape, retry
         self._stored = StoredFile(output)
         old = Study.from_json(self._stored.attrs["study_json"], declared=True)
-        self._numbers: Mapping[str, Any] = self._stored.columns()
+        self._numbers: Mapping[str, Any] = self._stored.tables["cells"].columns
         self._positions = [_positions(old.axes[name], axis) for name, axis in study.axes.items()]
 
     def close(self) -> None:

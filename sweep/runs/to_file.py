@@ -12,9 +12,9 @@ from sweep.cells.fingerprint import difference
 from sweep.errors import SweepError
 from sweep.file import disk
 from sweep.file.frame import cuts_of, expected_size
-from sweep.file.reading import StoredFile
-from sweep.file.store import Store, lock_of, opened, unfinished_of
 from sweep.file.open import verify
+from sweep.file.reading import StoredFile
+from sweep.file.store import Store, alone, begun, found, lock_of, reopened, unfinished_of
 from sweep.runs.extend import Precomputed, Reused, has_failed, obstacle
 from sweep.runs.loop import Loop, Task
 from sweep.runs.pool import Terminated, TimeUp
@@ -30,43 +30,71 @@ def run_to_file(task: Task, precomputed: Precomputed | None = None) -> Ending:
     seen, (standing, damaged) = disk.mark(task.output), ("nothing", ()) if left else _standing(task)
     if standing == "complete":
         return "done before"
-    with opened(task.output) as store:
+    with alone(task.output), contextlib.ExitStack() as stack:
         if left or seen != disk.mark(task.output):  # another run may have ended before this one had the lock
             standing, damaged = _standing(task)
-        found = store.found(task.force)
-        is_ours = found is not None and found.fingerprint == dict(task.fingerprint)
+        store = found(task.output, task.force)
+        is_ours = store is not None and store.fingerprint == dict(task.fingerprint)
         if standing == "complete":
             if is_ours:
-                disk.remove(store.path)
+                disk.remove(unfinished_of(task.output))
             return "done before"
-        if found is not None and is_ours:
-            damaged = store.resume(found)
-        elif found is None and standing == "damaged":
-            store.reopen(damaged)
+        if store is None and standing == "damaged":
+            store = stack.enter_context(reopened(task.output))
+            store.resume(damaged)
+        elif store is not None and is_ours:
+            damaged = stack.enter_context(store).resume()
         else:
-            if found is not None:
-                found.close()
-                if not task.force:
-                    raise SweepError(
-                        f"{store.path}: the unfinished result of another study or version; finish that one first, "
-                        f"choose another name, or give it up with --force\n{_changes(found.fingerprint, task)}"
-                    )
-            disk.remove(store.path)
+            if store is not None and not task.force:
+                raise SweepError(
+                    f"{store.path}: the unfinished result of another study or version; finish that one first, "
+                    f"choose another name, or give it up with --force\n{_changes(store.fingerprint, task)}"
+                )
+            disk.remove(unfinished_of(task.output))
+            store = None
         try:
-            _computed(store, task, precomputed, standing == "reused", damaged)
+            with contextlib.ExitStack() as running:
+                known: Reused | Precomputed | None = precomputed
+                to_do, sampled = store is None or bool(store.missing()), known is None
+                if to_do and standing == "reused":
+                    reused = Reused(task.output, task.study, task.retry_failed)
+                    known = running.enter_context(contextlib.closing(reused))
+                # signals are held back from here on, wherever they would leave half a file behind
+                loop = Loop(task, running, None if store is None else store.work.blocks, to_do, sampled, known)
+                if store is None:
+                    store = stack.enter_context(_begun(task, loop, known))
+                for block in damaged:
+                    task.note(f"{loop.blocks.label(block)} were damaged on the disk and are computed again")
+                shared = None if task.cluster is None else store.shared()
+                loop.compute(store.missing(), _Stored(store, loop.blocks, known), shared, store.tick)
+                store.finish(loop.endings())
+                loop.progress.end()
             return "complete"
         except (KeyboardInterrupt, Terminated, TimeUp) as reason:
-            if store.finished:  # the signal came while the result was put in its place
+            if store is not None and store.finished:  # the signal came while the result was put in its place
                 raise
             kept = "before the first block"
-            if store.file is not None:
+            if store is not None:
                 store.commit()
-                kept = f"{int(store.table.done.sum())} of {store.table.blocks.count} blocks are kept"
+                kept = f"{int(store.work.done.sum())} of {store.work.blocks.count} blocks are kept"
             why = f", for {reason}" if isinstance(reason, TimeUp) else ""
             task.note(f"stopped{why}; {kept}, run the same command again to continue")
             if isinstance(reason, TimeUp):
-                return "not begun" if store.file is None else "unfinished"
+                return "not begun" if store is None else "unfinished"
             raise
+
+
+def _begun(task: Task, loop: Loop, known: Reused | Precomputed | None) -> Store:
+    """A new file, if there is room for it. Raises SweepError."""
+    schema = task.said({"start": loop.began, **(known.attrs if isinstance(known, Precomputed) else {})})
+    cuts = cuts_of(task.study, schema, loop.blocks.partition)
+    needed, free = expected_size(schema, cuts), shutil.disk_usage(task.output.parent).free
+    if needed > free:
+        raise SweepError(
+            f"{task.output}: needs {quantity(needed)}, only {quantity(free)} are free here; free some space, "
+            "choose another folder with -o, fewer outputs, or keep a [summary] instead of every cell"
+        )
+    return begun(task.output, schema, cuts, task.cluster is not None)
 
 
 def _standing(task: Task) -> tuple[Literal["nothing", "complete", "damaged", "reused"], Sequence[int]]:
@@ -98,34 +126,6 @@ def _standing(task: Task) -> tuple[Literal["nothing", "complete", "damaged", "re
 
 def _changes(stored: Mapping[str, str], task: Task) -> str:
     return "\n".join(f"  {line}" for line in difference(dict(stored), dict(task.fingerprint)))
-
-
-def _computed(
-    store: Store, task: Task, known: Reused | Precomputed | None, reused: bool, damaged: Sequence[int]
-) -> None:
-    """Computes what is missing, notes which blocks of it were `damaged`, and puts the result in its place."""
-    with contextlib.ExitStack() as stack:
-        to_do, sampled = store.file is None or bool(store.missing()), known is None
-        if to_do and reused:
-            known = stack.enter_context(contextlib.closing(Reused(task.output, task.study, task.retry_failed)))
-        # signals are held back from here on, wherever they would leave half a file behind
-        loop = Loop(task, stack, None if store.file is None else store.table.blocks, to_do, sampled, known)
-        if store.file is None:
-            schema = task.said({"start": loop.began, **(known.attrs if isinstance(known, Precomputed) else {})})
-            cuts = cuts_of(task.study, schema, loop.blocks.partition)
-            needed, free = expected_size(schema, cuts), shutil.disk_usage(task.output.parent).free
-            if needed > free:
-                raise SweepError(
-                    f"{task.output}: needs {quantity(needed)}, only {quantity(free)} are free here; free some space, "
-                    "choose another folder with -o, fewer outputs, or keep a [summary] instead of every cell"
-                )
-            store.begin(schema, cuts, task.cluster is not None)
-        for block in damaged:
-            task.note(f"{loop.blocks.label(block)} were damaged on the disk and are computed again")
-        shared = None if task.cluster is None else store.shared()
-        loop.compute(store.missing(), _Stored(store, loop.blocks, known), shared, store.tick)
-        store.finish(loop.endings())
-        loop.progress.end()
 
 
 class _Stored:

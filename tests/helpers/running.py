@@ -70,13 +70,13 @@ def kept(output):
     if not unfinished_of(output).exists():
         return []
     with StoredFile(unfinished_of(output)) as file:
-        return np.flatnonzero(file.tables[file.work].done).tolist()
+        return np.flatnonzero(file.work.done).tolist()
 
 
 def place(output, name, cell, table="cells"):
     """Where a cell of a column stands in a file."""
     with StoredFile(output) as file:
-        column = file.columns(table)[name]
+        column = file.tables[table].columns[name]
         blocks = column.table.blocks
         block = next(number for number in range(blocks.count) if cell < blocks.bounds(number)[1])
         start = blocks.bounds(block)[0]

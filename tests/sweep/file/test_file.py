@@ -68,7 +68,7 @@ def test_a_file_of_another_format_is_refused_by_its_number(tmp_path):
     with h5py.File(path, "r+") as file:
         file["integrity"].attrs["format"] = 4
     for function in (sweep.open_result, sweep.verify):
-        with pytest.raises(sweep.SweepError, match=r"\(4\).*format 6"):
+        with pytest.raises(sweep.SweepError, match=r"\(4\).*format 7"):
             function(path)
 
 
@@ -80,7 +80,7 @@ def test_digests_reach_the_disk_behind_their_numbers(tmp_path, monkeypatch):
     monkeypatch.setattr(disk, "sync_numbers", lambda fd: (calls.append("sync"), sync(fd))[1])
     run(path, 5, **STUDIES["a line"]).close()
     with h5py.File(path) as file:
-        table = file["integrity/cells_digests"]
+        table = file["integrity/cells"]
         begin, row, end = table.id.get_offset(), table[0].size, table.id.get_offset() + table.size
         chunks = [file["fall_time"].id.get_chunk_info(k).byte_offset for k in range(5)]
     written = [(k, *call) for k, call in enumerate(calls) if call != "sync"]

@@ -75,10 +75,13 @@ def test_a_flipped_bit_is_found_wherever_anything_stands_and_a_whole_result_is_w
     assert before.whole is (path == file)
     content = file.read_bytes()
     with StoredFile(file) as found:
-        table, end = found.tables[found.work], found.key_at
+        table, end = found.work, found.key_at
         special = [table.digests_at + 3, found.key_at + 1, content.index(b"GCOL") + 40]
         columns = [
-            column for table in found.tables.values() if found.finished or table.done.any() for column in table.columns
+            column
+            for table in found.tables.values()
+            if found.finished or table.done.any()
+            for column in table.columns.values()
         ]
         chunks = [int(at) + k for c in columns for at, done in zip(c.at, c.table.done, strict=True) if done
                   for k in (0, c.size, c.size + c.check - 1)]  # fmt: skip
@@ -120,7 +123,7 @@ def test_what_another_program_changed_is_told_and_what_is_left_can_be_read(copy,
 def test_chunks_that_changed_places_are_found(copy, digests_too):
     """HDF5's own checksum sees nothing of it; neither would digests that do not say of which chunk they are."""
     with StoredFile(copy) as file:
-        table, column = file.tables["cells"], file.columns()["fall_time"]
+        table, column = file.tables["cells"], file.tables["cells"].columns["fall_time"]
         spans = [(int(at), column.size + column.check) for at in column.at[:2]]
     digests = [(table.digests_at + block * table.row_bytes, 16) for block in (0, 1)]
     content = bytearray(copy.read_bytes())
@@ -201,7 +204,7 @@ def test_a_damaged_summary_is_not_handed_out(summary, tmp_path):
 def test_damage_beside_the_numbers_is_told_at_once_and_cannot_be_repaired(copy, what):
     with h5py.File(copy) as file:
         places = {"height": file["height"].id.get_chunk_info(0).byte_offset + 12}
-        places["end"] = file["integrity/ending"].id.get_chunk_info(0).byte_offset + 16
+        places["end"] = file["ending/ending"].id.get_chunk_info(0).byte_offset + 16
     places["title"] = copy.read_bytes().index(b"toy:KERNEL")
     flip(copy, places[what])
     for action in (sweep.open_result, lambda path: quiet(study(), path, repair=True)):
@@ -291,8 +294,8 @@ def test_a_damaged_result_is_repaired_to_the_same_bytes(tmp_path, kind, what):
     quiet(made, path, block_cells=10).close()
     before = path.read_bytes()
     with StoredFile(path) as file:
-        table = file.tables[file.work]
-        count, places = table.blocks.count, table.columns[0].at
+        table = file.work
+        count, places = table.blocks.count, next(iter(table.columns.values())).at
     for block in [2 % count] if what == "digests" else [block for block in what if block < max(count, 2)]:
         at = table.digests_at + block % count * table.row_bytes if what == "digests" else int(places[block % count])
         flip(path, at + 1)
