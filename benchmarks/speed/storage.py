@@ -173,8 +173,8 @@ def unchecked(file: StoredFile) -> None:
     bounds = [table.blocks.bounds(block) for block in range(table.blocks.count)]
     for column in table.columns.values():
         numbers = np.empty((table.blocks.size, *column.own), column.dtype)
-        for block, found in enumerate(bounds):
-            disk.read_all(file.fd, (numbers[slice(*found)],), int(column.at[block]))
+        for block, cells in enumerate(bounds):
+            disk.read_all(file.fd, (numbers[slice(*cells)],), int(column.at[block]))
 
 
 PEAK = """

@@ -17,10 +17,6 @@ from typing import Any
 
 from sweep.errors import SweepError
 
-NO_SUCH_CALL = (errno.EINVAL, errno.EOPNOTSUPP, errno.ENOSYS)
-"""What a file system says that cannot reserve space."""
-FULL = (errno.ENOSPC, errno.EDQUOT)
-
 
 def open_file(path: Path | str, flags: int) -> int:
     """A file descriptor; a pipe that is to be read is not waited for. Raises OSError."""
@@ -45,7 +41,7 @@ def reserve(fd: int, size: int) -> None:
         try:
             os.posix_fallocate(fd, 0, size)
         except OSError as fault:
-            if fault.errno not in NO_SUCH_CALL:
+            if fault.errno not in (errno.EINVAL, errno.EOPNOTSUPP, errno.ENOSYS):
                 raise
     os.ftruncate(fd, size)
 
@@ -84,12 +80,6 @@ def as_bytes(piece: Any) -> memoryview:
     return view.cast("B") if view.nbytes else memoryview(b"")
 
 
-def sync_tree(path: Path) -> None:
-    """Returns when a file, or a folder and all that is in it, is on the disk. Raises OSError."""
-    for inner in (*path.rglob("*"), path):
-        sync_folder(inner)
-
-
 def sync_folder(path: Path) -> None:
     """Returns when the names in a folder, or the bytes of a file, are on the disk. Raises OSError."""
     fd = open_file(path, os.O_RDONLY)
@@ -115,7 +105,8 @@ def replacing(target: Path, held: bool = False) -> Iterator[Path]:
         stack.callback(discard, part)
         part.touch()  # says in plain words that there is no such folder, or no permission
         yield part
-        sync_tree(part)
+        for inner in (*part.rglob("*"), part):
+            sync_folder(inner)
         if target.is_dir() or (part.is_dir() and target.exists()):
             # a folder cannot be replaced in one step, and stands aside meanwhile
             discard(old)
@@ -186,5 +177,7 @@ def refusing(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as fault:
-        more = "; free some space, then run the same command again" if fault.errno in FULL else ""
-        raise SweepError(f"{path}: cannot be written ({fault.strerror or str(fault).splitlines()[0]}){more}") from fault
+        reason = fault.strerror or str(fault).splitlines()[0]
+        full = fault.errno in (errno.ENOSPC, errno.EDQUOT)
+        cure = "; free some space, then run the same command again" if full else ""
+        raise SweepError(f"{path}: cannot be written ({reason}){cure}") from fault

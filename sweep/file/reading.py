@@ -15,7 +15,7 @@ import os
 import struct
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import xxhash
@@ -52,21 +52,22 @@ class StoredFile:
     """A result of this program, open for reading, or for writing by other `flags`. To be used with `with`.
 
     Where its name does not say that it is `finished`, what is missing is handed out as NaN and PENDING. Of a column or
-    a coordinate `file[name]` gives `dims`, `attrs`, and its numbers as `values` or by indices. `tables` are "cells", the
-    output's columns, of a summary "rows", which they are made of, and "ending", what is known at the end; `work` is the
-    one that is computed. `attrs` are those of the file and of its end, texts as str. `key`, a digest of all that stands
-    before it, tells this file from any other. Raises Damaged where it is none of ours, or damaged beside the numbers;
-    FileNotFoundError or NotADirectoryError where there is none; SweepError where it cannot be read, or is of another
-    format.
+    a coordinate `file[name]` gives `dims`, `attrs`, and its numbers as `values` or by indices. `tables` are "cells",
+    the output's columns, of a summary "rows", which they are made of, and "ending", what is known at the end; `work` is
+    the one that is computed. `attrs` are those of the file and of its end, texts as str. `key`, a digest of all that
+    stands before it, tells this file from any other. Raises Damaged where it is none of ours, or damaged beside the
+    numbers; FileNotFoundError or NotADirectoryError where there is none; SweepError where it cannot be read, is of
+    another format, or has not the `key` that is asked for.
     """
 
-    def __init__(self, path: Path, flags: int = os.O_RDONLY) -> None:
+    def __init__(self, path: Path, flags: int = os.O_RDONLY, key: bytes | None = None) -> None:
         import h5py
 
         self.path, self.fd = Path(path), -1
         self.finished = self.path.suffix != UNFINISHED
         try:
             self.fd = disk.open_file(path, flags)
+            os.lseek(self.fd, 0, os.SEEK_SET)  # in a pipe one cannot
             raw = os.fdopen(os.dup(self.fd), "rb", 0)  # whatever has the file's name by now
         except (FileNotFoundError, NotADirectoryError):
             raise
@@ -74,16 +75,16 @@ class StoredFile:
             raise SweepError(f"{path}: cannot be read ({fault.strerror})") from fault
         try:
             with raw, h5py.File(raw, "r") as h5:
-                self._read(h5)
+                self._read(h5, key)
         except DAMAGE as fault:
             self.close()
             reason = (str(fault).splitlines() or [type(fault).__name__])[0]
             raise Damaged(
-                f"{path}: not the result of a sweep (exports are for xarray and other programs), or damaged ({reason}); "
-                "move it away or choose another name"
+                f"{path}: not the result of a sweep (exports are for xarray and other programs), or damaged "
+                f"({reason}); move it away or choose another name"
             ) from fault
 
-    def _read(self, h5: Any) -> None:
+    def _read(self, h5: Any, key: bytes | None) -> None:
         """All but numbers. Raises one of DAMAGE."""
         integrity = _own(h5, "integrity").attrs
         if (number := integrity.get("format")) != FORMAT:
@@ -94,7 +95,9 @@ class StoredFile:
         contents, self.coords = json.loads(integrity["contents"]), dict[str, Coordinate]()
         self.dims = {name: tuple(dims) for name, dims in contents["dims"].items()}
         self.key_at = _own(h5, "integrity/key").id.get_offset()
-        self.key = read_bytes(self.fd, self.key_at, BYTES)
+        self.key = os.pread(self.fd, BYTES, self.key_at)
+        if key not in (None, self.key):
+            raise SweepError(f"{self.path}: was replaced since it was opened; open it again")
         self.tables = {name: Table(self, h5, name, **keys) for name, keys in contents["tables"].items()}
         self.work = self.tables.get("rows", self.tables["cells"])
         for name in (name for name in self.dims if name not in self.tables["cells"].columns):
@@ -111,23 +114,22 @@ class StoredFile:
                 raise ValueError("what was written at its end is damaged")
             self.attrs |= json.loads(ending[0])
 
-    def __enter__(self) -> StoredFile:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *fault: object) -> None:
         self.close()
 
-    def __del__(self) -> None:
-        self.close()
-
     def __reduce__(self) -> Any:
-        return again, (self.path, self.key)
+        return StoredFile, (self.path, os.O_RDONLY, self.key)
 
     def close(self) -> None:
         """Gives the file back; nothing can be read from then on."""
         fd, self.fd = self.fd, -1
         if fd >= 0:
             os.close(fd)
+
+    __del__ = close
 
     def is_as_made(self) -> bool:
         """Whether all but numbers can be read, is as it was made, and as long; HDF5 does not check all of it."""
@@ -297,15 +299,6 @@ def _within(inner: Iterable[slice], outer: Iterable[slice]) -> Any:
     return (*(slice(a.start - b.start, a.stop - b.start) for a, b in zip(inner, outer, strict=True)), ...)
 
 
-def again(path: Path, key: bytes, flags: int = os.O_RDONLY) -> StoredFile:
-    """A file once more, in another process or from a pickle. Raises SweepError where another has its name by now."""
-    file = StoredFile(path, flags)
-    if file.key != key:
-        file.close()
-        raise SweepError(f"{path}: was replaced since it was opened; open it again")
-    return file
-
-
 def _own(h5: Any, path: str) -> Any:
     """What has a path. Raises ValueError where it lies elsewhere, or the file has no room for it: that is not read."""
     import h5py
@@ -331,16 +324,11 @@ def _attrs(thing: Any) -> dict[str, Any]:
     return found
 
 
-def read_bytes(fd: int, begin: int, count: int) -> bytes:
-    """So many bytes. Raises OSError, EOFError."""
-    found = bytearray(count)
-    disk.read_all(fd, (found,), begin)
-    return bytes(found)
-
-
 def key_of(fd: int, end: int) -> bytes:
     """Digest of all bytes of a file before a place, and of its length. Raises OSError, EOFError."""
-    return xxhash.xxh3_128_digest(read_bytes(fd, 0, end) + struct.pack("<q", os.fstat(fd).st_size))
+    found = bytearray(end)
+    disk.read_all(fd, (found,), 0)
+    return xxhash.xxh3_128_digest(found + struct.pack("<q", os.fstat(fd).st_size))
 
 
 def checksum(piece: Any, length: int) -> bytes:

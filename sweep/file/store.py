@@ -26,7 +26,7 @@ from sweep.cells.schema import Schema
 from sweep.errors import Incomplete, SweepError
 from sweep.file import disk
 from sweep.file.frame import PAGE, Cut, create
-from sweep.file.reading import BYTES, UNFINISHED, Damaged, StoredFile, read_bytes
+from sweep.file.reading import BYTES, UNFINISHED, Damaged, StoredFile
 
 SYNC_SECONDS = 0.2
 """How often blocks are brought to the disk, and it is looked whether the file is still in its place."""
@@ -145,7 +145,7 @@ class Store(StoredFile):
         """
         self._synced = time.monotonic()
         with disk.refusing(self.path):
-            if disk.mark(self.path)[:2] != self._mark or read_bytes(self.fd, self.key_at, BYTES) != self.key:
+            if disk.mark(self.path)[:2] != self._mark or os.pread(self.fd, BYTES, self.key_at) != self.key:
                 raise Incomplete(
                     f"{self.path}: was moved, removed, cut or overwritten while the run wrote to it; if it was moved, "
                     "move it back, and the same command continues; else remove what is left, and begin anew"

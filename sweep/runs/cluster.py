@@ -31,7 +31,7 @@ from sweep.cells.fingerprint import difference, fingerprint
 from sweep.cells.solve import Solver
 from sweep.errors import Incomplete, SweepError
 from sweep.file import disk
-from sweep.file.reading import StoredFile, again
+from sweep.file.reading import StoredFile
 from sweep.runs.isolate import Processes
 from sweep.runs.log import log
 from sweep.study.model import Study
@@ -195,7 +195,7 @@ class Remote:
         if shared is not None:
             path, key = shared
             with contextlib.suppress(OSError, SweepError):  # it is not seen here, or may not be written
-                self._file = again(path, key, os.O_RDWR)
+                self._file = StoredFile(path, os.O_RDWR, key)
         blocks = Blocks(study, partition)
         self.room = blocks.own
         return Bench(study, blocks, weakref.proxy(self), processes)  # so that all ends when dask lets go of this

@@ -77,12 +77,8 @@ def test_a_flipped_bit_is_found_wherever_anything_stands_and_a_whole_result_is_w
     with StoredFile(file) as found:
         table, end = found.work, found.key_at
         special = [table.digests_at + 3, found.key_at + 1, content.index(b"GCOL") + 40]
-        columns = [
-            column
-            for table in found.tables.values()
-            if found.finished or table.done.any()
-            for column in table.columns.values()
-        ]
+        tables = [table for table in found.tables.values() if found.finished or table.done.any()]
+        columns = [column for table in tables for column in table.columns.values()]
         chunks = [int(at) + k for c in columns for at, done in zip(c.at, c.table.done, strict=True) if done
                   for k in (0, c.size, c.size + c.check - 1)]  # fmt: skip
     rng = random.Random(3)

@@ -4,7 +4,6 @@ import csv
 import signal
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -73,10 +72,10 @@ def test_a_fault_half_way_leaves_the_old_file_and_nothing_else(tmp_path, monkeyp
     target = tmp_path / f"out{suffix}"
     target.write_text("old")
 
-    def full(self, target):
+    def full(old, new):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(Path, "replace", full)
+    monkeypatch.setattr(disk, "rename", full)
     with pytest.raises(SweepError, match="No space left"):
         sweep.export(result(), target, force=True)
     assert target.read_text() == "old"
@@ -87,7 +86,7 @@ KILLED = """
 import os, signal, sys
 import sweep
 from sweep.file import disk
-disk.sync_tree = lambda path: os.kill(os.getpid(), signal.SIGKILL)
+disk.sync_folder = lambda path: os.kill(os.getpid(), signal.SIGKILL)
 sweep.export(sweep.run(kernel="foliot", axes={"mu": [1.0]}, fixed={"phi0": 1.0, "a": 1.0}), sys.argv[1])
 """
 

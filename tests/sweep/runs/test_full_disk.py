@@ -12,9 +12,8 @@ from running import kept, quiet, same
 import sweep
 from sweep.cli import main
 from sweep.errors import COMPLETE, MISTAKE
-from sweep.file.open import open_result
+from sweep.file.open import open_result, verify
 from sweep.file.store import Store, unfinished_of
-from sweep.file.open import verify
 from sweep.study.read import to_toml
 
 MEGABYTES = 4
