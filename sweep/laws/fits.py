@@ -172,7 +172,7 @@ class _Search:
 
     def _squares(self, rows: NDArray[np.intp], q: Array) -> Array:
         """Weighted sums of squares about the curves of some q; infinite where there is no curve."""
-        every, basis, _ = _columns(self.laws, self.law[rows], q, self.t, self.root)
+        every, basis, _ = _columns(_curves(self.laws, self.law[rows], q, self.t, self.root))
         off = self.z[rows] * self.root - every[0]
         off = off - (basis @ (off[:, None] @ basis).transpose(0, 2, 1))[..., 0]
         square = (off**2).sum(axis=1)
@@ -181,17 +181,19 @@ class _Search:
     def derivatives(self, rows: NDArray[np.intp]) -> tuple[Array, Array, Array, Array, Array]:
         """Weighted distances (r, n), b (r, k), weighted derivatives by q (r, q, n) at fixed b and columns (k, r, n),
         and an orthonormal basis of these (r, n, k)."""
-        every, basis, back = _columns(self.laws, self.law[rows], self.q[rows], self.t, self.root)
+        q, step = self.q[rows], np.where(self.q[rows] > 0, -STEP, STEP)  # away from the limits
+        there = q[:, None] + step[:, None] * np.eye(1 + MOST_Q, MOST_Q, -1)  # q, and each of it changed
+        law = np.repeat(self.law[rows], 1 + MOST_Q)
+        near = _curves(self.laws, law, there.reshape(-1, MOST_Q), self.t, self.root)
+        near = near.reshape(len(near), rows.size, 1 + MOST_Q, self.t.size)
+        every, basis, back = _columns(near[:, :, 0].copy())
         off = self.z[rows] * self.root - every[0]
         along = (off[:, None] @ basis).transpose(0, 2, 1)
         b = np.linalg.solve(back, along)[..., 0]
-        by_q = np.zeros((rows.size, MOST_Q, self.t.size))
-        for k in np.flatnonzero((self.high > self.low)[rows].any(axis=0)):
-            there, step = self.q[rows].copy(), np.where(self.q[rows, k] > 0, -STEP, STEP)  # away from the limits
-            there[:, k] += step
-            change = (_curves(self.laws, self.law[rows], there, self.t, self.root) - every) / step[:, None]
-            by_q[:, k] = np.nan_to_num(change[0] + np.einsum("krn,rk->rn", change[1:], b), posinf=0.0, neginf=0.0)
-        return off - (basis @ along)[..., 0], b, by_q, np.nan_to_num(every[1:]), basis
+        change = (near[:, :, 1:] - every[:, :, None]) / step[:, :, None]
+        by_q = change[0] + np.einsum("krqn,rk->rqn", change[1:], b)
+        by_q[~np.isfinite(by_q) | (self.high == self.low)[rows][:, :, None]] = 0.0
+        return off - (basis @ along)[..., 0], b, by_q, every[1:], basis
 
     def step(self, rows: NDArray[np.intp]) -> NDArray[np.intp]:
         """Moves the q of rows by a damped Gauss-Newton step; those for which another one is worth it."""
@@ -258,7 +260,7 @@ def _grid(laws: tuple[Law, ...], t: bytes, root: bytes) -> tuple[Array, Array, A
     for first, some in zip(edges, tries, strict=False):
         grid[first : first + len(some), : some.shape[1]] = some
     places, weights = np.frombuffer(t), np.frombuffer(root)
-    every, basis, _ = _columns(laws, np.repeat(np.arange(len(laws)), np.diff(edges)), grid, places, weights)
+    every, basis, _ = _columns(_curves(laws, np.repeat(np.arange(len(laws)), np.diff(edges)), grid, places, weights))
     return edges, grid, every[0], basis
 
 
@@ -275,10 +277,9 @@ def _curves(laws: Sequence[Law], law: NDArray[np.intp], q: Array, t: Array, root
     return every
 
 
-def _columns(laws: Sequence[Law], law: NDArray[np.intp], q: Array, t: Array, root: Array) -> tuple[Array, Array, Array]:
-    """`_curves`, and Q (r, n, k) and R of the columns; of those that add nothing to the ones before, and where there is
+def _columns(every: Array) -> tuple[Array, Array, Array]:
+    """Curves, and Q (r, n, k) and R of their columns; of those that add nothing to the ones before, and where there is
     no curve and the shift is NaN, 0 and 1."""
-    every = _curves(laws, law, q, t, root)
     none = ~np.isfinite(every.sum(axis=0)).all(axis=1)
     every[:, none], every[0, none] = 0.0, np.nan
     basis, back = np.linalg.qr(np.moveaxis(every[1:], 0, -1))

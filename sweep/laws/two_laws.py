@@ -195,9 +195,9 @@ def _verdict(t: Array, z: Array, tried: dict[str, Found]) -> tuple[str, float]:
 
     evidence = min(gain(one, two) for one in (line, *others))
     nearest = min((*bends, *others), key=lambda fit: fit.aicc)
+    aicc = three.aicc if three and gain(line, three) > BEYOND_DOUBT else math.inf
     # three, if with a bend more even beside what noise of any kind leaves of fewer
-    rivals = nearest.aicc - OTHER_SHAPES, nearest.interval(t, [], "noise", 0.5)[1] - BEYOND_DOUBT
-    if three and three.aicc < min(rivals) and gain(line, three) > BEYOND_DOUBT:
+    if aicc < nearest.aicc - OTHER_SHAPES and aicc < nearest.interval(t, [], "noise", 0.5)[1] - BEYOND_DOUBT:
         return "three laws", evidence
     if evidence > BEYOND_DOUBT:
         return "two laws" if 0 <= two.numbers[0] <= 1 else "no meeting in the window", evidence
