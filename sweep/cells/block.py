@@ -21,7 +21,7 @@ from sweep.cells.partition import Partition, boxes, row_blocks
 from sweep.cells.reduce import Reducer, part_columns, seconds_a_cell
 from sweep.cells.schema import cells_of, columns
 from sweep.cells.solve import NONE, Solver
-from sweep.cells.timing import LANES, Sample, block_cells, take_sample, tolerated, work_clock
+from sweep.cells.timing import LANES, Sample, block_cells, take_sample, work_clock
 from sweep.errors import SweepError
 
 if TYPE_CHECKING:
@@ -101,8 +101,7 @@ def warm(solver: SolveCells, study: Study) -> None:
     last = Grid(study).size - 1
     several = study.method == "auto" or "method" in study.axes
     for index in dict.fromkeys((last // 2, 0, last) if several else (last // 2,)):
-        with tolerated():
-            solver.solve(index, empty_cells(study, 1))
+        Guard(solver, lambda cell: None).solve(index, empty_cells(study, 1))
 
 
 @contextlib.contextmanager

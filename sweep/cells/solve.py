@@ -87,7 +87,7 @@ def turns(study: Study, grid: Grid) -> tuple[Turn, ...]:
     found = dict[float, Turn]()
     for number, method in enumerate(study.kernel.methods):
         terms: dict[bool, list[Absent]] = {True: [], False: []}  # those that an axis changes, and others
-        for name in method.excludes:
+        for name in (name for name in method.excludes if name not in study.follows):
             default = study.kernel.parameter(name).default
             like = places[default] if isinstance(default, str) else None
             term = Absent(places[name], np.nan if like is not None or default is None else float(default), like)
@@ -100,10 +100,8 @@ def turns(study: Study, grid: Grid) -> tuple[Turn, ...]:
 
 
 def usable_methods(study: Study) -> tuple[int, ...]:
-    """Numbers of the methods that can do every term the study sets and give every output it asks for."""
-    terms, outputs = study.terms, set(study.outputs)
-    methods = enumerate(study.kernel.methods)
-    return tuple(k for k, m in methods if terms.isdisjoint(m.excludes) and outputs.isdisjoint(m.lacks))
+    """Numbers of the methods that can do all cells of the study and give every output it asks for."""
+    return tuple(turn.number for turn in turns(study, Grid(study)) if not (turn.absent or turn.early))
 
 
 class Solver:

@@ -6,12 +6,11 @@ compiles, numba itself tells.
 
 from __future__ import annotations
 
-import contextlib
 import math
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
@@ -90,11 +89,14 @@ def take_sample(solver: SolveCells, columns: Sequence[Column], size: int, clock:
         """Seconds of so many cells; infinity where the kernel fails."""
         arrays = {column.name: column.empty(cells) for column in columns}
         begun = clock()
-        with tolerated() as fault:
+        try:
             solver.solve(start, cells_of(arrays))
-            return clock() - begun
-        faults.extend(fault)
-        return math.inf
+        except (SweepError, MemoryError):
+            raise
+        except Exception as fault:
+            faults.append(fault)
+            return math.inf
+        return clock() - begun
 
     def anywhere(cells: int) -> float:
         """Seconds that some cells in the middle of the grid take, or elsewhere where these fail."""
@@ -151,18 +153,6 @@ def block_cells(sample: Sample, size: int, cell_bytes: float, workers: int, leas
         cells = max(cells, min(LANES, math.ceil(size / workers)))
     cells = max(1, math.floor(cells), -(-size // MOST_BLOCKS))
     return min(cells if cells < LANES else -(-cells // LANES) * LANES, size)
-
-
-@contextlib.contextmanager
-def tolerated() -> Iterator[list[Exception]]:
-    """What a kernel raises goes no further, but into the list."""
-    faults: list[Exception] = []
-    try:
-        yield faults
-    except (SweepError, MemoryError):
-        raise
-    except Exception as fault:
-        faults.append(fault)
 
 
 class WorkClock:

@@ -15,10 +15,10 @@ import numpy as np
 
 from kernels.interface import Status, machine_code_folder
 from sweep.cells.block import Guard, faults_reported
-from sweep.cells.grid import Grid, SolveCells, empty_cells
+from sweep.cells.grid import Grid, empty_cells
 from sweep.cells.reduce import strip_bytes
 from sweep.cells.solve import Solver
-from sweep.cells.timing import tolerated, work_clock
+from sweep.cells.timing import work_clock
 from sweep.explore.scaling import scaling
 from sweep.file.frame import cuts_of, expected_size
 from sweep.file.open import memory
@@ -59,7 +59,7 @@ class Plan:
     compile_seconds : float
         What compiling the methods took just now; 0 where their machine code was kept.
     methods, statuses : dict of str to float
-        Shares of the sampled cells. PENDING are those at the ends of axes that gave no answer in the time of a trial.
+        Shares of the sampled cells.
     sampled : int
         How many these are; the ends of all axes are among them.
     scaling : str
@@ -164,7 +164,7 @@ def plan(
         sample, blocks, apart = loop.sample, loop.blocks, loop.processes
         starting = 0.0 if apart is None else time.monotonic() - begun - apart.seconds
         seconds = RUN_SECONDS + sample.cost * blocks.rows.size / min(crew, blocks.count)
-        solver = apart or Guard(Solver(study), lambda cell: None)
+        solver = Guard(apart or Solver(study), lambda cell: None)
         methods, statuses, looked_at = _looked_at(study, solver, min(LOOK_SECONDS, SHARE * seconds))
     advice, allowed = NO_ADVICE, max(SHARE * seconds, ADVICE_SECONDS)
     if not apart and ADVICE_CELLS * sample.cost < allowed:
@@ -203,7 +203,7 @@ def _is_kept(kernel: str) -> bool:
     return machine_code_folder() is not None and ":" not in kernel
 
 
-def _looked_at(study: Study, solver: SolveCells, seconds: float) -> tuple[dict[str, float], dict[str, float], int]:
+def _looked_at(study: Study, solver: Guard, seconds: float) -> tuple[dict[str, float], dict[str, float], int]:
     """Shares of methods and statuses among cells at the ends of axes and, in some seconds, others; and their number.
 
     The ends are those of every axis, in the middle of the others, and of all axes at once: there a scene is most often
@@ -219,13 +219,11 @@ def _looked_at(study: Study, solver: SolveCells, seconds: float) -> tuple[dict[s
     numbers = dict.fromkeys([*ends, *drawn.tolist()])
 
     cells = empty_cells(study, len(numbers))
-    cells.status[:], cells.used[:] = Status.PENDING, -1
     sampled, until = 0, time.perf_counter() + seconds
     for number in numbers:
         if sampled >= len(ends) and time.perf_counter() > until:
             break
-        with tolerated():
-            solver.solve(number, cells.rows(slice(sampled, sampled + 1)))
+        solver.solve(number, cells.rows(slice(sampled, sampled + 1)))
         sampled += 1
 
     def shares(column: Any, names: dict[int, str]) -> dict[str, float]:

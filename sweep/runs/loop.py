@@ -113,11 +113,11 @@ class Task:
 
 
 class Loop:
-    """Times a sample of the grid, where it is to be `sampled`, and cuts it into blocks; then computes them.
+    """Times a sample of the grid, and cuts it into blocks; then computes them.
 
     The workers of the task's cluster do so, where anything is `to_do`, or threads here. How the rows are cut may be
-    settled already (`partition`), and some cells may be known (`reused`). Until `stack` ends, Ctrl-C and SIGTERM are
-    to be held back.
+    settled already (`partition`), and some cells may be known (`reused`), or all, and none is timed. Until `stack`
+    ends, Ctrl-C and SIGTERM are to be held back.
     """
 
     def __init__(
@@ -126,7 +126,6 @@ class Loop:
         stack: contextlib.ExitStack,
         partition: Partition | None = None,
         to_do: bool = True,
-        sampled: bool = True,
         reused: Reused | Precomputed | None = None,
         hold: bool = True,
     ) -> None:
@@ -140,10 +139,13 @@ class Loop:
             except ImportError:
                 raise missing("a cluster needs distributed", "cluster") from None
             self._cluster = stack.enter_context(Cluster(task.cluster, task.note))
+        stack.callback(lambda: self.progress.stop())
         self.processes = Processes(study, task.limit) if task.isolate else None
+        if self.processes is not None:
+            stack.callback(self.processes.end)
         self._threads = ThreadPoolExecutor(task.cores)
-        stack.callback(self._close)
-        self.sample = self._sample() if to_do and sampled else UNSAMPLED
+        stack.callback(self._threads.shutdown, wait=False)
+        self.sample = self._sample() if to_do and not isinstance(reused, Precomputed) else UNSAMPLED
         # a block of a cluster takes so long that the scheduler's millisecond is nothing
         least = 0.0 if self._cluster is None else 0.5
         self.blocks = Blocks(study, partition or cut(study, self._crew, self.sample, task.block_cells, least))
@@ -261,13 +263,6 @@ class Loop:
             self.processes.end()
         if wait(computing, 0.3).not_done:
             endless.set()
-
-    def _close(self) -> None:
-        """Ends the progress line, all threads that can be ended, and all processes."""
-        self._threads.shutdown(wait=False)
-        if self.processes is not None:
-            self.processes.end()
-        self.progress.stop()
 
     def _check(self) -> None:
         """Raises KeyboardInterrupt, Terminated or TimeUp where the run is to end."""

@@ -55,12 +55,12 @@ def run_to_file(task: Task, precomputed: Precomputed | None = None) -> Ending:
         try:
             with contextlib.ExitStack() as running:
                 known: Reused | Precomputed | None = precomputed
-                to_do, sampled = store is None or bool(store.missing()), known is None
+                to_do = store is None or bool(store.missing())
                 if to_do and standing == "reused":
                     reused = Reused(task.output, task.study, task.retry_failed)
                     known = running.enter_context(contextlib.closing(reused))
                 # signals are held back from here on, wherever they would leave half a file behind
-                loop = Loop(task, running, None if store is None else store.work.blocks, to_do, sampled, known)
+                loop = Loop(task, running, None if store is None else store.work.blocks, to_do, known)
                 if store is None:
                     store = stack.enter_context(_begun(task, loop, known))
                 for block in damaged:
