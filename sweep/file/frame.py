@@ -13,7 +13,7 @@ import io
 import json
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -120,7 +120,6 @@ def _lay_out(skeleton: _Skeleton, schema: Schema, cuts: Mapping[str, Cut], align
 
     Objects of so many bytes are aligned.
     """
-    import h5netcdf
     import h5py
     from h5py import h5f, h5fd, h5p
 
@@ -134,24 +133,24 @@ def _lay_out(skeleton: _Skeleton, schema: Schema, cuts: Mapping[str, Cut], align
     made.set_attr_phase_change(COMPACT, 0)
     made.set_attr_creation_order(h5p.CRT_ORDER_TRACKED | h5p.CRT_ORDER_INDEXED)
     made.set_link_creation_order(h5p.CRT_ORDER_TRACKED | h5p.CRT_ORDER_INDEXED)
-    with h5py.File(h5f.create(b"result", h5f.ACC_TRUNC, made, access)) as file, h5netcdf.File(file, "r+") as netcdf:
-        dims, tables = _write_coordinates(netcdf, schema), dict[str, dict[str, Any]]()
+    with h5py.File(h5f.create(b"result", h5f.ACC_TRUNC, made, access)) as file:
+        sizes, dims, tables = dict(schema.sizes), dict[str, tuple[str, ...]](), dict[str, dict[str, Any]]()
+        _write_coordinates(file, schema, sizes, dims)
         for name, cut in cuts.items():
             paths = [column.name if name == "cells" else f"{name}/{column.name}" for column in cut.columns]
             blocks = (cut.blocks.size, cut.blocks.cells, cut.blocks.row)
             tables[name] = {"grid": cut.grid, "blocks": blocks, "paths": paths}
             for path, column in zip(paths, cut.columns, strict=True):
                 how = _kept((*box_shape(cut.grid, cut.blocks.cells), *column.shape), column)
-                if name != "cells":
-                    file.create_dataset(path, (*cut.grid, *column.shape), column.dtype, **how)
-                    continue
-                over = dims[path] = (*schema.grid.dims, *column.dims)
-                # xarray's way to mark what belongs to the coordinates of a variable, and of all
-                beside = [c.name for c in schema.coordinates if c.dims != (c.name,) and set(c.dims) <= set(over)]
-                variable = netcdf.create_variable(path, over, column.dtype, **how)
-                _say(variable.attrs, {**column.attrs, "coordinates": " ".join(beside) or None})
+                data = file.create_dataset(path, (*cut.grid, *column.shape), column.dtype, **how)
+                if name == "cells":
+                    over = dims[path] = (*schema.grid.dims, *column.dims)
+                    # xarray's way to mark what belongs to the coordinates of a variable, and of all
+                    beside = [c.name for c in schema.coordinates if c.dims != (c.name,) and set(c.dims) <= {*over}]
+                    _say(data, column.attrs, beside)
+        _relate(file, sizes, dims)
         integrity = file.create_group("integrity")
-        _say(integrity.attrs, {"format": FORMAT, "contents": json.dumps({"tables": tables, "dims": dims})})
+        _say(integrity, {"format": FORMAT, "contents": json.dumps({"tables": tables, "dims": dims})})
         pieces = [integrity.create_dataset("key", BYTES, "u1")]
         for name, cut in cuts.items():
             pieces.append(integrity.create_dataset(name, (cut.blocks.count, len(cut.columns), BYTES), "u1"))
@@ -170,23 +169,35 @@ def _lay_out(skeleton: _Skeleton, schema: Schema, cuts: Mapping[str, Cut], align
         return int(pieces[0].id.get_offset())
 
 
-def _write_coordinates(netcdf: Any, schema: Schema) -> dict[str, tuple[str, ...]]:
-    """All but the columns, as netCDF4 and xarray know it; gives the dimensions of each coordinate."""
-    study, netcdf.dimensions = schema.attrs["study_json"], schema.sizes
+def _write_coordinates(file: Any, schema: Schema, sizes: dict[str, int], dims: dict[str, tuple[str, ...]]) -> None:
+    """Coordinates and attributes of the file; notes their dimensions, and what these are long."""
+    study = schema.attrs["study_json"]
     for c in schema.coordinates:
-        values, over, attrs = np.asarray(c.values), c.dims, c.attrs
+        values, dims[c.name], attrs = np.asarray(c.values), c.dims, c.attrs
         if values.nbytes >= LONG:  # the study refers to it
             study = study.replace(ARRAY % c.values.tobytes().hex(), ARRAY % f"@{c.name}")
         if values.dtype.kind == "U":  # as characters
             texts = np.array([word.encode() for word in values.ravel()])
             values = texts.view("S1").reshape(*values.shape, texts.dtype.itemsize)
-            over, attrs = (*over, f"{c.name}_letters"), {**attrs, "_Encoding": "utf-8"}
-            netcdf.dimensions[over[-1]] = texts.dtype.itemsize
-        variable = netcdf.create_variable(c.name, over, values.dtype, values, **_kept(values.shape))
-        _say(variable.attrs, attrs)
-    away = [c.name for c in schema.coordinates if c.dims and not set(c.dims) & {c.name, *schema.grid.dims}]
-    _say(netcdf.attrs, {**schema.attrs, "study_json": study, "coordinates": " ".join(away) or None})
-    return {c.name: c.dims for c in schema.coordinates}
+            dims[c.name], attrs = (*c.dims, f"string{texts.dtype.itemsize}"), {**attrs, "_Encoding": "utf-8"}
+            sizes[dims[c.name][-1]] = texts.dtype.itemsize
+        _say(file.create_dataset(c.name, data=values, **_kept(values.shape)), attrs)
+    away = [c.name for c in schema.coordinates if c.dims and not {*c.dims} & {c.name, *schema.grid.dims}]
+    _say(file, {**schema.attrs, "study_json": study}, away)
+
+
+def _relate(file: Any, sizes: Mapping[str, int], dims: Mapping[str, tuple[str, ...]]) -> None:
+    """Dimensions as netCDF4 knows them: each has a variable, if one without numbers, to which others refer."""
+    for number, (dim, size) in enumerate(sizes.items()):
+        own = dims.get(dim, ())
+        data = file[dim] if own else file.create_dataset(dim, size, ">f4")
+        data.make_scale(dim if own else f"This is a netCDF dimension but not a netCDF variable.{size:10}")
+        data.attrs["_Netcdf4Dimid"] = np.int32(number)
+        if len(own) > 1:
+            data.attrs["_Netcdf4Coordinates"] = np.array([[*sizes].index(dim) for dim in own], np.int32)
+    for name, over in dims.items():
+        for place, dim in enumerate(over if over[:1] != (name,) else ()):
+            file[name].dims[place].attach_scale(file[dim])
 
 
 def _kept(chunk: tuple[int, ...], column: Column | None = None) -> dict[str, Any]:
@@ -208,12 +219,12 @@ def _kept(chunk: tuple[int, ...], column: Column | None = None) -> dict[str, Any
     return {"chunks": chunk or None, "fletcher32": bool(chunk), "dcpl": how}
 
 
-def _say(place: Any, attrs: Mapping[str, Any]) -> None:
+def _say(thing: Any, attrs: Mapping[str, Any], beside: Sequence[str] = ()) -> None:
     """Attributes of a variable or a group; texts of a fixed length, which netCDF4 and MATLAB know, too."""
     import h5py
 
-    for name, value in ((name, value) for name, value in attrs.items() if value is not None):
+    for name, value in {**attrs, **({"coordinates": " ".join(beside)} if beside else {})}.items():
         if isinstance(value, str):
             text = value.encode()
             value = np.array(text, h5py.string_dtype("utf-8", max(2, len(text))))
-        place[name] = value
+        thing.attrs[name] = value

@@ -105,7 +105,7 @@ class StoredFile:
             attrs, values = _attrs(data), data[()]
             if attrs.pop("_Encoding", None):
                 values = np.char.decode(values.view(f"S{values.shape[-1]}")[..., 0], "utf-8")
-            self.coords[name] = Coordinate(name, self.dims[name], values, attrs)
+            self.coords[name] = Coordinate(name, self.dims[name][: values.ndim], values, attrs)
         self.attrs = _attrs(h5)
         self.attrs["study_json"] = study_together(self.attrs["study_json"], self.coords)
         self.fingerprint = dict(json.loads(self.attrs["fingerprint"]))
@@ -339,19 +339,17 @@ def checksum(piece: Any, length: int) -> bytes:
     times the sum of row numbers by sums of rows, and the sum of column numbers by sums of columns.
     """
     raw = np.frombuffer(disk.as_bytes(piece), np.uint8)
-    whole = raw.size - raw.size % (2 * ROW)
-    last = np.zeros(2 * ROW, np.uint8)
-    last[: raw.size - whole] = raw[whole:]
-    low = high = 0
-    for part in (*np.split(raw[:whole], range(2 * ROW * ROW, whole, 2 * ROW * ROW)), last):
-        rows = part.view("<u2").reshape(-1, ROW)
-        by_row = rows.sum(axis=1, dtype=np.uint32).astype(np.uint64)
-        by_column = rows.sum(axis=0, dtype=np.uint32).astype(np.uint64)
+    whole, low, high = raw.size - raw.size % (2 * ROW), 0, 0
+    rows = raw[:whole].view("<u2").reshape(-1, ROW)
+    last = np.frombuffer(raw[whole:].tobytes() + bytes(raw.size % 2), "<u2")[None]
+    for part in (*(rows[at : at + ROW] for at in range(0, len(rows), ROW)), last):
+        by_row = part.sum(axis=1, dtype=np.uint32).astype(np.uint64)
+        by_column = part.sum(axis=0, dtype=np.uint32).astype(np.uint64)
         more = int(by_row.sum())
-        numbered = ROW * int(by_row @ NUMBERS[: len(rows)]) + int(by_column @ NUMBERS)
-        high += rows.size * (low + more) - numbered
+        numbered = ROW * int(by_row @ NUMBERS[: len(by_row)]) + int(by_column @ NUMBERS[: len(by_column)])
+        high += part.size * (low + more) - numbered
         low += more
-    high += (-(-length // 2) - whole // 2 - ROW) * low  # the words are counted from the end of the chunk
+    high += (-(-length // 2) - rows.size - last.size) * low  # words are counted from the end of the chunk
     # 256 times a sum modulo 65535, as HDF5 has it: 0 stands for a sum that is zero itself
     first, second = (256 * total % MODULUS or (MODULUS if total else 0) for total in (low, high))
     return (second << 16 | first).to_bytes(4, "little")
