@@ -5,12 +5,15 @@ headings and statements about the result that `sweep run` made, and `figure` dra
 makes a program of these.
 """
 
+import math
+import operator
 import re
 import sys
 import textwrap
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +36,7 @@ class Statement:
     off : deviation
     holds : whether it is as said, by a check that can fail; None: a value, of which nothing is said
     refuted : it is known not to be as the source says, and would be a mistake here if it were
+    allowed : the largest deviation with which it holds, "of it" where that is relative
     """
 
     what: str
@@ -41,6 +45,7 @@ class Statement:
     off: float | None = None
     holds: bool | None = None
     refuted: bool = False
+    allowed: str = ""
 
     @property
     def failed(self) -> bool:
@@ -63,24 +68,46 @@ Conclusion = tuple[Groups, list[str], Callable[[], Any]]
 """What a script concludes: statements, further results as lines of text, and what draws the figure."""
 OPTIONS = ("--all", "--force")
 """Of every script."""
+NUMBER = re.compile(r"-?[\d.]+(?:e[-+]?\d+)?(?:/\d+)?")
+ORDER = {"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge}
 STUDIES = Path(__file__).parent
 
 
-def compared(what: str, theory: str, here: Any, value: float, allowed: float, digits: int = 8) -> Statement:
+def digits(allowed: float) -> int:
+    """How many a number is shown with that may deviate by so much."""
+    return min(max(2 - math.floor(math.log10(allowed)), 4), 14)
+
+
+def compared(what: str, theory: str, here: Any, value: float, allowed: float) -> Statement:
     """A number beside what theory says; it holds if the relative deviation is at most `allowed`."""
-    off = float(here) / value - 1
-    return Statement(what, theory, f"{float(here):.{digits}g}", off, bool(abs(off) <= allowed))
+    off, shown = float(here) / value - 1, f"{float(here):.{digits(allowed)}g}"
+    return Statement(what, theory, shown, off, abs(off) <= allowed, allowed=f"{allowed:.2g} of it")
 
 
-def differing(what: str, theory: str, here: Any, value: float, allowed: float, digits: int = 8) -> Statement:
+def differing(what: str, theory: str, here: Any, value: float, allowed: float) -> Statement:
     """As `compared`, of exponents and what else may be 0: the deviation is the difference."""
-    off = float(here) - value
-    return Statement(what, theory, f"{float(here):.{digits}g}", off, bool(abs(off) <= allowed))
+    off, shown = float(here) - value, f"{float(here):.{digits(allowed)}g}"
+    return Statement(what, theory, shown, off, abs(off) <= allowed, allowed=f"{allowed:.2g}")
 
 
 def said(what: str, holds: Any, here: str = "", theory: str = "", refuted: bool = False) -> Statement:
     """What holds or does not, without a number that it deviates by."""
     return Statement(what, theory, here, None, bool(holds), refuted)
+
+
+def held(what: str, here: Any, bound: str, form: str = "{:.3g}") -> Statement:
+    """A number within what the text says, which is what is checked: "< 1 %", ">= 1/2", "3 to 5"."""
+    sign, unit = bound.split()[0], 0.01 if "%" in bound else 1.0
+    ends = [unit * float(Fraction(number)) for number in NUMBER.findall(bound)]
+    value = float(here)
+    holds = ORDER[sign](value, ends[0]) if sign in ORDER else ends[0] <= value <= ends[1]
+    return Statement(what, bound, form.format(value), None, holds)
+
+
+def never(what: str, there: Any, theory: str = "none") -> Statement:
+    """That something is so in none of many cells."""
+    number = int(np.sum(there))
+    return Statement(what, theory, f"{number} of {np.size(there)}", None, number == 0)
 
 
 def all_ok(ds: xr.Dataset) -> Statement:
@@ -92,7 +119,12 @@ def all_ok(ds: xr.Dataset) -> Statement:
 def most(what: str, theory: str, off: Any, allowed: float, here: str = "largest deviation") -> Statement:
     """A deviation, or the largest of many, missing cells left out; it holds if that is at most `allowed`."""
     worst = float(off) if np.ndim(off) == 0 else float(abs(off).max())
-    return Statement(what, theory, here, worst, abs(worst) <= allowed)
+    return Statement(what, theory, here, worst, abs(worst) <= allowed, allowed=f"{allowed:.2g}")
+
+
+def nearest(values: xr.DataArray, value: float) -> dict[Any, int]:
+    """Where, along their one dimension, values come nearest to one; for `isel`."""
+    return {values.dims[0]: int(abs(values - value).values.argmin())}
 
 
 def count(there: Any, what: str = "cells") -> str:
@@ -160,11 +192,11 @@ def solved_by(kernel: Any, method: str, rtol: float, **given: Any) -> tuple[Any,
 
 
 def table(groups: Groups, source: str = "paper") -> list[str]:
-    """Every statement with its numbers, "`source` | here"."""
-    rows: list[tuple[str, ...]] = [("", source, "here", "deviation", "holds")]
+    """Every statement with its numbers, "`source` | here", and what deviation is allowed."""
+    rows: list[tuple[str, ...]] = [("", source, "here", "deviation", "allowed", "holds")]
     for heading, lines in groups.items():
         rows += [("",), (heading.upper(),)]
-        rows += [(s.what, s.paper, s.here, _number(s.off), s.verdict) for s in lines]
+        rows += [(s.what, s.paper, s.here, _number(s.off), s.allowed, s.verdict) for s in lines]
     return columns(rows, " | ")
 
 
@@ -181,7 +213,11 @@ def summary(groups: Groups, source: str = "paper") -> list[str]:
                 what = ", ".join(filter(None, dict.fromkeys((subject, s.what.strip()))))
                 which = "does not hold" if s.failed else "known not to hold"
                 words = f"{which}: {what}; {source}: {s.paper or '-'}; here: {s.here}"
-                off = "" if s.off is None else f", deviation {_number(s.off)}"
+                off = (
+                    ""
+                    if s.off is None
+                    else f", deviation {_number(s.off)}" + f", allowed {s.allowed}" * bool(s.allowed)
+                )
                 others += textwrap.wrap(words + off, 79, subsequent_indent="    ")
     return [*columns(rows, "  "), *([""] * bool(others)), *others]
 
@@ -243,7 +279,7 @@ class Script:
     Parameters
     ----------
     file, head : path of the script, and its docstring
-    inputs : names of the results that it takes, each of the study file of that name; or of the study file itself
+    inputs : names of the results that it takes, each of the study file of that name; or of what else it takes
     claims, figure : statements, and a figure, of what `prepared` makes of the results
     prepared : by default, the results as they are
     notes : further results as lines of text, of the same
@@ -255,16 +291,15 @@ class Script:
     inputs: tuple[str, ...]
     claims: Callable[..., Claims]
     figure: Callable[..., Any]
-    prepared: Callable[..., Any] | None
-    notes: Callable[..., list[str]]
-    source: str
+    prepared: Callable[..., Any] = lambda *results: results
+    notes: Callable[..., list[str]] = lambda *_: []
+    source: str = "theory"
 
     def conclude(self, *paths: str, **options: Any) -> Conclusion:
         """Statements, notes and what draws the figure, from the results at these paths."""
-        given = [
-            read_result(*one) if one[1].endswith(".h5") else one[0] for one in zip(paths, self.inputs, strict=True)
-        ]
-        found = tuple(given) if self.prepared is None else self.prepared(*given, **options)
+        asked = zip(paths, self.inputs, strict=True)
+        given = [read_result(path, name) if name.endswith(".h5") else path for path, name in asked]
+        found = self.prepared(*given, **options)
         made = found if isinstance(found, tuple) else (found,)
         return grouped(self.claims(*made)), self.notes(*made), lambda: self.figure(*made)
 
@@ -278,9 +313,22 @@ class Script:
         return self.report(arguments, lambda: self.conclude(*paths))
 
     def report(self, arguments: Sequence[str], conclude: Callable[[], Conclusion]) -> int:
-        """The same of what is concluded."""
-        target = Path(arguments[0]).with_suffix(".png")
-        return shown(Path(self.file).stem, target, conclude, arguments, self.source, self.head)
+        """Prints what is concluded and saves the figure, beside the first result or, where there is none, here."""
+        paths, complete = [one for one in arguments if one not in OPTIONS], "--all" in arguments
+        name = Path(self.file).stem
+        target = Path(paths[0] if Path(self.inputs[0]).suffix else name).with_suffix(".png")
+        try:
+            check_target(target, force="--force" in arguments)
+            groups, notes, draw = conclude()
+            page = draw()
+            said = table(groups, self.source) if complete else summary(groups, self.source)
+            parts = [[self.head] * complete, said, notes, what_came_out(name)]
+            print("\n\n".join(filter(None, ("\n".join(lines).strip("\n") for lines in parts))), end="\n\n")
+            print(f"figure: {charts.save(page, target)}" + "; every claim with its numbers: --all" * (not complete))
+        except sweep.SweepError as error:
+            print(error, file=sys.stderr)
+            return 2
+        return int(any(s.failed for lines in groups.values() for s in lines))
 
 
 def what_came_out(name: str) -> list[str]:
@@ -294,47 +342,13 @@ def what_came_out(name: str) -> list[str]:
     return []
 
 
-def script(
-    name: str,
-    inputs: str,
-    claims: Callable[..., Claims],
-    figure: Callable[..., Any],
-    prepared: Callable[..., Any] | None = None,
-    notes: Callable[..., list[str]] = lambda *_: [],
-    source: str = "theory",
-) -> Script:
-    """`main` of the script of this name, as `Script` has it; it runs if the name is "__main__"."""
+def script(name: str, inputs: str, *parts: Callable[..., Any], **more: Any) -> Script:
+    """`main` of the script of this name, of `parts` as `Script` has them; it runs if the name is "__main__"."""
     module = sys.modules[name]
-    main = Script(
-        str(module.__file__), str(module.__doc__), tuple(inputs.split()), claims, figure, prepared, notes, source
-    )
+    main = Script(str(module.__file__), str(module.__doc__), tuple(inputs.split()), *parts, **more)
     if name == "__main__":
         sys.exit(main(sys.argv[1:]))
     return main
-
-
-def shown(
-    name: str,
-    target: Path,
-    conclude: Callable[[], Conclusion],
-    arguments: Sequence[str],
-    source: str = "theory",
-    head: str = "",
-) -> int:
-    """Prints what the study of this name concludes and saves its figure; the exit status of `Script`."""
-    complete = "--all" in arguments
-    try:
-        check_target(target, force="--force" in arguments)
-        groups, notes, draw = conclude()
-        page = draw()
-        claims = table(groups, source) if complete else summary(groups, source)
-        parts = ("\n".join(lines).strip("\n") for lines in ([head] * complete, claims, notes, what_came_out(name)))
-        print("\n\n".join(filter(None, parts)), end="\n\n")
-        print(f"figure: {charts.save(page, target)}" + "; every claim with its numbers: --all" * (not complete))
-    except sweep.SweepError as error:
-        print(error, file=sys.stderr)
-        return 2
-    return int(any(s.failed for lines in groups.values() for s in lines))
 
 
 def paragraph(text: str) -> list[str]:

@@ -1,9 +1,9 @@
-"""What the figures of the studies share: the page, maps and their bars, labels, ticks."""
+"""What the figures of the studies share: the page and its panels, curves, maps and their bars, labels, ticks."""
 
 import sys
 from collections.abc import Callable, Sequence
-from functools import wraps
-from typing import Any
+from functools import partial, wraps
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -27,45 +27,138 @@ NARROW = 110.0
 """Width in mm of panels one above the other, which can be read at the width of a phone too."""
 HOLLOW = {"linestyle": "", "markerfacecolor": "white", "markersize": 3.6}
 """Marks of what is computed, beside lines of theory."""
+Ticks = Sequence[float] | dict[float, str] | None
 
 
-def panels(height: float, *shape: int, width: float = NARROW, **how: Any) -> Callable[..., Callable[..., Any]]:
-    """Makes a figure for print, of so many mm, of a function that draws into its panels.
+class Axis(NamedTuple):
+    """Label with the unit, ends (None: as what is drawn needs), ticks (see `ticks`), and whether it is logarithmic."""
 
-    The function takes the panels of `subplots`, lettered in the end if there are several, and what is drawn.
+    label: str = ""
+    ends: Any = None
+    ticks: Ticks = None
+    scale: str = "linear"
+
+    def to(self, low: float, high: float) -> "Axis":
+        """The same between these ends."""
+        return self._replace(ends=(low, high))
+
+
+Log = partial(Axis, scale="log")
+"""A logarithmic axis."""
+DRIVE, ALPHA = Log(r"drive, $\alpha = \mu/(a^2\varphi_0)$ [1]"), Log(r"drive, $\alpha$ [1]")
+TORQUE, KAPPA = Log(r"torque, $\mu/(a^2\varphi_0)$ [1]"), Log(r"wheel over foliot, $\kappa$ [1]")
+S, SLOPE = Axis("exponent, $s$ [1]"), Axis(r"exponent, $\mathrm{d}\ln P/\mathrm{d}\ln\mu$ [1]")
+COST, ERROR = Log("CPU time per cell [s]"), Log("relative error, worst cell [1]")
+"""Axes that several studies have."""
+
+
+def panel(x: Axis, y: Axis, legend: str = "", key: dict[str, Any] | None = None, **how: Any) -> Callable[..., Any]:
+    """Declares a panel of a page: its axes, the place of its legend ("outside ...": on the page) and its options.
+
+    Parameters
+    ----------
+    key : entries of the legend beside the lines that have names: format, or options, of a black line or mark
+    """
+
+    def declared(figure: Any) -> Any:
+        figure.panels.insert(0, (x, y, {"loc": legend, **how} if legend else {}, key or {}))
+        return figure
+
+    return declared
+
+
+def page(height: float, width: float = NARROW, columns: int = 1, **how: Any) -> Callable[..., Any]:
+    """Makes a figure for print, of so many mm, of a function that draws into the panels declared above it.
+
+    The function takes axes, lettered in the end if there are several, and what is drawn; `how` is of `subplots`.
     """
 
     def decorated(draw: Callable[..., None]) -> Callable[..., Any]:
         @wraps(draw)
         def figure(*made: Any) -> Any:
             with charts.style():
-                page = charts.new_figure(width, height)
-                axes = np.ravel(page.subplots(*shape, **how))
-                draw(*axes, *made)
-                for one, text in zip(axes, "abcdefghi", strict=False) if axes.size > 1 else ():
-                    charts.letter(one, text)
-            return page
+                whole = charts.new_figure(width, height)
+                panels = np.ravel(whole.subplots(-(-len(figure.panels) // columns), columns, **how))
+                for axes, (x, y, *_) in zip(panels, figure.panels, strict=True):
+                    axes.set(xscale=x.scale, yscale=y.scale)
+                draw(*panels, *made)
+                for axes, declared, text in zip(panels, figure.panels, "abcdefghi", strict=False):
+                    _finish(axes, *declared)
+                    if panels.size > 1:
+                        charts.letter(axes, text)
+            return whole
 
+        figure.panels = []
         return figure
 
     return decorated
 
 
+def _finish(axes: Any, x: Axis, y: Axis, legend: dict[str, Any], key: dict[str, Any]) -> None:
+    for name, axis, one in (("x", axes.xaxis, x), ("y", axes.yaxis, y)):
+        ticks(axis, one.ticks)
+        said = {f"{name}label": one.label, f"{name}lim": one.ends}
+        axes.set(**{what: value for what, value in said.items() if value})
+    for label, look in key.items():
+        form, how = ((), look) if isinstance(look, dict) else ((look,), {})
+        axes.plot([], [], *form, **{"color": "black", "label": label, **how})
+    if legend:
+        handles, labels = axes.get_legend_handles_labels()
+        named = dict(zip(labels, handles, strict=True))
+        (axes.figure if "outside" in legend["loc"] else axes).legend(named.values(), named, **legend)
+
+
+def ticks(axis: Any, values: Ticks) -> None:
+    """Ticks of an axis at these values, written out, or with the texts that are given, and no others."""
+    if values is not None:
+        texts = values if isinstance(values, dict) else {x: f"{x:g}" for x in values}
+        axis.set_ticks(list(texts), labels=list(texts.values()))
+        axis.set_ticks([], minor=True)
+
+
+def points(axes: Any, x: Any, y: Any, k: int, label: str | None = None, **how: Any) -> None:
+    """Hollow marks of the k-th of several: what is computed."""
+    axes.plot(x, y, **{"marker": MARKS[k], "color": COLOURS[k], "label": label, **HOLLOW, **how})
+
+
 def colour_map(axes: Any, x: Any, y: Any, values: Any, label: str, bar: Any = None, **how: Any) -> Any:
-    """A map of values, of shape (y, x), to the edges of its grid; gives its bar, whose options are `bar`."""
-    how = {"cmap": "cividis", "shading": "nearest", "rasterized": True, **how}
-    mesh = axes.pcolormesh(x, y, values, **how)
+    """A map of values, of shape (y, x), to the edges of its grid; gives its bar, whose options are `bar`.
+
+    In "cividis_r" are values that are the better the less they are: the good end is bright, and on top of the bar. Its
+    `ticks` may be texts by value.
+    """
+    how, bar = {"cmap": "cividis", "shading": "nearest", "rasterized": True, **how}, dict(bar or {})
+    mesh, texts = axes.pcolormesh(x, y, values, **how), bar.pop("ticks", None)
     axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
-    return axes.figure.colorbar(mesh, ax=axes, label=label, pad=0.02, **(bar or {}))
+    made = axes.figure.colorbar(mesh, ax=axes, label=label, pad=0.02, **bar)
+    if how["cmap"] == "cividis_r":
+        made.ax.invert_yaxis()
+    if texts:
+        made.set_ticks(list(texts), labels=list(texts.values()))
+        if "norm" in how:
+            made.minorticks_off()
+    return made
+
+
+def contours(axes: Any, x: Any, y: Any, values: Any, levels: Any, colour: str = "white", **text: Any) -> Any:
+    """Lines of equal values on a map, and their labels, with the options of `clabel`."""
+    width = text.pop("linewidths", 0.7)
+    lines = axes.contour(x, y, values, levels=levels, colors=colour, linewidths=width)
+    return axes.clabel(lines, **{"fmt": "%g", "fontsize": 7, **text})
+
+
+def kinds_map(axes: Any, x: Any, y: Any, kind: Any, colours: dict[str, str]) -> list[Any]:
+    """A map of kinds, of shape (y, x), each the place of its name among the colours; patches of those that occur."""
+    look = {"cmap": ListedColormap(list(colours.values())), "vmin": -0.5, "vmax": len(colours) - 0.5}
+    axes.pcolormesh(x, y, kind, shading="nearest", rasterized=True, **look)
+    return [Patch(color=c, label=name) for i, (name, c) in enumerate(colours.items()) if bool((kind == i).any())]
 
 
 def exponent_map(axes: Any, ds: xr.Dataset, out: Any, text: str) -> None:
     """A verge's exponent `s` over alpha and kappa; cells that are `out`, of shape (kappa, alpha), hatched and named."""
     alpha, kappa = ds.alpha.values, ds.kappa.values
-    axes.set(xscale="log", yscale="log", xlabel=r"drive, $\alpha$ [1]", ylabel=r"wheel over foliot, $\kappa$ [1]")
-    ticks = {"ticks": [1 / 3, 0.5, 0.75, 1]}
-    bar = colour_map(axes, alpha, kappa, ds.s.values, "exponent, $s$ [1]", ticks, vmin=1 / 3, vmax=1)
-    bar.ax.set_yticklabels(["1/3", "1/2", "3/4", "1"])
+    ends = {1 / 3: "1/3", 0.5: "1/2", 0.75: "3/4", 1.0: "1"}
+    colour_map(axes, alpha, kappa, ds.s.values, "exponent, $s$ [1]", {"ticks": ends}, vmin=1 / 3, vmax=1)
     hatch(axes, alpha, kappa, out, "////", "0.65")
     axes.set(xlim=(alpha[1], alpha[-2]))
     direct_label(axes, 2e4, 3e-3, text)
@@ -99,17 +192,3 @@ def draw_costs(axes: Any, found: dict[str, xr.Dataset], places: dict[str, tuple[
             right, up = places[name]
             x, y = float(row.seconds.sel(rtol=drawn.rtol[0])), float(drawn[0])
             direct_label(axes, right * x, up * y, name, look["color"], fontsize=7)
-    axes.set(xscale="log", yscale="log", xlabel="CPU time per cell [s]", ylabel="relative error, worst cell [1]")
-
-
-def quality_bar(page: Any, mesh: Any, axes: Any, label: str, **how: Any) -> Any:
-    """The bar of a map in "cividis_r" of what is better the less it is: the good end is bright, and on top."""
-    bar = page.colorbar(mesh, ax=axes, label=label, **how)
-    bar.ax.invert_yaxis()
-    return bar
-
-
-def plain_ticks(axis: Any, values: Sequence[float]) -> None:
-    """Ticks of a logarithmic axis at these values, written out, and no others."""
-    axis.set_ticks(list(values), labels=[f"{x:g}" for x in values])
-    axis.set_ticks([], minor=True)

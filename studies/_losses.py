@@ -3,15 +3,27 @@
 from __future__ import annotations
 
 import functools
+import math
 from typing import Any
 
 import numpy as np
 import xarray as xr
+from scipy.optimize import brentq
 
 NODES = 200
-
-
 legendre = functools.cache(np.polynomial.legendre.leggauss)
+
+
+def of_quarter(q: float) -> tuple[float, float, float]:
+    """alpha, s and A of the foliot with viscous friction alone, by q = a P/4: q - tanh q = 1/alpha."""
+    t = math.tanh(q)
+    alpha = 1 / (q - t)
+    return alpha, (1 - t / q) / t**2, alpha * (q + math.log1p(math.exp(-2 * q)) - math.log(2))
+
+
+def quarter(value: float, which: int = 0) -> float:
+    """The q at which one of the three of `of_quarter` has a value; by default alpha."""
+    return float(brentq(lambda q: math.log(of_quarter(q)[which] / value), 1e-4, 1e6, xtol=1e-15))
 
 
 def taken(mu: Any, phi0: Any, R: Any, a: Any, c: Any, n: Any, e: Any, speed: Any) -> tuple[Any, Any]:

@@ -75,9 +75,24 @@ def machine(ds: xr.Dataset) -> dict[str, float]:
     return {name: float(ds[name]) for name in NAMES}
 
 
-@functools.cache
-def _disc(rim: float, *numbers: float) -> Callable[[Any, Any], Any]:
-    fixed = dict(zip(NAMES, numbers, strict=True))
+def of_machine(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Makes once what hangs on the machine of a result alone, and on further arguments."""
+    made: dict[Any, Any] = {}
+
+    @functools.wraps(function)
+    def found(ds: xr.Dataset, *more: Any) -> Any:
+        key = (float(ds.radius[-1]), *machine(ds).values(), *more)
+        if key not in made:
+            made[key] = function(ds, *more)
+        return made[key]
+
+    return found
+
+
+@of_machine
+def disc(ds: xr.Dataset) -> Callable[[Any, Any], Any]:
+    """Profiles of a round tool on the machine of a result, as a function of throw and place of the workpiece [m]."""
+    fixed = machine(ds)
     solve = sweep.solver(
         {
             "kernel": "polisher_wear",
@@ -85,35 +100,26 @@ def _disc(rim: float, *numbers: float) -> Callable[[Any, Any], Any]:
             "rtol": 1e-6,
             "axes": {"e": [0.1], "w_x": [fixed["L"]]},
             "fixed": {**fixed, "type": "A", "tool_b": fixed["tool_a"], "tool_n": 2.0},
-            "along": {"radius": np.linspace(0.0, rim, POINTS)},
+            "along": {"radius": np.linspace(0.0, float(ds.radius[-1]), POINTS)},
         }
     )
     return lambda e, w_x: solve(e=e, w_x=w_x).wear
 
 
-def disc(ds: xr.Dataset) -> Callable[[Any, Any], Any]:
-    """Profiles of a round tool on the machine of a result, as a function of throw and place of the workpiece [m]."""
-    return _disc(float(ds.radius[-1]), *machine(ds).values())
-
-
+@of_machine
 def best_settings(ds: xr.Dataset) -> tuple[Setting, Setting]:
     """The most even setting of a disc, optimised over throw and offset: whatever it leaves, and without a hole.
 
     An offset evens the wear until the tool no longer reaches the middle, so the best without a hole lies where the
     least of the inner half is `KEPT` of the mean: a root in the offset for each throw, the least over throws of these.
     """
-    return _best(disc(ds), float(ds.L), float(ds.radius[-1]))
-
-
-@functools.cache
-def _best(wear: Callable[[Any, Any], Any], place: float, rim: float) -> tuple[Setting, Setting]:
     from scipy.optimize import brentq, minimize, minimize_scalar
 
-    radius = np.linspace(0.0, rim, POINTS)
+    wear, radius = disc(ds), np.linspace(0.0, float(ds.radius[-1]), POINTS)
     weight = area(radius)
 
     def setting(e: float, offset: float) -> Setting:
-        profile = np.asarray(wear(e, place + offset))
+        profile = np.asarray(wear(e, float(ds.L) + offset))
         return Setting(e, offset, float(unevenness(profile, weight)), float(least(profile, weight, radius)), profile)
 
     def border(e: float) -> Setting:

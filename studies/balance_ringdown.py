@@ -8,11 +8,10 @@ as the page has it, and cannot say otherwise; the time of a half swing and the m
 on the page's (3). What is said of the period is so of the free balance alone: driven, it loses
 (study `balance_isochronism`).
 
-By theory the balance rests at the first turning point within r of the spring's zero; x = pi zeta theta0/(2 r).
-Deviations are relative. Counts are whole numbers, so they hold to one half swing, and to the next term of the theory,
-0.5 zeta^2 and r/theta0 of themselves. Allowed are 1e-8 of what DOP853 gives at rtol 1e-12, and 1e-3 of zeta^2/2. "The
-page" says "vibration stops when A = theta +- r becomes smaller than r", where A is the amplitude about the shifted
-centre.
+By theory the balance rests at the first turning point within r of the spring's zero; x = pi zeta theta0/(2 r). Counts
+are whole numbers, so they hold to one half swing, and to the next term of the theory, 0.5 zeta^2 and r/theta0 of
+themselves. "The page" says "vibration stops when A = theta +- r becomes smaller than r", where A is the amplitude about
+the shifted centre.
 """
 
 import math
@@ -20,8 +19,8 @@ import math
 import numpy as np
 import xarray as xr
 from _common import Claims, compared, most, said, script
-from _figures import COLOURS, HOLLOW, MARKS, LogNorm, direct_label, hatch, panels
-from scipy.integrate import solve_ivp
+from _figures import Log, LogNorm, colour_map, direct_label, hatch, page, panel, points
+from _peers import ended
 
 from kernels.interface import Status
 
@@ -33,11 +32,6 @@ CELLS = ((0.005, 0.002), (0.02, 0.06), (0.1, 0.02), (0.3, 0.1), (1e-3, 0.14))
 
 def turning_points(zeta: float, r: float, start: float, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Times of rest and the angles there, by integrating (3) from rest to rest; `omega_n` is 1/s."""
-
-    def rest(t: float, y) -> float:
-        return float(y[1])
-
-    rest.terminal = True  # type: ignore[attr-defined]
     times, angles = [0.0], [start]
     for _ in range(count):
         side = -math.copysign(1.0, angles[-1])  # of the speed
@@ -48,9 +42,9 @@ def turning_points(zeta: float, r: float, start: float, count: int) -> tuple[np.
         push = -angles[-1] - side * r
         small = 1e-6  # the first step by its series, off the zero of the speed
         y = [angles[-1] + push * small**2 / 2, push * small * (1 - zeta * small)]
-        leg = solve_ivp(equation, (small, 10.0), y, "DOP853", events=rest, rtol=1e-12, atol=1e-14)
-        times.append(times[-1] + float(leg.t_events[0][0]))
-        angles.append(float(leg.y_events[0][0][0]))
+        time, (angle, _) = ended(equation, y, (small, 10.0), 1e-12, lambda _, y: float(y[1]))
+        times.append(times[-1] + time)
+        angles.append(angle)
     return np.array(times), np.array(angles)
 
 
@@ -61,8 +55,16 @@ def scaled(ds: xr.Dataset) -> xr.Dataset:
     return ds.assign(law=np.log1p(ds.x) / (math.pi * ds.zeta))
 
 
-def rest(ds: xr.Dataset) -> Claims:
-    """Where and when it rests, also by the page's rule as it stands: at the first rest with abs(theta) - r < r."""
+def claims(ds) -> Claims:
+    yield "Half swings"
+    light = ds.where((ds.zeta <= LIGHT) & (ds.N > 0))
+    off = abs(light.N - light.law)
+    allowed = 1 + light.law * (0.5 * light.zeta**2 + light.r / abs(ds.theta0))
+    text = f"off by {float(off.max()):.2f} at most"
+    yield said(f"N = ln(1 + x)/(pi zeta), zeta <= {LIGHT:g}", (off / allowed).max() < 1, text, "all cells")
+
+    yield "Rest"
+    # Where and when, also by the page's rule as it stands: at the first rest with abs(theta) - r < r.
     far = float((abs(ds.stop_angle) / ds.r).max())
     swings = ds.where(ds.swings & (ds.N > 0), drop=True)
     E = np.exp(-math.pi * swings.zeta / np.sqrt(1 - swings.zeta**2))
@@ -78,39 +80,32 @@ def rest(ds: xr.Dataset) -> Claims:
     yield said("the page's rule stops too early", 0.2 < share < 0.8 and longest == 1, stops, "-")
     yield said(f"  zeta = {zeta:g}, r = {r:g} rad, DOP853", fourth <= r < third < 2 * r, words, "abs(theta) <= r")
 
-
-def claims(ds) -> Claims:
-    """What theory says, and what comes out."""
-    yield "Half swings"
-    light = ds.where((ds.zeta <= LIGHT) & (ds.N > 0))
-    off = abs(light.N - light.law)
-    allowed = 1 + light.law * (0.5 * light.zeta**2 + light.r / abs(ds.theta0))
-    text = f"off by {float(off.max()):.2f} at most"
-    yield said(f"N = ln(1 + x)/(pi zeta), zeta <= {LIGHT:g}", (off / allowed).max() < 1, text, "all cells")
-
-    yield "Rest"
-    yield from rest(ds)
-
     yield "Isochronism of the free balance"
     swings = {(zeta, r): np.diff(turning_points(zeta, r, 1.0, 3)[0]) for zeta, r in CELLS}
     half = max(abs(swing * math.sqrt(1 - zeta**2) / math.pi - 1).max() for (zeta, _), swing in swings.items())
     radii = [r for _, r in CELLS]
-    free = f"free half swing, r = {min(radii):g} to {max(radii):g} rad, DOP853"
     light = ds.sel(zeta=LIGHT, method="nearest")
     damped, solid = float(light.zeta), float(light.period.max() / light.period.min() - 1)
     loses = f"viscous damping loses, zeta = {damped:.3g} [s/day]"
-    yield most(free, "pi/omega_d at any r", half, 1e-8)
+    yield most(f"free half swing, r = {min(radii):g} to {max(radii):g} rad, DOP853", "pi/omega_d at any r", half, 1e-8)
     yield most("  the kernel's period, over all r", "the same", solid, 1e-13, "largest spread")
-    yield compared(loses, "86400 zeta^2/2", 86400 * light.slow[0], 43200 * damped**2, 1e-3, 4)
+    yield compared(loses, "86400 zeta^2/2", 86400 * light.slow[0], 43200 * damped**2, 1e-3)
 
 
-@panels(138.0, 2, height_ratios=(1.4, 1))
+@panel(Log(r"viscous damping, $\zeta$ [1]"), Log(r"solid friction, $r/\theta_0$ [1]"))
+@panel(
+    Log(r"viscous over solid friction, $x=\pi\zeta\theta_0/(2r)$ [1]", (1e-4, 1e4)),
+    Log(r"$\pi\zeta N$ [1]"),
+    "lower right",
+    borderaxespad=0.3,
+    labelspacing=0.25,
+)
+@page(138.0, height_ratios=(1.4, 1))
 def figure(plane, law, ds):
     """The count over both frictions, and its collapse on one law."""
     n = ds.N.where(ds.swings & (ds.N > 0)).transpose("r", "zeta")
     zeta, r = ds.zeta.values, ds.r.values / abs(float(ds.theta0))
-    mesh = plane.pcolormesh(zeta, r, n, norm=LogNorm(1, 1e4), cmap="cividis", shading="nearest", rasterized=True)
-    plane.figure.colorbar(mesh, ax=plane, label=r"half swings until rest, $N$ [1]", pad=0.02)
+    colour_map(plane, zeta, r, n, r"half swings until rest, $N$ [1]", norm=LogNorm(1, 1e4))
     plane.contour(zeta, r, n, levels=[10, 100, 1000], colors="white", linewidths=0.7)
     for count, place in ((10, 0.051), (100, 5.4e-3), (1000, 4.8e-4)):
         plane.text(1.2e-4, place, f"{count}", color="white", fontsize=8, va="bottom")
@@ -118,17 +113,13 @@ def figure(plane, law, ds):
     plane.plot(zeta, math.pi * zeta / 2, color="white", linestyle=(0, (4, 2)), linewidth=0.9)
     plane.text(3e-2, 6e-2, r"$x=1$", color="white", fontsize=8, ha="right")
     direct_label(plane, 1.41, 9e-3, "creeps", fontsize=7.5, rotation=90)
-    plane.set(xscale="log", yscale="log", xlim=(zeta[0], zeta[-1]), ylim=(r[0], r[-1]))
-    plane.set(xlabel=r"viscous damping, $\zeta$ [1]", ylabel=r"solid friction, $r/\theta_0$ [1]")
+    plane.set(xlim=(zeta[0], zeta[-1]), ylim=(r[0], r[-1]))
     x = np.geomspace(1e-4, 1e4, 200)
-    law.loglog(x, np.log1p(x), color="black", label=r"$\ln(1+x)$")
+    law.plot(x, np.log1p(x), color="black", label=r"$\ln(1+x)$")
     for k, (text, zeta) in enumerate({"10^{-4}": 1e-4, "10^{-3}": 1e-3, "10^{-2}": 1e-2, "0.3": 0.3}.items()):
         row = ds.sel(zeta=zeta, method="nearest")
         row = row.where(row.N > 0, drop=True).isel(r=slice(None, None, 8))
-        law.plot(row.x, math.pi * row.zeta * row.N, MARKS[k], color=COLOURS[k], label=rf"$\zeta={text}$", **HOLLOW)
-    law.set(xlim=(1e-4, 1e4), ylabel=r"$\pi\zeta N$ [1]")
-    law.set_xlabel(r"viscous over solid friction, $x=\pi\zeta\theta_0/(2r)$ [1]")
-    law.legend(loc="lower right", ncols=1, borderaxespad=0.3, labelspacing=0.25)
+        points(law, row.x, math.pi * row.zeta * row.N, k, rf"$\zeta={text}$")
 
 
 main = script(__name__, "balance_ringdown.h5", claims, figure, scaled)

@@ -20,7 +20,7 @@ import math
 import numpy as np
 import xarray as xr
 from _common import Claims, compared, most, said, script
-from _figures import COLOURS, direct_label, panels
+from _figures import COLOURS, Axis, direct_label, page, panel
 
 from kernels.interface import Status
 
@@ -40,7 +40,6 @@ def heights(x) -> int:
 
 
 def claims(ds) -> Claims:
-    """What theory says, and what comes out."""
     yield "Bounces"
     least, doubles = borders(float(ds.e))
     ok = ds.where(ds.status == Status.OK, drop=True)
@@ -57,11 +56,16 @@ def claims(ds) -> Claims:
     }
     counted = ", ".join(map(str, sorted(found)))
     yield from (most(what, "", abs(ratio - 1.0).max(), 1e-6, "") for what, ratio in off.items())
-    yield compared("push at which bounces double", f"{doubles:.6f}", float(begins), doubles, 1e-4, 6)
+    yield compared("push at which bounces double", f"{doubles:.6f}", float(begins), doubles, 1e-4)
     yield said("heights beyond it, to 1.7", {2, 4} <= found <= {2, 4, 8}, counted, "2, 4, 8")
 
 
-@panels(132.0, 2)
+PUSH, HEIGHT = Axis("acceleration of the table over $g$ [1]"), Axis("height of the bounce [$g/\\omega^2$]")
+
+
+@panel(PUSH, HEIGHT)
+@panel(PUSH.to(1.66, 1.78), HEIGHT)
+@page(132.0)
 def figure(whole, part, ds):
     """The diagram of bifurcations, and beside it where bounces begin to be chaotic."""
     least, doubles = borders(float(ds.e))
@@ -69,13 +73,11 @@ def figure(whole, part, ds):
         for status, colour in ((Status.OK, "black"), (Status.INACCURATE, COLOURS[1])):
             some = ds.x.where(ds.status == status)
             axes.plot(ds.push, some, ".", color=colour, markersize=size, markeredgewidth=0.0)
-        axes.set(xlabel="acceleration of the table over $g$ [1]", ylabel="height of the bounce [$g/\\omega^2$]")
     push = np.linspace(least, 1.8, 200)
     whole.plot(push, np.sqrt(push**2 - least**2), color=COLOURS[0], linewidth=0.7, linestyle="--")
     whole.axvline(doubles, color="0.5", linewidth=0.7, linestyle=":")
     direct_label(whole, 1.2, 0.95, "once a period, theory", COLOURS[0])
     direct_label(whole, doubles - 0.005, -0.3, "doubles", "0.35", ha="right")
-    part.set(xlim=(1.66, 1.78))
 
 
 main = script(__name__, "bouncing_ball.h5", claims, figure)

@@ -73,9 +73,8 @@ class Measured:
     def predicted(self, u: Any) -> tuple[Any, Any]:
         """Logarithms of what is measured, (k, numbers), and the shares, (k, 4), of losses u, (k, 4)."""
         R, a, c, lost = (np.maximum(u, 0.0) * self.units).T[:, :, None]
-        mu = np.append(self.mu, self.middle)[None, :]
         e = np.sqrt(np.maximum(1.0 - lost, 0.0))
-        found = _clock()(mu, self.phi0, R, a, c, e)
+        found = _clock()(np.append(self.mu, self.middle)[None, :], self.phi0, R, a, c, e)
         shown = [found.period] if self.amplitude is None else [found.period, found.amplitude]
         share, _ = taken(self.middle, self.phi0, R, a, c, 2.0, e, found.crossing_speed[:, -1:])
         return np.concatenate([np.log(x[:, :-1]) for x in shown], 1), share[..., 0].T

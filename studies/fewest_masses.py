@@ -19,8 +19,8 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import OPTIONS, Groups, columns, said, shown
-from _figures import COLOURS, MARKS, panels
+from _common import OPTIONS, Claims, Script, columns, held, never, said
+from _figures import COLOURS, MARKS, Axis, Log, page, panel
 
 import sweep
 
@@ -29,6 +29,7 @@ MASSES, SPREAD, DAMPER, TOLERANCE = 10, 100.0, 0.1, 0.01
 INSIDE = tuple(range(1, 9))
 """Frequencies that the band holds."""
 DRIVETRAINS = 2000
+INNER = Axis("frequencies in the band [1]")
 
 
 def drivetrains(count: int, seed: int = 1) -> dict[str, np.ndarray]:
@@ -76,36 +77,31 @@ def write_points(path: Path) -> None:
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
-def statements(ds: xr.Dataset) -> Groups:
-    """What each method needs."""
-    more, worst = (ds.kept - ds.inside).mean("drivetrain"), float(ds.error.max())
-    modal, fewer = (ds.kept.sel(reduction="modal") == ds.inside).all(), (ds.kept < ds.inside).any()
+def claims(ds) -> Claims:
+    more, worst = (ds.kept - ds.inside).mean("drivetrain"), ds.error.max()
     order = [float(more.sel(reduction=name).mean()) for name in METHODS[:3]]
-    here, ranked = ", ".join(f"+{x:.2f}" for x in order), order[0] > order[1] > order[2]
-    return {
-        f"Masses for {100 * TOLERANCE:g} %": [
-            said("modal: as many as there are frequencies", modal, "all cells", "yes"),
-            said("no method needs fewer", not fewer, "all cells", "yes"),
-            said("Rivin needs the most, then Guyan, then IRS", ranked, here, "yes"),
-            said("frequencies in the band are held", worst <= TOLERANCE, f"{worst:.4f}", f"{TOLERANCE:g}"),
-        ]
-    }
+    ranked = order[0] > order[1] > order[2]
+    yield f"Masses for {100 * TOLERANCE:g} %"
+    yield never("modal: other than as many as there are frequencies", ds.kept.sel(reduction="modal") != ds.inside)
+    yield never("any method needs fewer", ds.kept < ds.inside)
+    yield said("Rivin needs the most, then Guyan, then IRS", ranked, ", ".join(f"+{x:.2f}" for x in order), "yes")
+    yield held("frequencies in the band are held: largest error", worst, f"<= {TOLERANCE:g}", "{:.4f}")
 
 
-def notes(ds: xr.Dataset) -> list[str]:
+def notes(ds) -> list[str]:
     """Masses needed by method and band, and the errors that are left."""
     rows = [("frequencies in the band", *map(str, INSIDE), "frequencies off by", "receptance off by")]
     for name in METHODS:
         cell = ds.sel(reduction=name)
         kept = (f"{float(x):.1f}" for x in cell.kept.mean("drivetrain"))
         rows.append((name, *kept, *(f"{float(cell[part].median()):.1e}" for part in ("error", "off"))))
-    return [
-        f"MASSES KEPT, mean of {ds.sizes['drivetrain']} drivetrains, and errors left (median)",
-        *columns(rows, "  "),
-    ]
+    head = f"MASSES KEPT, mean of {ds.sizes['drivetrain']} drivetrains, and errors left (median)"
+    return [head, *columns(rows, "  ")]
 
 
-@panels(136.0, 2)
+@panel(INNER, Axis("masses needed for 1 % [1]", (0, MASSES + 0.9)), "lower right", ncols=2)
+@panel(INNER, Log("error of the receptance [1]", (1e-6, 3)))
+@page(136.0)
 def figure(masses, receptance, ds):
     """Masses needed over the frequencies in the band, and the error of the receptance."""
     masses.axhline(MASSES, color="0.5", linewidth=0.7)
@@ -116,16 +112,12 @@ def figure(masses, receptance, ds):
             look = {"marker": MARKS[i], "color": COLOURS[i], "elinewidth": 0.6, "capsize": 1.5}
             place, label = ds.inside + 0.08 * (i - 2), name.replace("_", "-")
             axes.errorbar(place, middle, (middle - low, high - middle), label=label, **look)
-        axes.set(xlabel="frequencies in the band [1]", xticks=INSIDE)
-    masses.set(ylabel="masses needed for 1 % [1]", ylim=(0, MASSES + 0.9))
-    masses.legend(loc="lower right", ncols=2)
-    receptance.set(ylabel="error of the receptance [1]", yscale="log", ylim=(1e-6, 3))
+        axes.set(xticks=INSIDE)
 
 
-def conclusions(count: int):
-    """Statements, table and the figure of so many drivetrains."""
-    ds = needed(drivetrains(count))
-    return statements(ds), notes(ds), lambda: figure(ds)
+STUDY = Script(
+    __file__, __doc__, ("drivetrains",), claims, figure, lambda count: needed(drivetrains(count)), notes, "expected"
+)
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -137,8 +129,7 @@ def main(arguments: Sequence[str]) -> int:
     if len(counts) > 1 or not all(a.isdigit() and int(a) > 0 for a in counts):
         print("use: python fewest_masses.py [drivetrains] [--all] [--force]", file=sys.stderr)
         return 2
-    count = int(counts[0]) if counts else DRIVETRAINS
-    return shown("fewest_masses", Path("fewest_masses.png"), lambda: conclusions(count), arguments, "expected")
+    return STUDY.report(arguments, lambda: STUDY.conclude(int(counts[0]) if counts else DRIVETRAINS))
 
 
 if __name__ == "__main__":

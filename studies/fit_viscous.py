@@ -21,8 +21,7 @@ SPLIT = mpf(7) / 10
 
 def quarter_phase(k):
     """q of q - tanh q = k."""
-    start = (3 * k) ** (mpf(1) / 3) if k < 1 else k + 1
-    return findroot(lambda q: q - tanh(q) - k, start)
+    return findroot(lambda q: q - tanh(q) - k, (3 * k) ** (mpf(1) / 3) if k < 1 else k + 1)
 
 
 def strong(w):

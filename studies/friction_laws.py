@@ -10,15 +10,14 @@ With a v + R at strong drive, x = v0/mu obeys R x^2 + (2/3) a mu x^3 = 2 phi0, P
     s = (1/3) y/(1 + y) + (R/mu)^2,  y = (2 phi0/R)^(1/2) a mu/R, least at mu/R = (18 R/(a^2 phi0))^(1/6),   (2)
 there s = (3 a^2 phi0/(2 R))^(1/3). As mu grows without end, s - 1/3 goes as 4/45 - R/(9 a^2 phi0).  Derived here.
 
-mu and R are in units of a^2 phi0. Deviations of exponents are differences, others are relative. A limit holds if the
-next term of its series accounts for the deviation. The paper, Hoyng & Nieuwenhuizen, arXiv:1604.06681, has n = 1 and
-says that strong drive is best: there s = 1/3.
+mu and R are in units of a^2 phi0. A limit holds if the next term of its series accounts for the deviation. The paper,
+Hoyng & Nieuwenhuizen, arXiv:1604.06681, has n = 1 and says that strong drive is best: there s = 1/3.
 """
 
 import numpy as np
 import xarray as xr
 from _common import Claims, Statement, compared, differing, most, said, script, solved
-from _figures import COLOURS, direct_label, hatch, panels
+from _figures import COLOURS, SLOPE, TORQUE, Log, contours, direct_label, hatch, page, panel
 
 import sweep
 from kernels.interface import Status
@@ -36,13 +35,7 @@ def valley(grid: xr.Dataset) -> xr.Dataset:
     return solved("foliot", design="zip", mu=place, R=place.R, a=1, phi0=1)
 
 
-def prepared(laws, grid):
-    """The two sweeps, and the best torque along the map."""
-    return laws, grid, valley(grid)
-
-
 def claims(laws, grid, line) -> Claims:
-    """What theory says, and what comes out."""
     yield "Far out"
     # over three decades at each end; allowed: how far s is from its limit at their inner end, alpha_n, or
     # 2n/(n+2) powers of (n+2)/alpha_n
@@ -57,7 +50,7 @@ def claims(laws, grid, line) -> Claims:
             next_term = alpha if alpha < 1 else ((n + 2) / alpha) ** (2 * n / (n + 2)) if alpha > 1 else 0.0
             exponent = sweep.fit_exponent(laws.period.sel(n=n), "mu", window).exponent
             what = f"n = {n:g}: exponent of P, {drive} mu"
-            yield differing(what, text, exponent, -limit, 1e-9 + next_term, 9)
+            yield differing(what, text, exponent, -limit, 1e-9 + next_term)
 
     yield "At every drive"
     # Steps in ln alpha_n are 2/n - 1 times those in ln mu, so differences of ln P are of n >= 1.
@@ -89,8 +82,8 @@ def claims(laws, grid, line) -> Claims:
     yield compared("R at which s - 1/3 changes sign, mu = 1e8", "0.8", threshold, 0.8, 3 * (3 / 1e8) ** (2 / 3))
     for R, (drive, s) in KNOWN.items():
         cell = line.isel(cell=int(abs(line.R / R - 1).argmin("cell")))
-        yield compared(f"R = {R:g}: best torque mu/R", f"{drive}", cell.mu / cell.R, drive, 2e-4, 4)
-        yield compared("  s there", f"{s}", cell.sensitivity, s, 2e-5, 5)
+        yield compared(f"R = {R:g}: best torque mu/R", f"{drive}", cell.mu / cell.R, drive, 2e-4)
+        yield compared("  s there", f"{s}", cell.sensitivity, s, 2e-5)
     drive, R = (line.mu / line.R).rename("mu/R"), float(line.R[-1])
     for name, y, text, power, prefactor in (
         ("s", line.sensitivity, "-1/3, (3/2)^(1/3) = 1.1447", -1 / 3, 1.5 ** (1 / 3)),
@@ -103,30 +96,35 @@ def claims(laws, grid, line) -> Claims:
         yield Statement(what, text, f"{exponent:.4f}, {last:.4f}", off, fits)
 
 
-@panels(142.0, 2, height_ratios=(1, 1.15))
+NAMED = (
+    (0.6, 2e3, r"never starts, $\mu \leq R$"),
+    (2e4, 0.35, r"$s = 1/3$: $R = 0.8\,a^2\varphi_0$"),
+    (2e5, 8, "best torque (dashed)"),
+)
+
+
+@panel(Log(r"torque, $\mu$ [rad/s$^2$]", (1e-9, 1e9)), SLOPE.to(-1.05, 0.05))
+@panel(TORQUE, Log(r"Coulomb friction, $R/(a^2\varphi_0)$ [1]"))
+@page(142.0, height_ratios=(1, 1.15))
 def figure(exponents, valley, laws, grid, line):
     """Exponents against torque, and the map with its valley."""
     for i, (n, height) in enumerate(HEIGHTS.items()):
-        exponents.semilogx(laws.mu, -laws.sensitivity.sel(n=n), color=COLOURS[i])
+        exponents.plot(laws.mu, -laws.sensitivity.sel(n=n), color=COLOURS[i])
         direct_label(exponents, 3e-7 if n else 2e6, height, f"$n={n:g}$", COLOURS[i])
-    exponents.set(xlim=(1e-9, 1e9), ylim=(-1.05, 0.05), xlabel=r"torque, $\mu$ [rad/s$^2$]")
-    exponents.set_ylabel(r"exponent, $\mathrm{d}\ln P/\mathrm{d}\ln\mu$ [1]")
     part = grid.sel(R=slice(1e-2, 1e5), mu=slice(1e-2, 1e7))
     mu, R, s = part.mu.values, part.R.values, part.sensitivity.values
-    valley.set(xscale="log", yscale="log", xlabel=r"torque, $\mu/(a^2\varphi_0)$ [1]", xlim=(mu[0], mu[-1]))
+    valley.set(xlim=(mu[0], mu[-1]), ylim=(R[0], R[-1]))
     valley.set_title(r"$s = -\mathrm{d}\ln P/\mathrm{d}\ln\mu$", loc="right")
-    valley.set(ylabel=r"Coulomb friction, $R/(a^2\varphi_0)$ [1]", ylim=(R[0], R[-1]))
     shown = np.ma.masked_invalid(np.minimum(s, 1.0))
     valley.pcolormesh(mu, R, shown, cmap="viridis", vmin=0, vmax=1, alpha=0.75, rasterized=True)
     levels = (0.1, 0.2, 0.3, 1 / 3, 0.4, 0.5, 0.7, 1)
-    lines = valley.contour(mu, R, s, levels=levels, colors="black", linewidths=0.6)
     places = [(3.0, 0.05), (1.1, 0.05), (0.5, 0.05), (0.1, 0.02), (1e6, 600), (1e6, 3500), (1e6, 1.5e4)]
-    valley.clabel(lines, fmt=lambda x: f"{x:g}", fontsize=7, manual=places)
+    contours(valley, mu, R, s, levels, "black", linewidths=0.6, fmt=lambda x: f"{x:g}", manual=places)
     hatch(valley, mu, R, (part.status == Status.NEVER_STARTS).values, "////")
     valley.plot(line.mu, line.R, color="white", linestyle=(0, (5, 1.5)))
-    direct_label(valley, 0.6, 2e3, r"never starts, $\mu \leq R$")
-    direct_label(valley, 2e4, 0.35, r"$s = 1/3$: $R = 0.8\,a^2\varphi_0$")
-    direct_label(valley, 2e5, 8, "best torque (dashed)")
+    for x, y, text in NAMED:
+        direct_label(valley, x, y, text)
 
 
-main = script(__name__, "friction_laws.h5 friction_laws_map.h5", claims, figure, prepared)
+INPUTS = "friction_laws.h5 friction_laws_map.h5"
+main = script(__name__, INPUTS, claims, figure, lambda laws, grid: (laws, grid, valley(grid)))

@@ -11,18 +11,17 @@ against the displacement with first harmonic (4 mu/pi) cos(asin(phi0/A)), while 
     s = kappa^(-3/4) alpha^(-1/4) / (2 sqrt(pi)) / sqrt(1 - y).                                        (1)
 At given drive and friction (1) is least at y = 3/4; at given Q it is least at y = 1/2; y = 1 is the end. Derived here.
 
-Here s = -dlnP/dlnmu. The theory is of first order in the torque, and exact for large alpha and kappa. Deviations are
-relative; of exponents they are the difference. A number holds if the next order in 1/alpha^(1/2) or 1/kappa, or
-interpolation, explains its deviation. The paper, Hoyng & Nieuwenhuizen, arXiv:1604.06681, says "if they had only
-mounted some kind of a spring on the foliot".
+Here s = -dlnP/dlnmu. The theory is of first order in the torque, and exact for large alpha and kappa. A number holds if
+the next order in 1/alpha^(1/2) or 1/kappa, or interpolation, explains its deviation. The paper, Hoyng & Nieuwenhuizen,
+arXiv:1604.06681, says "if they had only mounted some kind of a spring on the foliot".
 """
 
 import math
 
 import numpy as np
 import xarray as xr
-from _common import Claims, compared, count, most, said, script
-from _figures import COLOURS, LogNorm, direct_label, hatch, panels
+from _common import Claims, compared, count, most, nearest, never, said, script, solved
+from _figures import COLOURS, DRIVE, Log, LogNorm, contours, direct_label, hatch, page, panel
 
 import sweep
 from kernels.interface import Status
@@ -43,14 +42,13 @@ def scaled(ds: xr.Dataset) -> xr.Dataset:
 
 def at(alpha, kappa, design: str = "product") -> xr.Dataset:
     """The same foliot at other alpha and kappa, by one method: near the last spring with a cycle it is INACCURATE."""
-    axes = {"a": np.atleast_1d(alpha) ** -0.5, "k": np.atleast_1d(kappa)}
-    fixed = {"mu": 1.0, "phi0": 1.0}
-    return scaled(sweep.run(kernel="foliot", method="segments", rtol=1e-7, design=design, axes=axes, fixed=fixed))
+    cells = {"a": np.atleast_1d(alpha) ** -0.5, "k": np.atleast_1d(kappa)}
+    return scaled(solved("foliot", method="segments", rtol=1e-7, design=design, **cells, mu=1, phi0=1))
 
 
 def line_of(ds: xr.Dataset, alpha) -> xr.Dataset:
     """The sweep of the spring at the drive next to `alpha`."""
-    return ds.isel({ds.alpha.dims[0]: int(np.argmin(abs(np.log(ds.alpha.values / float(alpha)))))})
+    return ds.isel(nearest(np.log(ds.alpha), math.log(alpha)))
 
 
 def first_order(alpha, kappa):
@@ -59,22 +57,19 @@ def first_order(alpha, kappa):
     return kappa**-0.75 * alpha**-0.25 / np.sqrt(4 * math.pi * np.where(y < 1, 1 - y, np.nan))
 
 
-def best_springs(ds: xr.Dataset) -> xr.Dataset:
-    """The springs of least sensitivity at the drives of the grid from alpha = 10 on; `blur`: error of interpolation."""
+def prepared(ds):
+    """The sweep with its groups, and the springs of least sensitivity at the drives of the grid from alpha = 10 on.
+
+    `blur` is the error of interpolation of a best spring, relative.
+    """
+    ds = scaled(ds)
     strong = ds.where(ds.alpha > 9.99, drop=True)
     place = sweep.where_exponent(strong.s, "kappa", 0.0)
     found = at(strong.alpha.values, place.abscissa.values, "zip")
-    return found.assign(blur=("cell", (place.abscissa_error / place.abscissa).values))
-
-
-def prepared(ds):
-    """The sweep with its groups, and the springs of least sensitivity."""
-    ds = scaled(ds)
-    return ds, best_springs(ds)
+    return ds, found.assign(blur=("cell", (place.abscissa_error / place.abscissa).values))
 
 
 def claims(ds, springs) -> Claims:
-    """What theory says, and what comes out."""
     yield "The law"
     strong, (low, high) = line_of(ds, ds.alpha.max()), WINDOW
     bare = at(strong.alpha.values, 0.0).s.item()
@@ -85,7 +80,7 @@ def claims(ds, springs) -> Claims:
     by_a, by_k = sweep.local_exponent(inner.period, "a"), sweep.local_exponent(inner.period, "k")
     off, rough = 0.5 + by_a / 2 + by_k - inner.s, float(np.diff(np.log(ds.k)).max() ** 4) / 4
     what = f"s, kappa = {low:g} to {high:g}, alpha from 1e5 on"
-    yield compared(f"s at kappa = {ds.kappa[0]:.0e}: still the foliot's", f"{bare:.6f}", strong.s[0], bare, 1e-2, 6)
+    yield compared(f"s at kappa = {ds.kappa[0]:.0e}: still the foliot's", f"{bare:.6f}", strong.s[0], bare, 1e-2)
     yield most(what, "(1)", part.s / first_order(part.alpha, part.kappa) - 1, slack, count(part.s))
     yield most("differences of ln P against the exact s", "0", off, rough, "largest distance")
 
@@ -97,10 +92,10 @@ def claims(ds, springs) -> Claims:
         end = float(fine.kappa[fine.s.notnull()][-1]) / alpha
         near, place = 1e-4 + 1 / alpha + float(best.blur), float(best.kappa / best.alpha)
         what = f"alpha = {alpha:.0e}: best spring, kappa/alpha"
-        yield compared(what, "9/pi^2 = 0.91189", place, 9 / math.pi**2, near, 6)
-        yield compared("  s alpha there", "pi/27^(1/2) = 0.60460", best.s * best.alpha, math.pi / 27**0.5, near, 6)
-        yield compared("  A/phi0 there", "2/3^(1/2) = 1.15470", float(best.A), 2 / 3**0.5, near, 6)
-        yield compared("  strongest with a cycle", "16/pi^2 = 1.6211", end, 16 / math.pi**2, 1e-3 + 4 / alpha, 5)
+        yield compared(what, "9/pi^2 = 0.91189", place, 9 / math.pi**2, near)
+        yield compared("  s alpha there", "pi/27^(1/2) = 0.60460", best.s * best.alpha, math.pi / 27**0.5, near)
+        yield compared("  A/phi0 there", "2/3^(1/2) = 1.15470", float(best.A), 2 / 3**0.5, near)
+        yield compared("  strongest with a cycle", "16/pi^2 = 1.6211", end, 16 / math.pi**2, 1e-3 + 4 / alpha)
     Q = 1000.0
     kappa = np.geomspace(Q / 10, Q, 61)
     place = sweep.where_exponent(at(Q**2 / kappa, kappa, "zip").s, "kappa", 0.0).abscissa.item()
@@ -110,10 +105,9 @@ def claims(ds, springs) -> Claims:
     zeta = np.minimum(1 / (2 * ds.Q), 1 - 1e-15)
     reach = (1 + np.exp(-math.pi * zeta / np.sqrt(1 - zeta**2))) / ds.kappa
     cells = ds.s.notnull()
-    wrong = int((((ds.status == Status.NOT_SELF_STARTING) != (reach < 1)) & cells).sum())
-    rule = "not self-starting unless kappa < 1 + e^(-pi zeta/(1-zeta^2)^(1/2))"
-    yield compared(what, "1/2", float(cell.s * cell.Q), 0.5, 3 / Q, 6)
-    yield said(rule, not wrong, f"{wrong} of {int(cells.sum())} cells", "0 cells")
+    wrong = ((ds.status == Status.NOT_SELF_STARTING) != (reach < 1)) & cells
+    yield compared(what, "1/2", float(cell.s * cell.Q), 0.5, 3 / Q)
+    yield never("not self-starting unless kappa < 1 + e^(-pi zeta/(1-zeta^2)^(1/2)): exceptions", wrong)
 
     yield "The paper's spring"
     for alpha, least, word in ((1e4, 10, "dramatically"), (1e2, 10, "dramatically"), (1.0, 1, ""), (1e-2, 1, "")):
@@ -121,14 +115,25 @@ def claims(ds, springs) -> Claims:
         yield said(f"best spring, s of alpha = {alpha:g} falls by", gain > least, f"{gain:.4g}", word)
 
 
-@panels(150.0, 2)
+SPRING = Log(r"spring, $\kappa = k\varphi_0/\mu$ [1]")
+KEY = {
+    "self-starting": "-",
+    "not self-starting": {"linestyle": (0, (2.5, 1))},
+    "theory of first order": {"marker": "x", "linestyle": ""},
+    "best spring": {"marker": "o", "linestyle": ""},
+}
+
+
+@panel(SPRING, Log(r"sensitivity to torque, $s$ [1]", (2e-7, 1.5)), "lower left", KEY)
+@panel(SPRING, DRIVE)
+@page(150.0)
 def figure(lines, plane, ds, springs):
     """Sensitivity against the spring, and a map of it over spring and drive."""
     for alpha, colour in zip(SHOWN, COLOURS, strict=False):
         line = line_of(ds, alpha)
         started = line.status == Status.OK
-        lines.loglog(line.kappa, line.s.where(started), color=colour)
-        lines.loglog(line.kappa, line.s.where(~started), color=colour, linestyle=(0, (2.5, 1)))
+        lines.plot(line.kappa, line.s.where(started), color=colour)
+        lines.plot(line.kappa, line.s.where(~started), color=colour, linestyle=(0, (2.5, 1)))
         if alpha == 1.0:
             direct_label(lines, 3, 0.45, r"$\alpha = 1$", colour, ha="left")
             continue
@@ -138,32 +143,26 @@ def figure(lines, plane, ds, springs):
         lines.plot(cell.kappa, cell.s, "o", color=colour)
         text = rf"$\alpha = 10^{{{round(math.log10(alpha))}}}$"
         direct_label(lines, 2.4 * cell.kappa, cell.s, text, colour, ha="left")
-    lines.set(xlabel=r"spring, $\kappa = k\varphi_0/\mu$ [1]", ylabel=r"sensitivity to torque, $s$ [1]")
-    lines.set(xlim=(ds.kappa.min(), 10 * ds.kappa.max()), ylim=(2e-7, 1.5))
-    looks = {"self-starting": {}, "not self-starting": {"linestyle": (0, (2.5, 1))}}
-    looks |= {"theory of first order": {"marker": "x", "linestyle": ""}}
-    looks |= {"best spring": {"marker": "o", "linestyle": ""}}
-    for name, look in looks.items():
-        lines.plot([], [], color="black", label=name, **look)
-    lines.legend(loc="lower left")
+    lines.set(xlim=(ds.kappa.min(), 10 * ds.kappa.max()))
     day = lines.secondary_yaxis("right", functions=(lambda s: 0.01 * DAY * s, lambda rate: rate / (0.01 * DAY)))
     day.set_ylabel("rate [s/day] by 1 % of torque")
     lines.tick_params(axis="y", which="both", right=False)
     kappa, alpha, rate = ds.kappa.values, ds.alpha.values, 0.01 * DAY * ds.s.values
-    plane.set(xscale="log", yscale="log", xlabel=r"spring, $\kappa = k\varphi_0/\mu$ [1]")
-    plane.set(ylabel=r"drive, $\alpha = \mu/(a^2\varphi_0)$ [1]", ylim=(alpha.min(), alpha.max()))
+    plane.set(ylim=(alpha.min(), alpha.max()))
     shown = np.ma.masked_invalid(rate)
     plane.pcolormesh(kappa, alpha, shown, norm=LogNorm(1e-4, 1e3), cmap="viridis", alpha=0.75, rasterized=True)
-    levels = (1e-3, 1e-2, 0.1, 1, 10, 100, 400)
-    plane.clabel(plane.contour(kappa, alpha, rate, levels=levels, colors="black", linewidths=0.7), fmt="%g", fontsize=7)
+    contours(plane, kappa, alpha, rate, (1e-3, 1e-2, 0.1, 1, 10, 100, 400), "black")
     hatch(plane, kappa, alpha, (ds.status == Status.STICKS).values, "////")
     hatch(plane, kappa, alpha, (ds.status == Status.NOT_SELF_STARTING).values, "..", "white")
     line = alpha[alpha > 9.9]
     plane.plot(9 / math.pi**2 * line, line, color="white", linestyle=(0, (5, 1.5)))
-    direct_label(plane, 3e4, 0.3, "sticks: no cycle")
     plane.set_title("rate [s/day] by 1 % of torque", loc="right")
-    direct_label(plane, 3e5, 3e2, "best spring (dashed)")
-    direct_label(plane, 3e2, 4e3, "not self-starting")
+    for x, y, text in (
+        (3e4, 0.3, "sticks: no cycle"),
+        (3e5, 3e2, "best spring (dashed)"),
+        (3e2, 4e3, "not self-starting"),
+    ):
+        direct_label(plane, x, y, text)
 
 
 main = script(__name__, "hairspring.h5", claims, figure, prepared)

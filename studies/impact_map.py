@@ -7,16 +7,16 @@ T:
     T^2 = p(1 + e)/(g(1 - e)(1 + kappa)),  swing Y = kappa g T^2/4,  recoil if kappa < 2e/(1 - e),
 where no tooth is met in between; stable for kappa > 1. The models of Lepschy and Roup are of this kind.
 
-In the theory kappa = M/m, the mass of the wheel over that of the foliot, both at the pallet. Deviations are relative,
-in the worst cell. Allowed is 1e-9 of what is followed contact by contact.
+In the theory kappa = M/m, the mass of the wheel over that of the foliot, both at the pallet
+(docs/theory/two_bodies.md).
 """
 
 import math
 
 import numpy as np
 import xarray as xr
-from _common import Claims, Statement, count, most, said, script
-from _figures import ListedColormap, Patch, colour_map, direct_label, hatch, panels
+from _common import Claims, Statement, count, most, never, said, script
+from _figures import KAPPA, Axis, colour_map, direct_label, hatch, kinds_map, page, panel
 
 from kernels.interface import Status
 
@@ -36,11 +36,6 @@ def scaled(ds: xr.Dataset) -> xr.Dataset:
     pitch = 2 * math.pi * ds.r_c / ds.teeth
     kappa = (ds.I_c / ds.r_c**2) / (ds.I_v / ds.r_v**2)
     return ds.assign_coords(kappa=kappa).assign(pitch=pitch, Y=ds.swing / pitch)
-
-
-def exceptions(what: str, wrong: xr.DataArray) -> Statement:
-    """That something is so in every cell."""
-    return said(what, not wrong.any(), count(wrong, "exceptions"), "no exception")
 
 
 def kinds(motion: xr.Dataset) -> xr.DataArray:
@@ -75,26 +70,18 @@ def lever(bent: xr.Dataset) -> Claims:
     steady = xr.where(k < 1, (bent.nu > -4 * (1 + k) / (k * (1 - k))) & (bent.nu < flip), light)
     heavy = exists & (k < 1)
     steadied = f"{int((heavy & held).sum())} of {count(heavy)}"
-    flat = heavy & (abs(bent.nu) < 1e-9) & held
-    yield exceptions("stability between the two borders in nu", exists & (steady != held))
+    yield never("stability between the two borders in nu: exceptions", exists & (steady != held))
     yield said("heavy foliots steadied by a lever that yields", (heavy & held).any(), steadied, "some")
-    yield said("heavy foliots steady with a flat lever", not flat.any(), count(flat), "none")
-
-
-def prepared(ds, lever):
-    """What the clock does contact by contact, the curved lever, and the symmetric cycle."""
-    closed, motion = (scaled(ds).sel({"method": name}) for name in ("closed", "events"))
-    return motion, scaled(lever), closed
+    yield never("heavy foliots steady with a flat lever", heavy & (abs(bent.nu) < 1e-9) & held)
 
 
 def claims(motion, bent, closed) -> Claims:
-    """What theory says, and what comes out."""
     yield "The symmetric cycle"
     free = closed.where(closed.status.isin(EXISTS) & (closed.e > 0))
     here = free.period.notnull() & (free.status != Status.GRAZING) & (abs(free.kappa - 1) > 1e-12)
     back = free.kappa < 2 * free.e / (1 - free.e)
-    yield exceptions("stable for kappa > 1 and no other", here & ((free.multiplier < 1) != (free.kappa > 1)))
-    yield exceptions("recoil for kappa < 2e/(1 - e)", here & ((free.recoil > 0) != back))
+    yield never("stable for kappa > 1 and no other: exceptions", here & ((free.multiplier < 1) != (free.kappa > 1)))
+    yield never("recoil for kappa < 2e/(1 - e): exceptions", here & ((free.recoil > 0) != back))
 
     yield "What the clock does"
     both = (closed.status == Status.OK) & (motion.status == Status.OK) & (motion.impacts == 1)
@@ -116,30 +103,32 @@ def claims(motion, bent, closed) -> Claims:
     yield from lever(bent)
 
 
-@panels(158.0, 2)
+@panel(KAPPA, Axis("restitution, $e$ [1]"))
+@panel(KAPPA, Axis(r"curvature of the lever, $\nu$ [1]"))
+@page(158.0)
 def figure(clock, lever, motion, bent, *_):
     """What the clock does, with the borders of its symmetric cycle, and what a curved lever does."""
-    kappa, e, kind = motion.kappa.values, motion.e.values, kinds(motion).transpose("e", "I_c").values
-    look = {"cmap": ListedColormap(list(KINDS.values())), "vmin": -0.5, "vmax": len(KINDS) - 0.5}
-    clock.pcolormesh(kappa, e, kind, shading="nearest", rasterized=True, **look)
+    kappa, e = motion.kappa.values, motion.e.values
+    keys = kinds_map(clock, kappa, e, kinds(motion).transpose("e", "I_c").values, KINDS)
     for border, name, dashes in ((np.ones_like(e), r"$\kappa=1$", "-"), (2 * e[:-1] / (1 - e[:-1]), "", "--")):
         clock.plot(border, e[: border.size], dashes, color="black", label=name or r"$\kappa=2e/(1-e)$")
-    clock.set(xlim=(kappa[0], kappa[-1]), ylim=(e[0], e[-1]), ylabel="restitution, $e$ [1]")
-    keys = [Patch(color=KINDS[name], label=name) for i, name in enumerate(KINDS) if (kind == i).any()]
+    clock.set(xlim=(kappa[0], kappa[-1]), ylim=(e[0], e[-1]))
     clock.figure.legend(handles=[*keys, *clock.lines], loc="outside upper center", ncols=2)
 
     kappa, values = bent.kappa.values, bent.multiplier.transpose("nu", "I_c").values
-    colour_map(lever, kappa, bent.nu.values, values, "multiplier [1]", {"extend": "max"}, vmin=0.5, vmax=1.5,
-               cmap="RdBu_r")  # fmt: skip
+    look = {"vmin": 0.5, "vmax": 1.5, "cmap": "RdBu_r"}
+    colour_map(lever, kappa, bent.nu.values, values, "multiplier [1]", {"extend": "max"}, **look)
     hatch(lever, kappa, bent.nu.values, np.isnan(values), "////")
     inside = kappa[~np.isnan(values).all(axis=0)]
     lever.plot(inside, flip_border(inside, LEVER_E), color="black", linewidth=0.9)
     lever.axvline(1.0, color="black", linewidth=0.9)
-    lever.set_ylabel(r"curvature of the lever, $\nu$ [1]")
     direct_label(lever, 0.3, -7, "stable")
     direct_label(lever, 0.22, 3, "unstable")
-    for axes in (clock, lever):
-        axes.set(xscale="log", xlabel=r"wheel over foliot, $\kappa$ [1]")
+
+
+def prepared(ds, lever):
+    """What the clock does contact by contact, the curved lever, and the symmetric cycle."""
+    return scaled(ds.sel({"method": "events"})), scaled(lever), scaled(ds.sel({"method": "closed"}))
 
 
 main = script(__name__, "impact_map.h5 impact_map_lever.h5", claims, figure, prepared)

@@ -2,20 +2,15 @@
 
     python studies/law_any_swing.py law_any_swing.h5
 
-Let friction of degree n (0 dry, 1 viscous, n drag) take the share lambda_n of the energy of half a swing, impacts the
-share lambda_e; N = sum of n lambda_n, and A is the amplitude over phi0. At large swings
-s = L = (N + lambda_e)/(N + 2). At small ones the foliot goes at its final speed, or starts from rest after an impact,
-and s = 1/M, M = N + 2 lambda_e. Between them, with x = k (A^2 - 1),
-    s = (1 + L x)/(M + x),   1/k = sum of lambda_n/k_n + lambda_e/5,   k_n = 2 (2n + 1)(3n + 2)/(n + 2)^2.       (1)
-k_n makes (1) right to the order A^-2 for one friction, from the series of its integrals in v^n; impacts enter M and k
-as friction of degree 2, k_2 = 5. Exact: dry friction alone at any swing, 1/(A^2 - 1) as k_0 = 1, friction of degree 2
-or impacts alone, 1/2, and both limits.
-Exact for every clock, since no other quantity has a time in it: with p_n = dlnP/dlnc_n for each friction c_n v^n,
+By docs/theory/general_law.md, with the share lambda_n of friction of degree n in the energy of half a swing, that of
+impacts lambda_e, N = sum of n lambda_n, A the amplitude over phi0, L = (N + lambda_e)/(N + 2), the law of large swings,
+and M = N + 2 lambda_e, where 1/M is that of small ones,
+    s = (1 + L x)/(M + x),  x = k (A^2 - 1),  1/k = sum of lambda_n/k_n + lambda_e/5,                            (1)
+k_n = 2 (2n + 1)(3n + 2)/(n + 2)^2, which is exact for dry friction alone, for friction of degree 2 or impacts alone,
+and in both limits. Exact for every clock is, with p_n = dlnP/dlnc_n for each friction c_n v^n,
     s = 1/2 + 1/2 sum of (2 - n) p_n.                                                                            (2)
 
-The deviation of s is a share of it, or the difference where an exponent stands beside a number. Allowed is of (1) what
-the line says, and of (2) the error of differences. The clocks are 1280, drawn over a, R, c and n, with e = 1, .99, .9,
-.5, 0.
+The clocks are 1280, drawn over a, R, c and n, with e = 1, .99, .9, .5, 0.
 """
 
 import itertools
@@ -23,13 +18,15 @@ import itertools
 import numpy as np
 import xarray as xr
 from _common import Claims, Statement, count, most, said, script, solved
-from _figures import COLOURS, panels
+from _figures import COLOURS, Log, page, panel
 from _losses import any_swing, shares
 
 import sweep
 
 BANDS = ((1.0, 1.1, 0.25), (1.1, 2.0, 0.20), (2.0, 10.0, 0.09), (10.0, np.inf, 0.005))
 """Swings over phi0, and the most that (1) may be off there, as a share of s."""
+KERNEL = {"linestyle": "", "markersize": 2.5, "markerfacecolor": "white"}
+"""Marks of the kernel."""
 SAMPLE = 32
 STEP = 1e-3
 """Of ln c_n, in the differences of (2); their error is the square of it."""
@@ -49,13 +46,7 @@ def alone(name: str) -> xr.Dataset:
     return any_swing(shares(solved("foliot", mu=mu, **clock, outputs=outputs, rtol=1e-10)))
 
 
-def prepared(ds):
-    """The clocks with their laws, and those of one loss alone, by its name."""
-    return any_swing(shares(ds)), {name: alone(name) for name in LOSSES}
-
-
 def claims(ds, single) -> Claims:
-    """What theory says, and what comes out."""
     yield "Any losses, any swing"
     off = abs(ds.law / ds.sensitivity - 1.0)
     half, nearly = off.quantile([0.5, 0.95]).values
@@ -92,26 +83,27 @@ def claims(ds, single) -> Claims:
     yield most(f"(2), {SAMPLE * 4} clocks", "1e-4", s / few.sensitivity - 1, 1e-4, text)
 
 
-@panels(132.0, 2, sharex=True)
+@panel(Log("", (1e-3, 1e2)), Log("exponent, $s$ [1]", (0.02, 30)), "upper right", {"kernel": {"marker": "o", **KERNEL}})
+@panel(Log(r"swing beyond the switch, $A-1$ [1]"), Log("deviation of (1) [% of $s$]", (1e-3, 100)), "lower left")
+@page(132.0, sharex=True)
 def figure(one, off, ds, single):
     """One loss alone over the swing, and how far (1) is off for every clock."""
-    beyond, s = r"swing beyond the switch, $A-1$ [1]", ds.sensitivity.values.ravel()
     for colour, (name, line) in zip(COLOURS, list(single.items())[:3], strict=False):
-        one.loglog(line.swing - 1, line.law, color=colour, label=name)
-        one.loglog(line.swing - 1, line.sensitivity, "o", color=colour, markersize=2.5, markerfacecolor="white")
-    one.plot([], [], "ko", markersize=2.5, markerfacecolor="white", label="kernel")
-    one.set(ylabel="exponent, $s$ [1]", xlim=(1e-3, 1e2), ylim=(0.02, 30))
-    one.legend(loc="upper right")
-
-    swing, far = ds.swing.values.ravel() - 1, 100 * abs(ds.law.values.ravel() / s - 1)
-    off.loglog(swing, far, ".", color="0.75", markersize=1, rasterized=True)
+        one.plot(line.swing - 1, line.law, color=colour, label=name)
+        one.plot(line.swing - 1, line.sensitivity, "o", color=colour, **KERNEL)
+    swing, far = ds.swing.values.ravel() - 1, 100 * abs(ds.law.values.ravel() / ds.sensitivity.values.ravel() - 1)
+    off.plot(swing, far, ".", color="0.75", markersize=1, rasterized=True)
     edges = np.geomspace(1e-3, 20, 10)
     bins = [far[(swing >= low) & (swing < high)] for low, high in itertools.pairwise(edges)]
     for share, dashes in ((95, "-"), (50, "--")):
         kept, look = [np.percentile(b, share) for b in bins], {"color": COLOURS[0], "label": f"{share} % of them"}
         off.plot(np.sqrt(edges[1:] * edges[:-1]), kept, dashes, **look)
-    off.set(xlabel=beyond, ylabel="deviation of (1) [% of $s$]", ylim=(1e-3, 100))
-    off.legend(loc="lower left")
 
 
-main = script(__name__, "law_any_swing.h5", claims, figure, prepared)
+main = script(
+    __name__,
+    "law_any_swing.h5",
+    claims,
+    figure,
+    lambda ds: (any_swing(shares(ds)), {name: alone(name) for name in LOSSES}),
+)

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from _common import Claims, Statement, most, said, script, solved
-from _figures import COLOURS, panels, plain_ticks
+from _figures import COLOURS, Log, page, panel
 from clock_losses import SHARES, SUM, THRESHOLD, Measured, forecast
 
 NOISE = 0.01
@@ -55,13 +55,7 @@ def matrices(ds: xr.Dataset, over: float, amplitude: bool, number: int = 12) -> 
     return mu[:-1], np.delete(J, [number, 2 * number + 1] if amplitude else [number], axis=0), by_u
 
 
-def prepared(ds, tell=True):
-    """The result, and how many clocks are fitted: all of them, or two shares of the first where not to `tell`."""
-    return ds, ds.sizes["point"] if tell else 1
-
-
 def claims(ds, clocks) -> Claims:
-    """What theory says, and what comes out."""
     yield "What can be known"
     for over in SPREADS:
         (alone, weak), (both, strong) = (forecast(*matrices(ds, over, amplitude)[1:]) for amplitude in (False, True))
@@ -118,19 +112,21 @@ def claims(ds, clocks) -> Claims:
     yield Statement(over, "20", f"{mean:.1f}", mean / 20 - 1, bool(enough))
 
 
-@panels(84.0)
+SPREAD = Log("largest over least torque [1]", None, (2, 5, 10, 20, 50))
+
+
+@panel(SPREAD, Log("standard error of a share [1]", (2e-3, 5)), "lower left", {"periods alone": "--"}, ncols=2)
+@page(84.0)
 def figure(axes, ds, *_):
     """Forecast errors of the shares over the spread of the torques."""
     spreads = np.geomspace(2.0, 60.0, 12)
     for dashes, amplitude in (("--", False), ("-", True)):
         errors = np.array([forecast(*matrices(ds, over, amplitude)[1:])[0] for over in spreads])
         for k, name in enumerate(SHARES):
-            axes.loglog(spreads, errors[:, k], dashes, color=COLOURS[k], label=name if amplitude else None)
-    axes.plot([], [], "--", color="black", label="periods alone")
+            axes.plot(spreads, errors[:, k], dashes, color=COLOURS[k], label=name if amplitude else None)
     axes.axhline(0.25, color="0.6", linewidth=0.6)
-    axes.set(xlabel="largest over least torque [1]", ylabel="standard error of a share [1]", ylim=(2e-3, 5))
-    plain_ticks(axes.xaxis, (2, 5, 10, 20, 50))
-    axes.legend(ncols=2, loc="lower left")
 
 
-main = script(__name__, "losses_from_periods.h5", claims, figure, prepared)
+main = script(
+    __name__, "losses_from_periods.h5", claims, figure, lambda ds, tell=True: (ds, ds.sizes["point"] if tell else 1)
+)

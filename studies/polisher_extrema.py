@@ -6,18 +6,18 @@ The figure is what the paper's figures 4, 6 and 7 show. b = (49, -38) cm has the
 of the paper's figure 4, which does not give it.
 
 The paper is Cordero-Davila et al., Opticheskii Zhurnal 78(3):55 (2011); where "-" stands it says nothing, and the
-formula is named in the line. Allowed are 1e-12 of a formula, and 1.5 degree for "does not move". "No, known" marks a
-statement of the source that its own equations refute: degrees of the crank count from b, and with the paper's equations
-for type A (upper signs) the minimum of alpha moves, and later. Its figure 4 shows the same arm with alpha counted
-clockwise.
+formula is named in the line. "No, known" marks a statement of the source that its own equations refute: degrees of the
+crank count from b, and with the paper's equations for type A (upper signs) the minimum of alpha moves, and later. Its
+figure 4 shows the same arm with alpha counted clockwise.
 """
 
 import math
+from math import degrees
 
 import numpy as np
 import xarray as xr
 from _common import Claims, compared, differing, most, said, script, solved
-from _figures import COLOURS, direct_label, panels
+from _figures import COLOURS, Axis, direct_label, page, panel
 
 from kernels.interface import Status
 
@@ -33,10 +33,6 @@ def at(ds: xr.Dataset, e: float) -> xr.Dataset:
     return ds.sel(e=e, method="nearest")
 
 
-def degrees(x) -> float:
-    return math.degrees(float(x))
-
-
 def aligned(ds: xr.Dataset):
     """e x f over e f at both extremes: crank and coupler lie on one line there, the paper's theorem."""
     found = []
@@ -47,32 +43,25 @@ def aligned(ds: xr.Dataset):
     return xr.concat(found, "extreme")
 
 
-def size(ds: xr.Dataset) -> Claims:
-    """Amplitude and middle against e."""
+def claims(ds) -> Claims:
+    yield "Size of the swing"
     last, start, b, d, f = at(ds, LAST), ds.isel(e=0), float(ds.b), float(ds.d), float(ds.f)
-    slope = f / (b * d * math.sin(float(start.A0)))
-    A1, fall = float(last.A1), degrees(start.A0 - last.A0)
-    grown, first = A1 / (LAST * slope) - 1, f"A1/e at e -> 0 by f/(b d sin A0) = {slope / 100:.6f} rad/cm"
+    slope, A1 = f / (b * d * math.sin(float(start.A0))), float(last.A1)
+    fall, grown = degrees(start.A0 - last.A0), A1 / (LAST * slope) - 1
     full = ds.where(ds.status == Status.OK, drop=True)
-    yield compared(first, "-", float(start.A1_e) / 100, slope / 100, 1e-12)
+    yield compared(
+        f"A1/e at e -> 0 by f/(b d sin A0) = {slope / 100:.6f} rad/cm", "-", float(start.A1_e) / 100, slope / 100, 1e-12
+    )
     yield said("A1 is proportional to e", 0.05 < grown < 0.2, f"{grown:+.1%} at 15 cm", "only nearly")
     yield said("A0 is constant", fall > 1, f"falls {fall:.2f} degree to 15 cm", "only nearly")
     yield most("alignment: the extremes have e x f = 0, over e f", "0", aligned(full), 1e-9, "largest of both")
-
-
-def claims(ds) -> Claims:
-    """What theory says, and what comes out."""
-    yield "Size of the swing"
-    yield from size(ds)
 
     yield "Times of the extremes (figure 4)"
     paper, last, start = ds.sel(e=slice(0, LAST + 1e-6)), at(ds, LAST), ds.isel(e=0)
     plus = degrees(paper.theta_plus.max() - paper.theta_plus.min())
     minus, later = degrees(last.theta_minus - start.theta_minus), (paper.theta_minus.diff("e") > 0).all()
-    maxima, clockwise = (
-        degrees(last.theta_plus - start.theta_plus),
-        "with alpha counted clockwise: maxima, the minima here",
-    )
+    maxima = degrees(last.theta_plus - start.theta_plus)
+    clockwise = "with alpha counted clockwise: maxima, the minima here"
     yield said("figure 4: maxima move to the right as e grows", maxima > 10, f"by {maxima:.1f} degree", "yes", True)
     yield said("figure 4: minima do not move", minus < 1.5, f"by {minus:.1f} degree", "yes", True)
     yield said(clockwise, later and minus > 10, f"{minus:.1f} degree", "yes")
@@ -85,18 +74,24 @@ def claims(ds) -> Claims:
     )
     there, near, angle = flat.isel(e=0), turns.isel(e=-1), last.transmission_angle
     sharp = (turns.e < limit).all() and (locked.e > limit).all() and flat.e.size == 1
-    cases = f"locks from {100 * float(locked.e[0]):.2f} cm on"
     text = f"{degrees(angle):.1f} at 15 cm, {degrees(near.transmission_angle):.2f} degree "
     text += f"{1e3 * (limit - float(near.e)):.1f} mm before"
     thd, what = float(last.thd), "angle of coupler and arm falls to 0 at the border"
-    yield compared("largest e of a motor that turns, cm", "-", 100 * float(flat.e[0]), 100 * limit, 1e-12, 6)
-    yield said("all smaller turn, all larger lock", sharp, cases, "-")
-    yield differing("A0 = A1 there, degree", "-", degrees(there.A1), degrees(there.A0), 1e-5, 6)
+    yield compared("largest e of a motor that turns, cm", "-", 100 * float(flat.e[0]), 100 * limit, 1e-12)
+    yield said("all smaller turn, all larger lock", sharp, f"locks from {100 * float(locked.e[0]):.2f} cm on", "-")
+    yield differing("A0 = A1 there, degree", "-", degrees(there.A1), degrees(there.A0), 1e-5)
     yield said(what, near.transmission_angle < 0.3 * angle, text, "-")
     yield said("harmonic motion", thd < 0.01, f"distortion {100 * thd:.1f} % at 15 cm", "held so elsewhere", True)
 
 
-@panels(136.0, 2)
+@panel(
+    Axis("crank angle from $b$ [degree]", (-180, 180)),
+    Axis(r"angle of the arm, $\alpha$ [degree]"),
+    "lower right",
+    title="eccentricity, $e$",
+)
+@panel(Axis("eccentricity, $e$ [cm]", (0, 18)), Axis("over its first order in $e$ [1]"), "upper left")
+@page(136.0)
 def figure(motion, size, ds):
     """alpha over a turn with the path of its extremes; A0 and A1 over their first order."""
     machine = {name: float(ds[name]) for name in "bdf"} | {"omega": 1.0, "b_angle": B_ANGLE}
@@ -108,9 +103,7 @@ def figure(motion, size, ds):
     paper, dashed = ds.sel(e=slice(0, LAST + 1e-6)), {"color": "black", "linewidth": 0.9, "linestyle": (0, (4, 2))}
     for end, label in (("plus", "extremes"), ("minus", None)):
         motion.plot(np.degrees(paper[f"theta_{end}"]), np.degrees(paper[f"eta_{end}"] + B_ANGLE), label=label, **dashed)
-    motion.set(xlabel="crank angle from $b$ [degree]", ylabel=r"angle of the arm, $\alpha$ [degree]")
-    motion.set(xlim=(-180, 180), xticks=range(-180, 181, 90))
-    motion.legend(title="eccentricity, $e$", loc="lower right")
+    motion.set_xticks(range(-180, 181, 90))
     limit, full = 100 * float(ds.d + ds.f - ds.b), ds.where(ds.A0.notnull() & (ds.e > 0), drop=True)
     size.plot(100 * full.e, full.A1 / (full.e * ds.A1_e[0]), color=COLOURS[0], label="amplitude, $A_1$")
     size.plot(100 * full.e, full.A0 / ds.A0[0], "--", color=COLOURS[1], label="middle, $A_0$")
@@ -119,8 +112,6 @@ def figure(motion, size, ds):
     # where the motor locks
     size.axvspan(limit, 18, facecolor="none", edgecolor="0.6", hatch="////", linewidth=0)
     direct_label(size, (limit + 18) / 2, 1.0, "motor locks", rotation=90)
-    size.set(xlabel="eccentricity, $e$ [cm]", ylabel="over its first order in $e$ [1]", xlim=(0, 18))
-    size.legend(loc="upper left")
 
 
 main = script(__name__, "polisher_extrema.h5", claims, figure, source="paper")

@@ -3,17 +3,15 @@
     python studies/polisher_sequence.py polisher_sequence.h5
 
 Wear adds up, so the time t_i >= 0 spent at setting i of the sweep wears the sum of t_i h_i(r); the most even sum of
-given mean is a least-squares problem over the area with t >= 0.
-
-The unevenness is the standard deviation over the area, over the mean. Allowed are 1e-6 of the conditions of an optimum,
-1e-9 m of a length found as a root, and 2 % of A0's slopes over 1 mm of throw.
+given mean is a least-squares problem over the area with t >= 0. The unevenness is the standard deviation over the area,
+over the mean.
 """
 
 import math
 
 import numpy as np
 from _common import Claims, Statement, compared, most, said, script, solved
-from _figures import COLOURS, colour_map, panels
+from _figures import COLOURS, Axis, colour_map, page, panel
 from _polishing import KEPT, area, best_settings, least, machine, profiles, unevenness
 from scipy.optimize import brentq
 
@@ -29,14 +27,7 @@ def middle(d: float, e: float, b: float, f: float) -> float:
     return 0.5 * sum(math.acos((b * b + d * d - (f + s * e) ** 2) / (2 * b * d)) for s in (1, -1))
 
 
-def prepared(ds):
-    """The sweep, its profiles, and the shares of the most even sequence."""
-    p = profiles(ds)
-    return ds, p, p.times(range(len(p.rows)), 0.0)
-
-
 def claims(ds, p, shares) -> Claims:
-    """What theory says, and what comes out."""
     yield "Sequences of settings"
     mixed, best, single = shares @ p.rows, p.nominal(range(len(p.rows)), shares), best_settings(ds)[0].uneven
     holds = best < single / 35 and least(mixed, p.weight, p.radius) > KEPT
@@ -51,9 +42,8 @@ def claims(ds, p, shares) -> Claims:
     n, m, a, b = np.array(TOOLS).T
     sizes = {"tool_n": n, "tool_m": m, "tool_a": 0.04 * a, "tool_b": 0.04 * b}
     given, along = machine(ds) | sizes | {"e": 0.1, "w_x": float(ds.w_x[3])}, {"radius": ds.radius.values}
-    found = unevenness(
-        solved("polisher_wear", design="zip", along=along, rtol=1e-5, **given).wear.values, area(ds.radius)
-    )
+    worn = solved("polisher_wear", design="zip", along=along, rtol=1e-5, **given).wear.values
+    found = unevenness(worn, area(ds.radius))
     for row, uneven in zip(TOOLS, found, strict=True):
         yield Statement("n, m = {:g}, {:g}, a, b = {:g}, {:g}: uneven by".format(*row), "", f"{uneven:.0%}")
     yield said("the disc is the most even of them", found.argmin() == 0, f"{found[0]:.0%}")
@@ -68,12 +58,13 @@ def claims(ds, p, shares) -> Claims:
     kept_by, shift = float(cells.A0[1] - cells.A0[0]), math.degrees(float(cells.A0[2] - cells.A0[0]))
     yield said("throw 10 to 15 cm, same arm: the middle moves by [degree]", shift < -1, f"{shift:.3f}", "-")
     yield most("  O_DH moved to keep it: arm [cm]", "-", kept_by, 1e-9, f"{100 * d:g} to {100 * exact:.3f}")
-    yield compared(
-        "  for 1 mm of throw, by A0_e/A0_d [um]", f"{1e6 * (small - d):.2f}", 1e6 * slope, 1e6 * (small - d), 0.02, 5
-    )
+    step = 1e6 * (small - d)
+    yield compared("  for 1 mm of throw, by A0_e/A0_d [um]", f"{step:.2f}", 1e6 * slope, step, 0.02)
 
 
-@panels(128.0, 2)
+@panel(Axis("radius [mm]", (0, 100)), Axis("wear over its mean [1]", (0, 2)), "upper right")
+@panel(Axis("offset [mm]", (-5, 105)), Axis("eccentricity, $e$ [mm]", (10, 170)))
+@page(128.0)
 def figure(profile, share, ds, p, shares):
     """The best profiles of one setting, and of the sequence, whose shares are mapped."""
     bored, best = best_settings(ds)
@@ -83,12 +74,15 @@ def figure(profile, share, ds, p, shares):
         weight = area(radius)
         text = f"{name}, {100 * float(unevenness(row, weight)):.1f} %"
         profile.plot(1e3 * radius, row / (row * weight).sum(), color=colour, label=text)
-    profile.set(xlabel="radius [mm]", ylabel="wear over its mean [1]", xlim=(0, 100), ylim=(0, 2))
-    profile.legend(loc="upper right")
     grid, offset, e = 100 * shares.reshape(ds.status.shape), 1e3 * (ds.w_x - ds.L).values, 1e3 * ds.e.values
     colour_map(share, offset, e, np.where(grid > 1e-7, grid, np.nan), "share of the wear [%]")
-    share.set(xlabel="offset [mm]", ylabel="eccentricity, $e$ [mm]", facecolor="0.92")
-    share.set(xlim=(-5, 105), ylim=(10, 170))
+    share.set(facecolor="0.92")
+
+
+def prepared(ds):
+    """The sweep, its profiles, and the shares of the most even sequence."""
+    p = profiles(ds)
+    return ds, p, p.times(range(len(p.rows)), 0.0)
 
 
 main = script(__name__, "polisher_sequence.h5", claims, figure, prepared)

@@ -6,16 +6,15 @@ The unevenness of a profile is the standard deviation of the wear over the area 
 even. It weighs by area, so it hardly sees a middle that the tool never reaches: the least wear of the inner half of
 the radius over the mean is told beside it, and below a half of the mean the workpiece is said to have a hole.
 
-The unevenness is the standard deviation over the area, over the mean. There is a hole where the least wear of the inner
-half is below half the mean. The optimum is over throw and offset, not on the grid. The offset is how much farther from
-the pivot the workpiece's centre lies than the tool's. The places of tool and workpiece, the rates, the pressure and
-Preston's coefficient are chosen here.
+The optimum is over throw and offset, not on the grid. The offset is how much farther from the pivot the workpiece's
+centre lies than the tool's. The places of tool and workpiece, the rates, the pressure and Preston's coefficient are
+chosen here.
 """
 
 import numpy as np
 import xarray as xr
-from _common import Claims, compared, said, script
-from _figures import COLOURS, hatch, panels, quality_bar
+from _common import Claims, compared, held, said, script
+from _figures import COLOURS, Axis, colour_map, contours, hatch, page, panel
 from _polishing import KEPT, POINTS, area, best_settings, disc, least, unevenness
 
 UM_PER_HOUR = 3.6e9
@@ -70,22 +69,11 @@ def one_setting(ds: xr.Dataset) -> Claims:
     again, near = float(unevenness(profile, area(ds.radius))), bored.uneven < best.uneven < 1.1 * bored.uneven
     yield said("disc, one setting, optimised: the most even has a hole", bored.least < KEPT, str(bored))
     yield said("disc, one setting, optimised, without a hole", near, str(best))
-    yield said(
-        "  best of 231 settings around it, over that",
-        1 <= uneven / best.uneven < 1.01,
-        f"{uneven / best.uneven:.4f}",
-        "1",
-    )
-    yield compared("disc, most even setting of the grid, solved again", f"{again:.5f}", found.uneven, again, 1e-4, 5)
-
-
-def prepared(ds, load):
-    """Both sweeps, the first with how uneven its profiles are."""
-    return scaled(ds), load
+    yield held("  best of 231 settings around it, over that", uneven / best.uneven, "1 to 1.01", "{:.4f}")
+    yield compared("disc, most even setting of the grid, solved again", f"{again:.5f}", found.uneven, again, 1e-4)
 
 
 def claims(ds, load) -> Claims:
-    """What theory says, and what comes out."""
     yield "Offset"
     for name in SHAPES:
         usual = tool(ds, name).sel(e=USUAL, method="nearest")
@@ -101,10 +89,9 @@ def claims(ds, load) -> Claims:
     even = aligned.isel(e=int(aligned.argmin("e")))
     here = f"{100 * float(aligned[0]):.0f} % at 2 cm, least {100 * float(even):.0f} % at {CM * float(even.e):g} cm"
     text = f"{UM_PER_HOUR * float(lost[0]):.3g} at 2 cm, at most {UM_PER_HOUR * float(lost.max()):.3g}"
-    grows = "disc, no offset: mean wear more than doubles with throw [um/h]"
     yield said("disc, no offset: throw halves the unevenness", even < 0.5 * aligned[0], here)
     yield from one_setting(round_tool)
-    yield said(grows, lost.max() > 2 * lost[0], text)
+    yield said("disc, no offset: mean wear more than doubles with throw [um/h]", lost.max() > 2 * lost[0], text)
 
     yield "Constant load"
     # The load is that of the constant pressure on the whole tool: where the tool hangs over the edge the pressure
@@ -116,7 +103,16 @@ def claims(ds, load) -> Claims:
     yield said("disc: wear by load over that by pressure, 2 mm from the edge", within, here, "3 to 5")
 
 
-@panels(136.0, 2)
+@panel(
+    Axis("radius [mm]", (0, 100)),
+    Axis("wear [µm/h]", (0, 0.24)),
+    "upper left",
+    {"constant load": {"linestyle": "--", "linewidth": 0.9}},
+    title="offset at $e=100$ mm",
+    ncols=2,
+)
+@panel(Axis("offset [mm]"), Axis("eccentricity, $e$ [mm]"))
+@page(136.0)
 def figure(profile, plane, ds, load):
     """Profiles of the disc, and how uneven they are over offset and eccentricity."""
     disc = tool(ds, "disc")
@@ -125,21 +121,15 @@ def figure(profile, plane, ds, load):
         dashed, text = load.wear.sel(w_x=place, method="nearest"), f"{MM * float(pressed.w_x - ds.L):.0f} mm"
         profile.plot(MM * pressed.radius, UM_PER_HOUR * pressed, color=colour, label=text)
         profile.plot(MM * dashed.radius, UM_PER_HOUR * dashed, "--", color=colour, linewidth=0.9)
-    profile.plot([], [], "k--", linewidth=0.9, label="constant load")
-    profile.set(xlabel="radius [mm]", ylabel="wear [µm/h]", xlim=(0, 100), ylim=(0, 0.24))
-    profile.legend(title="offset at $e=100$ mm", loc="upper left", ncols=2)
     x, y, uneven = MM * (ds.w_x - ds.L).values, MM * ds.e.values, disc.uneven.transpose("e", "w_x")
-    mesh = plane.pcolormesh(x, y, uneven, vmin=0, vmax=1.2, cmap="cividis_r", shading="gouraud", rasterized=True)
-    quality_bar(profile.figure, mesh, plane, "unevenness of the wear [1]", pad=0.02)
+    look = {"vmin": 0, "vmax": 1.2, "cmap": "cividis_r", "shading": "gouraud"}
+    colour_map(plane, x, y, uneven, "unevenness of the wear [1]", **look)
     hatch(plane, x, y, (disc.least < KEPT).transpose("e", "w_x").values, "////", "white")
-    lines = plane.contour(x, y, uneven, levels=[0.3, 0.5], colors="white", linewidths=0.7)
-    for text in plane.clabel(lines, fmt="%g", fontsize=8):
+    for text in contours(plane, x, y, uneven, [0.3, 0.5], fontsize=8):
         text.set_bbox({"facecolor": "0.35", "edgecolor": "none", "pad": 0.5})
-    best = least_uneven(disc, "e", "w_x")
-    plane.plot(
-        MM * float(best.w_x - ds.L), MM * float(best.e), "*", color="white", markeredgecolor="black", markersize=9
-    )
-    plane.set(xlabel="offset [mm]", ylabel="eccentricity, $e$ [mm]")
+    best, star = least_uneven(disc, "e", "w_x"), {"color": "white", "markeredgecolor": "black", "markersize": 9}
+    plane.plot(MM * float(best.w_x - ds.L), MM * float(best.e), "*", **star)
 
 
-main = script(__name__, "polisher_wear.h5 polisher_wear_load.h5", claims, figure, prepared)
+INPUTS = "polisher_wear.h5 polisher_wear_load.h5"
+main = script(__name__, INPUTS, claims, figure, lambda ds, load: (scaled(ds), load))

@@ -16,7 +16,8 @@ pallets, not after the oil.
 import numpy as np
 import xarray as xr
 from _common import Claims, differing, script
-from _figures import COLOURS, MARKS, direct_label, panels
+from _figures import COLOURS, DRIVE, MARKS, Axis, direct_label, page, panel
+from _losses import of_quarter, quarter
 
 import sweep
 
@@ -29,47 +30,36 @@ POINTS = 128
 NAMES = {"mu": "torque", "a": "friction", "phi0": "switching angle", "e": "restitution"}
 
 
-def shares(s: float) -> dict[str, float]:
-    """Shares of the variance of ln(P) by torque, friction and angle, from the exponent of the torque."""
+def shares(drive: float) -> dict[str, float]:
+    """Shares of the variance of ln(P) by torque, friction and angle, from the exponent of the torque at a drive."""
+    _, s, _ = of_quarter(quarter(drive))
     squares = {"mu": s**2, "a": (2 * s - 1) ** 2, "phi0": s**2}
     return {name: square / sum(squares.values()) for name, square in squares.items()}
 
 
-def exponent(drive: float) -> float:
-    """s of the viscous foliot at a drive alpha."""
-    viscous = {"kernel": "foliot", "outputs": ["sensitivity"], "fixed": {"a": 1.0, "phi0": 1.0}}
-    clock = sweep.solver({**viscous, "axes": {"mu": [1.0]}})
-    return float(clock(drive).sensitivity)
-
-
-def against_drive() -> xr.Dataset:
-    """Indices of every parameter along the drive, for a = phi0 = 1."""
+def prepared(ds):
+    """The result, and the indices of every parameter along the drive, for a = phi0 = 1."""
     found = []
     for drive in DRIVES:
         torque = {**RANGES["mu"], "start": 0.9048 * drive, "stop": 1.1052 * drive}
         keys = {"design": {"kind": "saltelli", "n": POINTS, "seed": 1}, "axes": {**RANGES, "mu": torque, **KEPT}}
-        ds = sweep.run(kernel="foliot", rtol=1e-10, outputs=["period"], **keys)
-        found.append(sweep.sensitivity(ds, np.log(ds.period)))
-    return xr.concat(found, dim=xr.DataArray(DRIVES, dims="alpha", name="alpha"))
-
-
-def prepared(ds):
-    """The result, and the indices along the drive."""
-    return ds, against_drive()
+        made = sweep.run(kernel="foliot", rtol=1e-10, outputs=["period"], **keys)
+        found.append(sweep.sensitivity(made, np.log(made.period)))
+    return ds, xr.concat(found, dim=xr.DataArray(DRIVES, dims="alpha", name="alpha"))
 
 
 def claims(ds, _) -> Claims:
-    """What theory says, and what comes out."""
     yield f"Sobol' index, total, alpha = {ds.mu.min():.3g} to {ds.mu.max():.3g}"
     total = sweep.sensitivity(ds, np.log(ds.period)).total.to_series()
-    for name, share in shares(exponent(np.sqrt(ds.mu.min() * ds.mu.max()))).items():
-        yield differing(NAMES[name], f"{share:.4f}", total[name] / (1 - total["e"]), share, ALLOWED, 4)
+    for name, share in shares(float(np.sqrt(ds.mu.min() * ds.mu.max()))).items():
+        yield differing(NAMES[name], f"{share:.4f}", total[name] / (1 - total["e"]), share, ALLOWED)
 
 
-@panels(82.0, width=120.0)
+@panel(DRIVE, Axis(r"share of the variance of $\ln P$ [1]", (-0.02, 0.58)))
+@page(82.0, 120.0)
 def figure(axes, _, found):
     """Total indices against the drive, with the shares that the exponents give."""
-    law = [shares(exponent(float(drive))) for drive in found.alpha.values]
+    law = [shares(drive) for drive in found.alpha.values]
     labels = {"mu": (0.1, 0.44, "torque"), "phi0": (22.0, 0.48, "switching angle, alike")}
     labels |= {"a": (25.0, 0.13, "friction"), "e": (250.0, 0.09, "restitution")}
     for k, (name, (x, y, text)) in enumerate(labels.items()):
@@ -78,8 +68,6 @@ def figure(axes, _, found):
         if name in law[0]:
             axes.plot(found.alpha, [row[name] for row in law], "-", color=COLOURS[k], zorder=0, linewidth=0.8)
         direct_label(axes, x, y, text, COLOURS[k])
-    axes.set(xscale="log", ylim=(-0.02, 0.58), ylabel=r"share of the variance of $\ln P$ [1]")
-    axes.set_xlabel(r"drive, $\alpha = \mu/(a^2 \varphi_0)$ [1]")
 
 
 main = script(__name__, "rate_parameters.h5", claims, figure, prepared)

@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 from _common import Claims, all_ok, compared, differing, script
-from _figures import COLOURS, direct_label, panels
+from _figures import COLOURS, Log, direct_label, page, panel
 
 SLOW = 3.0 - 2.0 * math.log(2.0)
 """Period over mu of strong friction."""
@@ -22,7 +22,6 @@ AT_ONE = 6.663286859323130
 
 
 def claims(ds) -> Claims:
-    """What theory says, and what comes out."""
     yield "Cells"
     near = float(ds.period.sel(mu=1.0, method="nearest"))
     yield all_ok(ds)
@@ -44,18 +43,19 @@ def claims(ds) -> Claims:
     yield differing("d ln T/d ln mu at the strongest", "1", last.period_by_mu, 1.0, 1e-4)
 
 
-@panels(120.0, 2, sharex=True)
+@panel(Log(), Log("period $T$ [1]", (3.0, 3e4)))
+@panel(Log(r"friction $\mu$ [1]"), Log(r"$T-(3-2\,\ln 2)\,\mu$ [1]"))
+@page(120.0, sharex=True)
 def figure(period, rest, ds):
     """Period with its limits; what is left of it beyond the strong one."""
-    period.loglog(ds.mu, ds.period, color=COLOURS[0])
-    period.plot(ds.mu, SLOW * ds.mu, color="0.5", linestyle="--", linewidth=0.8)
-    period.axhline(2.0 * math.pi, color="0.5", linestyle=":", linewidth=0.8)
-    period.set(ylabel="period $T$ [1]", ylim=(3.0, 3e4))
+    limit = {"color": "0.5", "linewidth": 0.8}
+    period.plot(ds.mu, ds.period, color=COLOURS[0])
+    period.plot(ds.mu, SLOW * ds.mu, "--", **limit)
+    period.axhline(2.0 * math.pi, linestyle=":", **limit)
     direct_label(period, 1500.0, 200.0, r"$(3-2\,\ln 2)\,\mu$", "0.4")
     direct_label(period, 0.1, 4.4, r"$2\pi$", "0.4")
-    rest.loglog(ds.mu, ds.period - SLOW * ds.mu, color=COLOURS[0])
-    rest.plot(ds.mu, NEXT * ds.mu ** (-1 / 3), color="0.5", linestyle="--", linewidth=0.8)
-    rest.set(xlabel=r"friction $\mu$ [1]", ylabel=r"$T-(3-2\,\ln 2)\,\mu$ [1]")
+    rest.plot(ds.mu, ds.period - SLOW * ds.mu, color=COLOURS[0])
+    rest.plot(ds.mu, NEXT * ds.mu ** (-1 / 3), "--", **limit)
     direct_label(rest, 400.0, 4.0, r"$7.0143\,\mu^{-1/3}$", "0.4")
 
 

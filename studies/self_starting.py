@@ -15,8 +15,8 @@ step of mu.
 
 import numpy as np
 import xarray as xr
-from _common import Claims, said, script, solved
-from _figures import COLOURS, ListedColormap, Patch, panels
+from _common import Claims, never, said, script, solved
+from _figures import COLOURS, Axis, kinds_map, page, panel
 
 
 def started(ds: xr.Dataset) -> xr.DataArray:
@@ -26,12 +26,10 @@ def started(ds: xr.Dataset) -> xr.DataArray:
 
 def least(ds: xr.Dataset) -> xr.DataArray:
     """(1), the least torque without viscous friction."""
-    moves = ds.R_s + ds.k * ds.phi_start
-    return np.maximum(moves, ds.R + ds.k * (ds.phi0 + ds.phi_start) / 2)
+    return np.maximum(ds.R_s + ds.k * ds.phi_start, ds.R + ds.k * (ds.phi0 + ds.phi_start) / 2)
 
 
 def claims(ds) -> Claims:
-    """What theory says, and what comes out."""
     yield "Viscous friction alone"
     places = {"mu": np.geomspace(1e-6, 1e2, 9), "phi_start": [-0.9, 0.0, 0.9]}
     bare = solved("foliot_start", **places, phi0=1.0, a=1.0, along={"flip": [1, 2]}, rtol=1e-9).flip_time
@@ -39,36 +37,34 @@ def claims(ds) -> Claims:
 
     yield "Coulomb friction, stiction and hairspring"
     smooth, rough = started(ds).sel(a=0), started(ds).sel(a=1)
-    wrong = int((smooth != (ds.mu > least(ds)).transpose(*smooth.dims)).sum())
-    lost, gained = smooth & ~rough, int((rough & ~smooth).sum())
+    lost, share = smooth & ~rough, float(1 - smooth.sel(k=0, R_s=0.6).mean())
     enough = ds.mu > np.maximum(ds.R + ds.k * ds.phi0, ds.R_s + ds.k * ds.phi_start)
-    within, costs = int((lost & enough).sum()), lost.any() and not lost.sel(k=0).any()
-    share = float(1 - smooth.sel(k=0, R_s=0.6).mean())
-    yield said("a = 0: starts where (1) says", wrong == 0, f"{wrong} of {smooth.size} not", "all cells")
-    yield said("a = 1/s: starts where a = 0 does not", gained == 0, f"{gained} cells", "never")
-    yield said("a = 1/s: does not start although mu > R + k phi0", within == 0, f"{within} cells", "never")
+    costs = lost.any() and not lost.sel(k=0).any()
+    yield never("a = 0: starts otherwise than (1) says", smooth != (ds.mu > least(ds)).transpose(*smooth.dims))
+    yield never("a = 1/s: starts where a = 0 does not", rough & ~smooth)
+    yield never("a = 1/s: does not start although mu > R + k phi0", lost & enough)
     yield said("viscous friction with a spring costs cells", costs, f"{int(lost.sum())}, all with k > 0", "some")
     what = "no spring: does not start by stiction, R_s = 0.6"
     yield said(what, abs(share - 0.23) < 0.015, f"{share:.3f}", "mu <= R_s: 23/100")
 
 
-@panels(86.0, 1, 2, sharey=True)
+KINDS = {"rests": "0.85", "starts if $a=0$ only": COLOURS[5], "starts": COLOURS[0]}
+RELEASED = Axis(r"released at $\varphi_\mathrm{s}/\varphi_0$ [1]")
+
+
+@panel(RELEASED, Axis(r"torque, $\mu/\varphi_0$ [s$^{-2}$]", (0, 2.5)))
+@panel(RELEASED, Axis("", (0, 2.5)))
+@page(86.0, columns=2, sharey=True)
 def figure(left, right, ds):
     """Where it starts, by hairspring; lines are (1)."""
-    palette = ("0.85", COLOURS[5], COLOURS[0])
     for axes, k in zip((left, right), ds.k.values[[0, -1]], strict=True):
         part = ds.sel(k=k, R_s=0.6)
         kind = started(part).sel(a=0).astype(int) + started(part).sel(a=1)
-        axes.pcolormesh(ds.phi_start, ds.mu, kind.transpose("mu", "phi_start"), cmap=ListedColormap(list(palette)),
-                        vmin=-0.5, vmax=2.5, shading="nearest", rasterized=True)  # fmt: skip
+        keys = kinds_map(axes, ds.phi_start, ds.mu, kind.transpose("mu", "phi_start"), KINDS)
         axes.plot(ds.phi_start, least(part), color="black", linewidth=0.9, label="theory")
         enough = axes.axhline(float(ds.R + k * ds.phi0), color="black", linewidth=0.8, linestyle=(0, (4, 2)))
         enough.set_label(r"$\mu=R+k\varphi_0$")
-        axes.set(xlabel=r"released at $\varphi_\mathrm{s}/\varphi_0$ [1]", ylim=(0, 2.5))
         axes.set_title(f"$k={k:g}$ s$^{{-2}}$")
-    left.set_ylabel(r"torque, $\mu/\varphi_0$ [s$^{-2}$]")
-    words = ("rests", "starts if $a=0$ only", "starts")
-    keys = [Patch(color=colour, label=text) for colour, text in zip(palette, words, strict=True)]
     left.figure.legend(handles=[*keys, *left.lines], loc="outside lower center", ncols=3)
 
 

@@ -16,7 +16,7 @@ The decay is (ln(multiplier) w/2 pi)^2, which by (1) is J_n^2 - detuning^2.
 import numpy as np
 import xarray as xr
 from _common import Claims, Statement, differing, most, said, script
-from _figures import COLOURS, ListedColormap, direct_label, panels
+from _figures import COLOURS, Axis, ListedColormap, direct_label, page, panel, points
 from scipy.special import jv
 
 from kernels.interface import Status
@@ -33,7 +33,6 @@ def scaled(ds: xr.Dataset) -> xr.Dataset:
 
 
 def claims(ds) -> Claims:
-    """What theory says, and what comes out."""
     yield "Shapiro steps"
     inside, clear = abs(ds.bessel) - abs(ds.detuning), BORDER / ds.w
     own = ds.locked & (ds.phase_turns == ds.order)
@@ -50,28 +49,29 @@ def claims(ds) -> Claims:
         for w, here in zip(ds.w.values, right, strict=True)
     )
     yield Statement("decay in the middle beside (1)", "", ", ".join(f"{off:.4f}" for off in middle.values))
-    yield differing("its deviation goes as w to the power", "-2", falls, -2.0, 0.2, 3)
+    yield differing("its deviation goes as w to the power", "-2", falls, -2.0, 0.2)
 
 
-@panels(136.0, 2)
+OVER = "alternating current over $w$ [1]"
+
+
+@panel(Axis("constant current over the critical one [1]", (-1, 7)), Axis(OVER, (0, 6.5)))
+@panel(Axis(OVER), Axis("rate of decay in the middle [1]", (0, 1.05)), "upper right")
+@page(136.0)
 def figure(plane, decay, ds):
     """The steps over both currents, their borders by (1), and the decay on one of them."""
     slow, fast = ds.sel(w=2.0), ds.sel(w=8.0)
     fine = np.linspace(0.0, 6.0, 200)
     for n in map(int, ds.order.values):
         colour, here = COLOURS[n], slow.sel(order=n).transpose("ac", "detuning")
-        plane.pcolormesh(2.0 * n + here.detuning, here.ac, np.where(here.locked, 1.0, np.nan),
-                         cmap=ListedColormap([colour]), alpha=0.45, rasterized=True)  # fmt: skip
+        locked, look = np.where(here.locked, 1.0, np.nan), {"cmap": ListedColormap([colour]), "alpha": 0.45}
+        plane.pcolormesh(2.0 * n + here.detuning, here.ac, locked, rasterized=True, **look)
         for sign in (1.0, -1.0):
             plane.plot(2.0 * n + sign * abs(jv(n, fine)), fine, color=colour, linewidth=0.8)
         direct_label(plane, 2.0 * n, 6.25, f"$n={n}$", colour)
         line = fast.sel(order=n, detuning=0.0)
-        decay.plot(line.ac, np.sqrt(line.decay), "os^D"[n], color=colour, markersize=3, markerfacecolor="white")
+        points(decay, line.ac, np.sqrt(line.decay), n, marker="os^D"[n], markersize=3)
         decay.plot(fine, abs(jv(n, fine)), color=colour, linewidth=0.8, label=f"$n={n}$")
-    plane.set(xlabel="constant current over the critical one [1]", ylabel="alternating current over $w$ [1]",
-              xlim=(-1, 7), ylim=(0, 6.5))  # fmt: skip
-    decay.set(xlabel="alternating current over $w$ [1]", ylabel="rate of decay in the middle [1]", ylim=(0, 1.05))
-    decay.legend(loc="upper right")
 
 
 main = script(__name__, "shapiro.h5", claims, figure, scaled)

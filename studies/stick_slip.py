@@ -18,9 +18,9 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Claims, Statement, cheapest, measured, said, script, solved_by
-from _figures import direct_label, draw_costs, method_look, panels, plain_ticks
-from _sliding_peers import FOLLOWERS
+from _common import Claims, Statement, cheapest, held, measured, script, solved_by
+from _figures import COST, ERROR, Log, direct_label, draw_costs, method_look, page, panel
+from _peers import SLIDING
 from belt_scene import KERNEL, SCENE
 
 from kernels.interface import FIRST_REFUSAL, Status
@@ -61,12 +61,6 @@ def last_count(flips: float, mu, belt, fall):
     return mu / belt + 0.5 * (flips - 1.0) * (slip + fall - place)
 
 
-def errors(name: str, belt, fall, rtol: float):
-    """How late others are, relative to the time: by how far the mass is from where it rides past; NaN: no answer."""
-    true = last_count(FLIPS, 1.0, belt, fall)
-    return abs(FOLLOWERS[name](belt, fall, true, rtol) - 1.0) / (belt * true)
-
-
 def errors_of_ours(kernel, method: str, belt, fall, rtol: float, **more):
     """Of the time of the last count, relative; NaN where there is none."""
     time, status = solved_by(kernel, method, rtol, mu=1.0, flips=FLIPS, belt=belt, fall=fall, **more)
@@ -74,43 +68,39 @@ def errors_of_ours(kernel, method: str, belt, fall, rtol: float, **more):
     return abs(np.where(given, time, np.nan) / last_count(FLIPS, 1.0, belt, fall) - 1.0)
 
 
-def others(ds: xr.Dataset) -> xr.Dataset:
-    """The errors of those that do not slide, over belt and fall; our dopri5 chatters about the kink."""
+def prepared(ds, tell=True):
+    """The sweep with its errors; those of others over belt and fall; and costs, of others where these are to be told.
+
+    Others are late by how far the mass is from where it rides past, relative to the time; NaN: no answer. Our dopri5 at
+    a fixed step chatters about the kink.
+    """
+
+    def errors(name: str, belt, fall, rtol: float):
+        true = last_count(FLIPS, 1.0, belt, fall)
+        return abs(SLIDING[name](belt, fall, true, rtol) - 1.0) / (belt * true)
+
+    true = xr.apply_ufunc(last_count, float(ds.flips), 1.0, ds.belt, ds.fall)
     some = ds.isel(belt=slice(None, None, COARSE), fall=slice(None, None, COARSE))
     belt, fall = (np.ravel(x) for x in np.meshgrid(some.belt, some.fall, indexing="ij"))
     steps = stepped_kernel(**{**SCENE, "name": "belt_steps"})
-    found = {"fixed step": errors_of_ours(steps, "dopri5", belt, fall, LOOSE, step=STEP, location=0.0)}
-    found |= {name: errors(name, belt, fall, LOOSE) for name in ("scipy Radau", "scipy LSODA")}
-    made = {name: (("belt", "fall"), off.reshape(some.belt.size, -1)) for name, off in found.items()}
-    return xr.Dataset(made, {"belt": some.belt, "fall": some.fall})
+    late = {"fixed step": errors_of_ours(steps, "dopri5", belt, fall, LOOSE, step=STEP, location=0.0)}
+    late |= {name: errors(name, belt, fall, LOOSE) for name in ("scipy Radau", "scipy LSODA")}
+    made = {name: (("belt", "fall"), off.reshape(some.belt.size, -1)) for name, off in late.items()}
 
-
-def costs(tell: bool) -> dict[str, xr.Dataset]:
-    """What a digit costs, of ours and of others where these are to be told."""
     random = np.random.default_rng(1)
     belt, fall = 10.0 ** random.uniform(-1.0, -0.4, CELLS), 10.0 ** random.uniform(-1.5, -0.4, CELLS)
-    found = {"dop853 (slides)": measured(partial(errors_of_ours, KERNEL, "dop853", belt, fall), TOLERANCES)}
-    for name in FOLLOWERS if tell else ():
-        found[name] = measured(partial(errors, name, belt[::FEW], fall[::FEW]), TOLERANCES)
-    return found
-
-
-def prepared(ds, tell=True):
-    """The sweep with its errors, those of others, and costs, of ours alone where others are not to be told."""
-    true = xr.apply_ufunc(last_count, float(ds.flips), 1.0, ds.belt, ds.fall)
-    ds = ds.assign(off=abs(ds.time / true - 1.0))
-    return ds, others(ds), costs(tell)
+    costs = {"dop853 (slides)": measured(partial(errors_of_ours, KERNEL, "dop853", belt, fall), TOLERANCES)}
+    for name in SLIDING if tell else ():
+        costs[name] = measured(partial(errors, name, belt[::FEW], fall[::FEW]), TOLERANCES)
+    return ds.assign(off=abs(ds.time / true - 1.0)), xr.Dataset(made, {"belt": some.belt, "fall": some.fall}), costs
 
 
 def claims(ds, unslid, found) -> Claims:
-    """What theory says, and what comes out."""
     yield "Twenty cycles"
     ok = ds.status == Status.OK
     for method in map(str, ds["method"].values):
-        share = float(ok.sel({"method": method}).mean())
-        yield said(f"{method} is OK", share >= 0.99, f"{share:.1%}", ">= 99 %")
-    worst = float(ds.off.where(ok).max())
-    yield said("worst error of what is OK", worst <= 1e-9, f"{worst:.1e}", "<= 1e-9")
+        yield held(f"{method} is OK", ok.sel({"method": method}).mean(), ">= 99 %", "{:.1%}")
+    yield held("worst error of what is OK", ds.off.where(ok).max(), "<= 1e-9", "{:.1e}")
 
     yield f"Two cycles without sliding, rtol {LOOSE:g}"
     for name, off in unslid.items():
@@ -121,7 +111,12 @@ def claims(ds, unslid, found) -> Claims:
     yield from cheapest(found)
 
 
-@panels(130.0, 2)
+BELT = Log("speed of the belt [1]", (0.01, 0.4), (0.01, 0.03, 0.1, 0.3))
+
+
+@panel(BELT, Log("relative error of the time [1]", (1e-16, 1e4)))
+@panel(COST.to(5e-6, 2e-2), ERROR.to(1e-16, 10))
+@page(130.0)
 def figure(error, cost, ds, unslid, found):
     """The error over the belt's speed, of a method that slides and of those that do not; costs."""
     slides = ds.sel({"method": "taylor"})
@@ -136,13 +131,9 @@ def figure(error, cost, ds, unslid, found):
         given = float(unslid[name].notnull().mean())
         text = "no value in any cell" if given == 0 else f"a value in {given:.0%} of the cells"
         direct_label(error, 0.063, 10.0 ** (2.6 - 1.9 * k), f"{name}: {text}", "0.35")
-    error.set(xscale="log", yscale="log", xlim=(0.01, 0.4), ylim=(1e-16, 1e4))
-    error.set(xlabel="speed of the belt [1]", ylabel="relative error of the time [1]")
-    plain_ticks(error.xaxis, (0.01, 0.03, 0.1, 0.3))
     draw_costs(cost, found, {"dop853 (slides)": (2.0, 15.0), "scipy DOP853, modes by hand": (0.45, 20.0)})
     none = "scipy Radau, BDF, LSODA,\ndiffrax Kvaerno5:\nno value in any cell"
     direct_label(cost, 0.95, 0.2, none, "0.35", ha="right", transform=cost.transAxes)
-    cost.set(xlim=(5e-6, 2e-2), ylim=(1e-16, 10))
 
 
 main = script(__name__, "stick_slip.h5", claims, figure, prepared)

@@ -23,14 +23,14 @@ loss.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import product
-from typing import Any
 
 import numpy as np
 import xarray as xr
 from _common import Claims, columns, compared, differing, power, script, solved
-from _figures import COLOURS, panels
+from _figures import COLOURS, Log, page, panel
 
 DAY = 86400.0
 CLOCKS = ("verge", "Bürgi", "spring")
@@ -41,15 +41,10 @@ LINEAR = 0.3
 """Noise beyond which torque would now and then vanish, and the linear law says no more than that."""
 
 
-def without_noise(ds: xr.Dataset) -> xr.Dataset:
-    """The clock's cycle on steady torque."""
-    return solved("foliot", mu=[float(ds.mu)], phi0=ds.phi0, a=ds.a, k=ds.k, rtol=1e-9).isel(mu=0)
-
-
 def scaled(ds):
     """One clock: its noisy runs with s, T, means over seeds and the scatter over sigma [s/day] at sigma = 0.01."""
-    cycle = without_noise(ds)
-    ds = ds.assign_coords(s=float(cycle.sensitivity), T=float(cycle.period) / 2)
+    cycle = solved("foliot", mu=[float(ds.mu)], phi0=ds.phi0, a=ds.a, k=ds.k, rtol=1e-9).isel(mu=0)
+    ds = ds.assign_coords(s=float(cycle.sensitivity), T=float(cycle.period) / 2, speed=float(cycle.crossing_speed))
     seeds, rate = ds.sizes["seed"], ds.rate_error_s_per_day
     scatter = np.sqrt((ds.rate_scatter_s_per_day**2).mean("seed"))
     return ds.assign(
@@ -84,42 +79,31 @@ def half_swing(m: float, u: float, clock: tuple[float, float, float]):
     return np.array([t, -v])
 
 
-def slopes(ds: xr.Dataset, step: float = 1e-3) -> tuple[Any, dict[str, Any]]:
-    """(T, U) on the cycle and its first and second derivatives, each a pair, by central differences."""
+def expanded(ds: xr.Dataset, step: float = 1e-3) -> tuple[float, Callable[[float], float]]:
+    """s, and by (2) the loss over sigma^2 [s/day] over tau_c, from the half swing by central differences."""
     unit = math.sqrt(float(ds.phi0 / ds.mu))
     clock = (float(ds.a) * unit, float(ds.k) * unit**2, float(ds["T"]) / unit)
-    u = float(without_noise(ds).crossing_speed / ds.phi0) * unit
+    u = float(ds.speed / ds.phi0) * unit
     f = {(i, j): half_swing(1 + i * step, u * (1 + j * step), clock) for i, j in product((-1, 0, 1), repeat=2)}
-    du = u * step
-    return f[0, 0], {
-        "m": (f[1, 0] - f[-1, 0]) / (2 * step),
-        "u": (f[0, 1] - f[0, -1]) / (2 * du),
-        "mm": (f[1, 0] - 2 * f[0, 0] + f[-1, 0]) / step**2,
-        "uu": (f[0, 1] - 2 * f[0, 0] + f[0, -1]) / du**2,
-        "mu": (f[1, 1] - f[1, -1] - f[-1, 1] + f[-1, -1]) / (4 * step * du),
-    }
+    (time, _), du = f[0, 0], u * step
+    (T_m, U_m), (T_u, U_u) = (f[1, 0] - f[-1, 0]) / (2 * step), (f[0, 1] - f[0, -1]) / (2 * du)
+    by_mm, by_uu = (f[1, 0] - 2 * f[0, 0] + f[-1, 0]) / step**2, (f[0, 1] - 2 * f[0, 0] + f[0, -1]) / du**2
+    by_mu = (f[1, 1] - f[1, -1] - f[-1, 1] + f[-1, -1]) / (4 * step * du)
 
+    def loss(tau_c: float) -> float:
+        r = math.exp(-1 / tau_c) if tau_c > 0 else 0.0
+        c = r * U_m / (1 - r * U_u)
+        V = (U_m**2 + 2 * U_m * U_u * c) / (1 - U_u**2)
+        longer, faster = by_mm / 2 + by_mu * c + by_uu * V / 2
+        return DAY * float(longer + T_u * faster / (1 - U_u)) / time
 
-def second_order(ds: xr.Dataset, tau_c: float) -> float:
-    """Loss over sigma^2 [s/day] by (2)."""
-    (time, _), d = slopes(ds)
-    r = math.exp(-1 / tau_c) if tau_c > 0 else 0.0
-    kept, kick = d["u"][1], d["m"][1]
-    c = r * kick / (1 - r * kept)
-    V = (kick**2 + 2 * kick * kept * c) / (1 - kept**2)
-    longer, faster = d["mm"] / 2 + d["mu"] * c + d["uu"] * V / 2
-    return DAY * float(longer + d["u"][0] * faster / (1 - kept)) / time
+    return -(T_m + T_u * U_m / (1 - U_u)) / time, loss
 
 
 def lasts(ds: xr.Dataset, tau_c):
     """Correlation time in days, T/2 (1 + r)/(1 - r): that of continuous noise alike over long times; T/2 if white."""
     r = np.exp(-1 / np.where(tau_c > 0, tau_c, 1e-3))
     return float(ds["T"]) / DAY / 2 * (1 + r) / (1 - r)
-
-
-def prepared(*sweeps):
-    """The clocks by name."""
-    return dict(zip(CLOCKS, map(scaled, sweeps), strict=True))
 
 
 def claims(clocks) -> Claims:
@@ -130,21 +114,20 @@ def claims(clocks) -> Claims:
     """
     for name, ds in clocks.items():
         yield name
-        (time, _), d = slopes(ds)
-        s, known = -(d["m"][0] + d["u"][0] * d["m"][1] / (1 - d["u"][1])) / time, float(ds.s)
-        yield compared(f"{name}: s from the half-swing map", f"{known:.6f} +- 1e-4", s, known, 1e-4, 6)
+        (s, loss), known = expanded(ds), float(ds.s)
+        yield compared(f"{name}: s from the half-swing map", f"{known:.6f} +- 1e-4", s, known, 1e-4)
         allowed = 3 * float(ds.blur)
         for j, time_name in enumerate(TIMES):
             theory, what = float(law(ds, ds.tau_c[j])), f"  scatter over sigma, {time_name} [s/day]"
-            yield compared(what, f"(1) = {theory:.4g} +- {allowed:.0%}", ds.per_sigma[j], theory, allowed, 4)
+            yield compared(what, f"(1) = {theory:.4g} +- {allowed:.0%}", ds.per_sigma[j], theory, allowed)
         by_sigma = power(ds.scatter.isel(tau_c=0).sel(sigma=slice(None, 0.03)))
-        yield differing("  power of sigma in the scatter, white", "1 +- 0.01", by_sigma, 1, 0.01, 4)
+        yield differing("  power of sigma in the scatter, white", "1 +- 0.01", by_sigma, 1, 0.01)
         for j in (0, 1):
             part, sigma = ds.isel(tau_c=j, sigma=-1), float(ds.sigma[-1])
-            theory = sigma**2 * second_order(ds, float(ds.tau_c[j]))
+            theory = sigma**2 * loss(float(ds.tau_c[j]))
             error, what = float(part.gain_error) / theory, f"  loss at sigma = {sigma:g}, {TIMES[j]} [s/day]"
             allowed = 4 * error + 5 * sigma**2
-            line = compared(what, f"(2) = {theory:.4g} +- {allowed:.0%}", -part.gain, theory, allowed, 4)
+            line = compared(what, f"(2) = {theory:.4g} +- {allowed:.0%}", -part.gain, theory, allowed)
             yield line if error < 0.1 else replace(line, here=f"{line.here} +- {part.gain_error:.1g}", holds=None)
 
 
@@ -162,30 +145,36 @@ def table(clocks):
     ]
 
 
-@panels(142.0, 2)
+NOISE, SCATTER = Log(r"torque noise, $\sigma$ [1]"), Log("scatter of the rate from day to day [s/day]", (1e-4, 1e4))
+LASTS, OVER = Log("correlation time of the torque [day]", (1e-6, 10)), Log(r"scatter over $s\sigma$ [1]", (1e-3, 1.2))
+KEY = {"white": {"marker": "o", "markerfacecolor": "white"}, "of a day": {"marker": "o", "linestyle": (0, (5, 1.5))}}
+
+
+@panel(NOISE.to(1e-3, 0.3), SCATTER, "lower right", KEY, title="torque noise", borderaxespad=0.2)
+@panel(LASTS, OVER, "outside upper center", ncols=3)
+@page(142.0)
 def figure(scatter, correlation, clocks):
     """Scatter against noise, white and of a day, and against the correlation of the noise, with (1)."""
     wide = np.geomspace(1e-3, 0.3, 2)
     for (name, ds), colour, mark in zip(clocks.items(), COLOURS, "os^", strict=False):
         for j, dashes, fill in ((0, "-", "white"), (3, (0, (5, 1.5)), colour)):
-            scatter.loglog(wide, law(ds, ds.tau_c[j]) * wide, color=colour, linestyle=dashes)
+            scatter.plot(wide, law(ds, ds.tau_c[j]) * wide, color=colour, linestyle=dashes)
             scatter.plot(ds.sigma, ds.scatter.isel(tau_c=j), mark, color=colour, markerfacecolor=fill)
         look = {"fmt": mark, "color": colour, "markerfacecolor": "white", "linewidth": 0.8}
         unit, theta = DAY * float(ds.s), np.geomspace(0.1, 10 * DAY / float(ds["T"]), 300)
         y = ds.per_sigma / unit
         correlation.errorbar(lasts(ds, ds.tau_c), y, float(ds.blur) * y, label=name, **look)
-        correlation.loglog(lasts(ds, theta), law(ds, theta) / unit, color=colour, linewidth=0.8)
+        correlation.plot(lasts(ds, theta), law(ds, theta) / unit, color=colour, linewidth=0.8)
     for goal, rate in GOALS.items():
         scatter.axhline(rate, color="0.6", linewidth=0.6)
         scatter.text(1.02, rate, goal, fontsize=8, va="center", transform=scatter.get_yaxis_transform())
-    scatter.set(xlim=(1e-3, 0.3), ylim=(1e-4, 1e4), xlabel=r"torque noise, $\sigma$ [1]")
-    scatter.set_ylabel("scatter of the rate from day to day [s/day]")
-    correlation.set(xlim=(1e-6, 10), ylim=(1e-3, 1.2), xlabel="correlation time of the torque [day]")
-    correlation.set_ylabel(r"scatter over $s\sigma$ [1]")
-    scatter.figure.legend(*correlation.get_legend_handles_labels(), loc="outside upper center", ncols=3)
-    scatter.plot([], [], "o-", color="black", markerfacecolor="white", label="white")
-    scatter.plot([], [], "o", color="black", linestyle=(0, (5, 1.5)), label="of a day")
-    scatter.legend(loc="lower right", title="torque noise", borderaxespad=0.2)
 
 
-main = script(__name__, "timekeeping.h5 timekeeping_buergi.h5 timekeeping_spring.h5", claims, figure, prepared, table)
+main = script(
+    __name__,
+    "timekeeping.h5 timekeeping_buergi.h5 timekeeping_spring.h5",
+    claims,
+    figure,
+    lambda *sweeps: dict(zip(CLOCKS, map(scaled, sweeps), strict=True)),
+    table,
+)

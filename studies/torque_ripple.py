@@ -17,32 +17,31 @@ follows the torque, and P/P0 is the mean of 1/(1 + depth f): 1/sqrt(1 - depth^2)
 h inertia alone shifts the period, in the layers behind the switches: K = -(5/24) alpha (h pi alpha)^2.
 Derived here.
 
-Deviations are relative, or divided by 1 where the coefficient is smaller; of powers they are the difference. Allowed is
-what the next order in the depth, in 1/h or in alpha explains.
+Allowed is what the next order in the depth, in 1/h or in alpha explains.
 """
 
 import math
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from _common import Claims, compared, differing, most, power, script
-from _figures import COLOURS, HOLLOW, direct_label, panels
-from scipy.optimize import brentq
+from _figures import COLOURS, Log, direct_label, page, panel, points
+from _losses import of_quarter, quarter
 
 DRIVES = ("weak", "middle", "strong")
+DOT, ENVELOPE = {"marker": ".", "linestyle": ""}, {"linestyle": "--", "linewidth": 0.8}
+"""How theory is drawn."""
+ABOUT = slice(0.01, 0.05)
+"""Depths over which the power of the depth is taken."""
 SLACK = 1e-3
 """Of first-order coefficients: rtol over the depths they are taken from is 5e-5; the rest is of third order."""
 
 
-def switch_time(alpha: float) -> float:
-    """Root q of q - tanh q = 1/alpha."""
-    return float(brentq(lambda q: q - math.tanh(q) - 1 / alpha, 1e-3, 1e6, xtol=1e-15))
-
-
 def first_order(alpha: float, harmonics, pieces: int = 1000):
     """K of (1) for all harmonics, by 16-point Gauss rules."""
-    q = switch_time(alpha)
+    q = quarter(alpha)
     x, w = np.polynomial.legendre.leggauss(16)
     width = 2 * q / pieces
     t = (width * (np.arange(pieces)[:, None] + (x + 1) / 2)).ravel()
@@ -56,79 +55,73 @@ def first_order_sensitivity(alpha: float, harmonics, step: float = 1e-4):
     return (first_order(alpha * (1 - step), harmonics) - first_order(alpha * (1 + step), harmonics)) / (2 * step)
 
 
-def amplitude(alpha: float) -> float:
-    """A = alpha ln cosh q."""
-    q = switch_time(alpha)
-    return alpha * (q + math.log1p(math.exp(-2 * q)) - math.log(2))
-
-
 def envelopes(alpha: float, harmonics) -> tuple[Any, Any]:
     """Amplitude of K in (2), and that of ds/ddepth where the harmonic is high."""
-    q = switch_time(alpha)
+    q = quarter(alpha)
     of_period = 1 / (q * np.sqrt(harmonics * alpha))
-    return of_period, of_period * harmonics * math.pi / 2 * (amplitude(alpha) - 1 / math.tanh(q))
+    return of_period, of_period * harmonics * math.pi / 2 * (of_quarter(q)[2] - 1 / math.tanh(q))
 
 
 def scaled(ds: xr.Dataset) -> xr.Dataset:
     """`ds` with alpha, changes of period and s, their slopes `K` and `L` at depth 0, and the period's `curvature`."""
-    d = ds.depth
+    change, moved = ds.period / ds.period.sel(depth=0) - 1, ds.sensitivity - ds.sensitivity.sel(depth=0)
+    first, second = (float(x) for x in ds.depth[1:3])
+    (low, high), rates = ((y / ds.depth).isel(depth=[1, 2]).transpose("depth", ...) for y in (change, moved))
+    K, L = ((x * second - y * first) / (second - first) for x, y in ((low, high), rates))
     ds = ds.assign_coords(alpha=ds.mu / (ds.a**2 * ds.phi0))
-    ds = ds.assign(change=ds.period / ds.period.sel(depth=0) - 1, change_s=ds.sensitivity - ds.sensitivity.sel(depth=0))
-    slopes = {name: (ds[name] / d).isel(depth=[1, 2], drop=True) for name in ("change", "change_s")}
-    first, second = (float(x) for x in d[1:3])
-    at_0 = {n: (y[..., 0] * second - y[..., 1] * first) / (second - first) for n, y in slopes.items()}
-    curvature = (slopes["change"][..., 1] - slopes["change"][..., 0]) / (second - first)
-    return ds.assign(K=at_0["change"], L=at_0["change_s"], curvature=curvature)
-
-
-def degree(line: xr.Dataset, harmonic: int) -> float:
-    """Exponent of the depth in |P/P0 - 1| about depth 0.02."""
-    return power(line.change.sel(harmonic=harmonic, depth=slice(0.01, 0.05)))
+    return ds.assign(change=change, K=K, L=L, curvature=(high - low) / (second - first))
 
 
 def claims(ds) -> Claims:
-    """What theory says, and what comes out."""
     yield "First order in the depth"
     for i, name in enumerate(DRIVES):
-        line, h = ds.isel(a=i), ds.harmonic.values
-        alpha, text = float(line.alpha), f"{h.size} harmonics"
+        line, h, text = ds.isel(a=i), ds.harmonic.values, f"{ds.harmonic.size} harmonics"
+        alpha = float(line.alpha)
         expected = first_order_sensitivity(alpha, h)
         off = (line.L - expected) / np.maximum(abs(expected), 1)
         yield most(f"{name}, alpha = {alpha:.4g}: worst of K", "(1)", line.K - first_order(alpha, h), SLACK, text)
         yield most("  worst of ds/ddepth, over 1 or itself", "(1)", off, 10 * SLACK, text)
+    degree = {i: power(abs(ds.change.isel(a=i).sel(harmonic=2 if i == 0 else 1, depth=ABOUT))) for i in range(3)}
     for i in (1, 2):
-        yield differing(f"{DRIVES[i]}: power of the depth, h = 1", "1", degree(ds.isel(a=i), 1), 1, 0.05, 4)
+        yield differing(f"{DRIVES[i]}: power of the depth, h = 1", "1", degree[i], 1, 0.05)
 
     yield "High harmonics"
     # They are K and ds/ddepth over cosine and sine of the phase in (2), from harmonic 16 on and away from zeros. The
     # power is NaN if signs differ.
     for i in (1, 2):
-        line, h = ds.isel(a=i), ds.harmonic
-        alpha = float(line.alpha)
-        phase = math.pi / 4 - h * math.pi * (amplitude(alpha) - 1) / 2
-        for name, y, wave, envelope, expected in zip(
-            ("K", "ds/ddepth"), (line.K, line.L), (-np.cos(phase), np.sin(phase)), envelopes(alpha, h), (-0.5, 0.5),
-            strict=True,
-        ):  # fmt: skip
+        line, h, alpha = ds.isel(a=i), ds.harmonic, float(ds.alpha[i])
+        phase = math.pi / 4 - h * math.pi * (of_quarter(quarter(alpha))[2] - 1) / 2
+        of_period, of_rate = envelopes(alpha, h)
+        for what, y, wave, envelope, expected in (
+            (f"{DRIVES[i]}: power of the harmonic in K", line.K, -np.cos(phase), of_period, "-1/2"),
+            ("  power of the harmonic in ds/ddepth", line.L, np.sin(phase), of_rate, "+1/2"),
+        ):
             size = (y / wave).where((h >= 16) & (abs(wave) > 0.7), drop=True)
             exponent = power(size) if abs(np.sign(size).sum()) == size.size else math.nan
-            what = f"{DRIVES[i]}: power" if name == "K" else "  power"
-            theory = "-1/2" if name == "K" else "+1/2"
-            yield differing(f"{what} of the harmonic in {name}", theory, exponent, expected, 0.05, 4)
-            yield compared(f"  {name} over its envelope", "1", (size / envelope).mean(), 1, 0.05, 4)
+            yield differing(what, expected, exponent, float(Fraction(expected)), 0.05)
+            yield compared(f"  {what.split()[-1]} over its envelope", "1", (size / envelope).mean(), 1, 0.05)
 
     yield "Weak drive"
     line = ds.isel(a=0)
     alpha, even, whole = float(line.alpha), line.sel(harmonic=2), 1 / 0.75**0.5 - 1
     layers = -5 / 24 * (2 * math.pi * alpha) ** 2
-    yield differing("power of the depth, h = 2", "2", degree(line, 2), 2, 0.1, 4)
-    yield compared("P/P0 - 1 over depth^2, h = 2", "1/2", even.curvature, 0.5, 2 * alpha, 4)
-    yield compared("P/P0 - 1 at depth 0.5, h = 2", f"{whole:.4f}", even.change.sel(depth=0.5), whole, 3 * alpha, 4)
-    yield compared("K/alpha, h = 1", "-2", line.K.sel(harmonic=1) / alpha, -2, 2 * alpha, 4)
-    yield compared("K/alpha, h = 2", f"-5/24 (2 pi alpha)^2 = {layers:.4f}", even.K / alpha, layers, 0.1, 4)
+    yield differing("power of the depth, h = 2", "2", degree[0], 2, 0.1)
+    yield compared("P/P0 - 1 over depth^2, h = 2", "1/2", even.curvature, 0.5, 2 * alpha)
+    yield compared("P/P0 - 1 at depth 0.5, h = 2", f"{whole:.4f}", even.change.sel(depth=0.5), whole, 3 * alpha)
+    yield compared("K/alpha, h = 1", "-2", line.K.sel(harmonic=1) / alpha, -2, 2 * alpha)
+    yield compared("K/alpha, h = 2", f"-5/24 (2 pi alpha)^2 = {layers:.4f}", even.K / alpha, layers, 0.1)
 
 
-@panels(142.0, 2, sharex=True)
+@panel(Log(), Log(r"$|\mathrm{d}\ln P/\mathrm{d}\,\mathrm{depth}|$ at depth 0 [1]", (2e-5, 2)))
+@panel(
+    Log("harmonic, $h$ [1]", (0.9, 72)),
+    Log(r"$|\mathrm{d}s/\mathrm{d}\,\mathrm{depth}|$ at depth 0 [1]", (2e-3, 20)),
+    "outside upper center",
+    {"theory of first order": {**DOT, "markersize": 3}, "its envelope": {**ENVELOPE, "color": "0.3"}},
+    ncols=3,
+    columnspacing=1.0,
+)
+@page(142.0, sharex=True)
 def figure(of_period, of_rate, ds):
     """First-order coefficients of period and sensitivity against the harmonic.
 
@@ -140,18 +133,10 @@ def figure(of_period, of_rate, ds):
     ):
         for i, mark in enumerate("os^"):
             alpha, name = float(ds.alpha[i]), rf"{DRIVES[i]}, $\alpha = {float(ds.alpha[i]):.3g}$"
-            axes.loglog(some, abs(found.isel(a=i).sel(harmonic=some)), mark, color=COLOURS[i], label=name, **HOLLOW)
-            axes.plot(some, abs(theory(alpha, some)), ".", color="black", markersize=1.5)
+            points(axes, some, abs(found.isel(a=i).sel(harmonic=some)), i, name, marker=mark)
+            axes.plot(some, abs(theory(alpha, some)), color="black", markersize=1.5, **DOT)
             if i:
-                axes.plot(some, envelopes(alpha, some)[which], "--", color=COLOURS[i], linewidth=0.8)
-        axes.plot([], [], ".", color="black", markersize=3, label="theory of first order")
-        axes.plot([], [], "--", color="0.3", linewidth=0.8, label="its envelope")
-    of_period.set(ylim=(2e-5, 2), ylabel=r"$|\mathrm{d}\ln P/\mathrm{d}\,\mathrm{depth}|$ at depth 0 [1]")
-    of_rate.set(ylim=(2e-3, 20), ylabel=r"$|\mathrm{d}s/\mathrm{d}\,\mathrm{depth}|$ at depth 0 [1]")
-    of_rate.set(xlim=(0.9, 72), xlabel="harmonic, $h$ [1]")
-    of_period.figure.legend(
-        *of_rate.get_legend_handles_labels(), loc="outside upper center", ncols=3, columnspacing=1.0
-    )
+                axes.plot(some, envelopes(alpha, some)[which], color=COLOURS[i], **ENVELOPE)
     direct_label(of_period, 20, 0.25, "$h^{-1/2}$")
     direct_label(of_rate, 3, 2.6, "$h^{1/2}$")
 

@@ -2,27 +2,24 @@
 
     python studies/verge_losses.py verge_losses.h5 verge_losses_wheel.h5
 
-P ~ torque^(-s). kappa = n^2 I_c/I_v is the wheel's
-inertia over the foliot's, alpha = n tau/(I_v a^2 phi0) the drive over viscous friction, lambda the share of a loss in
-the energy of half a period: viscous, dry, and impact. Theory, derived here: where the swing is large the speed at the
-switch follows from the balance of energy, friction of degree n taking abs(v)^(n + 2)/torque and impacts v^2, so that
+P ~ torque^(-s). kappa = n^2 I_c/I_v is the wheel's inertia over the foliot's, alpha = n tau/(I_v a^2 phi0) the drive
+over viscous friction, lambda the share of a loss in the energy of half a period: viscous, dry, and impact. At large
+swings (docs/theory/general_law.md)
 
     s = (sum n lambda_n + lambda_impact)/(2 + sum n lambda_n),                                           (1)
 
 n = 1 for viscous and 0 for dry friction: 1/3, 1/2 and 0 where one of them takes all. At weak drive s = 1/(1 + alpha).
 
-The exponent s is a difference of ln P over ln torque, with 8 points a decade. Deviations of exponents and shares are
-differences. Allowed are 1e-8 of the energy; 0.01 of an exponent at the ends of the grid, 0.015 of (1); 0.2 of the
-exponent -3; and 0.02 where friction moves to the wheel and s < 1/2. Near the torque that just drives the clock the drop
-decides.
+The exponent s is a difference of ln P over ln torque, with 8 points a decade. Near the torque that just drives the
+clock the drop decides.
 """
 
 import math
 
 import numpy as np
 import xarray as xr
-from _common import Claims, count, differing, last_passage, most, power, said, script
-from _figures import COLOURS, exponent_map, panels
+from _common import Claims, count, differing, held, last_passage, most, power, said, script
+from _figures import ALPHA, COLOURS, KAPPA, Axis, contours, exponent_map, page, panel
 from _losses import verge
 
 STRONG = 1e4
@@ -51,13 +48,7 @@ def passage(smooth: xr.Dataset, value: float) -> xr.DataArray:
     return xr.DataArray(found, {"kappa": smooth.kappa.values}, ("kappa",))
 
 
-def prepared(ds, wheel):
-    """Friction on the foliot, and on the wheel."""
-    return scaled(ds), scaled(wheel)
-
-
 def claims(ds, wheel) -> Claims:
-    """What theory says, and what comes out."""
     yield "Energy"
     whole = ds.viscous + ds.dry + ds.impact
     yield most("viscous, dry and impact losses are the work", "1", whole - 1, 1e-8)
@@ -66,9 +57,9 @@ def claims(ds, wheel) -> Claims:
     smooth = ds.isel(R_v=0)
     light, heavy = smooth.isel(I_c=0), smooth.sel(I_c=2.5e-3, method="nearest")
     first, weak = light.s.isel(tau=1), 1 / (1 + float(light.alpha[1]))
-    yield differing("kappa = .001, weakest drive", f"1/(1 + alpha) = {weak:.4f}", first, weak, 0.01, 4)
-    yield differing("kappa = .001: least s", "1/3", light.s.min(), 1 / 3, 0.01, 4)
-    yield differing("kappa = 1: strongest drive", "1/2", heavy.s.isel(tau=-2), 0.5, 0.01, 4)
+    yield differing("kappa = .001, weakest drive", f"1/(1 + alpha) = {weak:.4f}", first, weak, 0.01)
+    yield differing("kappa = .001: least s", "1/3", light.s.min(), 1 / 3, 0.01)
+    yield differing("kappa = 1: strongest drive", "1/2", heavy.s.isel(tau=-2), 0.5, 0.01)
 
     yield "Where exponents turn"
     upper, lower = (passage(smooth, value) for value in (3 / 4, 5 / 12))
@@ -82,8 +73,8 @@ def claims(ds, wheel) -> Claims:
     share = float(np.interp(math.log(float(deep[0])), np.log(smooth.alpha.values), near.values))
     yield said("s = 3/4, halfway from -1 to -1/2, at alpha", weak, ranged, "1/3 without wheel")
     yield said("s = 5/12, halfway from -1/3 to -1/2, at alpha", deep.size >= 2, text, "-")
-    yield differing("  alpha ~ (1 - e^2)^x, e = (1 - kappa)/(1 + kappa)", "-3", by_loss, -3, 0.2, 4)
-    yield differing("  share of viscous losses there, kappa = .01", "2/5 by (1)", share, 0.4, 0.02, 4)
+    yield differing("  alpha ~ (1 - e^2)^x, e = (1 - kappa)/(1 + kappa)", "-3", by_loss, -3, 0.2)
+    yield differing("  share of viscous losses there, kappa = .01", "2/5 by (1)", share, 0.4, 0.02)
 
     yield f"In mesh: recoil of at most {MESH:g} pitch"
     s, logs = smooth.s.where(smooth.pitches <= MESH), np.log(smooth.alpha.values)
@@ -102,11 +93,10 @@ def claims(ds, wheel) -> Claims:
     dips, end = float(least[first]), float(s[first, -2])
     heavy = f"kappa = {float(smooth.kappa[first]):.2g} stays in mesh at any drive: least s, strongest"
     text, what = f"{min(recoil):.2g} to {max(recoil):.2g}", "least s in mesh of kappa = .01, at half a pitch"
-    again = "in mesh, of clocks that have s < .38: s at a stronger drive"
     yield said("recoil where s rises through 5/12, kappa < .05 [pitches]", min(recoil) > MESH, text, "out of mesh")
-    yield differing(what, f"{AT_BORDER} by `verge`", border, AT_BORDER, 0.005, 4)
+    yield differing(what, f"{AT_BORDER} by `verge`", border, AT_BORDER, 0.005)
     yield said(heavy, dips > 0.43 and abs(end - 0.5) < 0.01, f"{dips:.3f}, {end:.3f}", ", 1/2")
-    yield said(again, back < 0.38, f"at most {back:.3f}", "< .38")
+    yield held("in mesh, of clocks that have s < .38: s at a stronger drive", back, "< .38", "at most {:.3f}")
 
     yield "A clock with a light wheel"
     # the wheel is light (kappa = .01), its dry friction I_v a^2 phi0, its recoil a quarter of a pitch.
@@ -116,7 +106,7 @@ def claims(ds, wheel) -> Claims:
     what = f"kappa = .01, alpha = {clock.alpha:.3g}, recoil of {clock.pitches:.2g} pitch"
     viscous = clock.viscous > clock.dry > clock.impact
     yield said(f"{what}: losses", viscous, text, "viscous most, impact least")
-    yield said("  its exponent", 1 / 3 < clock.s < 0.5, f"{clock.s:.3f}", "1/3 to 1/2")
+    yield held("  its exponent", clock.s, "1/3 to 1/2", "{:.3f}")
 
     yield "By the shares of the losses"
     off = ds.s - (ds.viscous + ds.impact) / (2 + ds.viscous)
@@ -133,20 +123,20 @@ def claims(ds, wheel) -> Claims:
         yield most(what, "as on the foliot", (moved - stayed)[both], 0.02, here)
 
 
-@panels(128.0, 2, height_ratios=(1.3, 1))
+@panel(ALPHA, KAPPA)
+@panel(ALPHA, Axis("share of the energy [1]", (0, 1)), "lower left", framealpha=0.9, frameon=True)
+@page(128.0, height_ratios=(1.3, 1))
 def figure(plane, shares, ds, _):
     """The exponent over drive and wheel, and the shares of the losses of a clock with a light wheel."""
     smooth = ds.isel(R_v=0)
     exponent_map(plane, smooth, (smooth.pitches > MESH).values, "recoil over 1/2 pitch")
-    lines = plane.contour(ds.alpha, ds.kappa, smooth.s, levels=[0.36, 5 / 12, 0.75], colors="white", linewidths=0.8)
-    plane.clabel(lines, fmt={0.36: "0.36", 5 / 12: "5/12", 0.75: "3/4"}, fontsize=7, inline_spacing=2)
+    names = {0.36: "0.36", 5 / 12: "5/12", 0.75: "3/4"}
+    contours(plane, ds.alpha, ds.kappa, smooth.s, list(names), linewidths=0.8, fmt=names, inline_spacing=2)
     clock = ds.isel(R_v=1).sel(I_c=2.5e-5, method="nearest")
     clock = clock.isel(tau=np.isfinite(clock.viscous.values))
     parts = [clock[name].values for name in LOSSES]
     shares.stackplot(clock.alpha.values, parts, colors=COLOURS[:3], labels=LOSSES, alpha=0.85)
-    shares.set(xscale="log", xlabel=r"drive, $\alpha$ [1]", ylabel="share of the energy [1]", ylim=(0, 1))
     shares.set(xlim=(clock.alpha[0], clock.alpha[-1]))
-    shares.legend(loc="lower left", framealpha=0.9, frameon=True)
 
 
-main = script(__name__, "verge_losses.h5 verge_losses_wheel.h5", claims, figure, prepared)
+main = script(__name__, "verge_losses.h5 verge_losses_wheel.h5", claims, figure, lambda *both: tuple(map(scaled, both)))

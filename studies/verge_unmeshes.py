@@ -4,31 +4,27 @@
 
 P ~ torque^(-s). kappa = n^2 I_c/I_v is the wheel's inertia over the foliot's, alpha = n tau/(I_v a^2 phi0) the drive
 over viscous friction, a = c_v/I_v. A wheel that is thrown back by more than half a pitch, 2 n phi0 + drop, is out of
-mesh. Theory, derived here for no drop and e = 0:
+mesh. By docs/theory/two_bodies.md, for no drop and e = 0:
 
-1. At strong drive impacts take all the work. A landing keeps (kappa - 1)/(kappa + 1) of the speed, so the balance
-   (1 + kappa)/2 (v^2 - v0^2) = 2 gives v^2 = (1 + kappa)/kappa, and the recoil is (1 - kappa)^2/(2 kappa) in units of
-   n phi0. It is below half a pitch, 2, for
+1. At strong drive the recoil is (1 - kappa)^2/(2 kappa) in units of n phi0, below half a pitch for
        kappa > 3 - 2 sqrt 2 = 0.1716,                                                                    (1)
    and such a wheel stays in mesh at any drive.
-2. Without inertia the wheel follows the foliot, and is out of mesh where the foliot swings beyond 3 phi0. By the closed
-   form alpha ln cosh q = 3, q - tanh q = 1/alpha, that is at alpha = 22.16, and there s = 0.3575.         (2)
-3. Bounces of a light wheel last about e kappa/(1 - e) of a half period. Where they die out in contact they take what
-   a plastic impact takes at once: e does not matter.
+2. Without inertia the wheel follows the foliot, and is out of mesh where that swings beyond 3 phi0, at alpha = 22.16;
+   there s = 0.3575.                                                                                     (2)
+3. Bounces of a light wheel last about e kappa/(1 - e) of a half period. Where they die out in contact, e does not
+   matter.
 
-The exponent s is a difference of ln P over ln torque, with 8 points a decade, between cells that run. Deviations of
-exponents are differences. Allowed are 1e-3 of the borders, found in steps of 6e-4, and 0.01 of exponents and 10 % of
-the recoil at the strongest drive, as the theory leaves out the drop, which is 5 % of n phi0.
+The exponent s is a difference of ln P over ln torque, with 8 points a decade, between cells that run. Borders are found
+in steps of 6e-4; the theory leaves out the drop, which is 5 % of n phi0.
 """
 
 import math
 
 import numpy as np
 import xarray as xr
-from _common import Claims, compared, count, differing, most, said, script, solved
-from _figures import COLOURS, DASHES, direct_label, exponent_map, panels
-from _losses import verge
-from scipy.optimize import brentq
+from _common import Claims, compared, count, differing, held, most, never, said, script, solved
+from _figures import ALPHA, COLOURS, DASHES, KAPPA, S, direct_label, exponent_map, page, panel
+from _losses import of_quarter, quarter, verge
 
 from kernels.interface import Status
 
@@ -42,12 +38,6 @@ def scaled(ds: xr.Dataset) -> xr.Dataset:
     return verge(ds, ds.period, ds.status == 0).assign(out=ds.status == Status.UNMESHES)
 
 
-def one_body() -> tuple[float, float]:
-    """alpha and s of (2)."""
-    q = brentq(lambda q: math.log(math.cosh(q)) / (q - math.tanh(q)) - 3, 0.1, 3.0)
-    return 1 / (q - math.tanh(q)), (1 - math.tanh(q) / q) / math.tanh(q) ** 2
-
-
 def border(axis: str, values, **changed: float) -> float:
     """Between which of these values a clock without drop stays in mesh on one side alone: their middle, else NaN."""
     clock = {"tau": 1.0, "I_v": 1.0, "n": 1.0, "phi0": 0.3, "drop": 3e-10} | changed | {axis: values}
@@ -55,16 +45,9 @@ def border(axis: str, values, **changed: float) -> float:
     return 0.5 * float(values[turns[0]] + values[turns[0] + 1]) if turns.size == 1 else math.nan
 
 
-def prepared(ds):
-    """Clocks without dry friction and restitution, and all of them."""
-    ds = scaled(ds)
-    return ds.isel(R_v=0, e=0), ds
-
-
 def claims(smooth, ds) -> Claims:
-    """What theory says, and what comes out."""
     yield "In mesh"
-    light, leaves, (alpha, _) = smooth.isel(I_c=0), smooth.out.any("tau"), one_body()
+    light, leaves, (alpha, least, _) = smooth.isel(I_c=0), smooth.out.any("tau"), of_quarter(quarter(3, 2))
     last, first = light.alpha.where(~light.out).max(), light.alpha.where(light.out).min()
     leaves_at = border("tau", 0.3 * np.arange(22.0, 22.4, 0.01), I_c=1e-9, c_v=1.0) / 0.3
     kappa = border("I_c", np.arange(0.165, 0.18, 1e-4))
@@ -74,14 +57,12 @@ def claims(smooth, ds) -> Claims:
     free, last_first = "kappa from which on no drive unmeshes it, no friction", f"{last:.3g}, {first:.3g}"
     bare, body = "alpha at which a wheel without inertia unmeshes, no drop", f"{alpha:.5g}, by one body"
     near, recoil = last < 1.1 * alpha < first, "  their recoil at alpha = 1e5 [pitches]"
-    yield compared(free, "3 - 2 sqrt 2 = 0.17157", kappa, BORDER, 1e-3, 5)
+    yield compared(free, "3 - 2 sqrt 2 = 0.17157", kappa, BORDER, 1e-3)
     yield said("  with viscous friction, between", below < BORDER < above, f"{below:.3f}, {above:.3f}", "the same")
     yield most(recoil, "(1 - kappa)^2/(8 kappa)", off, 0.1, f"{heavy.sizes['I_c']} wheels")
-    yield compared(bare, body, leaves_at, alpha, 1e-3, 5)
+    yield compared(bare, body, leaves_at, alpha, 1e-3)
     yield said("  kappa = .001, with the drop, between", near, last_first, "the same and 10 %")
-    yield said(
-        "largest recoil of a clock that runs [pitches]", 0.45 < farthest <= 0.5, f"{farthest:.3f}", "1/2 at most"
-    )
+    yield held("largest recoil of a clock that runs [pitches]", farthest, "0.45 to 1/2", "{:.3f}")
 
     yield "Exponents"
     off = []
@@ -91,9 +72,9 @@ def claims(smooth, ds) -> Claims:
         foliot = {"a": line.c_v / line.I_v / (1 + share), "phi0": line.phi0, "e": (1 - share) / (1 + share)}
         one = solved("foliot", mu=mu, **foliot, outputs=["sensitivity"])
         off.append(line.s.values[1:-1] - one.sensitivity.values[1:-1])
-    heavy, (_, s) = smooth.s.where(smooth.kappa > BORDER, drop=True).isel(tau=-2), one_body()
+    heavy = smooth.s.where(smooth.kappa > BORDER, drop=True).isel(tau=-2)
     body = "s, kappa < .7: one body keeping (1 - kappa)/(1 + kappa)"
-    yield differing("least s in mesh, kappa = .001", f"{s:.4f} or more", smooth.s.isel(I_c=0).min(), s, 0.01, 4)
+    yield differing("least s in mesh, kappa = .001", f"{least:.4f} or more", light.s.min(), least, 0.01)
     yield most(body, "foliot", xr.DataArray(off), 0.01, "largest difference")
     yield most("strongest drive, kappa > .17: s", "1/2", heavy - 0.5, 0.01, f"{heavy.min():.4f} to {heavy.max():.4f}")
 
@@ -103,7 +84,7 @@ def claims(smooth, ds) -> Claims:
     dry = ds.isel(R_v=1, e=0).s.sel(I_c=2.5e-5, method="nearest")
     near, friction = f"within {NEAR} of 1/2, kappa = .01", "kappa = .01, dry friction of I_v a^2 phi0: s in mesh"
     yield said(f"decades of torque with s {near}", 0.0 < light < 0.5, f"{light:.2g}", "< 1/2")
-    yield said("  kappa = 1", heavy > 3, f"{heavy:.2g}", "> 3")
+    yield held("  kappa = 1", heavy, "> 3", "{:.2g}")
     yield said(friction, dry.min() < 0.4, f"{dry.max():.3f} to {dry.min():.3f}", "below 1/2 at its end")
 
     yield "Restitution"
@@ -111,7 +92,7 @@ def claims(smooth, ds) -> Claims:
     short, longer = ((ds.period / plastic.period - 1).where(bounce < x) for x in (0.005, 0.1))
     light = (bounce < 0.25) & (ds.kappa < BORDER)
     other, leave = int(((ds.out != plastic.out) & light).sum()), int((ds.out & light).sum())
-    unknown = int((light & ~(np.isfinite(ds.period) | ds.out | (ds.status == Status.NEVER_STARTS))).sum())
+    unknown = light & ~(np.isfinite(ds.period) | ds.out | (ds.status == Status.NEVER_STARTS))
     irregular = ds.status == Status.NOT_CONVERGED
     none = f"{int(irregular.sum())} of {ds.status.size}"
     heavy = ds.s.where((ds.e > 0.0) & (ds.kappa > BORDER) & (ds.alpha > 1e4))
@@ -119,12 +100,14 @@ def claims(smooth, ds) -> Claims:
     yield most("e kappa/(1 - e) < .005: period against e = 0", "no difference", short, 1e-4, "largest")
     yield most("  < .1", "small", longer, 0.05, "largest")
     yield said(alike, other == 0 < leave, f"{other} of {leave}", "0")
-    yield said("  and that do not run, unmesh, or stick", unknown == 0, f"{unknown}", "0")
+    yield never("  and that do not run, unmesh, or stick", unknown)
     yield said("no cycle of one tooth from rest", bounce.where(irregular).min() > 0.4, none, "e kappa/(1 - e) > .4")
-    yield differing(f"e > 0, kappa > .17, alpha > 1e4: median s, {count(heavy)}", "1/2", heavy.median(), 0.5, 0.01, 4)
+    yield differing(f"e > 0, kappa > .17, alpha > 1e4: median s, {count(heavy)}", "1/2", heavy.median(), 0.5, 0.01)
 
 
-@panels(128.0, 2, height_ratios=(1.2, 1))
+@panel(ALPHA, KAPPA)
+@panel(ALPHA.to(0.1, 1e5), S.to(0.3, 1.0), "upper right", title=r"$\kappa$")
+@page(128.0, height_ratios=(1.2, 1))
 def figure(plane, lines, smooth, *_):
     """A map of the exponent with plastic impacts, and the exponent over the drive."""
     exponent_map(plane, smooth, smooth.out.values, "unmeshes")
@@ -133,13 +116,17 @@ def figure(plane, lines, smooth, *_):
     direct_label(plane, 2e3, 0.25, r"$3-2\sqrt{2}$", "C3")
     for i, kappa in enumerate((0.01, 0.1, 0.18, 1.0)):
         line, look = smooth.sel(I_c=kappa * 2.5e-3, method="nearest"), {"color": COLOURS[i]}
-        lines.semilogx(line.alpha, line.s, linestyle=DASHES[i], label=f"{line.kappa:.2g}", **look)
+        lines.plot(line.alpha, line.s, linestyle=DASHES[i], label=f"{line.kappa:.2g}", **look)
         if line.out.any():
             there = np.flatnonzero(np.isfinite(line.s.values))[-1]
             lines.plot(line.alpha[there], line.s[there], "x", markersize=5, **look)
     lines.axhline(0.5, color="0.7", linewidth=0.6)
-    lines.set(xlabel=r"drive, $\alpha$ [1]", ylabel="exponent, $s$ [1]", xlim=(0.1, 1e5), ylim=(0.3, 1.0))
-    lines.legend(title=r"$\kappa$", loc="upper right")
+
+
+def prepared(ds):
+    """Clocks without dry friction and restitution, and all of them."""
+    ds = scaled(ds)
+    return ds.isel(R_v=0, e=0), ds
 
 
 main = script(__name__, "verge_unmeshes.h5", claims, figure, prepared)

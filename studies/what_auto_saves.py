@@ -16,11 +16,12 @@ from pathlib import Path
 
 import numpy as np
 import xarray as xr
-from _common import Claims, Statement, said, script
-from _figures import method_look, panels
+from _common import Claims, Statement, held, said, script
+from _figures import Axis, Log, method_look, page, panel
+from work_precision import tables
 
 import sweep
-from sweep.explore.work_precision import TOLERANCES, precision_text, work_precision
+from sweep.explore.work_precision import TOLERANCES, work_precision
 
 PARTS = ("", "_viscous", "_drag", "_terms", "_balance", "_impact", "_polisher")
 """Ends of the names of the study files."""
@@ -28,6 +29,8 @@ AS_MANY = 1e-12
 """Shares of cells that differ by less are the same."""
 SHOWN = 1e-7
 """The tolerance at which times are drawn."""
+MARK = {"color": "0.3", "marker": "o", "linestyle": "", "markersize": 4}
+RING = {**MARK, "markerfacecolor": "none", "markersize": 10, "markeredgewidth": 0.7}
 
 
 def given(found: xr.Dataset):
@@ -42,57 +45,6 @@ def best_single(found: xr.Dataset, rtol: float) -> str:
     return str(row["method"].values[int(np.where(most, row.seconds, np.inf).argmin())])
 
 
-def statements(found: xr.Dataset) -> Claims:
-    """What is checked of one kernel; and for each rtol what auto saves over the best single method."""
-    auto, cells, saved, fewer = found.sel({"method": "auto"}), found.attrs["cells"], {}, []
-    for rtol in found.rtol.values:
-        name = best_single(found, rtol)
-        one, single = auto.sel({"rtol": rtol}), found.sel({"method": name, "rtol": rtol})
-        gives, there = 100 * float(given(single)), 100 * float(given(one))
-        text = f"{float(single.seconds / one.seconds):.2f} of {name}, which gives {gives:.4g} %"
-        saved[f"saved at {rtol:.0e}"] = f"{text}; auto by {one.methods_used.item()}"
-        fewer += [f"{there:.4g} % beside {gives:.4g} %"] if there < gives - 100 * AS_MANY else []
-    silent = float(auto.silent.max())
-    over = float((auto.error_worst / (auto.rtol + found.attrs["reference_error"])).max())
-    yield said("auto is silently wrong", silent == 0, f"{100 * silent:g} % of {cells} cells", "nowhere")
-    yield said("auto, worst error over rtol", over <= 1, f"{over:.2g}", "<= 1")
-    yield said("auto gives the cells that the best single method does", not fewer, ", ".join(fewer), "all, or more")
-    yield from (Statement(what, "", here) for what, here in saved.items())
-
-
-@panels(118.0, width=178.0)
-def figure(axes, parts):
-    """Time of every method over that of auto at one tolerance, a row for each study; the best single one is ringed."""
-    for k, found in enumerate(parts):
-        draw_row(axes, found, -k)
-    axes.axvline(1.0, color="black", linewidth=0.8)
-    axes.set(xscale="log", xlabel=f"time over that of auto, at rtol = $10^{{{np.log10(SHOWN):.0f}}}$ [1]")
-    axes.set_ylim(-len(parts) + 0.4, 0.6)
-    axes.set_yticks(range(0, -len(parts), -1), labels=[found.attrs["title"] for found in parts])
-    axes.set_yticks([], minor=True)
-    look = {"color": "0.3", "marker": "o", "linestyle": "", "markersize": 4}
-    axes.plot([], [], **look, label="gives every cell that auto gives")
-    axes.plot([], [], **look, markerfacecolor="white", label="gives fewer")
-    axes.plot([], [], **look | {"markersize": 9}, markerfacecolor="none", label="best single method")
-    keys = dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
-    axes.figure.legend(keys.values(), keys.keys(), loc="outside lower center", ncols=5, fontsize=7)
-
-
-def draw_row(axes, found: xr.Dataset, place: float) -> None:
-    """The methods of one study side by side at a height."""
-    row = found.sel({"rtol": SHOWN}, method="nearest")
-    auto, best = row.sel({"method": "auto"}), best_single(found, float(row.rtol))
-    axes.axhline(place, color="0.9", linewidth=0.6, zorder=0)
-    for name in [str(m) for m in found["method"].values if m != "auto"]:
-        one, look = row.sel({"method": name}), {**method_look(name), "linestyle": "", "markersize": 5}
-        ratio = float(one.seconds / auto.seconds)
-        axes.plot([], [], label=name, **look)
-        fill = {} if float(given(one)) >= float(given(auto)) - AS_MANY else {"markerfacecolor": "white"}
-        axes.plot(ratio, place, **look, **fill)
-        if name == best:
-            axes.plot(ratio, place, "o", color="0.3", markerfacecolor="none", markersize=10, markeredgewidth=0.7)
-
-
 def prepared(path, cells=1024, tolerances=TOLERANCES):
     """The charts of all studies."""
     files = [Path(path).with_name(f"{Path(path).stem}{part}.toml") for part in PARTS]
@@ -100,15 +52,50 @@ def prepared(path, cells=1024, tolerances=TOLERANCES):
 
 
 def claims(parts) -> Claims:
-    """What is checked of each study, and what auto saves."""
+    """What is checked of each study; and for each rtol what auto saves over the best single method."""
     for found in parts:
         yield found.attrs["title"]
-        yield from statements(found)
+        auto, cells, saved, fewer = found.sel({"method": "auto"}), found.attrs["cells"], {}, []
+        for rtol in found.rtol.values:
+            name = best_single(found, rtol)
+            one, single = auto.sel({"rtol": rtol}), found.sel({"method": name, "rtol": rtol})
+            gives, there = 100 * float(given(single)), 100 * float(given(one))
+            text = f"{float(single.seconds / one.seconds):.2f} of {name}, which gives {gives:.4g} %"
+            saved[f"saved at {rtol:.0e}"] = f"{text}; auto by {one.methods_used.item()}"
+            fewer += [f"{there:.4g} % beside {gives:.4g} %"] if there < gives - 100 * AS_MANY else []
+        silent, over = float(auto.silent.max()), auto.error_worst / (auto.rtol + found.attrs["reference_error"])
+        yield said("auto is silently wrong", silent == 0, f"{100 * silent:g} % of {cells} cells", "nowhere")
+        yield held("auto, worst error over rtol", over.max(), "<= 1", "{:.2g}")
+        yield said("auto gives the cells that the best single method does", not fewer, ", ".join(fewer), "all, or more")
+        yield from (Statement(what, "", here) for what, here in saved.items())
 
 
-def tables(parts):
-    """The charts as tables."""
-    return [f"{found.attrs['title']}\n{precision_text(found, complete=True)}\n" for found in parts]
+TIME = Log(f"time over that of auto, at rtol = $10^{{{np.log10(SHOWN):.0f}}}$ [1]")
+KEY = {
+    "gives every cell that auto gives": MARK,
+    "gives fewer": {**MARK, "markerfacecolor": "white"},
+    "best single method": RING,
+}
 
 
-main = script(__name__, "what_auto_saves.toml", claims, figure, prepared, tables)
+@panel(TIME, Axis("", (0.4 - len(PARTS), 0.75)), "outside lower center", KEY, ncols=3, fontsize=7)
+@page(150.0)
+def figure(axes, parts):
+    """Time of every method over that of auto at one tolerance, a row for each study; the best single one is ringed."""
+    for place, found in zip(range(0, -len(parts), -1), parts, strict=True):
+        row = found.sel({"rtol": SHOWN}, method="nearest")
+        auto, best = row.sel({"method": "auto"}), best_single(found, float(row.rtol))
+        axes.axhline(place, color="0.9", linewidth=0.6, zorder=0)
+        axes.text(0.02, place + 0.2, found.attrs["title"], fontsize=8, transform=axes.get_yaxis_transform())
+        for name in [str(m) for m in found["method"].values if m != "auto"]:
+            one, look = row.sel({"method": name}), {**method_look(name), "linestyle": "", "markersize": 5}
+            ratio, whole = float(one.seconds / auto.seconds), float(given(one)) >= float(given(auto)) - AS_MANY
+            axes.plot([], [], label=name, **look)
+            axes.plot(ratio, place, **look, **({} if whole else {"markerfacecolor": "white"}))
+            if name == best:
+                axes.plot(ratio, place, **RING)
+    axes.axvline(1.0, color="black", linewidth=0.8)
+    axes.set_yticks([])
+
+
+main = script(__name__, "what_auto_saves.toml", claims, figure, prepared, lambda parts: tables(*parts))

@@ -3,7 +3,7 @@
     python studies/which_average.py which_average.h5
 
 m = ln(mu/mu0) and x = ln(a/a0) change over the season or from swing to swing; P = F(alpha)/a, alpha = mu/(a^2 phi0),
-s = -dlnP/dlnmu, s' = ds/dln alpha. Derived here:
+s = -dlnP/dlnmu, s' = ds/dln alpha. By docs/theory/averages.md
 
 seasons: ln<P0/P> = s <m> + (1 - 2s) <x> + s' var(m - 2x)/2 + var(s m + (1 - 2s) x)/2 + ...,             (1)
     so of the friction the power mean of the exponent p = 1 - 2s + 4s'/(1 - 2s) counts, of the torque p = s + s'/s;  (2)
@@ -15,17 +15,16 @@ With lambda = a v/mu at the switch and h = lambda^2/(1 + lambda), all times 1/(2
     r = 2/alpha + lambda + (1/lambda - 1)(2/alpha + h),
     r_a = 2/alpha + 2 lambda - (4/alpha + lambda + (1/lambda - 1)(4/alpha + h)).                               (4)
 
-Deviations are relative; of exponents p they are the difference. Allowed are 0.01 of p, measured with a season of 2 %; 5
-% of (1) for seasons of 10 % and 5 %, the next order; and of (3) 5 %, three standard errors of 2000 seeds, which are the
-same in every line.
+(2) is measured with a season of 2 %; 5 % of (3) are three standard errors of 2000 seeds, which are the same in every
+line.
 """
 
 import math
 
 import numpy as np
 from _common import Claims, compared, differing, most, script, solved
-from _figures import COLOURS, MARKS, direct_label, panels
-from scipy.optimize import brentq
+from _figures import ALPHA, COLOURS, Axis, Log, direct_label, page, panel, points
+from _losses import quarter
 
 DAY, SIGMA, HALF = 86400.0, 1e-3, 1.46299058758010465706
 PHASE = np.linspace(0.0, 2.0 * np.pi, 64, endpoint=False)
@@ -35,7 +34,7 @@ NOISES = ((SIGMA, 0, 0), (0, SIGMA, 0), (SIGMA, SIGMA, -1), (SIGMA, SIGMA, 0), (
 
 def theory(alpha: float) -> tuple[float, float, float]:
     """s, s' and lambda, by q - tanh q = 1/alpha."""
-    q = brentq(lambda q: (q - math.tanh(q)) * alpha - 1, 1e-3, 1 / alpha + 1.1, xtol=1e-15)
+    q = quarter(alpha)
     t, d = math.tanh(q), 1 - math.tanh(q) ** 2
     slope = -2 * d / t**3 + 1 / (q * q * t) + d / (q * t * t)  # ds/dq
     return (1 - t / q) / t**2, -slope * (q - t) / t**2, t
@@ -80,18 +79,17 @@ def prepared(ds):
 
 
 def claims(spread) -> Claims:
-    """What theory says, and what comes out."""
     yield "Which mean counts over the year"
     x = 0.1 * np.cos(PHASE)
     for alpha in (1e-3, 0.1, 1.0, 30.0, 1e6):
         for name, p, found in zip(("friction", "torque"), exponents(alpha), measured(alpha), strict=True):
             what = f"alpha = {alpha:g}: p of the mean of the {name}"
-            yield differing(what, f"(2) {p:.4f}", found, p, 0.01, 4)
+            yield differing(what, f"(2) {p:.4f}", found, p, 0.01)
     for alpha, m, name in ((0.1, 0.5, "both"), (HALF, 0.5, "both"), (30.0, 0.5, "both"), (HALF, 0.0, "friction")):
         m, (s, slope, _) = m * 0.1 * np.cos(PHASE - 1), theory(alpha)
         year = 0.5 * DAY * (slope * np.var(m - 2 * x) + np.var(s * m + (1 - 2 * s) * x))
         what = f"alpha = {alpha:.3g}: mean rate with a season of {name} [s/day]"
-        yield compared(what, f"(1) {year:.2f}", DAY * mean_rate(alpha, m, x), year, 0.05, 4)
+        yield compared(what, f"(1) {year:.2f}", DAY * mean_rate(alpha, m, x), year, 0.05)
     kept = mean_rate(30.0, 2 * x, x) - math.log(np.mean(np.exp(x)))
     yield most("torque as the square of the friction: its arithmetic mean", "exact", kept, 1e-10)
 
@@ -104,29 +102,26 @@ def claims(spread) -> Claims:
     first, last = (spread[NOISES[0]].sel(mu=1000.0, half_swings=n) for n in (1, 100))
     short = scatter(1000, 1, *NOISES[0]) / scatter(1000, 100, *NOISES[0])
     what = "torque, alpha = 1000: of one half swing over that of 100"
-    yield compared(what, f"{short:.3f}", first / last, short, 0.05, 4)
+    yield compared(what, f"{short:.3f}", first / last, short, 0.05)
 
 
-@panels(132.0, 2)
+@panel(ALPHA, Axis("exponent of the mean, $p$ [1]", (-5, 5)), "lower left", title="mean of")
+@panel(Log("half swings, $n$ [1]"), Axis(r"scatter of the rate, $\sqrt{n}/\sigma$ [1]", (0, 1)), "lower left")
+@page(132.0)
 def figure(means, memory, spread):
     """Exponents of the means, and memory."""
     fine, marks = np.geomspace(1e-3, 1e5, 401), np.array([1e-3, 1e-2, 0.1, 0.5, 4, 30, 300, 1e4, 1e5])
-    lines, points = (np.array([f(a) for a in x]).T for f, x in ((exponents, fine), (measured, marks)))
+    lines, computed = (np.array([f(a) for a in x]).T for f, x in ((exponents, fine), (measured, marks)))
     lines[0][abs(np.log(fine / HALF)) < 0.03] = np.nan
     for k, name in enumerate(("friction", "torque")):
-        means.semilogx(fine, lines[k], color=COLOURS[k])
-        means.plot(marks, points[k], MARKS[k], color=COLOURS[k], markerfacecolor="white", label=name)
+        means.plot(fine, lines[k], color=COLOURS[k])
+        points(means, marks, computed[k], k, name, markersize=4)
     means.axvline(HALF, color="0.6", linewidth=0.7, linestyle=":")
     direct_label(means, 5.0, 4.2, "$s = 1/2$", "0.4", ha="left")
-    means.set(xlabel=r"drive, $\alpha$ [1]", ylabel="exponent of the mean, $p$ [1]", ylim=(-5, 5))
-    means.legend(loc="lower left", title="mean of")
     n, torque = np.unique(np.geomspace(1, 100, 40).astype(int)), spread[NOISES[0]]
     for k, alpha in enumerate(torque.mu.values):
-        look = {"color": COLOURS[k], "markerfacecolor": "white", "label": rf"$\alpha={alpha:g}$"}
-        memory.semilogx(n, [scatter(alpha, i, *NOISES[0]) for i in n], color=COLOURS[k])
-        memory.plot(torque.half_swings, torque.sel(mu=alpha), MARKS[k], **look)
-    memory.set(xlabel="half swings, $n$ [1]", ylabel=r"scatter of the rate, $\sqrt{n}/\sigma$ [1]", ylim=(0, 1))
-    memory.legend(loc="lower left")
+        memory.plot(n, [scatter(alpha, i, *NOISES[0]) for i in n], color=COLOURS[k])
+        points(memory, torque.half_swings, torque.sel(mu=alpha), k, rf"$\alpha={alpha:g}$", markersize=4)
 
 
 main = script(__name__, "which_average.h5", claims, figure, prepared)

@@ -17,16 +17,16 @@ import sys
 import time
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cache, partial
+from functools import cache
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Claims, Statement, cheapest, measured, said, script
-from _figures import direct_label, draw_precision, method_look, panels
-from _peers import FOLLOWERS, swings
+from _common import Claims, Statement, cheapest, held, measured, said, script
+from _figures import Log, direct_label, draw_precision, method_look, page, panel
+from _peers import CLOCKS, swings
 
 import sweep
 from sweep.cells.grid import Grid
@@ -87,28 +87,26 @@ def peers(study: sweep.study.read.Study, true, cells: int, tolerances: Sequence[
     given, found = precision_cells(study, cells), {}
     left = solved(replace(sampled(study, cells), outputs=("multiplier",), method="auto", rtol=1e-6))[0]["multiplier"]
     rows = np.transpose([given["a"], given["R"], left, *true.values()])
-    for name, follower in FOLLOWERS.items():
-        off = partial(errors_of, cache(follower), rows[:: PEER_CELLS[name]])  # made once a tolerance, and not timed
+    for name, follower in CLOCKS.items():
+        (a, R, left, *truth), made = rows[:: PEER_CELLS[name]].T, cache(follower)  # once a tolerance, and not timed
+
+        def off(rtol: float, a=a, R=R, left=left, truth=truth, made=made):
+            followed = made(rtol)(a, R, truth[2], [swings(rtol, x) for x in left])
+            return abs(followed / np.transpose(truth) - 1).max(axis=1)
+
         found[name] = measured(off, tolerances)
     return found
-
-
-def errors_of(made, rows, rtol: float):
-    """The largest relative error of each clock by a follower."""
-    a, R, left, *true = rows.T
-    found = made(rtol).settle(a, R, true[2], [swings(rtol, x) for x in left])
-    return abs(found / np.transpose(true) - 1).max(axis=1)
 
 
 def honesty(title: str, found: xr.Dataset) -> Claims:
     """What is checked of a chart: no method is silently wrong, and `auto` is right wherever it says so."""
     auto = found.sel({"method": "auto"})
     over = float((auto.error_worst / (auto.rtol + found.attrs["reference_error"])).max())
-    silent, unsolved = float(found.silent.max()), float(auto.unsolved.max())
+    silent = float(found.silent.max())
     cells = f"{found.attrs['cells']} cells, {len(found.rtol)} tolerances"
     yield said(f"{title}: silently wrong", silent == 0, f"{100 * silent:g} % of {cells}", "none")
-    yield said(f"{title}: auto, worst error over rtol", over <= 1, f"{over:.2g}", "<= 1")
-    yield said(f"{title}: auto leaves unsolved", unsolved == 0, f"{100 * unsolved:g} %", "none")
+    yield held(f"{title}: auto, worst error over rtol", over, "<= 1", "{:.2g}")
+    yield held(f"{title}: auto leaves unsolved", auto.unsolved.max(), "<= 0 %", "{:.2%}")
 
 
 def whole(found: xr.Dataset) -> dict[str, xr.Dataset]:
@@ -127,13 +125,12 @@ def prepared(path, cells=400, tolerances=TOLERANCES):
     return coulomb, others, dragged
 
 
-def tables(coulomb, _, dragged):
+def tables(*charts):
     """The charts as tables."""
-    return [f"{one.attrs['title']}\n{precision_text(one, complete=True)}\n" for one in (coulomb, dragged)]
+    return [f"{one.attrs['title']}\n{precision_text(one, complete=True)}\n" for one in charts]
 
 
 def claims(coulomb, others, dragged) -> Claims:
-    """What theory says, and what comes out."""
     yield "Honesty"
     yield from honesty("viscous and Coulomb", coulomb)
     yield from honesty("drag", dragged)
@@ -146,7 +143,11 @@ def claims(coulomb, others, dragged) -> Claims:
     yield from cheapest(whole(dragged))
 
 
-@panels(100.0, width=150.0)
+COST, ERROR = Log("CPU time per cell [s]", (3e-7, 0.5)), Log("largest relative error of a cell [1]", (3e-17, 3))
+
+
+@panel(COST, ERROR)
+@page(100.0, 150.0)
 def figure(axes, found, others, _):
     """The largest error over the time of a cell: a line for each method and library, through its tolerances."""
     rows = {str(name): found.sel({"method": name}) for name in found["method"].values}
@@ -164,8 +165,6 @@ def figure(axes, found, others, _):
         direct_label(axes, x, y, name, line.get_color())
     text = "each mark a tolerance,\nfrom $10^{-3}$ (top) to $10^{-13}$"
     axes.text(0.02, 0.97, text, va="top", fontsize=7, color="0.35", transform=axes.transAxes)
-    axes.set(xlabel="CPU time per cell [s]", ylabel="largest relative error of a cell [1]", ylim=(3e-17, 3))
-    axes.set_xlim(3e-7, 0.5)
 
 
-main = script(__name__, "work_precision.toml", claims, figure, prepared, tables)
+main = script(__name__, "work_precision.toml", claims, figure, prepared, lambda *made: tables(made[0], made[2]))

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 import xarray as xr
-from _common import Statement, summary, what_came_out
+from _common import Statement, grouped, held, never, summary, what_came_out
 
 import sweep
 from kernels.lanes.jit import COMPILED
@@ -330,6 +330,25 @@ def test_a_script_counts_what_holds_and_tells_in_full_what_does_not():
     assert "period" not in words
 
 
+@pytest.mark.parametrize(
+    ("bound", "inside", "outside"),
+    [
+        ("< 1 %", 0.0099, 0.01),
+        ("<= 1e-9", 1e-9, 1.1e-9),
+        ("> 1/2", 0.51, 0.5),
+        (">= .38", 0.38, 0.379),
+        ("1/3 to 1/2", 0.5, 0.51),
+        ("3 to 5 %", 0.04, 0.06),
+    ],
+)
+def test_a_number_is_held_to_what_its_line_says(bound, inside, outside):
+    assert not held("share", inside, bound).failed
+    assert held("share", outside, bound).failed
+    assert held("share", np.nan, bound).failed
+    assert not never("cells", np.zeros(3, bool)).failed
+    assert never("cells", np.array([False, True])).failed
+
+
 SCRIPTS = sorted(p.stem for p in STUDIES.glob("[!_]*.py") if "main = script(" in p.read_text(encoding="utf-8"))
 
 
@@ -397,7 +416,7 @@ def test_the_masses_that_a_model_needs_and_false_counts_and_errors_are_noticed(t
     assert (tmp_path / "points.csv").read_text() == (STUDIES / "fewest_masses.csv").read_text()
     ds = study.needed(study.drivetrains(6))
     for lie in ({"kept": ds.kept + 1}, {"kept": ds.kept - 1}, {"kept": -ds.kept}, {"error": 5 * ds.error}):
-        assert any(s.failed for lines in study.statements(ds.assign(lie)).values() for s in lines)
+        assert any(s.failed for lines in grouped(study.claims(ds.assign(lie))).values() for s in lines)
 
 
 def test_a_method_that_is_silently_wrong_or_gives_fewer_cells_is_noticed():
