@@ -118,7 +118,12 @@ def fit_two_laws(
 
 def _each(t: Array, z: Array, sigma: Array | None, bound: None, **keys: Any) -> list[dict[str, Any]]:
     tried = fitted((ONE, *BENDS, *OTHER_FUNCTIONS, THREE), t, z, sigma, TWO)
-    return [_one(t, row, laws, **keys) for row, laws in zip(z, tried, strict=True)]
+    every = [_one(t, row, laws, **keys) for row, laws in zip(z, tried, strict=True)]
+    if one := [k for k, found in enumerate(every) if found["verdict"] == "one law"]:
+        straight = fit_line(t, z[one], None if sigma is None else sigma[one], np.zeros((len(one), t.size)))["fits"]
+        for k in np.array(one)[straight == 0]:
+            every[k] |= {"verdict": "undecided", "regimes": 0}
+    return every
 
 
 def _one(t: Array, z: Array, tried: dict[str, Found], confidence: float, noise: bool | str | None) -> dict[str, Any]:
@@ -127,28 +132,29 @@ def _one(t: Array, z: Array, tried: dict[str, Found], confidence: float, noise: 
     size = math.sqrt(float(two.off @ two.off) / (t.size - 5))
     noisy = two.sigma is not None or (_is_noise(t, z, two.off, size) if noise is None else bool(noise))
     word = noise if isinstance(noise, str) else "noise" if noisy else "even"
-    others = [tried[law.name] for law in BENDS[1:] if law.name in tried]
+    verdict, evidence = _verdict(t, tried)
+    found = {"verdict": verdict, "regimes": VERDICTS.get(verdict, 0), "evidence": evidence}
+    found |= {"residual": two.residual, "noisy": noisy}
     # both exponents, and where the laws meet
     which, units, zero = [-2, -1, 0], np.array([1 / span, 1 / span, span]), np.array([0.0, 0.0, t[0]])
     best = two.numbers[which] * units + zero
-    own, (low, high) = union(t, two, others, which, word, confidence, OTHER_SHAPES) * units + zero
-    further = BEYOND_SHAPES * np.nan_to_num(max(own[0, 2] - low[2], high[2] - own[1, 2]))
-    low[2], high[2] = low[2] - further, high[2] + further
-    if not noisy:
-        low, high = _widened(t, z, best, low, high)
-    verdict, evidence = _verdict(t, z, tried)
     width, level = math.exp(two.numbers[1]) * span / math.log(10), np.exp(two.numbers[2])
-    if evidence <= 0 and not noisy:  # straight to rounding: nothing meets anywhere
-        best[2], low[2], high[2], width, level = math.nan, -np.inf, np.inf, math.nan, math.nan
+    if verdict in ("three laws", "no power law"):
+        best, low, high, width, level = *np.full((3, 3), math.nan), math.nan, math.nan
+    else:
+        others = [tried[law.name] for law in BENDS[1:] if law.name in tried]
+        own, (low, high) = union(t, two, others, which, word, confidence, OTHER_SHAPES) * units + zero
+        further = BEYOND_SHAPES * np.nan_to_num(max(own[0, 2] - low[2], high[2] - own[1, 2]))
+        low[2], high[2] = low[2] - further, high[2] + further
+        if not noisy:
+            low, high = _widened(t, z, best, low, high)
+        if evidence <= 0 and not noisy:  # straight to rounding: nothing meets anywhere
+            best[2], low[2], high[2], width, level = math.nan, -np.inf, np.inf, math.nan, math.nan
     if verdict == "no meeting in the window":
         best[2] = math.nan
-    found = {"width": width, "level": level}
     for name, of in (("", best), ("_low", low), ("_high", high)):
         found |= {f"exponent{name}": of[:2], f"crossover{name}": np.exp(of[2])}
-    if verdict in ("three laws", "no power law"):
-        found = {name: math.nan * value for name, value in found.items()}
-    found |= {"verdict": verdict, "regimes": VERDICTS.get(verdict, 0), "evidence": evidence}
-    return found | {"residual": two.residual, "noisy": noisy}
+    return found | {"width": width, "level": level}
 
 
 def _is_noise(t: Array, z: Array, off: Array, size: float) -> bool:
@@ -182,8 +188,8 @@ def _widened(t: Array, z: Array, best: Array, low: Array, high: Array) -> tuple[
     return np.minimum(low, reach[0]), np.maximum(high, reach[1])
 
 
-def _verdict(t: Array, z: Array, tried: dict[str, Found]) -> tuple[str, float]:
-    """One of VERDICTS, and by how much two laws are better than a line and than other functions.
+def _verdict(t: Array, tried: dict[str, Found]) -> tuple[str, float]:
+    """One of VERDICTS, if no straight line denies one law, and by how much two are better than one and than functions.
 
     By AICc, and BIC for many points. The noise of the line may be of any kind, that of all others is even.
     """
@@ -203,10 +209,8 @@ def _verdict(t: Array, z: Array, tried: dict[str, Found]) -> tuple[str, float]:
         return "two laws" if 0 <= two.numbers[0] <= 1 else "no meeting in the window", evidence
     if any(gain(line, one) > BEYOND_DOUBT and min(gain(law, one) for law in bends) > -BEYOND_DOUBT for one in others):
         return "no power law", evidence
-    known = None if line.sigma is None else line.sigma[None]
-    straight = fit_line(t, z[None], known, np.zeros((1, t.size)))["fits"][0]
     bends_more = max(gain(line, one) for one in (*bends, *others)) > BEYOND_DOUBT
-    return "one law" if straight and not bends_more else "undecided", evidence
+    return "undecided" if bends_more else "one law", evidence
 
 
 def crossover(low_fit: xr.Dataset, high_fit: xr.Dataset) -> xr.Dataset:
