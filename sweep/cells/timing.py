@@ -33,9 +33,7 @@ SHARE = 0.005
 PROBE_SECONDS = 5e-4
 """A probe as long as this sees past the cost of a call, and 64 of them take a few hundredths of a second."""
 DEAR = 2e-3
-"""Seconds of a probe that counts among those of the sample, wherever it was made."""
-FAILED_PROBE = max(BUDGET) / 16
-"""Seconds that a probe counts for which fails."""
+"""Seconds of a probe that counts among those of the sample, wherever it was made; one that fails counts as many."""
 BLOCK_SECONDS = (0.05, 1.0)
 CALLS = 400
 """Times that a block's cells cost what a call does beside them, by probes of few cells; of many, which cost less each
@@ -127,7 +125,7 @@ def take_sample(solver: SolveCells, columns: Sequence[Column], size: int, clock:
         if probes and spent > max(BUDGET[0], min(BUDGET[1], run / 100), SHARE * run):
             break
         seconds = probe(start, cells)
-        spent += FAILED_PROBE if seconds == math.inf else seconds
+        spent += DEAR if seconds == math.inf else seconds
         probes |= {start: seconds} if seconds < math.inf else {}
     probes = probes or {0: alone * cells}
     costs = np.array([probes[start] / cells for start in sorted(probes)])

@@ -26,9 +26,8 @@ from typing import Any
 
 import distributed
 
-from sweep.cells.block import Bench, Blocks, Done, Found, faults_reported, warm
+from sweep.cells.block import Bench, Blocks, Done, Found, faults_reported
 from sweep.cells.fingerprint import difference, fingerprint
-from sweep.cells.solve import Solver
 from sweep.errors import Incomplete, SweepError
 from sweep.file import disk
 from sweep.file.reading import StoredFile
@@ -172,7 +171,7 @@ class Remote:
         return self._bench.block(job, wanted)
 
     def _begun(self, where: str) -> Bench:
-        """Loads and compiles the kernel. Raises SweepError where what computes here is not what was asked for."""
+        """Loads the kernel. Raises SweepError where what computes here is not what was asked for."""
         text, mark, partition, shared, isolated, paths = self._words
         if ":" in mark["kernel"]:
             sys.path.extend(path for path in paths if path not in sys.path and Path(path).is_dir())
@@ -186,11 +185,8 @@ class Remote:
                 f"{where}: its kernel or its libraries are not those here; install the same versions on every "
                 "machine" + "".join(f"\n  {line}" for line in changed)
             )
-        processes = None
-        if isolated is None:
-            warm(Solver(study), study)
-        else:
-            processes = Processes(study, *isolated)
+        processes = None if isolated is None else Processes(study, *isolated)
+        if processes is not None:
             weakref.finalize(self, processes.end)
         if shared is not None:
             path, key = shared
