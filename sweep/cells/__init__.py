@@ -3,7 +3,7 @@
 Others may use
     `grid`         Grid: the cells of a study
     `partition`    blocks of cells, and row blocks, which a summary reduces to one row
-    `timing`       a timed sample of the grid, and blocks of a size that follows from it; tells what is compiled
+    `timing`       a timed sample of the grid, and blocks of a size that follows from it; what compiling takes
     `sample`       some cells of a study as a study of their own
     `schema`       what a result of cells holds, as CF names it
     `solve`        Solver: one cell, by the method asked for or by the cheapest; which methods may solve a study
