@@ -57,5 +57,7 @@ KERNEL = scene_kernel(
     rates=rates,
     surface=surface,
     start=start,
-    example=dict(tau=1e-3, I_l=5e-5, I_r=5e-5, phi0=0.35, c_l=5e-5, c_r=5e-5, stiffness=1.0, damper=1e-3),  # noqa: C408
-)
+    example={
+        "tau": 1e-3, "I_l": 5e-5, "I_r": 5e-5, "phi0": 0.35, "c_l": 5e-5, "c_r": 5e-5, "stiffness": 1.0, "damper": 1e-3,
+    },
+)  # fmt: skip

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 from _common import Claims, Statement, held, said, script
-from _figures import Axis, Log, method_look, page, panel
+from _figures import Axis, Log, direct_label, method_look, page, panel
 from work_precision import tables
 
 import sweep
@@ -78,15 +78,16 @@ KEY = {
 }
 
 
-@panel(TIME, Axis("", (0.4 - len(PARTS), 0.75)), "outside lower center", KEY, ncols=3, fontsize=7)
-@page(150.0)
+@panel(TIME, Axis("", (0.45 - len(PARTS), 0.7)), "outside lower center", KEY, ncols=3, fontsize=7)
+@page(132.0)
 def figure(axes, parts):
     """Time of every method over that of auto at one tolerance, a row for each study; the best single one is ringed."""
     for place, found in zip(range(0, -len(parts), -1), parts, strict=True):
         row = found.sel({"rtol": SHOWN}, method="nearest")
         auto, best = row.sel({"method": "auto"}), best_single(found, float(row.rtol))
         axes.axhline(place, color="0.9", linewidth=0.6, zorder=0)
-        axes.text(0.02, place + 0.2, found.attrs["title"], fontsize=8, transform=axes.get_yaxis_transform())
+        title = {"ha": "left", "transform": axes.get_yaxis_transform()}
+        direct_label(axes, 0.02, place + 0.32, found.attrs["title"], **title)
         for name in [str(m) for m in found["method"].values if m != "auto"]:
             one, look = row.sel({"method": name}), {**method_look(name), "linestyle": "", "markersize": 5}
             ratio, whole = float(one.seconds / auto.seconds), float(given(one)) >= float(given(auto)) - AS_MANY
