@@ -25,13 +25,10 @@ import sweep
 WEAK: tuple[float | None, float | None] = (None, 1e-5)
 STRONG: tuple[float | None, float | None] = (1e5, None)
 """Windows of alpha for the straight lines."""
-
 SHOWN = np.array([0.1, 1.463, 100.0])
 """alpha of the motions whose shape is told."""
-
 HALF = (1.46299058758010465706, 6.42446119521106945636, 1.39341841440363426389)
 """alpha, a P and A of the exponent -1/2, once in 50 digits."""
-
 STRONG_P, STRONG_A = 4 * 3 ** (1 / 3), 3 ** (2 / 3) / 2
 """At strong drive a P = STRONG_P alpha^(-1/3) and A = STRONG_A alpha^(1/3)."""
 QUARTER = 15 / (24 * 60)

@@ -21,13 +21,11 @@ from _figures import KAPPA, Axis, colour_map, direct_label, hatch, kinds_map, pa
 from kernels.interface import Status
 
 EXISTS = (Status.OK, Status.UNSTABLE, Status.GRAZING)
-
 KINDS = {
     "one impact": "#0072B2", "several impacts": "#56B4E9", "bounces end in contact": "#009E73",
     "off centre": "#E69F00", "period 2": "#CC79A7", "never settles": "#D55E00", "open": "0.85",
 }  # fmt: skip
 """Motions of the clock, and their colours."""
-
 LEVER_E = 0.6
 
 

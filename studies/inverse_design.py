@@ -20,7 +20,6 @@ MOTOR = 0.620
 AMPLITUDE = math.radians(15.0)
 CRANKS = np.linspace(1e-3, 0.3, 300)
 """e [m], among which the right one is looked for."""
-
 machine = sweep.solver(
     {
         "kernel": "polisher",

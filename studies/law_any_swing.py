@@ -30,7 +30,6 @@ KERNEL = {"linestyle": "", "markersize": 2.5, "markerfacecolor": "white"}
 SAMPLE = 32
 STEP = 1e-3
 """Of ln c_n, in the differences of (2); their error is the square of it."""
-
 LOSSES: dict[str, tuple[dict[str, float], float]] = {
     "dry": ({"R": 1.0}, 1e-8), "viscous": ({"a": 1.0}, 0.05), "degree 3": ({"c": 1.0, "n": 3.0}, 0.05),
     "degree 2": ({"c": 1e-2, "n": 2.0}, 1e-8), "impacts": ({"e": 0.7}, 1e-8),

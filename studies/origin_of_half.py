@@ -34,8 +34,6 @@ FIXED = 0.5
 """R [rad/s^2] of Coulomb friction of fixed strength."""
 TORQUES = (1e-4, 1.0, 1e4)
 """Torques [rad/s^2] at which mixtures are followed in SI units."""
-
-
 LOSSES = {"impact": {"e": E}, "v^2": {"c": 1.0}, "viscous": {"a": 1.0}, "Coulomb ~ drive": {}, "Coulomb": {}}
 """Parameters of the kernels; Coulomb friction is in proportion to the drive or fixed."""
 MIXTURES = {

@@ -28,11 +28,8 @@ STEPS = 64
 """Of the oscillator, after which it is seen whether it has grown."""
 WRONG = 0.1
 """Relative error of a period from which on it is no measurement any more: a switch missed, or found too soon."""
-
-
 GRIDS = {"mu": "Drive", "R": "Near sticking", "k": "Spring"}
 """What the studies of a foliot are over."""
-
 RUNGE_KUTTA = {
     "euler": (np.zeros((1, 1)), np.ones(1)),
     "rk4": (np.diag([0.5, 0.5, 1.0], -1), np.array([1, 2, 2, 1]) / 6),

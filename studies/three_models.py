@@ -23,8 +23,6 @@ from _figures import COLOURS, DASHES, Axis, Log, direct_label, page, panel
 import sweep
 
 MODELS = ("two bodies", "kept share", "viscous")
-
-
 IN_SI = (1e-5, 1e-3, 0.1, 10.0)
 """Torques [N m] at which the models with impacts are followed in SI units."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from itertools import chain, cycle
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
@@ -30,9 +30,6 @@ from sweep.show.charts import (
 )
 from sweep.show.view import View, edges, label, setting, view
 from sweep.words import require_dataset
-
-FLAGGED = ("#D55E00", "#000000", "#CC79A7", "#666666")
-"""Colours of cells that are not OK."""
 
 HATCHES = ("////", "\\\\\\\\", "....", "xxxx", "----")
 """Patterns of cells without a value, told apart without colour."""
@@ -128,7 +125,8 @@ def _draw_lines(axes: Any, shown: View) -> None:
         if not shown.joined:
             look |= {"linestyle": "", "marker": MARKS[i % len(MARKS)], "markersize": 2.5}
         axes.plot(x, y, label=setting(shown.axis(shown.across)[i]) if shown.across else None, **look)
-    for code, mark, colour in zip(shown.codes(), cycle(MARKS), cycle(FLAGGED), strict=False):
+    for code, mark in zip(shown.codes(), cycle(MARKS), strict=False):
+        colour = shown.colour(code)
         look = {"linestyle": "", "marker": mark, "color": colour, "markerfacecolor": "none", "clip_on": False}
         for y, here in zip(lines, status == code, strict=True):
             valued, empty = here & np.isfinite(y), here & ~np.isfinite(y)
@@ -140,8 +138,8 @@ def _draw_lines(axes: Any, shown: View) -> None:
 def _draw_passages(axes: Any, shown: View) -> None:
     """A point for each passage at each value of a parameter: a diagram of bifurcations."""
     x, y = np.broadcast_to(shown.values(shown.x), shown.y.shape), shown.y.values
-    for code, colour in zip([0, *shown.codes()], chain(["black"], cycle(FLAGGED)), strict=False):
-        here = (shown.status == code) & np.isfinite(y)
+    for code in (0, *shown.codes()):
+        here, colour = (shown.status == code) & np.isfinite(y), shown.colour(code) if code else "black"
         axes.plot(x[here], y[here], ".", markersize=1.5, markeredgewidth=0.0, color=colour)
         if here.any() and shown.codes():
             axes.plot([], [], ".", color=colour, label=shown.name(code))
@@ -157,8 +155,8 @@ def _draw_map(axes: Any, shown: View) -> None:
     norm = LogNorm() if spans_decades(shown.y) else Normalize()
     mesh = axes.pcolormesh(x, y, np.ma.masked_invalid(shown.y.values), norm=norm, cmap="viridis", rasterized=True)
     axes.figure.colorbar(mesh, ax=axes, label=label(shown.y))
-    for code, hatch, colour in zip(shown.codes(), cycle(HATCHES), cycle(FLAGGED), strict=False):
-        here, name = shown.status == code, shown.name(code)
+    for code, hatch in zip(shown.codes(), cycle(HATCHES), strict=False):
+        here, name, colour = shown.status == code, shown.name(code), shown.colour(code)
         empty = here & ~np.isfinite(shown.y.values)
         if (here & ~empty).any():
             around = (np.concatenate([ends[:1], grid, ends[-1:]]) for grid, ends in zip(grids, (x, y), strict=True))

@@ -6,6 +6,7 @@ import re
 import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import cycle
 from typing import Any
 
 import numpy as np
@@ -37,6 +38,10 @@ SIDE = 201
 """Cells along the sides of a map of cells that lie anywhere; of more axes as many cells altogether."""
 LONGEST = 50
 """Letters of a meaning on an axis; of a longer one the name stands there."""
+OWN = {"INACCURATE": "#D55E00", "NOT_CONVERGED": "#B2182B", "FAILED": "#000000", "PENDING": "#999999"}
+"""Colours of statuses that any kernel may give, none of them a map's own."""
+OTHERS = ("#CC79A7", "#E69F00", "#8C510A", "#FF9DA7", "#444444", "#FF7F50")
+"""Colours of the other statuses; one keeps its colour in all pictures of a result."""
 
 
 @dataclass(frozen=True)
@@ -81,6 +86,11 @@ class View:
     def name(self, code: int) -> str:
         """What a status is called."""
         return self.meanings.get(code, str(code))
+
+    def colour(self, code: int) -> str:
+        """The colour of a status, the same in a picture and in the viewer."""
+        rest = sorted(number for number, name in self.meanings.items() if name not in OWN)
+        return OWN.get(self.name(code)) or dict(zip(rest, cycle(OTHERS), strict=False)).get(code, OTHERS[0])
 
     def codes(self) -> list[int]:
         """Statuses other than OK that occur."""

@@ -26,7 +26,7 @@ try:
     from bokeh.events import RangesUpdate, Tap
     from tornado.web import ErrorHandler
 
-    from sweep.view.picture import Picture, status_colour
+    from sweep.view.picture import Picture
 except ImportError:
     raise missing("the viewer needs panel", "view") from None
 
@@ -238,6 +238,6 @@ def _legend(found: View) -> str:
     for code in found.codes():
         name, count = found.name(code), int((found.status == code).sum())
         doc = Status[name].doc if name in Status.__members__ else ""
-        chip = f'<span class="chip" style="background:{status_colour(found, code)}"></span>'
+        chip = f'<span class="chip" style="background:{found.colour(code)}"></span>'
         lines.append(f"<div>{chip}{html.escape(name)}, {count:,} shown: {html.escape(doc)}</div>")
     return "".join(lines)

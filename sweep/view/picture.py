@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import cycle
 from typing import Any
 
 import numpy as np
@@ -18,18 +17,8 @@ from sweep.view.region import Range
 
 WIDTH, HEIGHT = 900, 560
 """Pixels of the raster of a map."""
-OWN = {"INACCURATE": "#D55E00", "NOT_CONVERGED": "#B2182B", "FAILED": "#000000", "PENDING": "#999999"}
-"""Colours of statuses that any kernel may give, none of them a map's own."""
-OTHERS = ("#CC79A7", "#E69F00", "#8C510A", "#FF9DA7", "#444444", "#FF7F50")
-"""Colours of the other statuses; one keeps its colour in all slices of a result."""
 CLEAR = "#00000000"
 TOOLS = "pan,box_zoom,wheel_zoom,reset,tap"
-
-
-def status_colour(found: View, code: int) -> str:
-    """The colour of a status."""
-    rest = sorted(number for number, name in found.meanings.items() if name not in OWN)
-    return OWN.get(found.meanings.get(code, "")) or dict(zip(rest, cycle(OTHERS), strict=False)).get(code, OTHERS[0])
 
 
 def plain_label(found: View, name: str) -> str:
@@ -76,7 +65,7 @@ class Picture:
     def _prepare_map(self, found: View) -> None:
         self.cells, self.flags = (_source("image", "x", "y", "dw", "dh") for _ in range(2))
         self.mapper = (LogColorMapper if self.log_values else LinearColorMapper)(palette=Viridis256, nan_color=CLEAR)
-        palette = [CLEAR if code <= 0 else status_colour(found, code) for code in sorted(found.meanings)] or [CLEAR]
+        palette = [CLEAR if code <= 0 else found.colour(code) for code in sorted(found.meanings)] or [CLEAR]
         flags = LinearColorMapper(palette=palette, low=-0.5, high=len(palette) - 0.5, nan_color=CLEAR)
         place = {name: name for name in ("x", "y", "dw", "dh")}
         self.figure.image("image", source=self.cells, color_mapper=self.mapper, **place)
@@ -133,7 +122,7 @@ class Picture:
         self.points.data = {"x": np.tile(x, len(ys)), "y": ys.ravel(), "colour": np.repeat(colours, x.size)}
         status = np.atleast_2d(found.status) * statuses
         rows, columns = np.nonzero(status)
-        colour = [status_colour(found, int(code)) for code in status[rows, columns]]
+        colour = [found.colour(int(code)) for code in status[rows, columns]]
         self.marks.data = {"x": x[columns], "y": self.heights[rows, columns], "colour": colour}
 
     @property

@@ -96,6 +96,9 @@ def test_cells_that_are_not_ok_are_marked_on_the_line_or_at_its_foot():
     assert foot.get_ydata().tolist() == [0]
     assert foot.get_transform() == figure.axes[0].get_xaxis_transform()
     assert words(figure) == ["INACCURATE", "BAD_INPUT"]
+    colours = {text: mark.get_color() for text, mark in zip(words(figure), (remark, foot), strict=True)}
+    only = plot(ds.assign(status=ds.status.where(ds.status != 1, 0).assign_attrs(FLAGS)))
+    assert drawn(only.axes[0])[1].get_color() == colours["BAD_INPUT"] != colours["INACCURATE"]
 
 
 @pytest.mark.parametrize(

@@ -78,7 +78,7 @@ FLAGS = {"flag_values": np.array([0, 1, 64], np.int8), "flag_meanings": "OK INAC
 def test_lines_are_drawn_with_their_statuses_at_the_foot_where_they_have_no_value():
     values, status = [[1.0, 2.0, np.nan], [4.0, -5.0, 6.0]], np.array([[0, 1, 64], [0, 0, 0]], np.int8)
     columns = {"y": (("a", "x"), values, {"units": "s"}), "status": (("a", "x"), status, FLAGS)}
-    from sweep.view.picture import Picture, status_colour  # every worker reads this file, and one of them needs bokeh
+    from sweep.view.picture import Picture  # every worker reads this file, and one of them needs bokeh
 
     found = view(xr.Dataset(columns, {"x": [1.0, 2.0, 3.0], "a": [0.5, 0.7]}), x="x")
     linear = dict.fromkeys(("x", "y", "values"), "linear")
@@ -90,7 +90,7 @@ def test_lines_are_drawn_with_their_statuses_at_the_foot_where_they_have_no_valu
     assert (lines["colour"], lines["name"]) == (list(COLOURS[:2]), ["a = 0.5", "a = 0.7"])
     assert drawn.marks.data["x"].tolist() == [2.0, 3.0]
     assert drawn.marks.data["y"].tolist() == [2.0, -5.0]
-    assert drawn.marks.data["colour"] == [status_colour(found, code) for code in (1, 64)]
+    assert drawn.marks.data["colour"] == [found.colour(code) for code in (1, 64)]
     drawn.show(found, False)
     assert len(drawn.marks.data["x"]) == 0
     logarithmic = Picture(found, linear | {"values": "log"})
