@@ -17,9 +17,6 @@ from sweep.command.reading import DIFFERENT, Outcome, explained, opened, say, so
 from sweep.errors import CELLS_FAILED, COMPLETE, EXIT_CODES, INCOMPLETE, SweepError
 
 if TYPE_CHECKING:
-    import xarray as xr
-
-    from sweep.file.reading import StoredFile
     from sweep.study.model import Study
 
 NOTIFY_SECONDS = 60
@@ -81,6 +78,8 @@ def run(arguments: argparse.Namespace) -> Outcome:
 
 def _computed(arguments: argparse.Namespace, study: Study, target: Path) -> Outcome:
     """Runs, and says what became of all cells."""
+    from sweep.file.reading import StoredFile
+    from sweep.file.store import unfinished_of
     from sweep.results.statuses import account, summary_text
     from sweep.runs.run import complete
 
@@ -89,16 +88,8 @@ def _computed(arguments: argparse.Namespace, study: Study, target: Path) -> Outc
     if ending == "not begun":
         say(text := f"{target}: unfinished; no cell is computed yet")
         return Outcome(INCOMPLETE, text)
-    if ending == "complete":  # read without xarray, which takes longer to load than a small run
-        from sweep.file.reading import StoredFile
-
-        result: xr.Dataset | StoredFile = StoredFile(target)
-    else:
-        from sweep.file.open import open_result
-        from sweep.file.store import unfinished_of
-
-        result = open_result(unfinished_of(target) if ending == "unfinished" else target)
-    with result as found:
+    # read without xarray, which takes longer to load than a small run
+    with StoredFile(unfinished_of(target) if ending == "unfinished" else target) as found:
         text = f"{target}: {'' if ending == 'complete' else f'{ending}; '}{summary_text(found)}"
         failed = account(found).failed
     say(text)

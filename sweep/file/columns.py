@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import xarray as xr
 from xarray.backends import BackendArray, BackendEntrypoint
 from xarray.core import indexing
 
-from sweep.errors import SweepError
 from sweep.file.reading import Numbers, StoredFile
 
 
@@ -26,15 +24,11 @@ class Column(BackendArray):
 
 
 class Result(BackendEntrypoint):
-    """A result as xarray opens it, finished or not, the latter unless it is to be `strict`."""
+    """A result as xarray opens it, finished or not."""
 
-    def open_dataset(self, filename_or_obj: Any, *, drop_variables: Any = None, strict: bool = False) -> xr.Dataset:
-        """Raises as `StoredFile` does, and SweepError when damaged numbers are read."""
-        file = StoredFile(Path(filename_or_obj))
-        if strict and not file.finished:
-            done = file.work.done
-            left = f"{int((~done).sum())} of {done.size} blocks are missing"
-            raise SweepError(f"{file.path}: unfinished, {left}; run its sweep again to continue")
+    def open_dataset(self, filename_or_obj: Any, *, drop_variables: Any = None) -> xr.Dataset:
+        """Of a `StoredFile`. SweepError is raised when damaged numbers are read."""
+        file: StoredFile = filename_or_obj
         columns = {}
         for name, numbers in file.tables["cells"].columns.items():
             chunks = dict(zip(numbers.dims, (*numbers.table.box, *numbers.own), strict=True))

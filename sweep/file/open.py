@@ -13,7 +13,6 @@ import numpy as np
 
 from sweep.cells.schema import Schema
 from sweep.errors import SweepError
-from sweep.file import disk
 from sweep.file.reading import Damaged, StoredFile, Table
 from sweep.file.store import unfinished_of
 from sweep.words import as_path
@@ -59,13 +58,22 @@ def open_result(path: str | os.PathLike[str], strict: bool = False, *, chunks: A
 
     from sweep.file.columns import Result
 
-    output = as_path(path)
+    file: Any = stored(as_path(path))
+    if strict and not file.finished:
+        done = file.work.done
+        left = f"{int((~done).sum())} of {done.size} blocks are missing"
+        raise SweepError(f"{file.path}: unfinished, {left}; run its sweep again to continue")
+    if chunks is None and os.fstat(file.fd).st_size > MEMORY_SHARE * memory():
+        chunks = "auto"
+    return xr.open_dataset(file, engine=Result, chunks=chunks)
+
+
+def stored(output: Path) -> StoredFile:
+    """The file of a result, finished or not. Raises SweepError."""
     # a sweep that ends meanwhile puts its file in another place
     for place in (output, unfinished_of(output), output):
-        size = place.stat().st_size if disk.mark(place) else 0
-        pieces = "auto" if chunks is None and size > MEMORY_SHARE * memory() else chunks
         with contextlib.suppress(FileNotFoundError, NotADirectoryError):
-            return xr.open_dataset(os.fspath(place), engine=Result, chunks=pieces, strict=strict)
+            return StoredFile(place)
     raise SweepError(f"{output}: no such file, nor a run that is writing it")
 
 
@@ -141,12 +149,9 @@ def verify(path: str | os.PathLike[str]) -> Verdict:
     True
     """
     output = as_path(path)
-    place = output if disk.mark(output) else unfinished_of(output)
     try:
-        with StoredFile(place) as file:
+        with stored(output) as file:
             return _verdict(output, file)
-    except (FileNotFoundError, NotADirectoryError):
-        raise SweepError(f"{output}: no such file, nor a run that is writing it") from None
     except Damaged as fault:
         checked = "its structure is damaged, or it is not the result of a sweep"
         return Verdict(output, "damaged", checked, (str(fault),))

@@ -123,6 +123,9 @@ class StoredFile:
     def __reduce__(self) -> Any:
         return StoredFile, (self.path, os.O_RDONLY, self.key)
 
+    def __dask_tokenize__(self) -> Any:
+        return self.key, self.finished, self.work.digests
+
     def close(self) -> None:
         """Gives the file back; nothing can be read from then on."""
         fd, self.fd = self.fd, -1

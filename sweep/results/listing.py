@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from sweep.errors import SweepError
-from sweep.file.open import open_result
+from sweep.file.open import stored
 from sweep.results.statuses import Account, account, count_statuses
 from sweep.words import Table, as_path
 
@@ -103,14 +103,14 @@ def list_results(folder: str | os.PathLike[str] = ".") -> Listing:
 
 def _listed(path: Path) -> Listed:
     try:
-        with open_result(path) as dataset:
-            attrs, cells = dataset.attrs, account(dataset)
+        with stored(path) as file:
+            attrs, cells = file.attrs, account(file)
             return Listed(
                 path=path,
                 question=str(attrs.get("question") or attrs.get("title", "")),
                 cells=cells.total,
                 done=(cells.total - cells.pending) / cells.total,
-                statuses={count.name: count.cells for count in count_statuses(dataset, examples=False)},
+                statuses={count.name: count.cells for count in count_statuses(file, examples=False)},
                 account=cells,
                 when=str(attrs.get("end", attrs.get("start", ""))),
                 version=str(attrs.get("versions", "")).partition(",")[0].removeprefix("foliot "),
