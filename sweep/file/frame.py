@@ -141,8 +141,8 @@ def _lay_out(skeleton: _Skeleton, schema: Schema, cuts: Mapping[str, Cut], align
             blocks = (cut.blocks.size, cut.blocks.cells, cut.blocks.row)
             tables[name] = {"grid": cut.grid, "blocks": blocks, "paths": paths}
             for path, column in zip(paths, cut.columns, strict=True):
-                how = _kept((*box_shape(cut.grid, cut.blocks.cells), *column.shape), column)
-                data = file.create_dataset(path, (*cut.grid, *column.shape), column.dtype, **how)
+                chunk = (*box_shape(cut.grid, cut.blocks.cells), *column.shape)
+                data = _make(file, path, (*cut.grid, *column.shape), column.dtype, chunk, column)
                 if name == "cells":
                     over = dims[path] = (*schema.grid.dims, *column.dims)
                     # xarray's way to mark what belongs to the coordinates of a variable, and of all
@@ -181,7 +181,9 @@ def _write_coordinates(file: Any, schema: Schema, sizes: dict[str, int], dims: d
             values = texts.view("S1").reshape(*values.shape, texts.dtype.itemsize)
             dims[c.name], attrs = (*c.dims, f"string{texts.dtype.itemsize}"), {**attrs, "_Encoding": "utf-8"}
             sizes[dims[c.name][-1]] = texts.dtype.itemsize
-        _say(file.create_dataset(c.name, data=values, **_kept(values.shape)), attrs)
+        data = _make(file, c.name, values.shape, values.dtype, values.shape)
+        data[...] = values
+        _say(data, attrs)
     away = [c.name for c in schema.coordinates if c.dims and not {*c.dims} & {c.name, *schema.grid.dims}]
     _say(file, {**schema.attrs, "study_json": study}, away)
 
@@ -200,23 +202,33 @@ def _relate(file: Any, sizes: Mapping[str, int], dims: Mapping[str, tuple[str, .
             file[name].dims[place].attach_scale(file[dim])
 
 
-def _kept(chunk: tuple[int, ...], column: Column | None = None) -> dict[str, Any]:
-    """How HDF5 keeps numbers: in chunks with a checksum each, a single one in its object header.
+def _make(
+    file: Any, path: str, shape: tuple[int, ...], dtype: Any, chunk: tuple[int, ...], column: Column | None = None
+) -> Any:
+    """A dataset, in chunks with a checksum each; a single number stands in its object header.
 
     One of a column, which is written later, stands by itself; the chunks of a column have no places yet.
     """
-    from h5py import h5d, h5p
+    import h5py
+    from h5py import h5d, h5p, h5s, h5t
 
     how = h5p.create(h5p.DATASET_CREATE)
     how.set_attr_phase_change(COMPACT, 0)
+    if chunk:
+        how.set_chunk(chunk)
+        how.set_fletcher32()
+    elif column is None:
+        how.set_layout(h5d.COMPACT)
     if column is not None:
         how.set_alloc_time(h5d.ALLOC_TIME_LATE)
         how.set_fill_time(h5d.FILL_TIME_ALLOC if column.name == STATUS else h5d.FILL_TIME_NEVER)
         if column.name == STATUS:
             how.set_fill_value(np.array(Status.PENDING, column.dtype))
-    elif not chunk:
-        how.set_layout(h5d.COMPACT)
-    return {"chunks": chunk or None, "fletcher32": bool(chunk), "dcpl": how}
+    group, _, name = path.rpartition("/")
+    # h5py forgets how a single number is to be kept
+    space = h5s.create_simple(shape) if shape else h5s.create(h5s.SCALAR)
+    kind = h5t.py_create(np.dtype(dtype), logical=True)
+    return h5py.Dataset(h5d.create(file.require_group(group or "/").id, name.encode(), kind, space, how))
 
 
 def _say(thing: Any, attrs: Mapping[str, Any], beside: Sequence[str] = ()) -> None:

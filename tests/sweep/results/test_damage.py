@@ -90,6 +90,20 @@ def test_a_flipped_bit_is_found_wherever_anything_stands_and_a_whole_result_is_w
     assert sweep.verify(path) == before
 
 
+def test_a_result_with_more_behind_it_is_not_whole(copy):
+    with copy.open("ab") as file:
+        file.write(b"more")
+    assert not sweep.verify(copy).whole
+
+
+def test_a_damaged_fixed_parameter_is_refused_by_hdf5_too(copy):
+    with h5py.File(copy) as file:
+        number = file["g"][()]
+    flip(copy, copy.read_bytes().index(number.tobytes()))
+    with h5py.File(copy) as file, pytest.raises((OSError, KeyError)):
+        file["g"][()]
+
+
 @pytest.mark.parametrize("name", ["fall_time", "drop", "status"])
 def test_damaged_cells_are_named(copy, name):
     harm(copy, name, 17)

@@ -137,6 +137,13 @@ def test_a_result_that_is_open_can_be_opened_and_run_again_and_closing_it_frees_
         assert file["status"].shape == (4, 3, 2)
 
 
+def test_what_is_closed_says_so(stored):
+    found = open_result(stored)
+    found.close()
+    with pytest.raises(SweepError, match="is closed"):
+        found.fall_time.load()
+
+
 @pytest.mark.parametrize("given", [3, b"a.h5"])
 def test_what_is_no_path_is_named(given):
     found = run(stone())

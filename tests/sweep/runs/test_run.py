@@ -147,6 +147,14 @@ def test_what_is_left_over_beside_a_complete_output_is_removed_if_it_is_of_its_s
     assert left.read_bytes() == content
 
 
+def test_what_a_run_left_that_was_killed_at_its_beginning_is_removed(output):
+    quiet(tall(3), output).close()
+    for name in (".out.h5.unfinished.tmp", "out.h5.lock"):
+        output.with_name(name).write_bytes(b"half of it")
+    quiet(tall(3), output).close()
+    assert list(output.parent.iterdir()) == [output]
+
+
 def test_the_unfinished_result_of_another_study_is_kept_unless_forced(unfinished):
     before = unfinished_of(unfinished).read_bytes()
     with pytest.raises(SweepError, match=r"unfinished(.|\n)*axes\.height"):
