@@ -279,7 +279,7 @@ def _corrected(
         elif fits := not found.denied(t, word):
             steps, least, most = FADES
             best, known = float(np.clip(abs(found.numbers[1]), least, most)), found.sigma
-            doubt = 0.5 * np.ptp(found.interval(t, [1], word, confidence)[0])
+            doubt = 0.5 * np.ptp(found.interval(found.beside(t, word)[0], [1], confidence))
             far = np.clip(np.nan_to_num(doubt, posinf=most) / best, 0.02, 0.6)
             strength, fades = CORRECTION.q[0], np.clip(best * steps**far, least, most).tolist()
             laws = [CORRECTION._replace(name=str(d), q=(strength, Number(d, d, (d,)))) for d in fades]

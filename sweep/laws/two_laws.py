@@ -203,7 +203,7 @@ def _verdict(t: Array, tried: dict[str, Found]) -> tuple[str, float]:
     nearest = min((*bends, *others), key=lambda fit: fit.aicc)
     aicc = three.aicc if three and gain(line, three) > BEYOND_DOUBT else math.inf
     # three, if with a bend more even beside what noise of any kind leaves of fewer
-    if aicc < nearest.aicc - OTHER_SHAPES and aicc < nearest.interval(t, [], "noise", 0.5)[1] - BEYOND_DOUBT:
+    if aicc < nearest.aicc - OTHER_SHAPES and aicc < nearest.beside(t, "noise")[1] - BEYOND_DOUBT:
         return "three laws", evidence
     if evidence > BEYOND_DOUBT:
         return "two laws" if 0 <= two.numbers[0] <= 1 else "no meeting in the window", evidence
