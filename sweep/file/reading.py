@@ -8,6 +8,7 @@ thread. A table in the file has a digest of each chunk, a row of them for each b
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 import operator
@@ -21,7 +22,7 @@ import numpy as np
 import xxhash
 
 from kernels.interface import Status
-from sweep.cells.partition import Partition, box_shape, box_slices, row_blocks
+from sweep.cells.partition import Partition, box_shape, row_blocks
 from sweep.cells.reduce import gathered, pending
 from sweep.cells.schema import METHOD_USED, STATUS, Coordinate
 from sweep.errors import SweepError
@@ -266,8 +267,11 @@ class Numbers:
         out = np.empty((*(w.stop - w.start for w in wanted), *self.own), self.dtype)
         near = tuple(slice(w.start // m, -(-w.stop // m)) for w, m in zip(wanted, table.box, strict=True))
         counts = [-(-n // m) for n, m in zip(table.grid, table.box, strict=True)]
-        for block in np.ravel(np.arange(table.blocks.count).reshape(counts)[near]).tolist():
-            box = box_slices(table.grid, *table.blocks.bounds(block))
+        blocks = np.ravel(np.arange(table.blocks.count).reshape(counts)[near]).tolist()
+        corners = itertools.product(*(range(boxes.start, boxes.stop) for boxes in near))
+        for block, corner in zip(blocks, corners, strict=True):
+            ends = zip(corner, table.box, table.grid, strict=True)
+            box = [slice(c * m, min((c + 1) * m, n)) for c, m, n in ends]
             both = [slice(max(w.start, b.start), min(w.stop, b.stop)) for w, b in zip(wanted, box, strict=True)]
             view = out[_within(both, wanted)]
             shape = (*(b.stop - b.start for b in box), *self.own)
