@@ -425,7 +425,10 @@ def test_a_method_that_is_silently_wrong_or_gives_fewer_cells_is_noticed():
 
     file = STUDIES / "what_auto_saves_balance.toml"
     found = sweep.work_precision(sweep.study(file), cells=12, tolerances=(1e-3, 1e-12))
-    truths = {"saves": what_auto_saves.statements, "honest": lambda ds: work_precision.honesty("", ds)}
+    truths = {
+        "saves": lambda ds: next(iter(grouped(what_auto_saves.claims([ds])).values())),
+        "honest": lambda ds: list(work_precision.honesty("", ds)),
+    }
     assert {n: [s.what for s in says(found) if s.failed] for n, says in truths.items()} == {n: [] for n in truths}
     for lie in ({"silent": found.silent + 0.1}, {"error_worst": found.error_worst + 2e-3}):
         wrong = found.assign(lie).assign_attrs(found.attrs)
@@ -433,14 +436,13 @@ def test_a_method_that_is_silently_wrong_or_gives_fewer_cells_is_noticed():
     fewer = found.assign(ok=found.ok * (found["method"] != "auto"), unsolved=found.unsolved + 0.1)
     assert all(any(s.failed for s in says(fewer.assign_attrs(found.attrs))) for says in truths.values())
     (row,) = what_auto_saves.figure([found]).axes
-    assert [label.get_text() for label in row.get_yticklabels()] == ["balance"]
+    assert [text.get_text() for text in row.texts] == ["balance"]
 
 
 def test_the_point_of_exponent_one_half_is_that_of_20_digits():
     """q - tanh q = 1/alpha and (1 - tanh(q)/q)/tanh(q)^2 = 1/2 at once."""
     import foliot_scaling as study
 
-    ds = study.scaled(sweep.run(thinned("foliot_scaling", TABLE["foliot_scaling"].files["foliot_scaling"])))
-    half = study.half_point(ds)
+    _, half = study.prepared(sweep.run(thinned("foliot_scaling", TABLE["foliot_scaling"].files["foliot_scaling"])))
     expected = [1.46299058758010465706, 6.42446119521106945636, 1.39341841440363426389]
     np.testing.assert_allclose([half.alpha, half.aP, half.A], expected, rtol=1e-13)
