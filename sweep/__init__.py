@@ -36,7 +36,17 @@ _MODULES = {
     "to_toml": "study.read",
 }
 """Public names and the modules they live in, each imported when one of its names is first used."""
-_WITHOUT_DATASETS = {"study", "to_toml", "plan", "kernels", "solver", "StudyError", "SweepError"}
+_WITHOUT_DATASETS = {
+    "study",
+    "to_toml",
+    "plan",
+    "kernels",
+    "solver",
+    "list_results",
+    "verify",
+    "StudyError",
+    "SweepError",
+}
 """Names that take and give no Dataset; with any other one xarray is needed, and Datasets get `ds.sweep`."""
 
 __all__ = [*_MODULES]
