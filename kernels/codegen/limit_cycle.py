@@ -149,11 +149,14 @@ def settling(slopes, moved):
     return solved(identity(n, slopes.shape[-1]) - slopes[1:, :n], moved)
 
 
-def equilibrium(the_map, parameters, z, side):
-    """From states z: where the rates are 0, by Newton's method; and how far off, infinite where motions go from it."""
-    n = len(z)
+def equilibrium(the_map, parameters, z, side, size):
+    """From states z: where the rates are 0, by Newton's method; and how far off, infinite where motions go from it.
+
+    `size` : of a motion about it
+    """
+    n, h = len(z), STEP * np.maximum(size, 1e-150)
     for _ in range(ROUNDS):
-        h, J = STEP * np.maximum(most(abs(z)), 1e-150), np.empty((n, n, z.shape[1]))
+        J = np.empty((n, n, z.shape[1]))
         for j in range(n):
             up, down = z.copy(), z.copy()
             up[j], down[j] = z[j] + h, z[j] - h
@@ -267,7 +270,9 @@ class Search:
     def _at_equilibrium(self, left):
         """Where a motion ended close to a stable equilibrium."""
         for side in (1.0, -1.0) if len(left) else ():
-            self._rests(left, *equilibrium(self.map, self.cells.parameters[:, left], self.last[:, left], side))
+            parameters, last = self.cells.parameters[:, left], self.last[:, left]
+            first, _ = self._from_start(left, np.ones(len(left)))
+            self._rests(left, *equilibrium(self.map, parameters, last, side, most(abs(np.fmax(abs(first), abs(last))))))
 
     def _rests(self, left, z, off):
         """COMES_TO_REST at z, where that is known and the motion ended closer to it than a cycle after its start."""
