@@ -28,6 +28,8 @@ from kernels.lanes.vectors import fma, magnitude, where
 
 NEXT_TO = 1.0 / 16.0
 """Of a step, what it may be changed by so that a clock is not rounded; a shorter one is taken as it is."""
+STATE_OFF = 0.5
+"""Of the roundings that a clock is off by at events of a shaken run, those that another state is off by."""
 
 
 def cell_of(states, parameters, kinks, tells=False):
@@ -183,7 +185,7 @@ class Functions:
         return self.of_inputs(lost)
 
     def _of_clocks(self):
-        """`Written.on_clock` and `Written.clocks_off`."""
+        """`Written.on_clock` and `Written.states_off`."""
         clocks = [r.kind == NUMBER and r.args[0] == 1.0 for r in self.recorded.rates]
 
         def on_clock(state, unit, h):
@@ -192,10 +194,11 @@ class Functions:
                 h = where(magnitude(gone_on - h) <= NEXT_TO * h, gone_on, h)
             return h
 
-        def clocks_off(state, by):
-            return tuple(fma(by, u, u) if clock else u for u, clock in zip(state, clocks, strict=True))
+        def states_off(state, by):
+            parts = (1.0 if clock else STATE_OFF * (-1.0) ** j for j, clock in enumerate(clocks))
+            return tuple(fma(part * by, u, u) for part, u in zip(parts, state, strict=True))
 
-        return {"on_clock": written(on_clock), "clocks_off": written(clocks_off)}
+        return {"on_clock": written(on_clock), "states_off": written(states_off)}
 
     def _rates_of(self, *values):
         """The rates of expressions."""

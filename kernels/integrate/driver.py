@@ -28,7 +28,8 @@ BACK = 1e-9
 ONE_ULP = 2.0**-52
 CLOCK_OFF = 8.0
 """Roundings that a clock is off by from one event to the next in a shaken run: what is near an event in time hangs on
-the time that has gone by since then, of which what is left of a clock's rounding is much more than of the clock."""
+the time that has gone by since then, of which what is left of a clock's rounding is much more than of the clock. So it
+is with a pulse at a place, and the state that passes it (`Written.states_off`)."""
 REMEMBERED = 4.0
 """The way to an event, which roundings lengthen, counts for at most so many times the shortest time in which a state
 changes by all of its size: what is fast has forgotten the rest of the way."""
@@ -235,8 +236,8 @@ def arrived(m, cell, found, late, active, tells):
         longest = where(blur > longest, blur, longest)
     shakes, shake = moving & (magnitude(cell.shake) > 0.0), shaken_on(cell.shake)
     by = missed_by(m, shake)
-    off, way = by * longest, shake * (magnitude(shake) - 1.5)  # clocks go to either side
-    clocks_off = where(way < 0.0, -CLOCK_OFF * ONE_ULP, CLOCK_OFF * ONE_ULP)
+    off, way = by * longest, shake * (magnitude(shake) - 1.5)  # states go to either side
+    aside = where(way < 0.0, -CLOCK_OFF * ONE_ULP, CLOCK_OFF * ONE_ULP)
     shaken = shakes
     if m.speeds is not None:  # a slide ends late: before its end the motion is still pressed onto it, and would stick
         slides = zip(cell.signs[:-1], found.on[1:], strict=True)
@@ -245,7 +246,7 @@ def arrived(m, cell, found, late, active, tells):
     missed = tuple(where(shaken, fma(off, rate, u), u) for rate, u in zip(rates, state, strict=True))
     return cell._replace(
         shake=shake, verdict=verdict, h=found.h, on=found.on, size=size,
-        state=choose(shakes, m.clocks_off(missed, clocks_off), missed),
+        state=choose(shakes, m.states_off(missed, aside), missed),
         time=where(moving, fma(found.t, cell.unit, cell.time), cell.time),
         since=where(moving, fma(found.t, cell.unit, cell.since), cell.since),
         steps=where(active, found.tried, cell.steps), before=where(active, cell.steps, cell.before),

@@ -42,7 +42,7 @@ class Written(NamedTuple):
     passable : 1 for the surface, and for each kink, that does not depend on the side: a motion may pass through it
     deciding : 1 for each kink whose side decides what a switch does; None where there is none
     on_clock : (state, unit, h) -> the step next to h > 0 by which each *clock*, a state whose rate is 1, is not rounded
-    clocks_off : (state, by) -> the state, its clocks off by so many parts of themselves
+    states_off : (state, by) -> the state, its clocks off by so many parts of themselves, others by fewer
     factored, solved : None, or of a scene that may be stiff (`expression.stiff`)
     """
 
@@ -69,7 +69,7 @@ class Written(NamedTuple):
     passable: tuple
     deciding: object
     on_clock: object
-    clocks_off: object
+    states_off: object
     factored: object
     solved: object
 
