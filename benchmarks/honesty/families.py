@@ -1,4 +1,4 @@
-"""Is a scene of one's own that says OK right, over seventeen families of scenes that mislead integrators?
+"""Is a scene of one's own that says OK right, over twenty-two families of scenes that mislead integrators?
 
 Prints, by family and method, how many cells were OK, remarked and refused, and the largest error of an OK cell over its
 rtol; exit status 1 where one is off by more than its rtol, or where too few of those that can be solved are OK:
@@ -227,6 +227,52 @@ def crossed_pulse(random, n):
     """The same at a place that the motion passes at a speed of its own."""
     p, v = random.uniform(1.0, 30.0, n), random.uniform(0.5, 2.0, n)
     return {"p": p, "w": 10.0 ** random.uniform(-4, 1, n), "v": v, "T": p / v * random.uniform(1.3, 2.0, n)}
+
+
+def _flat_truth(w, d, T, steep):
+    w, d, T = (REAL(1) * c for c in (w, d, T))
+    n = np.where(steep > 0, 14, 3)
+    phase, start = w * (T - d) ** n, w * (-d) ** n
+    y = np.where(steep > 0, T, 0) + np.sin(phase) - np.sin(start)
+    crest = np.where(steep > 0, (PI / (2 * w)) ** (REAL(1) / 14), 0) + 1
+    size = np.maximum(abs(y), np.where(phase > PI / 2, crest, 0))
+    return Truth(T, [T, y], [T, size], n * abs(phase) * (1 + 1 / np.maximum(size, 1e-30)))
+
+
+def _flat_rate(t, w, d, steep):
+    u = t - d
+    return 1.0, (1.0 - steep) * 3.0 * w * u**2 * cos(w * u**3) + steep * (
+        1.0 + 14.0 * w * u**8 * u**5 * cos(w * u**8 * u**6)
+    )
+
+
+@family(
+    scene("flat", "t y", "w d T steep", _flat_rate, lambda t, T: T - t, lambda: (0.0, 0.0)), _flat_truth
+)  # fmt: skip
+def flat_start(random, n):
+    """sin(w t^3), and t + sin(w t^14): the last terms of their series are 0 at the start, or next to it."""
+    steep = np.floor(random.uniform(0.0, 2.0, n))
+    d = 10.0 ** random.uniform(-12, -0.5, n) * random.choice([-1.0, 0.0, 1.0], n)
+    T = random.uniform(0.5, np.where(steep > 0, 1.3, 3.0), n)
+    return {"w": random.uniform(0.1, 3.0, n), "d": d, "T": T, "steep": steep}
+
+
+def _flat_surface_truth(w, d, c):
+    w, d, c = (REAL(1) * x for x in (w, d, c))
+    angle = np.arccos(c)
+    T = d + (angle / w) ** (REAL(1) / 7)
+    return Truth(T, [T], [T], 1 + 1 / (angle * np.sqrt(1 - c * c)))
+
+
+@family(
+    scene(
+        "flat_surface", "t", "w d c", lambda: (1.0,), lambda t, w, d, c: cos(w * (t - d) ** 7) - c, lambda: (0.0,)
+    ), _flat_surface_truth,
+)  # fmt: skip
+def flat_surface(random, n):
+    """A surface whose series at the start has no last terms, or small ones."""
+    d = 10.0 ** random.uniform(-2.5, -0.5, n) * random.choice([-1.0, 0.0, 0.0, 1.0], n)
+    return {"w": random.uniform(0.1, 3.0, n), "d": d, "c": random.uniform(-0.99, 0.9, n)}
 
 
 def _behind_truth(a, v, flips):

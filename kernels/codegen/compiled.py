@@ -117,10 +117,11 @@ def _by_series(functions, m, changes=None):
 
     def run(order):
         series = functions.of_series(m, order, changes)
+        asks, apart = any(series.endless) or None, any(series.unseen) or None
 
         @jit_call
         def leg(cell, mode, active):
-            return taylor_leg.to_event(series, cell, mode, active, hides, at_kink)
+            return taylor_leg.to_event(series, cell, mode, active, hides, asks, apart, at_kink)
 
         return _driven(functions, m, leg, f"taylor_{order}", series.error)
 

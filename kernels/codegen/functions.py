@@ -326,15 +326,16 @@ class Functions:
     def of_series(self, m, order, changes=None):
         """`taylor_leg.Series` of an order; `changes` : of the error that is carried along, the first of `Changes`."""
         ways = {s: BY_SUM if s in self.summed else BY_SERIES for s in self.states} | {None: BY_SERIES}
-        pieces, tangents = self.series(order, True, changes is not None)
+        pieces, tangents, endless = self.series(order, True, changes is not None)
         return Series(
             m, order, pieces, *self.powers, tuple(ways[s] for s in self.states), tuple(ways[s] for s in self.seen),
-            tuple(float(s in self.summed) for s in self.states), tuple(float(s is None) for s in self.seen),
+            tuple(float(s in self.summed) for s in self.states), tuple(float(s is None) for s in self.seen), endless,
             changes and Changes(*changes, *tangents, self.feeds_back or None),
         )  # fmt: skip
 
     def series(self, order, powers=False, tells=False):
-        """`Series.pieces` of an order; if it tells, with `Changes.tangent` and `Changes.rough`, which go on from them.
+        """`Series.pieces` of an order; if it tells, with `Changes.tangent` and `Changes.rough`, which go on from them;
+        and `Series.endless`.
 
         With `powers` these are constants in their cores.
         """
@@ -358,16 +359,19 @@ class Functions:
                 events.append((values.value(offset), values.value(factor), found))
             return values, series, tuple(events)
 
+        def controlled(series, events):
+            return *series.values(), *(u for s, (*_, u) in zip(self.seen, events, strict=True) if s is None)
+
         def pieces(state, mode, unit, cores):
             values, series, events = computed(state, mode, unit, cores)
             of_states = curves(state, unit, series)
             watched = list(zip(self.seen, events, strict=True))
             of_events = tuple((u,) if s is None else of_states[s] for s, (*_, u) in watched)
-            controlled = *series.values(), *(u for s, (*_, u) in watched if s is None)
             inner, rough = (tuple(values.known[key] for key in keys) for keys in taken.values())
             return Pieces(
-                tuple(series.values()), events, controlled, tuple(of_states.values()), of_events, inner, rough
-            )
+                tuple(series.values()), events, controlled(series, events), tuple(of_states.values()), of_events,
+                inner, rough,
+            )  # fmt: skip
 
         def changed(values, length, changes, unit):
             found, nothing = {}, 0.0 * values.inputs["side"]
@@ -386,7 +390,8 @@ class Functions:
 
         state, mode, changes = (self.any[name] for name in ("state", "mode", "changes"))
         cores = self.any["cores"] if powers else ()
-        whole, *_ = computed(state, mode, ANY, cores)
+        whole, *found = computed(state, mode, ANY, cores)
+        series = controlled(*found)
         for part, length in lengths.items():
             values = Values(self.inputs(state, mode, ANY, changes), rates, cores)
             values.known = dict(whole.known)
@@ -394,7 +399,7 @@ class Functions:
             inputs = {(x.index, 0) for x in graph.nodes if x.kind == INPUT}
             asked = values.asked - inputs
             taken[part] = [key for key, value in whole.known.items() if key in asked and value is ANY]
-        return written(pieces), [tangent(part) for part in lengths]
+        return written(pieces), [tangent(part) for part in lengths], tuple(float(u[-1] is ANY) for u in series)
 
     @functools.cached_property
     def powers(self):

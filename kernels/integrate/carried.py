@@ -26,6 +26,7 @@ import math
 from typing import NamedTuple
 
 from kernels.integrate.events import of_event
+from kernels.integrate.powers import outside
 from kernels.integrate.taylor import curvature, last_term, natural_power, slope
 from kernels.lanes.symbols import fold, symbolic
 from kernels.lanes.vectors import choose, fma, magnitude, where
@@ -186,8 +187,7 @@ def moved(m, error, changes, state, mode, unit, x, pieces, coarse):
 @symbolic
 def weighed(m, error, lanes, cores, x):
     """The error with the weight of a step to x, in lanes that are in no core of a power."""
-    for core in cores:
-        lanes = lanes & (core < 0.0)
+    lanes = outside(cores, lanes)
     weight = where(lanes, x, 0.0) * (1.0 / (m.order + 1.0))
     return error._replace(weight=weight, left=tuple(where(weight > 0.0, left, 0.0) for left in error.left))
 

@@ -103,6 +103,14 @@ def core(p, state, mode, unit, tolerance, on, t, margins):
 
 
 @symbolic
+def outside(cores, lanes):
+    """Of the lanes those in no core of a power, which the series leaves out."""
+    for core in cores:
+        lanes = lanes & (core < 0.0)
+    return lanes
+
+
+@symbolic
 def least_share(x, share):
     """The smaller one; x beside NaN."""
     return where(share < x, share, x)

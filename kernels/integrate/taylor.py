@@ -32,6 +32,8 @@ TINY = 1e-280
 """Size of a state of which products of its terms would underflow: what is less is not told from 0."""
 COME_UP = 0.25
 """Of a step within which something is hidden (`expression.hidden`): the next trial. The longest grows back as fast."""
+VANISHING = 1e3
+"""By how much the last terms are too small to tell of a series: of e^t they are less than foretold by up to 150."""
 WIDER = 5.0 / 4.0
 GRAZING = 16.0
 SAME, ROUNDING = 0.04, 1e-15
@@ -106,6 +108,19 @@ def last_term(h, series):
 def size(h, series):
     """Of a state on a step: its first terms."""
     return fma(fma(magnitude(series[2]), h, magnitude(series[1])), h, magnitude(series[0]) + TINY)
+
+
+@symbolic
+def vanishes(h, series):
+    """Whether the last terms are far less than the ones before foretell, if terms fall by 1/4 each.
+
+    So they may be 0 by chance, or next to it, as of cos(t^3) at t = 0, and tell nothing.
+    """
+    total, wide = magnitude(series[-3]), 4.0 * h
+    for term in series[-4:2:-1]:
+        total = fma(total, wide, magnitude(term))
+    first, order = natural_power(h, 3), len(series) - 1
+    return not_(VANISHING * last_term(h, series) * natural_power(h, order - 1) > total * (first * 4.0 ** (3 - order)))
 
 
 @symbolic

@@ -1,15 +1,16 @@
 """The leg of a motion by Taylor series, from event to event; generic in the scene, in one cell or lanes.
 
 Each step takes the length that the series allow, is halved where no event is proved to fall all along or to stay
-clear (`taylor`), and ends the leg where one has fallen through 0. `m` is what is written of the scene for one order
-(`Series`).
+clear (`taylor`), and ends the leg where one has fallen through 0. A leg may begin where symmetry makes the last terms
+of a series 0, though it goes on. So its first step, and a step that does not hang on last terms, is taken only where
+rates and events are the series' (`agree`). `m` is what is written of the scene for one order (`Series`).
 """
 
 import math
 from typing import NamedTuple
 
 from kernels.integrate import carried
-from kernels.integrate.powers import FAR
+from kernels.integrate.powers import FAR, outside
 from kernels.integrate.records import Leg
 from kernels.integrate.taylor import (
     COME_UP,
@@ -29,15 +30,20 @@ from kernels.integrate.taylor import (
     next_step,
     rises,
     size,
+    slope,
     stays_apart,
+    vanishes,
     worse,
 )
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.symbols import fold, over_tuples, symbolic
 from kernels.lanes.tuples import all_of, any_of, joined, reached, total
-from kernels.lanes.vectors import any_lane, choose, fma, magnitude, not_, where
+from kernels.lanes.vectors import any_lane, choose, fma, horner, magnitude, not_, where
 from kernels.maths.intervals import most
 
+ASKED_AT, REFUSALS = (0.6, 1.0), 20.0
+"""Parts of a step at which rates and events are asked whether the series are theirs, where last terms tell nothing; and
+how often in a leg a step may be refused for that: what is left then is rounding."""
 BEYOND = 1e6
 """Times the step before, that one is at most where the series leave nothing out: of a motion that is a polynomial it
 would grow so far that halving it no more comes back to what an event next to 0 asks for."""
@@ -53,6 +59,7 @@ class Series(NamedTuple):
     on_kink : (state, fires) -> the state, 0 where a kink of a power fires
     ways, watched : how each state, and what each event watches, is evaluated (`taylor.Way`)
     summed, unseen : 1 for each state that is the sum of another one, for each event of more than one state
+    endless : of `Pieces.controlled`, 1 for each series that is no polynomial of a lower order for every motion
     error : `carried.Changes`; None where no error is carried along
     """
 
@@ -65,6 +72,7 @@ class Series(NamedTuple):
     watched: tuple
     summed: tuple
     unseen: tuple
+    endless: tuple
     error: object
 
 
@@ -142,6 +150,48 @@ def shows_all(m, pieces, state, mode, unit, trial, tolerance):
     return all_of(seen) & all_of(seen_events)
 
 
+@symbolic
+def tells_nothing(m, pieces, h):
+    """Whether the last terms of a series tell nothing of it."""
+    return any_of(
+        tuple((endless > 0.5) & vanishes(h, u) for endless, u in zip(m.endless, pieces.controlled, strict=True))
+    )
+
+
+@jit_call
+@over_tuples
+def agree(m, pieces, mode, unit, x, tolerance):
+    """Whether, a time x on, the rates of the series' states are the series', to the tolerance."""
+    state = tuple(way.value(x, curve) for way, curve in zip(m.ways, pieces.of_states, strict=True))
+    allowed = (m.order + 1.0) * fma(SLACK, tolerance, ROUNDING)
+    return all_of(
+        tuple(
+            x * magnitude(unit * rate - slope(x, u)) <= allowed * size(x, u)
+            for rate, u in zip(m.scene.rates(state, mode), pieces.states, strict=True)
+        )
+    )
+
+
+@jit_call
+@over_tuples
+def events_agree(m, pieces, mode, x, tolerance):
+    """Whether, a time x on, each event of more than one state has its series' value, to the tolerance and rounding."""
+    state = tuple(way.value(x, curve) for way, curve in zip(m.ways, pieces.of_states, strict=True))
+    values = joined((m.scene.surface(state, mode),), m.scene.kinks(state, mode))
+    return all_of(
+        tuple(
+            (unseen < 0.5)
+            | (
+                magnitude(value - fma(factor, horner(x, u), offset))
+                <= fma(ROUNDING, extent, SLACK * tolerance * (magnitude(offset) + magnitude(factor) * size(x, u)))
+            )
+            for unseen, value, (extent, rate), (offset, factor, u) in zip(
+                m.unseen, values, m.scene.made(state, mode), pieces.events, strict=True
+            )
+        )
+    )
+
+
 @jit
 def first_root(found, number, way, curve, event, facts, passed, met, span, tolerance):
     """`found` is where the leg ends, by which event, whether only just; with this event, where it fires before."""
@@ -190,13 +240,14 @@ def shorter(h, limit):
 
 @jit
 @over_tuples
-def to_event(m, cell, mode, active, hides, at_kink):
+def to_event(m, cell, mode, active, hides, asks, apart, at_kink):
     """Follow the motion of the active lanes until an event falls through 0, and stop there.
 
     Parameters
     ----------
     cell : `Cell` at the start of the leg; its h is the first guess of a step
     hides : None where neither rates nor events can hide anything
+    asks, apart : None where every series is a polynomial; where each event watches one state
     at_kink : None, or the entry of a tuple of the kink whose u is the rate of the surface
 
     Returns
@@ -211,7 +262,7 @@ def to_event(m, cell, mode, active, hides, at_kink):
     now, margins = passed, tuple(0.0 * h for _ in on)
     stuck, lost, broken, grazing = nothing, nothing, nothing, nothing
     power_h, allowed = natural_power(h, m.order - 1), SLACK * tolerance
-    longest, furthest, reach = 0.0 * h + FAR, 0.0 * h + FAR, tuple(magnitude(u) for u in state)
+    refused, longest, furthest, reach = 0.0 * h, 0.0 * h + FAR, 0.0 * h + FAR, tuple(magnitude(u) for u in state)
     error = carried.begun(m, state, errors, h)
     for step in range(STEP_LIMIT):
         cores, limits, coarse, full = m.cores(state, mode, unit, tolerance, on, t, margins)
@@ -224,8 +275,7 @@ def to_event(m, cell, mode, active, hides, at_kink):
         h = where(moving, next_step(h, ratio, m.order), h)
         h = where((ratio > 0.0) | (h < furthest), h, furthest)
         h = fold(shorter, h, (), limits)
-        if hides is not None:
-            h = where(h < longest, h, longest)
+        h = where(h > longest, longest, h)
         h = m.scene.on_clock(state, unit, h)
         power_h = natural_power(h, m.order - 1)
         fine = all_of(tuple(keeps(h, power_h, u, allowed) for u in pieces.controlled))
@@ -244,11 +294,20 @@ def to_event(m, cell, mode, active, hides, at_kink):
             margins = carried.wider(m, margins, state, mode, errors)
             moving = moving & not_(broken | stuck)
         tried = where(moving, tried + 1.0, tried)
-        steps = moving
+        seen = trial >= 0.0
         if hides is not None:
             seen = shows_all(m, pieces, state, mode, unit, trial, tolerance)
-            longest = where(seen, longest / COME_UP, COME_UP * trial)
-            steps = moving & seen
+        if asks is not None:
+            untold = not_(t > 0.0) | tells_nothing(m, pieces, trial)
+            untold = outside(cores, moving & (refused < REFUSALS) & untold)
+            if any_lane(untold):
+                for part in ASKED_AT:
+                    seen = seen & (not_(untold) | agree(m, pieces, mode, unit, part * trial, tolerance))
+                    if apart is not None:
+                        seen = seen & (not_(untold) | events_agree(m, pieces, mode, part * trial, tolerance))
+                refused = where(untold & not_(seen), refused + 1.0, refused)
+        longest = where(seen, longest / COME_UP, COME_UP * trial)
+        steps = moving & seen
         clears, fallings = judged(m, pieces, facts, margins, now, trial)
         if at_kink is not None:
             clears, fallings = by_kink(facts, now, clears, fallings, at_kink)

@@ -27,6 +27,7 @@ WIDE, TIGHT, BOTH = (-9, -3), (-11, -9.5), (-11, -3)
     [
         ("blow_up", "dop853", BOTH), ("windows", "taylor", WIDE), ("behind", "dop853", BOTH),
         ("moving_surface", "taylor", BOTH), ("pulses", "taylor", BOTH), ("broken_jump", "taylor", TIGHT),
+        ("flat_start", "taylor", BOTH), ("flat_surface", "taylor", WIDE),
     ],
 )  # fmt: skip
 def test_what_is_ok_is_right_and_most_of_what_can_be_solved_is_ok(name, method, decades):
