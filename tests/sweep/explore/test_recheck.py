@@ -152,7 +152,7 @@ def test_outputs_that_are_infinite_by_both_methods_agree():
 
 def test_xarray_opens_a_result_as_one_of_ours(clocks, tmp_path):
     """`ds.sweep` is there in a program that never imports sweep, and chunks are dask's where they are asked for."""
-    with sweep.run(FOLIOT, tmp_path / "clocks.h5"):
+    with sweep.run(FOLIOT, tmp_path / "clocks.h5", block_cells=24):
         pass
     script = "import xarray as xr; ds = xr.open_dataset('clocks.h5'); print(ds.sweep.check(sample=3).beyond)"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, cwd=tmp_path)
