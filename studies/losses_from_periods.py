@@ -108,7 +108,7 @@ def claims(ds, clocks) -> Claims:
     over = "  sum of squares over the noise, mean; 24 numbers, 4 losses"
     hold = "  with noise: intervals of 95 % that hold the true share"
     yield most(f"{clocks} clocks without noise: shares fitted", "1e-3", np.array(off), 1e-3)
-    yield Statement(hold, "> 4/5", f"{sum(held)} of {len(held)}", share, share >= 0.8)
+    yield Statement(hold, ">= 4/5", f"{sum(held)} of {len(held)}", share, share >= 0.8)
     yield Statement(over, "20", f"{mean:.1f}", mean / 20 - 1, bool(enough))
 
 

@@ -29,7 +29,8 @@ from kernels.lanes.vectors import fma, magnitude, where
 NEXT_TO = 1.0 / 16.0
 """Of a step, what it may be changed by so that a clock is not rounded; a shorter one is taken as it is."""
 STATE_OFF = 0.5
-"""Of the roundings that a clock is off by at events of a shaken run, those that another state is off by."""
+"""Of the roundings that a clock is off by at events of a shaken run, those that another state is off by: each second
+one to the other side, so that what hangs on the difference of two shows it."""
 
 
 def cell_of(states, parameters, kinks, tells=False):

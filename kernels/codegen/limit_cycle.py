@@ -152,7 +152,7 @@ def settling(slopes, moved):
 def equilibrium(the_map, parameters, z, side, size):
     """From states z: where the rates are 0, by Newton's method; and how far off, infinite where motions go from it.
 
-    `size` : of a motion about it
+    `size` : of the motion, not of what is left of it, to which the differences are in proportion
     """
     n, h = len(z), STEP * np.maximum(size, 1e-150)
     for _ in range(ROUNDS):
@@ -269,10 +269,12 @@ class Search:
 
     def _at_equilibrium(self, left):
         """Where a motion ended close to a stable equilibrium."""
-        for side in (1.0, -1.0) if len(left) else ():
-            parameters, last = self.cells.parameters[:, left], self.last[:, left]
-            first, _ = self._from_start(left, np.ones(len(left)))
-            self._rests(left, *equilibrium(self.map, parameters, last, side, most(abs(np.fmax(abs(first), abs(last))))))
+        if not len(left):
+            return
+        parameters, last = self.cells.parameters[:, left], self.last[:, left]
+        size = most(np.fmax(abs(self._from_start(left, np.ones(len(left)))[0]), abs(last)))
+        for side in (1.0, -1.0):
+            self._rests(left, *equilibrium(self.map, parameters, last, side, size))
 
     def _rests(self, left, z, off):
         """COMES_TO_REST at z, where that is known and the motion ended closer to it than a cycle after its start."""

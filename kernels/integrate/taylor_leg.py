@@ -2,8 +2,9 @@
 
 Each step takes the length that the series allow, is halved where no event is proved to fall all along or to stay
 clear (`taylor`), and ends the leg where one has fallen through 0. A leg may begin where symmetry makes the last terms
-of a series 0, though it goes on. So its first step, and a step that does not hang on last terms, is taken only where
-rates and events are the series' (`agree`). `m` is what is written of the scene for one order (`Series`).
+of a series 0, though it goes on. So its first step, and one that last terms tell nothing of, is taken only where the
+rates at the series' states are the series' derivatives, and events their own series (`agree`, `events_agree`).
+`m` is what is written of the scene for one order (`Series`).
 """
 
 import math
@@ -42,8 +43,8 @@ from kernels.lanes.vectors import any_lane, choose, fma, horner, magnitude, not_
 from kernels.maths.intervals import most
 
 ASKED_AT, REFUSALS = (0.6, 1.0), 20.0
-"""Parts of a step at which rates and events are asked whether the series are theirs, where last terms tell nothing; and
-how often in a leg a step may be refused for that: what is left then is rounding."""
+"""Parts of a step at which rates and events are asked whether the series are theirs; and how often in a leg a step may
+be refused for that: what is so much shorter than the first guess is not, or rounding would stop it."""
 BEYOND = 1e6
 """Times the step before, that one is at most where the series leave nothing out: of a motion that is a polynomial it
 would grow so far that halving it no more comes back to what an event next to 0 asks for."""
@@ -59,7 +60,7 @@ class Series(NamedTuple):
     on_kink : (state, fires) -> the state, 0 where a kink of a power fires
     ways, watched : how each state, and what each event watches, is evaluated (`taylor.Way`)
     summed, unseen : 1 for each state that is the sum of another one, for each event of more than one state
-    endless : of `Pieces.controlled`, 1 for each series that is no polynomial of a lower order for every motion
+    endless : of `Pieces.controlled`, 1 for each series whose last coefficient is not 0 for every motion
     error : `carried.Changes`; None where no error is carried along
     """
 
@@ -161,7 +162,7 @@ def tells_nothing(m, pieces, h):
 @jit_call
 @over_tuples
 def agree(m, pieces, mode, unit, x, tolerance):
-    """Whether, a time x on, the rates of the series' states are the series', to the tolerance."""
+    """Whether, a time x on, the rates at the series' states are the series' derivatives, to the tolerance."""
     state = tuple(way.value(x, curve) for way, curve in zip(m.ways, pieces.of_states, strict=True))
     allowed = (m.order + 1.0) * fma(SLACK, tolerance, ROUNDING)
     return all_of(
@@ -185,7 +186,7 @@ def events_agree(m, pieces, mode, x, tolerance):
                 magnitude(value - fma(factor, horner(x, u), offset))
                 <= fma(ROUNDING, extent, SLACK * tolerance * (magnitude(offset) + magnitude(factor) * size(x, u)))
             )
-            for unseen, value, (extent, rate), (offset, factor, u) in zip(
+            for unseen, value, (extent, _), (offset, factor, u) in zip(
                 m.unseen, values, m.scene.made(state, mode), pieces.events, strict=True
             )
         )
@@ -247,7 +248,8 @@ def to_event(m, cell, mode, active, hides, asks, apart, at_kink):
     ----------
     cell : `Cell` at the start of the leg; its h is the first guess of a step
     hides : None where neither rates nor events can hide anything
-    asks, apart : None where every series is a polynomial; where each event watches one state
+    asks : None where every series is a polynomial
+    apart : None where each event watches one state
     at_kink : None, or the entry of a tuple of the kink whose u is the rate of the surface
 
     Returns

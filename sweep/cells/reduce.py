@@ -63,11 +63,10 @@ def nothing(study: Study, rows: int) -> Rows:
     return found
 
 
-def pending(study: Study) -> Rows:
-    """All rows, not computed yet."""
-    blocks = row_blocks(study)
-    rows = nothing(study, blocks.count)
-    first = blocks.first(np.arange(blocks.count + 1, dtype=np.int64))
+def pending(study: Study, start: int, stop: int) -> Rows:
+    """Some of the rows, not computed yet."""
+    rows = nothing(study, stop - start)
+    first = row_blocks(study).first(np.arange(start, stop + 1, dtype=np.int64))
     rows[BY_STATUS][:, STATUSES.index(Status.PENDING.name)] = np.diff(first)
     return rows
 

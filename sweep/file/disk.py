@@ -110,9 +110,8 @@ def replacing(target: Path, held: bool = False) -> Iterator[Path]:
         if target.is_dir() or (part.is_dir() and target.exists()):
             # a folder cannot be replaced in one step, and stands aside meanwhile
             discard(old)
+            stack.callback(lambda: discard(old) if target.exists() else rename(old, target))
             rename(target, old)
-            stack.callback(discard, old)
-            stack.callback(lambda: target.exists() or rename(old, target))
         rename(part, target)
         sync_folder(target.parent)
 

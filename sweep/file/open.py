@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -62,6 +62,7 @@ def open_result(path: str | os.PathLike[str], strict: bool = False, *, chunks: A
     if strict and not file.finished:
         done = file.work.done
         left = f"{int((~done).sum())} of {done.size} blocks are missing"
+        file.close()
         raise SweepError(f"{file.path}: unfinished, {left}; run its sweep again to continue")
     if chunks is None and os.fstat(file.fd).st_size > MEMORY_SHARE * memory():
         chunks = "auto"
@@ -114,10 +115,10 @@ class Verdict:
     checked: str
     findings: tuple[str, ...]
     blocks: tuple[int, ...] | None = None
+    whole: bool = field(init=False)
 
-    @property
-    def whole(self) -> bool:
-        return not self.findings
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "whole", not self.findings)
 
     def __str__(self) -> str:
         return "\n  ".join([f"{self.path}: {self.state}; {self.checked}", *self.findings])

@@ -8,6 +8,8 @@ thread. A table in the file has a digest of each chunk, a row of them for each b
 
 from __future__ import annotations
 
+import errno
+import functools
 import itertools
 import json
 import math
@@ -38,6 +40,8 @@ OF_NETCDF = {"CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_Netcdf4Coord
 """Attributes that say nothing to a user."""
 DAMAGE = (OSError, EOFError, LookupError, ValueError, TypeError, AttributeError, RuntimeError)
 """What comes of reading a damaged file."""
+OF_DAMAGE = (errno.EINVAL, errno.EOVERFLOW)
+"""What the system says where a damaged file sends one to a place that cannot be."""
 NOTHING = {STATUS: int(Status.PENDING), METHOD_USED: -1}
 """What is handed out of cells that are not computed yet, where that is not NaN."""
 MODULUS, ROW = 65535, 4096
@@ -79,6 +83,8 @@ class StoredFile:
                 self._read(h5, key)
         except DAMAGE as fault:
             self.close()
+            if isinstance(fault, OSError) and fault.errno and fault.errno not in OF_DAMAGE:
+                raise SweepError(f"{path}: cannot be read ({os.strerror(fault.errno)})") from fault
             reason = (str(fault).splitlines() or [type(fault).__name__])[0]
             raise Damaged(
                 f"{path}: not the result of a sweep (exports are for xarray and other programs), or damaged "
@@ -153,14 +159,19 @@ class StoredFile:
 
         Raises SweepError where they are damaged.
         """
-        study, rows = Study.from_json(self.attrs["study_json"], declared=True), self.tables["rows"]
-        per_row, blocks = row_blocks(study).per_row, rows.blocks
+        study, rows = self._study, self.tables["rows"]
+        per_row = row_blocks(study).per_row
         first, stop = (per_row * place for place in self.tables["cells"].blocks.bounds(block))
-        there = np.repeat(rows.done, np.diff(blocks.first(np.arange(blocks.count + 1))))[first:stop]
-        found = {name: column[first:stop] for name, column in pending(study).items()}
+        begins = rows.blocks.first(np.arange(rows.blocks.count))
+        there = rows.done[np.searchsorted(begins, np.arange(first, stop), side="right") - 1]
+        found = pending(study, first, stop)
         for name, column in rows.columns.items():
             found[name][there] = column[first:stop][there]
         return gathered(study, found)
+
+    @functools.cached_property
+    def _study(self) -> Study:
+        return Study.from_json(self.attrs["study_json"], declared=True)
 
 
 class Table:

@@ -67,6 +67,7 @@ def found(output: Path, give_up: bool = False) -> Store | None:
     with contextlib.suppress(SweepError if give_up else Damaged):
         if (store := Store(output)).is_as_made():
             return store
+        store.close()
     if give_up:
         return None
     raise SweepError(f"{path}: damaged beside its numbers; remove it, or give it up with --force")
@@ -88,7 +89,8 @@ class Store(StoredFile):
 
     def __init__(self, output: Path) -> None:
         super().__init__(unfinished_of(output), os.O_RDWR)
-        self.output, self._mark = output, disk.mark(self.path)[:2]  # of the file: it is still the one, and as long
+        status = os.fstat(self.fd)
+        self.output, self._mark = output, (status.st_ino, status.st_size)  # of the file: still the one, and as long
         self._waiting: deque[tuple[int, bytes]] = deque()
         self._synced, self._elsewhere = time.monotonic(), False
         self._syncing, self._last = ThreadPoolExecutor(1), Future[None]()  # beside those that compute

@@ -13,7 +13,7 @@ from sweep.errors import SweepError
 from sweep.file import disk
 from sweep.file.frame import cuts_of, expected_size
 from sweep.file.open import verify
-from sweep.file.reading import StoredFile
+from sweep.file.reading import UNFINISHED, StoredFile
 from sweep.file.store import Store, alone, begun, found, lock_of, reopened, unfinished_of
 from sweep.runs.extend import Precomputed, Reused, has_failed, obstacle
 from sweep.runs.loop import Loop, Task
@@ -26,6 +26,8 @@ Ending = Literal["done before", "complete", "unfinished", "not begun"]
 
 def run_to_file(task: Task, precomputed: Precomputed | None = None) -> Ending:
     """Continues, begins or leaves alone what is there. Raises SweepError, KeyboardInterrupt, Terminated."""
+    if task.output.suffix == UNFINISHED:
+        raise SweepError(f"{task.path}: a result that is not finished is called *{UNFINISHED}; choose another name")
     left = any(map(disk.mark, (unfinished_of(task.output), lock_of(task.output))))
     seen, (standing, damaged) = disk.mark(task.output), ("nothing", ()) if left else _standing(task)
     if standing == "complete":
@@ -36,6 +38,8 @@ def run_to_file(task: Task, precomputed: Precomputed | None = None) -> Ending:
         store = found(task.output, task.force)
         is_ours = store is not None and store.fingerprint == dict(task.fingerprint)
         if standing == "complete":
+            if store is not None:
+                store.close()
             if is_ours:
                 disk.remove(unfinished_of(task.output))
             return "done before"
@@ -45,6 +49,8 @@ def run_to_file(task: Task, precomputed: Precomputed | None = None) -> Ending:
         elif store is not None and is_ours:
             damaged = stack.enter_context(store).resume()
         else:
+            if store is not None:
+                store.close()  # or its room on the disk is not free
             if store is not None and not task.force:
                 raise SweepError(
                     f"{store.path}: the unfinished result of another study or version; finish that one first, "

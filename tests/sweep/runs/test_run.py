@@ -1,12 +1,15 @@
 """One run: same bits however it is cut, continued, extended and repaired; what stands at its place is never lost."""
 
 import errno
+import gc
 import io
 import os
+import shutil
 import subprocess
 import sys
 import textwrap
 import time
+from pathlib import Path
 
 import bad
 import h5py
@@ -161,6 +164,27 @@ def test_the_unfinished_result_of_another_study_is_kept_unless_forced(unfinished
         quiet(tall(24), unfinished)
     assert unfinished_of(unfinished).read_bytes() == before
     same(quiet(tall(24), unfinished, force=True), quiet(tall(24)))
+
+
+@pytest.mark.skipif(not Path("/proc/self/fd").is_dir(), reason="what is open is looked up in /proc")
+def test_what_is_given_up_is_closed_so_that_its_room_on_the_disk_is_free(unfinished, monkeypatch):
+    def room(folder, ask=shutil.disk_usage):
+        left = str(unfinished_of(unfinished))
+        assert not [fd for fd in Path("/proc/self/fd").iterdir() if os.path.realpath(fd).startswith(left)]
+        return ask(folder)
+
+    monkeypatch.setattr(shutil, "disk_usage", room)
+    gc.disable()
+    try:
+        quiet(tall(24), unfinished, force=True).close()
+    finally:
+        gc.enable()
+
+
+def test_a_result_cannot_be_called_as_one_that_is_not_finished(tmp_path):
+    with pytest.raises(SweepError, match="unfinished"):
+        quiet(tall(3), tmp_path / "out.h5.unfinished")
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("harm", ["cut", "empty", "words", "attribute"])
