@@ -24,7 +24,8 @@ def open_file(path: Path | str, flags: int) -> int:
 
 
 write, rename, fsync = os.pwritev, os.replace, os.fsync
-"""`write(fd, pieces, offset)` says how many bytes were written, one piece behind the other; maybe not all."""
+"""`write(fd, pieces, offset)` says how many bytes were written, one piece behind the other; maybe not all. `rename(old,
+new)` takes the place of `new` in one step. `fsync(fd)` returns when the file is on the disk. They raise OSError."""
 sync_numbers = getattr(os, "fdatasync", os.fsync)
 """Returns when the bytes of a file whose length stays are on the disk."""
 
@@ -93,8 +94,8 @@ def sync_folder(path: Path) -> None:
 def replacing(target: Path, held: bool = False) -> Iterator[Path]:
     """A file beside `target` to write to, or to put a folder at; synced, it takes the place of `target` at the end.
 
-    What was there before then stays where the system refuses, or, unless a lock is `held`, another process writes it:
-    raises SweepError.
+    Raises SweepError where the system refuses, or another process writes it; what was there before then stays. With
+    `held` the caller has a lock of its own, and none is taken here.
     """
     part, old = part_of(target), target.with_name(f".{target.name}.old")
     lock = contextlib.nullcontext(True) if held else locked(target.with_name(f".{target.name}.lock"))

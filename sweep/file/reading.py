@@ -46,7 +46,7 @@ NOTHING = {STATUS: int(Status.PENDING), METHOD_USED: -1}
 """What is handed out of cells that are not computed yet, where that is not NaN."""
 MODULUS, ROW = 65535, 4096
 NUMBERS = np.arange(ROW, dtype=np.uint64)
-"""Of the words of a row, and of the rows, of which as many are summed at a time: 32 bits hold each sum."""
+"""Numbers of the words in a row, and of the rows that are summed at a time: at most ROW, so that 32 bits hold a sum."""
 
 
 class Damaged(SweepError):

@@ -117,7 +117,7 @@ class Loop:
 
     The workers of the task's cluster do so, where anything is `to_do`, or threads here. How the rows are cut may be
     settled already (`partition`), and some cells may be known (`reused`), or all, and none is timed. Until `stack`
-    ends, Ctrl-C and SIGTERM are to be held back.
+    ends, Ctrl-C and SIGTERM are held back, if they are to be (`hold`): a plan keeps nothing, and need not.
     """
 
     def __init__(
