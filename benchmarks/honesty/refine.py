@@ -79,12 +79,13 @@ def refined(function, axes, tolerance):
         found = dataset_of(function, list(values.values()), ("cell",))
         return found.assign_coords({name: ("cell", column) for name, column in values.items()})
 
-    study = SimpleNamespace(axes={n: Axis(n, g, "values") for n, g in zip(names, grid, strict=True)}, design="product")
+    gridded = {n: Axis(n, g, "values") for n, g in zip(names, grid, strict=True)}
+    study = SimpleNamespace(axes=gridded, outputs=("value",), design="product")
     first = dataset_of(function, np.meshgrid(*grid, indexing="ij"), names)
     first = first.assign_coords(dict(zip(names, grid, strict=True)))
     cells = Refiner(first, study, ["value"], tolerance, MOST_CELLS, solved)
     cells.refine()
-    return cells.points, cells.column("value"), cells.report(first)
+    return cells.points, cells.cells["value"], cells.report(first)
 
 
 def true_error(function, points, values):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,10 +14,10 @@ import xarray as xr
 from kernels.interface import Status
 from sweep.cells.fingerprint import fingerprint, is_of_program
 from sweep.cells.grid import Grid
-from sweep.cells.schema import ANCILLARY, STATUS, cell_schema
+from sweep.cells.schema import ANCILLARY, STATUS
 from sweep.errors import SweepError
 from sweep.file.disk import check_target
-from sweep.file.open import in_memory, memory
+from sweep.file.open import memory
 from sweep.results.diff import diff, two_results
 from sweep.runs.run import store_cells
 from sweep.study.model import SETTINGS, Axis, Block, Study, frozen, setting
@@ -80,40 +80,34 @@ def join(
     if 2 * sum(dataset.nbytes for dataset in results) > memory():
         raise SweepError("the two results together do not fit into the memory")
     studies = [Study.from_json(str(dataset.attrs["study_json"]), declared=True) for dataset in results]
-    apart = _apart(*studies)
-    if axis is None and len(apart) == 1 and (apart[0] == "points" or apart[0].startswith("axes.")):
-        study, whole = _longer(studies[0], studies[1], results, apart[0].removeprefix("axes."))
+    # what they differ in: "axes.mu", "fixed.a", "rtol"; of axes that run together "points"
+    old, new = map(_said, studies)
+    apart = sorted(name for name in {*old, *new} - {"study"} if old.get(name) != new.get(name))
+    if studies[0].dims == studies[1].dims and len(studies[0].dims) == 1 and studies[0].design != "product":
+        apart = list(dict.fromkeys("points" if name.startswith("axes.") else name for name in apart))
+    longer = apart[0].removeprefix("axes.") if axis is None and len(apart) == 1 else ""
+    if longer == "points" or longer in studies[0].dims:
+        study, whole = _longer(studies[0], studies[1], results, longer)
     else:
-        made = _new_axis(apart, studies, axis, labels, results[0])
-        study, whole = _with_axis(studies[0], results, made)
+        study, whole = _with_axis(studies[0], results, _new_axis(apart, studies, axis, labels, results[0]))
     study = replace(study, text="", title=studies[0].title)
 
     grid, arrays = Grid(study), dict[str, Any]()
     for name in (*study.outputs, *ANCILLARY):
         values = whole[name].transpose(*grid.dims, ...).values
         arrays[name] = np.ascontiguousarray(values.reshape(grid.size, *values.shape[len(grid.dims) :]))
+    if path is not None:
+        sources = [Path(d.encoding["source"]) for d in results if "source" in d.encoding]
+        check_target(as_path(path), force=force, read=sources)
+    versions = "\n".join(f"{k}: {d.attrs.get('versions', '')}" for k, d in zip(labels, results, strict=False))
     # no run continues it, nor is it of the program that joins
     mark = {**_said(study), "joined": "of two results"}
-    if path is None:
-        return in_memory(cell_schema(study, mark), arrays)
-    sources = [Path(d.encoding["source"]) for d in results if "source" in d.encoding]
-    check_target(as_path(path), force=force, read=sources)
-    versions = "\n".join(f"{k}: {d.attrs.get('versions', '')}" for k, d in zip(labels, results, strict=True))
     return store_cells(study, path, arrays, True, mark, {"taken_over": versions})
 
 
 def _said(study: Study) -> dict[str, str]:
     """The entries of a fingerprint that tell of the study, not of the program."""
     return {name: text for name, text in fingerprint(study).items() if not is_of_program(name)}
-
-
-def _apart(first: Study, second: Study) -> list[str]:
-    """What two studies differ in: "axes.mu", "fixed.a", "rtol"; of axes that run together "points"."""
-    old, new = _said(first), _said(second)
-    apart = sorted(name for name in {*old, *new} - {"study"} if old.get(name) != new.get(name))
-    if first.dims == second.dims and len(first.dims) == 1 and first.design != "product":
-        return list(dict.fromkeys("points" if name.startswith("axes.") else name for name in apart))
-    return apart
 
 
 def _new_axis(
@@ -152,42 +146,32 @@ def _with_axis(study: Study, results: Sequence[xr.Dataset], axis: Axis) -> tuple
         # dimensions of points have other names in a study of blocks
         names = {axes: dim for dim, axes in joined.dims.items()}
         results = [dataset.rename({dim: names[axes] for dim, axes in study.dims.items()}) for dataset in results]
-    whole = xr.concat([_numbers(dataset, study) for dataset in results], dim=axis.name)
-    return joined, whole.assign_coords({axis.name: list(axis.words if axis.words is not None else axis.values)})
+    return joined, xr.concat([_numbers(dataset, study) for dataset in results], dim=axis.name)
 
 
 def _longer(a: Study, b: Study, results: Sequence[xr.Dataset], name: str) -> tuple[Study, xr.Dataset]:
     """Both, longer along an axis or by further points; what is in both has to be the same."""
-    first, second = results
-    names, dim = ([name], name) if a.design == "product" else (list(a.axes), next(iter(a.dims)))
-
-    def points(study: Study) -> Iterable[tuple[Any, ...]]:
-        """What tells places along the axes, which run together, from each other."""
-        axes = [study.axes[name] for name in names]
-        columns = (axis.words if axis.words is not None else axis.values.tolist() for axis in axes)
-        return zip(*([tuple(v) if isinstance(v, list) else v for v in column] for column in columns), strict=True)
-
-    places = {point: place for place, point in enumerate(points(a))}
-    here = [places.get(point) for point in points(b)]
-    shared = [place for place, there in enumerate(here) if there is not None]
-    fresh = [place for place, there in enumerate(here) if there is None]
-    if shared:
-        found = diff(first.isel({dim: [here[place] for place in shared]}), second.isel({dim: shared}))
-        if not found.same:
-            raise SweepError(f"the results do not fit together: cells that are in both differ\n{found}")
-    whole = xr.concat([_numbers(first, a), _numbers(second, b).isel({dim: fresh})], dim=dim)
+    product = name in a.dims
+    names, dim = ([name], name) if product else (list(a.axes), next(iter(a.dims)))
+    values = {name: np.concatenate([a.axes[name].values, b.axes[name].values]) for name in names}
+    points = np.column_stack([column.reshape(len(column), -1) for column in values.values()])
+    _, first, number = np.unique(points, axis=0, return_index=True, return_inverse=True)
+    if not product:  # cells are told apart by their points
+        numbers = np.split(number.ravel(), [len(a.axes[names[0]])])
+        results = [dataset.assign_coords({dim: here}) for dataset, here in zip(results, numbers, strict=True)]
+    one, other = results
+    found = diff(one, other)
+    if found.statuses or any(distance.cells for distance in found.outputs.values()):
+        raise SweepError(f"the results do not fit together: cells that are in both differ\n{found}")
+    # numbers of an axis of a product rise; words and points stand as they are given
+    kept = np.sort(first) if a.axes[names[0]].words or not product else first
+    whole = xr.concat([_numbers(dataset, a) for dataset in results], dim=dim).isel({dim: kept})
     axes = dict(a.axes)
-    for name in names:
-        one, other = a.axes[name], b.axes[name]
-        words = None if one.words is None or other.words is None else (*one.words, *(other.words[k] for k in fresh))
-        axes[name] = Axis(name, frozen(np.concatenate([one.values, other.values[fresh]])), "values", words)
-    if a.design != "product":
-        return replace(a, design="zip", blocks=(), axes=axes), whole
-    if not axes[dim].words:
-        order = np.argsort(axes[dim].values, kind="stable")
-        axes[dim] = replace(axes[dim], values=frozen(axes[dim].values[order]))
-        whole = whole.isel({dim: order})
-    return replace(a, axes=axes), whole
+    for name, column in values.items():
+        old, new = a.axes[name].words, b.axes[name].words
+        words = tuple((*old, *new)[k] for k in kept) if old and new else None
+        axes[name] = Axis(name, frozen(column[kept]), "values", words)
+    return replace(a, axes=axes) if product else replace(a, design="zip", blocks=(), axes=axes), whole
 
 
 def _numbers(dataset: xr.Dataset, study: Study) -> xr.Dataset:

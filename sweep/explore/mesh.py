@@ -58,28 +58,12 @@ FLATTEST, STRAIGHT = 1e-5, 1e-9
 
 
 class Mesh:
-    """Cells joined to simplices as an output wants it.
+    """Cells joined to simplices as an output wants it, which has some `heights` (n,) at `points` (n, axes) of a box.
 
-    Parameters
-    ----------
-    points : ndarray, shape (n, axes)
-        Where cells lie in a box.
-    heights : ndarray, shape (n,)
-        The output there, NaN where it has no value.
-    kind : ndarray of int, shape (n,), optional
-        Of which kind cells are, -1 of none: a simplex is judged by cells of its own kind alone. Default: all with a
-        value are of one.
-    matrix : ndarray, optional
-        By which points are multiplied before they are joined; default: what `stretch` tells.
-
-    Attributes
-    ----------
-    corners : ndarray of int, shape (m, axes + 1)
-        Cells at the corners of each simplex; one without a volume is left out.
-    edges : ndarray of int, shape (m, pairs, 2)
-        Cells at the ends of its edges.
-    places : ndarray, shape (n, axes)
-        Where cells lie when they are joined.
+    A simplex is judged by cells of its own `kind` alone, -1 of those that are of none; default: all with a value are of
+    one. The `matrix` multiplies points before they are joined; default: what `stretch` tells. Then cells lie at
+    `places`. The cells at the `corners` (m, axes + 1) of simplices, and at the ends of their `edges` (m, pairs, 2), are
+    numbers; a simplex without a volume is left out.
     """
 
     def __init__(self, points: Array, heights: Array, kind: Indices | None = None, matrix: Array | None = None) -> None:

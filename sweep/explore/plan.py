@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import time
+from collections import Counter
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -209,26 +210,23 @@ def _looked_at(study: Study, solver: Guard, seconds: float) -> tuple[dict[str, f
     The ends are those of every axis, in the middle of the others, and of all axes at once: there a scene is most often
     another one, and so is the method. The others are one of each of equal shares of the grid.
     """
-    grid = Grid(study)
+    grid, rng = Grid(study), np.random.default_rng(0)
     last, axis = np.array(grid.shape) - 1, np.eye(len(grid.shape), dtype=bool)
-    middle = last // 2
-    places = np.concatenate([[0 * last], [last], np.where(axis, 0, middle), np.where(axis, last, middle)])
-    ends = dict.fromkeys(np.ravel_multi_index(tuple(places.T), grid.shape).tolist())
-    rng = np.random.default_rng(0)
+    places = np.concatenate([[0 * last], [last], np.where(axis, 0, last // 2), np.where(axis, last, last // 2)])
+    ends = np.ravel_multi_index(tuple(places.T), grid.shape)
     drawn = rng.permutation(((np.arange(DRAWN) + rng.random(DRAWN)) * (grid.size / DRAWN)).astype(np.int64))
-    numbers = dict.fromkeys([*ends, *drawn.tolist()])
-
-    cells = empty_cells(study, len(numbers))
-    sampled, until = 0, time.perf_counter() + seconds
-    for number in numbers:
-        if sampled >= len(ends) and time.perf_counter() > until:
+    numbers = list(dict.fromkeys([*ends.tolist(), *drawn.tolist()]))
+    cells, until = empty_cells(study, len(numbers)), time.perf_counter() + seconds
+    for taken, number in enumerate(numbers):
+        if number not in ends and time.perf_counter() > until:
+            numbers = numbers[:taken]
             break
-        solver.solve(number, cells.rows(slice(sampled, sampled + 1)))
-        sampled += 1
+        solver.solve(number, cells.rows(slice(taken, taken + 1)))
+    sampled = len(numbers)
 
     def shares(column: Any, names: dict[int, str]) -> dict[str, float]:
-        found, counts = np.unique(column[:sampled], return_counts=True)
-        return {names[int(n)]: float(c / sampled) for n, c in zip(found, counts, strict=True)}
+        counts = Counter(column[:sampled].tolist())
+        return {names[code]: counts[code] / sampled for code in sorted(counts)}
 
     methods = {-1: "none", **dict(enumerate(method.name for method in study.kernel.methods))}
     return shares(cells.used, methods), shares(cells.status, {int(s): s.name for s in Status}), sampled

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-import dataclasses
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from kernels.interface import FIRST_REFUSAL, Status
-from sweep.cells.sample import relative_error, solved, with_method
+from sweep.cells.grid import Grid
+from sweep.cells.sample import relative_error, solved
 from sweep.cells.schema import ERROR_BOUND, METHOD_USED, STATUS
-from sweep.cells.solve import GIVEN_UP, among, usable_methods
+from sweep.cells.solve import GIVEN_UP, among, turns
 from sweep.errors import SweepError
 from sweep.results.statuses import cell_values, flag_words
-from sweep.study.model import SETTINGS, SMALLEST_RTOL, Axis, Study, frozen, short
+from sweep.study.model import SMALLEST_RTOL, Axis, Study, frozen, short
 from sweep.words import Table, page, paragraph
 
 CLOSER = 100.0
@@ -34,31 +34,35 @@ def require_cells(name: str, dataset: xr.Dataset) -> None:
         raise SweepError(f"sweep {name}: this is a summary, which keeps no cells; run its study without [summary]")
 
 
-def study_of(cell: xr.Dataset, study: Study) -> Study:
-    """The study of one cell of a result, a Dataset without a dimension of the grid, and of the study it came from.
+def study_of(cells: xr.Dataset, study: Study) -> Study:
+    """A zip of cells of a result, those along "cell", by all parameters and rtol, from the study that they came from.
 
     Raises
     ------
     SweepError
         A parameter's value is no longer there, or stands in another unit.
     """
-    fixed = dict[str, Any]()
+    columns, size = dict[str, Any](), cells[STATUS].size
     for field in study.kernel.parameters:
         name = study.follows.get(field.name, field.name)
-        if name not in cell.coords:
+        if name not in cells.coords:
             raise SweepError(f"{name}: the dataset has lost this coordinate; take a cell of the result as it was read")
-        value: Any = cell[name].values
-        if field.choices and value.dtype.kind not in "fiu":
-            value = field.choices[str(value)]
-        elif cell[name].attrs.get("units", field.unit) != field.unit:
+        values: Any = cells[name].values
+        if field.choices and values.dtype.kind not in "fiu":
+            values = np.vectorize(field.choices.get, otypes=[float])(values)
+        elif cells[name].attrs.get("units", field.unit) != field.unit:
             raise SweepError(f"{name}: stands in another unit; take a cell of the result as it was read")
-        fixed[field.name] = frozen(value) if field.dims else float(value)
-    first = min(study.kernel.parameters, key=lambda field: field.default is not None).name  # a required one, if any
-    axes = {first: Axis(first, frozen(np.asarray(fixed.pop(first))[None]), "values")}
-    plain: dict[str, Any] = {"design": "zip", "blocks": (), "where": "", "summary": None, "follows": {}}
-    return dataclasses.replace(
-        study, axes=axes, fixed=fixed, **plain, **{name: cell[name].item() for name in SETTINGS if name in study.axes}
-    )
+        columns[field.name] = values if "cell" in cells[name].dims else np.broadcast_to(values, (size, *values.shape))
+    columns["rtol"] = np.full(size, cells["rtol"].values if "rtol" in study.axes else study.rtol)
+    axes = {name: Axis(name, frozen(values), "values") for name, values in columns.items()}
+    return replace(study, axes=axes, fixed={}, follows={}, design="zip", blocks=(), where="", summary=None)
+
+
+def able(study: Study) -> dict[int, Any]:
+    """The methods that can do some of a study's cells, of which all parameters are axes, and whether each can."""
+    *columns, rtol = (axis.values for axis in study.axes.values())
+    turned = (turn for turn in turns(study, Grid(study)) if not turn.early)
+    return {t.number: np.all([rtol > 0, *(term.holds(columns) for term in t.absent)], axis=0) for t in turned}
 
 
 @dataclass(frozen=True)
@@ -76,10 +80,9 @@ class CellReport:
         Error of the values, and the accuracy that the study asks for.
     methods : dict of str to tuple
         Status, error bound and outputs by each method that can do the cell, at the same rtol.
-    of_method : tuple of str
-        Outputs that say how a cell was solved, such as a number of steps, in which methods differ anyway.
-    nothing : float
-        What is not larger by two methods is the same: of a scene of one's own, what is 0 to rounding.
+    differs : dict of str to float
+        The largest relative difference of each method's outputs from `values`, NaN where only one is NaN. Outputs that
+        say how a cell was solved, such as a number of steps, are left out; {} where only these or traces are there.
     """
 
     place: dict[str, str]
@@ -90,35 +93,23 @@ class CellReport:
     error_bound: float
     rtol: float
     methods: dict[str, tuple[Status, float, dict[str, float]]]
-    of_method: tuple[str, ...] = ()
-    nothing: float = 0.0
+    differs: dict[str, float]
 
     def __str__(self) -> str:
+        special = "" if self.status is Status.OK else f" ({self.status.kind})"
         outputs = ((name, f"{value:.10g}", self.units[name]) for name, value in self.values.items())
-        width = 4 if self.values.keys() - set(self.of_method) else 3  # traces are not compared
-        asked = (
-            (name, status.name, f"{error:.2g}", f"{self._apart(values):.2g}")[:width]
-            for name, (status, error, values) in self.methods.items()
-        )
-        headings = ("method", "status", "error", "differs by")[:width]
+        headings = ("method", "status", "error", *["differs by"] * bool(self.differs))
+        off = {name: (f"{share:.2g}",) for name, share in self.differs.items()}
+        asked = [(k, status.name, f"{error:.2g}", *off.get(k, ())) for k, (status, error, _) in self.methods.items()]
         return page(
             paragraph("cell: " + ", ".join(f"{name} = {value}" for name, value in self.place.items())),
             paragraph(
-                f"{self.status.name}{'' if self.status is Status.OK else f' ({self.status.kind})'}: {self.status.doc}\n"
+                f"{self.status.name}{special}: {self.status.doc}\n"
                 f"solved by {self.method}; error bound {self.error_bound:.2g}, requested rtol {self.rtol:g}"
             ),
             Table(outputs, ("output", "value", "unit")).text(),
             Table(asked, headings, "Each method of the kernel at the same rtol, computed now:").text(),
         )
-
-    def _apart(self, values: dict[str, float]) -> float:
-        """The largest relative difference of a method's outputs from those above; NaN where only one is NaN."""
-        off = [0.0]
-        for name in self.values.keys() - set(self.of_method):
-            pair = np.array([values[name], self.values[name]])
-            pair[abs(pair) <= self.nothing] = 0.0
-            off.append(np.nan if np.isnan(pair).sum() == 1 else float(relative_error(pair[:1], pair[1:])[0]))
-        return float(np.max(off))
 
 
 def report_cell(dataset: xr.Dataset, study: Study) -> CellReport:
@@ -134,35 +125,38 @@ def report_cell(dataset: xr.Dataset, study: Study) -> CellReport:
     if longer:
         axes = ", ".join(f"{dim} ({n} values)" for dim, n in longer.items())
         raise SweepError(f"sweep cell: name one cell; these axes have several values still: {axes}")
-    dataset = dataset.squeeze(list(dataset[STATUS].dims)).compute()
-    alone = study_of(dataset, study)
-    numbers = [name for name in study.outputs if not dataset[name].dims]
-    words, again = {int(status): status for status in Status}, {}
-    required = [field.name for field in study.kernel.parameters if field.default is None]
-    for method in (study.kernel.methods[k].name for k in usable_methods(alone)):
-        cells = solved(with_method(alone, method, alone.rtol))
-        outputs = {name: float(cells.outputs[name][0]) for name in numbers}
-        again[method] = words[int(cells.status[0])], float(cells.error[0]), outputs
+    cell = dataset.squeeze(list(dataset[STATUS].dims)).compute()
+    again = study_of(cell.expand_dims("cell"), study)
+    values = {name: cell[name].item() for name in study.outputs if not cell[name].dims}
+    compared = [field.name for field in study.asked if field.name in values and not field.of_method]
+    words, methods, differs = {int(status): status for status in Status}, {}, dict[str, float]()
+    for method in (study.kernel.methods[k].name for k, can in able(again).items() if can):
+        found = solved(replace(again, method=method))
+        outputs = {name: float(found.outputs[name][0]) for name in values}
+        methods[method] = words[int(found.status[0])], float(found.error[0]), outputs
+        if compared:
+            pair = np.array([[some[name] for name in compared] for some in (outputs, values)])
+            if ":" in study.kernel_name:
+                pair[abs(pair) <= NOTHING] = 0.0
+            off = np.where(np.isnan(pair).sum(axis=0) == 1, np.nan, relative_error(*pair))
+            differs[method] = float(off.max())
+    shown = {*study.terms, *study.axes, *(field.name for field in study.kernel.parameters if field.default is None)}
+    place = dict[str, str]()
+    for name, value in ((name, cell[name]) for name in cell.coords if name in shown):
+        unit = value.attrs.get("units", "1")
+        text = short(value.values) if value.dtype.kind in "fiu" else str(value.item())
+        place[str(name)] = text if unit == "1" else f"{text} {unit}"
     return CellReport(
-        {name: _label(dataset[name]) for name in dataset.coords if name in {*alone.terms, *required, *study.axes}},
-        {name: dataset[name].item() for name in numbers},
-        {name: dataset[name].attrs.get("units", "") for name in numbers},
-        words[dataset[STATUS].item()],
-        flag_words(dataset[METHOD_USED])[dataset[METHOD_USED].item()],
-        float(dataset[ERROR_BOUND]) if ERROR_BOUND in dataset else np.nan,
-        alone.rtol,
-        again,
-        tuple(field.name for field in study.asked if field.of_method),
-        NOTHING if ":" in study.kernel_name else 0.0,
+        place,
+        values,
+        {name: cell[name].attrs.get("units", "") for name in values},
+        words[cell[STATUS].item()],
+        flag_words(cell[METHOD_USED])[cell[METHOD_USED].item()],
+        float(cell[ERROR_BOUND]) if ERROR_BOUND in cell else np.nan,
+        float(again.axes["rtol"].values[0]),
+        methods,
+        differs,
     )
-
-
-def _label(value: xr.DataArray) -> str:
-    """A parameter as people write it, with its unit."""
-    if value.dtype.kind not in "fiu":
-        return str(value.item())
-    unit = value.attrs.get("units", "1")
-    return short(value.values) + (f" {unit}" if unit != "1" else "")
 
 
 @dataclass(frozen=True)
@@ -250,13 +244,8 @@ def check(dataset: xr.Dataset, study: Study, sample: int = 200, seed: int = 0) -
     cells = dataset.isel({dim: xr.DataArray(place, dims="cell") for dim, place in places}).compute()
     cells = cells.transpose("cell", ...)
     used, methods = cells[METHOD_USED].values, [method.name for method in study.kernel.methods]
-    rtol = cells["rtol"].values if "rtol" in study.axes else np.full(len(drawn), study.rtol)
-    by, error = np.full(len(drawn), -1), np.full(len(drawn), np.nan)
-    values = {field.name: np.full(cells[field.name].shape, np.nan) for field in study.asked}
-    for i in range(len(drawn)):
-        by[i], error[i], outputs = _second_opinion(study_of(cells.isel(cell=i), study), used[i])
-        for name, value in outputs.items():
-            values[name][i] = value
+    again = study_of(cells, study)
+    rtol, (by, error, values) = again.axes["rtol"].values, _second_opinions(again, used)
 
     judged, own = by >= 0, ":" in study.kernel_name
     sizes = {field.name: float(abs(cells[field.name]).max()) if own else 0.0 for field in study.asked}
@@ -282,22 +271,29 @@ def check(dataset: xr.Dataset, study: Study, sample: int = 200, seed: int = 0) -
     return Checked(len(ok), len(drawn), number, by_another, beyond, limit, worst)
 
 
-def _second_opinion(cell: Study, own: int) -> tuple[int, float, dict[str, Any]]:
-    """The number of a method that solves a cell closely, what it is right to, and its outputs; -1 where none does.
+def _second_opinions(study: Study, used: Any) -> tuple[Any, Any, dict[str, Any]]:
+    """Of cells that some methods solved: the numbers of methods that solve them closely, their errors, and outputs.
 
-    `own` is the method that solved it. Outputs are NaN, and differ from any value, where a method finds that the scene
-    has no such answer.
+    The number is -1 where no method does. Outputs are NaN, and differ from any value, where a method finds that the
+    scene has no such answer.
     """
-    methods, tried = cell.kernel.methods, dict[int, Any]()
-    # the cell's own method comes last, and those that say what they are right to before the others
-    vague = [method.bound is None and not method.estimates for method in methods]
-    order = sorted(usable_methods(cell), key=lambda k: (k == own, vague[k]))
-    for good, k in itertools.product((GOOD, 1.0), order):
-        if k not in tried:
-            tried[k] = solved(with_method(cell, methods[k].name, max(cell.rtol / CLOSER, SMALLEST_RTOL)))
-        again, status = tried[k], int(tried[k].status[0])
-        none = status >= FIRST_REFUSAL and not among(again.status, GIVEN_UP)[0]
-        error = 0.0 if none else float(again.error[0])
-        if none or (status in (Status.OK, Status.INACCURATE) and error <= cell.rtol / good):
-            return k, error, {name: column[0] for name, column in again.outputs.items()}
-    return -1, np.nan, {}
+    methods, size, rtol = study.kernel.methods, len(used), study.axes["rtol"].values
+    closer = study.axes | {"rtol": Axis("rtol", np.maximum(rtol / CLOSER, SMALLEST_RTOL), "values")}
+    by, error, settled = np.full(size, -1), np.full(size, np.nan), np.zeros(size, bool)
+    values = {name: np.full((size, *shape), np.nan) for name, shape in study.shapes.items()}
+    # methods that say what they are right to come before others, and a cell's own after all
+    order = sorted(able(study).items(), key=lambda k: methods[k[0]].bound is None and not methods[k[0]].estimates)
+    for own, (k, can) in itertools.product((False, True), order):
+        some = np.flatnonzero(can & ~settled & ((used == k) == own))
+        if not len(some):
+            continue
+        axes = {name: replace(axis, values=frozen(axis.values[some])) for name, axis in closer.items()}
+        again = solved(replace(study, axes=axes, method=methods[k].name))
+        void = (again.status >= FIRST_REFUSAL) & ~among(again.status, GIVEN_UP)
+        known = np.where(void, 0.0, np.where(again.status <= Status.INACCURATE, again.error, np.inf))
+        settled[some] = known <= rtol[some] / GOOD
+        taken = settled[some] | ((known <= rtol[some]) & (by[some] < 0))
+        by[some[taken]], error[some[taken]] = k, known[taken]
+        for name, column in again.outputs.items():
+            values[name][some[taken]] = column[taken]
+    return by, error, values

@@ -28,13 +28,12 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from kernels.interface import Status
-from sweep.cells.schema import ANCILLARY, STATUS, cell_schema
+from sweep.cells.schema import ANCILLARY, STATUS
 from sweep.errors import SweepError
 from sweep.explore.mesh import Array, Indices, Mesh, at_pole, scatter, stretch
 from sweep.explore.scattered import MOST_AXES, REFINED_TO, Box, axes_of, heights, kinds
 from sweep.file import disk
 from sweep.file.disk import check_target
-from sweep.file.open import in_memory
 from sweep.runs.run import run, store_cells
 from sweep.study.model import Axis, Study, frozen
 from sweep.study.read import study as as_study
@@ -179,13 +178,11 @@ def refine(
     cells = Refiner(dataset, study, names, tolerance, most_cells, solve)
     cells.refine()
     # all cells in rising order, in a file or in memory
-    values = {name: cells.column(name) for name in cells.axes}
-    order = np.lexsort(list(values.values())[::-1])
-    whole = study_of({n: column[order] for n, column in values.items()}, "product" if len(values) == 1 else "zip")
-    arrays = {name: cells.column(name)[order] for name in (*study.outputs, *ANCILLARY)}
+    order = np.lexsort([cells.cells[name] for name in reversed(cells.axes)])
+    arrays = {name: column[order] for name, column in cells.cells.items()}
+    values = {name: arrays.pop(name) for name in cells.axes}
+    whole = study_of(values, "product" if len(values) == 1 else "zip")
     attrs = {REFINED_TO: json.dumps(dict.fromkeys(names, tolerance))}
-    if path is None:
-        return cells.report(in_memory(cell_schema(whole, {}), arrays).assign_attrs(attrs))
     found = cells.report(store_cells(whole, path, arrays, force, attrs=attrs))
     shutil.rmtree(rounds or "", ignore_errors=True)
     return found
@@ -243,7 +240,8 @@ class Judged(NamedTuple):
 class Refiner:
     """Cells joined to simplices, whose edges are cut until outputs can be interpolated.
 
-    It begins with a dataset; `solve` makes further ones, of cells with given values of the axes.
+    It begins with a dataset; `solve` makes further ones, of cells with given values of the axes. `cells` are the
+    columns of all: axes, outputs, and what is said of them.
     """
 
     def __init__(
@@ -256,18 +254,17 @@ class Refiner:
         solve: Callable[[Mapping[str, Array]], xr.Dataset],
     ) -> None:
         self.tolerance, self.most, self._solve = tolerance, most_cells, solve
-        self.axes, even = list(study.axes), study.design != "product"
-        cells = dataset.load()
-        if cells[STATUS].ndim > 1:
+        self.axes, first = list(study.axes), dataset.load()
+        if first[STATUS].ndim > 1:
             # all along one dimension, which is the first one of traces too
-            cells = cells.stack(cell=list(cells[STATUS].dims), create_index=False).transpose("cell", ...)
-        self.parts, self.box = [cells], Box.of(cells, self.axes)
-        self.points = self.box.points(cells)  # from 0 to 1, shape (cells, axes)
-        self.first = len(self.points)
+            first = first.stack(cell=list(first[STATUS].dims), create_index=False).transpose("cell", ...)
+        self.cells: dict[str, Any] = {name: first[name].values for name in (*self.axes, *study.outputs, *ANCILLARY)}
+        self.box, self.first = Box.of(first, self.axes), first[STATUS].size
+        self.points = self.box.points(self.cells)  # from 0 to 1, shape (cells, axes)
         # the two cells that each was put between; of the first ones, itself
         self.origins = np.stack([np.arange(self.first)] * 2, axis=1)
-        lengths = (len(axis) - 1 for axis in study.axes.values())
-        self._steps = np.array([self.first ** (1 / len(self.axes)) if even else length for length in lengths])
+        even = self.first ** (1 / len(self.axes)) if study.design != "product" else 0.0
+        self._steps = np.array([even or len(axis) - 1 for axis in study.axes.values()])
         # how far values of an output scatter, which more cells do not lessen; 0 where they do
         self.noise = dict.fromkeys(names, 0.0)
         self._to_cut: dict[str, list[tuple[int, float]]] = {name: [] for name in names}
@@ -283,7 +280,7 @@ class Refiner:
         stretched_at = 0
         while True:
             if len(self.points) >= GROWTH * stretched_at:
-                stretches = {name: stretch(self.points, heights(self.column(name))) for name in self.noise}
+                stretches = {name: stretch(self.points, heights(self.cells[name])) for name in self.noise}
                 stretched_at = len(self.points)
             parts = [self._judged(name, stretches[name]) for name in self.noise]
             self.found = found = Judged(*(np.concatenate(column) for column in zip(*parts, strict=True)))
@@ -300,10 +297,6 @@ class Refiner:
                 stretched_at = 0
             else:
                 return
-
-    def column(self, name: str) -> Any:
-        """An axis, an output, or what is said of it, of all cells."""
-        return np.concatenate([part[name].values for part in self.parts])
 
     def report(self, dataset: xr.Dataset) -> Refinement:
         """What came of it, with the dataset of all cells."""
@@ -332,22 +325,22 @@ class Refiner:
 
         Of places along an axis that rounding alone tells apart, all get the value of the first.
         """
-        values = {}
-        for k, name in enumerate(self.axes):
-            places = np.round(np.concatenate([self.points[:, k], points[:, k]]) / SAME)
-            first, same = np.unique(places, return_index=True, return_inverse=True)[1:]
-            known = np.concatenate([self.column(name), self.box.values(k, points[:, k])])
-            values[name] = known[first[same[len(self.points) :]]]
-        self.parts.append(self._solve(values))
-        itself = len(self.points) + np.arange(len(points))
+        values, before = {}, len(self.points)
         self.points = np.concatenate([self.points, points])
+        for k, name in enumerate(self.axes):
+            known = np.concatenate([self.cells[name], self.box.values(k, points[:, k])])
+            _, first, same = np.unique(np.round(self.points[:, k] / SAME), return_index=True, return_inverse=True)
+            values[name] = known[first[same[before:]]]
+        solved = self._solve(values)
+        self.cells = {name: np.concatenate([column, solved[name].values]) for name, column in self.cells.items()}
+        itself = before + np.arange(len(points))
         self.origins = np.concatenate([self.origins, np.stack([itself] * 2, axis=1) if ends is None else ends])
 
     def _judged(self, name: str, matrix: Array) -> Judged:
         """Errors of an output's straight lines between cells, and borders between statuses that are to be cut."""
-        points, axes, height = self.points, len(self.axes), heights(self.column(name))
-        finite = np.isfinite(np.stack([self.column(each) for each in self.noise])).all(axis=0)
-        mesh = Mesh(points, height, kinds(self.column(STATUS), finite), matrix)
+        points, axes, height = self.points, len(self.axes), heights(self.cells[name])
+        finite = np.logical_and.reduce([np.isfinite(self.cells[each]) for each in self.noise])
+        mesh = Mesh(points, height, kinds(self.cells[STATUS], finite), matrix)
         of_corners, of_ends, rows = mesh.kind[mesh.corners], mesh.kind[mesh.edges], np.arange(len(mesh.corners))
         alike = (of_corners == of_corners[:, :1]).all(axis=1)
         valued = alike & (of_corners[:, 0] >= 0)

@@ -174,8 +174,8 @@ def scaling(study: Given) -> Scaling:
     def group(powers: Weights, most: int = 1) -> Group:
         """Their product, raised to whole powers where their denominator is no larger."""
         common = math.lcm(*(power.denominator for power in powers.values()))
-        raised = {name: power * (common if common <= most else 1) for name, power in powers.items()}
-        return Group(tuple((name, raised[name]) for name in present if raised.get(name)))
+        factor = common if common <= most else 1
+        return Group(tuple((name, factor * powers[name]) for name in present if powers.get(name)))
 
     groups = []
     for i, name in enumerate(present):
@@ -222,19 +222,15 @@ def _held(study: Study) -> tuple[dict[str, Weights], int]:
             if _tried(few, old_few, weights) and (row := _tried(cells, old, weights)):
                 held[base] = row
                 break
-    rows, led = list(held.values()), dict[str, Weights]()
+    led = dict[str, Weights]()
     for field in fields:  # their reduced echelon form
-        if lead := next((row for row in rows if row[field.name]), None):
-            rows.remove(lead)
-            led[field.name] = {name: weight / lead[field.name] for name, weight in lead.items()}
-            rows = [_without(field.name, led[field.name], row) for row in rows]
-            led |= {n: _without(field.name, led[field.name], row) for n, row in led.items() if n != field.name}
+        if first := next((base for base, row in held.items() if row[field.name]), None):
+            row = held.pop(first)
+            led[field.name] = lead = {name: weight / row[field.name] for name, weight in row.items()}
+            for rows, key in [*((held, key) for key in held), *((led, key) for key in led if key != field.name)]:
+                factor = rows[key][field.name]
+                rows[key] = {name: weight - factor * lead[name] for name, weight in rows[key].items()}
     return led, int(valued.sum())
-
-
-def _without(name: str, lead: Weights, row: Weights) -> Weights:
-    """A scaling less as much of another one as makes a weight 0."""
-    return {n: weight - row[name] * lead[n] for n, weight in row.items()}
 
 
 def _is_scalable(study: Study, field: Field) -> bool:

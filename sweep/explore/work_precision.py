@@ -14,7 +14,7 @@ import itertools
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -145,13 +145,14 @@ def work_precision(
     if isolate or cell_timeout is not None:
         part = _without_failing(part, ["auto", *able], cell_timeout, note)
     against = _given(part, truth) if truth is not None else _best(part, [reference] if reference else able)
+    source, _, floor = against
     rows = [_measured(part, name, rtol, against) for name in names for rtol in tolerances]
     columns = {key: np.array([row[key] for row in rows]).reshape(len(names), -1) for key in rows[0]}
     columns["seconds"] = _seconds(part, names, tolerances)
     about = {key: {"units": "s" if key == "seconds" else "1", "long_name": LONG_NAMES[key]} for key in columns}
-    sound, judged = against.floor[against.sound], against.judged
-    basis = {"reference": against.source, "reference_error": float(max(sound, default=math.nan))}
-    basis |= {"cells": judged, "open_cells": len(against.floor) - judged}
+    open_cells = int(np.isinf(floor).sum())
+    basis = {"reference": source, "reference_error": float(max(floor[np.isfinite(floor)], default=math.nan))}
+    basis |= {"cells": len(floor) - open_cells, "open_cells": open_cells}
     found = xr.Dataset(
         {key: (("method", "rtol"), values, about[key]) for key, values in columns.items()},
         {"method": names, "rtol": tolerances},
@@ -223,27 +224,12 @@ def _omissions(found: xr.Dataset, study: Study, able: Sequence[str] | None) -> l
     return lines
 
 
-class _Reference(NamedTuple):
-    """Values by output; in each cell their relative error, infinite where they are not known to be right; and whether
-    it is known that there is nothing to give."""
-
-    source: str
-    values: dict[str, Any]
-    floor: Any
-    void: Any
-
-    @property
-    def sound(self) -> Any:
-        """Cells that have values accurate to `floor`."""
-        return np.isfinite(self.floor)
-
-    @property
-    def judged(self) -> int:
-        """Number of cells in which a method can be told right or wrong."""
-        return int((self.sound | self.void).sum())
+Reference = tuple[str, Mapping[str, Any], Any]
+"""Its name, values by output, and in each cell what these are right to: inf where that is not known, NaN where it is
+known that there is nothing to give."""
 
 
-def _given(study: Study, values: Mapping[str, Any]) -> _Reference:
+def _given(study: Study, values: Mapping[str, Any]) -> Reference:
     """Values of some outputs in all cells of a study; NaN in all of them: there is nothing to give."""
     size = Grid(study).size
     shapes = {name: (size, *shape) for name, shape in study.shapes.items()}
@@ -252,10 +238,10 @@ def _given(study: Study, values: Mapping[str, Any]) -> _Reference:
     if not given or given.items() - shapes.items():
         raise SweepError(f"truth: expected arrays of outputs, of the shapes {shapes}; found {given or 'none'}")
     void = np.all([np.isnan(column).reshape(size, -1).all(axis=1) for column in taken.values()], axis=0)
-    return _Reference(GIVEN, taken, np.where(void, np.inf, ROUNDING), void)
+    return GIVEN, taken, np.where(void, np.nan, ROUNDING)
 
 
-def _best(study: Study, names: Sequence[str]) -> _Reference:
+def _best(study: Study, names: Sequence[str]) -> Reference:
     """Of the method that leaves the fewest cells open; then: states a bound, is right to less. Raises SweepError.
 
     In each cell its values are those at the least rtol at which it says that they are right.
@@ -263,46 +249,47 @@ def _best(study: Study, names: Sequence[str]) -> _Reference:
     # what a method tells of itself, its work and its error, is neither right nor wrong
     compared = tuple(name for name in study.outputs if name not in (*WORK, *ESTIMATES))
     study = dataclasses.replace(study, outputs=compared or study.outputs)
-    vague = {name: study.kernel.method(name).bound is None for name in names}
-    size, found = Grid(study).size, list[_Reference]()
-    for name in sorted(names, key=lambda name: vague[name]):
-        if vague[name] and any(one.judged == size for one in found):
+    found = dict[tuple[int, bool, float], Reference]()
+    for name in sorted(names, key=lambda name: study.kernel.method(name).bound is None):
+        vague = study.kernel.method(name).bound is None
+        if vague and any(rank[0] == 0 for rank in found):
             break  # those that state a bound suffice
-        one = _Reference(name, {}, np.full(size, np.inf), np.zeros(size, bool))
+        values, floor = dict[str, Any](), np.full(Grid(study).size, np.inf)
         for rtol in FINE:
             outputs, status, *_ = solved(with_method(study, name, rtol))
             refused = status >= FIRST_REFUSAL
-            one.void[refused & ~among(status, GIVEN_UP)] = True
-            now = ~refused & (status != Status.INACCURATE) & ~one.sound
+            now = np.isinf(floor) & ~refused & (status != Status.INACCURATE)
             for output, column in outputs.items():
-                one.values.setdefault(output, column)[now] = column[now]
-            one.floor[now] = rtol
-            if one.judged == size:
+                values.setdefault(output, column)[now] = column[now]
+            floor[np.isinf(floor) & refused & ~among(status, GIVEN_UP)] = np.nan
+            floor[now] = rtol
+            if not np.isinf(floor).any():
                 break
-        found.append(one)
-
-    def rank(one: _Reference) -> tuple[int, bool, float]:
-        return -one.judged, vague[one.source], float(np.log10(one.floor[one.sound]).mean()) if one.sound.any() else 0.0
-
-    best = min(found, key=rank)
-    if not best.sound.any():
-        raise SweepError(f"{best.source} solves none of the cells, so there is nothing to measure against")
+        sound = floor[np.isfinite(floor)]
+        digits = float(np.log10(sound).mean()) if sound.size else 0.0
+        found.setdefault((int(np.isinf(floor).sum()), vague, digits), (name, values, floor))
+    best = found[min(found)]
+    if not np.isfinite(best[2]).any():
+        raise SweepError(f"{best[0]} solves none of the cells, so there is nothing to measure against")
     return best
 
 
-def _measured(study: Study, name: str, rtol: float, against: _Reference) -> dict[str, Any]:
+def _measured(study: Study, name: str, rtol: float, against: Reference) -> dict[str, Any]:
     """What is measured of a method at a tolerance, but for its time."""
+    source, truth, floor = against
+    sound, void, judged = np.isfinite(floor), np.isnan(floor), (~np.isinf(floor)).sum()
     outputs, status, used, _ = solved(with_method(study, name, rtol))
-    error = np.max([relative_error(outputs[name], true) for name, true in against.values.items()], axis=0)
+    error = np.max([relative_error(outputs[name], true) for name, true in truth.items()], axis=0)
     methods = [method.name for method in study.kernel.methods]
     # against itself the reference has no error; what can be said is what it is right to, also where auto took it
-    itself = against.source in methods and used == methods.index(against.source)
-    error = np.where(itself, np.maximum(error, against.floor), error)
-    valued, ok, inaccurate = against.sound & (status < FIRST_REFUSAL), status == Status.OK, status == Status.INACCURATE
-    sure, unsolved = valued & ~np.isin(status, UNSURE), against.sound & ~valued
-    wrong, worst = sure & ~(error <= rtol + against.floor) | against.void & ok, error[sure].max(initial=0.0)
+    itself = source in methods and used == methods.index(source)
+    error = np.where(itself, np.fmax(error, floor), error)
+    ok, inaccurate = status == Status.OK, status == Status.INACCURATE
+    valued = sound & (status < FIRST_REFUSAL)
+    sure, unsolved = valued & ~np.isin(status, UNSURE), sound & ~valued
+    wrong, worst = sure & ~(error <= rtol + floor) | void & ok, error[sure].max(initial=0.0)
     shares = {
-        "ok": against.sound & ok,
+        "ok": sound & ok,
         "remarked": valued & ~ok & ~inaccurate,
         "inaccurate": valued & inaccurate,
         "unsolved": unsolved,
@@ -316,7 +303,7 @@ def _measured(study: Study, name: str, rtol: float, against: _Reference) -> dict
     return {
         "error_median": np.median(error[valued]) if valued.any() else math.nan,
         "error_worst": worst if sure.any() else math.nan,
-        **{key: cells.sum() / against.judged for key, cells in shares.items()},
+        **{key: cells.sum() / judged for key, cells in shares.items()},
         **{key: outputs[key][valued].mean() if valued.any() else math.nan for key in WORK if key in outputs},
         "worst_cell": first(sure & (error == worst)),
         "unsolved_as": f"{NAMES[int(status[unsolved][0])]} at {first(unsolved)}" if unsolved.any() else "",

@@ -13,6 +13,7 @@ import numpy as np
 from sweep.cells.block import Blocks
 from sweep.cells.partition import row_blocks
 from sweep.cells.reduce import gathered
+from sweep.cells.schema import cell_schema
 from sweep.errors import SweepError
 from sweep.file.open import in_memory, memory, open_result
 from sweep.file.store import unfinished_of
@@ -129,17 +130,20 @@ def complete(study: Study, path: str | os.PathLike[str], **options: Any) -> Endi
 
 def store_cells(
     study: Study,
-    path: str | os.PathLike[str],
+    path: str | os.PathLike[str] | None,
     arrays: Mapping[str, Any],
     force: bool = False,
     mark: Mapping[str, str] | None = None,
     attrs: Mapping[str, str] | None = None,
 ) -> xr.Dataset:
-    """Writes the result of cells that are solved already, a file like that of `run`. Raises SweepError as `run`.
+    """The result of cells that are solved already, in memory or in a file like that of `run`.
 
     Their columns are `arrays`, of shape (cells, ...), of outputs and of `schema.ANCILLARY`. `mark` is their
-    fingerprint, where that is not the one of the study and of this program; `attrs` are further attributes of the file.
+    fingerprint, where that is not the one of the study and of this program; `attrs` are further attributes. Raises
+    SweepError as `run`.
     """
+    if path is None:
+        return in_memory(cell_schema(study, mark or {}), arrays).assign_attrs(attrs or {})
     block = max(1, min(row_blocks(study).count, 1 << 16))
     task = Task(study, path, 1, force, progress=False, block_cells=block, fingerprint=mark or {})
     run_to_file(task, Precomputed(arrays, attrs or {}))
