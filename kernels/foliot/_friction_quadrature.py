@@ -17,7 +17,6 @@ b = gamma v1^n; M = m0 + m1 s + m2 s^n. Units and records: see `_units`. Derived
 
 import math
 from collections import namedtuple
-from decimal import Decimal, localcontext
 
 import numpy as np
 
@@ -25,6 +24,7 @@ from kernels.foliot._units import Cycle, errors
 from kernels.lanes.codes import NOT_CONVERGED, OK, OUT_OF_RANGE
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.vectors import any_lane, fma, magnitude, not_, sqrt, where
+from kernels.maths.decimals import legendre, precise
 from kernels.maths.elementary import exp, expm1, is_normal, log, log1p
 from kernels.maths.roots import by_steps, in_bracket
 
@@ -38,28 +38,11 @@ _WIDEST = 750.0  # no ln v1 of a float64 is beyond
 _POWER, _NODES = 5, 32
 
 
-def _rule():
-    """s, 1 - s, ln s and weights of Gauss-Legendre in s^(1/5), where s^n and ln s are smooth enough for any n >= 0.
-
-    Newton's method on P_n, n = _NODES, in decimal arithmetic: the table has the same bits on every machine.
-    """
-    rows = []
-    with localcontext(prec=40):
-        for j in range(_NODES):
-            x = Decimal(-math.cos(math.pi * (j + 0.75) / (_NODES + 0.5)))
-            for _ in range(7):
-                before, value = Decimal(1), x
-                for k in range(2, _NODES + 1):
-                    before, value = value, ((2 * k - 1) * x * value - (k - 1) * before) / k
-                slope = _NODES * (x * value - before) / (x * x - 1)
-                x -= value / slope
-            u, weight = (1 + x) / 2, 1 / ((1 - x * x) * slope**2)
-            s = u**_POWER
-            rows.append([float(v) for v in (s, 1 - s, s.ln(), weight * _POWER * u ** (_POWER - 1))])
-    return (np.array(column) for column in zip(*rows, strict=True))
-
-
-_S, _REST, _LOG_S, _WEIGHT = _rule()
+with precise():
+    _RULE = [(u**_POWER, _POWER * u ** (_POWER - 1) * weight) for u, weight in legendre(_NODES)]
+    _RULE = [tuple(map(float, (s, 1 - s, s.ln(), weight))) for s, weight in _RULE]
+_S, _REST, _LOG_S, _WEIGHT = map(np.array, zip(*_RULE, strict=True))
+"""s, 1 - s, ln s and weights of Gauss-Legendre in s^(1/5), where s^n and ln s are smooth enough for any n >= 0."""
 
 Terminal = namedtuple("Terminal", "log_V D G")
 """ln V of f(V) = 1, and the shares D and G of 1 - rho there; without drag V is infinite and D = 0."""
@@ -146,28 +129,6 @@ def _defect(z, rule, e, far, near):
     mild = z < 600.0
     inward = where(mild, log1p(gap / where(mild, near, 1.0)), z + log(near + gap))
     return where(close, where(e > 0.0, z, inward) / far - rule, 0.0)
-
-
-@jit_call
-def _solve(scene, terminal):
-    """y of the cycle, and where it has not settled.
-
-    The right side of (2) grows with y, on logarithmic scales with a slope between about 1 and n + 2: Newton, within the
-    bracket that every evaluation narrows; it begins with all float64 and is halved where a step leaves it. The start is
-    from the strong limit of each friction term alone and from the weak limit V z = 2 V f'(V)/V.
-    """
-    d, gamma, n, slack, (log_V, D, G) = scene.d, scene.gamma, scene.n, scene.slack, terminal
-    lost, m0, m1, m2 = _leg(scene, d, gamma)
-    product = slack * (slack + m0)
-    steady = 0.5 * log(4.0 * product / fma(lost, slack, m0))
-    viscous = (1.0 / 3.0) * log(6.0 * product / m1)
-    drag = log(2.0 * (n + 2.0) * product / m2) / (n + 2.0)
-    strong = where(steady < viscous, steady, viscous)
-    strong = where(strong < drag, strong, drag)
-    y = log(exp(strong) + 2.0 * fma(n, G, D) * exp(-log_V))
-    y = where((y > -_WIDEST) & (y < _WIDEST), y, 0.0)
-    low, high = 0.0 * y - _WIDEST, 0.0 * y + _WIDEST
-    return in_bracket(_way, y, low, high, y > low, (scene, terminal), NEWTON_LIMIT, SETTLED)
 
 
 @jit
@@ -290,12 +251,29 @@ def _weak(scene, terminal, speeds):
 
 @jit
 def quadrature(scene, rtol):
-    """The cycle of a scene with kappa = 0, accurate to `bound` whatever rtol, and its verdict."""
-    terminal = _terminal(scene)
-    y, unsettled = _solve(scene, terminal)
+    """The cycle of a scene with kappa = 0, accurate to `bound` whatever rtol, and its verdict.
+
+    The right side of (2) grows with y, on logarithmic scales with a slope between about 1 and n + 2: Newton, within the
+    bracket that every evaluation narrows; it begins with all float64 and is halved where a step leaves it. The start is
+    from the strong limit of each friction term alone and from the weak limit V z = 2 V f'(V)/V.
+    """
+    d, gamma, n, slack, e, terminal = scene.d, scene.gamma, scene.n, scene.slack, scene.e, _terminal(scene)
+    lost, m0, m1, m2 = _leg(scene, d, gamma)
+    product = slack * (slack + m0)
+    steady = 0.5 * log(4.0 * product / fma(lost, slack, m0))
+    viscous = (1.0 / 3.0) * log(6.0 * product / m1)
+    drag = log(2.0 * (n + 2.0) * product / m2) / (n + 2.0)
+    strong = where(steady < viscous, steady, viscous)
+    strong = where(strong < drag, strong, drag)
+    y = log(exp(strong) + 2.0 * fma(n, terminal.G, terminal.D) * exp(-terminal.log_V))
+    y = where((y > -_WIDEST) & (y < _WIDEST), y, 0.0)
+    low, high = 0.0 * y - _WIDEST, 0.0 * y + _WIDEST
+    y, unsettled = in_bracket(_way, y, low, high, y > low, (scene, terminal), NEWTON_LIMIT, SETTLED)
+
+    # what comes of it, where the pole is far and where it is near
     speeds = _speeds(scene, terminal, y)
     v1, F1, (_, m0, m1, m2) = speeds.v1, speeds.F1, speeds.terms
-    e, near = scene.e, speeds.z > _NEAR
+    near = speeds.z > _NEAR
     time, rise, s = 0.0 * y, 0.0 * y, 0.0 * y
     if any_lane(not_(near)):
         time, rise, s = _strong(scene, speeds)

@@ -20,29 +20,15 @@ what J exp(-Y) is with the slope followed to rest.
 import math
 from collections import namedtuple
 
-from kernels.integrate.tableaux import DOPRI5, DOPRI5_ERROR
 from kernels.lanes.jit import jit, jit_call, jit_inline
 from kernels.lanes.symbols import symbolic
-from kernels.lanes.tuples import after, joined, times
 from kernels.lanes.vectors import any_lane, choose, exponent, fma, magnitude, nearest, not_, pow2, sqrt, where
 from kernels.maths.elementary import LN2, exp, larger, power, sincos, smaller
-from kernels.maths.roots import bisected
 
-SDIRK4 = (
-    (1 / 2,),
-    (17 / 50, -1 / 25),
-    (371 / 1360, -137 / 2720, 15 / 544),
-    (25 / 24, -49 / 48, 125 / 16, -85 / 12),
-)
-"""Stages 1 to 4 from all before, beside 1/4 of their own."""
-SDIRK4_ERROR = (-3 / 16, -27 / 32, 25 / 32, 1 / 4)
-"""Of stages 0, 1, 2 and 4."""
-HELP_LIMIT, STEP_LIMIT = 1000, 10_000
-"""Places of rest on one half swing, and steps of a leg, after which a cell is given up."""
-_ROOT_LIMIT, _SETTLED = 60, 1e-9
-"""Trials for the end of a leg; Newton's step, over the whole one, after which the next is the last."""
-_STAGE_LIMIT = 12
-"""Newton's steps for a stage of an implicit method."""
+HELP_LIMIT, STEP_LIMIT, _ROOT_LIMIT = 1000, 10_000, 60
+"""Places of rest on one half swing, and steps of a leg, after which a cell is given up; trials for the end of a leg."""
+_SETTLED = 1e-9
+"""Newton's step for the end of a leg, over the whole one, after which the next is the last."""
 _SAFETY, _SHRINK, _GROW = 0.9, 0.2, 5.0
 _SHARE, _ROUGH_SHARE, _SHARP_SHARE = 0.3, 0.1, 0.03
 """Of rtol that a single step may take; the same for friction whose slope is not smooth at rest, where estimates of the
@@ -75,13 +61,15 @@ share : of rtol that a single step may take; rough: whether friction's slope is 
 stiffness, pace : f'(V) and 1/V for the speed V at which friction balances the drive, within a factor of 2
 """
 
-Law = namedtuple("Law", "side steady floor problem")
-"""The right-hand side of (1) from a reversal to the next: sign of the speed, constant force, terms, and the speed below
-which power-law friction is constant."""
+Leg = namedtuple("Leg", "side steady floor problem stop forgotten slow scales")
+"""The motion from a reversal to the next.
 
-Leg = namedtuple("Leg", "stop forgotten slow scales")
-"""What ends a leg and bounds its steps: speed along it and Y at its end, and the speed above which power-law friction
-is not smooth, 0 if it is; what errors are relative to, at least: of speed, of its tangent by ln mu, of those by v0."""
+side, steady, floor, problem : of the right-hand side of (1), the sign of the speed, the constant force, the speed below
+    which power-law friction is constant, and the terms
+stop, forgotten : what ends it: the speed along it, and Y
+slow : the speed above which power-law friction is not smooth, 0 if it is
+scales : what errors are relative to, at least: of speed, of its tangent by ln mu, of those by v0
+"""
 
 Half = namedtuple("Half", "end state rate top top_by_start time shrink helped lost")
 """A half swing: the speed F at the switch, 0 where it is not reached, and (x, v, x_mu, v_mu, x_start, v_start, Y)
@@ -137,120 +125,48 @@ def _held_at(problem, speed):
 
 
 @jit
-def _force(x, v, law):
+def force_on(x, v, leg):
     """Force towards the switch with that of friction; tau - 1; the slopes of the force by x and by v."""
-    problem, (extra, by_x, lost, by_v) = law.problem, (0.0 * x, 0.0 * x, 0.0 * x, 0.0 * x)
+    problem, (extra, by_x, lost, by_v) = leg.problem, (0.0 * x, 0.0 * x, 0.0 * x, 0.0 * x)
     if any_lane(problem.depth > 0.0):
         extra, by_x = _ripple(x, problem.depth, problem.wave)
     if any_lane(problem.gamma > 0.0):
-        within, speed = magnitude(v) > law.floor, larger(magnitude(v), law.floor)
+        within, speed = magnitude(v) > leg.floor, larger(magnitude(v), leg.floor)
         slope = problem.gamma * power(speed, problem.n - 1.0)
         lost, by_v = slope * speed, where(within, problem.n * slope, 0.0)
-    force = fma(problem.kappa, x, law.steady + extra) + fma(problem.d, v, law.side * lost)
+    force = fma(problem.kappa, x, leg.steady + extra) + fma(problem.d, v, leg.side * lost)
     return force, extra, problem.kappa + by_x, problem.d + by_v
 
 
 @jit
-def rates(state, law):
+def rates(state, leg):
     """(1), its tangents, and f'."""
     x, v, x_mu, v_mu, x_start, v_start, _ = state
-    force, extra, stiffness, slope = _force(x, v, law)
+    force, extra, stiffness, slope = force_on(x, v, leg)
     by_mu = fma(stiffness, x_mu, fma(slope, v_mu, 1.0 + extra))
     return v, -force, v_mu, -by_mu, v_start, -fma(stiffness, x_start, slope * v_start), slope
 
 
 @jit
 def inwards(problem, floor):
-    """The law of the leg behind the turning point."""
-    return Law(0.0 * floor - 1.0, problem.inwards, floor, problem)
+    """The leg behind the turning point, but for what ends it."""
+    none = 0.0 * floor
+    return Leg(none - 1.0, problem.inwards, floor, problem, none, none, none, (none, none, none))
 
 
 @jit
-def _worst(state, errors, scales):
-    """The largest error over its scale.
-
-    One division in all, for they are dear: the worst error and its scale are compared crosswise.
-    """
-    speed, weak, pace = scales
-    worst, over = 0.0 * speed, 0.0 * speed + 1.0
-    least = (over, speed, weak, pace, pace, over, over)
-    for j in range(7):
-        error, scale = magnitude(errors[j]), least[j] + where(j < 6, 1.0, 0.01) * magnitude(state[j])
-        worse = (error * over > worst * scale) | not_(error < math.inf)
-        worst, over = where(worse, error, worst), where(worse, scale, over)
-    return worst / over
-
-
-@jit_call
-def dopri5_step(state, first, law, h, scales):
-    """One step of Dormand-Prince 5(4) from the rates `first`: state and rates after it, largest error over scale."""
-    k1 = rates(after(state, h, DOPRI5[0], (first,)), law)
-    k2 = rates(after(state, h, DOPRI5[1], (first, k1)), law)
-    k3 = rates(after(state, h, DOPRI5[2], (first, k1, k2)), law)
-    k4 = rates(after(state, h, DOPRI5[3], (first, k1, k2, k3)), law)
-    k5 = rates(after(state, h, DOPRI5[4], (first, k1, k2, k3, k4)), law)
-    new = after(state, h, DOPRI5[5], (first, k2, k3, k4, k5))
-    last = rates(new, law)
-    errors = after(times(0.0, state), h, DOPRI5_ERROR, (first, k2, k3, k4, k5, last))
-    return new, last, _worst(state, errors, scales)
-
-
-@jit_call
-def _stage(base, v, law, g):
-    """The rates k at base + g k, by Newton's method from the speed v; and how far its last step went.
-
-    As x' = v, the speed alone is unknown: v + g force(x_b + g v, v) = v_b. The tangents are linear in theirs.
-    """
-    x_b, v_b, x_mu, v_mu, x_start, v_start, _ = base
-    change, searching = 0.0 * v, g > 0.0
-    for _ in range(_STAGE_LIMIT):
-        if not any_lane(searching):
-            break
-        force, _, stiffness, slope = _force(fma(g, v, x_b), v, law)
-        new = (v - v_b + g * force) / (1.0 + g * fma(g, stiffness, slope))
-        change, v = where(searching, new, change), where(searching, v - new, v)
-        searching = searching & (magnitude(change) > 1e-14 * magnitude(v))
-    _, extra, stiffness, slope = _force(fma(g, v, x_b), v, law)
-    damped, stiff = 1.0 / (1.0 + g * fma(g, stiffness, slope)), g * stiffness
-    of_mu = (v_mu - fma(stiff, x_mu, g * (1.0 + extra))) * damped
-    of_start = (v_start - stiff * x_start) * damped
-    rise = 1.0 / g
-    return (v, (v - v_b) * rise, of_mu, (of_mu - v_mu) * rise, of_start, (of_start - v_start) * rise, slope), change
-
-
-@jit_call
-def sdirk4_step(state, first, law, h, scales):
-    """One step of the L-stable SDIRK of order 4(3) of Hairer & Wanner, Solving ODEs II, table IV.6.5; as `dopri5_step`.
-
-    What relaxes within much less than h is damped away. Its last stage is the result.
-    """
-    g = 0.25 * h
-    k0, c0 = _stage(state, state[1], law, g)
-    k1, c1 = _stage(after(state, h, SDIRK4[0], (k0,)), k0[0], law, g)
-    k2, c2 = _stage(after(state, h, SDIRK4[1], (k0, k1)), k1[0], law, g)
-    k3, c3 = _stage(after(state, h, SDIRK4[2], (k0, k1, k2)), k2[0], law, g)
-    base = after(state, h, SDIRK4[3], (k0, k1, k2, k3))
-    k4, c4 = _stage(base, k3[0], law, g)
-    new = after(base, g, (1.0,), (k4,))
-    left = larger(larger(magnitude(c0), magnitude(c1)), larger(larger(magnitude(c2), magnitude(c3)), magnitude(c4)))
-    errors = after(times(0.0, state), h, SDIRK4_ERROR, (k0, k1, k2, k4))
-    errors = joined((errors[0], magnitude(errors[1]) + left), errors[2:])
-    return new, k4, _worst(state, errors, scales)
-
-
-@jit
-def _left(state, acceleration, law, leg):
+def _left(state, acceleration, leg):
     """Falls to 0 where a leg ends, and its rate: the least of speed along the leg, way left to the switch, and memory.
 
     Outwards the way left is above 2, so that the speed decides: at the turning point. Inwards it is the switch, unless
     the motion comes to rest before, or friction has made it uniform.
     """
     x, v, decay = state[0], state[1], state[6]
-    value, rate = law.side * v - leg.stop, law.side * acceleration
+    value, rate = leg.side * v - leg.stop, leg.side * acceleration
     way = x + 1.0
     value, rate = where(value < way, value, way), where(value < way, rate, v)
     memory = leg.forgotten - decay
-    return where(value < memory, value, memory), where(value < memory, rate, -law.problem.stiffness)
+    return where(value < memory, value, memory), where(value < memory, rate, -leg.problem.stiffness)
 
 
 @jit
@@ -265,27 +181,27 @@ def _longest(v, acceleration, leg):
 
 
 @jit_inline
-def _to_end(step, state, law, leg, h, tolerance, active):
+def _to_end(step, state, leg, h, tolerance, active):
     """The active cells at the end of their leg, the time taken, the last whole step, and where it is not reached.
 
     The step across the end is shortened until it ends there: Newton, bisection where that leaves the bracket. Each
     trial is a whole Runge-Kutta step from the same state, so the root has the order of the method.
     """
-    moving, t, first = active, 0.0 * h, rates(state, law)
+    moving, t, first = active, 0.0 * h, rates(state, leg)
     h = smaller(h, _longest(state[1], first[1], leg))
     for _ in range(STEP_LIMIT):
         if not any_lane(moving):
             break
-        new, last, error = step(state, first, law, h, leg.scales)
+        new, last, error = step(state, first, leg, h)
         ratio = error / tolerance
         accepted = moving & (ratio <= 1.0)
 
         # at the end, or where a hairspring takes more than torque and dry friction have to give on the way to the
         # switch, (x + 1)(1 - rho + kappa (x - 1)/2) without a ripple, so that what creeps need not be followed
-        x, v, kappa = new[0], new[1], law.problem.kappa
-        energy = fma(0.5 * v, v, (x + 1.0) * fma(0.5 * kappa, x - 1.0, law.steady))
-        held_back = (law.side < 0.0) & not_(law.problem.depth > 0.0) & (energy < -_CLEARLY * kappa)
-        passed = accepted & ((_left(new, 0.0, law, leg)[0] <= 0.0) | held_back)
+        x, v, kappa = new[0], new[1], leg.problem.kappa
+        energy = fma(0.5 * v, v, (x + 1.0) * fma(0.5 * kappa, x - 1.0, leg.steady))
+        held_back = (leg.side < 0.0) & not_(leg.problem.depth > 0.0) & (energy < -_CLEARLY * kappa)
+        passed = accepted & ((_left(new, 0.0, leg)[0] <= 0.0) | held_back)
         moving = moving & not_(passed)
         accepted = accepted & moving
         state, first, t = choose(accepted, (new, last, t + h), (state, first, t))
@@ -301,28 +217,28 @@ def _to_end(step, state, law, leg, h, tolerance, active):
         h = where(moving, smaller(h * smaller(factor, _GROW + 0.0 * ratio), most), h)
 
     low, high, shorter = 0.0 * h, h, 0.5 * h
-    new, last, _ = step(state, first, law, shorter, leg.scales)
+    new, last, _ = step(state, first, leg, shorter)
     searching = active
     for _ in range(_ROOT_LIMIT):
         if not any_lane(searching):
             break
-        value, rate = _left(new, last[1], law, leg)
+        value, rate = _left(new, last[1], leg)
         low, high = where(value > 0.0, shorter, low), where(value > 0.0, high, shorter)
         guess = shorter - value / rate
         settled = magnitude(guess - shorter) <= _SETTLED * h
         guess = where(settled | ((guess > low) & (guess < high)), guess, 0.5 * (low + high))
         shorter = where(searching, guess, shorter)
-        trial, rates_there, _ = step(state, first, law, shorter, leg.scales)
+        trial, rates_there, _ = step(state, first, leg, shorter)
         new, last = choose(searching, (trial, rates_there), (new, last))
         searching = searching & not_(settled)
     return choose(active, new, state), t + where(active, shorter, 0.0), h, moving
 
 
 @symbolic
-def _moved(state, law, steady, time):
+def _moved(state, leg, steady, time):
     """The state after a time over which accelerations are constant, under the constant force `steady`, without drag."""
-    bare = law.problem._replace(gamma=0.0 * law.problem.gamma)
-    rate, half = rates(state, law._replace(steady=steady, problem=bare)), 0.5 * time
+    bare = leg.problem._replace(gamma=0.0 * leg.problem.gamma)
+    rate, half = rates(state, leg._replace(steady=steady, problem=bare)), 0.5 * time
     ways = (fma(time, fma(half, rate[j + 1], state[j + 1]), state[j]) for j in (0, 2, 4))
     speeds = (fma(time, rate[j], state[j]) for j in (1, 3, 5))
     (x, x_mu, x_start), (v, v_mu, v_start) = ways, speeds
@@ -330,19 +246,19 @@ def _moved(state, law, steady, time):
 
 
 @jit
-def _turned(state, law, slow):
+def _turned(state, leg, slow):
     """The state behind the turning point; J; way and its tangent by v0 there; and the time taken.
 
     Power-law friction that is not smooth at rest is constant from the speed of the state to rest, and from there to
     the speed `slow`: J takes both, and with the integral Y outside is what it is without a step through rest.
     """
-    zero, v, problem, turns = 0.0 * slow, state[1], law.problem, law.problem.e > 0.0
+    zero, v, problem, turns = 0.0 * slow, state[1], leg.problem, leg.problem.e > 0.0
     still = turns | not_(v < 0.0)
     speed = where(slow > 0.0, larger(v, zero), zero)
     held = _held_at(problem, speed)
     braking = problem.outwards + held + pull(state[0], problem) + problem.d * speed
     before = speed / braking
-    x, _, x_mu, v_mu, x_start, v_start, decay = _moved(state, law, problem.outwards + held, before)
+    x, _, x_mu, v_mu, x_start, v_start, decay = _moved(state, leg, problem.outwards + held, before)
     force = pull(x, problem)
     free = problem.inwards + force
     speed = where(still & (free > 0.0), slow * smaller(free / problem.inwards, zero + 1.0), zero)
@@ -351,15 +267,8 @@ def _turned(state, law, slow):
     jump = where(turns, (problem.inwards - held_in + force) / (problem.outwards + held + force), 1.0)
     after_rest = where(goes, speed / (free - held_in), 0.0)
     rest = (x, 0.0 * x, x_mu, jump * v_mu, x_start, jump * v_start, decay)
-    behind = _moved(rest, law, problem.inwards - held_in, after_rest)
+    behind = _moved(rest, leg, problem.inwards - held_in, after_rest)
     return choose(still, behind, state), jump, x, x_start, before + after_rest
-
-
-@jit
-def _wins(x, scene):
-    """Whether the drive wins over dry friction at x."""
-    slack, problem = scene
-    return slack + pull(x, problem) > 0.0
 
 
 @jit_call
@@ -372,11 +281,15 @@ def _released(x, slack, problem):
         if not any_lane(searching):
             break
         there = x - (i + 1.0) * step
-        found = searching & _wins(there, (slack, problem))
+        found = searching & (slack + pull(there, problem) > 0.0)
         held = where(searching & not_(found), there, held)
         free = where(found & (there > -1.0), there, free)
         searching = searching & not_(found)
-    return bisected(_wins, held, free, (slack, problem), _BISECTIONS)
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (held + free)
+        wins = slack + pull(middle, problem) > 0.0
+        held, free = where(wins, held, middle), where(wins, middle, free)
+    return free
 
 
 @jit_inline
@@ -414,10 +327,9 @@ def half_swing(step, start, problem, tolerance, active):
         state, jump, top, top_by_start, time = choose(turning, turned, old)
 
         side, steady = where(rising, 1.0, falling.side), where(rising, problem.outwards, problem.inwards)
-        law = Law(side, steady, floor, problem)
         stop = where(rising, smaller(slow, 0.5 * start), zero)
-        leg = Leg(stop, forgotten, slow, scales)
-        state, spent, h, late = _to_end(step, state, law, leg, h, tolerance, moving)
+        leg = Leg(side, steady, floor, problem, stop, forgotten, slow, scales)
+        state, spent, h, late = _to_end(step, state, leg, h, tolerance, moving)
         time, lost, moving = time + spent, lost | late, moving & not_(late)
         turning, inward = moving & rising, moving & not_(rising)
         rising = rising & not_(turning)

@@ -13,16 +13,19 @@ v1^2 - F^2 rising; so the one root is found, and if help was needed on the cycle
 
 import math
 
-from kernels.foliot._half_swing import dopri5_step, half_swing, problem_of, pull, sdirk4_step
+from kernels.foliot._half_swing import force_on, half_swing, problem_of, pull, rates
+from kernels.foliot._units import given, without_dimensions
+from kernels.integrate.tableaux import DOPRI5, DOPRI5_ERROR, SDIRK4, SDIRK4_ERROR
 from kernels.lanes.codes import INACCURATE, NOT_CONVERGED, OK, STEP_LIMIT, STICKS
-from kernels.lanes.jit import jit, jit_inline
+from kernels.lanes.jit import jit, jit_call, jit_inline
+from kernels.lanes.symbols import symbolic
+from kernels.lanes.tuples import after, joined, times
 from kernels.lanes.vectors import any_lane, choose, fma, magnitude, not_, sqrt, where
 from kernels.lanes.wiring import method
 from kernels.maths.elementary import larger, smaller
 
-NEWTON_LIMIT = 60
-SMOOTH = (0.0, 0.0)
-"""The ripple (depth, harmonic) of a torque that does not vary."""
+NEWTON_LIMIT, _STAGE_LIMIT = 60, 12
+"""Newton's steps on the map of a half swing, and for a stage of the implicit method."""
 EXPLICIT, IMPLICIT = (1e4, 1e6), (math.inf, math.inf)
 """Larger f'(V)/V (viscous friction: d^2) takes a stable explicit method more steps than the limit: about 2/3 of it; and
 the same where the motion becomes uniform and need not be followed so far."""
@@ -39,6 +42,79 @@ _CANCELS, _STEEP = 0.3, 0.2
 which tolerances are finer: two of them may differ by less than either is off."""
 _STEEP_FROM, _STEEP_TO = 1e-8, 0.03
 """Changes of v1 between two swings, near the cycle, whose effect on s is their own, not that of the tolerances."""
+
+
+@jit
+def _worst(state, errors, scales):
+    """The largest error over its scale.
+
+    One division in all, for they are dear: the worst error and its scale are compared crosswise.
+    """
+    speed, weak, pace = scales
+    worst, over = 0.0 * speed, 0.0 * speed + 1.0
+    least = (over, speed, weak, pace, pace, over, over)
+    for j in range(7):
+        error, scale = magnitude(errors[j]), least[j] + where(j < 6, 1.0, 0.01) * magnitude(state[j])
+        worse = (error * over > worst * scale) | not_(error < math.inf)
+        worst, over = where(worse, error, worst), where(worse, scale, over)
+    return worst / over
+
+
+@jit_call
+def dopri5_step(state, first, leg, h):
+    """One step of Dormand-Prince 5(4) from the rates `first`: state and rates after it, largest error over scale."""
+    k1 = rates(after(state, h, DOPRI5[0], (first,)), leg)
+    k2 = rates(after(state, h, DOPRI5[1], (first, k1)), leg)
+    k3 = rates(after(state, h, DOPRI5[2], (first, k1, k2)), leg)
+    k4 = rates(after(state, h, DOPRI5[3], (first, k1, k2, k3)), leg)
+    k5 = rates(after(state, h, DOPRI5[4], (first, k1, k2, k3, k4)), leg)
+    new = after(state, h, DOPRI5[5], (first, k2, k3, k4, k5))
+    last = rates(new, leg)
+    errors = after(times(0.0, state), h, DOPRI5_ERROR, (first, k2, k3, k4, k5, last))
+    return new, last, _worst(state, errors, leg.scales)
+
+
+@jit_call
+def _stage(base, v, leg, g):
+    """The rates k at base + g k, by Newton's method from the speed v; and how far its last step went.
+
+    As x' = v, the speed alone is unknown: v + g force(x_b + g v, v) = v_b. The tangents are linear in theirs.
+    """
+    x_b, v_b, x_mu, v_mu, x_start, v_start, _ = base
+    change, searching = 0.0 * v, g > 0.0
+    for _ in range(_STAGE_LIMIT):
+        if not any_lane(searching):
+            break
+        force, _, stiffness, slope = force_on(fma(g, v, x_b), v, leg)
+        new = (v - v_b + g * force) / (1.0 + g * fma(g, stiffness, slope))
+        change, v = where(searching, new, change), where(searching, v - new, v)
+        searching = searching & (magnitude(change) > 1e-14 * magnitude(v))
+    _, extra, stiffness, slope = force_on(fma(g, v, x_b), v, leg)
+    damped, stiff = 1.0 / (1.0 + g * fma(g, stiffness, slope)), g * stiffness
+    of_mu = (v_mu - fma(stiff, x_mu, g * (1.0 + extra))) * damped
+    of_start = (v_start - stiff * x_start) * damped
+    rise = 1.0 / g
+    return (v, (v - v_b) * rise, of_mu, (of_mu - v_mu) * rise, of_start, (of_start - v_start) * rise, slope), change
+
+
+@jit_call
+def sdirk4_step(state, first, leg, h):
+    """One step of the L-stable SDIRK of order 4(3) of Hairer & Wanner, Solving ODEs II, table IV.6.5; as `dopri5_step`.
+
+    What relaxes within much less than h is damped away. Its last stage is the result.
+    """
+    g = 0.25 * h
+    k0, c0 = _stage(state, state[1], leg, g)
+    k1, c1 = _stage(after(state, h, SDIRK4[0], (k0,)), k0[0], leg, g)
+    k2, c2 = _stage(after(state, h, SDIRK4[1], (k0, k1)), k1[0], leg, g)
+    k3, c3 = _stage(after(state, h, SDIRK4[2], (k0, k1, k2)), k2[0], leg, g)
+    base = after(state, h, SDIRK4[3], (k0, k1, k2, k3))
+    k4, c4 = _stage(base, k3[0], leg, g)
+    new = after(base, g, (1.0,), (k4,))
+    left = larger(larger(magnitude(c0), magnitude(c1)), larger(larger(magnitude(c2), magnitude(c3)), magnitude(c4)))
+    errors = after(times(0.0, state), h, SDIRK4_ERROR, (k0, k1, k2, k4))
+    errors = joined((errors[0], magnitude(errors[1]) + left), errors[2:])
+    return new, k4, _worst(state, errors, leg.scales)
 
 
 @jit
@@ -182,11 +258,18 @@ def sdirk4(rippled, rtol):
     return limit_cycle(sdirk4_step, IMPLICIT, rippled, rtol)
 
 
-def by_steps(units, sooner=None):
+@symbolic
+def _taken(p):
+    """The scene and its ripple (depth, harmonic), 0 of a record without, and its units."""
+    scene, units = without_dimensions(p)
+    return (scene, (p.depth, p.harmonic) if hasattr(p, "depth") else (0.0, 0.0)), units
+
+
+def by_steps(sooner=None):
     """Both as methods of a kernel, `sooner` of the first."""
     explicit = "adaptive Runge-Kutta of order 5, Newton on the half-swing map"
     implicit = "implicit Runge-Kutta of order 4, L-stable, for stiff cells"
     return (
-        method("dopri5", explicit, dopri5, units=units, sooner=sooner),
-        method("sdirk4", implicit, sdirk4, units=units),
+        method("dopri5", explicit, dopri5, units=(_taken, given), sooner=sooner),
+        method("sdirk4", implicit, sdirk4, units=(_taken, given)),
     )

@@ -112,32 +112,6 @@ def _turn(scene, energy):
     return where(balanced, work, after - energy), noise, balanced, legs
 
 
-@jit_apart
-def _by_torque(scene, balanced, legs, start):
-    """Changes of E_1 and of the time by that of the torque alone, and the sizes of their terms.
-
-    By (2), with E_1 = v^2/2 or by (4), and d for a change by that of mu, g for the push behind the turning point:
-        dA = -C1,  dt1 = -S1/back,  dg = kappa dA + 1,  dt2 = (dA - C2 dg)/v,  dv = S2 dg + v' dt2,
-        dJ1 = 2 back (J1/back^2) dg + u^2 dt1,  dJ2 = 2 g2 (J2/g2^2) dg + v^2 dt2,
-    where dA = dt1 = 0 for e < 0. The sizes are the sums of the magnitudes of the terms: the changes round so.
-    """
-    d, rho, kappa = scene.d, scene.rho, scene.kappa
-    rises, back, speed, end = scene.e > 0.0, legs.back, legs.speed, legs.end
-    dtop, dt1 = where(rises, -legs.c1, 0.0), where(rises, -legs.s1 / back, 0.0)
-    of_top, of_t1 = magnitude(dtop), magnitude(dt1)
-    dg, of_g = fma(kappa, dtop, 1.0), fma(kappa, of_top, 1.0)
-    dt2, of_t2 = (dtop - legs.c2 * dg) / speed, (of_top + magnitude(legs.c2) * of_g) / speed
-    dspeed, of_speed = fma(legs.s2, dg, end * dt2), magnitude(legs.s2) * of_g + magnitude(end) * of_t2
-
-    by_g1 = 2.0 * back * linear_flow.loss(-0.5 * d, kappa, legs.t1)
-    by_g2 = 2.0 * legs.g2 * linear_flow.loss(0.5 * d, kappa, legs.t2)
-    losses = by_g1 * dg + start * start * dt1 + (by_g2 * dg + speed * speed * dt2)
-    of_losses = magnitude(by_g1 + by_g2) * of_g + start * start * of_t1 + speed * speed * of_t2
-    work, of_work = 2.0 - 2.0 * rho * dtop - d * losses, 2.0 + 2.0 * rho * of_top + d * of_losses
-    gain, of_gain = where(balanced, work, speed * dspeed), where(balanced, of_work, speed * of_speed)
-    return gain, dt1 + dt2, of_gain, of_t1 + of_t2
-
-
 @jit
 def _gain(energy, scene):
     """Whether a half swing gains energy, Newton's step to where it repeats, and the one that is the last.
@@ -152,39 +126,59 @@ def _gain(energy, scene):
 
 @jit_apart
 def segments(scene, rtol):
-    """The cycle, the relative errors of its outputs whatever rtol, and its verdict."""
-    # the energy before the switch, by Newton from rest: a half swing's gain falls with E, which makes a bracket
-    rest = 0.0 * scene.d
-    energy, active = in_bracket(_gain, rest, rest, rest + 1e308, rest < 1.0, scene, NEWTON_LIMIT, -1.0)
-    _, noise, balanced, legs = _turn(scene, energy)
-    rest = _lost(scene, legs)
+    """The cycle, the relative errors of its outputs whatever rtol, and its verdict.
 
-    # s = -dlnP/dlnmu of the fixed point E_1(E, mu) = E; the sizes of its terms, and of the terms of those; dlnT/dlnE
-    start, time = magnitude(scene.e) * sqrt(2.0 * energy), legs.time
-    gain, longer, of_gain, of_longer = _by_torque(scene, balanced, legs, start)
+    s = -dlnP/dlnmu is of the fixed point E_1(E, mu) = E. By (2), with E_1 = v^2/2 or by (4), and d for a change by that
+    of mu alone, g for the push behind the turning point:
+        dA = -C1,  dt1 = -S1/back,  dg = kappa dA + 1,  dt2 = (dA - C2 dg)/v,  dv = S2 dg + v' dt2,
+        dJ1 = 2 back (J1/back^2) dg + u^2 dt1,  dJ2 = 2 g2 (J2/g2^2) dg + v^2 dt2,
+    where dA = dt1 = 0 for e < 0. What is called of_... is a sum of the magnitudes of terms: the changes round so.
+    """
+    d, rho, kappa, rises = scene.d, scene.rho, scene.kappa, scene.e > 0.0
+    # the energy before the switch, by Newton from rest: a half swing's gain falls with E, which makes a bracket
+    zero = 0.0 * d
+    energy, active = in_bracket(_gain, zero, zero, zero + 1e308, zero < 1.0, scene, NEWTON_LIMIT, -1.0)
+    _, noise, balanced, legs = _turn(scene, energy)
+    lost, speed, end, time = _lost(scene, legs), legs.speed, legs.end, legs.time
+    start = magnitude(scene.e) * sqrt(2.0 * energy)
+
+    # what the torque changes of both legs and of their losses, and so of E_1 and of the time
+    dtop, dt1 = where(rises, -legs.c1, 0.0), where(rises, -legs.s1 / legs.back, 0.0)
+    of_top, of_t1 = magnitude(dtop), magnitude(dt1)
+    dg, of_g = fma(kappa, dtop, 1.0), fma(kappa, of_top, 1.0)
+    dt2, of_t2 = (dtop - legs.c2 * dg) / speed, (of_top + magnitude(legs.c2) * of_g) / speed
+    dspeed, of_speed = fma(legs.s2, dg, end * dt2), magnitude(legs.s2) * of_g + magnitude(end) * of_t2
+    by_g1 = 2.0 * legs.back * linear_flow.loss(-0.5 * d, kappa, legs.t1)
+    by_g2 = 2.0 * legs.g2 * linear_flow.loss(0.5 * d, kappa, legs.t2)
+    losses = by_g1 * dg + start * start * dt1 + (by_g2 * dg + speed * speed * dt2)
+    of_losses = magnitude(by_g1 + by_g2) * of_g + start * start * of_t1 + speed * speed * of_t2
+    work, of_work = 2.0 - 2.0 * rho * dtop - d * losses, 2.0 + 2.0 * rho * of_top + d * of_losses
+    gain, of_gain = where(balanced, work, speed * dspeed), where(balanced, of_work, speed * of_speed)
+
+    # s, by these and by what E changes of the time; and dlnT/dlnE
     area, by_start, of_start, _, _ = passed_on(scene, start, legs)
-    by_gain = magnitude(scene.e) / sqrt(2.0 * energy) / rest
-    chain = by_start * (by_gain * gain)
+    by_gain = magnitude(scene.e) / sqrt(2.0 * energy) / lost
+    chain, longer = by_start * (by_gain * gain), dt1 + dt2
     of_chain = magnitude(by_start) * (by_gain * of_gain)
     of_chain = of_chain + of_start * (by_gain * magnitude(gain))
-    s, terms, of_terms = -(longer + chain) / time, (magnitude(longer) + magnitude(chain)) / time, of_longer + of_chain
-    of_terms, by_energy = of_terms / time, 0.5 * start * magnitude(by_start) / time
+    s, terms = -(longer + chain) / time, (magnitude(longer) + magnitude(chain)) / time
+    of_terms, by_energy = (of_t1 + of_t2 + of_chain) / time, 0.5 * start * magnitude(by_start) / time
 
     # what the noise of the energy and the rounding of pieces leave of each output
-    of_energy, of_pieces = noise / (rest * energy), 1.0 + (1.0 + legs.top) / (legs.speed * time)
+    of_energy, of_pieces = noise / (lost * energy), 1.0 + (1.0 + legs.top) / (speed * time)
     loose = fma(ROUNDING, of_pieces, of_energy)
     loose_cycle = fma(ROUNDING, of_pieces, of_energy * where(by_energy > 1.0, by_energy, 1.0))
     loose_s = fma(2.0 * loose, terms, _ULPS * of_terms) / magnitude(s)
     loose_s = where(loose_s < 1.0, loose_s / (1.0 - loose_s), math.inf)  # of the true s
     of_time = fma(of_energy, by_energy, 0.3 * ROUNDING * of_pieces)
-    loose_m = loose_cycle + where(area > 0.0, of_time * scene.d * time, 0.0)
+    loose_m = loose_cycle + where(area > 0.0, of_time * d * time, 0.0)
 
     # whether the half swing comes through, and what else keeps the foliot from it; from rest at x = 0, too
-    starts = linear_flow.reach(0.5 * scene.d, scene.kappa, 0.0 * scene.d, scene.slack) > 1.0
+    starts = linear_flow.reach(0.5 * d, kappa, zero, scene.slack) > 1.0
     verdict = where((scene.rho_s < 1.0) & starts, OK, NOT_SELF_STARTING)
     verdict = where(active, NOT_CONVERGED, verdict)
-    passes = (scene.e < 0.0) | (1.0 + scene.kappa * legs.top > scene.rho_s)  # nothing rests where e < 0
+    passes = (scene.e < 0.0) | (1.0 + kappa * legs.top > scene.rho_s)  # nothing rests where e < 0
     verdict = where(legs.comes & (energy > 0.0) & passes, verdict, STICKS)
-    verdict = where(scene.d < _STIFFEST, verdict, NO_METHOD)
+    verdict = where(d < _STIFFEST, verdict, NO_METHOD)
     cycle = Cycle(time, legs.top, sqrt(2.0 * energy), s, scene.e * scene.e * area)
     return cycle, errors(loose_cycle, loose_s, loose_m), verdict

@@ -74,6 +74,7 @@ RIPPLED = Form("foliot_ripple_swing", SMOOTH.states, (*TERMS, *RIPPLE))
 _BARE = tuple(name for name in RIPPLED.terms if name not in ("gamma", "degree"))
 LINEAR = Form("foliot_ripple_linear", tuple(name for name in SMOOTH.states if name != "decay"), _BARE)
 SEARCHED = Form("foliot_ripple_search", ("x", "v", "top"), _BARE)
+FORMS = SMOOTH, RIPPLED, LINEAR, SEARCHED
 _UNKNOWN = {"x_mu": np.nan, "v_mu": np.nan, "up_mu": np.nan}
 _FIRST = {"x": 1.0, "v_start": 1.0, "top": 1.0, "up_start": 1.0}
 _STEP = (*TERMS, "first", "stiff", "end", "change", "slope", "cancels", *Outputs._fields)
@@ -83,8 +84,9 @@ _DECAY, _TOP = Swung._fields.index("decay"), Swung._fields.index("top")
 """Positions of columns."""
 
 
-def _rates_of(form):
-    """(1) of `_half_swing` with what its tangents and the states at the turning point change by."""
+@functools.cache
+def _runner(form):
+    """The compiled half swing by (1) of `_half_swing`, with its tangents and the states at the turning point."""
     dragged, varies = "gamma" in form.terms, "wave" in form.terms
 
     def rates_of_named(**p):
@@ -110,13 +112,6 @@ def _rates_of(form):
             found |= {"up_mu": rising * by_mu, "up_start": rising * by_start}
         return tuple(found[name] for name in form.states)
 
-    return signed(rates_of_named, [*form.states, *form.terms])
-
-
-@functools.cache
-def _runner(form):
-    """The compiled half swing."""
-
     def surface(x):
         return x + 1.0
 
@@ -124,22 +119,33 @@ def _runner(form):
         return tuple(v0 if name == "v" else _FIRST.get(name, 0.0) for name in form.states)
 
     terms = (*form.terms, "v0")
-    functions = _rates_of(form), surface, start
+    functions = signed(rates_of_named, [*form.states, *form.terms]), surface, start
     return runner(Scene(form.name, "half swing of a foliot", form.states, terms, *functions, most_kinks=1), "taylor")
 
 
-def half_swings(form, columns, tolerance):
-    """The half swings of cells, rows of a `Swung` and of statuses, from columns: the form's terms, v0, and 1.
+def half_swings(form, rough, terms, start, tolerance):
+    """The half swings of cells, rows of a `Swung` and of statuses.
 
-    Tangents that the form does not follow are NaN by mu, so that the sensitivity is none; by v0 they are 0, which
+    Tangents that a form does not follow are NaN by mu, so that the sensitivity is none; by v0 they are 0, which
     takes from time and amplitude what Newton's last step would better.
+
+    Parameters
+    ----------
+    form, rough : the number in FORMS of each cell's, and whether its terms are to be some roundings off
+    terms, start : {name: column}, and the speed v0
     """
-    rows = followed(_runner(form), columns, tolerance)
-    found = dict(zip(("time", "interval", *form.states), rows, strict=False))
-    if "decay" not in found:
-        found["decay"] = columns[form.terms.index("drag")] * found["time"]
-    nothing = {name: np.full(len(tolerance), _UNKNOWN.get(name, 0.0)) for name in Swung._fields}
-    return np.array([*((nothing | found)[name] for name in Swung._fields), rows[-1]])
+    swung, kind = np.empty((len(Swung._fields) + 1, len(start))), 2 * form + rough
+    for k in np.unique(kind):
+        own, (cells,) = FORMS[k // 2], np.nonzero(kind == k)
+        columns = [*(terms[name][cells] for name in own.terms), start[cells], np.ones(len(cells))]
+        columns = off_by_roundings(columns) if k % 2 else columns
+        rows = followed(_runner(own), columns, tolerance[cells])
+        found = dict(zip(("time", "interval", *own.states), rows, strict=False))
+        found = {"decay": columns[own.terms.index("drag")] * found["time"]} | found
+        for row, name in enumerate(Swung._fields):
+            swung[row, cells] = found.get(name, _UNKNOWN.get(name, 0.0))
+        swung[-1, cells] = rows[-1]
+    return swung
 
 
 @jit
@@ -179,9 +185,9 @@ _step = kernel(
 ).methods[0].solve  # fmt: skip
 
 
-def by_taylor(parameters, rippled):
-    """The method of a kernel with these parameters, the last two of which, if `rippled`, are depth and harmonic."""
-    n = len(parameters)
+def by_taylor(parameters):
+    """The method of a kernel with these parameters; depth and harmonic are the last two, where the torque varies."""
+    n, rippled = len(parameters), "depth" in parameters
 
     def solve(*columns):
         rtol, asked = columns[n], columns[n + 1]
@@ -240,16 +246,14 @@ def cycles(cells, rtol, rippled, asked):
     n = len(rtol)
     terms, v, possible = begun(cells, rtol)
     terms |= dict(zip(RIPPLE, (cells[-2], cells[-1] * (0.5 * np.pi)), strict=True))
-    dragged = terms["gamma"] > 0.0
-    rough, linear = dragged & (terms["degree"] < 2.0), ~dragged & rippled
-    varies = cells[-2] > 0.0
-    told = np.tile(np.where(rough | varies, _TOLD_ROUGH, _TOLD), (len(Outputs._fields), 1))
+    dragged, varies = terms["gamma"] > 0.0, cells[-2] > 0.0
+    linear, rough = ~dragged & rippled, (dragged & (terms["degree"] < 2.0)) | varies
+    told = np.tile(np.where(rough, _TOLD_ROUGH, _TOLD), (len(Outputs._fields), 1))
     told[_SENSITIVITY, varies] = _TOLD_STEEP
-    share = np.where(rough | varies, _SHARE_ROUGH, _SHARE)
-    forms = RIPPLED if rippled else SMOOTH, SEARCHED, LINEAR
+    share, final = np.where(rough, _SHARE_ROUGH, _SHARE), np.where(varies, LAST, FINE)
+    form, searched = np.where(linear, FORMS.index(LINEAR), int(rippled)), FORMS.index(SEARCHED)
     low, high, stuck, again = np.full(n, -1.0), np.full(n, np.inf), np.zeros(n, int), np.zeros(n, int)
     stage, tolerance, before = np.full(n, SEARCH), np.full(n, _COARSE), np.full(n, np.nan)
-    final = np.where(varies, LAST, FINE)
     outputs, errors = np.full((len(Outputs._fields), n), np.nan), np.full((len(Outputs._fields), n), np.inf)
     by_tolerance = errors.copy()
     status = np.where(possible, Status.NOT_CONVERGED, Status.NO_METHOD).astype(np.int8)
@@ -258,61 +262,51 @@ def cycles(cells, rtol, rippled, asked):
         if not len(i):
             break
 
-        # the half swings, each in the form that its cell needs; rough ones from parameters some roundings off
-        swung = np.empty((len(Swung._fields) + 1, len(i)))
-        bare = linear[i] & ((stage[i] < ROUGH) | (not asked[_SENSITIVITY]))
-        kind = 2 * np.where(bare, 1, np.where(linear[i], 2, 0)) + (stage[i] == ROUGH)
-        for k in np.flatnonzero(np.bincount(kind)):
-            of_kind = np.flatnonzero(kind == k)
-            form, j = forms[k // 2], i[of_kind]
-            columns = [*(terms[name][j] for name in form.terms), cells[_E][j] * v[j], np.ones(len(j))]
-            swung[:, of_kind] = half_swings(form, off_by_roundings(columns) if k % 2 else columns, tolerance[j])
-
-        # Newton's step of each, and the cycle by it
-        _, step_of, found, verdict = stepped([column[i] for column in cells], v[i], swung[:-1], rtol[i])
+        # the half swings, each in the form that its cell needs; Newton's step of each, and the cycle by it
+        bare, now, used = linear[i] & ((stage[i] < ROUGH) | (not asked[_SENSITIVITY])), v[i], tolerance[i]
+        of_cells = {name: column[i] for name, column in terms.items()}
+        swung = half_swings(np.where(bare, searched, form[i]), stage[i] == ROUGH, of_cells, cells[_E][i] * now, used)
+        _, step_of, found, verdict = stepped([column[i] for column in cells], now, swung[:-1], rtol[i])
         end, change, slope, cancels = step_of
         free = (swung[-1] < FIRST_REFUSAL) & np.isfinite(step_of[:3]).all(axis=0) & (end > 0.0)
         relative, gap, decay = np.abs(change / end), 1.0 - slope, np.where(swung[_DECAY] < 750.0, swung[_DECAY], 0.0)
         stuck[i] = np.where(free, 0, stuck[i] + 1)
-        lost = (stuck[i] > STUCK) | ((stage[i] == SEARCH) & (high[i] - low[i] <= _COARSE * v[i]))
+        lost = (stuck[i] > STUCK) | ((stage[i] == SEARCH) & (high[i] - low[i] <= _COARSE * now))
 
         # the error by how far fine ones are from rough ones, and by the speed; done where that will do or nothing helps
-        moved = np.abs(v[i] / before[i] - 1.0)
-        apart = np.abs(found / outputs[:, i] - 1.0)
+        moved, apart = np.abs(now / before[i] - 1.0), np.abs(found / outputs[:, i] - 1.0)
         rate = np.where(moved > 0.0, relative / moved, 0.0)
         by_tolerance[:, i] = np.where(stage[i] == LAST, by_tolerance[:, i] + apart, told[:, i] * apart)
         # without tangents the errors of steps add up over the waves
         waves = np.where(linear[i] & (not asked[_SENSITIVITY]), terms["wave"][i] / np.pi * (1.0 + swung[_TOP]), 0.0)
-        floor = np.tile((_ROUNDING + tolerance[i] * (1.0 + waves)) / gap, (len(found), 1))
+        floor = np.tile((_ROUNDING + used * (1.0 + waves)) / gap, (len(found), 1))
         floor[3] *= 1.0 + cancels
         floor[4] *= 1.0 + decay
         ended, stated = free & (stage[i] == final[i]), by_tolerance[:, i] + 2.0 * (rate * apart + relative) + floor
         outputs[:, i[free]], errors[:, i] = found[:, free], np.where(ended, stated, np.inf)
         right = errors[:, i][asked].max(axis=0) <= rtol[i]
-        last = ended & (right | (again[i] >= AGAIN) | (tolerance[i] <= _LEAST))
+        last = ended & (right | (again[i] >= AGAIN) | (used <= _LEAST))
         status[i[last]] = verdict[last]
         repeated = i[ended & ~last]
         share[repeated], again[repeated] = _TIGHTER * share[repeated], again[repeated] + 1
 
         # the next speed: Newton's, or where that leaves the bracket one that narrows it
-        now = before[i] = v[i]
-        noise = np.where(linear[i], _NOISE_BARE, _NOISE) * tolerance[i] * now
+        noise = np.where(linear[i], _NOISE_BARE, _NOISE) * used * now
         low[i] = np.where(~free | (end - now > noise), now, low[i])
         high[i] = np.where(free & (now - end > noise), now, high[i])
         new = now + change
         inside = free & (new > low[i]) & (new < high[i]) & (new < 8.0 * now + 8.0)
         between = np.where(high[i] < np.inf, 0.5 * (np.maximum(low[i], 0.0) + high[i]), 2.0 * now + 1.0)
         checked = inside & (stage[i] >= ROUGH) & (stage[i] < final[i]) & (relative < _CHECKED)
-        v[i] = np.where(inside, new, between)
+        before[i], v[i] = now, np.where(inside, new, between)
 
         # the next stage and its tolerance: an error of F counts 1/(1 - slope)-fold in v1. Where the search is cheap,
         # it goes on until what Newton's method leaves is below what is wanted
         wanted = np.fmax(share[i] * rtol[i] * gap / (1.0 + decay) / (1.0 + waves), _LEAST)
         near = np.clip(0.01 * np.sqrt(rtol[i] * gap), FINER * wanted, _COARSE)
-        converged = relative < np.sqrt(near)
-        left = relative * relative
+        left, converged = relative * relative, relative < np.sqrt(near)
         near = np.where(linear[i], np.clip(0.01 * left, np.minimum(4.0 * wanted, _CALM), _COARSE), near)
-        converged = np.where(linear[i], (left < wanted) & (tolerance[i] <= FINER * wanted), converged)
+        converged = np.where(linear[i], (left < wanted) & (used <= FINER * wanted), converged)
         close = inside & np.where(stage[i] == SEARCH, relative < _CLOSE, converged)
         onward = checked | (close & (stage[i] < ROUGH))
         stage[i] = np.where(onward, stage[i] + 1, np.minimum(stage[i], ROUGH))

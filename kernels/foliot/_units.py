@@ -10,10 +10,11 @@ from collections import namedtuple
 
 from kernels.lanes.jit import jit
 from kernels.lanes.ranges import judged
-from kernels.lanes.records import read
+from kernels.lanes.symbols import symbolic
 from kernels.lanes.vectors import any_lane, not_, where
-from kernels.maths.elementary import is_normal, mantissa_exponent, measured, power, scale, scaled_root
+from kernels.maths.elementary import is_normal, power
 from kernels.maths.pairs import two_sum
+from kernels.maths.wide import number, over, root, size, times, wide
 
 Foliot = namedtuple("Foliot", "mu phi0 a R R_s c n k e")
 """Parameters."""
@@ -30,55 +31,23 @@ Scene = namedtuple("Scene", "d rho rho_s gamma n kappa e slack")
 Drag of degree 0 is Coulomb friction: it is counted in rho, rho_s and slack. n is 1 where gamma is 0.
 """
 
-Units = namedtuple("Units", "t e_t m_phi e_phi fine")
-"""T0 = t 2^e_t and phi0 = m_phi 2^e_phi, and whether all groups of (1) are normal numbers."""
+Units = namedtuple("Units", "time angle fine")
+"""T0 and phi0, as `wide` numbers, and whether all groups of (1) are normal numbers."""
 
 Cycle = namedtuple("Cycle", "half_period amplitude speed sensitivity multiplier")
 """A limit cycle: half period, amplitude, speed before the switch, s = -dlnP/dlnmu, multiplier."""
 
 
-@jit
-def without_drag(p):
-    """The foliot of a `LinearFoliot`."""
-    return Foliot(p.mu, p.phi0, p.a, p.R, p.R_s, 0.0, 1.0, p.k, p.e)
-
-
-@jit
+@symbolic
 def errors(swing, sensitivity, multiplier):
     """Relative errors of the outputs; period, amplitude and speed share the first."""
     return Outputs(swing, swing, swing, sensitivity, multiplier)
 
 
-@jit
-def _times(x, unit, e_unit):
-    """x times a unit, and whether that is a normal number where x is not zero."""
-    m, e = mantissa_exponent(where(x > 0.0, x, 1.0))
-    group = where(x > 0.0, scale(m * unit, e + e_unit), 0.0)
-    return group, not_(x > 0.0) | is_normal(group)
-
-
-@jit
-def without_dimensions(p):
-    """The scene of a record with the parameters of a `Foliot`, and its units."""
-    (m_mu, e_mu), (m_phi, e_phi) = mantissa_exponent(p.mu), mantissa_exponent(p.phi0)
-    t, e_t = scaled_root(m_phi / m_mu, e_phi - e_mu)
-    v, e_v = scaled_root(m_phi * m_mu, e_phi + e_mu)
-    (d, fine_d), (kappa, fine_kappa) = _times(p.a, t, e_t), _times(p.k, t * t, 2.0 * e_t)
-    powered = p.n > 0.0
-    solid, drag = where(powered, 0.0, p.c), where(powered, p.c, 0.0)
-    gamma = 0.0 * drag
-    if any_lane(drag > 0.0):
-        gamma = where(drag > 0.0, drag / p.mu * power(scale(v, e_v), p.n), 0.0)
-    rho, slack = (p.R + solid) / p.mu, spare_torque(p.mu, p.R, solid) / p.mu
-    fine = fine_d & fine_kappa & (not_(drag > 0.0) | is_normal(gamma)) & (not_(p.R + solid > 0.0) | is_normal(rho))
-    scene = Scene(d, rho, (p.R_s + solid) / p.mu, gamma, where(gamma > 0.0, p.n, 1.0), kappa, p.e, slack)
-    return scene, Units(t, e_t, m_phi, e_phi, fine)
-
-
-@jit
-def linear(columns, i):
-    """The scene of cell i of columns without drag, and its units."""
-    return without_dimensions(without_drag(read(LinearFoliot, columns, i)))
+@symbolic
+def drag_of(p):
+    """c and n of a `Foliot`, or of a `LinearFoliot`, which has no drag."""
+    return (p.c, p.n) if hasattr(p, "c") else (0.0, 1.0)
 
 
 @jit
@@ -90,23 +59,35 @@ def spare_torque(mu, R, solid):
 
 
 @jit
-def speed(units, v):
-    """[rad/s], NaN where it is no normal number, as all sizes that are put back here."""
-    return measured(units.m_phi / units.t * v, units.e_phi - units.e_t)
+def _sound(x, group):
+    """Whether a group is a normal number wherever the term that it is of is not 0."""
+    return not_(x > 0.0) | is_normal(group)
 
 
 @jit
-def time(units, t):
-    """[s]."""
-    return measured(units.t * t, units.e_t)
+def without_dimensions(p):
+    """The scene of a `Foliot` or a `LinearFoliot`, or of a record with more parameters, and its units."""
+    mu, phi0, a, k = wide((p.mu, p.phi0, p.a, p.k))
+    time, speed = root(over(phi0, mu)), root(times(phi0, mu))
+    d, kappa = number(times(a, time)), number(times(k, times(time, time)))
+    c, n = drag_of(p)
+    powered = n > 0.0
+    solid, drag = where(powered, 0.0, c), where(powered, c, 0.0)
+    gamma = 0.0 * drag
+    if any_lane(drag > 0.0):
+        gamma = where(drag > 0.0, drag / p.mu * power(number(speed), n), 0.0)
+    rho, slack = (p.R + solid) / p.mu, spare_torque(p.mu, p.R, solid) / p.mu
+    fine = _sound(p.a, d) & _sound(p.k, kappa) & _sound(drag, gamma) & _sound(p.R + solid, rho)
+    scene = Scene(d, rho, (p.R_s + solid) / p.mu, gamma, where(gamma > 0.0, n, 1.0), kappa, p.e, slack)
+    return scene, Units(time, phi0, fine)
 
 
 @jit
 def given(units, cycle, verdict):
     """What a method gives of a cycle: its outputs and its status."""
-    half_period, amplitude, before, sensitivity, multiplier = cycle
-    period, fast = time(units, 2.0 * half_period), speed(units, before)
-    swing = measured(units.m_phi * amplitude, units.e_phi)
+    half_period, amplitude, speed, sensitivity, multiplier = cycle
+    period, swing = size(2.0 * half_period, units.time), size(amplitude, units.angle)
+    fast = size(speed, over(units.angle, units.time))
     verdict = judged(units.fine, (period > 0.0) & (swing > 0.0) & (fast > 0.0), verdict)
     return Outputs(period, swing, fast, sensitivity, multiplier), verdict
 

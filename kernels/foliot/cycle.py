@@ -11,21 +11,14 @@ spring; `taylor` and `dopri5`, which do what `segments` cannot, follow the cycle
 """
 
 from kernels.foliot import _coulomb, _friction_quadrature, _taylor_swing, _viscous
-from kernels.foliot._integrated_swing import SMOOTH, by_steps
+from kernels.foliot._integrated_swing import by_steps
 from kernels.foliot._linear_swing import segments
-from kernels.foliot._units import UNITS, Foliot, given, spare_torque, without_dimensions
+from kernels.foliot._units import UNITS, Foliot, drag_of, errors, spare_torque
 from kernels.interface import Field
 from kernels.lanes.codes import BAD_INPUT, NEVER_STARTS, NO_LIMIT_CYCLE, OK
 from kernels.lanes.jit import jit
 from kernels.lanes.vectors import not_, where
 from kernels.lanes.wiring import kernel, method
-
-
-@jit
-def _unrippled(p):
-    """The scene with no ripple, and its units."""
-    scene, units = without_dimensions(p)
-    return (scene, SMOOTH), units
 
 
 def dopri5_is_cheaper(p, rtol):
@@ -35,14 +28,15 @@ def dopri5_is_cheaper(p, rtol):
 
 @jit
 def check(p):
-    """What no method is asked; of a record that may have more parameters.
+    """What no method is asked; of a record that may have more parameters, or no drag.
 
     BAD_INPUT: stiction below the friction of motion. NEVER_STARTS: torque that cannot overcome solid friction.
     NO_LIMIT_CYCLE: nothing that takes energy.
     """
     friction = where(p.k > 0.0, p.R, p.R_s)  # a spring helps stiction be overcome
-    spare = spare_torque(p.mu, friction, where(p.n > 0.0, 0.0, p.c))
-    lossless = not_((p.a > 0.0) | (p.R > 0.0) | (p.c > 0.0) | (p.e < 1.0))
+    c, n = drag_of(p)
+    spare = spare_torque(p.mu, friction, where(n > 0.0, 0.0, c))
+    lossless = not_((p.a > 0.0) | (p.R > 0.0) | (c > 0.0) | (p.e < 1.0))
     verdict = where(spare > 0.0, where(lossless, NO_LIMIT_CYCLE, OK), NEVER_STARTS)
     return where(p.R_s >= p.R, verdict, BAD_INPUT)
 
@@ -79,7 +73,7 @@ FOLIOT = kernel(
     check=check,
     methods=(
         method("closed", "root of q - tanh q = 1/alpha by fitted polynomials",
-               _viscous.closed, _viscous.closed_bound, **_VISCOUS),
+               _viscous.closed, errors(_viscous.ROUNDING, _viscous.ROUNDING, 2.0 * _viscous.ROUNDING), **_VISCOUS),
         method("asymptotic", "weak and strong series with a bound each",
                _viscous.asymptotic, _viscous.asymptotic_bound, **_VISCOUS),
         method("pure", "closed forms where one loss acts alone",
@@ -92,8 +86,8 @@ FOLIOT = kernel(
                _friction_quadrature.quadrature, _friction_quadrature.bound, units=UNITS, excludes=("k",)),
         method("map", "exact map from switch to switch, iterated from rest",
                _viscous.event_map, _viscous.event_map_bound, **_VISCOUS),
-        _taylor_swing.by_taylor(Foliot._fields, rippled=False),
-        *by_steps((_unrippled, given), sooner=dopri5_is_cheaper),
+        _taylor_swing.by_taylor(Foliot._fields),
+        *by_steps(sooner=dopri5_is_cheaper),
     ),
     example={"mu": 1.0, "phi0": 1.0, "a": 1.0},
 )  # fmt: skip

@@ -13,8 +13,9 @@ from kernels.lanes.jit import jit
 from kernels.lanes.ranges import judged
 from kernels.lanes.vectors import magnitude, where
 from kernels.lanes.wiring import kernel, method
-from kernels.maths.elementary import is_normal, mantissa_exponent, measured
+from kernels.maths.elementary import is_normal
 from kernels.maths.roots import by_steps
+from kernels.maths.wide import over, size, times, wide
 
 _NEWTON_LIMIT = 20
 
@@ -34,13 +35,13 @@ def newton(p, rtol):
 
     That is nearly a straight line: slope (1/lambda - A)/(A - 1), from -1 (weak drive) to -1/3 (strong).
     """
-    (period, e_p), (phi0, e_f) = mantissa_exponent(p.period), mantissa_exponent(p.phi0)
     overshoot = (p.amplitude - p.phi0) / p.phi0
     k = 1.125 / (overshoot * (overshoot * overshoot + 3.0 * overshoot + 3.666))
     k, active = by_steps(_step, k, k > 0.0, overshoot, _NEWTON_LIMIT)
-    unit_a = 4.0 * _viscous.cycle_of((k, 0.0 * k)).q / period
-    unit_k, e_k = mantissa_exponent(k)
-    a, mu = measured(unit_a, -e_p), measured(unit_a * unit_a * phi0 / unit_k, e_f - 2.0 * e_p - e_k)
+    period, phi0, group = wide((p.period, p.phi0, k))
+    cycle, _ = _viscous.closed((k, 0.0 * k), rtol)
+    friction = over((4.0 * cycle.q, 0.0), period)
+    a, mu = size(1.0, friction), size(1.0, over(times(times(friction, friction), phi0), group))
     rubs, drives = a > 0.0, mu > 0.0
     return (a, mu), judged(is_normal(k) & (rubs | drives), rubs & drives, where(active, NOT_CONVERGED, OK))
 

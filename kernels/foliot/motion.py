@@ -8,8 +8,7 @@ hairspring or restitution the two pieces of the half swing follow `linear_flow`;
 
 from kernels.foliot import _linear_swing, _units, _viscous
 from kernels.foliot._units import LinearFoliot
-from kernels.foliot.cycle import FOLIOT
-from kernels.foliot.cycle import check as check_foliot
+from kernels.foliot.cycle import FOLIOT, check
 from kernels.integrate import linear_flow
 from kernels.interface import Field
 from kernels.lanes.codes import OK
@@ -20,13 +19,14 @@ from kernels.lanes.records import read
 from kernels.lanes.vectors import fma, where
 from kernels.lanes.wiring import kernel, tracing
 from kernels.maths.elementary import exp, exp_remainder, scale
+from kernels.maths.wide import number, over, times
 
 
 @jit
 def closed(i, columns):
     """Equation (1) on the cycle from fitted polynomials: 4e-15 of amplitude and crossing speed at every drive."""
     (k, rest), units = _viscous.without_dimensions(read(LinearFoliot, columns, i))
-    cycle = _viscous.cycle_of((k, rest))
+    cycle, _ = _viscous.closed((k, rest), 0.0)
     outputs, _ = _viscous.given(units, cycle, OK)
     wide, moves = outputs.amplitude > 0.0, outputs.crossing_speed > 0.0
     for j in range(columns.phase.size):
@@ -45,7 +45,7 @@ def closed(i, columns):
 @jit
 def segments(i, columns):
     """The exact pieces of the swing on the cycle that `foliot` finds with them."""
-    scene, units = _units.linear(columns, i)
+    scene, units = _units.without_dimensions(read(LinearFoliot, columns, i))
     cycle, errors, verdict = _linear_swing.segments(scene, columns.rtol[i])
     columns.error[i] = errors.period if errors.period > errors.multiplier else errors.multiplier
     start = scene.e * cycle.speed
@@ -60,15 +60,9 @@ def segments(i, columns):
         v, force = where(rising, where(start > 0.0, start, 0.0), legs.down), where(rising, -legs.g1, legs.g2)
         y, v = linear_flow.motion(0.5 * scene.d, scene.kappa, v, force, where(rising, t, t - legs.t1))
         x, v = where(rising, 1.0 + y, legs.top - y), where(rising, v, -v)
-        columns.angle[i, j] = or_none(sign * scale(units.m_phi * x, units.e_phi), wide)
-        columns.speed[i, j] = or_none(sign * scale(units.m_phi / units.t * v, units.e_phi - units.e_t), moves)
+        columns.angle[i, j] = or_none(sign * number(times((x, 0.0), units.angle)), wide)
+        columns.speed[i, j] = or_none(sign * number(times((v, 0.0), over(units.angle, units.time))), moves)
     columns.status[i] = judged(units.fine & (wide | moves), wide & moves, verdict)
-
-
-@jit
-def check(p):
-    """As for `foliot`."""
-    return check_foliot(_units.without_drag(p))
 
 
 FOLIOT_MOTION = kernel(

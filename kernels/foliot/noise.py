@@ -26,17 +26,19 @@ from collections import namedtuple
 import numpy as np
 
 from kernels.foliot import _linear_swing, _units
-from kernels.foliot._units import Scene
+from kernels.foliot._units import LinearFoliot, Scene
 from kernels.foliot.cycle import FOLIOT, check
 from kernels.integrate import linear_flow
 from kernels.interface import FIRST_REFUSAL, Field
 from kernels.lanes.codes import INACCURATE, NOT_SELF_STARTING, OK, OUT_OF_RANGE, STICKS, TOO_SHORT
 from kernels.lanes.columns import GROUP, cells_at
 from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.records import read
 from kernels.lanes.vectors import any_lane, choose, fma, magnitude, nearest, not_, sqrt, where
 from kernels.lanes.wiring import kernel, tracing
 from kernels.maths import philox
-from kernels.maths.elementary import exp, expm1, is_normal, larger, mantissa_exponent, scale
+from kernels.maths.elementary import exp, expm1, is_normal, larger
+from kernels.maths.wide import number, over, wide
 
 HALF_SWING_LIMIT = 1e9
 SECONDS_PER_DAY = 86400.0
@@ -126,7 +128,7 @@ def _run(first, seed, half_swings, clock, speed, active, radii, turns, radii_apa
 def segments(first, columns, radii, turns, radii_apart, turns_apart):
     """Every half swing from exact pieces. `rtol` is meant of rates as fractions: 1e-9 of a day is 8.6e-5 s."""
     i = cells_at(first)
-    scene, units = _units.linear(columns, i)
+    scene, units = _units.without_dimensions(read(LinearFoliot, columns, i))
     cycle, _, found = _linear_swing.segments(scene, columns.rtol[i])
 
     # the floor of (1): from rest at the switch the force must reach over the way 2, which grows with it
@@ -140,8 +142,8 @@ def segments(first, columns, radii, turns, radii_apart, turns_apart):
     tau_c = where(white, 1.0, columns.tau_c[i])
     remembered, fresh = where(white, 0.0, exp(-1.0 / tau_c)), where(white, 1.0, sqrt(-expm1(-2.0 / tau_c)))
 
-    m_tau, e_tau = mantissa_exponent(columns.averaging_time[i])
-    tau = scale(m_tau / units.t, e_tau - units.e_t)
+    (averaging_time,) = wide((columns.averaging_time[i],))
+    tau = number(over(averaging_time, units.time))
     sigma, sigma_a, shared = columns.sigma[i], columns.sigma_a[i], columns.shared[i]
     own = sqrt((1.0 - shared) * (1.0 + shared))
     clock = Clock(scene, sigma, sigma_a, remembered, fresh, floor, cycle.half_period, tau, shared, own)

@@ -12,23 +12,15 @@ Leaves out: the geometry of the pallets that makes the ripple. Source: as `folio
 
 import math
 
-from kernels.foliot import _taylor_swing, _units
 from kernels.foliot._integrated_swing import by_steps
+from kernels.foliot._taylor_swing import by_taylor
+from kernels.foliot._units import Foliot
 from kernels.foliot.cycle import FOLIOT, check
 from kernels.interface import Field
-from kernels.lanes.jit import jit
 from kernels.lanes.wiring import kernel
 
 HIGHEST = 1000.0
 """Of harmonics: more waves than steps that the integrator may take follow from more."""
-
-
-@jit
-def _taken(p):
-    """The scene with its ripple, and its units."""
-    scene, units = _units.without_dimensions(p)
-    return (scene, (p.depth, p.harmonic)), units
-
 
 FOLIOT_RIPPLE = kernel(
     "foliot_ripple",
@@ -43,9 +35,6 @@ FOLIOT_RIPPLE = kernel(
     ),
     outputs=FOLIOT.outputs,
     check=check,
-    methods=(
-        _taylor_swing.by_taylor((*_units.Foliot._fields, "depth", "harmonic"), rippled=True),
-        *by_steps((_taken, _units.given)),
-    ),
+    methods=(by_taylor((*Foliot._fields, "depth", "harmonic")), *by_steps()),
     example={"mu": 1.0, "phi0": 1.0, "a": 1.0, "depth": 0.3, "harmonic": 2.0},
 )  # fmt: skip

@@ -15,6 +15,7 @@ from collections import namedtuple
 
 from kernels.foliot import _linear_swing, _units
 from kernels.foliot._linear_swing import ROUNDING
+from kernels.foliot._units import LinearFoliot
 from kernels.foliot.cycle import FOLIOT
 from kernels.integrate import linear_flow
 from kernels.interface import Field
@@ -22,9 +23,11 @@ from kernels.lanes.codes import BAD_INPUT, COMES_TO_REST, GRAZING, INACCURATE, N
 from kernels.lanes.columns import cells_at, one_row, write_row
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.ranges import partly
+from kernels.lanes.records import read
 from kernels.lanes.vectors import any_lane, choose, fma, magnitude, not_, where
 from kernels.lanes.wiring import kernel, tracing
 from kernels.maths.elementary import is_normal, larger
+from kernels.maths.wide import over, size
 
 FLIP_LIMIT = 1e6
 """The last flip that can be asked for."""
@@ -57,12 +60,6 @@ def _near_miss(scene, energy, push, speed, way):
     return left * against <= 2.0 * energy + rounding
 
 
-@jit
-def _either(condition, yes, no):
-    """`where` for conditions."""
-    return (condition & yes) | (not_(condition) & no)
-
-
 @jit_call
 def _release(scene, x, way):
     """The first flip, whether it comes, and whether the last digits decide that."""
@@ -78,7 +75,7 @@ def _release(scene, x, way):
     wrong = rounded + ROUNDING * way * magnitude(push * slope) / (speed * speed)
     late = rounded * way / speed + ROUNDING * time
     near = (push > 0.0) & _near_miss(scene, 0.0 * way, push, 0.0 * way, way)
-    unsure = unsure | _either(through, wrong > UNSURE, near & not_(held))
+    unsure = unsure | (through & (wrong > UNSURE)) | (near & not_(through | held))
     return Flip(time, 0.0 * time, speed, wrong, late), through & not_(held), unsure
 
 
@@ -94,7 +91,7 @@ def _next(scene, flip):
     late = flip.late + magnitude(longer * start) * flip.wrong + time_noise
     energy = start * start * (flip.wrong + ROUNDING)
     near = _near_miss(scene, energy, legs.g2, legs.down, 1.0 + legs.top)
-    unsure = (turns & unsure) | _either(legs.comes, wrong > UNSURE, near)
+    unsure = (turns & unsure) | (legs.comes & (wrong > UNSURE)) | (near & not_(legs.comes))
     later = flip.time + legs.time
     low = flip.low + (legs.time - (later - flip.time))
     return Flip(later, low, legs.speed, wrong, late), legs.comes & not_(turns & held), unsure
@@ -111,7 +108,7 @@ def segments(first, columns, row):
         if not (1.0 <= number <= FLIP_LIMIT and number == math.floor(number)):
             columns.status[i] = BAD_INPUT
             return
-    scene, units = _units.linear(columns, i)
+    scene, units = _units.without_dimensions(read(LinearFoliot, columns, i))
     phi0, phi_start = columns.phi0[i], columns.phi_start[i]
     before = phi_start < phi0
     way = where(before, phi0 - phi_start, phi_start + phi0) / phi0  # 1 + x, with its digits for a start just before
@@ -130,7 +127,7 @@ def segments(first, columns, row):
                 going = going & comes
                 now = choose(going, new, now)
         here = flip[j]
-        time, speed = _units.time(units, now.time + now.low), _units.speed(units, now.speed)
+        time, speed = size(now.time + now.low, units.time), size(now.speed, over(units.angle, units.time))
         whole, given = whole & ((time > 0.0) & (speed > 0.0) | not_(going)), given | (time > 0.0) | (speed > 0.0)
         accurate = accurate & ((larger(now.late / now.time, now.wrong) <= columns.rtol[i]) | not_(going))
         write_row(first, j, where(going, time, math.nan), row, columns.flip_time)

@@ -10,8 +10,9 @@ STEP_LIMIT: no switch in 20 000 steps, as where a method takes too much energy, 
 OUT_OF_RANGE: the method blew up.
 """
 
+from kernels.foliot.cycle import FOLIOT
 from kernels.interface import Field, Kernel, Status
-from kernels.scene import Scene, limits_check, sign, signed
+from kernels.scene import Scene, limits_check, sign
 from kernels.stepping import COST, stepping_fields, stepping_methods
 
 
@@ -36,13 +37,9 @@ SCENE = Scene(
 )
 
 PARAMETERS = (
-    Field("mu", "rad/s^2", "drive torque per moment of inertia", lower=0.0, open_lower=True),
-    Field("phi0", "rad", "angle at which the drive switches", lower=0.0, open_lower=True),
-    Field("a", "1/s", "viscous friction per moment of inertia", default=0.0, lower=0.0),
-    Field("R", "rad/s^2", "Coulomb friction per moment of inertia", default=0.0, lower=0.0),
+    *map(FOLIOT.parameter, ("mu", "phi0", "a", "R")),
     Field("c", "1", "quadratic drag per moment of inertia", default=0.0, lower=0.0),
-    Field("k", "1/s^2", "hairspring stiffness per moment of inertia", default=0.0, lower=0.0),
-    Field("e", "1", "restitution of the speed at the switch", default=1.0, lower=-1.0, upper=1.0, open_lower=True),
+    *map(FOLIOT.parameter, ("k", "e")),
     *stepping_fields(),
 )
 
@@ -61,15 +58,11 @@ def _fill(time, interval, states, reach, columns):
     period[:], last[:], amplitude[:], crossing_speed[:] = 2.0 * interval, time, reach[0], abs(states[1])
 
 
-def _check_columns(*columns):
-    """As of every scene; and NEVER_STARTS where the drive cannot overcome dry friction."""
-    _limits(*columns)
-    mu, _, _, R, *_, status = columns
+def _never_starts(mu, phi0, a, R, *others):
+    """NEVER_STARTS where the drive cannot overcome dry friction."""
+    status = others[-1]
     status[(status == Status.OK) & (mu <= R)] = Status.NEVER_STARTS
 
-
-_limits = limits_check(PARAMETERS)
-check = signed(_check_columns, [*(f.name for f in PARAMETERS), "status"])
 
 FOLIOT_STEPS = Kernel(
     name="foliot_steps",
@@ -77,7 +70,7 @@ FOLIOT_STEPS = Kernel(
     source="as of the kernel foliot; the methods of Hairer, Norsett & Wanner and Moreau",
     parameters=PARAMETERS,
     outputs=OUTPUTS,
-    check=check,
+    check=limits_check(PARAMETERS, _never_starts),
     methods=stepping_methods(SCENE, PARAMETERS, OUTPUTS, _fill),
     example={"mu": 1.0, "phi0": 1.0, "a": 0.5, "flips": 2.0, "step": 0.05},
 )

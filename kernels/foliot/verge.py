@@ -38,9 +38,10 @@ from kernels.lanes.codes import NEVER_STARTS, NO_METHOD, NOT_CONVERGED, OK, STEP
 from kernels.lanes.columns import cell_by_cell
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.ranges import judged
-from kernels.lanes.vectors import magnitude, sqrt, where
+from kernels.lanes.vectors import choose, magnitude, not_, sqrt, where
 from kernels.lanes.wiring import kernel, method
-from kernels.maths.elementary import log, mantissa_exponent, measured, scale, scaled_root
+from kernels.maths.elementary import log
+from kernels.maths.wide import number, over, root, size, times, wide
 
 HALF_PERIODS = 600
 """Half periods that are followed until one repeats the one before; secants between them."""
@@ -64,49 +65,35 @@ Half = namedtuple("Half", "v w gap time swing way back lost closing impacts end"
 largest abs(y), `way` that of the foliot to and fro, `back` the wheel's way backwards since its first landing, `lost`
 the energy of impacts, and `closing` the first closing speed."""
 
-Cycle = namedtuple("Cycle", "period amplitude escape_speed recoil impact_share dry_share")
-"""The outputs, or their relative errors."""
 
-Units = namedtuple("Units", "time e_time angle e_angle wheel e_wheel fine")
-"""The time unit, and the foliot's and the wheel's angles, each a mantissa and an exponent; whether in range."""
+@jit
+def _usual(group):
+    """Whether a group is within 2^+-40, or 0."""
+    return (magnitude(group[1]) <= 40.0) | not_(group[0] > 0.0)
 
 
 @jit
 def without_dimensions(p):
-    """The scene and its units."""
-    (tau, e_tau), (I_v, e_v), (I_c, e_c) = mantissa_exponent(p.tau), mantissa_exponent(p.I_v), mantissa_exponent(p.I_c)
-    (n, e_n), (phi0, e_phi) = mantissa_exponent(p.n), mantissa_exponent(p.phi0)
-    time, e_time = scaled_root(I_v * phi0 / (n * tau), e_v + e_phi - e_n - e_tau)
-    e_kappa = 2.0 * e_n + e_c - e_v
-    c, e_c_v = mantissa_exponent(where(p.c_v > 0.0, p.c_v, p.I_v))
-    drop, e_drop = mantissa_exponent(where(p.drop > 0.0, p.drop, p.phi0))
-    R, e_R = mantissa_exponent(where(p.R_v > 0.0, p.R_v, p.tau))
-    e_d, e_drop, e_R = e_c_v + e_time - e_v, e_drop - e_n - e_phi, e_R - e_n - e_tau
-    damped, drops = p.c_v > 0.0, p.drop > 0.0
-    fine = (e_kappa <= 12.0) & (e_kappa >= -40.0) & ((magnitude(e_d) <= 40.0) | (p.c_v <= 0.0))
-    fine = fine & ((magnitude(e_drop) <= 40.0) | (p.drop <= 0.0))
-    scene = Scene(
-        kappa=scale(n * n * I_c / I_v, where(fine, e_kappa, 0.0)),
-        d=where(damped, scale(c * time / I_v, where(fine, e_d, 0.0)), 0.0),
-        r=where(p.R_v > 0.0, scale(R / (n * tau), where(e_R < 40.0, e_R, 40.0)), 0.0),
-        drop=where(drops, scale(drop / (n * phi0), where(fine, e_drop, 0.0)), 0.0),
-        e=p.e,
-    )
-    return scene, Units(time, e_time, phi0, e_phi, n * phi0, e_n + e_phi, fine)
+    """The scene; the units of time, of the foliot's and of the wheel's angle; whether the groups are in range."""
+    tau, I_v, I_c, n, phi0, c_v, R_v, drop = wide((p.tau, p.I_v, p.I_c, p.n, p.phi0, p.c_v, p.R_v, p.drop))
+    push, wheel = times(n, tau), times(n, phi0)
+    time = root(over(times(I_v, phi0), push))
+    kappa, d, drop = over(times(times(n, n), I_c), I_v), over(times(c_v, time), I_v), over(drop, wheel)
+    fine = (kappa[1] <= 12.0) & (kappa[1] >= -40.0) & _usual(d) & _usual(drop)
+    kappa, d, drop = choose(fine, (kappa, d, drop), ((1.0, 0.0), (1.0, 0.0), (1.0, 0.0)))
+    scene = Scene(number(kappa), number(d), number(over(R_v, push)), number(drop), p.e)
+    return scene, (time, phi0, wheel, fine)
 
 
 @jit
 def given(units, answer, verdict):
     """The outputs, NaN where they are no normal numbers, and the status."""
-    half, share, rubbed = answer
-    period = measured(2.0 * units.time * half.time, units.e_time)
-    amplitude = measured(units.angle * half.swing, units.e_angle)
-    speed = measured(units.angle / units.time * half.v, units.e_angle - units.e_time)
-    recoil = 0.0 if half.back == 0.0 else measured(units.wheel * half.back, units.e_wheel)
+    (time, angle, wheel, fine), (half, share, rubbed) = units, answer
+    period, amplitude, speed = size(2.0 * half.time, time), size(half.swing, angle), size(half.v, over(angle, time))
+    recoil = 0.0 if half.back == 0.0 else size(half.back, wheel)
     sound = period > 0.0 and amplitude > 0.0
-    verdict = verdict if units.fine else NO_METHOD
-    cycle = Cycle(period, amplitude, speed, recoil, share, rubbed)
-    return cycle, judged(sound, sound and speed > 0.0 and recoil >= 0.0, verdict)
+    verdict = judged(sound, sound and speed > 0.0 and recoil >= 0.0, verdict if fine else NO_METHOD)
+    return (period, amplitude, speed, recoil, share, rubbed), verdict
 
 
 @jit_call
@@ -239,9 +226,10 @@ def of_both(one, other):
     )  # fmt: skip
 
 
-@jit_call
-def repeated(scene):
-    """The half period that repeats, the clock started from rest; its relative error; the status.
+@jit
+def return_map(scene, rtol):
+    """The half period that repeats, the clock started from rest, with the shares of the losses in the drive's work; the
+    relative errors; the status.
 
     Where it repeats only after the one between, the clock limps, and the answer is of both. Where bounces die out
     before the escape the next half period depends on one speed alone, and secants lead to the speed that repeats. A
@@ -250,13 +238,14 @@ def repeated(scene):
     """
     v, w, gap, tried, floor, ceiling = 0.0, 0.0, 0.0, False, 0.0, math.inf
     old_v, old_image, slope, before = -1.0, 0.0, 0.0, math.inf
-    half = half_period(scene, v, w, gap)
+    half, error, status = half_period(scene, v, w, gap), math.nan, NOT_CONVERGED
     one, first_v, first_w, first_gap = half, -1.0, 0.0, 0.0
     limped, earlier, pace = math.inf, math.inf, 0.0
     for _ in range(HALF_PERIODS):
         if half.end != DONE:
             if not tried:
-                return half, math.nan, UNMESHES if half.end == OUT_OF_MESH else STEP_LIMIT
+                status = UNMESHES if half.end == OUT_OF_MESH else STEP_LIMIT
+                break
             v, w, gap, tried, ceiling = floor, floor, 0.0, False, v
             half = half_period(scene, v, w, gap)
             continue
@@ -267,13 +256,15 @@ def repeated(scene):
         elif not alone and change > 1e-9:
             slope = change / before
         if slope < 1.0 and change <= 1e-13 and (change <= 2e-16 or change >= 0.5 * before):
-            return half, (change + ROUNDING) / (1.0 - max(slope, 0.0)), OK
+            error, status = (change + ROUNDING) / (1.0 - max(slope, 0.0)), OK
+            break
         if not alone and first_v >= 0.0:
             twice = distance(half, first_v, first_w, first_gap)
             if twice > 1e-9:
                 pace = twice / earlier
             if pace < 1.0 and change > 1e-6 and twice <= 1e-13 and (twice <= 2e-16 or twice >= 0.5 * earlier):
-                return of_both(one, half), (twice + ROUNDING) / (1.0 - pace), OK
+                half, error, status = of_both(one, half), (twice + ROUNDING) / (1.0 - pace), OK
+                break
         limped, earlier, one, first_v, first_w, first_gap = twice, limped, half, -1.0 if alone else v, w, gap
         before, floor, image = change, half.v, half.v
         if alone and slope < 1.0:
@@ -285,17 +276,10 @@ def repeated(scene):
         tried, old_v, old_image = image != half.v, v, half.v
         v, w, gap = (image, image, 0.0) if alone else (half.v, half.w, half.gap)
         half = half_period(scene, v, w, gap)
-    return half, math.nan, NOT_CONVERGED
-
-
-@jit
-def return_map(scene, rtol):
-    """`repeated`, with the shares of the losses in the work of the drive, and the error of each output."""
-    half, error, status = repeated(scene)
     work, fast = 2.0 + scene.drop, half.v + magnitude(half.w)
     blunt = fast * sqrt(2.0 * (1.0 + scene.kappa) / half.back) if half.back > 0.0 else 0.0
     hit = max(1.0, fast / half.closing)
-    errors = Cycle(error, error, error, error * (1.0 + blunt), 4.0 * hit * error, 2.0 * error)
+    errors = error, error, error, error * (1.0 + blunt), 4.0 * hit * error, 2.0 * error
     return (half, half.lost / work, scene.r * half.way / work), errors, status
 
 

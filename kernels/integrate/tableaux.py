@@ -31,6 +31,17 @@ DOPRI5_DENSE = (
 )
 """Of the same, powers 1 to 4 of the part of the step: fourth order."""
 
+SDIRK4 = (
+    (1 / 2,),
+    (17 / 50, -1 / 25),
+    (371 / 1360, -137 / 2720, 15 / 544),
+    (25 / 24, -49 / 48, 125 / 16, -85 / 12),
+)
+"""The L-stable SDIRK of order 4(3), Hairer & Wanner, Solving ODEs II, table IV.6.5: stages 1 to 4 from all before,
+beside 1/4 of their own; the last is the result."""
+SDIRK4_ERROR = (-3 / 16, -27 / 32, 25 / 32, 1 / 4)
+"""Of stages 0, 1, 2 and 4."""
+
 DOP853 = (
     (0.05260015195876773,),
     (0.0197250569845379, 0.0591751709536137),

@@ -76,12 +76,12 @@ def largest(errors: Any, asked: Any, order: Any, given: Any) -> Any:
 
     Parameters
     ----------
-    errors : a number, or a record (of records) with one for each output
+    errors : a number; a record (of records) with one for each output, or a tuple in their order
     asked : ndarray, 1 for each output that counts
     order : NamedTuple class whose fields are the outputs in their order
     given : NamedTuple class of the outputs that a record must have an error for
     """
-    if not hasattr(errors, "_fields"):
+    if not isinstance(errors, tuple):
         return errors
     worst = 0.0
     for name, error in _flat(named(given, errors)):

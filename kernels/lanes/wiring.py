@@ -23,6 +23,8 @@ from functools import partial
 from types import FunctionType
 from typing import Any
 
+import numpy as np
+
 from kernels.interface import BoundCell, CheckCell, Field, FillCells, Kernel, Method, OnColumns, SolveCell
 from kernels.lanes import columns as loops
 from kernels.lanes.cache import is_ours
@@ -49,7 +51,7 @@ class method(Method):
     Parameters
     ----------
     solve : `solve(p, rtol, *buffers())`; `fill(i, columns, *buffers())` where `fills`
-    bound : what `solve` is right to: a number, or `bound(p)`; None where its status says so
+    bound : what `solve` is right to: a number, or one for each output, or `bound(p)`; None where its status says so
     sooner : `sooner(p, rtol)` of columns, uncompiled
     name, doc, excludes, lacks, estimates : as in `kernels.interface.Method`
     buffers : makes a tuple of arrays that a thread's cells use one after the other: `buffers()`, or `buffers(columns)`
@@ -61,7 +63,7 @@ class method(Method):
     """
 
     solve: SolveCell | FillCells  # type: ignore[assignment]
-    bound: BoundCell | float | None = None  # type: ignore[assignment]
+    bound: BoundCell | float | tuple[float, ...] | None = None  # type: ignore[assignment]
     _: KW_ONLY
     buffers: Callable[..., tuple[Any, ...]] = nothing
     loop: Loop = loops.in_lanes
@@ -238,8 +240,8 @@ class _Wiring:
         if solver.bound is None:
             return None
         names, bound = [*self.parameters, "rtol", *self.along, "asked", "out"], solver.bound
-        if isinstance(bound, float):
-            return signed(lambda *columns: columns[-1].fill(bound), names)
+        if isinstance(bound, float | tuple):
+            return signed(lambda *columns: columns[-1].fill(np.max(columns[-2] * np.array(bound))), names)
         record, order, given = self.record, namedtuple("Order", self.outputs), self._given(solver)
         take, _ = solver.units or (_as_it_is, _with_none)
 

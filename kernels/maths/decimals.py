@@ -1,9 +1,10 @@
-"""Cosines in decimal arithmetic, for tables made at import: each entry is the float64 nearest to the exact number.
+"""Cosines and nodes in decimal arithmetic, for tables made at import: an entry is the float64 nearest to the exact one.
 
 numpy's and the C library's functions differ in the last digit from processor to processor, and with them every cell
 that a table enters.
 """
 
+import math
 from decimal import Decimal, localcontext
 
 PI = Decimal("3.1415926535897932384626433832795028841971693993751058209749445923078164062862089986280348253421170679")
@@ -32,3 +33,18 @@ def multiples(cosine_of_x, count):
     while len(row) < count:
         row.append(2 * row[1] * row[-1] - row[-2])
     return row
+
+
+def legendre(n):
+    """Nodes in (0, 1) and weights of the rule of Gauss-Legendre, to 1e-98, by Newton's method on P_n."""
+    rule = []
+    for j in range(n):
+        x = Decimal(-math.cos(math.pi * (j + 0.75) / (n + 0.5)))
+        for _ in range(8):
+            before, value = Decimal(1), x
+            for k in range(2, n + 1):
+                before, value = value, ((2 * k - 1) * x * value - (k - 1) * before) / k
+            slope = n * (x * value - before) / (x * x - 1)
+            x -= value / slope
+        rule.append(((1 + x) / 2, 1 / ((1 - x * x) * slope**2)))
+    return rule

@@ -40,13 +40,3 @@ def in_bracket(trial, x, low, high, active, scene, limit, beyond):
         last, active = magnitude(new - x) <= near, active & not_(near < 0.0)
         x, active = where(active, new, x), active & not_(last)
     return x, active
-
-
-@jit
-def bisected(holds, low, high, scene, count):
-    """The upper end of what is left after so many bisections, where holds(x, scene) is true of it and not of `low`."""
-    for _ in range(count):
-        middle = 0.5 * (low + high)
-        there = holds(middle, scene)
-        low, high = where(there, low, middle), where(there, middle, high)
-    return high
