@@ -46,15 +46,12 @@ Weights = Mapping[str, Fraction]
 ONE = Fraction(1)
 
 
-@dataclass(frozen=True)
-class Group:
-    """A product of powers of parameters that has no unit: `str` of {mu: 1, a: -2, phi0: -1} is "mu/(a^2 phi0)"."""
-
-    powers: tuple[tuple[str, Fraction], ...]
+class Group(dict[str, Fraction]):
+    """Powers of parameters whose product has no unit: `str` of {mu: 1, a: -2, phi0: -1} is "mu/(a^2 phi0)"."""
 
     def __str__(self) -> str:
         def product(sign: int) -> list[str]:
-            powers = [(name, sign * power) for name, power in self.powers if sign * power > 0]
+            powers = [(name, sign * power) for name, power in self.items() if sign * power > 0]
             return [name if p == 1 else f"{name}^{p}" if p.denominator == 1 else f"{name}^({p})" for name, p in powers]
 
         over, under = " ".join(product(1)), product(-1)
@@ -63,7 +60,7 @@ class Group:
 
     def of(self, values: Mapping[str, xr.DataArray]) -> xr.DataArray:
         """The group's value, from those of its parameters."""
-        return math.prod(values[name] ** float(power) for name, power in self.powers)  # type: ignore[return-value]
+        return math.prod(values[name] ** float(power) for name, power in self.items())  # type: ignore[return-value]
 
 
 @dataclass(frozen=True)
@@ -76,37 +73,16 @@ class Scaling:
         All that its cells depend on, beside parameters that do not scale. None of a kernel with array parameters.
     scales : dict of output to Group
         What an output is multiplied by to have no unit.
-    axes : tuple of str
-        The axes that scale with others, or with outputs.
     free : int
         How many of the study's axes change nothing but the numbers.
-    others : tuple of str
-        The other axes of parameters.
-    tried : int
-        Cells on which all this was tried.
+    advice : str
+        What `sweep plan` says of superfluous axes; "" where there are none.
     """
 
     groups: tuple[Group, ...]
     scales: dict[str, Group]
-    axes: tuple[str, ...]
     free: int
-    others: tuple[str, ...] = ()
-    tried: int = 0
-
-    @property
-    def advice(self) -> str:
-        """What `sweep plan` says of superfluous axes; "" where there are none."""
-        if not self.free:
-            return ""
-        basis = f"tried on {self.tried} cells at random"
-        left, names = len(self.axes) - self.free, ", ".join(self.axes)
-        where = f" for each {', '.join(self.others)}" if self.others else ""
-        if left == 0:
-            return f"every output is a power of {names} times a constant; a single cell tells all{where}; {basis}"
-        varied = [str(group) for group in self.groups if any(name in self.axes for name, _ in group.powers)]
-        matter = f"only {', '.join(varied)} matter{'s' * (len(varied) == 1)}; " if varied else ""
-        kind = "one-dimensional" if left == 1 else f"{left}-dimensional"
-        return f"{kind} in {names}{where}: {matter}{self.free} of these axes can be left out; {basis}"
+    advice: str
 
     def rescaled(self, dataset: xr.Dataset) -> xr.Dataset:
         """A result of the study with its outputs freed of units, and a coordinate for each dimensionless group.
@@ -175,7 +151,7 @@ def scaling(study: Given) -> Scaling:
         """Their product, raised to whole powers where their denominator is no larger."""
         common = math.lcm(*(power.denominator for power in powers.values()))
         factor = common if common <= most else 1
-        return Group(tuple((name, factor * powers[name]) for name in present if powers.get(name)))
+        return Group({name: factor * powers[name] for name in present if powers.get(name)})
 
     groups = []
     for i, name in enumerate(present):
@@ -186,17 +162,22 @@ def scaling(study: Given) -> Scaling:
             groups.append(group({**against, name: ONE}, LARGEST_COMMON))
     # an output that scales with what is in no group cannot be freed of units
     stuck = [row for lead, row in held.items() if lead not in present]
-    free = [output.name for output in study.asked if not any(row[output.name] for row in stuck)]
-    axes = tuple(name for name in study.axes if name in weights)
+    free_outputs = [output.name for output in study.asked if not any(row[output.name] for row in stuck)]
+    scales = {name: group({lead: -row[name] for lead, row in held.items()}) for name in free_outputs}
+
+    axes = [name for name in study.axes if name in weights]
     unswept = np.array([row for name, row in weights.items() if name not in axes], float)
-    return Scaling(
-        groups=tuple(groups),
-        scales={name: group({lead: -row[name] for lead, row in held.items()}) for name in free},
-        axes=axes,
-        free=len(held) - int(np.linalg.matrix_rank(unswept) if unswept.size else 0),
-        others=tuple(name for name in study.axes if name in fields and name not in axes),
-        tried=tried,
-    )
+    free = len(held) - int(np.linalg.matrix_rank(unswept) if unswept.size else 0)
+    left, swept = len(axes) - free, ", ".join(axes)
+    others = ", ".join(name for name in study.axes if name in fields and name not in axes)
+    where, basis = f" for each {others}" if others else "", f"tried on {tried} cells at random"
+    varied = [str(group) for group in groups if not group.keys().isdisjoint(axes)]
+    matter = f"only {', '.join(varied)} matter{'s' * (len(varied) == 1)}; " if varied else ""
+    kind = "one-dimensional" if left == 1 else f"{left}-dimensional"
+    advice = f"{kind} in {swept}{where}: {matter}{free} of these axes can be left out; {basis}"
+    if left == 0:
+        advice = f"every output is a power of {swept} times a constant; a single cell tells all{where}; {basis}"
+    return Scaling(tuple(groups), scales, free, advice if free else "")
 
 
 def _held(study: Study) -> tuple[dict[str, Weights], int]:
