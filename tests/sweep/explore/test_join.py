@@ -64,6 +64,16 @@ def test_refined_results_that_share_a_border_are_joined_to_one_that_can_be_refin
     assert sweep.join(parts[0], joined).sizes == joined.sizes
 
 
+def test_results_of_blocks_become_longer_along_an_axis_of_their_product():
+    def blocks(heights, speeds=(0.0, 1.0)):
+        pairs = {"design": "zip", "axes": {"v0": list(speeds), "g": [9.0, 10.0]}}
+        return sweep.run(build(blocks=[{"design": "product", "axes": {"height": heights}}, pairs]))
+
+    same(sweep.join(blocks([1.0, 4.0]), blocks([2.0, 4.0])), blocks([1.0, 2.0, 4.0]))
+    with pytest.raises(sweep.SweepError, match=r"differ in axes\.v0"):
+        sweep.join(blocks([1.0]), blocks([1.0], (0.0, 2.0)))
+
+
 def test_a_new_axis_has_labels_and_a_file_that_opens(tmp_path):
     a, b = of(), of()
     with sweep.join(a, b, tmp_path / "c.h5", axis="version", labels=["0.1", "0.2"]) as found:
