@@ -226,7 +226,7 @@ def of_both(one, other):
     )  # fmt: skip
 
 
-@jit
+@jit_call
 def return_map(scene, rtol):
     """The half period that repeats, the clock started from rest, with the shares of the losses in the drive's work; the
     relative errors; the status.
