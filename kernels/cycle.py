@@ -13,8 +13,8 @@ from typing import Any, Unpack
 
 import numpy as np
 
-from kernels.codegen.cycle_values import Described
-from kernels.codegen.limit_cycle import FOUND, RESTS, Cells, Search
+from kernels.codegen.cycle_values import described
+from kernels.codegen.limit_cycle import FOUND, RESTS, Search
 from kernels.codegen.return_map import ReturnMap
 from kernels.interface import Field, Kernel, Status
 from kernels.scene import Function, Scene, SceneError, SceneParts, estimating_kernel, flips_field, scene_of
@@ -77,7 +77,9 @@ def cycle_kernel(
     turning = _turning(scene, turns or {}, maps["taylor"].held)
     doc = "switches, or periods of the drive, a cycle"
     flips = replace(flips_field(2.0 if maps["taylor"].sides else 1.0, MOST), doc=doc)
-    fields = (*parameters, *_begun(scene, parameters, branch), flips, SETTLE)
+    begun = [parameters[_number(scene, "branch", "parameter", branch)]] if branch else []
+    begun = [replace(f, name=f"{f.name}_from", doc=f"{f.name} where the search begins", default=f.name) for f in begun]
+    fields = (*parameters, *begun, flips, SETTLE)
     outputs, modes = _outputs(parts, [scene.states[j] for j in turning], len(maps["taylor"].directions))
 
     def solved(method: str, columns: Any, rtol: Any, ranks: Any, asked: set[str]) -> Any:
@@ -85,13 +87,13 @@ def cycle_kernel(
         the_map, (*own, flips, settle) = maps[method], columns
         origin = (scene.parameters.index(branch), own.pop()) if branch else None
         r, tight = (np.clip(share * rtol, the_map.fine, WIDEST * the_map.rough) for share in SHARES)
-        cells = Cells(np.array(own).reshape(len(own), len(rtol)), flips.copy(), r)
-        search = Search(the_map, turning, cells, settle, origin)
+        own = np.array(own).reshape(len(own), len(rtol))
+        search = Search(the_map, turning, own, flips.copy(), r, settle, origin)
         swept = {k: f"period_by_{f.name}" for k, f in enumerate(parameters) if f"period_by_{f.name}" in asked}
-        there = np.isin(search.status, FOUND)
-        found, error = Described(search, swept, ranks.astype(int) - 1, asked).to(rtol, tight)
-        error = np.where(search.status == Status.COMES_TO_REST, RESTS, np.where(there, error, 0.0))
-        return [found.get(f.name) for f in outputs], error, search.status
+        status, there = search.cycles.status, np.isin(search.cycles.status, FOUND)
+        found, error = described(search, swept, ranks.astype(int) - 1, asked, rtol, tight)
+        error = np.where(status == Status.COMES_TO_REST, RESTS, np.where(there, error, 0.0))
+        return [found.get(f.name) for f in outputs], error, status
 
     def check(*columns: Any) -> None:
         columns[-1][columns[-3] % 2.0 != 0.0] = Status.BAD_INPUT  # half a turn of the side is no cycle
@@ -100,28 +102,23 @@ def cycle_kernel(
     return estimating_kernel(parts, fields, outputs, modes, docs, solved, check if maps["taylor"].sides else None)
 
 
+def _number(scene: Scene, role: str, kind: str, name: str) -> int:
+    """The number of a state or a parameter that is named for this role."""
+    names = scene.states if kind == "state" else scene.parameters
+    if name not in names:
+        raise SceneError(f"{role} of the scene {scene.name}: there is no {kind} {name!r}; there are {', '.join(names)}")
+    return names.index(name)
+
+
 def _turning(scene: Scene, turns: Mapping[str, float], held: list[int]) -> dict[int, float]:
     """{number of a state: what it goes on by in a turn}."""
-    there = f"turns of the scene {scene.name}:"
-    for state, turn in turns.items():
-        if state not in scene.states:
-            raise SceneError(f"{there} there is no state {state!r}; there are {', '.join(scene.states)}")
-        if not 0.0 < turn < math.inf:
-            raise SceneError(f"{there} a turn of {state} must be above 0 and finite, found {turn}")
-        if scene.states.index(state) in held:
-            raise SceneError(f"{there} the surface watches {state}, so it cannot turn; let the switch put it back")
-    return {scene.states.index(state): float(turn) for state, turn in turns.items()}
-
-
-def _begun(scene: Scene, parameters: tuple[Field, ...], branch: str | None) -> list[Field]:
-    """The parameter that says where the search begins, of a cycle that is continued."""
-    if branch is None:
-        return []
-    if branch not in scene.parameters:
-        there = f"there is no parameter {branch!r}; there are {', '.join(scene.parameters)}"
-        raise SceneError(f"branch of the scene {scene.name}: {there}")
-    field = parameters[scene.parameters.index(branch)]
-    return [replace(field, name=f"{branch}_from", doc=f"{branch} where the search begins", default=branch)]
+    found = {_number(scene, "turns", "state", name): float(turn) for name, turn in turns.items()}
+    for j, turn in found.items():
+        if j in held or not 0.0 < turn < math.inf:
+            watched = "the surface watches it, so it cannot turn; let the switch put it back"
+            why = watched if j in held else f"a turn must be above 0 and finite, found {turn}"
+            raise SceneError(f"turns of the scene {scene.name}: {scene.states[j]}: {why}")
+    return found
 
 
 def _outputs(parts: SceneParts, turning: list[str], many: int) -> tuple[list[Field], list[Field]]:

@@ -11,7 +11,7 @@ from typing import Any, Unpack
 
 import numpy as np
 
-from kernels.codegen.at_times import at_times
+from kernels.codegen.return_map import at_times
 from kernels.codegen.to_tolerance import at_switches
 from kernels.interface import FIRST_REFUSAL, UNSOLVED, Field, Kernel, Status
 from kernels.scene import SceneParts, estimating_kernel, scene_of

@@ -1,9 +1,10 @@
-"""The return map of a scene: its states just before the switch at its first surface, from those one cycle earlier.
+"""Maps of a scene's states: from one switch at its first surface to a later one, and from the start to a given time.
 
 A run begins behind the switch. So a scene of its own is made, whose start takes the states before it as parameters,
 and which begins as the scene itself does where the parameter FRESH is 1. Its rates, surfaces and switches are the
 scene's; of several surfaces the first alone counts. The state that it watches is put onto it, whatever is given for it.
-Of a scene that is driven with a period, the switch is that one has passed: then all states are free.
+Of a scene that is driven with a period, the switch is that one has passed: then all states are free. For given times a
+scene is made with a clock as its last state: its first surface is that the clock comes to the time wanted.
 """
 
 import functools
@@ -13,12 +14,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from kernels.codegen.at_times import asked, at_times, clocked, named
 from kernels.codegen.compiled import runner, running, written_of
 from kernels.codegen.followed import followed
 from kernels.codegen.record import named_functions, record
 from kernels.codegen.to_tolerance import solver
-from kernels.expression.graph import ADD, INPUT, NUMBER, Expression, SceneError, needed
+from kernels.expression.graph import ADD, INPUT, NUMBER, Expression, SceneError, math_recorded, needed
 from kernels.integrate.records import Mode
 from kernels.interface import Status
 from kernels.lanes.columns import DONE, fresh, to_the_end
@@ -26,7 +26,9 @@ from kernels.lanes.jit import jit_call
 from kernels.lanes.tuples import flat, read, write
 from kernels.lanes.vectors import where
 
-FRESH = "from_start"
+FRESH, CLOCK, UNTIL = "from_start", "clock_of_motion", "time_wanted"
+MOST_SWITCHES = 100_000
+"""Before the time wanted: a motion whose switches accumulate does not come to it."""
 TOLERANCES = {
     "taylor": (3e-14, 4e-10, 2e-3),
     "rodas5p": (1e-10, 1e-7, 1e-2),
@@ -57,8 +59,8 @@ class ReturnMap:
             raise SceneError(f"{scene.name}: a cycle that depends on the time `t` needs the period of its `drive`")
         if drive is None and scene.surface is None:
             raise SceneError(f"{scene.name}: a cycle needs a surface, or a drive")
-        self.own, self.method, self.driven = scene, method, drive is not None
-        self.scene, n = returning(scene, drive), len(scene.states) - (scene.start_time is not None)
+        self.own, self.method, self.driven, self.scene = scene, method, drive is not None, returning(scene, drive)
+        self.states = scene.states if scene.start_time is None else scene.states[:-1]
         recorded, first = record(self.scene), next(iter(named_functions(self.scene.surface)))
         parts = needed(*recorded.rates, recorded.surface, *recorded.graph.kinks, *recorded.switched)
         self.sides = any(x.kind == INPUT and x.args[0] == "side" for x in parts)
@@ -69,23 +71,25 @@ class ReturnMap:
             raise SceneError(f"{scene.name}: the motion passes through the surface, but not through one as side * x")
         self.held = [] if self.driven else [watched(scene)[-1]]
         """The state that is put onto the surface."""
-        self.directions = [j for j in range(n) if j not in self.held]
+        self.directions = [j for j in range(len(self.states)) if j not in self.held]
         """Of the states, those that the map depends on."""
         self.modes = [j for j, rate in enumerate(recorded.rates) if rate.kind == NUMBER and not rate.args[0]]
         """The states whose rate is 0."""
         self.fine, self.rough, self.step = TOLERANCES[method]
         self._how = solver(self.scene, method)
-        self._turning = [(turning(self.scene, True), (1.0,)), (turning(self.scene, False), OTHERS)]
-        for one in (*(scene for scene, _ in self._turning), *([] if self.driven else [clocked(scene)])):
+        self._sized = (turning(self.scene, True), (1.0,)), (turning(self.scene, False), OTHERS), (self.scene, OTHERS)
+        for one in (*(scene for scene, _ in self._sized), *([] if self.driven else [clocked(scene)])):
             record(one)
 
-    def passed(self, parameters, before, flips, rtol, fresh=0.0):
+    def passed(self, parameters, before, flips, rtol):
         """Rows of time and states, and statuses: `flips` switches after the one before which the states are given.
 
-        `fresh` : 1 where that is the scene's start instead
+        `before` : None where the scene's start is meant instead
         """
-        found, status = self._how([*parameters, *before, np.full(len(flips), fresh), flips], rtol)
-        return found[[0, *range(2, 2 + len(before))]], status
+        begin = np.zeros((len(self.states), len(flips))) if before is None else before
+        columns = [*parameters, *begin, np.full(len(flips), float(before is None)), flips]
+        found, status = self._how(columns, rtol)
+        return found[[0, *range(2, 2 + len(begin))]], status
 
     def rates(self, parameters, states, side):
         """The rates of each state, columns."""
@@ -111,16 +115,16 @@ class ReturnMap:
         return rows, sizes
 
     def turned(self, parameters, before, flips):
-        """The same tightly, where states turn round; and by how much it may be off besides.
+        """The largest sizes on the way, tightly, where states turn round; and by how much they may be off besides.
 
         Where a turn cannot be told, sizes are those of three runs whose steps end at other points.
         """
-        sizes, off = np.full(before.shape, np.nan), np.zeros(before.shape)
-        for scene, tolerances in (*self._turning, (self.scene, OTHERS)):
+        sizes, off = np.full(before.shape, np.nan), np.full(before.shape, np.inf)
+        for scene, tolerances in self._sized:
             left = np.flatnonzero(np.isnan(sizes).any(axis=0))
             if len(left):
-                some, here, steps = parameters[:, left], before[:, left], flips[left]
-                found = [self._once(scene, some, here, steps, many * TIGHT * self.fine)[1] for many in tolerances]
+                some = parameters[:, left], before[:, left], flips[left]
+                found = [self._once(scene, *some, many * TIGHT * self.fine)[1] for many in tolerances]
                 sizes[:, left] = np.maximum.reduce(found)
                 off[:, left] = APART * (sizes[:, left] - np.minimum.reduce(found))
         return sizes, np.where(np.isnan(off), np.inf, off)
@@ -131,9 +135,58 @@ class ReturnMap:
         by = "told" if self.method == "taylor" and scene is self.scene else self.method
         columns = [*parameters, *before, 0.0 * flips, flips]
         found, many = followed(runner(scene, by), columns, np.full(len(flips), rtol)), len(before)
-        found = np.where(found[-1] <= Status.INACCURATE, found, np.nan)
-        sizes = 2 + len(scene.states)
+        found, sizes = np.where(found[-1] <= Status.INACCURATE, found, np.nan), 2 + len(scene.states)
         return found[[0, *range(2, 2 + many)]], found[sizes : sizes + many]
+
+
+def at_times(scene, method, columns, times, rtol):
+    """The states (n_states, n_cells) at a time after the start each; and the status."""
+    rows, status = solver(clocked(scene), method)([*columns, times, np.ones(len(rtol))], rtol)
+    return rows[2:], status
+
+
+def named(function, names):
+    """A function of keywords that asks for these names."""
+    kind = inspect.Parameter.POSITIONAL_OR_KEYWORD
+    function.__signature__ = inspect.Signature([inspect.Parameter(name, kind) for name in names])
+    return function
+
+
+def asked(function, values):
+    """What a scene's function returns for those of the values that it asks for, as a tuple; a constant for itself."""
+    if not callable(function):
+        return (function,)
+    with math_recorded(function):
+        found = function(**{name: values[name] for name in inspect.signature(function).parameters})
+    return tuple(found) if isinstance(found, tuple | list | np.ndarray) else (found,)
+
+
+@functools.cache
+def clocked(scene, drive=None):
+    """The scene that ends where its clock has gone on by UNTIL; or which counts its drive's periods, and begins anew.
+
+    `drive` : the period, a number or a function of parameters; then the clock is put back at its end
+    """
+    timed = scene if scene.start_time is not None else replace(scene, states=(*scene.states, CLOCK), start_time=0.0)
+    clock, parameters = timed.states[-1], (*scene.parameters, *([UNTIL] if drive is None else []))
+
+    def until(**given):
+        (begin,), (long,) = asked(timed.start_time, given), asked(given.get(UNTIL, drive), given)
+        return begin + long - given[clock]
+
+    def again(**given):
+        return (*(given[name] for name in timed.states[:-1]), *asked(timed.start_time, given))
+
+    own, jumps = named_functions(scene.surface or {}), named_functions(scene.switch)
+    everywhere = jumps.pop("", None)
+    surfaces = {f"own {name}": function for name, function in own.items()}
+    switches = dict.fromkeys(surfaces, everywhere) | {f"own {name}": function for name, function in jumps.items()}
+    if drive is not None:
+        switches[f".{CLOCK}"] = named(again, (*timed.states, *parameters))
+    return replace(
+        timed, name=f"{scene.name}_clocked", parameters=parameters, switch=switches, only_first=True,
+        surface={f".{CLOCK}": named(until, (*parameters, clock))} | surfaces, most_kinks=MOST_SWITCHES,
+    )  # fmt: skip
 
 
 def watched(scene):
