@@ -93,11 +93,6 @@ def solved(study: Study) -> Cells:
     return cells
 
 
-def with_method(study: Study, method: str, rtol: float) -> Study:
-    """The study by one method, at one rtol."""
-    return replace(study, method=method, rtol=rtol)
-
-
 def multiplied(study: Study, factors: Mapping[str, Any]) -> Study:
     """The study, a zip, with its numbers times a factor each; factors of an axis may be one a cell.
 

@@ -9,11 +9,11 @@ shares of cells and counts of work are not.
 
 from __future__ import annotations
 
-import dataclasses
 import itertools
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,7 @@ import xarray as xr
 
 from kernels.interface import FIRST_REFUSAL, Status
 from sweep.cells.grid import Grid, empty_cells
-from sweep.cells.sample import relative_error, sampled, solved, with_method
+from sweep.cells.sample import relative_error, sampled, solved
 from sweep.cells.schema import STATUS
 from sweep.cells.solve import GIVEN_UP, Solver, among, usable_methods
 from sweep.errors import SweepError
@@ -168,7 +168,7 @@ def _without_failing(
     good = np.ones(Grid(study).size, bool)
     # auto also tries, on cells, methods that cannot do the whole study
     for method, rtol in itertools.product(methods, EXTREMES):
-        found = run(with_method(study, method, rtol), progress=False, isolate=True, cell_timeout=cell_timeout)
+        found = run(replace(study, method=method, rtol=rtol), progress=False, isolate=True, cell_timeout=cell_timeout)
         good &= found[STATUS].values.ravel() != Status.FAILED
     if good.all():
         return study
@@ -176,8 +176,8 @@ def _without_failing(
     if not good.any():
         raise SweepError(text)
     note(f"{text}; they are left out")
-    axes = {name: dataclasses.replace(a, values=frozen(a.values[good])) for name, a in study.axes.items()}
-    return dataclasses.replace(study, axes=axes)
+    axes = {name: replace(a, values=frozen(a.values[good])) for name, a in study.axes.items()}
+    return replace(study, axes=axes)
 
 
 def precision_text(found: xr.Dataset, complete: bool = False) -> str:
@@ -248,7 +248,7 @@ def _best(study: Study, names: Sequence[str]) -> Reference:
     """
     # what a method tells of itself, its work and its error, is neither right nor wrong
     compared = tuple(name for name in study.outputs if name not in (*WORK, *ESTIMATES))
-    study = dataclasses.replace(study, outputs=compared or study.outputs)
+    study = replace(study, outputs=compared or study.outputs)
     found = dict[tuple[int, bool, float], Reference]()
     for name in sorted(names, key=lambda name: study.kernel.method(name).bound is None):
         vague = study.kernel.method(name).bound is None
@@ -256,7 +256,7 @@ def _best(study: Study, names: Sequence[str]) -> Reference:
             break  # those that state a bound suffice
         values, floor = dict[str, Any](), np.full(Grid(study).size, np.inf)
         for rtol in FINE:
-            outputs, status, *_ = solved(with_method(study, name, rtol))
+            outputs, status, *_ = solved(replace(study, method=name, rtol=rtol))
             refused = status >= FIRST_REFUSAL
             now = np.isinf(floor) & ~refused & (status != Status.INACCURATE)
             for output, column in outputs.items():
@@ -278,7 +278,7 @@ def _measured(study: Study, name: str, rtol: float, against: Reference) -> dict[
     """What is measured of a method at a tolerance, but for its time."""
     source, truth, floor = against
     sound, void, judged = np.isfinite(floor), np.isnan(floor), (~np.isinf(floor)).sum()
-    outputs, status, used, _ = solved(with_method(study, name, rtol))
+    outputs, status, used, _ = solved(replace(study, method=name, rtol=rtol))
     error = np.max([relative_error(outputs[name], true) for name, true in truth.items()], axis=0)
     methods = [method.name for method in study.kernel.methods]
     # against itself the reference has no error; what can be said is what it is right to, also where auto took it
@@ -319,7 +319,7 @@ def _seconds(study: Study, names: Sequence[str], tolerances: Sequence[float]) ->
     """
     best = np.full((len(names), len(tolerances)), math.inf)
     for _, (i, name), (j, rtol) in itertools.product(range(ROUNDS), enumerate(names), enumerate(tolerances)):
-        trial = with_method(study, name, rtol)
+        trial = replace(study, method=name, rtol=rtol)
         cells, solver = empty_cells(trial, Grid(trial).size), Solver(trial)
         count, begin = 0, time.thread_time()
         while (spent := time.thread_time() - begin) < LEAST_SECONDS or not count:

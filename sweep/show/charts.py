@@ -33,16 +33,12 @@ except ImportError:
 
 MILLIMETRE = 1 / 25.4
 """One millimetre in the inches of matplotlib."""
-
-COLUMN, PAGE = 86.0, 178.0
-"""Widths in mm of one and of two columns of a physics journal."""
-
+PAGE = 178.0
+"""Width in mm of two columns of a physics journal."""
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
 """Okabe and Ito's colours, told apart by colour-blind readers; their yellow is lost on white paper."""
-
 DASHES = ("-", (0, (5, 1.5)), (0, (1.2, 1.2)), (0, (6, 1.5, 1.2, 1.5)))
 """Line styles, so that a line is known in black and white too."""
-
 TICKS = {
     "labelsize": 8,
     "direction": "in",
@@ -71,16 +67,12 @@ STYLE = {
     "pdf.fonttype": 42,
     "hatch.linewidth": 0.4,
 }
-
 MARKS = "osD^vPX*"
 """Marks of points that no line joins."""
-
 KINDS = (".png", ".svg", ".pdf")
 """Suffixes of pictures."""
-
 FLOOR, CEILING = 1e-16, 3.0
 """Where errors of 0, and errors beyond all sense, are drawn at the least and at the most."""
-
 FAMILIES = {
     COLOURS[6]: ("auto",),
     COLOURS[2]: ("closed", "coulomb", "pure", "asymptotic", "stable"),

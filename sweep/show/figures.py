@@ -33,10 +33,8 @@ from sweep.words import require_dataset
 
 HATCHES = ("////", "\\\\\\\\", "....", "xxxx", "----")
 """Patterns of cells without a value, told apart without colour."""
-
 MOST_LAWS = 6
 """That are drawn beside each other."""
-
 LEAST_SPAN = 30.0
 """Of the times in a chart, so that methods alike look alike."""
 
