@@ -12,7 +12,6 @@ import numpy as np
 
 from kernels import catalogue
 from kernels.interface import KINDS, Field, Kernel, Status
-from sweep.errors import SweepError
 from sweep.study.mistakes import limits
 from sweep.study.model import load_kernel
 from sweep.words import Table, listed, page, paragraph, quoted
@@ -135,14 +134,12 @@ def write_starter(name: str, path: Path, allow_import: bool = False, force: bool
 
     A kernel of one's own is looked up in the folder of the study, as it is when the study is run.
     """
-    from sweep.file.disk import check_target
+    from sweep.file import disk
 
     text = starter(name, load_kernel(name, allow_import, [path.parent]))
-    check_target(path, force=force)
-    try:
+    disk.check_target(path, force=force)
+    with disk.refusing(path):
         path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise SweepError(f"{path} cannot be written: {error.strerror}") from None
 
 
 def starter(name: str, kernel: Kernel | None = None) -> str:

@@ -121,21 +121,15 @@ def laws(
         with contextlib.suppress(SweepError):  # the window leaves too few points
             found = fit_two_laws(column, x, limits[0], **keys)  # type: ignore[arg-type]
             bend = found if bool((found.regimes == 2).any()) else None
-    remark = " ".join(filter(None, (dataset.attrs.get("lines", ""), _remark(dataset, y))))
-    return Laws(y, x, fits, bend, meeting, confidence, remark)
-
-
-def _remark(dataset: xr.Dataset, y: str) -> str:
-    """Cells that are not OK, by status; those with a value are in the fit."""
-    if STATUS not in dataset or dataset[y].dims != dataset[STATUS].dims:
-        return ""
-    status, valued, words = dataset[STATUS].values, dataset[y].notnull().values, flag_words(dataset[STATUS])
-    parts = []
-    for code in np.unique(status[status != 0]).tolist():
-        for cells, fate in ((valued, "in the fit"), (~valued, "left out")):
-            if count := int((cells & (status == code)).sum()):
-                parts.append(f"{count} {words.get(code, code)} ({fate})")
-    return f"Of {status.size} cells: {', '.join(parts)}." if parts else ""
+    remarks, parts = [str(dataset.attrs.get("lines", ""))], []
+    if STATUS in dataset and column.dims == dataset[STATUS].dims:
+        status, valued, words = dataset[STATUS].values, column.notnull().values, flag_words(dataset[STATUS])
+        for code in np.unique(status[status != 0]).tolist():
+            for cells, fate in ((valued, "in the fit"), (~valued, "left out")):
+                if count := int((cells & (status == code)).sum()):
+                    parts.append(f"{count} {words.get(code, code)} ({fate})")
+        remarks += [f"Of {status.size} cells: {', '.join(parts)}."] if parts else []
+    return Laws(y, x, fits, bend, meeting, confidence, " ".join(filter(None, remarks)))
 
 
 def law_tables(found: Laws, complete: bool = False) -> list[Table]:

@@ -7,7 +7,7 @@ import shutil
 from pathlib import Path
 
 from sweep.errors import SweepError
-from sweep.file.disk import check_target
+from sweep.file import disk
 from sweep.words import Table, did_you_mean, listed
 
 HERE = Path(__file__).parents[1]
@@ -72,8 +72,6 @@ def copy_study(name: str, target: Path = Path(), force: bool = False) -> list[Pa
     for source in sources:
         copy = target / source.name
         same = copy.is_file() and copy.read_bytes() == source.read_bytes()
-        check_target(copy, force=force or same, read=[source])
-    try:
+        disk.check_target(copy, force=force or same, read=[source])
+    with disk.refusing(target):
         return [Path(shutil.copyfile(source, target / source.name)) for source in sources]
-    except OSError as error:
-        raise SweepError(f"{error.filename2 or error.filename}: {error.strerror}") from None

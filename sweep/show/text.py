@@ -38,12 +38,23 @@ _FAILED, _REASON = " FAILED (", "): "
 
 
 def result_text(path: Path, dataset: xr.Dataset) -> str:
-    """All about a result."""
+    """All about a result; of the first cells that FAILED also what their kernel did, as the log of the run has it."""
+    known, summed = reasons(Path(path)), is_summary(dataset)
+    numbers, done = list(known) if summed else [], 0
+    for piece in () if summed else flat_pieces(dataset[STATUS]):
+        numbers += (done + np.flatnonzero(piece == Status.FAILED)[:MOST_FAILED]).tolist()
+        done += len(piece)
+        if len(numbers) >= MOST_FAILED:
+            break
+    failed = []
+    for number in numbers[:MOST_FAILED]:
+        place = "" if summed else _named(cell_values(dataset, number))
+        failed.append((f"cell {number}", place, known.get(number, "")))
     return page(
         paragraph("\n".join(head(path, dataset))),
         settings(dataset).text(),
         *(table.text() for table in sections(dataset)),
-        _failed(Path(path), dataset).text(),
+        Table(failed, title="FAILED, and why").text(),
     )
 
 
@@ -188,22 +199,6 @@ def _span(values: Any) -> str:
     numbers = values[~np.isnan(values)]
     ends = dict.fromkeys(f"{v:.6g}" for v in (numbers.min(), numbers.max())) if len(numbers) else {}
     return " and ".join(filter(None, [" to ".join(ends), "nan" if len(numbers) < len(values) else ""]))
-
-
-def _failed(path: Path, dataset: xr.Dataset) -> Table:
-    """The first cells that FAILED, and what their kernel did, as the log of the run has it."""
-    known, summed = reasons(path), is_summary(dataset)
-    numbers, done = list(known)[:MOST_FAILED] if summed else [], 0
-    for piece in () if summed else flat_pieces(dataset[STATUS]):
-        numbers += (done + np.flatnonzero(piece == Status.FAILED)[:MOST_FAILED]).tolist()
-        done += len(piece)
-        if len(numbers) >= MOST_FAILED:
-            break
-    rows = [
-        (f"cell {number}", "" if summed else _named(cell_values(dataset, number)), known.get(number, ""))
-        for number in numbers[:MOST_FAILED]
-    ]
-    return Table(rows, title="FAILED, and why")
 
 
 def reasons(output: Path) -> dict[int, str]:
