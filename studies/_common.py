@@ -36,7 +36,7 @@ class Statement:
     off : deviation
     holds : whether it is as said, by a check that can fail; None: a value, of which nothing is said
     refuted : it is known not to be as the source says, and would be a mistake here if it were
-    allowed : the largest deviation with which it holds, "of it" where that is relative
+    allowed : the bound that is checked: the largest deviation, "of it" where that is relative, or what the value is in
     """
 
     what: str
@@ -59,6 +59,11 @@ class Statement:
             return ""
         return "NO" if self.failed else "no, known" if self.refuted else "yes"
 
+    @property
+    def deviation(self) -> str:
+        """The deviation as text."""
+        return "" if self.off is None else f"{self.off:+.1e}"
+
 
 Claims = Iterator[Statement | str]
 """What a script says: headings, and the statements below each."""
@@ -71,6 +76,8 @@ OPTIONS = ("--all", "--force")
 NUMBER = re.compile(r"-?[\d.]+(?:e[-+]?\d+)?(?:/\d+)?")
 ORDER = {"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge}
 STUDIES = Path(__file__).parent
+DAY = 86400.0
+"""Seconds."""
 
 
 def digits(allowed: float) -> int:
@@ -84,36 +91,10 @@ def compared(what: str, theory: str, here: Any, value: float, allowed: float) ->
     return Statement(what, theory, shown, off, abs(off) <= allowed, allowed=f"{allowed:.2g} of it")
 
 
-def differing(what: str, theory: str, here: Any, value: float, allowed: float) -> Statement:
+def differing(what: str, theory: str, here: Any, value: float, allowed: float, refuted: bool = False) -> Statement:
     """As `compared`, of exponents and what else may be 0: the deviation is the difference."""
     off, shown = float(here) - value, f"{float(here):.{digits(allowed)}g}"
-    return Statement(what, theory, shown, off, abs(off) <= allowed, allowed=f"{allowed:.2g}")
-
-
-def said(what: str, holds: Any, here: str = "", theory: str = "", refuted: bool = False) -> Statement:
-    """What holds or does not, without a number that it deviates by."""
-    return Statement(what, theory, here, None, bool(holds), refuted)
-
-
-def held(what: str, here: Any, bound: str, form: str = "{:.3g}") -> Statement:
-    """A number within what the text says, which is what is checked: "< 1 %", ">= 1/2", "3 to 5"."""
-    sign, unit = bound.split()[0], 0.01 if "%" in bound else 1.0
-    ends = [unit * float(Fraction(number)) for number in NUMBER.findall(bound)]
-    value = float(here)
-    holds = ORDER[sign](value, ends[0]) if sign in ORDER else ends[0] <= value <= ends[1]
-    return Statement(what, bound, form.format(value), None, holds)
-
-
-def never(what: str, there: Any, theory: str = "none") -> Statement:
-    """That something is so in none of many cells."""
-    number = int(np.sum(there))
-    return Statement(what, theory, f"{number} of {np.size(there)}", None, number == 0)
-
-
-def all_ok(ds: xr.Dataset) -> Statement:
-    """Whether every cell is OK."""
-    share = float((ds.status == Status.OK).mean())
-    return said("cells that are OK", share == 1.0, f"{share:.0%}", "all")
+    return Statement(what, theory, shown, off, abs(off) <= allowed, refuted, f"{allowed:.2g}")
 
 
 def most(what: str, theory: str, off: Any, allowed: float, here: str = "largest deviation") -> Statement:
@@ -122,9 +103,27 @@ def most(what: str, theory: str, off: Any, allowed: float, here: str = "largest 
     return Statement(what, theory, here, worst, abs(worst) <= allowed, allowed=f"{allowed:.2g}")
 
 
-def nearest(values: xr.DataArray, value: float) -> dict[Any, int]:
-    """Where, along their one dimension, values come nearest to one; for `isel`."""
-    return {values.dims[0]: int(abs(values - value).values.argmin())}
+def said(what: str, holds: Any, here: str = "", theory: str = "", refuted: bool = False) -> Statement:
+    """What holds or does not, without a number that it deviates by."""
+    return Statement(what, theory, here, None, bool(holds), refuted)
+
+
+def held(what: str, here: Any, bound: str, form: str = "{:.3g}", theory: str = "", refuted: bool = False) -> Statement:
+    """A number within what the text says, which is what is checked: "< 1 %", ">= 1/2", "3 to 5", or "0" itself."""
+    sign, unit, value = bound.split()[0], 0.01 if "%" in bound else 1.0, float(here)
+    ends = [unit * float(Fraction(number)) for number in NUMBER.findall(bound)]
+    holds = ORDER[sign](value, ends[0]) if sign in ORDER else ends[0] <= value <= ends[-1]
+    return Statement(what, theory, form.format(value), None, holds, refuted, bound)
+
+
+def never(what: str, there: Any, theory: str = "none") -> Statement:
+    """That something is so in none of many cells."""
+    return held(what, np.sum(there), "0", f"{{:.0f}} of {np.size(there)}", theory)
+
+
+def all_ok(ds: xr.Dataset) -> Statement:
+    """Whether every cell is OK."""
+    return held("cells that are OK", (ds.status == Status.OK).mean(), "100 %", "{:.0%}", "all")
 
 
 def count(there: Any, what: str = "cells") -> str:
@@ -136,22 +135,22 @@ KEYS = ("method", "rtol", "outputs", "design", "along")
 
 
 def solved(kernel: str, **given: Any) -> xr.Dataset:
-    """A sweep in memory, by keys of a study and parameters: those that are sequences are axes, numbers are fixed."""
+    """A sweep in memory, by keys of a study and parameters: sequences are axes, numbers and words are fixed."""
     keys = {name: given.pop(name) for name in KEYS if name in given}
     axes = {name: np.asarray(values) for name, values in given.items() if np.ndim(values)}
-    fixed = {name: float(value) for name, value in given.items() if not np.ndim(value)}
+    fixed = {name: x if isinstance(x, str) else float(x) for name, x in given.items() if not np.ndim(x)}
     return sweep.run(sweep.study(kernel=kernel, axes=axes, fixed=fixed, allow_import=":" in kernel, **keys))
 
 
 def last_passage(x: Any, y: Any, value: float, way: float = 0.0) -> float:
     """Where y passes a value last, upwards (`way` 1) or downwards (-1) if so said; NaN where it does not."""
     log_x, y = np.log(np.asarray(x)), np.asarray(y)
-    cross = (y[:-1] - value) * (y[1:] - value) <= 0
-    there = np.flatnonzero(cross & (y[1:] != y[:-1]) & (way * (y[1:] - y[:-1]) >= 0))
+    rise = np.diff(y)
+    there = np.flatnonzero(((y[:-1] - value) * (y[1:] - value) <= 0) & (rise != 0) & (way * rise >= 0))
     if not there.size:
-        return float("nan")
+        return math.nan
     i = there[-1]
-    return float(np.exp(log_x[i] + (value - y[i]) / (y[i + 1] - y[i]) * (log_x[i + 1] - log_x[i])))
+    return float(np.exp(log_x[i] + (value - y[i]) / rise[i] * (log_x[i + 1] - log_x[i])))
 
 
 def power(y: xr.DataArray) -> float:
@@ -178,8 +177,8 @@ def measured(off: Callable[[float], Any], tolerances: Sequence[float]) -> xr.Dat
         begin = time.process_time()
         errors = off(rtol)
         rows.append((np.nan_to_num(errors, nan=np.inf).max(), (time.process_time() - begin) / len(errors)))
-    worst, seconds = zip(*rows, strict=True)
-    return xr.Dataset({"worst": ("rtol", list(worst)), "seconds": ("rtol", list(seconds))}, {"rtol": list(tolerances)})
+    worst, seconds = np.transpose(rows)
+    return xr.Dataset({"worst": ("rtol", worst), "seconds": ("rtol", seconds)}, {"rtol": list(tolerances)})
 
 
 def solved_by(kernel: Any, method: str, rtol: float, **given: Any) -> tuple[Any, Any]:
@@ -191,52 +190,51 @@ def solved_by(kernel: Any, method: str, rtol: float, **given: Any) -> tuple[Any,
     return outputs[0], status
 
 
-def table(groups: Groups, source: str = "paper") -> list[str]:
-    """Every statement with its numbers, "`source` | here", and what deviation is allowed."""
-    rows: list[tuple[str, ...]] = [("", source, "here", "deviation", "allowed", "holds")]
+def columns(rows: Sequence[Sequence[str]], between: str = "  ") -> list[str]:
+    """Rows as lines of text with aligned columns."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    padded = ([cell.ljust(width) for cell, width in zip(row, widths, strict=True)] for row in rows)
+    return [between.join(cells).rstrip() for cells in padded]
+
+
+def table(groups: Groups, source: str) -> list[str]:
+    """Every statement with its numbers, "`source`  here", and what is allowed."""
+    rows = [("", source, "here", "deviation", "allowed", "holds")]
     for heading, lines in groups.items():
-        rows += [("",), (heading.upper(),)]
-        rows += [(s.what, s.paper, s.here, _number(s.off), s.allowed, s.verdict) for s in lines]
-    return columns(rows, " | ")
+        rows += [("",) * 6, (heading.upper(), *[""] * 5)]
+        rows += [(s.what, s.paper, s.here, s.deviation, s.allowed, s.verdict) for s in lines]
+    return columns(rows)
 
 
-def summary(groups: Groups, source: str = "paper") -> list[str]:
+def summary(groups: Groups, source: str) -> list[str]:
     """How many claims hold, part by part, and those that do not hold, in 79 columns."""
-    rows, others = [(f"claims held to {source}", "hold")], []
+    rows, others, subject = [(f"claims held to {source}", "hold")], [""], ""
     for heading, lines in groups.items():
-        subject = ""
         checked = [s for s in lines if s.holds is not None]
-        rows += [(heading, f"{sum(s.verdict == 'yes' for s in checked)} of {len(checked)}")] if checked else []
+        if checked:
+            rows.append((heading, f"{sum(s.verdict == 'yes' for s in checked)} of {len(checked)}"))
+        subject = ""
         for s in lines:
-            subject = s.what if s.what[:1] != " " else subject
+            subject = subject if s.what.startswith(" ") else s.what
             if s.verdict in ("NO", "no, known"):
                 what = ", ".join(filter(None, dict.fromkeys((subject, s.what.strip()))))
                 which = "does not hold" if s.failed else "known not to hold"
-                words = f"{which}: {what}; {source}: {s.paper or '-'}; here: {s.here}"
-                off = (
-                    ""
-                    if s.off is None
-                    else f", deviation {_number(s.off)}" + f", allowed {s.allowed}" * bool(s.allowed)
-                )
-                others += textwrap.wrap(words + off, 79, subsequent_indent="    ")
-    return [*columns(rows, "  "), *([""] * bool(others)), *others]
-
-
-def columns(rows: Sequence[Sequence[str]], between: str) -> list[str]:
-    """Rows as lines of text with aligned columns; a row of one cell is a heading."""
-    full = [row for row in rows if len(row) > 1]
-    widths = [max(map(len, column)) for column in zip(*full, strict=True)]
-    padded = [[cell.ljust(width) for cell, width in zip(row, widths, strict=False)] for row in rows]
-    return [row[0] if len(row) == 1 else between.join(cells).rstrip() for row, cells in zip(rows, padded, strict=True)]
-
-
-def _number(off: float | None) -> str:
-    return "" if off is None else f"{off:+.1e}"
+                numbers = {"": s.here, ", deviation ": s.deviation, ", allowed ": s.allowed}
+                here = "".join(name + number for name, number in numbers.items() if number)
+                words = f"{which}: {what}; {source}: {s.paper or '-'}; here: {here}"
+                others += textwrap.wrap(words, 79, subsequent_indent="    ")
+    return [*columns(rows), *others]
 
 
 def study_of(name: str) -> Any:
     """The study whose result, as it is or refined, has this name."""
     return sweep.study(STUDIES / f"{Path(name).stem.removesuffix('_fine')}.toml", allow_import=True)
+
+
+def run_of(name: str) -> str:
+    """The command that makes the result of this name."""
+    options = " --allow-import" * (":" in study_of(name).kernel_name)
+    return f"sweep run studies/{Path(name).stem.removesuffix('_fine')}.toml{options}"
 
 
 def read_result(path: str, name: str) -> xr.Dataset:
@@ -250,22 +248,14 @@ def read_result(path: str, name: str) -> xr.Dataset:
     return ds.load()
 
 
-def run_of(name: str) -> str:
-    """The command that makes the result of this name."""
-    study = study_of(name)
-    return f"sweep run studies/{Path(name).stem.removesuffix('_fine')}.toml" + " --allow-import" * (
-        ":" in study.kernel_name
-    )
-
-
 def grouped(claims: Claims) -> Groups:
     """Statements by the heading before them."""
     found: Groups = {}
     for one in claims:
         if isinstance(one, str):
-            found[one] = []
+            lines = found.setdefault(one, [])
         else:
-            next(reversed(found.values())).append(one)
+            lines.append(one)
     return found
 
 
@@ -313,16 +303,15 @@ class Script:
         return self.report(arguments, lambda: self.conclude(*paths))
 
     def report(self, arguments: Sequence[str], conclude: Callable[[], Conclusion]) -> int:
-        """Prints what is concluded and saves the figure, beside the first result or, where there is none, here."""
-        paths, complete = [one for one in arguments if one not in OPTIONS], "--all" in arguments
-        name = Path(self.file).stem
-        target = Path(paths[0] if Path(self.inputs[0]).suffix else name).with_suffix(".png")
+        """Prints what is concluded and saves the figure beside the first of the results."""
+        target = next(Path(one) for one in arguments if one not in OPTIONS).with_suffix(".png")
+        complete = "--all" in arguments
         try:
             check_target(target, force="--force" in arguments)
             groups, notes, draw = conclude()
             page = draw()
             said = table(groups, self.source) if complete else summary(groups, self.source)
-            parts = [[self.head] * complete, said, notes, what_came_out(name)]
+            parts = [[self.head] * complete, said, notes, what_came_out(Path(self.file).stem)]
             print("\n\n".join(filter(None, ("\n".join(lines).strip("\n") for lines in parts))), end="\n\n")
             print(f"figure: {charts.save(page, target)}" + "; every claim with its numbers: --all" * (not complete))
         except sweep.SweepError as error:
@@ -338,7 +327,7 @@ def what_came_out(name: str) -> list[str]:
         if row.startswith(f"| `{name}` |"):
             _, _, question, answer, checked, _ = row.split("|")
             text = f"As shipped: {question} {answer} How it was checked, and its limits: {checked}"
-            return paragraph(re.sub(r"\[(.+?)\]\(.+?\)", r"\1", text))
+            return textwrap.wrap(" ".join(re.sub(r"\[(.+?)\]\(.+?\)", r"\1", text).split()), 79)
     return []
 
 
@@ -349,8 +338,3 @@ def script(name: str, inputs: str, *parts: Callable[..., Any], **more: Any) -> S
     if name == "__main__":
         sys.exit(main(sys.argv[1:]))
     return main
-
-
-def paragraph(text: str) -> list[str]:
-    """Running text as lines of 79 characters."""
-    return textwrap.wrap(" ".join(text.split()), 79)

@@ -48,6 +48,8 @@ Log = partial(Axis, scale="log")
 DRIVE, ALPHA = Log(r"drive, $\alpha = \mu/(a^2\varphi_0)$ [1]"), Log(r"drive, $\alpha$ [1]")
 TORQUE, KAPPA = Log(r"torque, $\mu/(a^2\varphi_0)$ [1]"), Log(r"wheel over foliot, $\kappa$ [1]")
 S, SLOPE = Axis("exponent, $s$ [1]"), Axis(r"exponent, $\mathrm{d}\ln P/\mathrm{d}\ln\mu$ [1]")
+LAWS = {-1: "$-1$", -1 / 2: r"$-\frac{1}{2}$", -1 / 3: r"$-\frac{1}{3}$", 0: "0"}
+"""Ticks of it at the exponents of laws."""
 COST, ERROR = Log("CPU time per cell [s]"), Log("relative error, worst cell [1]")
 """Axes that several studies have."""
 

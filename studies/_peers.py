@@ -4,8 +4,8 @@ CLOCKS follow the foliot with viscous and Coulomb friction in units of mu = phi0
 gives rows of period, amplitude and speed before the switch of clocks after so many half swings. A half swing is two
 legs, out to the turning point and back to the other switch, whose ends are terminal events.
 SLIDING give the places of a mass on a belt at given times, at one tolerance; they know nothing of its kink, and NaN
-stands where one asks for the rates MOST times. "modes by hand" is scipy's DOP853 as an expert would use it: stick and
-slip apart, each up to an event.
+stands where one asks for the rates MOST times, Jacobians apart. "modes by hand" is scipy's DOP853 as an expert would
+use it: stick and slip apart, each up to an event.
 STIFF give the times of the first switch of the foliot with a lagging drive, from rest.
 All have those that are installed, by their names.
 """
@@ -17,7 +17,7 @@ from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
-from scipy.integrate import solve_ivp
+from scipy import integrate
 
 START = 1.1
 """Speed at the first switch over that of the cycle."""
@@ -28,8 +28,19 @@ FRICTION = 0.5
 """a = b [1/s] of the foliot with a lagging drive."""
 
 
-class TooManyCalls(Exception):
-    """More calls of the rates than a follower is given."""
+def leg(a: Any, friction: Any) -> Callable[..., Any]:
+    """Rates of the foliot's angle and speed while it is driven back."""
+    return lambda t, u: (u[1], -1.0 - a * u[1] - friction)
+
+
+def belt_rates(belt: Any, fall: Any) -> Callable[..., Any]:
+    """Rates of place and speed of the mass on the belt, the sign of the sliding as it is."""
+    return lambda t, u: (u[1], fall * u[1] - u[0] - 1.0 * (u[1] > belt) + 1.0 * (u[1] < belt))
+
+
+def lag_rates(drive: Any, eps: Any) -> Callable[..., Any]:
+    """Rates of angle, speed and force of the foliot with a lagging drive."""
+    return lambda t, u: (u[1], u[2] - FRICTION * u[1], (drive - FRICTION * u[1] - u[2]) / eps)
 
 
 def installed(**by_module: dict[str, Any]) -> dict[str, Any]:
@@ -37,39 +48,49 @@ def installed(**by_module: dict[str, Any]) -> dict[str, Any]:
     return {name: one for module, some in by_module.items() if find_spec(module) for name, one in some.items()}
 
 
+cellwise = partial(np.vectorize, otypes=[float])
+"""A function of many cells from that of one."""
+
+
 def ended(rates: Any, begin: Any, span: Any, rtol: float, event: Any, way: int = 0, method: str = "DOP853", **how: Any):
     """Time and state at the end of what scipy's solve_ivp follows up to an event, or the end of the span."""
     event.terminal, event.direction = True, way
-    found = solve_ivp(rates, span, begin, method, events=event, rtol=rtol, atol=1e-3 * rtol, **how)
+    found = integrate.solve_ivp(rates, span, begin, method, events=event, rtol=rtol, atol=1e-3 * rtol, **how)
     return float(found.t[-1]), found.y[:, -1]
 
 
 def diffrax_motion(
-    solver: str, rates: Any, begin: Any, until: Any, args: Any, rtol: Any, event: Any = None, steps: int = 100_000
+    solver: str, rates: Any, begin: Any, until: Any, rtol: Any, event: Any = None, steps: int = 100_000
 ) -> Any:
     """What diffrax's solver gives from 0 until a time or an event, whose root is found a thousand times as sharply."""
     import diffrax
+    import jax
     import optimistix
 
     root = optimistix.Newton(rtol=1e-3 * rtol, atol=1e-3 * rtol)
+    stop = None if event is None else diffrax.Event(lambda t, y, args, **_: event(t, y), root)
     return diffrax.diffeqsolve(
-        diffrax.ODETerm(rates), getattr(diffrax, solver)(), t0=0.0, t1=until, dt0=None, y0=begin, args=args,
+        diffrax.ODETerm(lambda t, y, args: jax.numpy.stack(rates(t, y))), getattr(diffrax, solver)(),
+        t0=0.0, t1=until, dt0=None, y0=jax.numpy.stack(begin), event=stop, max_steps=steps, throw=False,
         stepsize_controller=diffrax.PIDController(rtol=rtol, atol=1e-3 * rtol),
-        event=None if event is None else diffrax.Event(event, root), max_steps=steps, throw=False,
     )  # fmt: skip
 
 
-def side_by_side(motion: Callable[..., Any], *axes: int | None) -> Callable[..., Any]:
-    """A function of cells as jax makes it, in double precision: all cells at once, along the axes given."""
+def side_by_side(motion: Callable[..., Any]) -> Callable[..., Any]:
+    """A function of cells as jax makes it, in double precision: all cells at once; numbers are the same of all."""
 
     @cache
-    def compiled() -> Any:
+    def compiled(axes: tuple[int | None, ...]) -> Any:
         import jax
 
         jax.config.update("jax_enable_x64", True)
         return jax.jit(jax.vmap(motion, in_axes=axes))
 
-    return lambda *cells: np.asarray(compiled()(*(np.asarray(x) if np.ndim(x) else x for x in cells)))
+    def follow(*cells: Any) -> Any:
+        axes = tuple(0 if np.ndim(x) else None for x in cells)
+        return np.asarray(compiled(axes)(*map(np.asarray, cells)))
+
+    return follow
 
 
 def swings(rtol: float, multiplier: float) -> int:
@@ -77,26 +98,26 @@ def swings(rtol: float, multiplier: float) -> int:
     return math.ceil(math.log(rtol / 10) / math.log(max(multiplier, 1e-12))) + 2
 
 
-def one_by_one(settled: Callable[..., Any]) -> Callable[..., Any]:
-    """A follower of clocks from that of one, with a, R, speed at the switch and half swings."""
-    return lambda *clocks: np.array([settled(*cell) for cell in zip(*clocks, strict=True)])
+def half_swing(follow: Callable[..., Any], a: Any, R: Any, speed: Any) -> tuple[Any, Any, Any]:
+    """Time, amplitude and speed at the next switch of a clock, by a follower of rates up to an event."""
+    out, (top, _) = follow(leg(a, R), (1.0, speed), lambda _, u: u[1])
+    back, (_, last) = follow(leg(a, -R), (top, 0.0), lambda _, u: u[0] + 1.0)
+    return out + back, top, -last
 
 
 def scipy_clock(rtol: float) -> Callable[..., Any]:
     """solve_ivp by DOP853."""
 
-    def leg(begin: Any, a: float, friction: float, event: Any) -> Any:
-        return ended(lambda _, u: (u[1], -1.0 - a * u[1] - friction), begin, (0.0, FOREVER), rtol, event)
+    def follow(rates: Any, begin: Any, event: Any) -> Any:
+        return ended(rates, begin, (0.0, FOREVER), rtol, event)
 
-    def settled(a: float, R: float, speed: float, count: int) -> tuple[float, float, float]:
+    def settled(a: float, R: float, speed: float, count: int) -> Any:
         time, top, speed = 0.0, 1.0, START * speed
         for _ in range(count):
-            out, (top, _) = leg((1.0, speed), a, R, lambda _, u: u[1])
-            back, (_, last) = leg((top, 0.0), a, -R, lambda _, u: u[0] + 1.0)
-            time, speed = out + back, -last
-        return 2.0 * time, top, speed
+            time, top, speed = half_swing(follow, a, R, speed)
+        return np.array([2.0 * time, top, speed])
 
-    return one_by_one(settled)
+    return np.vectorize(settled, otypes=[float], signature="(),(),(),()->(row)")
 
 
 def heyoka_clock(rtol: float) -> Callable[..., Any]:
@@ -125,7 +146,7 @@ def heyoka_clock(rtol: float) -> Callable[..., Any]:
     motion = [(x, v), (v, drive - a * v - way * friction)]
     run = hy.taylor_adaptive(motion, [0.0, 1.0], t_events=events, tol=rtol, pars=[0.0] * 4)
 
-    def settled(a: float, R: float, speed: float, count: int) -> tuple[float, float, float]:
+    def settled(a: float, R: float, speed: float, count: int) -> Any:
         log.clear()
         wanted[0] = count
         run.time = 0.0
@@ -133,120 +154,87 @@ def heyoka_clock(rtol: float) -> Callable[..., Any]:
         run.pars[:] = -1.0, 1.0, a, R
         run.reset_cooldowns()
         run.propagate_until(FOREVER)
-        return 2.0 * (log[-1][0] - log[-2][0]), top[0], log[-1][1]
+        return np.array([2.0 * (log[-1][0] - log[-2][0]), top[0], log[-1][1]])
 
-    return one_by_one(settled)
+    return np.vectorize(settled, otypes=[float], signature="(),(),(),()->(row)")
 
 
-def _settled(a: Any, R: Any, speed: Any, count: Any, rtol: Any) -> Any:
-    """By diffrax's Dopri8, all clocks side by side by jax, each as often as the slowest."""
+@side_by_side
+def diffrax_clocks(a: Any, R: Any, speed: Any, count: Any, rtol: Any) -> Any:
+    """diffrax's Dopri8, all clocks side by side by jax, each as often as the slowest."""
     import jax
 
-    def rates(t: Any, y: Any, args: Any) -> Any:
-        return jax.numpy.stack([y[1], -1.0 - args[0] * y[1] - args[1]])
-
-    def leg(begin: Any, friction: Any, event: Any) -> Any:
-        found = diffrax_motion("Dopri8", rates, begin, FOREVER, (a, friction), rtol, event)
+    def follow(rates: Any, begin: Any, event: Any) -> Any:
+        found = diffrax_motion("Dopri8", rates, begin, FOREVER, rtol, event)
         return found.ts[-1], found.ys[-1]
 
-    def half_swing(_: Any, found: Any) -> Any:
-        out, top = leg(jax.numpy.stack([1.0, found[2]]), R, lambda t, y, args, **_: y[1])
-        back, last = leg(jax.numpy.stack([top[0], 0.0]), -R, lambda t, y, args, **_: y[0] + 1.0)
-        return out + back, top[0], -last[1]
-
     begin = (0.0 * speed, 0.0 * speed, START * speed)
-    time, top, last = jax.lax.fori_loop(0, count, half_swing, begin)
+    time, top, last = jax.lax.fori_loop(0, count, lambda _, found: half_swing(follow, a, R, found[2]), begin)
     return jax.numpy.stack([2.0 * time, top, last])
 
 
-_all_settled = side_by_side(_settled, 0, 0, 0, 0, None)
 CLOCKS = installed(
     heyoka={"heyoka.py": heyoka_clock},
-    diffrax={"diffrax": lambda rtol: lambda *clocks: _all_settled(*clocks, rtol)},
+    diffrax={"diffrax": lambda rtol: lambda *clocks: diffrax_clocks(*clocks, rtol)},
     scipy={"scipy": scipy_clock},
 )
 
 
-def scipy_places(method: str, belt: Any, fall: Any, until: Any, rtol: float) -> Any:
-    """By solve_ivp, the sign as it is."""
-
-    def place(belt: float, fall: float, until: float) -> float:
-        calls = 0
-
-        def rates(t: float, u: Any) -> tuple[float, float]:
-            nonlocal calls
-            calls += 1
-            if calls > MOST:
-                raise TooManyCalls
-            return u[1], fall * u[1] - u[0] - np.sign(u[1] - belt)
-
-        try:
-            return float(solve_ivp(rates, (0.0, until), (0.0, belt), method, rtol=rtol, atol=1e-3 * rtol).y[0, -1])
-        except TooManyCalls:
-            return np.nan
-
-    return np.vectorize(place, otypes=[float])(belt, fall, until)
+@cellwise
+def scipy_place(method: str, belt: float, fall: float, until: float, rtol: float) -> float:
+    """By scipy's solver of that name, the sign as it is."""
+    how = {"rtol": rtol, "atol": 1e-3 * rtol}
+    run = getattr(integrate, method)(belt_rates(belt, fall), 0.0, (0.0, belt), until, **how)
+    while run.status == "running" and run.nfev < MOST:
+        run.step()
+    return float(run.y[0]) if run.status == "finished" else math.nan
 
 
-def modes(belt: Any, fall: Any, until: Any, rtol: float) -> Any:
+@cellwise
+def modes(belt: float, fall: float, until: float, rtol: float) -> float:
     """By solve_ivp's DOP853, stick and slip apart."""
 
-    def place(belt: float, fall: float, until: float) -> float:
-        def slips(_: float, u: Any) -> tuple[float, float]:
-            return u[1], fall * u[1] - u[0] + 1.0
+    def slips(_: float, u: Any) -> tuple[float, float]:
+        return u[1], fall * u[1] - u[0] + 1.0
 
-        t, place, last = 0.0, 0.0, 1.0 + fall * belt
-        while t + (last - place) / belt < until:
-            t += (last - place) / belt
-            t, (place, _) = ended(slips, (last, belt), (t, until), rtol, lambda _, u: belt - float(u[1]), -1)
-        return place + belt * (until - t)
-
-    return np.vectorize(place, otypes=[float])(belt, fall, until)
+    t, place, last = 0.0, 0.0, 1.0 + fall * belt
+    while t + (last - place) / belt < until:
+        t += (last - place) / belt
+        t, (place, _) = ended(slips, (last, belt), (t, until), rtol, lambda _, u: belt - float(u[1]), -1)
+    return place + belt * (until - t)
 
 
-def _belt_by_kvaerno5(belt: Any, fall: Any, until: Any, rtol: Any) -> Any:
+@side_by_side
+def belt_by_kvaerno5(belt: Any, fall: Any, until: Any, rtol: Any) -> Any:
+    """By diffrax's Kvaerno5, the sign as it is."""
     import diffrax
     import jax
 
-    def rates(t: Any, u: Any, args: Any) -> Any:
-        return jax.numpy.stack([u[1], fall * u[1] - u[0] - jax.numpy.sign(u[1] - belt)])
-
-    begin = jax.numpy.stack([0.0 * belt, belt])
-    end = diffrax_motion("Kvaerno5", rates, begin, until, None, rtol, steps=MOST)
+    end = diffrax_motion("Kvaerno5", belt_rates(belt, fall), (0.0 * belt, belt), until, rtol, steps=MOST)
     return jax.numpy.where(end.result == diffrax.RESULTS.successful, end.ys[-1, 0], jax.numpy.nan)
 
 
 SLIDING = installed(
-    scipy={f"scipy {method}": partial(scipy_places, method) for method in ("Radau", "BDF", "LSODA")},
-    diffrax={"diffrax Kvaerno5": side_by_side(_belt_by_kvaerno5, 0, 0, 0, None)},
+    scipy={f"scipy {method}": partial(scipy_place, method) for method in ("Radau", "BDF", "LSODA")},
+    diffrax={"diffrax Kvaerno5": belt_by_kvaerno5},
 ) | {"scipy DOP853, modes by hand": modes}
 
 
-def scipy_times(method: str, mu: Any, eps: float, rtol: float) -> Any:
+@cellwise
+def scipy_time(method: str, drive: float, eps: float, rtol: float) -> float:
     """By solve_ivp, with the exact Jacobian and a terminal event."""
     jacobian = np.array([[0.0, 1.0, 0.0], [0.0, -FRICTION, 1.0], [0.0, -FRICTION / eps, -1.0 / eps]])
-
-    def time(drive: float) -> float:
-        def rates(t: float, u: Any) -> tuple[float, float, float]:
-            return u[1], u[2] - FRICTION * u[1], (drive - FRICTION * u[1] - u[2]) / eps
-
-        how = {"method": method, "jac": jacobian}
-        return ended(rates, np.zeros(3), (0.0, LATEST), rtol, lambda _, u: 1.0 - float(u[0]), **how)[0]
-
-    return np.vectorize(time, otypes=[float])(mu)
+    how = {"method": method, "jac": jacobian}
+    return ended(lag_rates(drive, eps), np.zeros(3), (0.0, LATEST), rtol, lambda _, u: 1.0 - float(u[0]), **how)[0]
 
 
-def _lag_by_kvaerno5(drive: Any, eps: Any, rtol: Any) -> Any:
-    import jax
-
-    def rates(t: Any, u: Any, args: Any) -> Any:
-        return jax.numpy.stack([u[1], u[2] - FRICTION * u[1], (drive - FRICTION * u[1] - u[2]) / eps])
-
-    begin, event = jax.numpy.zeros(3), lambda t, y, args, **_: y[0] - 1.0
-    return diffrax_motion("Kvaerno5", rates, begin, LATEST, None, rtol, event).ts[-1]
+@side_by_side
+def lag_by_kvaerno5(drive: Any, eps: Any, rtol: Any) -> Any:
+    """By diffrax's Kvaerno5."""
+    return diffrax_motion("Kvaerno5", lag_rates(drive, eps), (0.0,) * 3, LATEST, rtol, lambda _, u: u[0] - 1.0).ts[-1]
 
 
 STIFF = installed(
-    scipy={"scipy Radau": partial(scipy_times, "Radau"), "scipy BDF": partial(scipy_times, "BDF")},
-    diffrax={"diffrax Kvaerno5": side_by_side(_lag_by_kvaerno5, 0, None, None)},
+    scipy={f"scipy {method}": partial(scipy_time, method) for method in ("Radau", "BDF")},
+    diffrax={"diffrax Kvaerno5": lag_by_kvaerno5},
 )

@@ -21,13 +21,12 @@ import math
 
 import numpy as np
 import xarray as xr
-from _common import Claims, Statement, differing, most, never, said, script, solved
+from _common import DAY, Claims, Statement, count, differing, held, most, never, script, solved
 from _figures import COLOURS, DASHES, HOLLOW, Axis, Log, direct_label, page, panel, points
 from scipy.special import j1, jn_zeros
 
 import sweep
 
-DAY = 86400.0
 LARGE = 20.0
 """Amplitude over the larger of r and abs(at) from which (1) is held to `FIRST` of the loss."""
 FIRST = 0.02
@@ -64,44 +63,49 @@ def prepared(ds, lift, hung):
     return ds, lift, hung
 
 
+def slowest(lift: xr.Dataset, beta) -> tuple[xr.Dataset, xr.Dataset]:
+    """The balance of most solid friction on this lift, and its torque of the greatest loss."""
+    line = lift.sel(beta=beta).isel(r=-1)
+    return line, line.isel(m=int(line.loss.fillna(-1.0).argmax("m")))
+
+
 def claims(ds, lift, hung) -> Claims:
     yield "Impulses before, at and behind the centre"
-    there = abs(ds["at"] + ds.r) < 1e-12
-    still, span = float(abs(ds.loss).where(there).max()), ds.a.where(there & ds.loss.notnull())
-    away = ds.where(abs(ds["at"] + ds.r) > 1e-3)
+    before = ds["at"] + ds.r
+    still, away = ds.where(abs(before) < 1e-12), ds.where(abs(before) > 1e-3)
+    span = still.a.where(still.loss.notnull())
     ratio = (away.loss / theory(away)).where(away.a > LARGE * np.maximum(abs(away["at"]), away.r))
-    turns = (away.loss.diff("w") * np.sign(away["at"] + away.r)) > 0
     middle = ds.sel(at=0, method="nearest")
     made = solved("balance_driven", r=ds.r.values, w=ds.w.values, zeta=ds.zeta, omega_n=ds.omega_n, rtol=1e-12)
-    off = max(float(abs(middle.clock / made.period - 1).max()), float(abs(middle.a / made.amplitude - 1).max()))
     what = f"at = -r: loss at every drive, a = {float(span.min()):.2f} to {float(span.max()):.2f} rad [s/day]"
-    cells = f"elsewhere (1), a > 20 r, 20 abs(at): {int(ratio.notnull().sum())} cells"
-    yield most(what, "0", still, FLAT, "at most")
-    yield most(cells, "1", abs(ratio - 1).max(), FIRST)
-    yield never("  amplitudes at which the loss is stationary", turns)
-    yield most("at = 0: period and amplitude by `balance_driven`", "the same", off, 1e-6, "largest")
+    yield most(what, "0", still.loss, FLAT, "at most")
+    yield most(f"elsewhere (1), a > 20 r, 20 abs(at): {count(ratio)}", "1", ratio - 1, FIRST)
+    yield never("  amplitudes at which the loss is stationary", away.loss.diff("w") * np.sign(before) > 0)
+    yield most("at = 0: period by `balance_driven`", "the same", middle.clock / made.period - 1, 1e-6)
+    yield most("  amplitude", "the same", middle.a / made.amplitude - 1, 1e-6)
 
     yield "A lift"
     for beta in lift.beta.values:
-        line = lift.sel(beta=beta).isel(r=-1)
-        k = int(line.loss.fillna(-1.0).argmax("m"))
-        a, least = float(line.amplitude[k]), float(line.m[int(line.amplitude.notnull().argmax("m"))])
-        here = f"{float(line.loss[k]):.0f} at {math.degrees(a):.0f} degree = {a / beta:.2f} lifts"
-        what = f"lift +-{math.degrees(beta):.0f} degree: greatest loss [s/day] at amplitude"
-        holds = 0 < k < line.m.size - 1 and 1.1 * beta < a < 2.0 * beta
-        yield said(what, holds, f"{here}, m {float(line.m[k]) / least:.2f} times the least", "1 to 2 lifts")
+        line, top = slowest(lift, beta)
+        least = top.m / line.m[int(line.amplitude.notnull().argmax("m"))]
+        what = f"lift +-{math.degrees(beta):.0f} degree: amplitude of the greatest loss, over the lift"
+        here = (
+            f"{{:.2f}}: {top.loss:.0f} s/day at {np.degrees(top.amplitude):.0f} degree, m {least:.2f} times the least"
+        )
+        yield held(what, top.amplitude / beta, "1.1 to 2", here)
     free = lift.sel(r=0).loss
     yield never("no solid friction: torques at which a lift loses", free >= 0)
     yield Statement("  what it gains at most [s/day]", "", f"{-float(free.min()):.2f}")
 
     yield "Positions, out of poise"
     spread, a, first = hung.loss.isel(hang=0) - hung.loss.isel(hang=2), hung.a.isel(hang=0), jn_zeros(1, 1)[0]
-    zero = float(sweep.where_exponent(spread.swap_dims(w="a0"), "a0", 0.0, values=True).abscissa)
-    rate = -2 * DAY * float(hung.poise) * j1(a) / a
-    off, level = (abs(x).max() / abs(spread).max() for x in (spread - rate, hung.loss.isel(hang=1)))
+    zero = sweep.where_exponent(spread.swap_dims(w="a0"), "a0", 0.0, values=True).abscissa
+    rate, largest = -2 * DAY * hung.poise * j1(a) / a, abs(spread).max()
     yield differing("positions agree at the amplitude [rad]", f"{first:.4f}", zero, first, 5e-3)
-    yield most("top heavy against bottom heavy, by J1(a)/a", "the same", off, 5e-3, "of the largest")
-    yield most("heavy at the side: of that", "0", level, 5e-3, "")
+    yield most(
+        "top heavy against bottom heavy, by J1(a)/a, of the largest", "the same", (spread - rate) / largest, 5e-3
+    )
+    yield most("heavy at the side: of that", "0", hung.loss.isel(hang=1) / largest, 5e-3)
 
 
 ARC = Log("amplitude, $a$ [rad]", None, (0.2, 0.5, 1, 2, 5))
@@ -133,12 +137,11 @@ def figure(lines, lifted, ds, lift, *_):
         x, y = 1.15 * float(line.a.max()), float(theory(line)[int(line.a.argmax("w"))])
         place = {"ha": "left", "va": "top" if at == -0.0125 else "center"}
         direct_label(lines, x, y, text, COLOURS[k], fontsize=6.5, **place)
-    for k, beta in enumerate(lift.isel(r=-1).beta.values):
-        line = lift.isel(r=-1).sel(beta=beta)
+    for k, beta in enumerate(lift.beta.values):
+        line, top = slowest(lift, beta)
         text = f"lift ±{math.degrees(beta):.0f} degree"
         lifted.plot(line.amplitude, line.loss, color=COLOURS[k], linestyle=DASHES[k], label=text)
-        top = line.isel(m=int(line.loss.fillna(-1.0).argmax("m")))
-        lifted.plot(float(top.amplitude), float(top.loss), "o", color=COLOURS[k])
+        lifted.plot(top.amplitude, top.loss, "o", color=COLOURS[k])
 
 
 INPUTS = "balance_isochronism.h5 balance_isochronism_lift.h5 balance_isochronism_positions.h5"

@@ -18,8 +18,8 @@ import math
 
 import numpy as np
 import xarray as xr
-from _common import Claims, compared, most, said, script
-from _figures import Log, LogNorm, colour_map, direct_label, hatch, page, panel, points
+from _common import DAY, Claims, compared, held, most, said, script
+from _figures import Log, LogNorm, colour_map, contours, direct_label, hatch, page, panel, points
 from _peers import ended
 
 from kernels.interface import Status
@@ -32,84 +32,77 @@ CELLS = ((0.005, 0.002), (0.02, 0.06), (0.1, 0.02), (0.3, 0.1), (1e-3, 0.14))
 
 def turning_points(zeta: float, r: float, start: float, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Times of rest and the angles there, by integrating (3) from rest to rest; `omega_n` is 1/s."""
-    times, angles = [0.0], [start]
+    times, angles, small = [0.0], [start], 1e-6
     for _ in range(count):
-        side = -math.copysign(1.0, angles[-1])  # of the speed
-
-        def equation(t: float, y, side: float = side) -> tuple[float, float]:
-            return y[1], -2 * zeta * y[1] - y[0] - side * r
-
-        push = -angles[-1] - side * r
-        small = 1e-6  # the first step by its series, off the zero of the speed
+        friction = -math.copysign(r, angles[-1])
+        push = -angles[-1] - friction
+        # the first step by its series, off the zero of the speed
         y = [angles[-1] + push * small**2 / 2, push * small * (1 - zeta * small)]
-        time, (angle, _) = ended(equation, y, (small, 10.0), 1e-12, lambda _, y: float(y[1]))
+        time, (angle, _) = ended(
+            lambda _, y, f=friction: (y[1], -2 * zeta * y[1] - y[0] - f), y, (small, 10.0), 1e-12, lambda _, y: y[1]
+        )
         times.append(times[-1] + time)
         angles.append(angle)
     return np.array(times), np.array(angles)
 
 
 def scaled(ds: xr.Dataset) -> xr.Dataset:
-    """`ds` with its groups: `x`, count `N`, `slow` = period over 2 pi/omega_n, minus 1, and where it swings."""
-    ds = ds.assign(x=math.pi * ds.zeta * abs(ds.theta0) / (2 * ds.r), N=ds.half_swings)
-    ds = ds.assign(slow=ds.period * ds.omega_n / (2 * math.pi) - 1, swings=ds.status != Status.OVERDAMPED)
-    return ds.assign(law=np.log1p(ds.x) / (math.pi * ds.zeta))
+    """`ds` with `x`, where it `creeps`, count `N`, its `law`, and `slow` = period over 2 pi/omega_n, minus 1."""
+    x = math.pi * ds.zeta * abs(ds.theta0) / (2 * ds.r)
+    creeps = ds.status == Status.OVERDAMPED
+    slow, N = ds.period * ds.omega_n / (2 * math.pi) - 1, ds.half_swings.where(~creeps & (ds.half_swings > 0))
+    return ds.assign(x=x, N=N, slow=slow, creeps=creeps, law=np.log1p(x) / (math.pi * ds.zeta))
 
 
 def claims(ds) -> Claims:
     yield "Half swings"
-    light = ds.where((ds.zeta <= LIGHT) & (ds.N > 0))
+    light = ds.where(ds.zeta <= LIGHT)
     off = abs(light.N - light.law)
     allowed = 1 + light.law * (0.5 * light.zeta**2 + light.r / abs(ds.theta0))
-    text = f"off by {float(off.max()):.2f} at most"
-    yield said(f"N = ln(1 + x)/(pi zeta), zeta <= {LIGHT:g}", (off / allowed).max() < 1, text, "all cells")
+    what = f"N off ln(1 + x)/(pi zeta), zeta <= {LIGHT:g}, over the next order"
+    yield most(what, "0", off / allowed, 1, f"off by {float(off.max()):.2f} at most")
 
     yield "Rest"
     # Where and when, also by the page's rule as it stands: at the first rest with abs(theta) - r < r.
-    far = float((abs(ds.stop_angle) / ds.r).max())
-    swings = ds.where(ds.swings & (ds.N > 0), drop=True)
-    E = np.exp(-math.pi * swings.zeta / np.sqrt(1 - swings.zeta**2))
+    E = np.exp(-math.pi * ds.zeta / np.sqrt(1 - ds.zeta.where(ds.zeta < 1) ** 2))
     C = (1 + E) / (1 - E)
-    need = np.ceil(np.log((abs(swings.theta0) + swings.r * C) / (2 * swings.r + swings.r * C)) / -np.log(E))
-    early = (swings.N - np.maximum(need, 0)).where(swings.N > 0)
-    share, longest = float((early > 0).sum() / early.notnull().sum()), float(early.max())
+    need = np.ceil(np.log((abs(ds.theta0) + ds.r * C) / (2 * ds.r + ds.r * C)) / -np.log(E))
+    early = (ds.N - np.maximum(need, 0)).where(ds.N > 0)
     zeta, r = CELLS[-1]
     third, fourth = abs(turning_points(zeta, r, 1.0, 4)[1][3:])
-    stops = f"{share:.0%} of cells, by {longest:.0f} half swing"
     words = f"rests at {fourth:.3f} rad, after 4; by the page at {third:.3f} > r, after 3"
-    yield said("it rests within r of the spring's zero", far <= 1, f"largest abs(theta)/r {far:.6f}", "yes")
-    yield said("the page's rule stops too early", 0.2 < share < 0.8 and longest == 1, stops, "-")
+    yield held(
+        "it rests within r of the spring's zero: abs(theta)/r", (abs(ds.stop_angle) / ds.r).max(), "<= 1", "{:.6f}"
+    )
+    yield held("the page's rule stops too early, of cells", (early > 0).sum() / early.count(), "20 to 80 %", "{:.0%}")
+    yield held("  by half swings, at most", early.max(), "1", "{:.0f}")
     yield said(f"  zeta = {zeta:g}, r = {r:g} rad, DOP853", fourth <= r < third < 2 * r, words, "abs(theta) <= r")
 
     yield "Isochronism of the free balance"
-    swings = {(zeta, r): np.diff(turning_points(zeta, r, 1.0, 3)[0]) for zeta, r in CELLS}
-    half = max(abs(swing * math.sqrt(1 - zeta**2) / math.pi - 1).max() for (zeta, _), swing in swings.items())
+    half = [np.diff(turning_points(zeta, r, 1.0, 3)[0]) * math.sqrt(1 - zeta**2) / math.pi for zeta, r in CELLS]
     radii = [r for _, r in CELLS]
     light = ds.sel(zeta=LIGHT, method="nearest")
-    damped, solid = float(light.zeta), float(light.period.max() / light.period.min() - 1)
+    damped, same = float(light.zeta), light.period.max() / light.period.min() - 1
+    what = f"free half swing, r = {min(radii):g} to {max(radii):g} rad, DOP853"
+    yield most(what, "pi/omega_d at any r", np.array(half) - 1, 1e-8)
+    yield most("  the kernel's period, over all r", "the same", same, 1e-13, "largest spread")
     loses = f"viscous damping loses, zeta = {damped:.3g} [s/day]"
-    yield most(f"free half swing, r = {min(radii):g} to {max(radii):g} rad, DOP853", "pi/omega_d at any r", half, 1e-8)
-    yield most("  the kernel's period, over all r", "the same", solid, 1e-13, "largest spread")
-    yield compared(loses, "86400 zeta^2/2", 86400 * light.slow[0], 43200 * damped**2, 1e-3)
+    yield compared(loses, "86400 zeta^2/2", DAY * light.slow[0], DAY / 2 * damped**2, 1e-3)
+
+
+X = Log(r"viscous over solid friction, $x=\pi\zeta\theta_0/(2r)$ [1]", (1e-4, 1e4))
 
 
 @panel(Log(r"viscous damping, $\zeta$ [1]"), Log(r"solid friction, $r/\theta_0$ [1]"))
-@panel(
-    Log(r"viscous over solid friction, $x=\pi\zeta\theta_0/(2r)$ [1]", (1e-4, 1e4)),
-    Log(r"$\pi\zeta N$ [1]"),
-    "lower right",
-    borderaxespad=0.3,
-    labelspacing=0.25,
-)
+@panel(X, Log(r"$\pi\zeta N$ [1]"), "lower right", borderaxespad=0.3, labelspacing=0.25)
 @page(138.0, height_ratios=(1.4, 1))
 def figure(plane, law, ds):
     """The count over both frictions, and its collapse on one law."""
-    n = ds.N.where(ds.swings & (ds.N > 0)).transpose("r", "zeta")
+    n = ds.N.transpose("r", "zeta")
     zeta, r = ds.zeta.values, ds.r.values / abs(float(ds.theta0))
     colour_map(plane, zeta, r, n, r"half swings until rest, $N$ [1]", norm=LogNorm(1, 1e4))
-    plane.contour(zeta, r, n, levels=[10, 100, 1000], colors="white", linewidths=0.7)
-    for count, place in ((10, 0.051), (100, 5.4e-3), (1000, 4.8e-4)):
-        plane.text(1.2e-4, place, f"{count}", color="white", fontsize=8, va="bottom")
-    hatch(plane, zeta, r, (~ds.swings).transpose("r", "zeta").values, "////")
+    contours(plane, zeta, r, n, [10, 100, 1000])
+    hatch(plane, zeta, r, ds.creeps.transpose("r", "zeta").values, "////")
     plane.plot(zeta, math.pi * zeta / 2, color="white", linestyle=(0, (4, 2)), linewidth=0.9)
     plane.text(3e-2, 6e-2, r"$x=1$", color="white", fontsize=8, ha="right")
     direct_label(plane, 1.41, 9e-3, "creeps", fontsize=7.5, rotation=90)
@@ -118,7 +111,7 @@ def figure(plane, law, ds):
     law.plot(x, np.log1p(x), color="black", label=r"$\ln(1+x)$")
     for k, (text, zeta) in enumerate({"10^{-4}": 1e-4, "10^{-3}": 1e-3, "10^{-2}": 1e-2, "0.3": 0.3}.items()):
         row = ds.sel(zeta=zeta, method="nearest")
-        row = row.where(row.N > 0, drop=True).isel(r=slice(None, None, 8))
+        row = row.isel(r=slice(None, None, 8))
         points(law, row.x, math.pi * row.zeta * row.N, k, rf"$\zeta={text}$")
 
 

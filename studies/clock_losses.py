@@ -81,24 +81,24 @@ class Measured:
 
     def matrix(self, u: Any) -> tuple[Any, Any]:
         """Derivatives of both by u, (numbers, 4) over the noise and (4, 4)."""
-        step = 1e-5 * np.eye(4)
-        (up, share_up), (down, share_down) = self.predicted(u + step), self.predicted(np.maximum(u - step, 0.0))
-        apart = np.diag(step + u - np.maximum(u - step, 0.0))[:, None]
+        above, below = u + 1e-5 * np.eye(4), np.maximum(u - 1e-5 * np.eye(4), 0.0)
+        (up, share_up), (down, share_down) = self.predicted(above), self.predicted(below)
+        apart = np.diag(above - below)[:, None]
         return ((up - down) / apart).T / self.noise, ((share_up - share_down) / apart).T
 
     def fit(self, tied: int | None = None, at: float = 0.0, start: Any = (0.25, 0.25, 0.25, 0.25)) -> tuple[Any, float]:
         """The best losses and their sum of squares; with the share (of `SHARES`) numbered `tied` at a value."""
         exact = {"ftol": 1e-7, "xtol": 1e-7, "gtol": 1e-7, "max_nfev": 60}
         seen = np.log(np.concatenate([x for x in (self.period, self.amplitude) if x is not None]))
+        bond = TIE * SUM[[] if tied is None else [tied]]
 
         def off(u: Any) -> Any:
             shown, share = self.predicted(u[None])
-            bond = [] if tied is None else [TIE * (SUM[tied] @ share[0] - at)]
-            return np.concatenate([(shown[0] - seen) / self.noise, bond])
+            return np.concatenate([(shown[0] - seen) / self.noise, bond @ share[0] - TIE * at])
 
         def slopes(u: Any) -> Any:
             shown, share = self.matrix(u)
-            return shown if tied is None else np.vstack([shown, TIE * (SUM[tied] @ share)])
+            return np.vstack([shown, bond @ share])
 
         start = np.clip(start, 1e-3, 0.9 * self.most)
         found = least_squares(off, start, slopes, bounds=(np.zeros(4), self.most), x_scale=0.3, **exact)

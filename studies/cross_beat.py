@@ -76,31 +76,28 @@ def claims(ds) -> Claims:
     turned = np.gradient(stiff.off, np.log(ds.tau.values))
     usual = ds.off.isel(tau=int(abs(ds.alpha - HIS).argmin("tau")))
     grown = np.log2(stiff.period / ds.alone)
-    inside = ((grown > ds.s_alone - 5e-3) & (grown < ds.s + 5e-3)).all()
-    text, detail = f"2^{grown[0]:.3f} to 2^{grown[-1]:.3f}", "exponents, gear of 1 N m/rad, alpha .3 to 300"
     yield most(f"(2), wind-up < {SMALL:g}: {count(first)}", "1", first - 1, FIRST)
     yield differing("  power of the stiffness in it", "-1", power(usual), -1, 0.01)
-    yield most(detail, "a detail (paper)", turned, 5e-3, "largest difference from (1)")
-    yield said("a second foliot like the first: P grows by", inside, text, "2^s")
+    yield most("exponents, gear of 1 N m/rad, alpha .3 to 300, against (1)", "a detail (paper)", turned, 5e-3)
+    inside = ((grown > ds.s_alone - 5e-3) & (grown < ds.s + 5e-3)).all()
+    yield said("a second foliot like the first: P grows by", inside, f"2^{grown[0]:.3f} to 2^{grown[-1]:.3f}", "2^s")
 
     yield "Only the sums count (alpha = 30)"
     inertia, c, phi0 = float(ds.I_l + ds.I_r), float(ds.c_l + ds.c_r), float(ds.phi0)
     tau = HIS * c**2 * phi0 / inertia
     R = 0.2 * tau
     made = pair(ds, c_l=[c, c / 2, c / 2], c_r=[0.0, c / 2, c / 2], R_l=[0.0, R, R / 2], R_r=[0.0, 0.0, R / 2])
-    P = 2 * made.interval.values
-    one, rubbed = (single(tau, inertia, c, phi0, x).isel(tau=0) for x in (0.0, R))
-    h, s = 0.01, float(one.sensitivity)
+    smooth, rough = (single(tau, inertia, c, phi0, x).isel(tau=0) for x in (0.0, R))
+    names = "viscous friction of one alone: P [s]", "dry friction of one, a fifth of the torque", "  half of it of each"
+    for what, P, one in zip(names, 2 * made.interval, (smooth, rough, rough), strict=True):
+        yield compared(what, f"{one.period:.5f}", P, float(one.period), 1e-3)
+    h, kept = 0.01, (1 - float(smooth.sensitivity)) / 2
     moved = pair(ds, I_l=[inertia / 2 * math.exp(x) for x in (-h, h)])
     rise = np.log(moved.interval[1] / moved.interval[0]) / (2 * h)
-    smooth, rough = float(one.period), float(rubbed.period)
-    yield compared("viscous friction of one alone: P [s]", f"{smooth:.5f}", P[0], smooth, 1e-3)
-    yield compared("dry friction of one, a fifth of the torque", f"{rough:.5f}", P[1], rough, 1e-3)
-    yield compared("  half of it of each", f"{rough:.5f}", P[2], rough, 1e-3)
-    yield differing("weights moved on one: dlnP/dlnI_l", f"(1 - s)/2 = {(1 - s) / 2:.4f}", rise, (1 - s) / 2, 1e-3)
+    yield differing("weights moved on one: dlnP/dlnI_l", f"(1 - s)/2 = {kept:.4f}", rise, kept, 1e-3)
 
     yield f"A case that sways by {SWAY:g} rad/s^2"
-    half, swings = 0.5 * float(ds.I_l + ds.I_r), list(range(61, 101))
+    half, swings = 0.5 * inertia, list(range(61, 101))
     clocks = [pair(ds, flips=swings, I_l=half * (1 + x), I_r=half * (1 - x), sway=SWAY, nu=NU) for x in SHARES]
     scatter = np.array([float(clock.interval.std()) for clock in clocks])
     unit = scatter[1:] / SHARES[1:]
@@ -109,10 +106,11 @@ def claims(ds) -> Claims:
     yield most("  of equal foliots, over that", "0", scatter[0] / unit.mean(), 1e-3, f"{scatter[0]:.1e} s")
 
 
+GAIN, KEY = Log(r"gain, $-\Delta P/P$ [1]"), {"(2)": "-", "scene": SCENE}
+
+
 @panel(Log(), Log("period, $P$ [s]", (0.5, 60)), "upper right")
-@panel(
-    ALPHA, Log(r"gain, $-\Delta P/P$ [1]"), "upper left", {"(2)": "-", "scene": SCENE}, title="gear [N m/rad]", ncols=2
-)
+@panel(ALPHA, GAIN, "upper left", KEY, title="gear [N m/rad]", ncols=2)
 @page(132.0, sharex=True)
 def figure(period, wound, ds):
     """Period, and what the gear's wind-up does to it."""

@@ -1,9 +1,9 @@
 """How many masses does a drivetrain need to hold its frequencies to 1 % up to a given band, by each method?
 
-    python studies/fewest_masses.py [drivetrains]
+    python studies/fewest_masses.py studies/fewest_masses.toml
 
-Takes the 2000 random drivetrains of ten masses that fewest_masses.csv holds (or as many as told), reduces each by every
-method for bands that hold its first 1 to 8 frequencies, and draws fewest_masses.png here. What comes out:
+Reduces the 2000 random drivetrains of ten masses that fewest_masses.csv holds by every method, for bands that hold the
+first 1 to 8 frequencies of each. What comes out:
 
 - modal reduction needs as many masses as there are frequencies in the band;
 - IRS needs 0.3 more in the mean, Craig-Bampton 0.6 more (one more in a narrow band), Guyan 1.5 more;
@@ -12,69 +12,57 @@ method for bands that hold its first 1 to 8 frequencies, and draws fewest_masses
   0.02 to 0.15 %: with about 1 % of damping a resonance that moves by 0.4 % is felt.
 """
 
-import sys
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import OPTIONS, Claims, Script, columns, held, never, said
+from _common import Claims, Statement, held, never, said, script, solved
 from _figures import COLOURS, MARKS, Axis, Log, page, panel
 
 import sweep
 
 METHODS = ("rivin", "guyan", "irs", "craig_bampton", "modal")
 MASSES, SPREAD, DAMPER, TOLERANCE = 10, 100.0, 0.1, 0.01
-INSIDE = tuple(range(1, 9))
+INSIDE = np.arange(1, 9)
 """Frequencies that the band holds."""
 DRIVETRAINS = 2000
 INNER = Axis("frequencies in the band [1]")
 
 
-def drivetrains(count: int, seed: int = 1) -> dict[str, np.ndarray]:
-    """Random chains: inertias and stiffnesses evenly over the logarithm of a factor SPREAD, in four digits."""
-    random = np.random.default_rng(seed)
-    J, k = np.moveaxis(SPREAD ** random.uniform(0, 1, (count, 2, MASSES)), 1, 0)
-    return {name: np.vectorize(lambda x: float(f"{x:.4g}"))(values) for name, values in (("J", J), ("k", k))}
-
-
-def swept(chains: dict[str, np.ndarray], outputs: list[str], reduction: str = "none", **more) -> xr.Dataset:
+def reduced(J, k, outputs, reduction: str = "none", **more) -> xr.Dataset:
     """One cell a chain; what else differs from cell to cell, or is the same of all, is in `more`."""
-    fixed = {"reduction": reduction, "h": DAMPER} | {name: v for name, v in more.items() if np.ndim(v) == 0}
-    axes = {name: v.tolist() for name, v in (chains | more).items() if np.ndim(v) > 0}
-    return sweep.run(kernel="drivetrain", design="zip", rtol=1e-7, outputs=outputs, axes=axes, fixed=fixed, workers=1)
+    chain = {"design": "zip", "J": J, "k": k, "h": DAMPER}
+    return solved("drivetrain", rtol=1e-7, outputs=outputs, reduction=reduction, **chain, **more)
 
 
-def bands(chains: dict[str, np.ndarray]) -> np.ndarray:
+def bands(J, k) -> np.ndarray:
     """Bands [Hz] that end midway between two frequencies, after INSIDE of them; shape (drivetrains, len(INSIDE))."""
-    f = swept(chains, ["frequency"]).frequency.values
-    return np.sqrt(f[:, [m - 1 for m in INSIDE]] * f[:, list(INSIDE)])
+    f = reduced(J, k, ["frequency"]).frequency.values
+    return np.sqrt(f[:, INSIDE - 1] * f[:, INSIDE])
 
 
-def needed(chains: dict[str, np.ndarray]) -> xr.Dataset:
+def prepared(path, count: int = DRIVETRAINS) -> xr.Dataset:
     """Masses kept, error of the frequencies in the band and of the receptance `off`, by method, drivetrain and band."""
-    count, f_max = len(chains["J"]), bands(chains)
-    many = {name: np.repeat(values, len(INSIDE), axis=0) for name, values in chains.items()}
-    dims, inside = ("reduction", "drivetrain", "inside"), np.arange(MASSES) < np.tile(INSIDE, count)[:, None]
-    found: dict[str, list[Any]] = {"kept": [], "off": [], "error": []}
+    J, k = (sweep.study(path).axes[name].values[:count] for name in "Jk")
+    every, f_max = [np.repeat(x, INSIDE.size, axis=0) for x in (J, k)], bands(J, k).ravel()
+    inside, found = np.arange(MASSES) < np.tile(INSIDE, len(J))[:, None], []
     for name in METHODS:
-        ds = swept(many, ["n_kept", "frf_error", "frequency_error"], reduction=name, f_max=f_max.ravel(), tol=TOLERANCE)
-        worst = abs(ds.frequency_error.where(inside)).max("mode")
-        for part, values in zip(found, (ds.n_kept, ds.frf_error, worst), strict=True):
-            found[part].append(values.values.reshape(count, -1))
-    made = {part: (dims, np.array(values)) for part, values in found.items()}
-    return xr.Dataset(made, coords={"reduction": list(METHODS), "inside": list(INSIDE)})
+        ds = reduced(*every, ["n_kept", "frf_error", "frequency_error"], name, f_max=f_max, tol=TOLERANCE)
+        parts = {"kept": ds.n_kept, "off": ds.frf_error, "error": abs(ds.frequency_error.where(inside)).max("mode")}
+        rows = {part: (("drivetrain", "inside"), x.values.reshape(len(J), -1)) for part, x in parts.items()}
+        found.append(xr.Dataset(rows, {"inside": INSIDE}))
+    return xr.concat(found, xr.DataArray(list(METHODS), dims="reduction", name="reduction"))
 
 
-def write_points(path: Path) -> None:
-    """The csv file of the toml: DRIVETRAINS chains, each with a band of 1 to 8 of its frequencies in turn."""
-    chains = drivetrains(DRIVETRAINS)
-    f_max = bands(chains)[np.arange(DRIVETRAINS), np.arange(DRIVETRAINS) % len(INSIDE)]
-    names = [f"{name}_{i + 1}" for name in chains for i in range(MASSES)]
-    rows = np.hstack([*chains.values(), f_max[:, None]])
-    lines = [",".join([*names, "f_max"]), *(",".join(f"{x:.4g}" for x in row) for row in rows)]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+def write_points(path: Path, seed: int = 1) -> None:
+    """The csv file of the toml: chains with inertias and stiffnesses evenly over the logarithm of a factor SPREAD, each
+    with a band of 1 to 8 of its frequencies in turn; all in four digits."""
+    random, turn = np.random.default_rng(seed), np.arange(DRIVETRAINS)
+    drawn = SPREAD ** random.uniform(0, 1, (DRIVETRAINS, 2, MASSES))
+    J, k = np.moveaxis(np.vectorize(lambda x: float(f"{x:.4g}"))(drawn), 1, 0)
+    rows = np.hstack([J, k, bands(J, k)[turn, turn % INSIDE.size, None]])
+    names = [f"{name}_{i + 1}" for name in "Jk" for i in range(MASSES)]
+    np.savetxt(path, rows, "%.4g", ",", header=",".join([*names, "f_max"]), comments="")
 
 
 def claims(ds) -> Claims:
@@ -86,17 +74,10 @@ def claims(ds) -> Claims:
     yield never("any method needs fewer", ds.kept < ds.inside)
     yield said("Rivin needs the most, then Guyan, then IRS", ranked, ", ".join(f"+{x:.2f}" for x in order), "yes")
     yield held("frequencies in the band are held: largest error", worst, f"<= {TOLERANCE:g}", "{:.4f}")
-
-
-def notes(ds) -> list[str]:
-    """Masses needed by method and band, and the errors that are left."""
-    rows = [("frequencies in the band", *map(str, INSIDE), "frequencies off by", "receptance off by")]
     for name in METHODS:
-        cell = ds.sel(reduction=name)
-        kept = (f"{float(x):.1f}" for x in cell.kept.mean("drivetrain"))
-        rows.append((name, *kept, *(f"{float(cell[part].median()):.1e}" for part in ("error", "off"))))
-    head = f"MASSES KEPT, mean of {ds.sizes['drivetrain']} drivetrains, and errors left (median)"
-    return [head, *columns(rows, "  ")]
+        few, off, error = more.sel(reduction=name), *(ds[x].sel(reduction=name).median() for x in ("off", "error"))
+        here = f"{few.min():.1f} to {few.max():.1f}; {error:.1e}; {off:.1e}"
+        yield Statement(f"{name}: masses more than frequencies; median errors of these, of the receptance", "", here)
 
 
 @panel(INNER, Axis("masses needed for 1 % [1]", (0, MASSES + 0.9)), "lower right", ncols=2)
@@ -115,22 +96,4 @@ def figure(masses, receptance, ds):
         axes.set(xticks=INSIDE)
 
 
-STUDY = Script(
-    __file__, __doc__, ("drivetrains",), claims, figure, lambda count: needed(drivetrains(count)), notes, "expected"
-)
-
-
-def main(arguments: Sequence[str]) -> int:
-    """Table and figure; 1 if a statement does not hold."""
-    if list(arguments) == ["points"]:
-        write_points(Path(__file__).with_suffix(".csv"))
-        return 0
-    counts = [argument for argument in arguments if argument not in OPTIONS]
-    if len(counts) > 1 or not all(a.isdigit() and int(a) > 0 for a in counts):
-        print("use: python fewest_masses.py [drivetrains] [--all] [--force]", file=sys.stderr)
-        return 2
-    return STUDY.report(arguments, lambda: STUDY.conclude(int(counts[0]) if counts else DRIVETRAINS))
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+main = script(__name__, "fewest_masses.toml", claims, figure, prepared, source="expected")

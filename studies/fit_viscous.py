@@ -1,8 +1,8 @@
-# How few coefficients hold the viscous foliot's limit cycle to a few 1e-16?
-"""Fits the polynomials of `kernels/foliot/_viscous_fit.py` in 50-digit arithmetic and prints that module.
+"""How few coefficients hold the viscous foliot's limit cycle to a few 1e-16?
 
     python studies/fit_viscous.py > kernels/foliot/_viscous_fit.py
 
+fits the polynomials of that module in 50-digit arithmetic and prints it.
 LOG_TAIL of `kernels/maths/elementary.py` is fitted with it and printed on stderr.
 
 With k = 1/alpha = a^2 phi0/mu, the cycle is q - tanh q = k, and everything is smooth in
@@ -12,8 +12,9 @@ Chebyshev interpolation, then monomials; the leading coefficients are known and 
 """
 
 import sys
+from functools import cache
 
-from mpmath import chebyt, cos, exp, findroot, log, log1p, mp, mpf, pi, tanh, taylor
+from mpmath import chebyfit, exp, findroot, log, log1p, mp, mpf, tanh
 
 mp.dps = 50
 SPLIT = mpf(7) / 10
@@ -45,20 +46,8 @@ def weak(x):
 
 def interpolate(function, low, high, degree, outputs):
     """Monomial coefficients on [low, high], lowest first, one list for each output of the function."""
-    n = degree + 1
-    nodes = [cos(pi * (2 * j + 1) / (2 * n)) for j in range(n)]
-    values = [function((high - low) / 2 * t + (high + low) / 2) for t in nodes]
-    fits = []
-    for output in range(outputs):
-        sums = [sum(values[j][output] * chebyt(m, nodes[j]) for j in range(n)) * 2 / n for m in range(n)]
-        sums[0] /= 2
-
-        def series(z, sums=sums):
-            t = (2 * z - high - low) / (high - low)
-            return sum(c * chebyt(m, t) for m, c in enumerate(sums))
-
-        fits.append(taylor(series, 0, degree))
-    return fits
+    value = cache(function)
+    return [chebyfit(lambda z, i=i: value(z)[i], [low, high], degree + 1)[::-1] for i in range(outputs)]
 
 
 def log_tail(v):

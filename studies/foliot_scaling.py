@@ -14,21 +14,21 @@ Why the exponents are -1 and -1/3 is said in docs/theory/weak_drive.md and stron
 """
 
 import math
+from fractions import Fraction
 
 import numpy as np
 import xarray as xr
-from _common import Claims, Statement, compared, most, nearest, said, script, solved
-from _figures import COLOURS, DRIVE, HOLLOW, SLOPE, Log, page, panel
+from _common import Claims, compared, differing, held, most, never, said, script, solved
+from _figures import COLOURS, DRIVE, LAWS, SLOPE, Log, page, panel, points
 
 import sweep
 
-WEAK: tuple[float | None, float | None] = (None, 1e-5)
-STRONG: tuple[float | None, float | None] = (1e5, None)
+WEAK, STRONG = (None, 1e-5), (1e5, None)
 """Windows of alpha for the straight lines."""
 SHOWN = np.array([0.1, 1.463, 100.0])
 """alpha of the motions whose shape is told."""
-HALF = (1.46299058758010465706, 6.42446119521106945636, 1.39341841440363426389)
-"""alpha, a P and A of the exponent -1/2, once in 50 digits."""
+HALF = {"alpha": 1.46299058758010465706, "aP": 6.42446119521106945636, "A": 1.39341841440363426389}
+"""Where the exponent is -1/2, once in 50 digits."""
 STRONG_P, STRONG_A = 4 * 3 ** (1 / 3), 3 ** (2 / 3) / 2
 """At strong drive a P = STRONG_P alpha^(-1/3) and A = STRONG_A alpha^(1/3)."""
 QUARTER = 15 / (24 * 60)
@@ -56,95 +56,98 @@ def prepared(ds):
     return ds, sweep_of_alpha(ds, [float(found.abscissa)]).isel(mu=0)
 
 
-def claims(ds, half) -> Claims:
-    yield "Limits"
+def limits(ds) -> Claims:
+    """Values and exponents at both ends, to the next term of the series."""
     first, last = ds.isel(mu=0), ds.isel(mu=-1)
-    weak, strong = float(first.alpha), float(last.alpha)
-    third, b2 = strong ** (1 / 3), (3 / strong) ** (2 / 3)  # b2: square of the strong drive's small parameter
-    at, period, swing = f"at alpha = {strong:.2g}", f"4 3^(1/3) = {STRONG_P:.5f} *", f"3^(2/3)/2 = {STRONG_A:.5f} *"
-    yield compared(f"weak drive: a P alpha at alpha = {weak:.2g}", "4 *", first.aP * weak, 4.0, 1.01 * weak)
-    yield compared(f"weak drive: A at alpha = {weak:.2g}", "1 *", first.A, 1.0, 0.31 * weak)
-    yield compared(f"strong drive: a P alpha^(1/3) {at}", period, last.aP * third, STRONG_P, 0.14 * b2)
-    yield compared(f"strong drive: A alpha^(-1/3) {at}", swing, last.A / third, STRONG_A, 0.11 * b2)
-    # A limit is allowed the distance of the local exponent at the inner end of its window, by the series' next term.
-    for name, y, window, paper, limit in (
-        ("a P", ds.aP, WEAK, "-1 *", -1.0),
-        ("a P", ds.aP, STRONG, "-1/3 *", -1 / 3),
-        ("A", ds.A, WEAK, "0 *", 0.0),
-        ("A", ds.A, STRONG, "1/3 *", 1 / 3),
-    ):
-        fit = sweep.fit_exponent(y, "alpha", window)
-        off, next_term = fit.exponent - limit, fit.high if window == WEAK else 4 / 45 * (3 / fit.low) ** (2 / 3)
+    weak, third, b2 = float(first.alpha), last.alpha ** (1 / 3), float(3 / last.alpha) ** (2 / 3)
+    yield compared(f"alpha = {weak:.2g}: a P alpha", "4 *", first.aP * weak, 4.0, 1.01 * weak)
+    yield compared("  A", "1 *", first.A, 1.0, 0.31 * weak)
+    what = f"alpha = {last.alpha:.2g}: a P alpha^(1/3)"
+    yield compared(what, f"4 3^(1/3) = {STRONG_P:.5f} *", last.aP * third, STRONG_P, 0.14 * b2)
+    yield compared("  A alpha^(-1/3)", f"3^(2/3)/2 = {STRONG_A:.5f} *", last.A / third, STRONG_A, 0.11 * b2)
+    for name, window, limit in (("aP", WEAK, "-1"), ("aP", STRONG, "-1/3"), ("A", WEAK, "0"), ("A", STRONG, "1/3")):
+        fit = sweep.fit_exponent(ds[name], "alpha", window)
+        # the local exponent at the inner end of a window is farthest from its limit
+        farthest = float(fit.high if window == WEAK else 4 / 45 * (3 / fit.low) ** (2 / 3))
         here = f"{fit.exponent:.7f} ± {fit.exponent_error:.1g}, prefactor {fit.prefactor:.5f}"
         what = f"exponent of {name}, alpha = {fit.low:.1e} to {fit.high:.1e} ({fit.points:d} points)"
-        yield most(what, paper, off, next_term, here)
+        yield most(what, f"{limit} *", fit.exponent - float(Fraction(limit)), farthest, here)
     meet = sweep.fit_two_laws(ds.aP, "alpha", windows=(WEAK, STRONG))
     here = f"alpha = {meet.crossover:.5f} ± {meet.crossover_error:.1g}, a P = {meet.level:.4f}"
-    exact = "(3^(-1/2) = 0.57735, 6.9282)"
-    yield most("the two laws of a P meet at", exact, meet.crossover * math.sqrt(3) - 1, 0.01, here)
+    yield most("the two laws of a P meet at", "3^(-1/2), 6.9282", meet.crossover * math.sqrt(3) - 1, 0.01, here)
 
-    yield "In between"
-    slope = sweep.local_exponent(ds.aP, "alpha")
-    rough = float(np.diff(np.log(ds.alpha)).max() ** 4)  # differences are of fourth order
-    low, high = float(slope.min()), float(slope.max())
-    slides = (slope.diff("mu") > -rough).all() and abs(low + 1) < 0.01 and abs(high + 1 / 3) < 0.01
-    near, roup = (abs(slope + 0.5) < 0.01).mean(), "exponent -1/2 (Roup et al. and Denny: at all torques)"
-    yield said("exponent of P changes gradually", slides, f"{low:.7f} to {high:.7f}", "-1 to -1/3 *")
-    yield said(roup, near < 0.02, f"{near:.1%} of alpha within 0.01", "at one alpha")
-    for name, here, true in zip(("at alpha", "a P there", "A there"), (half.alpha, half.aP, half.A), HALF, strict=True):
-        yield compared(f"  {name}", "read off a figure", here, true, 1e-12)
 
-    yield "At every drive"
-    # a weak drive is followed from rest in SI units; weaker ones take steps in proportion to 1/alpha
-    weak = ds.isel(nearest(np.log(ds.alpha), math.log(1e-3)))
-    rest = solved("foliot_scene:KERNEL", mu=[float(weak.mu)], a=ds.a, phi0=ds.phi0, flips=4, rtol=1e-10)
-    friction, mu = float(ds.a) * np.exp(np.linspace(-0.02, 0.02, 9)), half.alpha * ds.a**2 * ds.phi0
-    near = solved("foliot", method="closed", outputs=["period"], a=friction, mu=mu, phi0=ds.phi0)
-    blind, least = sweep.local_exponent(near.period, "a")[4], ds.A.min() - 1
-    followed = f"from rest to 4 switches at alpha = {weak.alpha:.1e}: P"
-    yield most("self-starting, no least torque", "yes", 2 * rest.interval[0] / weak.period - 1, 1e-8, followed)
-    yield said("A is always larger than 1", least > 0, f"smallest A - 1 = {least:.2g}", "yes")
-    yield most("at exponent -1/2 friction does not count", "yes *", blind, 1e-8, "dlnP/dlna = 0")
-
-    yield "Torque"
-    for drive, alpha, percent in (("weak", float(ds.alpha[0]), 1), ("strong", float(ds.alpha[-1]), 3)):
-        part = QUARTER / float(sweep_of_alpha(ds, [alpha]).s[0])
-        slow, fast = sweep_of_alpha(ds, [alpha * math.exp(-part / 2), alpha * math.exp(part / 2)]).period.values
-        off, what = math.log(slow / fast) / QUARTER - 1, f"change of the torque for 15 min/day, {drive} drive"
-        holds = abs(off) < 1e-3 and round(100 * part) == percent
-        yield Statement(what, f"{percent} % *", f"{100 * part:.4g} %", off, holds)
-
-    yield "Shape of the swing"
+def shape(ds) -> Claims:
+    """The motion from a switch to its peak, and back to the angle of the switch."""
     phase, faster, out, back = np.linspace(0, 1, 8001), [], [], []
     mu, how = SHOWN * float(ds.a**2 * ds.phi0), {"method": "closed", "outputs": ["angle", "speed"]}
     motion = solved("foliot_motion", **how, along={"phase": phase}, mu=mu, a=ds.a, phi0=ds.phi0)
     turned = motion.angle / ds.phi0
     for angle, speed in zip(turned.values, motion.speed.values, strict=True):
-        top = int(angle.argmax())  # falling from there, the angle passes the switch once more
+        top = int(angle.argmax())
         falling = slice(top, phase.size // 2 + 1)
-        faster.append(speed[0] / float(np.interp(-1.0, -angle[falling], -speed[falling])))
+        again = np.interp(-1.0, -angle[falling], phase[falling])
+        faster.append(speed[0] / -np.interp(again, phase, speed))
         out.append(phase[top])
-        back.append(float(np.interp(-1.0, -angle[falling], phase[falling])) - phase[top])
+        back.append(again - phase[top])
     strong = abs(turned.isel(mu=-1))
-    high, rounder = (strong > 0.5 * strong.max()).mean(), "strong drive: rounder than a sine, time over A/2"
-    times = ", ".join(f"{x:.4f}" for x in faster) + " times"
     sooner = ", ".join(f"{x:.3f} and {y:.3f} P" for x, y in zip(out, back, strict=True))
-    yield said("faster at the switch than back there after the turn", min(faster) > 1, times, "yes")
+    yield held("faster at the switch than back there after the turn", min(faster), "> 1", "{:.4f} times or more")
     yield said("time from the switch to the peak, shorter than back", np.all(np.less(out, back)), sooner, "yes")
-    yield said(rounder, high > 2 / 3 + 0.01, f"{high:.3f} P, sine 0.667", "yes")
+    high = (strong > 0.5 * strong.max()).mean()
+    yield held("strong drive: rounder than a sine, time over A/2 [P]", high, "> 0.677", "{:.3f}", "sine 0.667")
+
+
+def claims(ds, half) -> Claims:
+    yield "Limits"
+    yield from limits(ds)
+
+    yield "In between"
+    slope = sweep.local_exponent(ds.aP, "alpha")
+    rough = float(np.diff(np.log(ds.alpha)).max() ** 4)  # differences are of fourth order
+    roup = "exponent within 0.01 of -1/2 (Roup et al. and Denny: at all torques)"
+    yield differing("exponent of P changes gradually, from", "-1 *", slope.min(), -1, 0.01)
+    yield differing("  to", "-1/3 *", slope.max(), -1 / 3, 0.01)
+    yield never("  drives at which it falls", slope.diff("mu") <= -rough)
+    yield held(roup, (abs(slope + 0.5) < 0.01).mean(), "< 2 %", "{:.1%} of alpha", "at one alpha")
+    yield from (
+        compared(f"  {name} there", "read off a figure", half[name], true, 1e-12) for name, true in HALF.items()
+    )
+
+    yield "At every drive"
+    # a weak drive is followed from rest in SI units; weaker ones take steps in proportion to 1/alpha
+    weak = ds.isel(abs(np.log(ds.alpha / 1e-3)).argmin(...))
+    rest = solved("foliot_scene:KERNEL", mu=[float(weak.mu)], a=ds.a, phi0=ds.phi0, flips=4, rtol=1e-10)
+    friction, mu = float(ds.a) * np.exp(np.linspace(-0.02, 0.02, 9)), half.alpha * ds.a**2 * ds.phi0
+    near = solved("foliot", method="closed", outputs=["period"], a=friction, mu=mu, phi0=ds.phi0)
+    blind = sweep.local_exponent(near.period, "a")[4]
+    followed = f"from rest to 4 switches at alpha = {weak.alpha:.1e}: P"
+    yield most("self-starting, no least torque", "yes", 2 * rest.interval[0] / weak.period - 1, 1e-8, followed)
+    yield held("smallest A - 1", ds.A.min() - 1, "> 0", "{:.2g}", "A > 1")
+    yield most("at exponent -1/2 friction does not count", "yes *", blind, 1e-8, "dlnP/dlna = 0")
+
+    yield "Torque"
+    for drive, alpha, percent in (("weak", ds.alpha[0], 1), ("strong", ds.alpha[-1], 3)):
+        part = QUARTER / float(sweep_of_alpha(ds, [alpha]).s[0])
+        slow, fast = sweep_of_alpha(ds, float(alpha) * np.exp([-part / 2, part / 2])).period.values
+        what = f"change of the torque for 15 min/day, {drive} drive [%]"
+        yield differing(what, f"{percent} *", 100 * part, percent, 0.5)
+        yield most("  the rate by it", "15 min/day", math.log(slow / fast) / QUARTER - 1, 1e-3)
+
+    yield "Shape of the swing"
+    yield from shape(ds)
 
     yield "Energy"
     weak, strong = ds.isel(mu=0), ds.isel(mu=-1)
-    kept = float(ds.multiplier.where(ds.alpha < 0.1).max())
-    cube = strong.crossing_speed**3 * strong.a / (strong.mu**2 * strong.phi0)
-    final = weak.crossing_speed * weak.a / weak.mu
-    yield said("a swing forgets the one before it, alpha < 0.1", kept < 1e-8, f"kept: {kept:.0e}")
+    kept, final = ds.multiplier.where(ds.alpha < 0.1).max(), weak.crossing_speed * weak.a / weak.mu
+    cube, b2 = strong.crossing_speed**3 * strong.a / (strong.mu**2 * strong.phi0), (3 / strong.alpha.item()) ** (2 / 3)
+    yield held("what a swing keeps of the one before it, alpha < 0.1", kept, "< 1e-8", "{:.0e}")
     yield compared("why -1: v a/mu, v at the switch, weak drive", "1 *", final, 1.0, 1e-6)
     yield compared("why -1/3: v^3 a/(mu^2 phi0), strong drive", "(3) order 1", cube, 3.0, b2)
 
 
 @panel(Log(), Log(r"$aP$ and $\varphi_{\max}/\varphi_0$ [1]"), "upper right")
-@panel(DRIVE, SLOPE.to(-1.06, -0.27), "center right", bbox_to_anchor=(1, 0.35))
+@panel(DRIVE, SLOPE._replace(ends=(-1.06, -0.27), ticks=LAWS), "center right", bbox_to_anchor=(1, 0.35))
 @page(118.0, sharex=True, height_ratios=(1.15, 1))
 def figure(scaling, exponent, ds, half):
     """Period and amplitude over the drive, and the exponent that slides."""
@@ -163,16 +166,12 @@ def figure(scaling, exponent, ds, half):
     line.set_label("asymptotes")
     scaling.plot(half.alpha, half.aP, "o", color="black", label=r"exponent $-1/2$")
     slope = sweep.local_exponent(ds.aP, "alpha")
-    few = slice(None, None, max(1, slope.size // 56))
     for value in (-1, -1 / 2, -1 / 3):
         exponent.axhline(value, color="0.6", linewidth=0.6, linestyle=(0, (4, 2)))
     exponent.plot(ds.alpha, -ds.s, color=COLOURS[0], label=r"exact, $-s$")
-    how = {"marker": "o", "color": COLOURS[1], "markersize": 3, "label": r"differences of $\ln P$"}
-    exponent.plot(ds.alpha[few], slope[few], **{**HOLLOW, **how})
+    points(exponent, ds.alpha[::25], slope[::25], 1, r"differences of $\ln P$", marker="o", markersize=3)
     exponent.plot(half.alpha, -0.5, "o", color="black")
     exponent.annotate(rf"$\alpha = {float(half.alpha):.6f}$", (half.alpha, -0.5), (8, -12), textcoords="offset points")
-    exponent.set_yticks([-1, -1 / 2, -1 / 3], labels=["$-1$", r"$-\frac{1}{2}$", r"$-\frac{1}{3}$"])
-    exponent.set_yticks([-0.9, -0.8, -0.7, -0.6, -0.4], minor=True)
 
 
 main = script(__name__, "foliot_scaling.h5", claims, figure, prepared, source="paper")

@@ -14,10 +14,12 @@ mu and R are in units of a^2 phi0. A limit holds if the next term of its series 
 Hoyng & Nieuwenhuizen, arXiv:1604.06681, has n = 1 and says that strong drive is best: there s = 1/3.
 """
 
+from fractions import Fraction
+
 import numpy as np
 import xarray as xr
-from _common import Claims, Statement, compared, differing, most, said, script, solved
-from _figures import COLOURS, SLOPE, TORQUE, Log, contours, direct_label, hatch, page, panel
+from _common import Claims, compared, differing, most, never, said, script, solved
+from _figures import COLOURS, SLOPE, TORQUE, Log, colour_map, contours, direct_label, hatch, page, panel
 
 import sweep
 from kernels.interface import Status
@@ -40,29 +42,23 @@ def claims(laws, grid, line) -> Claims:
     # over three decades at each end; allowed: how far s is from its limit at their inner end, alpha_n, or
     # 2n/(n+2) powers of (n+2)/alpha_n
     for n in laws.n.values[laws.n.values > 0]:
-        free = "-1/2" if n == 2 else f"-{n:g}/{n + 2:g}"
-        limits = ((1 / n, f"-1/{n:g}"), (n / (n + 2), free))[:: 1 if n <= 2 else -1]
-        for drive, window, edge, (limit, text) in (
-            ("small", (None, 1e-21), 1e-21, limits[0]),
-            ("large", (1e21, None), 1e21, limits[1]),
-        ):
+        limits = (1 / n, n / (n + 2))[:: 1 if n <= 2 else -1]
+        for drive, edge, limit in zip(("small", "large"), (1e-21, 1e21), limits, strict=True):
             alpha = edge ** (2 / n - 1)
             next_term = alpha if alpha < 1 else ((n + 2) / alpha) ** (2 * n / (n + 2)) if alpha > 1 else 0.0
+            window, text = (None, edge) if edge < 1 else (edge, None), f"-{Fraction(limit).limit_denominator(99)}"
             exponent = sweep.fit_exponent(laws.period.sel(n=n), "mu", window).exponent
-            what = f"n = {n:g}: exponent of P, {drive} mu"
-            yield differing(what, text, exponent, -limit, 1e-9 + next_term)
+            yield differing(f"n = {n:g}: exponent of P, {drive} mu", text, exponent, -limit, 1e-9 + next_term)
 
     yield "At every drive"
     # Steps in ln alpha_n are 2/n - 1 times those in ln mu, so differences of ln P are of n >= 1.
     dry, air, some = laws.sel(n=0), laws.sel(n=2), laws.sel(n=laws.n[laws.n >= 1])
-    rho2 = (1 / dry.mu) ** 2
-    held, silent = int((dry.mu <= 1).sum()), int((dry.status == Status.NEVER_STARTS).sum())
+    rho2, silent = (1 / dry.mu) ** 2, dry.status == Status.NEVER_STARTS
     rough = float(np.diff(np.log(laws.mu)).max()) ** 4 / 4
     apart, coulomb = sweep.local_exponent(some.period, "mu") + some.sensitivity, rho2 / (1 - rho2)
-    viscous = laws.sel(n=1)
-    grown = viscous.amplitude * viscous.mu ** (-1 / 3)
+    grown = laws.amplitude.sel(n=1) * laws.mu ** (-1 / 3)
     yield most("n = 0: s at every mu > R", "rho^2/(1 - rho^2)", dry.sensitivity / coulomb - 1, 1e-10)
-    yield said("n = 0: no cycle for mu <= R", silent == held, f"{silent} cells", f"{held} cells")
+    yield never("n = 0: a cycle for mu <= R, or none above", silent != (dry.mu <= 1))
     yield most("n = 2: s at every mu", "1/2", air.sensitivity - 0.5, 1e-10)
     yield compared("n = 1: amplitude/mu^(1/3), largest mu", "3^(2/3)/2 = 1.0400", grown[-1], 3 ** (2 / 3) / 2, 1e-9)
     yield most("differences of ln P against the exact s", "0", apart, rough, "largest distance")
@@ -84,23 +80,14 @@ def claims(laws, grid, line) -> Claims:
         cell = line.isel(cell=int(abs(line.R / R - 1).argmin("cell")))
         yield compared(f"R = {R:g}: best torque mu/R", f"{drive}", cell.mu / cell.R, drive, 2e-4)
         yield compared("  s there", f"{s}", cell.sensitivity, s, 2e-5)
-    drive, R = (line.mu / line.R).rename("mu/R"), float(line.R[-1])
-    for name, y, text, power, prefactor in (
-        ("s", line.sensitivity, "-1/3, (3/2)^(1/3) = 1.1447", -1 / 3, 1.5 ** (1 / 3)),
-        ("mu/R", drive, "1/6, 18^(1/6) = 1.6189", 1 / 6, 18 ** (1 / 6)),
+    R = float(line.R[-1])
+    for name, y, power, prefactor, text in (
+        ("s", line.sensitivity, -1 / 3, 1.5 ** (1 / 3), ("-1/3", "(3/2)^(1/3) = 1.1447")),
+        ("mu/R", (line.mu / line.R).rename("mu/R"), 1 / 6, 18 ** (1 / 6), ("1/6", "18^(1/6) = 1.6189")),
     ):
-        exponent = float(sweep.fit_exponent(y, "R", (1e7, None)).exponent)
-        off, last = exponent - power, float(y[-1]) / R**power
-        fits = abs(off) < 0.01 and abs(last / prefactor - 1) < 0.01
-        what = f"valley: {name} ~ R^x, R > 1e7; prefactor at R = {R:.0e}"
-        yield Statement(what, text, f"{exponent:.4f}, {last:.4f}", off, fits)
-
-
-NAMED = (
-    (0.6, 2e3, r"never starts, $\mu \leq R$"),
-    (2e4, 0.35, r"$s = 1/3$: $R = 0.8\,a^2\varphi_0$"),
-    (2e5, 8, "best torque (dashed)"),
-)
+        exponent = sweep.fit_exponent(y, "R", (1e7, None)).exponent
+        yield differing(f"valley: {name} ~ R^x, R > 1e7", text[0], exponent, power, 0.01)
+        yield compared(f"  {name}/R^x at R = {R:.0e}", text[1], y[-1] / R**power, prefactor, 0.01)
 
 
 @panel(Log(r"torque, $\mu$ [rad/s$^2$]", (1e-9, 1e9)), SLOPE.to(-1.05, 0.05))
@@ -113,17 +100,15 @@ def figure(exponents, valley, laws, grid, line):
         direct_label(exponents, 3e-7 if n else 2e6, height, f"$n={n:g}$", COLOURS[i])
     part = grid.sel(R=slice(1e-2, 1e5), mu=slice(1e-2, 1e7))
     mu, R, s = part.mu.values, part.R.values, part.sensitivity.values
-    valley.set(xlim=(mu[0], mu[-1]), ylim=(R[0], R[-1]))
-    valley.set_title(r"$s = -\mathrm{d}\ln P/\mathrm{d}\ln\mu$", loc="right")
-    shown = np.ma.masked_invalid(np.minimum(s, 1.0))
-    valley.pcolormesh(mu, R, shown, cmap="viridis", vmin=0, vmax=1, alpha=0.75, rasterized=True)
-    levels = (0.1, 0.2, 0.3, 1 / 3, 0.4, 0.5, 0.7, 1)
+    colour_map(valley, mu, R, np.minimum(s, 1.0), "exponent, $s$ [1]", vmin=0, vmax=1, cmap="cividis_r")
     places = [(3.0, 0.05), (1.1, 0.05), (0.5, 0.05), (0.1, 0.02), (1e6, 600), (1e6, 3500), (1e6, 1.5e4)]
-    contours(valley, mu, R, s, levels, "black", linewidths=0.6, fmt=lambda x: f"{x:g}", manual=places)
+    levels = (0.1, 0.2, 0.3, 1 / 3, 0.4, 0.5, 0.7, 1)
+    contours(valley, mu, R, s, levels, "black", fmt=lambda x: f"{x:g}", manual=places)
     hatch(valley, mu, R, (part.status == Status.NEVER_STARTS).values, "////")
-    valley.plot(line.mu, line.R, color="white", linestyle=(0, (5, 1.5)))
-    for x, y, text in NAMED:
-        direct_label(valley, x, y, text)
+    valley.plot(line.mu, line.R, "k--", linewidth=1.4)
+    direct_label(valley, 0.6, 2e3, r"never starts, $\mu \leq R$")
+    direct_label(valley, 2e4, 0.35, r"$s = 1/3$: $R = 0.8\,a^2\varphi_0$")
+    direct_label(valley, 2e5, 8, "best torque (dashed)")
 
 
 INPUTS = "friction_laws.h5 friction_laws_map.h5"

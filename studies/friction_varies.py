@@ -24,10 +24,10 @@ import math
 
 import numpy as np
 import xarray as xr
-from _common import Claims, compared, most, said, script, solved
+from _common import DAY, Claims, compared, differing, held, most, said, script, solved
 from _figures import ALPHA, COLOURS, MARKS, Axis, page, panel
 
-DAY, SMALL = 86400.0, 0.125
+SMALL = 0.125
 """Depth of the differences that stand for first order."""
 HALF = 1.4629905875801047
 """alpha where s = 1/2, and friction does not count."""
@@ -82,25 +82,22 @@ def seasons(mu: float) -> tuple[np.ndarray, np.ndarray]:
 def prepared(ds, noisy):
     """What means of friction are worth, their sweep, and by noise the scatter of the rate over its unit, s and P/2."""
     clock = cycles(noisy.mu)
-    rate, T = noisy.rate_scatter_s_per_day, clock.period / 2
-    unit = DAY * 0.05 * np.sqrt(T / noisy.averaging_time)
-    scatter = {name: np.sqrt((rate.sel(cell) ** 2).mean("seed")) / unit for name, (cell, _) in NOISES.items()}
-    found = xr.Dataset({name: y.reset_coords(drop=True) for name, y in scatter.items()})
-    return averages(ds), ds, found.assign(s=clock.sensitivity, T=T)
+    found = xr.Dataset({"s": clock.sensitivity, "T": clock.period / 2})
+    for name, (cell, _) in NOISES.items():
+        rate = np.sqrt((noisy.rate_scatter_s_per_day.sel(cell) ** 2).mean("seed")).reset_coords(drop=True)
+        found[name] = rate / (DAY * 0.05 * np.sqrt(found["T"] / noisy.averaging_time))
+    return averages(ds), ds, found
 
 
 def claims(means, ds, scatter) -> Claims:
     yield "Friction over the swing"
     weak, strong = ds.sel(mu=0.04, harmonic=1), means.sel(mu=100.0, harmonic=1)
     off = (weak.interval / (2 / 0.04 + 2 / (1 - weak.depth)) - 1).where(abs(weak.depth) < 0.6)
-    energy, worst = float(strong.energy), float(DAY * SMALL * abs(means.effect).max())
-    here, by_energy = (
-        f"up to {worst:.0f} s/day at depth {SMALL:g}",
-        "strong drive: mean by the energy, (2): effect of depth",
-    )
-    yield most("weak drive: the mean and the turn, (1), alpha = .04", "1e-2", off, 1e-2)
-    yield compared(by_energy, f"{energy:.5f}", strong.effect, energy, 0.05)
-    yield said("the paper: only the mean over a period counts", worst < 1.0, here, "0", True)
+    energy, worst = float(strong.energy), DAY * SMALL * abs(means.effect).max()
+    paper = f"the paper: only the mean over a period counts; at depth {SMALL:g} [s/day]"
+    yield most("weak drive: the mean and the turn, (1), alpha = .04", "0", off, 1e-2)
+    yield compared("strong drive: effect of depth, (2)", f"{energy:.5f}", strong.effect, energy, 0.05)
+    yield held(paper, worst, "< 1", "up to {:.0f}", "0", refuted=True)
 
     yield "Friction by season"
     span, steps = {}, 0.05 * np.arange(-2, 3)
@@ -111,25 +108,25 @@ def claims(means, ds, scatter) -> Claims:
         x, power = np.log(oil), DAY * float(np.mean(oil ** (1 - 2 * s)) - 1)
         gain = (1 - 2 * s) * x + 2 * first * x**2 - 4 / 3 * second * x**3 + 2 / 3 * third * x**4
         theory, year, span[mu] = DAY * float(np.mean(np.exp(gain)) - 1), float(rate.mean()), np.ptp(rate)
-        slopes = f"alpha = {mu:.3g}: mean rate of the year by s and three slopes of it, (3)"
-        mean, near = f"  by a power mean of a, exponent {1 - 2 * s:+.2f}", abs(power - year) < 0.1 * abs(year)
+        slopes, mean = (
+            f"alpha = {mu:.3g}: mean rate of the year, (3)",
+            f"  by a power mean of a, exponent {1 - 2 * s:+.2f}",
+        )
         yield compared(slopes, f"{theory:.1f}", year, theory, 0.01)
-        yield said(mean, near, f"{year:.1f}", f"{power:.1f}", True)
+        yield differing(mean, f"{power:.1f}", year, power, 0.1 * abs(year), refuted=True)
     least, here = min(span, key=lambda mu: span[mu]) == HALF, ", ".join(f"{x:.4g}" for x in span.values())
     yield said("daily rates differ over the year, least where s = 1/2, by", least, here)
 
     yield "Noise of friction and torque"
-    for mu in scatter.mu.values:
-        clock = scatter.sel(mu=mu)
+    for clock in (scatter.sel(mu=mu) for mu in scatter.mu):
         hours = 20000 * float(clock["T"]) / 3600
         allowed = 3 / math.sqrt(2 * 0.6 * 64 * max(hours - 1, 1)) + 0.02
         for name, (_, law) in NOISES.items():
-            share, here = float(law(clock.s)), float(clock[name])
-            what = f"alpha = {mu:.3g}: scatter by 5 % noise of {name}, over unit"
+            share, what = float(law(clock.s)), f"alpha = {clock.mu:.3g}: scatter by 5 % noise of {name}, over unit"
             if share < 1e-3:
-                yield said(what, here < 0.1, f"{here:.4f}", "0 to first order")
+                yield held(what, clock[name], "< 0.1", "{:.4f}", "0 to first order")
             else:
-                yield compared(what, f"(4) {share:.4f} +- {allowed:.0%}", here, share, allowed)
+                yield compared(what, f"(4) {share:.4f}", clock[name], share, allowed)
 
 
 @panel(ALPHA, Axis(r"$\mathrm{d}\ln P/\mathrm{d}d$ [1]"), "best")

@@ -18,13 +18,14 @@ of it; "no, known" says that the source is wrong there. J8 is 99.44 in Table 1 a
 hides of tables 2 to 4 is left out.
 """
 
+import itertools
 import math
 
 import numpy as np
 import xarray as xr
-from _common import Claims, differing, said, script
+from _common import Claims, differing, held, most, said, script
 from _figures import COLOURS, Axis, Log, page, panel
-from _fula_source import KGF, TABLE_6, in_source_units, judged, tables
+from _fula_source import KGF, judged, tables
 from scipy.signal import find_peaks
 
 FIVE = {
@@ -71,63 +72,64 @@ def error_of_five(ds: xr.Dataset, f: np.ndarray, how: str = "source"):
     return abs(receptance(J, K, w) / response(full, f) - 1)
 
 
-def claims(ds) -> Claims:
-    yield from tables({n: in_source_units(chain(ds, n)) for n in (8, 7, 6, 5)})
+def conclusions(ds: xr.Dataset) -> Claims:
+    """The source's four conclusions, and the causes that it names."""
+    f, five = np.linspace(0.5, 400, 4000), ds.sel(n_keep=5)
+    H8, H5, short = response(chain(ds, 8), f), response(chain(ds, 5), f), response(chain(ds, 8), f, np.float32)
+    worst, first = abs(H5 / H8 - 1)[f <= SPAN].max(), abs(five.frequency_error[:4]).max()
+    neglect = "   above: the dampers merged, which hold to w h e = 0.1 at [Hz]"
+    yield held("1. below 1000 rad/s: largest error of the receptance", worst, "< 5 %", "{:.1%}", "good")
+    yield held("   the same, of f1 to f4", first, "< 0.25 %", "{:.2%}", "good")
+    yield held(neglect, five.valid_to, f"< {1.5 * SPAN:.0f}", "{:.0f}", "159", refuted=True)
+    # the amplitudes of 8 and 5 differ by the reduction; by numbers of 24 bits far less
+    error, lost = abs(abs(H5) / abs(H8) - 1), abs(abs(short) / abs(H8) - 1).max()
+    bands = itertools.pairwise((0.0, 20.0, SPAN, 200.0, 300.0, 400.0))
+    growth = {high: error[(f > low) & (f <= high)].max() for low, high in bands}
+    by_band, largest = ", ".join(f"{x:.3f} to {high:.0f} Hz" for high, x in growth.items()), growth[400.0]
+    bits = "   that is the computer: eight masses in 24 bits, of that"
+    yield said("2. amplitudes differ more at higher f, by", np.all(np.diff([*growth.values()]) > 0), by_band, "grows")
+    yield held(bits, lost / largest, "> 1/10", "{:.0e}", "the cause", refuted=True)
+    size = abs(H8)
+    lower = {f[i]: size.max() / size[i] for i in find_peaks(size)[0] if f[i] > 60}
+    peaks = ", ".join(f"1/{ratio:.0f} at {place:.0f} Hz" for place, ratio in lower.items())
+    yield said("3. high resonances against the main one", min(lower.values()) > 100, peaks, "to some 1/100")
+    true, zeta = ds.damping.sel(n_keep=8).values[:5], five.damping.values[:5]
+    off, high = zeta / true - 1, f"1/(2 zeta) = {math.sqrt(1 - zeta[1] ** 2) / (2 * zeta[1]):.1f}"
+    here = f"of f5 {off[4]:.0%}"
+    yield most(
+        "4. dampers merged by (34): error of the damping of f1 to f4", "matters", abs(off[:4]).max(), 0.011, here
+    )
+    yield said("   without dampers resonances are infinite; of the main one", np.all(true > 0), high, "finite")
 
-    yield "Table 6"
-    here = ds.isel(reduction=0)
-    f = {n: here.frequency.sel(n_keep=n).values for n in TABLE_6}
-    fifth = float(here.frequency_error.sel(n_keep=5)[4])
-    for n, row in TABLE_6.items():
-        yield from (judged(f"Table 6, {n} masses, f{i + 1} [Hz]", x, f[n][i]) for i, x in enumerate(row[:n]))
-    yield judged('  "f6" of 5 masses is f7 of the 8', 387.6, f[8][6])
+
+def claims(ds) -> Claims:
+    rivin = ds.sel(reduction="rivin")
+    f = {n: rivin.frequency.sel(n_keep=n).values for n in (8, 7, 6, 5)}
+    yield from tables({n: {**chain(ds, n), "f": f[n]} for n in f})
+    yield judged('  "f6" of 5 masses is f7 of the 8', "387.6", f[8][6])
+    fifth = rivin.frequency_error.sel(n_keep=5)[4]
     yield differing("f5 of 5 masses against that of 8, as printed", "-0.1761", fifth, 187.2 / 227.2 - 1, 2e-3)
 
     yield "The cause"
     f = np.array([187.3, 200.0, 226.9])
     errors = (error_of_five(ds, f, how) for how in ("source", "dampers", "mu"))
     for at, real, dampers, mu in zip(f, *errors, strict=True):
-        here = f"{real:.4f} -> {dampers:.4f}"
-        yield said(f"error at {at:g} Hz: dampers exact", dampers < 0.1 * real, here, "would vanish", True)
-        yield said("  with mu = 1 - (w/w0)^2", mu < 1e-12, f"{mu:.0e}")
+        kept = f"error at {at:g} Hz, {real:.4f}: what of it is left with exact dampers"
+        yield held(kept, dampers / real, "< 1/10", "{:.4f}", "would vanish", refuted=True)
+        yield most("  with mu = 1 - (w/w0)^2", "0", mu, 1e-12)
 
     yield "Conclusions"
-    f, five = np.linspace(0.5, 400, 4000), ds.sel(n_keep=5).isel(reduction=0)
-    H8, H5, short = response(chain(ds, 8), f), response(chain(ds, 5), f), response(chain(ds, 8), f, np.float32)
-    worst, first = abs(H5 / H8 - 1)[f <= SPAN].max(), float(abs(five.frequency_error[:4]).max())
-    valid, neglect = float(five.valid_to), "   above: the dampers merged, which hold to w h e = 0.1 at"
-    yield said("1. below 1000 rad/s: largest error of the receptance", worst < 0.05, f"{worst:.1%}", "good")
-    yield said("   the same, of f1 to f4", first < 2.5e-3, f"{first:.2%}", "good")
-    yield said(neglect, valid < 1.5 * SPAN, f"{valid:.0f} Hz", "159 Hz", True)
-    # the amplitudes of 8 and 5 differ by the reduction; by numbers of 24 bits far less
-    error, lost = abs(abs(H5) / abs(H8) - 1), abs(abs(short) / abs(H8) - 1).max()
-    bands = ((0.0, 20.0), (20.0, SPAN), (SPAN, 200.0), (200.0, 300.0), (300.0, 400.0))
-    growth = [error[(f > low) & (f <= high)].max() for low, high in bands]
-    by_band = ", ".join(f"{x:.3f} to {high:.0f} Hz" for x, (_, high) in zip(growth, bands, strict=True))
-    bits = "   that is the computer: eight masses in 24 bits"
-    yield said("2. amplitudes differ more at higher f, by", np.all(np.diff(growth) > 0), by_band, "grows")
-    yield said(bits, lost > 0.1 * growth[-1], f"off by {lost:.0e}", "the cause", True)
-    size = abs(H8)
-    lower = {f[i]: size.max() / size[i] for i in find_peaks(size)[0] if f[i] > 60}
-    peaks = ", ".join(f"1/{ratio:.0f} at {place:.0f} Hz" for place, ratio in lower.items())
-    yield said("3. high resonances against the main one", min(lower.values()) > 100, peaks, "to some 1/100")
-    true, zeta = ds.damping.sel(n_keep=8).isel(reduction=0).values[:5], five.damping.values[:5]
-    off, high = zeta / true - 1, f"1/(2 zeta) = {math.sqrt(1 - zeta[1] ** 2) / (2 * zeta[1]):.1f}"
-    merged, here = abs(off[:4]).max(), f"{abs(off[:4]).max():.1%}, of f5 {off[4]:.0%}"
-    yield said("4. dampers merged by (34): error of the damping of f1 to f4", merged < 0.011, here, "matters")
-    yield said("   without dampers resonances are infinite; of the main one", np.all(true > 0), high, "finite")
+    yield from conclusions(rivin)
 
-    yield "Five by other methods"
-    five, true = ds.sel(n_keep=5), ds.damping.sel(n_keep=8).isel(reduction=0)
-    off, lost = 100 * abs(five.frequency_error.values[:, :5]), 100 * abs((five.damping / true - 1).values[:, :4])
-    for (name, (first, fifth)), row, damping in zip(FIVE.items(), off, lost, strict=True):
-        close = np.isclose([row[:4].max(), row[4]], [first, fifth], rtol=0.05, atol=1e-3).all()
-        here = f"{row[:4].max():.2g} %, {row[4]:.2g} %; damping of f1-f4 {damping.max():.2g} %"
-        yield said(f"{name}: largest error of f1-f4, of f5", close, here, f"{first} %, {fifth} %")
-    yield said("each method better at f5 than the one before", np.all(np.diff(off[:5, 4]) < 0))
-    guyan, rest = lost[1].max(), np.delete(lost, 1, axis=0).max()
-    held = off[:, :4].max() < 1.0 and rest < 1.1 and 1.9 < guyan < 2.3
-    yield said("all hold f1-f4 to 1 %; damping by Guyan, by others", held, f"{guyan:.2g} %, {rest:.2g} %", "2.1 %, 1 %")
+    yield "Five by other methods, all of which hold f1 to f4 to 1 %"
+    off, true = 100 * abs(ds.frequency_error.sel(n_keep=5)), rivin.damping.sel(n_keep=8)
+    lost = abs(ds.damping.sel(n_keep=5) / true - 1)
+    for name, (first, fifth) in FIVE.items():
+        four, damping = off.sel(reduction=name)[:4].max(), lost.sel(reduction=name)[:4].max()
+        yield differing(f"{name}: largest error of f1 to f4 [%]", f"{first}", four, first, 0.05 * first + 1e-3)
+        yield differing("  of f5 [%]", f"{fifth}", off.sel(reduction=name)[4], fifth, 0.05 * fifth + 1e-3)
+        yield held("  of the damping of f1 to f4", damping, "1.9 to 2.3 %" if name == "guyan" else "< 1.1 %", "{:.2%}")
+    yield said("each method better at f5 than the one before", (off[:5, 4].diff("reduction") < 0).all())
 
 
 @panel(Axis("", (0, 500)), Log("$|H|$ [10$^{-3}$ rad/(kgf m)]"), "upper right")

@@ -20,16 +20,9 @@ MOTOR = 0.620
 AMPLITUDE = math.radians(15.0)
 CRANKS = np.linspace(1e-3, 0.3, 300)
 """e [m], among which the right one is looked for."""
-machine = sweep.solver(
-    {
-        "kernel": "polisher",
-        "rtol": 1e-10,
-        "outputs": ["A1", "thd", "transmission_angle"],
-        "axes": {"f": [0.5], "e": [0.08]},
-        "fixed": {"b": MOTOR, "d": ARM},
-    }
-)
-"""A machine's half amplitude [rad], distortion [1] and transmission angle [rad], of coupler f and crank e [m]."""
+STUDY = {"kernel": "polisher", "rtol": 1e-10, "outputs": ["A1", "thd"], "axes": {"f": [0.5], "e": [0.08]}}
+machine = sweep.solver({**STUDY, "fixed": {"b": MOTOR, "d": ARM}})
+"""A machine's half amplitude [rad] and distortion [1], of coupler f and crank e [m]."""
 
 
 class Design(NamedTuple):
@@ -58,13 +51,10 @@ def distortion(f: float, amplitude: float = AMPLITUDE) -> float:
     return float(machine(f, e).thd) if math.isfinite(e) else math.inf
 
 
-def best(amplitude: float = AMPLITUDE, shortest: float = 0.30, longest: float = 0.70) -> Design:
+def best(shortest: float = 0.30, longest: float = 0.70) -> Design:
     """The coupler within bounds whose machine is least distorted, among those of the amplitude."""
-    found = minimize_scalar(
-        lambda f: distortion(f, amplitude), bounds=(shortest, longest), method="bounded", options={"xatol": 1e-9}
-    )
-    f = float(found.x)
-    return Design(f, crank(f, amplitude), float(found.fun))
+    found = minimize_scalar(distortion, bounds=(shortest, longest), method="bounded", options={"xatol": 1e-9})
+    return Design(found.x, crank(found.x), found.fun)
 
 
 if __name__ == "__main__":
