@@ -126,6 +126,11 @@ def all_ok(ds: xr.Dataset) -> Statement:
     return held("cells that are OK", (ds.status == Status.OK).mean(), "100 %", "{:.0%}", "all")
 
 
+def nearest(values: xr.DataArray, value: float) -> Any:
+    """Where values come nearest to one; for `isel`."""
+    return abs(values - value).argmin(...)
+
+
 def count(there: Any, what: str = "cells") -> str:
     """How many are true, or have a value: "12 cells"."""
     return f"{int((there if there.dtype == bool else there.notnull()).sum())} {what}"

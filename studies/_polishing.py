@@ -93,16 +93,9 @@ def of_machine(function: Callable[..., Any]) -> Callable[..., Any]:
 def disc(ds: xr.Dataset) -> Callable[[Any, Any], Any]:
     """Profiles of a round tool on the machine of a result, as a function of throw and place of the workpiece [m]."""
     fixed = machine(ds)
-    solve = sweep.solver(
-        {
-            "kernel": "polisher_wear",
-            "outputs": ["wear"],
-            "rtol": 1e-6,
-            "axes": {"e": [0.1], "w_x": [fixed["L"]]},
-            "fixed": {**fixed, "type": "A", "tool_b": fixed["tool_a"], "tool_n": 2.0},
-            "along": {"radius": np.linspace(0.0, float(ds.radius[-1]), POINTS)},
-        }
-    )
+    axes, along = {"e": [0.1], "w_x": [fixed["L"]]}, {"radius": np.linspace(0.0, float(ds.radius[-1]), POINTS)}
+    study = {"kernel": "polisher_wear", "outputs": ["wear"], "rtol": 1e-6, "axes": axes, "along": along}
+    solve = sweep.solver({**study, "fixed": {**fixed, "type": "A", "tool_b": fixed["tool_a"], "tool_n": 2.0}})
     return lambda e, w_x: solve(e=e, w_x=w_x).wear
 
 
@@ -236,7 +229,7 @@ def reached(p: Profiles, sets: dict[int, list[int]]) -> tuple[list[int], float, 
 def swings(ds: xr.Dataset, e: Any) -> xr.Dataset:
     """alpha [rad] and its rate [rad/s] over a turn of the crank, by throw."""
     along = {"crank_angle": np.linspace(0, 2 * np.pi, TURN, endpoint=False)}
-    known = {name: float(ds[name]) for name in ("b", "d", "f", "omega", "b_angle")}
+    known = {name: ds[name] for name in ("b", "d", "f", "omega", "b_angle")}
     return solved("polisher_motion", e=e, along=along, outputs=["alpha", "alpha_rate"], rtol=1e-12, **known)
 
 
@@ -254,9 +247,7 @@ def tool_wear(ds: xr.Dataset, motion: xr.Dataset, X: Any, Y: Any, beta: float = 
     """
     turned, rate = np.exp(1j * (motion.alpha.values + beta))[:, :, None], motion.alpha_rate.values[:, :, None]
     centre, place = turned * float(ds.L), turned * (np.ravel(X) + 1j * np.ravel(Y))
-    work = float(ds.Omega)
-    speed = abs(
-        rate * centre + (rate if spin is None else spin * work) * place - work * (centre + place - float(ds.w_x))
-    )
+    work, turn = float(ds.Omega), rate if spin is None else spin * float(ds.Omega)
+    speed = abs(rate * centre + turn * place - work * (centre + place - float(ds.w_x)))
     mean = speed.mean(axis=1).reshape(motion.sizes["e"], *np.shape(X))
     return float(ds.preston) * float(ds.pressure) * mean

@@ -109,20 +109,12 @@ def claims(ds, lift, hung) -> Claims:
 
 
 ARC = Log("amplitude, $a$ [rad]", None, (0.2, 0.5, 1, 2, 5))
-LIGHT = {
-    "computed": {**HOLLOW, "marker": "o", "color": "0.3"},
-    "theory, light losses": {"color": "0.3", "linewidth": 0.9},
-}
+KEY = {"computed": {**HOLLOW, "marker": "o"}, "theory, light losses": {"linewidth": 0.9}}
+LOSS, FREE = Log("loss [s/day]", (0.1, 1000)), {"rate independent of the torque": "o"}
 
 
-@panel(ARC.to(0.2, 22), Axis("loss [s/day]", (-4e3, 1e4)), "upper right", LIGHT, fontsize=7)
-@panel(
-    ARC.to(0.15, 8),
-    Log("loss [s/day]", (0.1, 1000)),
-    "upper right",
-    {"rate independent of the torque": "o"},
-    fontsize=7,
-)
+@panel(ARC.to(0.2, 22), Axis("loss [s/day]", (-4e3, 1e4)), "upper right", KEY, fontsize=7)
+@panel(ARC.to(0.15, 8), LOSS, "upper right", FREE, fontsize=7)
 @page(138.0)
 def figure(lines, lifted, ds, lift, *_):
     """Loss against amplitude, for impulses and for lifts."""

@@ -20,7 +20,7 @@ import math
 
 import numpy as np
 import xarray as xr
-from _common import DAY, Claims, compared, count, held, most, never, script, solved
+from _common import DAY, Claims, compared, count, held, most, nearest, never, script, solved
 from _figures import COLOURS, DRIVE, Log, LogNorm, contours, direct_label, hatch, page, panel
 
 import sweep
@@ -47,7 +47,7 @@ def at(alpha, kappa, design: str = "product") -> xr.Dataset:
 
 def line_of(ds: xr.Dataset, alpha) -> xr.Dataset:
     """The sweep of the spring at the drive next to `alpha`."""
-    return ds.isel(abs(np.log(ds.alpha / alpha)).argmin(...))
+    return ds.isel(nearest(np.log(ds.alpha), math.log(alpha)))
 
 
 def first_order(alpha, kappa):
@@ -112,12 +112,8 @@ def claims(ds, springs) -> Claims:
 
 
 SPRING = Log(r"spring, $\kappa = k\varphi_0/\mu$ [1]")
-KEY = {
-    "self-starting": "-",
-    "not self-starting": {"linestyle": (0, (2.5, 1))},
-    "theory of first order": {"marker": "x", "linestyle": ""},
-    "best spring": {"marker": "o", "linestyle": ""},
-}
+PUSHED = {"linestyle": (0, (2.5, 1))}
+KEY = {"self-starting": "-", "not self-starting": PUSHED, "theory of first order": "x", "best spring": "o"}
 
 
 @panel(SPRING, Log(r"sensitivity to torque, $s$ [1]", (2e-7, 1.5)), "lower left", KEY)
@@ -129,7 +125,7 @@ def figure(lines, plane, ds, springs):
         line = line_of(ds, alpha)
         started = line.status == Status.OK
         lines.plot(line.kappa, line.s.where(started), color=colour)
-        lines.plot(line.kappa, line.s.where(~started), color=colour, linestyle=(0, (2.5, 1)))
+        lines.plot(line.kappa, line.s.where(~started), color=colour, **PUSHED)
         if alpha == 1.0:
             direct_label(lines, 3, 0.45, r"$\alpha = 1$", colour, ha="left")
             continue
