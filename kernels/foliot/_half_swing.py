@@ -22,6 +22,7 @@ from collections import namedtuple
 
 from kernels.lanes.jit import jit, jit_call, jit_inline
 from kernels.lanes.symbols import symbolic
+from kernels.lanes.tuples import after
 from kernels.lanes.vectors import any_lane, choose, exponent, fma, magnitude, nearest, not_, pow2, sqrt, where
 from kernels.maths.elementary import LN2, exp, larger, power, sincos, smaller
 
@@ -238,11 +239,10 @@ def _to_end(step, state, leg, h, tolerance, active):
 def _moved(state, leg, steady, time):
     """The state after a time over which accelerations are constant, under the constant force `steady`, without drag."""
     bare = leg.problem._replace(gamma=0.0 * leg.problem.gamma)
-    rate, half = rates(state, leg._replace(steady=steady, problem=bare)), 0.5 * time
-    ways = (fma(time, fma(half, rate[j + 1], state[j + 1]), state[j]) for j in (0, 2, 4))
-    speeds = (fma(time, rate[j], state[j]) for j in (1, 3, 5))
-    (x, x_mu, x_start), (v, v_mu, v_start) = ways, speeds
-    return x, v, x_mu, v_mu, x_start, v_start, fma(time, rate[6], state[6])
+    rate = rates(state, leg._replace(steady=steady, problem=bare))
+    halfway = after(state, 0.5 * time, (1.0,), (rate,))
+    (_, a, _, a_mu, _, a_start, slope), (_, v, _, v_mu, _, v_start, _) = rate, halfway
+    return after(state, time, (1.0,), ((v, a, v_mu, a_mu, v_start, a_start, slope),))
 
 
 @jit

@@ -35,7 +35,7 @@ _STIFFEST = 1e60
 ROUNDING = 2e-15
 """Relative error of one half swing: of time, amplitude, speed and of the terms of (4)."""
 
-Legs = namedtuple("Legs", "time top speed comes t1 s1 c1 slope1 g1 t2 s2 c2 slope2 g2 down back end")
+Legs = namedtuple("Legs", "time top speed comes t1 s1 c1 slope1 g1 t2 s2 c2 g2 down back end")
 """A half swing: until the switch, largest x, speed there, whether it comes; and each leg.
 
 Leg 1 rises, for the time t1, against the force g1, which is `back` in the end; leg 2 falls under g2, beginning with the
@@ -62,7 +62,7 @@ def half_swing(torque, scene, start):
     s2, c2, slope2 = linear_flow.response(beta, kappa, t2)
     speed = fma(down, slope2, g2 * s2)
     back, end = 1.0 + scene.rho + kappa * top, fma(g2, slope2, -down * fma(scene.d, slope2, kappa * s2))
-    return Legs(t1 + t2, top, speed, comes, t1, s1, c1, slope1, g1, t2, s2, c2, slope2, g2, down, back, end)
+    return Legs(t1 + t2, top, speed, comes, t1, s1, c1, slope1, g1, t2, s2, c2, g2, down, back, end)
 
 
 @jit_apart

@@ -190,15 +190,13 @@ def by_taylor(parameters):
     n, rippled = len(parameters), "depth" in parameters
 
     def solve(*columns):
-        rtol, asked = columns[n], columns[n + 1]
-        if len(rtol):
-            outputs, errors, status = cycles(cells_of(columns), rtol, rippled, asked > 0)
-            for column, found in zip(columns[n + 2 :], (*outputs, errors[asked > 0].max(axis=0), status), strict=True):
-                column[...] = found
+        asked = columns[n + 1] > 0
+        outputs, errors, status = cycles(cells_of(columns), columns[n], rippled, asked)
+        for column, found in zip(columns[n + 2 :], (*outputs, errors[asked].max(axis=0), status), strict=True):
+            column[...] = found
 
     def bound(*columns):
-        if len(columns[n]):
-            columns[-1][...] = np.where(begun(cells_of(columns), columns[n])[2], 0.0, np.inf)
+        columns[-1][...] = np.where(begun(cells_of(columns), columns[n])[2], 0.0, np.inf)
 
     def cells_of(columns):
         return columns[:n] if rippled else (*columns[:n], np.zeros(len(columns[n])), np.ones(len(columns[n])))

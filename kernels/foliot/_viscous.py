@@ -44,7 +44,8 @@ def without_dimensions(p):
     Scaling by powers of two is exact, so the bits do not depend on whether a neighbouring cell needed it.
     """
     mu, phi0, a = p.mu, p.phi0, p.a
-    wild = not_(_tame(mu) & _tame(phi0) & _tame(a))
+    low = (mu < _TAME_LOW) | (phi0 < _TAME_LOW) | (a < _TAME_LOW)
+    wild = low | (mu > _TAME_HIGH) | (phi0 > _TAME_HIGH) | (a > _TAME_HIGH)
     e_mu, e_phi, e_a = 0.0, 0.0, 0.0
     if any_lane(wild):
         (mu, e_mu), (phi0, e_phi), (a, e_a) = mantissa_exponent(mu), mantissa_exponent(phi0), mantissa_exponent(a)
@@ -57,11 +58,6 @@ def without_dimensions(p):
         n = 2.0 * e_a + e_phi - e_mu
         k, rest = scale(k, n), scale(rest, n)
     return (k, rest), Scaled(mu, phi0, a, e_mu, e_phi, e_a, wild, is_normal(k))
-
-
-@jit
-def _tame(x):
-    return (x >= _TAME_LOW) & (x <= _TAME_HIGH)
 
 
 @jit

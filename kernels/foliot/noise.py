@@ -54,15 +54,13 @@ _COUNTABLE = 2.0**50
 Clock = namedtuple("Clock", "scene sigma sigma_a remembered fresh floor nominal tau shared own")
 """What a half swing needs: (1) in units of mu, T and the averaging time in those of the scene."""
 
-Run = namedtuple("Run", "x apart speed t gain truncated")
-"""x, x' and the speed, t and D of (2) after a half swing, and how many had their torque raised to the floor."""
-
-Averages = namedtuple("Averages", "closed reading rate squares")
-"""How many averaging times are closed, D at the end of the last, its y, and the sum of squares in (3)."""
+Run = namedtuple("Run", "x apart speed t gain truncated closed reading rate squares")
+"""x, x' and the speed, t and D of (2) after a half swing, and how many had their torque raised to the floor; how many
+averaging times are closed, D at the end of the last, its y, and the sum of squares in (3)."""
 
 
 @jit_call
-def _beat(run, averages, z, z_apart, clock):
+def _beat(run, z, z_apart, clock):
     """One half swing with the torque of (1), and whether it comes to the switch."""
     begun = run.t > 0.0
     x = where(begun, fma(clock.remembered, run.x, clock.fresh * z), z)
@@ -77,28 +75,27 @@ def _beat(run, averages, z, z_apart, clock):
     legs = _linear_swing.half_swing(torque, scene, start)
     goes_on = legs.comes & ((start < 0.0) | (fma(scene.kappa, legs.top, torque) > scene.rho_s))
     later = run.t + legs.time
-    closed, reading, rate, squares = averages
-    tau = clock.tau
+    closed, reading, rate, squares, tau = run.closed, run.reading, run.rate, run.squares, clock.tau
     passes = later >= (closed + 1.0) * tau
     if any_lane(passes):  # averaging times end within the half swing; those that lie wholly within it share one y
         slope, ratio = (clock.nominal - legs.time) / legs.time, later / tau
         until = nearest(ratio)
         until = where(until > ratio, until - 1.0, until)
         first = (fma(slope, (closed + 1.0) * tau - run.t, run.gain) - reading) / tau
-        squares = where(closed > 0.0, fma(first - rate, first - rate, squares), squares)
+        total = where(closed > 0.0, fma(first - rate, first - rate, squares), squares)
         more = until > closed + 1.0
-        squares = where(more, fma(slope - first, slope - first, squares), squares)
-        ended = Averages(until, fma(slope, until * tau - run.t, run.gain), where(more, slope, first), squares)
-        averages = choose(passes, ended, averages)
-    truncated = where(short, run.truncated + 1.0, run.truncated)
-    return Run(x, apart, legs.speed, later, run.gain + (clock.nominal - legs.time), truncated), averages, goes_on
+        total = where(more, fma(slope - first, slope - first, total), total)
+        ended = until, fma(slope, until * tau - run.t, run.gain), where(more, slope, first), total
+        closed, reading, rate, squares = choose(passes, ended, (closed, reading, rate, squares))
+    truncated, gain = where(short, run.truncated + 1.0, run.truncated), run.gain + (clock.nominal - legs.time)
+    return Run(x, apart, legs.speed, later, gain, truncated, closed, reading, rate, squares), goes_on
 
 
 @jit_call
 def _run(first, seed, half_swings, clock, speed, active, radii, turns, radii_apart, turns_apart):
     """All half swings of the active cells of a group, and those of them that did not come to a switch."""
     count, zero = half_swings[cells_at(first)], 0.0 * speed
-    run, averages = Run(zero, zero, speed, zero, zero, zero), Averages(zero, zero, zero, zero)
+    run = Run(zero, zero, speed, zero, zero, zero, zero, zero, zero, zero)
     two_noises, stopped, most = any_lane(clock.own > 0.0), count < 0.0, 0.0
     for cell in range(GROUP):
         most = max(most, half_swings[first + cell])
@@ -117,11 +114,11 @@ def _run(first, seed, half_swings, clock, speed, active, radii, turns, radii_apa
                 if not any_lane(active):
                     break
                 z, z_apart = where(second > 0, z_1, z_0), where(second > 0, apart_1, apart_0)
-                new, newer, goes_on = _beat(run, averages, z, z_apart, clock)
+                new, goes_on = _beat(run, z, z_apart, clock)
                 stopped = stopped | (active & not_(goes_on))
                 active = active & goes_on
-                run, averages = choose(active, (new, newer), (run, averages))
-    return run, averages, stopped
+                run = choose(active, new, run)
+    return run, stopped
 
 
 @jit
@@ -149,10 +146,9 @@ def segments(first, columns, radii, turns, radii_apart, turns_apart):
     clock = Clock(scene, sigma, sigma_a, remembered, fresh, floor, cycle.half_period, tau, shared, own)
     runs = units.fine & (found < FIRST_REFUSAL) & (least < 1.0)
     numbers = radii, turns, radii_apart, turns_apart
-    run, averages, stopped = _run(first, columns.seed, columns.half_swings, clock, cycle.speed, runs, *numbers)
-    t, closed = where(runs, run.t, 1.0), averages.closed
-    enough = closed > 1.0
-    deviation = sqrt(averages.squares / (2.0 * where(enough, closed - 1.0, 1.0)))
+    run, stopped = _run(first, columns.seed, columns.half_swings, clock, cycle.speed, runs, *numbers)
+    t, enough = where(runs, run.t, 1.0), run.closed > 1.0
+    deviation = sqrt(run.squares / (2.0 * where(enough, run.closed - 1.0, 1.0)))
     columns.rate_error_s_per_day[i] = SECONDS_PER_DAY * run.gain / t
     columns.rate_scatter_s_per_day[i] = where(enough, SECONDS_PER_DAY * deviation, math.nan)
     columns.truncated[i] = run.truncated / columns.half_swings[i]

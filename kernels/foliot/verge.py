@@ -38,7 +38,7 @@ from kernels.lanes.codes import NEVER_STARTS, NO_METHOD, NOT_CONVERGED, OK, STEP
 from kernels.lanes.columns import cell_by_cell
 from kernels.lanes.jit import jit, jit_call
 from kernels.lanes.ranges import judged
-from kernels.lanes.vectors import choose, magnitude, not_, sqrt, where
+from kernels.lanes.vectors import choose, magnitude, sqrt, where
 from kernels.lanes.wiring import kernel, method
 from kernels.maths.elementary import log
 from kernels.maths.wide import number, over, root, size, times, wide
@@ -60,16 +60,10 @@ DIES_OUT = 1e-12
 Scene = namedtuple("Scene", "kappa d r drop e")
 """kappa, d, r, and drop as above, and the restitution."""
 
-Half = namedtuple("Half", "v w gap time swing way back lost closing impacts end")
+Half = namedtuple("Half", "v w gap time swing way back lost closing end")
 """Speed of the foliot and of the wheel, and the gap, at escape, and what happened in the half period: `swing` is the
 largest abs(y), `way` that of the foliot to and fro, `back` the wheel's way backwards since its first landing, `lost`
 the energy of impacts, and `closing` the first closing speed."""
-
-
-@jit
-def _usual(group):
-    """Whether a group is within 2^+-40, or 0."""
-    return (magnitude(group[1]) <= 40.0) | not_(group[0] > 0.0)
 
 
 @jit
@@ -79,7 +73,8 @@ def without_dimensions(p):
     push, wheel = times(n, tau), times(n, phi0)
     time = root(over(times(I_v, phi0), push))
     kappa, d, drop = over(times(times(n, n), I_c), I_v), over(times(c_v, time), I_v), over(drop, wheel)
-    fine = (kappa[1] <= 12.0) & (kappa[1] >= -40.0) & _usual(d) & _usual(drop)
+    fine = (kappa[1] <= 12.0) & (kappa[1] >= -40.0)
+    fine = fine & ((magnitude(d[1]) <= 40.0) | (p.c_v <= 0.0)) & ((magnitude(drop[1]) <= 40.0) | (p.drop <= 0.0))
     kappa, d, drop = choose(fine, (kappa, d, drop), ((1.0, 0.0), (1.0, 0.0), (1.0, 0.0)))
     scene = Scene(number(kappa), number(d), number(over(R_v, push)), number(drop), p.e)
     return scene, (time, phi0, wheel, fine)
@@ -206,7 +201,7 @@ def half_period(scene, v, w, gap):
         else:
             how = end
             break
-    return Half(v, w, gap, time, swing, way, -least, lost, first, 1.0 * impacts, how)
+    return Half(v, w, gap, time, swing, way, -least, lost, first, how)
 
 
 @jit
@@ -214,16 +209,6 @@ def distance(half, v, w, gap):
     """Between the end of half a period and another state at an escape, over the speeds."""
     apart = (magnitude(half.v - v) + magnitude(half.w - w)) / (half.v + magnitude(half.w))
     return apart + magnitude(half.gap - gap) / (1.0 + half.gap)
-
-
-@jit
-def of_both(one, other):
-    """Two unlike halves as one: the larger of what is largest, the means of all else."""
-    return Half(
-        0.5 * (one.v + other.v), 0.5 * (one.w + other.w), one.gap, 0.5 * (one.time + other.time),
-        max(one.swing, other.swing), 0.5 * (one.way + other.way), max(one.back, other.back),
-        0.5 * (one.lost + other.lost), min(one.closing, other.closing), one.impacts + other.impacts, one.end,
-    )  # fmt: skip
 
 
 @jit_call
@@ -263,7 +248,12 @@ def return_map(scene, rtol):
             if twice > 1e-9:
                 pace = twice / earlier
             if pace < 1.0 and change > 1e-6 and twice <= 1e-13 and (twice <= 2e-16 or twice >= 0.5 * earlier):
-                half, error, status = of_both(one, half), (twice + ROUNDING) / (1.0 - pace), OK
+                error, status = (twice + ROUNDING) / (1.0 - pace), OK
+                half = Half(  # both as one: the larger of what is largest, the means of all else
+                    0.5 * (one.v + half.v), 0.5 * (one.w + half.w), one.gap, 0.5 * (one.time + half.time),
+                    max(one.swing, half.swing), 0.5 * (one.way + half.way), max(one.back, half.back),
+                    0.5 * (one.lost + half.lost), min(one.closing, half.closing), one.end,
+                )  # fmt: skip
                 break
         limped, earlier, one, first_v, first_w, first_gap = twice, limped, half, -1.0 if alone else v, w, gap
         before, floor, image = change, half.v, half.v
