@@ -62,9 +62,9 @@ def kernel_seconds(study: Study, workers: int, block: int = 1 << 16) -> float:
         return seconds(lambda: [future.result() for future in [pool.submit(pull) for _ in range(workers)]])
 
 
-def run_seconds(study: Study, path: Path, workers: int | None) -> float:
-    """Time of a whole run with an output, which is removed."""
-    taken = seconds(lambda: sweep.run(study, path, workers=workers, progress=False).close())
+def run_seconds(study: Study, path: Path, workers: int | None, block: int | None = None) -> float:
+    """Time of a whole run with an output, which is removed; of blocks of so many cells, or as a timed sample has it."""
+    taken = seconds(lambda: sweep.run(study, path, workers=workers, block_cells=block, progress=False).close())
     path.unlink()
     return taken
 
