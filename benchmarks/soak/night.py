@@ -26,7 +26,7 @@ from typing import Any
 HELPERS = Path(__file__).parents[2] / "tests" / "helpers"
 sys.path[:0] = [str(HELPERS)]
 
-import bad  # noqa: E402
+import night_kernel  # noqa: E402
 import numpy as np  # noqa: E402
 import psutil  # noqa: E402
 import toy_studies  # noqa: E402
@@ -37,7 +37,7 @@ from sweep.results.statuses import account  # noqa: E402
 from sweep.runs.log import log_path  # noqa: E402
 
 STUDY = """
-kernel = "bad:NIGHT"
+kernel = "night_kernel:NIGHT"
 outputs = ["fall_time"]
 [axes.height]
 spacing = "linear"
@@ -73,7 +73,12 @@ class Night:
                 return
 
     def _once(self) -> int:
-        paths = [str(Path(__file__).parents[2]), str(HELPERS), os.environ.get("PYTHONPATH", "")]
+        paths = [
+            str(Path(__file__).parents[2]),
+            str(HELPERS),
+            str(Path(__file__).parent),
+            os.environ.get("PYTHONPATH", ""),
+        ]
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
         with subprocess.Popen(self.words, cwd=self.folder, env=environment, stdout=-3, stderr=-3) as process:
             while process.poll() is None:
@@ -107,11 +112,11 @@ class Night:
         verdict = sweep.verify(self.output)
         with sweep.open_result(self.output) as found:
             told, status, times = account(found), found.status.values, found.fall_time.values
-        kinds = [bad.deed(height) for height in self.heights]
+        kinds = [night_kernel.deed(height) for height in self.heights]
         expected = np.array([EXPECTED.get(kind, Status.FAILED) for kind in kinds])
         good = expected == Status.OK
         self.done.update({"cells": told.total, "ok": told.ok, "refused": told.refused, "FAILED": told.failed})
-        self.done.update(f"FAILED, for it {kind}" for kind in kinds if kind in bad.FAILING)
+        self.done.update(f"FAILED, for it {kind}" for kind in kinds if kind in night_kernel.FAILING)
         self.done["wrong: status"] += int((status != expected).sum())
         self.done["wrong: bits"] += int((times[good].view(np.int64) != truth[good].view(np.int64)).sum())
         self.done["wrong: numbers where there are none"] += int((~np.isnan(times[~good])).sum())

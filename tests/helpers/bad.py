@@ -10,9 +10,8 @@ import time
 
 import numba
 import numpy as np
+import slow
 import toy
-
-from kernels.interface import Status
 
 RAISES, CRASHES, EXITS, HANGS, HOGS, HUNGRY, ORPHANS, QUITS, MUMBLES = (11.0 * k for k in range(1, 10))
 """Heights at which the kernel misbehaves."""
@@ -58,8 +57,7 @@ def kernel(name, *kinds, pause=0.0):
         misbehave(height, kinds)
         toy.exact(height, *rest)
 
-    method = dataclasses.replace(toy.KERNEL.methods[1], solve=solve)
-    return dataclasses.replace(toy.KERNEL, name=name, methods=(method,))
+    return dataclasses.replace(slow.kernel(solve), name=name)
 
 
 RAISING = kernel("raising", RAISES)
@@ -80,9 +78,6 @@ def says(height, *rest):
     rest[-1][:] = height.astype(np.uint8).view(np.int8)
 
 
-SAYING = dataclasses.replace(RAISING, methods=(dataclasses.replace(toy.KERNEL.methods[1], solve=says),))
-
-
 @numba.njit
 def _slowly_compiled(x):
     """Takes longer to compile than cells are given in the test."""
@@ -95,52 +90,9 @@ def late(height, *rest):
     toy.exact(height, *rest)
 
 
-LATE = dataclasses.replace(RAISING, methods=(dataclasses.replace(toy.KERNEL.methods[1], solve=late),))
-
-
-def whole_only(height, *rest):
-    """Crashes at heights that are no whole numbers."""
-    misbehave([CRASHES] * int((height % 1 != 0).any()), [CRASHES])
-    toy.exact(height, *rest)
-
-
-WHOLE = dataclasses.replace(RAISING, methods=(dataclasses.replace(toy.KERNEL.methods[1], solve=whole_only),))
-
-
 def nothing_but_bad(height, *rest):
     """Raises at every height."""
     raise ZeroDivisionError(f"at {np.size(height)} cells")
 
 
-HOPELESS = dataclasses.replace(RAISING, methods=(dataclasses.replace(toy.KERNEL.methods[1], solve=nothing_but_bad),))
-
-
-NIGHT_SECONDS, BAD_SHARE, LEAK_BYTES = 0.002, 400, 4 << 20
-DEEDS = ("raises", "crashes", "exits", "hangs", "hogs", "writes NaN", "leaks", "is refused")
-FAILING = DEEDS[:6]
-_leaked = []
-
-
-def deed(height):
-    """What becomes of a cell: one in `BAD_SHARE` of each kind, anywhere; "" of all others."""
-    number = int(height) * 0x9E3779B97F4A7C15 % 2**64 >> 40
-    kind = number % BAD_SHARE
-    return DEEDS[kind] if kind < len(DEEDS) else ""
-
-
-def night(height, *rest):
-    """As `toy.exact`, but for the cells of `deed`."""
-    kinds = [deed(one) for one in height]
-    time.sleep(NIGHT_SECONDS * len(height))
-    misbehave([BY_DEED[kind] for kind in kinds if kind in BY_DEED], BY_DEED.values())
-    _leaked.extend(np.ones(LEAK_BYTES // 8) for kind in kinds if kind == "leaks")
-    toy.exact(height, *rest)
-    fall_time, status = rest[-4], rest[-1]
-    fall_time[[kind == "writes NaN" for kind in kinds]] = np.nan
-    status[[kind == "is refused" for kind in kinds]] = Status.STICKS
-
-
-BY_DEED = {"raises": RAISES, "crashes": CRASHES, "exits": EXITS, "hangs": HANGS, "hogs": HOGS}
-NIGHT = dataclasses.replace(
-    toy.KERNEL, name="night", methods=(dataclasses.replace(toy.KERNEL.methods[1], solve=night),)
-)
+SAYING, LATE, HOPELESS = map(slow.kernel, (says, late, nothing_but_bad))

@@ -7,6 +7,9 @@ from mpmath import mp, mpf
 
 from kernels.interface import FIRST_REFUSAL, Kernel, Status
 
+JUNK = -7.5
+"""What stands in an output before a method writes it."""
+
 
 def columns_of(kernel: Kernel, parameters, named):
     """One column per parameter of the kernel: the first ones in order, others by name, the rest at their defaults.
@@ -38,14 +41,13 @@ def estimated(kernel: Kernel, method: str, *parameters, rtol=1e-9, along=(), ask
 
 
 def called(kernel: Kernel, method: str, columns, rtol, along, asked):
-    """Outputs by name, status and error as the method writes them."""
-    outputs, status, error = (
-        unwritten(kernel, columns, along),
-        np.full(rtol.size, 99, np.int8),
-        np.full(rtol.size, np.nan),
-    )
+    """Outputs by name, NaN where the cell is refused, status and error as the method writes them, over junk."""
+    outputs = {name: np.full_like(none, JUNK) for name, none in unwritten(kernel, columns, along).items()}
+    status, error = np.full(rtol.size, 99, np.int8), np.full(rtol.size, np.nan)
     before, after = ([asked_for(kernel, asked)], [error]) if kernel.method(method).estimates else ([], [])
     kernel.method(method).solve(*columns, rtol, *along, *before, *outputs.values(), *after, status)
+    for values in outputs.values():
+        values[status >= FIRST_REFUSAL] = np.nan
     return outputs, status, error
 
 

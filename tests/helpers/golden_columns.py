@@ -22,6 +22,7 @@ from pathlib import Path
 import numpy as np
 import rich_scene
 import sliding_scene
+from columns import bounds, called, checked, columns_of
 
 from kernels import catalogue
 from kernels.interface import FIRST_REFUSAL, Status
@@ -172,16 +173,11 @@ def _cells(name, count, length, numbers, spread):
     return columns
 
 
-def _special(name):
-    """The cells of `SPECIAL`."""
-    rows = []
-    for changed in SPECIAL.get(name, ()):
-        row = {}
-        for field in kernel_of(name).parameters:
-            value = (example_of(name) | changed).get(field.name, field.default)
-            row[field.name] = row[value] if isinstance(value, str) else value
-        rows.append(row)
-    return rows
+def cell_of(name, **changed):
+    """{parameter: column} of one cell: the example with these changes."""
+    kernel = kernel_of(name)
+    columns = columns_of(kernel, (), {key: [value] for key, value in (example_of(name) | changed).items()})
+    return {field.name: column for field, column in zip(kernel.parameters, columns, strict=True)}
 
 
 def inputs(name, length=1):
@@ -189,9 +185,8 @@ def inputs(name, length=1):
     numbers = Numbers()
     counts = FEW if name in SCENES else MANY
     cells = [_cells(name, count, length, numbers, spread) for spread, count in counts.items()]
+    cells += [cell_of(name, **changed) for changed in SPECIAL.get(name, ())]
     columns = {key: np.concatenate([part[key] for part in cells]) for key in cells[0]}
-    if rows := _special(name):
-        columns = {key: np.concatenate([column, [row[key] for row in rows]]) for key, column in columns.items()}
     return columns, np.resize(RTOLS, len(next(iter(columns.values()))))
 
 
@@ -205,36 +200,18 @@ def along_of(kernel):
     ]
 
 
-def lengths_of(kernel, columns, along):
-    """The length of each dim."""
-    lengths = {field.name: values.size for field, values in zip(kernel.along, along, strict=True)}
-    lengths |= {dim: columns[p.name].shape[1] for p in kernel.parameters for dim in p.dims}
-    return lengths | {new: lengths[old] for new, old in kernel.same_length.items()}
-
-
 def check_of(kernel, columns):
     """The status that `check` gives every cell."""
-    status = np.full(len(next(iter(columns.values()))), 99, np.int8)
-    kernel.check(*columns.values(), status)
-    return status
+    return checked(kernel, *columns.values())
 
 
 def solved(kernel, method, columns, rtol, along=None):
     """{what: column} of a method: outputs, NaN where the cell is refused, the error it estimates, status and bound."""
-    along = along_of(kernel) if along is None else along
-    lengths = lengths_of(kernel, columns, along)
-    found = {f.name: np.zeros((rtol.size, *(lengths[d] for d in f.dims))) for f in kernel.outputs}
-    status, asked = np.full(rtol.size, 99, np.int8), np.ones(len(found), np.uint8)
-    if method.estimates:
-        found["error"] = np.zeros(rtol.size)
-    method.solve(*columns.values(), rtol, *along, *([asked] if method.estimates else []), *found.values(), status)
-    for values in found.values():
-        values[status >= FIRST_REFUSAL] = np.nan
-    found["status"] = status
-    if method.bound is not None:
-        found["bound"] = np.zeros(rtol.size)
-        method.bound(*columns.values(), rtol, *along, asked, found["bound"])
-    return found
+    along, columns = along_of(kernel) if along is None else along, list(columns.values())
+    found, status, error = called(kernel, method.name, columns, rtol, along, None)
+    found |= {"error": np.where(status >= FIRST_REFUSAL, np.nan, error)} if method.estimates else {}
+    bound = {} if method.bound is None else {"bound": bounds(kernel, method.name, *columns, rtol=rtol, along=along)}
+    return found | {"status": status} | bound
 
 
 def taken(columns, rows):

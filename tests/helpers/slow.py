@@ -1,4 +1,4 @@
-"""Kernels for tests of faults: the stone of `toy`, slow, uneven, or failing."""
+"""Kernels for tests of faults: the stone of `toy`, slow, or failing."""
 
 from __future__ import annotations
 
@@ -16,12 +16,6 @@ CELL_SECONDS = 0.002
 def slow(height, *rest):
     """As `toy.exact`, two milliseconds a cell."""
     time.sleep(CELL_SECONDS * len(height))
-    toy.exact(height, *rest)
-
-
-def uneven(height, *rest):
-    """As `toy.exact`; a cell takes as many milliseconds as it is high."""
-    time.sleep(1e-3 * height.sum())
     toy.exact(height, *rest)
 
 
@@ -57,4 +51,4 @@ def kernel(solve):
     )
 
 
-SLOW, UNEVEN, CALLED, HUNGRY, LETHAL = map(kernel, (slow, uneven, called, hungry, lethal))
+SLOW, CALLED, HUNGRY, LETHAL = map(kernel, (slow, called, hungry, lethal))

@@ -1,4 +1,4 @@
-"""Several surfaces, each with its jump: walls, a section beside an impact, and a mode of more than two values."""
+"""Several surfaces, each with its jump: walls, a section beside an impact, and a lid that is not met."""
 
 import math
 
@@ -7,7 +7,7 @@ from columns import solve
 
 from kernels.interface import Status
 from kernels.lanes.jit import COMPILED
-from kernels.scene import Field, SceneError, cos, scene_kernel, sin, sqrt, where
+from kernels.scene import Field, SceneError, cos, scene_kernel, sin, sqrt
 from kernels.stepping import stepped_kernel
 
 
@@ -26,14 +26,6 @@ WALLS = {
         "floor": lambda x, v, y, w: (x, v, y, -w),
     },
     "start": lambda x0, y0, v0: (x0, v0, y0, -1.0),
-}  # fmt: skip
-SHIFTED = {
-    "name": "gears", "doc": "a mode of three values, the gear",
-    "states": fields("x", "mode"), "parameters": fields("a"),
-    "rates": lambda x, mode, a: (a * where(mode > 1.5, 4.0, where(mode > 0.5, 2.0, 1.0)), 0.0),
-    "surface": {"one": lambda x: 1.0 - x, "two": lambda x: 3.0 - x, "end": lambda x: 7.0 - x},
-    "switch": {"one": lambda x: (x, 1.0), "two": lambda x: (x, 2.0), "end": lambda: (0.0, 0.0)},
-    "start": lambda: (0.0, 0.0),
 }  # fmt: skip
 plain = pytest.mark.skipif(COMPILED, reason="compiled in test_functions; run with NUMBA_DISABLE_JIT=1")
 
@@ -131,16 +123,6 @@ def test_a_surface_without_a_side_and_without_a_jump_is_passed_once_a_period(met
     outputs, status = solve(kernel, method, [2.0], flips=3.0, **step)
     assert status[0] <= (Status.GRAZING if step else Status.OK)
     assert [outputs[name][0] for name in ("time", "x", "v")] == pytest.approx([2.25 * math.pi, 0, -2], abs=1e-6)
-
-
-@plain
-@pytest.mark.parametrize("method", ["taylor", "dop853"])
-def test_a_state_of_rate_0_that_a_switch_sets_is_a_mode_of_any_number_of_values(method):
-    kernel = scene_kernel(**SHIFTED)
-    for flips, time, x, mode in ((1, 1, 1, 0), (2, 2, 3, 1), (3, 3, 7, 2), (5, 5, 3, 1)):
-        outputs, status = found(kernel, method, 1.0, flips=flips)
-        assert status == Status.OK
-        assert [outputs[name] for name in ("time", "x", "mode")] == pytest.approx([time, x, mode], abs=1e-8)
 
 
 @pytest.mark.parametrize(

@@ -52,15 +52,6 @@ def test_ripple_is_right_to_half_of_rtol_where_energy_gives_the_speed():
         compare(cells, truths, rtol)
 
 
-def test_under_dry_friction_alone_the_amplitude_knows_nothing_of_the_ripple():
-    depth = np.array([0.0, 0.3, 0.6] if COMPILED else [0.6])
-    rtol = 1e-6 if COMPILED else 1e-3
-    for harmonic in (1.0, 2.0, 5.0) if COMPILED else (2.0,):
-        outputs, status = solve(FOLIOT_RIPPLE, "dopri5", 1.0, 1.0, R=0.25, depth=depth, harmonic=harmonic, rtol=rtol)
-        assert (status == Status.OK).all()
-        assert np.allclose(outputs["amplitude"], 4.0, rtol=rtol)
-
-
 @compiled
 def test_sticking_agrees_with_energy_over_a_grid():
     grid = [(R, depth, h) for R in (0.7, 0.95) for depth in (0.3, 0.8) for h in (2, 3)]

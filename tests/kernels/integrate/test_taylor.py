@@ -108,6 +108,12 @@ def test_a_start_on_the_switch_moves_away_or_switches_at_once():
     assert outputs["time"][1] == pytest.approx(1.0 + np.sqrt(5.0), rel=1e-12)
 
 
+@pytest.mark.parametrize("method", ["taylor_once", "dop853"])
+def test_a_number_of_switches_that_is_none_is_refused_and_ends(method):
+    _, status = solve(method, 1.0, 1.0, 0.3, 0.2, R=0.1, flips=[np.nan, np.inf, 0.0, -3.0, 2.0])
+    assert status.tolist() == [Status.BAD_INPUT] * 4 + [Status.OK]
+
+
 @pytest.mark.skipif(not COMPILED, reason="thousands of steps")
 def test_kinks_are_limited_between_two_switches_and_not_in_all():
     outputs, status = solve("taylor_once", 1.0, 1.0, a=0.3, flips=1200.0)
