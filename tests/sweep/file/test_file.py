@@ -9,7 +9,6 @@ import xarray as xr
 import sweep
 from sweep.cells.partition import boxes
 from sweep.cells.reduce import output_schema
-from sweep.file import disk
 from sweep.file.frame import cuts_of, expected_size
 
 PHASE = {"outputs": ["fall_time", "drop"], "along": {"phase": [0.0, 0.5, 1.0]}}
@@ -70,24 +69,3 @@ def test_a_file_of_another_format_is_refused_by_its_number(tmp_path):
     for function in (sweep.open_result, sweep.verify):
         with pytest.raises(sweep.SweepError, match=r"\(4\).*format 7"):
             function(path)
-
-
-def test_digests_reach_the_disk_behind_their_numbers(tmp_path, monkeypatch):
-    """Between the writes of a block's numbers and that of its digests the disk is told to sync."""
-    path, calls = tmp_path / "out.h5", []
-    write, sync = disk.write, disk.sync_numbers
-    monkeypatch.setattr(disk, "write", lambda fd, pieces, at: (calls.append((at, pieces)), write(fd, pieces, at))[1])
-    monkeypatch.setattr(disk, "sync_numbers", lambda fd: (calls.append("sync"), sync(fd))[1])
-    run(path, 5, **STUDIES["a line"]).close()
-    with h5py.File(path) as file:
-        table = file["integrity/cells"]
-        begin, row, end = table.id.get_offset(), table[0].size, table.id.get_offset() + table.size
-        chunks = [file["fall_time"].id.get_chunk_info(k).byte_offset for k in range(5)]
-    written = [(k, *call) for k, call in enumerate(calls) if call != "sync"]
-    digests = [(k, (at - begin) // row, sum(map(len, pieces)) // row) for k, at, pieces in written
-               if begin <= at < end and any(map(any, pieces))]  # fmt: skip
-    digests = [(k, block + i) for k, block, count in digests for i in range(count)]
-    assert {block for _, block in digests} == set(range(5))
-    for last, block in digests:
-        numbers = max(k for k, at, _ in written if at == chunks[block] and k < last)
-        assert "sync" in calls[numbers:last]

@@ -88,6 +88,8 @@ def test_a_flipped_bit_is_found_wherever_anything_stands_and_a_whole_result_is_w
         assert path != file or sweep.verify(path) != before, at
         file.write_bytes(content)
     assert sweep.verify(path) == before
+    file.write_bytes(content + b"more")
+    assert not sweep.verify(path).whole
 
 
 def test_a_damaged_fixed_parameter_is_refused_by_hdf5_too(copy):
