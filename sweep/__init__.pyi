@@ -2,7 +2,6 @@
 
 from sweep.errors import StudyError as StudyError
 from sweep.errors import SweepError as SweepError
-from sweep.explore.join import join as join
 from sweep.explore.plan import plan as plan
 from sweep.explore.refine import refine as refine
 from sweep.explore.scaling import scaling as scaling
@@ -23,6 +22,7 @@ from sweep.laws.two_laws import fit_two_laws as fit_two_laws
 from sweep.results.diff import diff as diff
 from sweep.results.export import export as export
 from sweep.results.filter import where as where
+from sweep.results.join import join as join
 from sweep.results.listing import list_results as list_results
 from sweep.results.units import in_units as in_units
 from sweep.runs.run import run as run

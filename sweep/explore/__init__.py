@@ -5,7 +5,6 @@ Others may use
     `work_precision`  error against time of every method of a kernel
     `refine`          cells where they are needed
     `scattered`       values between cells that lie anywhere in a box, and those of them that lie on lines
-    `join`            two results as one
     `solver`          a study's kernel as a function of its axes
     `recheck`         one cell solved again by each method; a sample of OK cells, to see whether they are right to rtol
     `sensitivity`     which parameters decide an output

@@ -34,7 +34,8 @@ from sweep.explore.mesh import Array, Indices, Mesh, at_pole, scatter, stretch
 from sweep.explore.scattered import MOST_AXES, REFINED_TO, Box, axes_of, heights, kinds
 from sweep.file import disk
 from sweep.file.disk import check_target
-from sweep.runs.run import run, store_cells
+from sweep.file.open import store_cells
+from sweep.runs.run import run
 from sweep.study.model import Axis, Study, frozen
 from sweep.study.read import study as as_study
 from sweep.words import as_path, require_dataset

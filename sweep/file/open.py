@@ -4,21 +4,30 @@ from __future__ import annotations
 
 import contextlib
 import os
+import time
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sweep.cells.schema import Schema
+from sweep.cells.fingerprint import fingerprint
+from sweep.cells.partition import boxes
+from sweep.cells.schema import Schema, cell_schema
+from sweep.cells.timing import BLOCK_BYTES
 from sweep.errors import SweepError
+from sweep.file import disk
+from sweep.file.frame import cuts_of
 from sweep.file.reading import Damaged, StoredFile, Table
-from sweep.file.store import unfinished_of
+from sweep.file.store import alone, begun, found, unfinished_of
 from sweep.words import as_path
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from sweep.study.model import Study
 
 MEMORY_SHARE = 0.25
 """Results larger than this share of the memory are opened in pieces (dask)."""
@@ -87,6 +96,42 @@ def in_memory(plan: Schema, arrays: Mapping[str, Any]) -> xr.Dataset:
     }
     coordinates = {c.name: (c.dims, c.values, dict(c.attrs)) for c in plan.coordinates}
     return xr.Dataset(variables, coordinates, dict(plan.attrs))
+
+
+def store_cells(
+    study: Study,
+    path: str | os.PathLike[str] | None,
+    arrays: Mapping[str, Any],
+    force: bool = False,
+    mark: Mapping[str, str] | None = None,
+    attrs: Mapping[str, str] | None = None,
+) -> xr.Dataset:
+    """The result of cells that are solved already, in memory or in a file like that of a run. Raises SweepError.
+
+    Their columns are `arrays`, of shape (cells, ...), of outputs and of `schema.ANCILLARY`. `mark` is their
+    fingerprint, where that is not the one of the study and of this program; `attrs` are further attributes.
+    """
+    if path is None:
+        return in_memory(cell_schema(study, mark or {}), arrays).assign_attrs(attrs or {})
+    output, now = Path(os.path.realpath(as_path(path))), datetime.now(UTC).isoformat(timespec="seconds")
+    schema = cell_schema(study, mark or fingerprint(study))
+    schema = replace(schema, attrs={**schema.attrs, "start": now, **(attrs or {})})
+    blocks = boxes(schema.grid.shape, max(1, BLOCK_BYTES // sum(column.cell_bytes for column in schema.columns)))
+    begin = time.monotonic()
+    with alone(output), contextlib.ExitStack() as stack:
+        disk.check_target(output, force=force)
+        if (left := found(output, force)) is not None:
+            left.close()
+            ours = left.attrs["fingerprint"] == schema.attrs["fingerprint"]
+            disk.check_target(left.path, force=force or ours)
+        disk.remove(unfinished_of(output))
+        store = stack.enter_context(begun(output, schema, cuts_of(study, schema, blocks)))
+        for block in range(blocks.count):
+            rows = slice(*blocks.bounds(block))
+            store.put(block, {name: column[rows] for name, column in arrays.items()})
+        rate = schema.grid.size / max(time.monotonic() - begin, 1e-9)
+        store.finish({"created": now, "end": now, "cells_per_second": f"{rate:.6e}"})
+    return open_result(output)
 
 
 def memory() -> int:

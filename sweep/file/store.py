@@ -45,6 +45,8 @@ def lock_of(output: Path) -> Path:
 @contextlib.contextmanager
 def alone(output: Path) -> Iterator[None]:
     """No other run writes this output meanwhile. Raises SweepError."""
+    if output.suffix == UNFINISHED:
+        raise SweepError(f"{output}: a result that is not finished is called *{UNFINISHED}; choose another name")
     with disk.refusing(output), disk.locked(lock_of(output)) as ours:
         if not ours:
             raise SweepError(f"{output}: another run is at work on this output; wait for it, or choose another with -o")

@@ -1,7 +1,7 @@
 """One run of a study, here or on a cluster: a loop has an executor compute blocks, which go into a sink.
 
 Others may use
-    `run`       run, complete, store_cells
+    `run`       run, complete
     `loop`      Task, Loop: what a run was asked for, and its beginning: a timed sample, the grid cut into blocks
     `pool`      cores, whole_number, endless
     `progress`  Progress: how far it is, and how long it will take

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import reduce
 from pathlib import Path
 from typing import Any
@@ -79,21 +78,6 @@ class Reused:
         axes = [positions[s] >= 0 for positions, s in zip(self._positions, box, strict=True)]
         shared = reduce(np.logical_and.outer, axes).ravel()
         return shared, shared & np.ravel(self._numbers[STATUS][box] != Status.FAILED) if self._retry else shared
-
-
-@dataclass
-class Precomputed:
-    """All cells of a study, solved before: what `Reused` is, by columns of shape (cells, ...)."""
-
-    arrays: Mapping[str, Any]
-    attrs: Mapping[str, str]
-
-    def missing(self, start: int, stop: int) -> Any:
-        return np.zeros(stop - start, bool)
-
-    def fill(self, start: int, stop: int, arrays: Mapping[str, Any]) -> None:
-        for name, values in self.arrays.items():
-            arrays[name][...] = values[start:stop]
 
 
 def _positions(old: Axis, new: Axis) -> Any:

@@ -12,7 +12,7 @@ import platform
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ThreadPoolExecutor, wait
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import cached_property
 from pathlib import Path
@@ -26,7 +26,7 @@ from sweep.cells.sample import require_asked
 from sweep.cells.schema import Schema
 from sweep.cells.timing import UNSAMPLED, Sample, work_clock
 from sweep.errors import SweepError, missing
-from sweep.runs.extend import Precomputed, Reused
+from sweep.runs.extend import Reused
 from sweep.runs.isolate import Processes
 from sweep.runs.log import log
 from sweep.runs.pool import TimeUp, cores, deadline, endless, passed, signals_held, whole_number
@@ -56,7 +56,7 @@ class Task:
     cores, end, limit
         What `workers`, `until` and `cell_timeout` mean.
     fingerprint : mapping of str to str
-        Of the study and of this program, or what is given instead.
+        Of the study and of this program.
     note : callable
         Says something at once; by default where the progress is told.
     """
@@ -74,11 +74,10 @@ class Task:
     isolate: bool = False
     cell_timeout: float | str | None = None
     retry_failed: bool = False
-    fingerprint: Mapping[str, str] = field(default_factory=dict)
     note: Any = None
 
     def __post_init__(self) -> None:
-        self.fingerprint = dict(self.fingerprint or fingerprint(self.study))
+        self.fingerprint = fingerprint(self.study)
         self.output = Path(os.path.realpath(as_path("." if self.path is None else self.path)))
         if not self.output.parent.is_dir():
             raise SweepError(f"{self.path}: there is no folder {self.output.parent}")
@@ -126,7 +125,7 @@ class Loop:
         stack: contextlib.ExitStack,
         partition: Partition | None = None,
         to_do: bool = True,
-        reused: Reused | Precomputed | None = None,
+        reused: Reused | None = None,
         hold: bool = True,
     ) -> None:
         self.task, self._reused, study = task, reused, task.study
@@ -145,7 +144,7 @@ class Loop:
             stack.callback(self.processes.end)
         self._threads = ThreadPoolExecutor(task.cores)
         stack.callback(self._threads.shutdown, wait=False)
-        self.sample = self._sample() if to_do and not isinstance(reused, Precomputed) else UNSAMPLED
+        self.sample = self._sample() if to_do else UNSAMPLED
         # a block of a cluster takes so long that the scheduler's millisecond is nothing
         least = 0.0 if self._cluster is None else 0.5
         self.blocks = Blocks(study, partition or cut(study, self._crew, self.sample, task.block_cells, least))

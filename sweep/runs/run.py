@@ -11,13 +11,10 @@ from typing import TYPE_CHECKING, Any, TextIO
 import numpy as np
 
 from sweep.cells.block import Blocks
-from sweep.cells.partition import row_blocks
 from sweep.cells.reduce import gathered
-from sweep.cells.schema import cell_schema
 from sweep.errors import SweepError
 from sweep.file.open import in_memory, memory, open_result
 from sweep.file.store import unfinished_of
-from sweep.runs.extend import Precomputed
 from sweep.runs.loop import Loop, Task
 from sweep.runs.to_file import Ending, run_to_file
 from sweep.study.keys import KEYS
@@ -126,28 +123,6 @@ def run(
 def complete(study: Study, path: str | os.PathLike[str], **options: Any) -> Ending:
     """Runs as `run` does, and opens nothing."""
     return run_to_file(Task(study, path, **options))
-
-
-def store_cells(
-    study: Study,
-    path: str | os.PathLike[str] | None,
-    arrays: Mapping[str, Any],
-    force: bool = False,
-    mark: Mapping[str, str] | None = None,
-    attrs: Mapping[str, str] | None = None,
-) -> xr.Dataset:
-    """The result of cells that are solved already, in memory or in a file like that of `run`.
-
-    Their columns are `arrays`, of shape (cells, ...), of outputs and of `schema.ANCILLARY`. `mark` is their
-    fingerprint, where that is not the one of the study and of this program; `attrs` are further attributes. Raises
-    SweepError as `run`.
-    """
-    if path is None:
-        return in_memory(cell_schema(study, mark or {}), arrays).assign_attrs(attrs or {})
-    block = max(1, min(row_blocks(study).count, 1 << 16))
-    task = Task(study, path, 1, force, progress=False, block_cells=block, fingerprint=mark or {})
-    run_to_file(task, Precomputed(arrays, attrs or {}))
-    return open_result(task.output)
 
 
 class _Memory:

@@ -13,9 +13,9 @@ from sweep.errors import SweepError
 from sweep.file import disk
 from sweep.file.frame import cuts_of, expected_size
 from sweep.file.open import verify
-from sweep.file.reading import UNFINISHED, StoredFile
+from sweep.file.reading import StoredFile
 from sweep.file.store import Store, alone, begun, found, lock_of, reopened, unfinished_of
-from sweep.runs.extend import Precomputed, Reused, has_failed, obstacle
+from sweep.runs.extend import Reused, has_failed, obstacle
 from sweep.runs.loop import Loop, Task
 from sweep.runs.pool import Terminated, TimeUp
 from sweep.words import quantity
@@ -24,10 +24,8 @@ Ending = Literal["done before", "complete", "unfinished", "not begun"]
 """What became of an output: the last two where the time was up before the end, or before the first block."""
 
 
-def run_to_file(task: Task, precomputed: Precomputed | None = None) -> Ending:
+def run_to_file(task: Task) -> Ending:
     """Continues, begins or leaves alone what is there. Raises SweepError, KeyboardInterrupt, Terminated."""
-    if task.output.suffix == UNFINISHED:
-        raise SweepError(f"{task.path}: a result that is not finished is called *{UNFINISHED}; choose another name")
     left = any(map(disk.mark, (unfinished_of(task.output), lock_of(task.output))))
     seen, (standing, damaged) = disk.mark(task.output), ("nothing", ()) if left else _standing(task)
     if standing == "complete":
@@ -60,15 +58,14 @@ def run_to_file(task: Task, precomputed: Precomputed | None = None) -> Ending:
             store = None
         try:
             with contextlib.ExitStack() as running:
-                known: Reused | Precomputed | None = precomputed
-                to_do = store is None or bool(store.missing())
+                known, to_do = None, store is None or bool(store.missing())
                 if to_do and standing == "reused":
                     reused = Reused(task.output, task.study, task.retry_failed)
                     known = running.enter_context(contextlib.closing(reused))
                 # signals are held back from here on, wherever they would leave half a file behind
                 loop = Loop(task, running, None if store is None else store.work.blocks, to_do, known)
                 if store is None:
-                    store = stack.enter_context(_begun(task, loop, known))
+                    store = stack.enter_context(_begun(task, loop))
                 for block in damaged:
                     task.note(f"{loop.blocks.label(block)} were damaged on the disk and are computed again")
                 shared = None if task.cluster is None else store.shared()
@@ -90,9 +87,9 @@ def run_to_file(task: Task, precomputed: Precomputed | None = None) -> Ending:
             raise
 
 
-def _begun(task: Task, loop: Loop, known: Reused | Precomputed | None) -> Store:
+def _begun(task: Task, loop: Loop) -> Store:
     """A new file, if there is room for it. Raises SweepError."""
-    schema = task.said({"start": loop.began, **(known.attrs if isinstance(known, Precomputed) else {})})
+    schema = task.said({"start": loop.began})
     cuts = cuts_of(task.study, schema, loop.blocks.partition)
     needed, free = expected_size(schema, cuts), shutil.disk_usage(task.output.parent).free
     if needed > free:
@@ -137,7 +134,7 @@ def _changes(stored: Mapping[str, str], task: Task) -> str:
 class _Stored:
     """Where blocks of a run to a file go, with the cells that are known."""
 
-    def __init__(self, store: Store, blocks: Blocks, known: Reused | Precomputed | None) -> None:
+    def __init__(self, store: Store, blocks: Blocks, known: Reused | None) -> None:
         self._store, self._blocks, self._known, self.room = store, blocks, known, blocks.own
 
     def put(self, job: int, found: bytes | Mapping[str, Any]) -> None:

@@ -17,9 +17,8 @@ from sweep.cells.grid import Grid
 from sweep.cells.schema import ANCILLARY, STATUS
 from sweep.errors import SweepError
 from sweep.file.disk import check_target
-from sweep.file.open import memory
+from sweep.file.open import memory, store_cells
 from sweep.results.diff import diff, two_results
-from sweep.runs.run import store_cells
 from sweep.study.model import SETTINGS, Axis, Block, Study, frozen, setting
 from sweep.words import as_path, listed
 

@@ -123,7 +123,7 @@ def test_results_beyond_the_memory_are_refused(monkeypatch):
     """Both, and what is made of them."""
     a, b = of([1.0, 2.0]), of([4.0, 8.0])
     there = [2 * (a.nbytes + b.nbytes)]
-    monkeypatch.setattr("sweep.explore.join.memory", lambda: there[0])
+    monkeypatch.setattr("sweep.results.join.memory", lambda: there[0])
     same(sweep.join(a, b), of())
     same(sweep.join(b, a), of())  # values of an axis rise
     there[0] -= 1
