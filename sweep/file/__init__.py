@@ -10,6 +10,7 @@ same way, and its columns made from them, at the end for all programs, before fo
 computed yet is PENDING, and an error to whoever asks HDF5 for its numbers. All that reads a result compares it with its
 digests (`reading`).
 
-`open` gives a file as a Dataset (its arrays are `columns`), or says what in it is damaged. All calls that change the
-disk are in `disk`, which also refuses to overwrite what is there already, unless that is forced.
+`open` gives a file as a Dataset (its arrays are `columns`), says what in it is damaged, or writes one of cells that are
+known. All calls that change the disk are in `disk`, which also refuses to overwrite what is there already, unless that
+is forced.
 """
