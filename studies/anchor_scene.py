@@ -5,7 +5,6 @@
 `side` changes where phi passes +phi0 outwards at the right and -phi0 at the left: from there the scape wheel, driven
 back, brakes the rest of the swing (recoil), and pushes the way back until the other pallet takes over. It is the
 verge's law with a restoring force. Leaves out: drop, the pallets' curves and friction, the wheel's inertia.
-Source: Airy, Trans. Cambridge Phil. Soc. 3:105 (1830).
 """
 
 from kernels.cycle import cycle_kernel
@@ -14,14 +13,6 @@ from kernels.scene import Field, pi, sin, sqrt
 
 def rates(angle, speed, side, mu, Q, phi0, w0):
     return speed, side * mu - w0 / Q * speed - w0**2 * sin(angle)
-
-
-def surface(angle, side, phi0):
-    return phi0 - side * angle
-
-
-def start(mu, Q, phi0, w0):
-    return -sqrt(4 / pi * mu * phi0 * Q) / w0, 0.0
 
 
 KERNEL = cycle_kernel(
@@ -35,8 +26,8 @@ KERNEL = cycle_kernel(
         Field("w0", "rad/s", "angular frequency of small free swings", lower=0.0, open_lower=True),
     ),
     rates=rates,
-    surface=surface,
-    start=start,
+    surface=lambda angle, side, phi0: phi0 - side * angle,
+    start=lambda mu, Q, phi0, w0: (-sqrt(4 / pi * mu * phi0 * Q) / w0, 0.0),
     source="Airy, Trans. Cambridge Phil. Soc. 3:105 (1830)",
-    example={"mu": 1e-3, "Q": 1e3, "phi0": 0.025, "w0": 3.141592653589793},
+    example={"mu": 1e-3, "Q": 1e3, "phi0": 0.025, "w0": pi},
 )

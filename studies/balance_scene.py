@@ -7,7 +7,7 @@ passes angle = at (at < 0: before the centre) it is given the energy k w. `hang`
 and the top in the watch's position. Leaves out: what else an escapement does.
 """
 
-from kernels.scene import Field, scene_kernel, sign, sin, sqrt, where
+from kernels.scene import Field, pi, scene_kernel, sign, sin, sqrt, where
 
 
 def rates(angle, speed, clock, side, zeta, omega_n, r, poise, hang):
@@ -15,16 +15,8 @@ def rates(angle, speed, clock, side, zeta, omega_n, r, poise, hang):
     return speed, -(omega_n**2) * spring - 2.0 * zeta * omega_n * speed, 1.0 + 0.0 * side
 
 
-def surface(angle, speed, at):
-    return where(speed > 0.0, at - angle, 1.0)
-
-
 def switch(angle, speed, clock, side, omega_n, w):
     return -angle, -sqrt(speed**2 + 2.0 * w * omega_n**2), 0.5 * (1.0 - side) * clock
-
-
-def start(zeta, r, w):
-    return -(sqrt(r**2 + 3.141592653589793 * zeta * w) - r) / (3.141592653589793 * zeta), 0.0, 0.0
 
 
 KERNEL = scene_kernel(
@@ -46,8 +38,8 @@ KERNEL = scene_kernel(
         Field("hang", "rad", "where that hangs at rest, from the top", default=0.0),
     ),
     rates=rates,
-    surface=surface,
-    start=start,
+    surface=lambda angle, speed, at: where(speed > 0.0, at - angle, 1.0),
+    start=lambda zeta, r, w: (-(sqrt(r**2 + pi * zeta * w) - r) / (pi * zeta), 0.0, 0.0),
     switch=switch,
     example={"zeta": 0.005, "omega_n": 15.708, "r": 0.01, "w": 0.01},
 )

@@ -3,27 +3,10 @@
     x'' = -1,    v -> (1 + e) push cos t - e v    where x falls onto the table at push sin t               (1)
 
 in units of the table's angular frequency w and of g/w^2, so that `push` is the table's largest acceleration over g.
-Source: Holmes, J. Sound Vib. 84:173 (1982); Tufillaro and Albano, Am. J. Phys. 54:939 (1986).
 """
 
 from kernels.scene import Field, cos, pi, sin
 from kernels.trajectory import section_kernel
-
-
-def rates(v):
-    return v, -1.0
-
-
-def surface(x, t, push):
-    return x - push * sin(t)
-
-
-def switch(x, v, t, push, e):
-    return x, (1.0 + e) * push * cos(t) - e * v
-
-
-def start():
-    return 0.0, pi
 
 
 KERNEL = section_kernel(
@@ -34,10 +17,10 @@ KERNEL = section_kernel(
         Field("push", "1", "largest acceleration of the table over g", lower=0.0),
         Field("e", "1", "coefficient of restitution", default=0.5, lower=0.0, upper=1.0),
     ),
-    rates=rates,
-    surface=surface,
-    switch=switch,
-    start=start,
-    source="Tufillaro and Albano, Am. J. Phys. 54:939 (1986)",
+    rates=lambda v: (v, -1.0),
+    surface=lambda x, t, push: x - push * sin(t),
+    switch=lambda x, v, t, push, e: (x, (1.0 + e) * push * cos(t) - e * v),
+    start=lambda: (0.0, pi),
+    source="Holmes, J. Sound Vib. 84:173 (1982); Tufillaro and Albano, Am. J. Phys. 54:939 (1986)",
     example={"push": 1.4},
 )

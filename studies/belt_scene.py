@@ -13,14 +13,6 @@ def rates(place, speed, mu, belt, fall):
     return speed, fall * speed - place - mu * sign(speed - belt)
 
 
-def surface(place, side, mu):
-    return side * (mu - place)
-
-
-def start(belt):
-    return 0.0, belt
-
-
 SCENE = {
     "name": "belt_scene",
     "doc": "mass on a spring and on a belt that drags it by dry friction",
@@ -31,7 +23,7 @@ SCENE = {
         Field("fall", "1", "fall of friction with speed", default=0.1),
     ),
     "rates": rates,
-    "surface": surface,
-    "start": start,
+    "surface": lambda place, side, mu: side * (mu - place),
+    "start": lambda belt: (0.0, belt),
 }
 KERNEL = scene_kernel(**SCENE, example={"belt": 0.2, "flips": 41.0})

@@ -22,14 +22,6 @@ def rates(left, speed, right, other, age, side, tau, I_l, I_r, c_l, c_r, R_l, R_
     return speed, gain, other, other_gain, 1.0 + 0.0 * side
 
 
-def surface(left, right, side, phi0):
-    return phi0 - (0.5 + 0.5 * side) * left + (0.5 - 0.5 * side) * right
-
-
-def start(phi0):
-    return -phi0, 0.0, -phi0, 0.0, 0.0
-
-
 KERNEL = scene_kernel(
     name="cross_beat_scene",
     doc="two geared foliots, pushed in turn, on a case that may sway",
@@ -55,8 +47,8 @@ KERNEL = scene_kernel(
         Field("nu", "rad/s", "angular frequency of the sway", default=1.0, lower=0.0),
     ),
     rates=rates,
-    surface=surface,
-    start=start,
+    surface=lambda left, right, side, phi0: phi0 - (0.5 + 0.5 * side) * left + (0.5 - 0.5 * side) * right,
+    start=lambda phi0: (-phi0, 0.0, -phi0, 0.0, 0.0),
     example={
         "tau": 1e-3, "I_l": 5e-5, "I_r": 5e-5, "phi0": 0.35, "c_l": 5e-5, "c_r": 5e-5, "stiffness": 1.0, "damper": 1e-3,
     },

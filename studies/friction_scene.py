@@ -5,19 +5,11 @@
 The mean of the friction over the way from switch to switch is a, whatever the depth.
 """
 
-from kernels.scene import Field, cos, scene_kernel
+from kernels.scene import Field, cos, pi, scene_kernel
 
 
 def rates(angle, speed, side, mu, phi0, a, depth, harmonic):
-    return speed, side * mu - a * (1.0 + depth * cos(harmonic * 3.141592653589793 * angle / phi0)) * speed
-
-
-def surface(angle, side, phi0):
-    return phi0 - side * angle
-
-
-def start(phi0):
-    return -phi0, 0.0
+    return speed, side * mu - a * (1.0 + depth * cos(harmonic * pi * angle / phi0)) * speed
 
 
 KERNEL = scene_kernel(
@@ -33,7 +25,7 @@ KERNEL = scene_kernel(
         Field("harmonic", "1", "its half waves from the middle to the switch", default=1.0, lower=0.0),
     ),
     rates=rates,
-    surface=surface,
-    start=start,
+    surface=lambda angle, side, phi0: phi0 - side * angle,
+    start=lambda phi0: (-phi0, 0.0),
     example={"mu": 1.0, "phi0": 1.0, "a": 1.0, "depth": 0.5},
 )

@@ -4,7 +4,6 @@
 
 in units of the critical current and of the time hbar/(2 e R I_c), so that phase' is the voltage; capacity is left out.
 On a Shapiro step the phase gains `order` turns a period of the drive, whatever the detuning.
-Source: Shapiro, Phys. Rev. Lett. 11:80 (1963); equation (1) is Stewart's and McCumber's of 1968 without capacity.
 """
 
 from kernels.cycle import cycle_kernel
@@ -13,18 +12,6 @@ from kernels.scene import Field, cos, pi, sin
 
 def rates(phase, order, detuning, ac, w, drive):
     return order * w + detuning + ac * w * cos(drive) - sin(phase), w
-
-
-def surface(drive):
-    return 2.0 * pi - drive
-
-
-def switch(phase):
-    return phase, 0.0
-
-
-def start():
-    return 0.0, 0.0
 
 
 KERNEL = cycle_kernel(
@@ -38,10 +25,10 @@ KERNEL = cycle_kernel(
         Field("w", "1/s", "frequency of the drive, times hbar/(2 e R I_c)", lower=0.0, open_lower=True),
     ),
     rates=rates,
-    surface=surface,
-    switch=switch,
-    start=start,
+    surface=lambda drive: 2.0 * pi - drive,
+    switch=lambda phase: (phase, 0.0),
+    start=lambda: (0.0, 0.0),
     turns={"phase": 2.0 * pi},
-    source="Shapiro, Phys. Rev. Lett. 11:80 (1963)",
+    source="Shapiro, Phys. Rev. Lett. 11:80 (1963); Stewart and McCumber (1968), without capacity",
     example={"order": 1, "detuning": 0.1, "ac": 1.0, "w": 2.0, "flips": 1},
 )

@@ -13,14 +13,6 @@ def rates(angle, speed, force, side, mu, a, b, eps):
     return speed, force - a * speed, (side * mu - b * speed - force) / eps
 
 
-def surface(angle, side, phi0):
-    return phi0 - side * angle
-
-
-def start():
-    return 0.0, 0.0, 0.0
-
-
 KERNEL = scene_kernel(
     name="lag_scene",
     doc="foliot driven by a motor whose current lags",
@@ -37,7 +29,7 @@ KERNEL = scene_kernel(
         Field("eps", "s", "lag of the drive", lower=0.0, open_lower=True),
     ),
     rates=rates,
-    surface=surface,
-    start=start,
+    surface=lambda angle, side, phi0: phi0 - side * angle,
+    start=lambda: (0.0, 0.0, 0.0),
     example={"mu": 1.0, "eps": 1e-6},
 )

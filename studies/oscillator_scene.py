@@ -1,8 +1,6 @@
 """A damped oscillator at a fixed step, followed for a time: whether its integrator makes it grow.
 
-    angle'' = -a angle' - w^2 angle                                                                        (1)
-
-Source: the linear test equation, Hairer & Wanner, Solving ODEs II, section IV.2.
+angle'' = -a angle' - w^2 angle                                                                        (1)
 """
 
 from kernels.interface import Field
@@ -11,14 +9,6 @@ from kernels.stepping import stepped_kernel
 
 def rates(angle, speed, clock, pace, a, w):
     return speed, -a * speed - w * w * angle, pace, 0.0
-
-
-def surface(clock, end):
-    return end - clock
-
-
-def start():
-    return 1.0, 0.0, 0.0, 1.0
 
 
 KERNEL = stepped_kernel(
@@ -36,8 +26,8 @@ KERNEL = stepped_kernel(
         Field("end", "s", "time to follow it", lower=0.0, open_lower=True),
     ),
     rates=rates,
-    surface=surface,
-    start=start,
+    surface=lambda clock, end: end - clock,
+    start=lambda: (1.0, 0.0, 0.0, 1.0),
     source="the linear test equation, Hairer & Wanner, Solving ODEs II, section IV.2",
     example={"a": 0.1, "w": 1.0, "end": 6.35, "flips": 1.0, "step": 0.1, "location": 0.0},
 )

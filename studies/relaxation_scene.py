@@ -3,7 +3,6 @@
     x'' - mu (1 - x^2) x' + x = 0                                                                       (1)
 
 Its cycle is a sine for small mu; for large mu x creeps along and then jumps.
-Source: van der Pol, Phil. Mag. 2:978 (1926).
 """
 
 from kernels.cycle import cycle_kernel
@@ -14,22 +13,14 @@ def rates(x, v, mu):
     return v, mu * (1.0 - x**2) * v - x
 
 
-def surface(x, side):
-    return side * x
-
-
-def start():
-    return 2.0, 0.0
-
-
 KERNEL = cycle_kernel(
     name="relaxation_scene",
     doc="limit cycle of van der Pol's oscillator",
     states=(Field("x", "1", "deflection"), Field("v", "1/s", "its rate")),
     parameters=(Field("mu", "1/s", "strength of the friction", lower=0.0, open_lower=True),),
     rates=rates,
-    surface=surface,
-    start=start,
+    surface=lambda x, side: side * x,
+    start=lambda: (2.0, 0.0),
     source="van der Pol, Phil. Mag. 2:978 (1926)",
     example={"mu": 1.0},
 )

@@ -3,7 +3,6 @@
     x'' + 2 zeta x' + x = F(belt - x'),    F(v) = sign(v) (1 + (still - 1) exp(-abs(v)/fall))              (1)
 
 in units of the mass, the spring and the friction at high speed. A cycle is counted where the mass turns back, x' = 0.
-Source: Stribeck, Z. VDI 46:1341 (1902).
 """
 
 from kernels.cycle import cycle_kernel
@@ -14,10 +13,6 @@ def rates(place, speed, belt, zeta, still, fall):
     slip = belt - speed
     friction = sign(slip) * (1.0 + (still - 1.0) * exp(-abs(slip) / fall))
     return speed, friction - place - 2.0 * zeta * speed
-
-
-def surface(speed, side):
-    return side * speed
 
 
 def start(belt, still, fall, zeta, size):
@@ -37,7 +32,7 @@ KERNEL = cycle_kernel(
         Field("size", "1", "how far from steady sliding it begins", default=2.0),
     ),
     rates=rates,
-    surface=surface,
+    surface=lambda speed, side: side * speed,
     start=start,
     source="Stribeck, Z. VDI 46:1341 (1902)",
     example={"belt": 0.2, "flips": 2},

@@ -25,10 +25,6 @@ def rates(angle, speed, wheel, side, tau, I_v, I_c, n, c_v, c_c, R_v, R_c):
     return speed, contact * pushed + flight * free, spin, -closing, 1.0 + 0.0 * side, drag, rubbing, back
 
 
-def surface(angle, gap, side, phi0):
-    return (0.5 + 0.5 * side) * (phi0 - angle) + (0.5 - 0.5 * side) * gap
-
-
 def switch(angle, speed, wheel, gap, clock, drag, rubbing, recoil, side, I_v, I_c, n, drop):
     contact, flight = 0.5 + 0.5 * side, 0.5 - 0.5 * side
     together = (n * I_c * wheel - I_v * speed) / (I_v + n**2 * I_c)
@@ -36,10 +32,6 @@ def switch(angle, speed, wheel, gap, clock, drag, rubbing, recoil, side, I_v, I_
         side * angle, contact * speed + flight * together, contact * wheel + flight * n * together,
         drop, contact * clock, contact * drag, contact * rubbing, contact * recoil,
     )  # fmt: skip
-
-
-def start(phi0, drop):
-    return -phi0, 0.0, 0.0, drop, 0.0, 0.0, 0.0, 0.0
 
 
 KERNEL = scene_kernel(
@@ -68,8 +60,8 @@ KERNEL = scene_kernel(
         Field("R_c", "N m", "dry friction of the wheel", default=0.0, lower=0.0),
     ),
     rates=rates,
-    surface=surface,
-    start=start,
+    surface=lambda angle, gap, side, phi0: (0.5 + 0.5 * side) * (phi0 - angle) + (0.5 - 0.5 * side) * gap,
+    start=lambda phi0, drop: (-phi0, 0.0, 0.0, drop, 0.0, 0.0, 0.0, 0.0),
     switch=switch,
     example={"tau": 1e-3, "I_v": 1e-4, "I_c": 1e-4, "n": 0.2, "phi0": 0.25, "drop": 0.001},
 )  # fmt: skip
