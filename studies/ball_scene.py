@@ -8,7 +8,6 @@ in units of the table's angular frequency w and of g/w^2, so that `push` is the 
 from kernels.scene import Field, cos, pi, sin
 from kernels.trajectory import section_kernel
 
-
 KERNEL = section_kernel(
     name="ball_scene",
     doc="ball at its bounces on a table that goes up and down",

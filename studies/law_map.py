@@ -2,12 +2,10 @@
 
     python studies/law_map.py law_map.h5
 
-By docs/theory/general_law.md, with the share lambda_n of friction of degree n in the energy of half a swing, that of
-impacts lambda_e, and N = sum of n lambda_n, large swings have s = (N + lambda_e)/(N + 2). (1) Small swings have
-s = 1/(N + 2 lambda_e); from rest after each impact, e = 0, with dry friction alone this is exact at any share of
-impacts, s = mu/(2 (mu - R)). (2) The ratio of the shares of two frictions goes as v^(n - n'), that of impacts to a
-friction as mu/v^n, and dlnv = (1 - s) dlnmu: with (1) this says how many decades of torque an exponent takes to turn
-into another. (3)
+By docs/theory/general_law.md, large swings have s = (N + lambda_e)/(N + 2), (1) small ones s = 1/(N + 2 lambda_e), (2)
+which is exact from rest after each impact, e = 0, with dry friction alone. The ratio of the shares of two frictions
+goes as v^(n - n'), that of impacts to a friction as mu/v^n, and dlnv = (1 - s) dlnmu: with (1) this says how many
+decades of torque an exponent takes to turn into another. (3)
 
 Here s = -dlnP/dlnmu. The shares are quadratures of the losses over the speed.
 """
@@ -22,19 +20,15 @@ from _losses import any_swing, of_quarter, quarter, shares
 
 LARGE, SMALL = 100.0, 1.0003
 """Amplitudes over phi0 from which, and up to which, losses are called light and heavy."""
-AT_ONCE = 4000
-"""Cells whose losses are summed up together: 6 MB an array."""
 SPEEDS = ["amplitude", "crossing_speed", "sensitivity"]
 """Outputs that shares of the losses are made of."""
 
 
 def prepared(ds: xr.Dataset) -> xr.Dataset:
     """`ds` with shares and what `any_swing` makes of them: (1) is `large`, (2) `small`."""
-    order = ds.sensitivity.dims
-    width = max(1, AT_ONCE * ds.sizes["mu"] // ds.sensitivity.size)
-    parts = [shares(ds.isel(mu=slice(i, i + width))) for i in range(0, ds.sizes["mu"], width)]
-    ds = xr.concat(parts, "mu", data_vars="minimal", coords="minimal", compat="override", join="outer")
-    return any_swing(ds).transpose(*order)
+    parts = [shares(ds.isel(mu=[i])) for i in range(ds.sizes["mu"])]  # some MB at a time
+    whole = xr.concat(parts, "mu", data_vars="minimal", coords="minimal", compat="override", join="outer")
+    return any_swing(whole).transpose(*ds.sensitivity.dims)
 
 
 def by_shares(n: float, other: float | None) -> float:
@@ -55,15 +49,12 @@ def all_over() -> xr.Dataset:
     Of energy 2 mu phi0 and speed v at the switch, viscous friction takes 2 a v^3/(3 mu), dry R v^2/mu and impacts
     (1 - e^2) v^2/2; with v^2 = 400 mu phi0 that says a, R and e for wanted shares, to the order of phi0 over the swing.
     """
-    wanted = [(i / 6, j / 6) for i in range(7) for j in range(7 - i) if (i, j) not in ((0, 0), (6, 0), (0, 6))]
+    wanted = [(i / 6, j / 6) for i in range(7) for j in range(7 - i) if 6 not in (i, j) and i + j]
     viscous, struck = np.array(wanted).T
     mu, speed = 1e4, math.sqrt(400e4)
-    losses = {
-        "a": 3.0 * viscous * mu**2 / speed**3,
-        "R": np.maximum(1.0 - viscous - struck, 0.0) * 2.0 * mu**2 / speed**2,
-        "e": np.sqrt(1.0 - struck * 4.0 * mu / speed**2),
-    }
-    return shares(solved("foliot", design="zip", **losses, mu=mu, c=0, n=3, phi0=1, rtol=1e-9, outputs=SPEEDS))
+    a, e = 3.0 * viscous * mu**2 / speed**3, np.sqrt(1.0 - struck * 4.0 * mu / speed**2)
+    R = np.maximum(1.0 - viscous - struck, 0.0) * 2.0 * mu**2 / speed**2
+    return shares(solved("foliot", design="zip", a=a, R=R, e=e, mu=mu, c=0, phi0=1, rtol=1e-9, outputs=SPEEDS))
 
 
 def claims(ds) -> Claims:
@@ -84,38 +75,25 @@ def claims(ds) -> Claims:
 
     yield "Width of the crossovers (25 to 75 %)"
     smooth, alone = ds.sensitivity.sel(n=3, a=1, R=0), [of_quarter(quarter(s, 1))[0] for s in (5 / 6, 1 / 2)]
-    known = (
-        (
-            "1 to 1/3, viscous, small to large swings",
-            smooth.sel(c=0, e=1),
-            (1.0, 1 / 3),
-            math.log10(alone[1] / alone[0]),
-        ),
-        ("1/3 to 1/2, viscous to impacts (e = .99)", smooth.sel(c=0, e=0.99), (1 / 3, 1 / 2), by_shares(1, None)),
-        ("1/3 to 3/5, viscous to drag of degree 3", smooth.sel(c=1e-6, e=1), (1 / 3, 3 / 5), by_shares(1, 3)),
-    )
-    for what, s, (start, end), theory in known:
+    for what, s, start, end, theory in (
+        ("1 to 1/3, viscous, small to large swings", smooth.sel(c=0, e=1), 1, 1 / 3, math.log10(alone[1] / alone[0])),
+        ("1/3 to 1/2, viscous to impacts (e = .99)", smooth.sel(c=0, e=0.99), 1 / 3, 1 / 2, by_shares(1, None)),
+        ("1/3 to 3/5, viscous to drag of degree 3", smooth.sel(c=1e-6, e=1), 1 / 3, 3 / 5, by_shares(1, 3)),
+    ):
         places = [last_passage(s.mu, s, start + part * (end - start)) for part in (0.25, 0.75)]
         width = abs(np.log10(places[1] / places[0]))
         yield compared(f"{what}: decades", f"{theory:.3f}", width, theory, 0.03)
 
 
+LAW = {"theory (1)": {"linewidth": 0.8}}
+
+
 @panel(Axis(), Axis(), "lower center", fontsize=7, borderaxespad=0)
-@panel(
-    Axis(r"$(N+\lambda_e)/(N+2)$ [1]", (0, 0.62)),
-    S.to(0, 1.0),
-    "upper left",
-    {"theory (1)": {"linewidth": 0.8}},
-    title=r"swing, $A/\varphi_0$",
-    markerscale=5,
-    ncols=2,
-)
+@panel(Axis(r"$(N+\lambda_e)/(N+2)$ [1]", (0, 0.62)), S.to(0, 1.0), "upper left", LAW, markerscale=5, ncols=2)
 @page(150.0, height_ratios=(1.05, 1))
 def figure(triangle, check, ds):
     """The law over shares, and against every cell."""
-    steps = 60
-    corner = np.array([(i / steps, j / steps) for i in range(steps + 1) for j in range(steps + 1 - i)])
-    viscous, struck = corner.T
+    viscous, struck = np.array([(i / 60, j / 60) for i in range(61) for j in range(61 - i)]).T
     s = (viscous + struck) / (viscous + 2)
     look = {"vmin": 0, "vmax": 0.5, "cmap": "cividis"}
     x, y = struck + 0.5 * viscous, viscous * math.sqrt(3) / 2
@@ -134,8 +112,8 @@ def figure(triangle, check, ds):
     bands = ((1.5, 3, "0.8"), (3, 10, COLOURS[5]), (10, 100, COLOURS[1]), (100, math.inf, COLOURS[0]))
     for low, high, colour in bands:
         part = ds.where((ds.swing > low) & (ds.swing <= high))
-        label = f"{low:g} to {high:g}" if math.isfinite(high) else f"over {low:g}"
-        look = {"color": colour, "markersize": 1.6, "rasterized": True, "label": label}
+        name = f"swing {low:g} to {high:g}" if math.isfinite(high) else f"swing over {low:g}"
+        look = {"color": colour, "markersize": 1.6, "rasterized": True, "label": name + r" $\varphi_0$"}
         check.plot(part.large.values.ravel(), part.sensitivity.values.ravel(), ".", **look)
     check.plot([0, 0.6], [0, 0.6], color="black", linewidth=0.8)
 

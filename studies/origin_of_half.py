@@ -7,13 +7,12 @@ docs/theory/origin_of_half.md has the theory of impacts. For any losses: where
     (ii)  every reset of speeds is of degree 1 in them (restitution, ratios of inertias), and
     (iii) every other force that depends on speed is of degree 2 in it (or there is none),
 the change t -> t/g, v -> g v, mu -> g^2 mu makes of every motion another, so P = C mu^(-1/2) exactly and the amplitude
-does not depend on the torque. That the exponent -1/2 at every torque needs (i) to (iii) is not claimed. The kernel
-solves such a foliot in units of its torque, so it can say nothing else: the exponents and prefactors of these mixtures
-are measured on `foliot_scene`, followed from rest in SI units, at rtol 1e-10.
+does not depend on the torque. The kernel solves such a foliot in units of its torque, so it can say nothing else: these
+exponents and prefactors are measured on `foliot_scene`, followed from rest in SI units.
 
-Here s = -dlnP/dlnmu. Proportional Coulomb friction changes with the drive: its exponent is that of differences of ln P,
-and s is at fixed R. Roup et al., Int. J. Control 76, 1685 (2003), and Denny, Eur. J. Phys. 23, 449 (2002), as Hoyng &
-Nieuwenhuizen, arXiv:1604.06681, report them, have mu^(-1/2).
+The exponent of proportional Coulomb friction is that of differences of ln P, since s = -dlnP/dlnmu is at fixed R. Roup
+et al., Int. J. Control 76, 1685 (2003), and Denny, Eur. J. Phys. 23, 449 (2002), as Hoyng & Nieuwenhuizen,
+arXiv:1604.06681, report them, have mu^(-1/2).
 """
 
 import itertools
@@ -26,30 +25,18 @@ from _figures import COLOURS, DASHES, SLOPE, TORQUE, page, panel
 
 import sweep
 
-E = 0.8
-"""Restitution of impacts."""
-RHO = 0.5
-"""R/mu of Coulomb friction in proportion to the drive."""
-FIXED = 0.5
-"""R [rad/s^2] of Coulomb friction of fixed strength."""
+E, RHO, FIXED = 0.8, 0.5, 0.5
+"""Restitution of impacts; R/mu of Coulomb friction in proportion to the drive; R [rad/s^2] of fixed one."""
 TORQUES = (1e-4, 1.0, 1e4)
 """Torques [rad/s^2] at which mixtures are followed in SI units."""
-LOSSES = {"impact": {"e": E}, "v^2": {"c": 1.0}, "viscous": {"a": 1.0}, "Coulomb ~ drive": {}, "Coulomb": {}}
-"""Parameters of the kernels; Coulomb friction is in proportion to the drive or fixed."""
-MIXTURES = {
-    " + ".join(names): set(names)
-    for number in range(1, len(LOSSES))
-    for names in itertools.combinations(LOSSES, number)
-    if names[-2:] != ("Coulomb ~ drive", "Coulomb")
-}
-"""Names of the losses by the name of each mixture."""
-OTHERS = {name for name, names in MIXTURES.items() if names & {"viscous", "Coulomb"}}
-"""Mixtures for which (i) to (iii) do not hold."""
-KERNELS = {
-    name: dict(itertools.chain({"e": 1.0, "c": 0.0, "a": 0.0}.items(), *(LOSSES[x].items() for x in names)))
-    for name, names in MIXTURES.items()
-}
-"""Their parameters, without Coulomb friction."""
+MIXTURES = [
+    " + ".join(some)
+    for number in range(1, 5)
+    for some in itertools.combinations(("impact", "v^2", "viscous", "Coulomb ~ drive", "Coulomb"), number)
+    if some[-2:] != ("Coulomb ~ drive", "Coulomb")
+]
+HALF = [m for m in MIXTURES if "viscous" not in m and not m.endswith("Coulomb")]
+"""Those for which (i) to (iii) hold."""
 SHOWN = {
     "viscous": r"viscous, $a\dot\varphi$",
     "Coulomb": r"Coulomb, $R = \frac{1}{2} a^2 \varphi_0$",
@@ -60,9 +47,14 @@ SHOWN = {
 }
 
 
+def without_coulomb(mixture: str) -> dict[str, float]:
+    """The parameters of its other losses."""
+    return {"e": E if "impact" in mixture else 1.0, "c": float("v^2" in mixture), "a": float("viscous" in mixture)}
+
+
 def part(ds: xr.Dataset, mixture: str) -> xr.Dataset:
     """The cells of a mixture along mu, those without a cycle left out; `slope` is its local exponent."""
-    line = ds.sel(KERNELS[mixture])
+    line = ds.sel(without_coulomb(mixture))
     if "Coulomb ~ drive" in mixture:
         along = xr.DataArray(line.R.values[1:], dims="mu")
         line = line.sel(R=along, mu=along / RHO, method="nearest")
@@ -74,19 +66,16 @@ def part(ds: xr.Dataset, mixture: str) -> xr.Dataset:
 
 def claims(ds) -> Claims:
     yield "Exponent -1/2 at every torque"
-    # the mixtures that meet (i) to (iii) are followed in SI units
-    half = [m for m in MIXTURES if m not in OTHERS]
-    cells = [(m, x) for m in half for x in TORQUES]
-    axes = {name: [KERNELS[m][name] for m, _ in cells] for name in ("e", "c")} | {"mu": [x for _, x in cells]}
-    dry = [{"Coulomb ~ drive": RHO * x, "Coulomb": FIXED}.get(m.split(" + ")[-1], 0.0) for m, x in cells]
-    ds_si = solved("foliot_scene:KERNEL", design="zip", **axes, R=dry, phi0=1, flips=120, rtol=1e-10)
-    both = {"period": 2 * ds_si.interval, "speed": abs(ds_si.speed)}
-    grid = {name: (("mixture", "mu"), x.values.reshape(len(half), -1)) for name, x in both.items()}
-    found = xr.Dataset(grid, {"mixture": half, "mu": list(TORQUES)})
-    for mixture in half:
+    cells = [(without_coulomb(m), RHO * x if "Coulomb" in m else 0.0, x) for m in HALF for x in TORQUES]
+    losses, dry, mu = zip(*cells, strict=True)
+    axes = {"mu": mu, "R": dry} | {name: [cell[name] for cell in losses] for name in ("e", "c")}
+    rest = solved("foliot_scene:KERNEL", design="zip", **axes, phi0=1, flips=120, rtol=1e-10)
+    both = {"period": 2 * rest.interval, "speed": abs(rest.speed)}
+    grid = {name: (("mixture", "mu"), x.values.reshape(len(HALF), -1)) for name, x in both.items()}
+    found = xr.Dataset(grid, {"mixture": HALF, "mu": list(TORQUES)})
+    for mixture in HALF:
         line = found.sel(mixture=mixture)
-        slopes = np.diff(np.log(line.period)) / np.diff(np.log(line.mu))
-        off, energy = float(abs(slopes + 0.5).max()), line.speed**2 / line.mu
+        off, energy = float(abs(sweep.local_exponent(line.period, "mu") + 0.5).max()), line.speed**2 / line.mu
         spread = float(energy.max() / energy.min() - 1)
         here = f"-1/2 off by at most; A's spread {spread:.0e}"
         yield Statement(mixture, "-1/2, A constant", here, off, off < 1e-8 and spread < 1e-8)
@@ -105,11 +94,10 @@ def claims(ds) -> Claims:
         yield compared(f"{mixture}: P (mu/phi0)^(1/2)", f"{text} = {value:.8g}", period, value, 1e-8)
 
     yield "Other exponents"
-    others = {m: part(ds, m) for m in MIXTURES if m in OTHERS}
-    greatest = {name: float(abs(line.slope + 0.5).max()) for name, line in others.items()}
-    nearest = min(greatest, key=lambda name: greatest[name])
-    least, last = greatest[nearest], {name: float(line.slope[-1]) for name, line in others.items()}
-    of_two = [name for name in others if MIXTURES[name] & {"impact", "v^2", "Coulomb ~ drive"}]
+    others = {m: part(ds, m) for m in MIXTURES if m not in HALF}
+    least, nearest = min((float(abs(line.slope + 0.5).max()), name) for name, line in others.items())
+    last = {name: float(line.slope[-1]) for name, line in others.items()}
+    of_two = [name for name in others if any(loss in name for loss in ("impact", "v^2", "~ drive"))]
     farthest = max(of_two, key=lambda name: abs(last[name] + 0.5))
     exact = [part(ds, m) for m in MIXTURES if "Coulomb" not in m]
     off = max(float(abs(sweep.local_exponent(line.period, "mu") - line.slope).max()) for line in exact)

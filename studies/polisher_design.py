@@ -2,19 +2,16 @@
 
     python studies/polisher_design.py polisher_design.h5
 
-For each b, d, f the crank e that makes the amplitude A1 is found between two cranks of the sweep. A machine of that
-amplitude exists where A1 passes it before the crank locks; at the border eta_minus = 0 or eta_plus = 180 degree, so
-that sin^2 A1 = e f/(b d) with e = d+f-b, b+f-d or b+d-f. For the figure the crank is the root of an equation of second
-degree in e^2, so that no grid of cranks is seen in it.
+For each b, d, f the crank e that makes the amplitude A1 is found between two cranks of the sweep, for the figure as a
+root. A machine of that amplitude exists where A1 passes it before the crank locks; at the border eta_minus = 0 or
+eta_plus = 180 degree, so that sin^2 A1 = e f/(b d) with e = d+f-b, b+f-d or b+d-f.
 
-The distortion is the root of the sum of squares of the harmonics from the second on, over the first; the best is the
-least over f. The paper's machine holds if it runs well, and each of the others if it has less distortion than the one
-before. The transmission angle is the least angle of coupler and arm over the turn; below 40 degree a linkage is held to
-run badly.
+The distortion is the root of the sum of squares of the harmonics from the second on, over the first. The paper's
+machine holds if it runs well, and each of the others if it has less distortion than the one before. The transmission
+angle is the least angle of coupler and arm over the turn; below 40 degree a linkage is held to run badly.
 """
 
 import math
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -26,53 +23,42 @@ ARM = 0.38
 """The arm whose machines are mapped [m]."""
 PAPER = {"b": 0.6201, "f": 0.405}
 """The paper's machine with that arm [m]."""
-FINE = 2e-3
-"""Steps of the figure along motor and coupler [m]."""
 
 
-def of_amplitude(ds: xr.Dataset, wanted: float = WANTED) -> xr.Dataset:
-    """Machines of one amplitude over d, b and f: every output, and the crank `e`, between two cranks of the sweep."""
-    above = wanted <= ds.A1
+def of_amplitude(ds: xr.Dataset) -> xr.Dataset:
+    """Machines of the amplitude over d, b and f: every output, and the crank `e`, between two cranks of the sweep."""
+    above = ds.A1 >= WANTED
     n = above.argmax("e")
     there = above.any("e") & (n > 0)
     n = n.where(there, 1)
     low, high = ds.A1.isel(e=n - 1), ds.A1.isel(e=n)
-    share = (wanted - low) / (high - low)
+    share = (WANTED - low) / (high - low)
     full = ds[["thd", "transmission_angle"]].assign(crank=ds.e.broadcast_like(ds.A1))
     made = full.isel(e=n - 1) * (1 - share) + full.isel(e=n) * share
     return made.where(there).drop_vars("e").transpose("d", "b", "f")
 
 
-def to_spare(b, d, f, wanted: float = WANTED) -> tuple[Any, Any]:
-    """The longest crank that turns, and whether the amplitude is passed before it locks."""
+def exists(b, d, f):
+    """Whether the amplitude is passed before the longest crank that turns locks."""
     longest = np.minimum(np.minimum(d + f - b, b + f - d), b + d - f)
-    return longest, (longest * f > b * d * math.sin(wanted) ** 2) & (longest > 0)
+    return (longest * f > b * d * math.sin(WANTED) ** 2) & (longest > 0)
 
 
-def crank_of(b, d, f, wanted: float = WANTED):
-    """The crank of one amplitude, where one reaches it.
+def exactly(ds: xr.Dataset, d: float) -> xr.Dataset:
+    """The machines of one arm, as `of_amplitude`, in steps of 2 mm, with the root of their crank.
 
     cos(A0 +- A1) = (b^2 + d^2 - (f +- e)^2)/(2 b d): sum and difference give cos A0 and sin A0, and the sum of their
     squares an equation of second degree in e^2.
     """
-    q = b * b + d * d - f * f
-    half = q - 2 * (f / math.tan(wanted)) ** 2
-    rest = (2 * b * d * math.cos(wanted)) ** 2 - q * q
-    return np.sqrt(rest / (np.sqrt(half * half + rest) - half))
-
-
-def machines_on(b, d: float, f) -> xr.Dataset:
-    """The machines of the wanted amplitude over b and f, as `of_amplitude`, with the crank of `crank_of`."""
-    motor, coupler = np.meshgrid(b, f, indexing="ij")
-    there = to_spare(motor, d, coupler)[1]
-    axes = {"b": motor[there], "f": coupler[there], "e": crank_of(motor[there], d, coupler[there])}
-    found = solved("polisher", design="zip", outputs=["thd", "transmission_angle"], rtol=1e-6, d=d, **axes)
-    made = xr.Dataset(coords={"b": b, "f": f, "d": d})
-    for name, values in {"crank": axes["e"], "thd": found.thd, "transmission_angle": found.transmission_angle}.items():
-        whole = np.full(there.shape, math.nan)
-        whole[there] = values
-        made[name] = (("b", "f"), whole)
-    return made
+    fine = {name: np.arange(float(ds[name][0]), float(ds[name][-1]) + 1e-9, 2e-3) for name in ("b", "f")}
+    b, f = xr.broadcast(*(xr.DataArray(x, {name: x}) for name, x in fine.items()))
+    q = (b * b + d * d - f * f).where(exists(b, d, f))
+    half = q - 2 * (f / math.tan(WANTED)) ** 2
+    rest = (2 * b * d * math.cos(WANTED)) ** 2 - q * q
+    crank = np.sqrt(rest / (np.sqrt(half * half + rest) - half)).stack(cell=("b", "f")).dropna("cell")
+    lengths = {"b": crank.b.values, "d": d, "f": crank.f.values, "e": crank.values}
+    found = solved("polisher", design="zip", outputs=["thd"], rtol=1e-6, **lengths)
+    return xr.Dataset({"crank": crank, "thd": crank.copy(data=found.thd.values)}).unstack("cell").reindex(fine)
 
 
 def best(machines: xr.Dataset) -> xr.Dataset:
@@ -84,7 +70,7 @@ def best(machines: xr.Dataset) -> xr.Dataset:
 def claims(ds) -> Claims:
     machines = of_amplitude(ds)
     yield "Machines of 15 degree"
-    within = to_spare(machines.b, machines.d, machines.f)[1].transpose("d", "b", "f")
+    within = exists(machines.b, machines.d, machines.f).transpose("d", "b", "f")
     found = machines.thd.notnull()
     yield never("machines beyond the border", found & ~within)
     yield held("of those within it, in the sweep's cranks", found.sum() / within.sum(), "> 1/2", "{:.1%}")
@@ -121,14 +107,14 @@ MOTOR = Axis("motor from pivot, $b$ [mm]")
 @page(156.0, height_ratios=(1.5, 1))
 def figure(plane, best_of, ds):
     """Distortion over motor and coupler, with the border of lock-up and the crank; the best coupler."""
-    b, f = (np.arange(float(x[0]), float(x[-1]) + 1e-9, FINE) for x in (ds.b, ds.f))
-    arms = {float(d): machines_on(b, float(d), f) for d in ds.d.values}
-    for k, (d, arm) in enumerate(arms.items()):
-        best_of.plot(1e3 * b, 100 * best(arm).thd, label=f"$d={1e3 * d:.0f}$ mm", color=COLOURS[k], linestyle=DASHES[k])
-    arm = next(arm for d, arm in arms.items() if abs(d - ARM) < 1e-9)
-    x, y, thd, top = 1e3 * b, 1e3 * f, 100 * arm.thd.transpose("f", "b").values, best(arm)
+    arms = [exactly(ds, float(d)) for d in ds.d]
+    for arm, d, colour, dashes in zip(arms, ds.d.values, COLOURS, DASHES, strict=False):
+        look = {"label": f"$d={1e3 * d:.0f}$ mm", "color": colour, "linestyle": dashes}
+        best_of.plot(1e3 * arm.b, 100 * best(arm).thd, **look)
+    arm = arms[int(abs(ds.d - ARM).argmin())].transpose("f", "b")
+    x, y, thd, top = 1e3 * arm.b.values, 1e3 * arm.f.values, 100 * arm.thd.values, best(arm)
     colour_map(plane, x, y, thd, *MAP, norm=LogNorm(2, 40), cmap="cividis_r")
-    e, where = 1e3 * arm.crank.transpose("f", "b").values, [(275, 330), (350, 330)]
+    e, where = 1e3 * arm.crank.values, [(275, 330), (350, 330)]
     contours(plane, x, y, e, [70, 90], linewidths=0.6, fmt="$e$ = %g mm", fontsize=8, manual=where)
     hatch(plane, x, y, np.isnan(thd), "////")
     plane.plot(x, 1e3 * top.f.where(top.thd.notnull()), "k--", linewidth=0.9, label="least distortion")

@@ -2,23 +2,17 @@
 
     python studies/polisher_robust.py polisher_robust.h5
 
-By docs/theory/polishing.md, with h_i(r) the profile of setting i over its own mean, t_i >= 0 its share of the wear, of
-sum 1, and each time of dwell off by a factor 1 + delta z_i, the square of the unevenness to be expected is
+By docs/theory/polishing.md the square of the unevenness to be expected of shares t_i of settings with profiles h_i,
     U^2 = |sum of t_i h_i - 1|^2 + delta^2 sum of t_i^2 |h_i - 1|^2,                                                 (1)
-what is left with exact times, and what errors add. Both are squares that are linear in t, so the t >= 0 that make U
-least are found by non-negative least squares at once. The best set of k settings is that of all pairs and threes, and
-of more it is looked for by exchanging one setting at a time, from 25 starts.
-
-The unevenness is the standard deviation over the area, over the mean; the expected one is the root of its mean square.
+is what is left with exact times, and what errors add; non-negative least squares make it least at once. The best set of
+k settings is that of all pairs and threes, and of more it is looked for by exchanging one setting at a time, from 25
+starts. The unevenness is the standard deviation over the area, over the mean; the expected one a root of mean squares.
 """
 
 import numpy as np
 from _common import Claims, Statement, compared, held, most, said, script
 from _figures import COLOURS, Axis, page, panel, points
 from _polishing import DWELL, KEPT, WANTED, fewest, of_sets, profiles, reached
-
-FEWEST = [4, 5, 7, 9]
-"""Settings for 2, 1.5, 1.2 and 1 %; of three and four all sets were tried, for more there may be better ones."""
 
 
 def claims(p, sets) -> Claims:
@@ -32,21 +26,21 @@ def claims(p, sets) -> Claims:
         what = f"least {name}, {np.sum(times > 1e-9)} settings: {nominal:.2%} with exact times, with errors"
         yield compared(what, f"(1) {theory:.3%}", here, theory, 0.03)
         yield Statement("  19 of 20 pieces below", "", f"{below:.2%}")
-    yield held(
-        "  the one over the other", p.expected(everything, exact) / p.expected(everything, robust), "> 1.2", "{:.3f}"
-    )
+    ratio = p.expected(everything, exact) / p.expected(everything, robust)
+    yield held("  the one over the other", ratio, "> 1.2", "{:.3f}")
 
     yield "Few settings"
     for n, chosen in sets.items():
         nominal, best = p.nominal(chosen, p.times(chosen)), p.best(chosen)
         yield Statement(f"{n} settings: with exact times, with errors", "", f"{nominal:.2%}, {best:.3%}")
     needed, kept, drawn = reached(p, sets)
-    exact, wanted = p.expected(everything, p.times(everything, 0.0)), ", ".join(f"{100 * x:g}" for x in WANTED)
-    equal = min(n for n, chosen in sets.items() if p.best(chosen) < exact)
+    known = [4, 5, 7, 9]  # of three and four all sets were tried, for more there may be better ones
+    wanted = ", ".join(f"{100 * x:g}" for x in WANTED)
+    equal = min(n for n, chosen in sets.items() if p.best(chosen) < p.expected(everything, exact))
     off = max(abs(float(of_sets(p, chosen)) / p.best(chosen) - 1.0) for chosen in sets.values())
     yield most("  errors drawn: largest deviation from (1)", "3 %", drawn, 0.03)
     yield held("  fewest that are as good as the best for exact times", equal, "< 11", "{:.0f}")
-    yield said(f"  fewest for {wanted} % with errors", needed == FEWEST, ", ".join(map(str, needed)), f"{FEWEST}")
+    yield said(f"  fewest for {wanted} % with errors", needed == known, ", ".join(map(str, needed)), f"{known}")
     yield held("  least wear of the inner half of each", kept, f"> {KEPT}", "{:.2f} or more")
     yield most("  the least square of each set, by non-negative least squares", "0", off, 1e-9)
 
@@ -71,10 +65,4 @@ def figure(number, errors, p, sets):
     errors.plot(100 * delta, best, "k--", linewidth=0.8, label="all settings, best for each error")
 
 
-def prepared(ds):
-    """Profiles of all settings, and the best few of them."""
-    p = profiles(ds)
-    return p, fewest(p)
-
-
-main = script(__name__, "polisher_robust.h5", claims, figure, prepared)
+main = script(__name__, "polisher_robust.h5", claims, figure, lambda ds: (p := profiles(ds), fewest(p)))

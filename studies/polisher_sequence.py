@@ -15,10 +15,10 @@ from _figures import COLOURS, Axis, colour_map, page, panel
 from _polishing import KEPT, area, best_settings, least, machine, profiles, unevenness
 from scipy.optimize import brentq
 
-TOOLS = (
+TOOLS = np.array([
     (2, 2, 1, 1), (2, 2, 1, 2), (1, 1, 1, 2), (0.5, 0.5, 1, 2), (100, 100, 1, 2),
     (2, 1, 1, 2), (2, 0.5, 1, 2), (2, 8, 1, 2),
-)  # fmt: skip
+])  # fmt: skip
 """n, m, a, b of the paper's figure 5, abs(X/a)^n + abs(Y/b)^m <= 1: five known tools, three unknown ones."""
 
 
@@ -39,7 +39,7 @@ def claims(ds, p, shares) -> Claims:
         yield Statement(f"  {shares[i]:.0%} of the wear at", "", f"e = {e:g} cm, offset {offset:.0f} cm")
 
     yield "The eight tools at e = 10 cm, offset 3 cm"
-    n, m, a, b = np.array(TOOLS).T
+    n, m, a, b = TOOLS.T
     sizes = {"tool_n": n, "tool_m": m, "tool_a": 0.04 * a, "tool_b": 0.04 * b}
     given, along = machine(ds) | sizes | {"e": 0.1, "w_x": float(ds.w_x[3])}, {"radius": ds.radius.values}
     worn = solved("polisher_wear", design="zip", along=along, rtol=1e-5, **given).wear.values
@@ -81,8 +81,7 @@ def figure(profile, share, ds, p, shares):
 
 def prepared(ds):
     """The sweep, its profiles, and the shares of the most even sequence."""
-    p = profiles(ds)
-    return ds, p, p.times(range(len(p.rows)), 0.0)
+    return ds, (p := profiles(ds)), p.times(range(len(p.rows)), 0.0)
 
 
 main = script(__name__, "polisher_sequence.h5", claims, figure, prepared)

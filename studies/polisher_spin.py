@@ -6,12 +6,9 @@ By docs/theory/polishing.md, a point of the work at w + r n moves under a disc a
 rate k Omega, Omega that of the work about w, with
     v = J ((alpha' - k Omega) c + k Omega w + (k - 1) Omega r n),                                             (1)
 J a right angle; rigid on the arm it turns as the arm does. A free tool turns as the work, k = 1, while it lies wholly
-on the work. Times of dwell, their errors and the unevenness to be expected are those of `polisher_robust`. Where it
-hangs over the rim a free tool turns otherwise, which is left out here, as is friction of its bearing.
-
-The unevenness is the standard deviation over the area, over the mean; the expected one has errors of 5 % of the times
-of dwell, and 4000 are drawn. Wear is compared from 2 mm on, with 720 crank angles. Sets of up to three settings are the
-best of all; larger ones are what exchanging finds from 25 starts.
+on the work. Where it hangs over the rim it turns otherwise, which is left out here, as is friction of its bearing.
+Times of dwell, their errors, the unevenness and the search for settings are those of `polisher_robust`. Wear is
+compared from 2 mm on, with 720 crank angles.
 """
 
 import numpy as np
@@ -21,8 +18,6 @@ from _figures import COLOURS, DASHES, Axis, page, panel
 from _polishing import KEPT, WANTED, Profiles, disc_points, fewest, of_machine, profiles, reached, swings, tool_wear
 from scipy.optimize import brentq
 
-NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
-"""Of an arc of contact, from -1 to 1."""
 SPINS = {"as the work": 1.0, "5 times": 5.0, "20 times": 20.0}
 """k of the tools whose sets of settings are looked for."""
 FEWEST = {
@@ -30,24 +25,20 @@ FEWEST = {
     "20 times": ([3, 4, 5, 5], 0.410),
 }  # fmt: skip
 """Settings for `WANTED`, and what all settings reach [%], by twice as many crank angles."""
-MORE = (-20.0, -10.0, -5.0, -2.0, 0.0, 2.0, 10.0)
-"""k of further ones that are drawn."""
 
 
 def wear(ds: xr.Dataset, motion: xr.Dataset, w: float, k: float | None, radius):
     """Mean wear of rings [m/s] by (1), over the arc of each that the disc covers, at one throw; k None: rigid."""
     a, work, rate = float(ds.tool_a), float(ds.Omega), motion.alpha_rate.values
-    turn = rate if k is None else k * work + 0 * rate
-    centre = float(ds.L) * np.exp(1j * motion.alpha.values)
+    turn, centre = rate if k is None else k * work + 0 * rate, float(ds.L) * np.exp(1j * motion.alpha.values)
     way = abs(centre - w)[:, None]
     ahead = ((rate - turn) * centre + turn * w) * np.exp(-1j * np.angle(centre - w))  # from the work's centre on
-    with np.errstate(divide="ignore", invalid="ignore"):
-        cosine = (radius**2 + way**2 - a * a) / (2 * radius * way)
-    half = np.where(radius > 0, np.arccos(np.clip(cosine, -1, 1)), np.where(way < a, np.pi, 0.0))
-    touched, speed = half > 0.0, np.zeros(half.shape)
-    around = ((turn - work)[:, None] * radius)[touched][:, None] * np.exp(1j * half[touched][:, None] * NODES)
-    met = ahead[np.nonzero(touched)[0]][:, None] + around
-    speed[touched] = np.sqrt(met.real**2 + met.imag**2) @ WEIGHTS
+    cosine = (radius**2 + way**2 - a * a) / (2 * np.maximum(radius, 1e-9) * way)
+    half = np.arccos(np.clip(cosine, -1, 1))
+    speed, (angle, ring) = np.zeros(half.shape), np.nonzero(half)
+    nodes, weights = np.polynomial.legendre.leggauss(8)
+    around = ((turn - work)[angle] * radius[ring])[:, None] * np.exp(1j * half[angle, ring][:, None] * nodes)
+    speed[angle, ring] = abs(ahead[angle][:, None] + around) @ weights
     return float(ds.preston * ds.pressure) * (speed * half).mean(0) / (2 * np.pi)
 
 
@@ -60,27 +51,15 @@ def spun(ds: xr.Dataset, k: float | None) -> Profiles:
 
 
 @of_machine
-def sets_of(ds: xr.Dataset, k: float) -> dict[int, list[int]]:
-    """Its best sets of settings (`fewest`)."""
-    return fewest(spun(ds, k))
-
-
-def free_turn(ds: xr.Dataset, pace: float) -> float:
-    """k at which friction has no moment about the centre of a disc on the work, that moves over it with a speed."""
-    places, share = disc_points(float(ds.tool_a))
-
-    def moment(k: float) -> float:
-        v = pace + 1j * (k - 1) * float(ds.Omega) * places
-        return float(((np.conj(places) * v / abs(v)).imag * share).sum())
-
-    return brentq(moment, -3, 6)
+def spun_sets(ds: xr.Dataset) -> dict[str, dict[int, list[int]]]:
+    """The best sets of settings (`fewest`) of those that spin."""
+    return {name: fewest(spun(ds, k)) for name, k in SPINS.items()}
 
 
 def prepared(ds):
     """The sweep, and by tool the profiles of all settings and the best few of them."""
     tools = {"rigid": profiles(ds)} | {name: spun(ds, k) for name, k in SPINS.items()}
-    sets = {"rigid": fewest(tools["rigid"])} | {name: sets_of(ds, k) for name, k in SPINS.items()}
-    return ds, tools, sets
+    return ds, tools, {"rigid": fewest(tools["rigid"])} | spun_sets(ds)
 
 
 def claims(ds, tools, sets) -> Claims:
@@ -97,7 +76,13 @@ def claims(ds, tools, sets) -> Claims:
         ring = wear(ds, motion.isel(e=0), float(work.w_x), k, fine)
         here = 2 * np.pi * np.trapezoid(ring * fine, fine)
         yield compared(f"turns {name}: wear in all by the tool's points", f"{theory:.5g}", here, theory, 2e-3)
-    yield differing("free disc wholly on the work: k", "1", free_turn(ds, 0.3), 1.0, 1e-6)
+    # friction has no moment about the centre of a free disc on the work, here at 0.3 m/s
+
+    def moment(k: float) -> float:
+        v = 0.3 + 1j * (k - 1) * float(ds.Omega) * places
+        return float(((np.conj(places) * v / abs(v)).imag * share).sum())
+
+    yield differing("free disc wholly on the work: k", "1", brentq(moment, -3, 6), 1.0, 1e-6)
 
     yield "Few settings"
     wanted, errors = ", ".join(f"{100 * x:g}" for x in WANTED), []
@@ -119,7 +104,7 @@ def figure(number, spin, ds, tools, sets):
     for colour, dash, (name, p) in zip(COLOURS, DASHES, tools.items(), strict=False):
         few, look = sets[name], {"linestyle": dash, "markersize": 3, "color": colour, "label": name}
         number.plot(list(few), [100 * p.best(s) for s in few.values()], "o", **look)
-    turns = sorted({*MORE, *SPINS.values()})
+    turns = (-20.0, -10.0, -5.0, -2.0, 0.0, 1.0, 2.0, 5.0, 10.0, 20.0)
     for delta, look, colour in ((0.05, "o-", COLOURS[0]), (0.0, "s--", COLOURS[1])):
         made = [(p, p.times(range(len(p.rows)), delta)) for p in (spun(ds, k) for k in turns)]
         found = [100 * p.expected(range(len(p.rows)), times, delta) for p, times in made]

@@ -3,12 +3,9 @@
     python studies/polisher_wear.py polisher_wear.h5 polisher_wear_load.h5
 
 The unevenness of a profile is the standard deviation of the wear over the area of the workpiece, over its mean; 0 is
-even. It weighs by area, so it hardly sees a middle that the tool never reaches: the least wear of the inner half of
-the radius over the mean is told beside it, and below a half of the mean the workpiece is said to have a hole.
-
-The optimum is over throw and offset, not on the grid. The offset is how much farther from the pivot the workpiece's
-centre lies than the tool's. The places of tool and workpiece, the rates, the pressure and Preston's coefficient are
-chosen here.
+even. It hardly sees a middle that the tool never reaches: where the least wear of the inner half of the radius is below
+half of the mean, the workpiece is said to have a hole. The offset is how much farther from the pivot the workpiece's
+centre lies than the tool's. The places of both, the rates, the pressure and Preston's coefficient are chosen here.
 """
 
 import numpy as np
@@ -17,11 +14,8 @@ from _common import Claims, compared, held, said, script
 from _figures import COLOURS, Axis, colour_map, contours, hatch, page, panel
 from _polishing import KEPT, POINTS, area, best_settings, disc, least, unevenness
 
-UM_PER_HOUR = 3.6e9
-"""1 m/s."""
-CM, MM = 100.0, 1000.0
-PROFILES = (0.50, 0.54, 0.56, 0.58)
-"""Workpiece centres [m] whose profiles are drawn."""
+UM_PER_HOUR, CM, MM = 3.6e9, 100.0, 1000.0
+"""1 m/s; 1 m."""
 USUAL = 0.10
 """Eccentricity [m] of the profiles."""
 SHAPES = {"disc": (2, 0.04), "ellipse": (2, 0.08), "rhombus 1:2": (1, 0.08), "rhombus 1:1": (1, 0.04)}
@@ -30,13 +24,10 @@ SHAPES = {"disc": (2, 0.04), "ellipse": (2, 0.08), "rhombus 1:2": (1, 0.08), "rh
 
 def scaled(ds: xr.Dataset) -> xr.Dataset:
     """`ds` with the mean over the area, the unevenness and the least wear of the inner half over the mean."""
-    weight, wear = area(ds.radius), ds.wear.transpose(..., "radius")
-    cells = ds.status.dims
-    return ds.assign(
-        average=(ds.wear * xr.DataArray(weight, dims="radius")).sum("radius"),
-        uneven=(cells, unevenness(wear.values, weight)),
-        least=(cells, least(wear.values, weight, ds.radius.values)),
-    )
+    weight, wear, cells = area(ds.radius), ds.wear.transpose(..., "radius").values, ds.status.dims
+    found = {"uneven": unevenness(wear, weight), "least": least(wear, weight, ds.radius.values)}
+    found["average"] = (wear * weight).sum(-1)
+    return ds.assign({name: (cells, values) for name, values in found.items()})
 
 
 def tool(ds: xr.Dataset, name: str) -> xr.Dataset:
@@ -53,24 +44,8 @@ def least_uneven(ds: xr.Dataset, *over: str, hole: bool = False) -> xr.Dataset:
 
 def described(cell: xr.Dataset) -> str:
     """Unevenness, place and hole of a cell."""
-    place = f"{100 * float(cell.uneven):.1f} % at e = {CM * float(cell.e):g} cm, "
-    return f"{place}offset {CM * float(cell.w_x - cell.L):.3g} cm, least {float(cell.least):.2f}"
-
-
-def one_setting(ds: xr.Dataset) -> Claims:
-    """What one setting of a disc does at best, and the most even of the grid, over e and w_x, solved again."""
-    (bored, best), wear, place = best_settings(ds), disc(ds), float(ds.L)
-    fine = np.linspace(0.0, float(ds.radius[-1]), POINTS)
-    around = np.meshgrid(best.e + np.linspace(-0.01, 0.01, 11), place + best.offset + np.linspace(-4e-3, 1e-3, 21))
-    rows = wear(*around)
-    uneven = unevenness(rows, area(fine))[least(rows, area(fine), fine) >= KEPT].min()
-    found = least_uneven(ds, "e", "w_x", hole=True)
-    profile = np.asarray(wear(float(found.e), float(found.w_x)))[:: (POINTS - 1) // (ds.radius.size - 1)]
-    again, near = float(unevenness(profile, area(ds.radius))), bored.uneven < best.uneven < 1.1 * bored.uneven
-    yield said("disc, one setting, optimised: the most even has a hole", bored.least < KEPT, str(bored))
-    yield said("disc, one setting, optimised, without a hole", near, str(best))
-    yield held("  best of 231 settings around it, over that", uneven / best.uneven, "1 to 1.01", "{:.4f}")
-    yield compared("disc, most even setting of the grid, solved again", f"{again:.5f}", found.uneven, again, 1e-4)
+    offset = CM * float(cell.w_x - cell.L)
+    return f"{cell.uneven:.1%} at e = {CM * cell.e:g} cm, offset {offset:.3g} cm, least {cell.least:.2f}"
 
 
 def claims(ds, load) -> Claims:
@@ -87,15 +62,25 @@ def claims(ds, load) -> Claims:
     round_tool = ds.sel(tool_n=2).isel(tool_b=0)
     aligned, lost = (round_tool[name].isel(w_x=0) for name in ("uneven", "average"))
     even = aligned.isel(e=int(aligned.argmin("e")))
-    here = f"{100 * float(aligned[0]):.0f} % at 2 cm, least {100 * float(even):.0f} % at {CM * float(even.e):g} cm"
-    text = f"{UM_PER_HOUR * float(lost[0]):.3g} at 2 cm, at most {UM_PER_HOUR * float(lost.max()):.3g}"
+    here = f"{aligned[0]:.0%} at 2 cm, least {even:.0%} at {CM * even.e:g} cm"
+    text = f"{UM_PER_HOUR * lost[0]:.3g} at 2 cm, at most {UM_PER_HOUR * lost.max():.3g}"
     yield said("disc, no offset: throw halves the unevenness", even < 0.5 * aligned[0], here)
-    yield from one_setting(round_tool)
+    # one setting at best, and the most even of the grid solved again
+    (bored, best), wear, fine = best_settings(round_tool), disc(ds), np.linspace(0.0, float(ds.radius[-1]), POINTS)
+    w_x = float(ds.L) + best.offset + np.linspace(-4e-3, 1e-3, 21)
+    rows = wear(*np.meshgrid(best.e + np.linspace(-0.01, 0.01, 11), w_x))
+    uneven = unevenness(rows, area(fine))[least(rows, area(fine), fine) >= KEPT].min()
+    found = least_uneven(round_tool, "e", "w_x", hole=True)
+    profile = np.asarray(wear(float(found.e), float(found.w_x)))[:: (POINTS - 1) // (ds.radius.size - 1)]
+    again, near = float(unevenness(profile, area(ds.radius))), bored.uneven < best.uneven < 1.1 * bored.uneven
+    yield said("disc, one setting, optimised: the most even has a hole", bored.least < KEPT, str(bored))
+    yield said("disc, one setting, optimised, without a hole", near, str(best))
+    yield held("  best of 231 settings around it, over that", uneven / best.uneven, "1 to 1.01", "{:.4f}")
+    yield compared("disc, most even setting of the grid, solved again", f"{again:.5f}", found.uneven, again, 1e-4)
     yield said("disc, no offset: mean wear more than doubles with throw [um/h]", lost.max() > 2 * lost[0], text)
 
     yield "Constant load"
-    # The load is that of the constant pressure on the whole tool: where the tool hangs over the edge the pressure
-    # rises by its area over that in contact, 3 to 5 times on this grid.
+    # that of the constant pressure on the whole tool, which rises where the tool hangs over the edge
     pressed = tool(ds, "disc").wear.sel(e=USUAL, method="nearest")
     ratio = load.wear.isel(radius=-1) / pressed.interp(radius=load.radius[-1]).sel(w_x=load.w_x, method="nearest")
     here = ", ".join(f"{float(r):.3g} at {MM * float(r.w_x - ds.L):.0f} mm" for r in ratio)
@@ -103,20 +88,16 @@ def claims(ds, load) -> Claims:
     yield said("disc: wear by load over that by pressure, 2 mm from the edge", within, here, "3 to 5")
 
 
-@panel(
-    Axis("radius [mm]", (0, 100)),
-    Axis("wear [µm/h]", (0, 0.24)),
-    "upper left",
-    {"constant load": {"linestyle": "--", "linewidth": 0.9}},
-    title="offset at $e=100$ mm",
-    ncols=2,
-)
+RADIUS, WEAR, KEY = Axis("radius [mm]", (0, 100)), Axis("wear [µm/h]", (0, 0.24)), {"constant load": "--"}
+
+
+@panel(RADIUS, WEAR, "upper left", KEY, title="offset at $e=100$ mm", ncols=2)
 @panel(Axis("offset [mm]"), Axis("eccentricity, $e$ [mm]"))
 @page(136.0)
 def figure(profile, plane, ds, load):
     """Profiles of the disc, and how uneven they are over offset and eccentricity."""
     disc = tool(ds, "disc")
-    for place, colour in zip(PROFILES, COLOURS, strict=False):
+    for place, colour in zip(load.w_x.values, COLOURS, strict=False):
         pressed = disc.wear.sel(e=USUAL, method="nearest").sel(w_x=place, method="nearest")
         dashed, text = load.wear.sel(w_x=place, method="nearest"), f"{MM * float(pressed.w_x - ds.L):.0f} mm"
         profile.plot(MM * pressed.radius, UM_PER_HOUR * pressed, color=colour, label=text)

@@ -2,19 +2,15 @@
 
     python studies/polisher_zone.py polisher_zone.h5
 
-O_DH on its arc turns the tool's centre by beta, to L (cos(alpha + beta), sin(alpha + beta)); so the tool, of half
-width a, covers the work's centre, at distance L, in some part of the swing if
-
+O_DH on its arc turns the tool's centre by beta, so that the tool, of half width a, covers the work's centre, at the
+distance L, in some part of the swing if
     alpha_min - q <= -beta <= alpha_max + q,  sin(q/2) = a/(2 L),                                        (1)
-
 and a throw that moves the middle A0 of the swing is put right by beta = -(change of A0). The tool wears by Preston's
-law as the work does, A p times its speed against it. On the arm it does not spin, so each of its points keeps its own
-mean speed, and all that the tool loses the work loses too,
-
+law as the work does. On the arm it does not spin, so each of its points keeps its own mean speed, and all that the tool
+loses the work loses too,
     integral of the wear over the tool = 2 pi integral of the wear over r dr.                            (2)
 
-The zone is at the mean radius of what is worn off, by volume; outer and inner are the points of the tool's rim farthest
-from and nearest to the pivot. Trapezoids of 2.5 mm in the radius leave 2e-3 of (2).
+The zone is at the mean radius of what is worn off, by volume. Trapezoids of 2.5 mm in the radius leave 2e-3 of (2).
 """
 
 import math
@@ -22,7 +18,7 @@ import math
 import numpy as np
 import xarray as xr
 from _common import Claims, held, most, never, said, script, solved
-from _figures import COLOURS, DASHES, MARKS, Axis, page, panel
+from _figures import COLOURS, DASHES, HOLLOW, MARKS, Axis, page, panel, points
 from _polishing import disc_points, swings, tool_wear
 
 
@@ -53,11 +49,10 @@ def claims(ds) -> Claims:
     middle = 0.5 * (alpha.max("crank_angle") + alpha.min("crank_angle")).values + np.array([0.0, beta])
     line = ds.zone.sel(e=0.15, method="nearest")
     shift = 100 * float(line.interp(beta=0.0) - line.interp(beta=math.radians(beta)))
-    low, high = float(zone.min()), float(zone.max())
-    alone = "e = 4 cm: zones by O_DH alone, 15 degree to each side"
-    yield never("the centre wears otherwise than (1) says", worn != theory.transpose(*worn.dims))
-    yield said(alone, high > 3 * low, f"{low:.1f} to {high:.1f} cm", "-")
+    alone, text = "e = 4 cm: zones by O_DH alone, 15 degree to each side", f"{zone.min():.1f} to {zone.max():.1f} cm"
     kept = "  O_DH turned by that keeps the middle [degree]"
+    yield never("the centre wears otherwise than (1) says", worn != theory.transpose(*worn.dims))
+    yield said(alone, zone.max() > 3 * zone.min(), text, "-")
     yield most(kept, "0", middle[1] - middle[0], 2e-3, f"beta = {beta:.3f}")
     yield said("  zone with and without it, e = 15 cm", abs(shift) > 0.1, f"by {10 * shift:.1f} mm", "moves")
 
@@ -71,28 +66,20 @@ def claims(ds) -> Claims:
     yield said("outer rim over inner rim", (uneven > 1).all(), here, "> 1 at every throw")
 
 
-@panel(
-    Axis(r"O$_\mathrm{DH}$ turned by $\beta$ [degree]"),
-    Axis("zone, mean radius [cm]", (0, 27)),
-    "upper center",
-    {"centre not worn": {"marker": "o", "linestyle": "", "markerfacecolor": "white"}},
-    title="throw, $e$ [cm]",
-    ncols=4,
-)
-@panel(
-    Axis("place on the tool, outwards [cm]"),
-    Axis("wear of the tool over its mean [1]"),
-    "upper left",
-    title="throw, $e$ [cm]",
-    ncols=3,
-)
+TURNED, ZONE = Axis(r"O$_\mathrm{DH}$ turned by $\beta$ [degree]"), Axis("zone, mean radius [cm]", (0, 27))
+PLACE, WEAR = Axis("place on the tool, outwards [cm]"), Axis("wear of the tool over its mean [1]")
+KEY, THROW = {"centre not worn": {"marker": "o", **HOLLOW}}, "throw, $e$ [cm]"
+
+
+@panel(TURNED, ZONE, "upper center", KEY, title=THROW, ncols=4)
+@panel(PLACE, WEAR, "upper left", title=THROW, ncols=3)
 @page(128.0)
 def figure(zone, tool, ds):
     """Zones by beta, filled where the centre wears, and the tool's wear."""
     for k, e in enumerate(ds.e.values):
         line, look = ds.sel(e=e), {"color": COLOURS[k], "label": f"{100 * e:.0f}"}
         beta, place, worn = np.degrees(line.beta), 100 * line.zone, line.wear.isel(radius=0) > 0
-        zone.plot(beta, place, MARKS[k] + "-", markerfacecolor="white", linewidth=0.8, color=COLOURS[k])
+        points(zone, beta, place, k, linestyle="-", linewidth=0.8)
         zone.plot(beta, place.where(worn), MARKS[k], linestyle="", **look)
         tool.plot(100 * ds.X, line.across / line.across.mean(), linestyle=DASHES[k], **look)
 

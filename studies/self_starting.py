@@ -7,10 +7,8 @@ viscous friction comes to the switch if the energy is enough,
 
     mu > max(R_s + k phi_s, R + k (phi0 + phi_s)/2);                                                     (1)
 
-viscous friction takes more, at most so much that the foliot must be able to rest at the switch, mu > R + k phi0.
-
-The theory is sharp, and no cell is on its border, so that exceptions are counted. The share of cells is accurate to one
-step of mu.
+viscous friction takes more, at most so much that the foliot must be able to rest at the switch, mu > R + k phi0. No
+cell is on these borders, so that exceptions are counted.
 """
 
 import numpy as np

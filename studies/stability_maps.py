@@ -3,15 +3,11 @@
     python studies/stability_maps.py stability_maps.h5 stability_maps_oscillator.h5 stability_maps_sticking.h5 \\
         stability_maps_spring.h5
 
-The second sweep is of a damped oscillator x'' = -a x' - w^2 x, which a method makes grow
-where the largest eigenvalue of its step exceeds 1: for Runge-Kutta methods that is abs(R(z)), z the scene's
-eigenvalues times h, R(z) the result of one step of x' = z x. Of semi-implicit Euler and Verlet it is that of a 2 by 2
-matrix. The others are of a foliot's first flips from rest: a step h against its drive, against dry friction close to
-sticking, and against a hairspring that it hardly overcomes; truth is the kernel foliot_start.
-
-The theory is the largest eigenvalue of one step of the linear oscillator; "stated" is the error that a method gives.
-The truth is the kernel foliot_start. A value is silently wrong if it is off by more than ten times the larger of 1e-9
-and the stated error.
+The second sweep is of a damped oscillator x'' = -a x' - w^2 x, which a method makes grow where the largest eigenvalue
+of its step exceeds 1: for Runge-Kutta methods that is abs(R(z)), z the scene's eigenvalues times h, R(z) the result of
+one step of x' = z x. The others are of a foliot's first flips from rest: a step h against its drive, against dry
+friction close to sticking, and against a hairspring that it hardly overcomes; truth is the kernel foliot_start. A value
+is silently wrong if it is off by more than ten times the larger of 1e-9 and the error that the method states.
 """
 
 from typing import Any
@@ -51,19 +47,18 @@ def stability_function(z, method: str):
 def eigenvalue(method: str, ah, wh):
     """Modulus of the largest eigenvalue of a step, by theory."""
     ah, wh = np.broadcast_arrays(ah, wh)
-    root = np.sqrt((ah**2 / 4 - wh**2).astype(complex))
-    z = np.stack([-ah / 2 + root, -ah / 2 - root])
-    if method in RUNGE_KUTTA:
-        return abs(stability_function(z, method)).max(axis=0)
-    if method == "semi_implicit":
-        trace, product = 2 - ah - wh**2, 1 - ah
-    else:  # Verlet: (x, v h) -> x1 = x + v - (w^2 x + a v)/2, v1 = v - (f0 + w^2 x1 + a (v - f0))/2
-        m11, m12 = 1 - wh**2 / 2, 1 - ah / 2
-        m21 = -(wh**2 + wh**2 * m11 - ah * wh**2) / 2
-        m22 = 1 - (ah + wh**2 * m12 + ah * (1 - ah)) / 2
-        trace, product = m11 + m22, m11 * m22 - m12 * m21
-    part = np.sqrt((trace**2 / 4 - product).astype(complex))
-    return abs(np.stack([trace / 2 + part, trace / 2 - part])).max(axis=0)
+
+    def force(x, v):
+        return -(wh**2) * x - ah * v
+
+    columns = []  # what becomes of (x, v) = (1, 0) and (0, 1): of a Runge-Kutta method the rates, of others a step
+    for x, v in ((1.0, 0.0), (0.0, 1.0)):
+        f, v1 = force(x, v), v + force(x, v)
+        behind = x + v + f / 2
+        made = {"semi_implicit": (x + v1, v1), "verlet": (behind, v + (f + force(behind, v1)) / 2)}
+        columns.append(np.stack(np.broadcast_arrays(*made.get(method, (v, f))), -1))
+    found = np.linalg.eigvals(np.stack(columns, -1))
+    return abs(stability_function(found, method) if method in RUNGE_KUTTA else found).max(-1)
 
 
 def grown(ds: xr.Dataset) -> xr.DataArray:
@@ -104,36 +99,31 @@ def claims(linear, foliots) -> Claims:
 
 
 TRIED, LONGEST = Log(r"torque, $\mu$ [rad/s$^2$]"), Log("longest step for 10 %, $h$ [s]", (0.015, 80))
+DAMPING, FREQUENCY = Axis("damping, $ah$ [1]", (0, 8)), Axis(r"frequency, $\omega h$ [1]", (0, 8))
+BORDER = {"(a) border by theory": {"color": "0.3", "linewidth": 0.9}}
 
 
-@panel(Axis("damping, $ah$ [1]", (0, 8)), Axis(r"frequency, $\omega h$ [1]", (0, 8)))
+@panel(DAMPING, FREQUENCY, "outside lower center", BORDER, ncols=4, columnspacing=1.0)
 @panel(TRIED, LONGEST)
 @page(148.0)
 def figure(growth, steps, linear, foliots):
     """Where the oscillator grows; the longest step that holds a foliot's period to 10 %."""
-    # lines by theory, marks as followed, at every so many-th damping
-    some = slice(2, None, max(1, linear.a.size // 10))
     for method, factor in zip(map(str, linear["method"].values), grown(linear), strict=True):
         look, theory = method_look(method), eigenvalue(method, linear.a.values, linear.w.values[:, None])
         growth.contour(linear.a, linear.w, theory, levels=[1], colors=[look["color"]], linewidths=0.9)
-        grows = (factor > 1).isel(a=some)
-        shown = np.where(grows.any("w") & ~grows.isel(w=0), linear.w.values[grows.argmax("w").values], np.nan)
-        growth.plot(linear.a[some], shown, **{**look, "linestyle": ""}, markersize=4, label=method)
-    # up to where all steps that are not refused give the period to 10 %
+        grows = (factor > 1).isel(a=slice(2, None, max(1, linear.a.size // 10)))
+        seen = linear.w.where(grows).min("w").where(~grows.isel(w=0))
+        growth.plot(seen.a, seen, **{**look, "linestyle": ""}, markersize=4, label=method)
     ds = foliots["mu"].sortby("step")
-    place = xr.DataArray(np.arange(ds.step.size), dims="step")
     for method in map(str, ds["method"].values):
         one = ds.sel({"method": method})
         right = one.told & (one.off <= WRONG)
-        ends = place.where((place > right.argmax("step")) & ~right).min("step").fillna(ds.step.size) - 1
-        longest = np.where(right.any("step"), ds.step.values[ends.values.astype(int)], np.nan)
+        fails = ~right & (right.cumsum("step") > 0)  # the first after one that holds ends it
+        longest = one.step.where(right & (fails.cumsum("step") == 0)).max("step")
         look = {**method_look(method), "markersize": 4, "linewidth": 0.9, "markevery": max(1, ds.mu.size // 10)}
         steps.plot(ds.mu, longest, **look)
     steps.axhline(float(ds.step.max()), color="0.7", linewidth=4.0, zorder=0)
     direct_label(steps, 0.03, 0.93, "longest step tried", "0.35", ha="left", transform=steps.transAxes)
-    border = growth.plot([], [], color="0.3", linewidth=0.9, label="(a) border by theory")
-    marks = [line for line in growth.lines if line.get_marker() not in ("None", "")]
-    growth.figure.legend(handles=[*marks, *border], loc="outside lower center", ncols=4, columnspacing=1.0)
 
 
 INPUTS = "stability_maps.h5 stability_maps_oscillator.h5 stability_maps_sticking.h5 stability_maps_spring.h5"

@@ -4,13 +4,11 @@
 
 A mass on a spring is dragged by a belt: it rides on the belt until the spring is stronger than friction, slips back,
 and is caught again. Truth is the closed form of both phases. The sweep follows twenty cycles by each method; others,
-which know nothing of the kink, follow two cycles, and so does our dopri5 at a fixed step that locates no kink. Last,
-the cost of a digit. Timings are noisy and for information only.
+which know nothing of the kink, follow two, and so does our dopri5 at a fixed step that locates no kink.
 
 The error is that of the time of the last count, relative to the closed form; for other programs it is that of where
 they are at the true time. These get the sign as it is and 5 000 calls of the rates a cell; their absolute tolerance is
-a thousandth of the relative one. They, and the fixed step of 0.01, follow two cycles. Times are CPU seconds of one
-core.
+a thousandth of the relative one. Times are CPU seconds of one core, noisy and for information only.
 """
 
 from functools import partial
@@ -22,43 +20,28 @@ from _common import Claims, Statement, cheapest, held, measured, script, solved_
 from _figures import COST, ERROR, Log, direct_label, draw_costs, method_look, page, panel
 from _peers import SLIDING
 from belt_scene import KERNEL, SCENE
+from scipy.optimize.elementwise import find_root
 
 from kernels.interface import FIRST_REFUSAL, Status
 from kernels.stepping import stepped_kernel
 
 TOLERANCES = 10.0 ** -np.arange(3.0, 10.5, 3.0)
-FLIPS = 5.0
-"""Counts of the mass for others: two cycles."""
-COARSE = 3
-"""Every so many-th cell of the sweep's axes is one of the others'."""
-STEP = 0.01
-LOOSE = 1e-6
-"""The others' tolerance there."""
-CELLS, FEW = 256, 64
-"""Cells of our own in the cost; of the others every so many-th."""
+FLIPS, LOOSE = 5.0, 1e-6
+"""Counts of the mass for others, two cycles, and their tolerance."""
 
 
-def slipped(fall) -> tuple[Any, Any]:
-    """How long a slip takes, and how far it carries the mass, over the speed of the belt: one root, by bisection."""
+def slipping(t, fall) -> tuple[Any, Any]:
+    """Place and speed of the mass over the speed of the belt, a time after it was torn off."""
     turn = np.sqrt(1.0 - 0.25 * fall**2)
-
-    def motion(t) -> tuple[Any, Any]:
-        grown, wave, other = np.exp(0.5 * fall * t), np.cos(turn * t), np.sin(turn * t) / turn
-        return grown * (fall * wave + (1.0 - 0.5 * fall**2) * other), grown * (wave - 0.5 * fall * other)
-
-    low, high = np.pi + 0.0 * fall, 2.0 * np.pi + 0.0 * fall
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        early = motion(middle)[1] < 1.0
-        low, high = np.where(early, middle, low), np.where(early, high, middle)
-    return low, motion(low)[0]
+    grown, wave, other = np.exp(0.5 * fall * t), np.cos(turn * t), np.sin(turn * t) / turn
+    return grown * (fall * wave + (1.0 - 0.5 * fall**2) * other), grown * (wave - 0.5 * fall * other)
 
 
 def last_count(flips: float, mu, belt, fall):
     """The time of that count, an odd one: the mass rides past x = mu once a cycle."""
     fall = np.asarray(fall, float)
-    slip, place = slipped(fall)
-    return mu / belt + 0.5 * (flips - 1.0) * (slip + fall - place)
+    slip = find_root(lambda t, fall: slipping(t, fall)[1] - 1.0, (np.pi, 2.0 * np.pi), args=(fall,)).x
+    return mu / belt + 0.5 * (flips - 1.0) * (slip + fall - slipping(slip, fall)[0])
 
 
 def errors_of_ours(kernel, method: str, belt, fall, rtol: float, **more):
@@ -71,8 +54,7 @@ def errors_of_ours(kernel, method: str, belt, fall, rtol: float, **more):
 def prepared(ds, tell=True):
     """The sweep with its errors; those of others over belt and fall; and costs, of others where these are to be told.
 
-    Others are late by how far the mass is from where it rides past, relative to the time; NaN: no answer. Our dopri5 at
-    a fixed step chatters about the kink.
+    Others are late by how far the mass is from where it rides past, relative to the time; NaN: no answer.
     """
 
     def errors(name: str, belt, fall, rtol: float):
@@ -80,19 +62,19 @@ def prepared(ds, tell=True):
         return abs(SLIDING[name](belt, fall, true, rtol) - 1.0) / (belt * true)
 
     true = xr.apply_ufunc(last_count, float(ds.flips), 1.0, ds.belt, ds.fall)
-    some = ds.isel(belt=slice(None, None, COARSE), fall=slice(None, None, COARSE))
-    belt, fall = (np.ravel(x) for x in np.meshgrid(some.belt, some.fall, indexing="ij"))
+    some = xr.Dataset(coords={"belt": ds.belt[::3], "fall": ds.fall[::3]})
+    belt, fall = (x.values.ravel() for x in xr.broadcast(some.belt, some.fall))
     steps = stepped_kernel(**{**SCENE, "name": "belt_steps"})
-    late = {"fixed step": errors_of_ours(steps, "dopri5", belt, fall, LOOSE, step=STEP, location=0.0)}
+    late = {"fixed step": errors_of_ours(steps, "dopri5", belt, fall, LOOSE, step=0.01, location=0.0)}
     late |= {name: errors(name, belt, fall, LOOSE) for name in ("scipy Radau", "scipy LSODA")}
-    made = {name: (("belt", "fall"), off.reshape(some.belt.size, -1)) for name, off in late.items()}
+    unslid = some.assign({name: (("belt", "fall"), off.reshape(some.belt.size, -1)) for name, off in late.items()})
 
     random = np.random.default_rng(1)
-    belt, fall = 10.0 ** random.uniform(-1.0, -0.4, CELLS), 10.0 ** random.uniform(-1.5, -0.4, CELLS)
+    belt, fall = 10.0 ** random.uniform(-1.0, -0.4, 256), 10.0 ** random.uniform(-1.5, -0.4, 256)
     costs = {"dop853 (slides)": measured(partial(errors_of_ours, KERNEL, "dop853", belt, fall), TOLERANCES)}
     for name in SLIDING if tell else ():
-        costs[name] = measured(partial(errors, name, belt[::FEW], fall[::FEW]), TOLERANCES)
-    return ds.assign(off=abs(ds.time / true - 1.0)), xr.Dataset(made, {"belt": some.belt, "fall": some.fall}), costs
+        costs[name] = measured(partial(errors, name, belt[::64], fall[::64]), TOLERANCES)
+    return ds.assign(off=abs(ds.time / true - 1.0)), unslid, costs
 
 
 def claims(ds, unslid, found) -> Claims:

@@ -4,12 +4,11 @@
 
 The first sweep is of a foliot driven by a motor that lags by eps, by each method; truth is the closed form of its
 first swing. The second is of a ball whose bounces accumulate: counted to 20 and to 100, and carried to rest, whose
-time is sqrt(2 h/g) (1 + e)/(1 - e) without drag. Last, the cost of a digit beside scipy's Radau and BDF, and diffrax's
-Kvaerno5 where it is installed (the extra `peers`). Timings are noisy and for information only.
+time is sqrt(2 h/g) (1 + e)/(1 - e) without drag. Last, the cost of a digit beside other programs (the extra `peers`).
 
-The error is that of the time of the switch, or of rest, relative to the closed form. Times are CPU seconds of one core.
-Other programs start from rest too, with the exact Jacobian (scipy) and an event that ends the run; their absolute
-tolerance is a thousandth of the relative one. diffrax does all cells side by side; its compilation is not counted.
+The error is that of the time of the switch, or of rest, relative to the closed form. Times are CPU seconds of one core,
+noisy and for information only. Other programs have the exact Jacobian (scipy) and an event that ends the run; their
+absolute tolerance is a thousandth of the relative one. diffrax does all cells side by side, compiled before.
 """
 
 import numpy as np
@@ -23,9 +22,6 @@ from kernels.interface import FIRST_REFUSAL, Status
 
 EPS = 1e-6
 """Lag at which the costs are compared, in seconds."""
-TOLERANCES = 10.0 ** -np.arange(3.0, 11.5, 2.0)
-MU = np.geomspace(0.1, 10.0, 256)
-"""Cells of our own; of the others every 32nd."""
 
 
 def lagged(t, mu, eps):
@@ -52,15 +48,15 @@ def prepared(lag, bounce, tell=True):
     """The sweeps, the first with its errors, and what a digit costs, of others where these are to be told."""
 
     def ours(mu, eps: float, rtol: float):
-        cells = {"mu": mu, "phi0": 1.0, "a": FRICTION, "b": FRICTION, "eps": eps, "flips": 1.0}
-        time, status = solved_by(KERNEL, "rodas5p", rtol, **cells)
+        time, status = solved_by(KERNEL, "rodas5p", rtol, mu=mu, a=FRICTION, b=FRICTION, eps=eps, flips=1.0)
         return np.where(status == Status.OK, time, np.nan)
 
     def cost(follow, mu) -> xr.Dataset:
-        return measured(lambda rtol: abs(follow(mu, EPS, rtol) / first_switch(mu, EPS) - 1.0), TOLERANCES)
+        tolerances, true = 10.0 ** -np.arange(3.0, 11.5, 2.0), first_switch(mu, EPS)
+        return measured(lambda rtol: abs(follow(mu, EPS, rtol) / true - 1.0), tolerances)
 
-    costs = {"rodas5p": cost(ours, MU)}
-    costs |= {name: cost(follow, MU[::32]) for name, follow in STIFF.items() if tell}
+    mu = np.geomspace(0.1, 10.0, 256)
+    costs = {"rodas5p": cost(ours, mu)} | {name: cost(follow, mu[::32]) for name, follow in STIFF.items() if tell}
     return lag.assign(off=abs(lag.time / first_switch(lag.mu, lag.eps) - 1.0)), costs, bounce
 
 
@@ -70,8 +66,7 @@ def claims(lag, found, bounce) -> Claims:
     for method in map(str, lag["method"].values):
         here = lag.sel({"method": method})
         given = here.status < FIRST_REFUSAL
-        least = float(here.eps.where(given.all("mu")).min())
-        reached = f"unsolved {float((~given).mean()):.0%}; least lag done {least:.1e} s"
+        reached = f"unsolved {(~given).mean():.0%}; least lag done {here.eps.where(given.all('mu')).min():.1e} s"
         yield Statement(f"{method}: unsolved, and down to which lag it does all", "", reached)
     yield held("worst error of what is OK", lag.off.where(ok).max(), "<= 1e-9", "{:.1e}")
     yield never("rodas5p: lags at which it is not OK", ~ok.sel({"method": "rodas5p"}))

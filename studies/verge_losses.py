@@ -3,31 +3,23 @@
     python studies/verge_losses.py verge_losses.h5 verge_losses_wheel.h5
 
 P ~ torque^(-s). kappa = n^2 I_c/I_v is the wheel's inertia over the foliot's, alpha = n tau/(I_v a^2 phi0) the drive
-over viscous friction, lambda the share of a loss in the energy of half a period: viscous, dry, and impact. At large
-swings (docs/theory/general_law.md)
+over viscous friction. At large swings (docs/theory/general_law.md), with the shares of viscous friction and impacts,
 
-    s = (sum n lambda_n + lambda_impact)/(2 + sum n lambda_n),                                           (1)
+    s = (lambda_viscous + lambda_impact)/(2 + lambda_viscous).                                           (1)
 
-n = 1 for viscous and 0 for dry friction: 1/3, 1/2 and 0 where one of them takes all. At weak drive s = 1/(1 + alpha).
-
-The exponent s is a difference of ln P over ln torque, with 8 points a decade. Near the torque that just drives the
-clock the drop decides.
+At weak drive s = 1/(1 + alpha). The exponent s is a difference of ln P over ln torque, with 8 points a decade.
 """
 
 import math
 
 import numpy as np
 import xarray as xr
-from _common import Claims, count, differing, held, last_passage, most, power, said, script
+from _common import Claims, count, differing, held, last_passage, most, nearest, power, said, script
 from _figures import ALPHA, COLOURS, KAPPA, Axis, contours, exponent_map, page, panel
 from _losses import verge
 
-STRONG = 1e4
-"""alpha from which (1) is held to 0.015, what is left of the drop and of a swing that is not endless."""
 MESH = 0.5
 """Recoil of the wheel, in tooth pitches, beyond which the pallet is no longer between its two teeth."""
-AT_BORDER = 0.3615
-"""The least s in mesh of kappa = .01, at the border, alpha = 26.6, by the kernel `verge` at 1500 torques."""
 LOSSES = ("viscous", "dry", "impact")
 
 
@@ -35,8 +27,7 @@ def scaled(ds: xr.Dataset) -> xr.Dataset:
     """`ds` with its groups, and the shares of the losses."""
     period, work = 2 * ds.clock, ds.tau * (2 * ds.n * ds.phi0 + ds["drop"])
     together = (ds.n * ds.I_c * ds.wheel - ds.I_v * ds.speed) / (ds.I_v + ds.n**2 * ds.I_c)
-    kept = (ds.I_v + ds.n**2 * ds.I_c) * together**2
-    knocked = 0.5 * (ds.I_v * ds.speed**2 + ds.I_c * ds.wheel**2 - kept)
+    knocked = 0.5 * (ds.I_v * ds.speed**2 + ds.I_c * ds.wheel**2 - (ds.I_v + ds.n**2 * ds.I_c) * together**2)
     ds = verge(ds, period, np.isfinite(period))
     return ds.assign(viscous=ds.drag / work, dry=ds.rubbing / work, impact=knocked / work)
 
@@ -67,39 +58,33 @@ def claims(ds, wheel) -> Claims:
     text = ", ".join(f"{float(x):.2g} at kappa = {float(x.kappa):.3g}" for x in deep)
     ranged = f"{float(there[0]):.2f} to {float(there[-1]):.2f}, kappa = .001 to {float(there.kappa[-1]):.0f}"
     weak = abs(there[0] - 1 / 3) < 0.02 and there[-1] < 1.0
-    lost = 4 * deep.kappa / (1 + deep.kappa) ** 2  # 1 - e^2
-    by_loss = power(deep.assign_coords(kappa=lost.values))
-    near = smooth.viscous.isel(I_c=int(abs(smooth.kappa - 0.01).argmin("I_c")))
-    share = float(np.interp(math.log(float(deep[0])), np.log(smooth.alpha.values), near.values))
+    by_loss = power(deep.assign_coords(kappa=4 * deep.kappa.values / (1 + deep.kappa.values) ** 2))  # 1 - e^2
+    near, logs = smooth.isel(nearest(smooth.kappa, 0.01)), np.log(smooth.alpha.values)
+    share = float(np.interp(math.log(float(deep[0])), logs, near.viscous.values))
     yield said("s = 3/4, halfway from -1 to -1/2, at alpha", weak, ranged, "1/3 without wheel")
     yield said("s = 5/12, halfway from -1/3 to -1/2, at alpha", deep.size >= 2, text, "-")
     yield differing("  alpha ~ (1 - e^2)^x, e = (1 - kappa)/(1 + kappa)", "-3", by_loss, -3, 0.2)
     yield differing("  share of viscous losses there, kappa = .01", "2/5 by (1)", share, 0.4, 0.02)
 
     yield f"In mesh: recoil of at most {MESH:g} pitch"
-    s, logs = smooth.s.where(smooth.pitches <= MESH), np.log(smooth.alpha.values)
+    s = smooth.s.where(smooth.pitches <= MESH)
     least, where = s.min("tau"), s.fillna(np.inf).argmin("tau")
     back = float(s.where(s.tau >= s.tau.isel(tau=where)).max("tau").where(least < 0.38).max())
-    recoil = [
-        float(np.interp(math.log(alpha), logs, smooth.pitches.isel(I_c=k)))
-        for k, alpha in enumerate(lower.values)
-        if alpha > 0 and smooth.kappa[k] < 0.05
-    ] or [0.0]
-    line = smooth.isel(I_c=int(abs(smooth.kappa - 0.01).argmin("I_c")))
-    line = line.isel(tau=slice(1, int(line.pitches.argmax("tau"))))
+    rising = lower.where(lower.kappa < 0.05).values
+    recoil = [np.interp(math.log(a), logs, smooth.pitches[k]) for k, a in enumerate(rising) if a > 0] or [0.0]
+    line = near.isel(tau=slice(1, int(near.pitches.argmax("tau"))))
     border = float(np.interp(MESH, line.pitches.values, line.s.values))
-    stays = np.flatnonzero(np.isfinite(s.isel(tau=-2)))
-    first = int(stays[0]) if stays.size else -1
+    first = int(np.isfinite(s.isel(tau=-2)).argmax("I_c"))
     dips, end = float(least[first]), float(s[first, -2])
-    heavy = f"kappa = {float(smooth.kappa[first]):.2g} stays in mesh at any drive: least s, strongest"
+    heavy = f"kappa = {smooth.kappa[first]:.2g} stays in mesh at any drive: least s, strongest"
     text, what = f"{min(recoil):.2g} to {max(recoil):.2g}", "least s in mesh of kappa = .01, at half a pitch"
     yield said("recoil where s rises through 5/12, kappa < .05 [pitches]", min(recoil) > MESH, text, "out of mesh")
-    yield differing(what, f"{AT_BORDER} by `verge`", border, AT_BORDER, 0.005)
+    yield differing(what, "0.3615 by `verge`, 1500 torques", border, 0.3615, 0.005)
     yield said(heavy, dips > 0.43 and abs(end - 0.5) < 0.01, f"{dips:.3f}, {end:.3f}", ", 1/2")
     yield held("in mesh, of clocks that have s < .38: s at a stronger drive", back, "< .38", "at most {:.3f}")
 
     yield "A clock with a light wheel"
-    # the wheel is light (kappa = .01), its dry friction I_v a^2 phi0, its recoil a quarter of a pitch.
+    # of dry friction I_v a^2 phi0
     line = ds.isel(R_v=1).sel(I_c=2.5e-5, method="nearest")
     clock = line.isel(tau=int(abs(line.pitches - 0.25).argmin("tau")))
     text = ", ".join(f"{name} {clock[name]:.0%}" for name in LOSSES)
@@ -110,8 +95,9 @@ def claims(ds, wheel) -> Claims:
 
     yield "By the shares of the losses"
     off = ds.s - (ds.viscous + ds.impact) / (2 + ds.viscous)
-    strong, near = off.where(ds.alpha > STRONG), off.isel(R_v=0).where(ds.alpha > 100)
-    yield most(f"s by the shares, (1), alpha > {STRONG:.0e}", "0.015", strong, 0.015, count(strong))
+    # what is left of the drop and of a swing that is not endless
+    strong, near = off.where(ds.alpha > 1e4), off.isel(R_v=0).where(ds.alpha > 100)
+    yield most("s by the shares, (1), alpha > 1e+04", "0.015", strong, 0.015, count(strong))
     yield most("  the same, alpha > 100 without dry friction", "0.05", near, 0.05, count(near))
 
     yield "Friction on the wheel"

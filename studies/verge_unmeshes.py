@@ -14,14 +14,12 @@ mesh. By docs/theory/two_bodies.md, for no drop and e = 0:
 3. Bounces of a light wheel last about e kappa/(1 - e) of a half period. Where they die out in contact, e does not
    matter.
 
-The exponent s is a difference of ln P over ln torque, with 8 points a decade, between cells that run. Borders are found
-in steps of 6e-4; the theory leaves out the drop, which is 5 % of n phi0.
+The exponent s is a difference of ln P over ln torque, with 8 points a decade; the drop is 5 % of n phi0.
 """
 
 import math
 
 import numpy as np
-import xarray as xr
 from _common import Claims, compared, count, differing, held, most, never, said, script, solved
 from _figures import ALPHA, COLOURS, DASHES, KAPPA, S, direct_label, exponent_map, page, panel
 from _losses import of_quarter, quarter, verge
@@ -29,13 +27,6 @@ from _losses import of_quarter, quarter, verge
 from kernels.interface import Status
 
 BORDER = 3 - 2 * math.sqrt(2)
-NEAR = 0.02
-"""How near to 1/2 an exponent is called 1/2."""
-
-
-def scaled(ds: xr.Dataset) -> xr.Dataset:
-    """`ds` with its groups, and which clocks come out of mesh."""
-    return verge(ds, ds.period, ds.status == 0).assign(out=ds.status == Status.UNMESHES)
 
 
 def border(axis: str, values, **changed: float) -> float:
@@ -65,24 +56,24 @@ def claims(smooth, ds) -> Claims:
     yield held("largest recoil of a clock that runs [pitches]", farthest, "0.45 to 1/2", "{:.3f}")
 
     yield "Exponents"
-    off = []
-    for i in np.flatnonzero(smooth.kappa.values < 0.7):
-        line = smooth.isel(I_c=int(i))
-        share, mu = float(line.kappa), line.n * line.tau / (line.I_v * (1 + line.kappa))
-        foliot = {"a": line.c_v / line.I_v / (1 + share), "phi0": line.phi0, "e": (1 - share) / (1 + share)}
-        one = solved("foliot", mu=mu, **foliot, outputs=["sensitivity"])
-        off.append(line.s.values[1:-1] - one.sensitivity.values[1:-1])
+    several = smooth.where(smooth.kappa < 0.7, drop=True).transpose("I_c", "tau")
+    share = several.kappa.values[:, None] + 0.0 * several.s.values
+    mu = (several.n * several.tau / several.I_v).values / (1 + share)
+    cells = {"mu": mu, "a": float(several.c_v / several.I_v) / (1 + share), "e": (1 - share) / (1 + share)}
+    cells = {name: values.ravel() for name, values in cells.items()}
+    one = solved("foliot", design="zip", **cells, phi0=smooth.phi0, outputs=["sensitivity"])
+    off = several.s - one.sensitivity.values.reshape(share.shape)
     heavy = smooth.s.where(smooth.kappa > BORDER, drop=True).isel(tau=-2)
     body = "s, kappa < .7: one body keeping (1 - kappa)/(1 + kappa)"
     yield differing("least s in mesh, kappa = .001", f"{least:.4f} or more", light.s.min(), least, 0.01)
-    yield most(body, "foliot", xr.DataArray(off), 0.01, "largest difference")
+    yield most(body, "foliot", off, 0.01, "largest difference")
     yield most("strongest drive, kappa > .17: s", "1/2", heavy - 0.5, 0.01, f"{heavy.min():.4f} to {heavy.max():.4f}")
 
     yield "Where s is 1/2"
-    decades = (abs(smooth.s - 0.5) < NEAR).sum("tau") / 8
+    decades = (abs(smooth.s - 0.5) < 0.02).sum("tau") / 8
     light, heavy = (decades.sel(I_c=kappa * 2.5e-3, method="nearest") for kappa in (0.01, 1.0))
     dry = ds.isel(R_v=1, e=0).s.sel(I_c=2.5e-5, method="nearest")
-    near, friction = f"within {NEAR} of 1/2, kappa = .01", "kappa = .01, dry friction of I_v a^2 phi0: s in mesh"
+    near, friction = "within 0.02 of 1/2, kappa = .01", "kappa = .01, dry friction of I_v a^2 phi0: s in mesh"
     yield said(f"decades of torque with s {near}", 0.0 < light < 0.5, f"{light:.2g}", "< 1/2")
     yield held("  kappa = 1", heavy, "> 3", "{:.2g}")
     yield said(friction, dry.min() < 0.4, f"{dry.max():.3f} to {dry.min():.3f}", "below 1/2 at its end")
@@ -124,8 +115,8 @@ def figure(plane, lines, smooth, *_):
 
 
 def prepared(ds):
-    """Clocks without dry friction and restitution, and all of them."""
-    ds = scaled(ds)
+    """Clocks without dry friction and restitution, and all of them, with their groups and which come out of mesh."""
+    ds = verge(ds, ds.period, ds.status == 0).assign(out=ds.status == Status.UNMESHES)
     return ds.isel(R_v=0, e=0), ds
 
 

@@ -2,14 +2,11 @@
 
     python studies/what_auto_saves.py studies/what_auto_saves.toml
 
-Measures `auto` and every method on the same cells, at rtol from 1e-3 to 1e-13, in one run on one core. The best single
-method at an rtol is the fastest of those that give the most cells; errors are against the best reference among the
-methods. Timings are noisy and for information only; what is right is checked.
-
-What is saved is the time of the best single method over that of auto, on the same cells; "gives" is the share of cells
-that have a value and are not INACCURATE. Below 1 auto is the slower one: it asks for the bounds of every cell, and pays
-for cells that the single method leaves unsolved. Where auto takes the reference itself its error is 0 for that reason
-alone; benchmarks/honesty/auto_honesty.py compares what auto calls OK with 50 digits.
+Measures `auto` and every method on the same cells, at rtol from 1e-3 to 1e-13, on one core. The best single method at
+an rtol is the fastest of those that give the most cells; "gives" is the share of cells that have a value and are not
+INACCURATE. What is saved is its time over that of auto. Below 1 auto is the slower one: it asks for the bounds of every
+cell, and pays for cells that the single method leaves unsolved. Timings are noisy and for information only. Errors are
+against the best reference among the methods; benchmarks/honesty/auto_honesty.py has 50 digits.
 """
 
 from pathlib import Path
@@ -27,9 +24,8 @@ PARTS = ("", "_viscous", "_drag", "_terms", "_balance", "_impact", "_polisher")
 """Ends of the names of the study files."""
 AS_MANY = 1e-12
 """Shares of cells that differ by less are the same."""
-SHOWN = 1e-7
-"""The tolerance at which times are drawn."""
 MARK = {"color": "0.3", "marker": "o", "linestyle": "", "markersize": 4}
+OPEN = {"markerfacecolor": "white"}
 RING = {**MARK, "markerfacecolor": "none", "markersize": 10, "markeredgewidth": 0.7}
 
 
@@ -55,27 +51,23 @@ def claims(parts) -> Claims:
     """What is checked of each study; and for each rtol what auto saves over the best single method."""
     for found in parts:
         yield found.attrs["title"]
-        auto, cells, saved, fewer = found.sel({"method": "auto"}), found.attrs["cells"], {}, []
+        auto, cells, saved, fewer = found.sel({"method": "auto"}), found.attrs["cells"], [], []
         for rtol in found.rtol.values:
             name = best_single(found, rtol)
             one, single = auto.sel({"rtol": rtol}), found.sel({"method": name, "rtol": rtol})
             gives, there = 100 * float(given(single)), 100 * float(given(one))
-            text = f"{float(single.seconds / one.seconds):.2f} of {name}, which gives {gives:.4g} %"
-            saved[f"saved at {rtol:.0e}"] = f"{text}; auto by {one.methods_used.item()}"
+            text = f"{single.seconds / one.seconds:.2f} of {name}, which gives {gives:.4g} %"
+            saved += [Statement(f"saved at {rtol:.0e}", "", f"{text}; auto by {one.methods_used.item()}")]
             fewer += [f"{there:.4g} % beside {gives:.4g} %"] if there < gives - 100 * AS_MANY else []
         silent, over = float(auto.silent.max()), auto.error_worst / (auto.rtol + found.attrs["reference_error"])
         yield said("auto is silently wrong", silent == 0, f"{100 * silent:g} % of {cells} cells", "nowhere")
         yield held("auto, worst error over rtol", over.max(), "<= 1", "{:.2g}")
         yield said("auto gives the cells that the best single method does", not fewer, ", ".join(fewer), "all, or more")
-        yield from (Statement(what, "", here) for what, here in saved.items())
+        yield from saved
 
 
-TIME = Log(f"time over that of auto, at rtol = $10^{{{np.log10(SHOWN):.0f}}}$ [1]")
-KEY = {
-    "gives every cell that auto gives": MARK,
-    "gives fewer": {**MARK, "markerfacecolor": "white"},
-    "best single method": RING,
-}
+TIME = Log("time over that of auto, at rtol = $10^{-7}$ [1]")
+KEY = {"gives every cell that auto gives": MARK, "gives fewer": {**MARK, **OPEN}, "best single method": RING}
 
 
 @panel(TIME, Axis("", (0.45 - len(PARTS), 0.7)), "outside lower center", KEY, ncols=3, fontsize=7)
@@ -83,7 +75,7 @@ KEY = {
 def figure(axes, parts):
     """Time of every method over that of auto at one tolerance, a row for each study; the best single one is ringed."""
     for place, found in zip(range(0, -len(parts), -1), parts, strict=True):
-        row = found.sel({"rtol": SHOWN}, method="nearest")
+        row = found.sel({"rtol": 1e-7}, method="nearest")
         auto, best = row.sel({"method": "auto"}), best_single(found, float(row.rtol))
         axes.axhline(place, color="0.9", linewidth=0.6, zorder=0)
         title = {"ha": "left", "transform": axes.get_yaxis_transform()}
@@ -92,7 +84,7 @@ def figure(axes, parts):
             one, look = row.sel({"method": name}), {**method_look(name), "linestyle": "", "markersize": 5}
             ratio, whole = float(one.seconds / auto.seconds), float(given(one)) >= float(given(auto)) - AS_MANY
             axes.plot([], [], label=name, **look)
-            axes.plot(ratio, place, **look, **({} if whole else {"markerfacecolor": "white"}))
+            axes.plot(ratio, place, **look, **({} if whole else OPEN))
             if name == best:
                 axes.plot(ratio, place, **RING)
     axes.axvline(1.0, color="black", linewidth=0.8)

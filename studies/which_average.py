@@ -5,18 +5,16 @@
 m = ln(mu/mu0) and x = ln(a/a0) change over the season or from swing to swing; P = F(alpha)/a, alpha = mu/(a^2 phi0),
 s = -dlnP/dlnmu, s' = ds/dln alpha. By docs/theory/averages.md
 
-seasons: ln<P0/P> = s <m> + (1 - 2s) <x> + s' var(m - 2x)/2 + var(s m + (1 - 2s) x)/2 + ...,             (1)
-    so of the friction the power mean of the exponent p = 1 - 2s + 4s'/(1 - 2s) counts, of the torque p = s + s'/s;  (2)
-noise: of a change of the torque in one half swing the clock gains R_k = r + (s - r)(1 - K^k) in k more of them, K the
-    multiplier and r what that half swing itself gains; of the friction (1 - 2s) and r_a likewise. Over n of them
-    the rate scatters by 1/n times the root of
-    sum over k < n of (sigma R_k)^2 + (sigma_a R_ka)^2 + 2 shared sigma sigma_a R_k R_ka.                     (3)
-With lambda = a v/mu at the switch and h = lambda^2/(1 + lambda), all times 1/(2/alpha + 2 lambda):
-    r = 2/alpha + lambda + (1/lambda - 1)(2/alpha + h),
-    r_a = 2/alpha + 2 lambda - (4/alpha + lambda + (1/lambda - 1)(4/alpha + h)).                               (4)
+    ln<P0/P> = s <m> + (1 - 2s) <x> + s' var(m - 2x)/2 + var(s m + (1 - 2s) x)/2 + ...                    (1)
 
-(2) is measured with a season of 2 %; 5 % of (3) are three standard errors of 2000 seeds, which are the same in every
-line.
+over the year, so of the friction the power mean of exponent p = 1 - 2s + 4s'/(1 - 2s) counts, of the torque that of
+p = s + s'/s (2), here measured with a season of 2 %. Of a change of the torque in one half swing the clock gains a
+share R_k, and of the friction R_ka, in k more of them; so over n of them noise scatters the rate by 1/n times the
+root of
+
+    sum over k < n of (sigma R_k)^2 + (sigma_a R_ka)^2 + 2 shared sigma sigma_a R_k R_ka,                     (3)
+
+of which 5 % are three standard errors of 2000 seeds, the same in every line.
 """
 
 import math
@@ -40,12 +38,6 @@ def theory(alpha: float) -> tuple[float, float, float]:
     return (1 - t / q) / t**2, -slope * (q - t) / t**2, t
 
 
-def exponents(alpha: float) -> tuple[float, float]:
-    """(2), of friction and torque."""
-    s, slope, _ = theory(alpha)
-    return 1 - 2 * s + 4 * slope / (1 - 2 * s), s + slope / s
-
-
 def mean_rate(alpha: float, m, x) -> float:
     """ln<P0/P> by the kernel."""
     mu, a = np.append(alpha * np.exp(m), alpha), np.append(np.exp(x), 1.0)
@@ -53,17 +45,23 @@ def mean_rate(alpha: float, m, x) -> float:
     return math.log(np.mean(P[-1] / P[:-1]))
 
 
-def measured(alpha: float) -> tuple[float, float]:
-    """The exponents of (2) by the kernel, from a season of 2 % of one of both."""
+def exponents(alpha: float):
+    """(2), of friction and torque."""
+    s, slope, _ = theory(alpha)
+    return np.array([1 - 2 * s + 4 * slope / (1 - 2 * s), s + slope / s])
+
+
+def measured(alpha: float):
+    """The same by the kernel, from a season of one of both."""
     s, season = theory(alpha)[0], 0.02 * np.cos(PHASE)
     friction, torque = mean_rate(alpha, 0 * season, season), mean_rate(alpha, season, 0 * season)
-    return 2 * friction / (1 - 2 * s) / np.var(season), 2 * torque / s / np.var(season)
+    return 2 * np.array([friction / (1 - 2 * s), torque / s]) / np.var(season)
 
 
 def scatter(alpha: float, n: int, sigma: float, sigma_a: float, shared: float) -> float:
-    """(3) times sqrt(n) over `SIGMA`."""
+    """(3) times sqrt(n) over `SIGMA`, by what a half swing itself gains, `r`, and those that remember its speed."""
     s, _, u = theory(alpha)
-    two, h, lost = 2 / alpha, u * u / (1 + u), 1 - np.exp(-(2 / alpha + 2 * u) * np.arange(n))  # K = exp(-a P/2)
+    two, h, lost = 2 / alpha, u * u / (1 + u), 1 - np.exp(-(2 / alpha + 2 * u) * np.arange(n))
     r = (two + u + (1 / u - 1) * (two + h)) / (two + 2 * u)
     r_a = 1 - (2 * two + u + (1 / u - 1) * (2 * two + h)) / (two + 2 * u)
     R, R_a = sigma / SIGMA * (r + (s - r) * lost), sigma_a / SIGMA * (r_a + (1 - 2 * s - r_a) * lost)
@@ -72,10 +70,8 @@ def scatter(alpha: float, n: int, sigma: float, sigma_a: float, shared: float) -
 
 def prepared(ds):
     """The scatter of the rate over seeds, in units of sigma, by the noise."""
-    axes = ["sigma", "sigma_a", "shared"]
-    over = ds.rate_error_s_per_day.std("seed") / (DAY * SIGMA) * np.sqrt(ds.half_swings)
-    over = over.drop_vars([name for name in over.coords if name not in over.dims])
-    return {kind: over.sel(dict(zip(axes, kind, strict=True)), method="nearest") for kind in NOISES}
+    over = (ds.rate_error_s_per_day.std("seed") / (DAY * SIGMA) * np.sqrt(ds.half_swings)).reset_coords(drop=True)
+    return {(a, b, c): over.sel(sigma=a, sigma_a=b, shared=c, method="nearest") for a, b, c in NOISES}
 
 
 def claims(spread) -> Claims:
@@ -85,8 +81,8 @@ def claims(spread) -> Claims:
         for name, p, found in zip(("friction", "torque"), exponents(alpha), measured(alpha), strict=True):
             what = f"alpha = {alpha:g}: p of the mean of the {name}"
             yield differing(what, f"(2) {p:.4f}", found, p, 0.01)
-    for alpha, m, name in ((0.1, 0.5, "both"), (HALF, 0.5, "both"), (30.0, 0.5, "both"), (HALF, 0.0, "friction")):
-        m, (s, slope, _) = m * 0.1 * np.cos(PHASE - 1), theory(alpha)
+    for alpha, size, name in ((0.1, 0.05, "both"), (HALF, 0.05, "both"), (30.0, 0.05, "both"), (HALF, 0.0, "friction")):
+        m, (s, slope, _) = size * np.cos(PHASE - 1), theory(alpha)
         year = 0.5 * DAY * (slope * np.var(m - 2 * x) + np.var(s * m + (1 - 2 * s) * x))
         what = f"alpha = {alpha:.3g}: mean rate with a season of {name} [s/day]"
         yield compared(what, f"(1) {year:.2f}", DAY * mean_rate(alpha, m, x), year, 0.05)
@@ -111,7 +107,7 @@ def claims(spread) -> Claims:
 def figure(means, memory, spread):
     """Exponents of the means, and memory."""
     fine, marks = np.geomspace(1e-3, 1e5, 401), np.array([1e-3, 1e-2, 0.1, 0.5, 4, 30, 300, 1e4, 1e5])
-    lines, computed = (np.array([f(a) for a in x]).T for f, x in ((exponents, fine), (measured, marks)))
+    lines, computed = (np.transpose([f(a) for a in x]) for f, x in ((exponents, fine), (measured, marks)))
     lines[0][abs(np.log(fine / HALF)) < 0.03] = np.nan
     for k, name in enumerate(("friction", "torque")):
         means.plot(fine, lines[k], color=COLOURS[k])

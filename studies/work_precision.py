@@ -2,22 +2,20 @@
 
     python studies/work_precision.py studies/work_precision.toml
 
-Sweeps ten thousand foliots with viscous and Coulomb friction by every method at every tolerance, on one core, follows
-some of the same foliots by heyoka.py, diffrax and scipy (the extra `peers`). The time is that of the whole
-`sweep.run`, over its cells. Errors are the largest among 400 of the cells, against 20 digits where mpmath is
-installed, else against the best method. A table for drag is printed beside it. Timings are noisy and for information
-only; errors and counts are checked.
+Sweeps ten thousand foliots with viscous and Coulomb friction by every method at every tolerance, on one core, and
+follows some of them by heyoka.py, diffrax and scipy (the extra `peers`). The time is that of the whole `sweep.run`,
+over its cells. The error is the largest relative one of period, amplitude and speed at the switch among 400 of the
+cells, against 20 digits where mpmath is installed, else against the best method. A table for drag is printed beside it.
+Timings are noisy and for information only.
 
-The error is the largest relative one of period, amplitude and speed at the switch. The other libraries are told how
-many half swings it takes until nothing is left of a start 10 % from the cycle; diffrax follows all clocks side by side,
-each for as many half swings as the slowest.
+The other libraries know how many half swings it takes until nothing is left of a start 10 % from the cycle; diffrax
+follows all clocks side by side, each for as many half swings as the slowest.
 """
 
 import sys
-import time
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -25,70 +23,58 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from _common import Claims, Statement, cheapest, held, measured, said, script
-from _figures import Log, direct_label, draw_precision, method_look, page, panel
+from _figures import COST, ERROR, direct_label, draw_precision, method_look, page, panel
 from _peers import CLOCKS, swings
 
 import sweep
 from sweep.cells.grid import Grid
-from sweep.cells.sample import sampled, solved
 from sweep.explore.work_precision import TOLERANCES, precision_cells, precision_text, work_precision
+from sweep.study.model import Study
 
-DIGITS = 20
-"""Of the truth."""
 PEER_CELLS = {"heyoka.py": 1, "diffrax": 2, "scipy": 10}
-"""Other libraries follow every so many-th of the cells; diffrax follows all of them side by side."""
-LONGEST = 10.0
+"""Other libraries follow every so many-th of the cells."""
 PLACES = {
     "auto": (0.6, 1.0), "coulomb": (0.85, 9.0), "quadrature": (1.7, 9.0), "segments": (1.9, 1.0), "sdirk4": (1.9, 2.0),
 }  # fmt: skip
 """Where the names of methods stand whose marks are close: factors of time and error. Others stand above their marks."""
 
 
-def cycles(study: sweep.study.read.Study, cells: int) -> dict[str, Any] | None:
-    """True values of the outputs by mpmath; None where that is not installed or the oracle is not at hand."""
+def cycles(study: Study, cells: int) -> dict[str, Any]:
+    """True values by mpmath, to 20 digits; none where that is not installed or the oracle is not at hand."""
     folder = str(Path(__file__).parents[1] / "tests" / "oracles")
     sys.path += [] if folder in sys.path else [folder]
     try:
         truth = import_module("foliot_oracles")
     except ImportError:
-        return None
-    fixed = {name: study.fixed[name] for name in ("mu", "phi0", "a", "R", "c", "n", "k", "e") if name in study.fixed}
-    columns, rows = precision_cells(study, cells), []
-    for values in zip(*columns.values(), strict=True):
-        cell = {**fixed, **dict(zip(columns, map(float, values), strict=True))}
-        rows.append([float(x) for x in truth.cycle(**cell, digits=DIGITS)])
-    names = ("period", "amplitude", "crossing_speed", "sensitivity", "multiplier")
-    found = dict(zip(names, np.transpose(rows), strict=True))
-    return {name: found[name] for name in study.outputs}
+        return {}
+    cell, names = {**study.fixed, **precision_cells(study, cells)}, ("mu", "phi0", "a", "R", "c", "n")
+    exact = np.vectorize(lambda *values: tuple(map(float, truth.cycle(*values, digits=20))), otypes="ddddd")
+    found = exact(*(cell.get(name, 0.0) for name in names))
+    return dict(zip(("period", "amplitude", "crossing_speed", "sensitivity", "multiplier"), found, strict=True))
 
 
-def swept(study: sweep.study.read.Study, found: xr.Dataset) -> xr.Dataset:
-    """`found` with the CPU seconds of `sweep.run` over the whole grid, per cell, by every method and tolerance.
-
-    The less of two runs counts, for the first may load machine code. What would take more than `LONGEST` seconds keeps
-    the time of its sample, beside which the engine's share is small.
-    """
+def swept(study: Study, found: xr.Dataset) -> xr.Dataset:
+    """`found` with the CPU seconds of `sweep.run` over the whole grid, per cell; above 10 s the sample's time stands."""
     seconds = found.seconds.copy()
-    for method in map(str, found["method"].values):
-        for rtol in found.rtol.values:
-            at, spent = {"method": method, "rtol": rtol}, []
-            for _ in range(2 if float(seconds.sel(at)) * Grid(study).size < LONGEST else 0):
-                begin = time.process_time()
-                sweep.run(replace(study, method=method, rtol=float(rtol)), progress=False, workers=1)
-                spent.append((time.process_time() - begin) / Grid(study).size)
-            seconds.loc[at] = min(spent, default=float(seconds.sel(at)))
+
+    def statuses(rtol: float, method: str):
+        return sweep.run(
+            replace(study, method=method, rtol=float(rtol)), progress=False, workers=1
+        ).status.values.ravel()
+
+    for name, row in by_method(found).items():
+        quick = row.rtol.values[row.seconds.values * Grid(study).size < 10.0]
+        if quick.size:
+            seconds.loc[{"method": name, "rtol": quick}] = measured(partial(statuses, method=name), quick).seconds
     return found.assign(seconds=seconds)
 
 
-def peers(study: sweep.study.read.Study, true, cells: int, tolerances: Sequence[float]) -> dict[str, xr.Dataset]:
+def peers(study: Study, true: dict[str, Any], cells: int, tolerances: Sequence[float]) -> dict[str, xr.Dataset]:
     """Other libraries on some of the cells, by name; none where the truth is not at hand."""
-    if true is None:
-        return {}
     given, found = precision_cells(study, cells), {}
-    left = solved(replace(sampled(study, cells), outputs=("multiplier",), method="auto", rtol=1e-6))[0]["multiplier"]
-    rows = np.transpose([given["a"], given["R"], left, *true.values()])
-    for name, follower in CLOCKS.items():
-        (a, R, left, *truth), made = rows[:: PEER_CELLS[name]].T, cache(follower)  # once a tolerance, and not timed
+    for name, follower in CLOCKS.items() if true else ():
+        columns = (given["a"], given["R"], true["multiplier"], *(true[name] for name in study.outputs))
+        (a, R, left, *truth), made = (x[:: PEER_CELLS[name]] for x in columns), cache(follower)  # once a tolerance
 
         def off(rtol: float, a=a, R=R, left=left, truth=truth, made=made):
             followed = made(rtol)(a, R, truth[2], [swings(rtol, x) for x in left])
@@ -101,28 +87,30 @@ def peers(study: sweep.study.read.Study, true, cells: int, tolerances: Sequence[
 def honesty(title: str, found: xr.Dataset) -> Claims:
     """What is checked of a chart: no method is silently wrong, and `auto` is right wherever it says so."""
     auto = found.sel({"method": "auto"})
-    over = float((auto.error_worst / (auto.rtol + found.attrs["reference_error"])).max())
-    silent = float(found.silent.max())
+    over, silent = auto.error_worst / (auto.rtol + found.attrs["reference_error"]), float(found.silent.max())
     cells = f"{found.attrs['cells']} cells, {len(found.rtol)} tolerances"
     yield said(f"{title}: silently wrong", silent == 0, f"{100 * silent:g} % of {cells}", "none")
-    yield held(f"{title}: auto, worst error over rtol", over, "<= 1", "{:.2g}")
+    yield held(f"{title}: auto, worst error over rtol", over.max(), "<= 1", "{:.2g}")
     yield held(f"{title}: auto leaves unsolved", auto.unsolved.max(), "<= 0 %", "{:.2%}")
 
 
-def whole(found: xr.Dataset) -> dict[str, xr.Dataset]:
-    """By method, the worst error and the time of each tolerance at which it solves all cells."""
-    rows = {str(name): found.sel({"method": name}) for name in found["method"].values}
-    return {name: row.assign(worst=row.error_worst.where(row.unsolved + row.silent == 0)) for name, row in rows.items()}
+def by_method(found: xr.Dataset) -> dict[str, xr.Dataset]:
+    """The rows of a chart by their names; `worst` is the largest error where all cells are solved."""
+    found = found.assign(worst=found.error_worst.where(found.unsolved + found.silent == 0))
+    return {str(name): found.sel({"method": name}) for name in found["method"].values}
 
 
 def prepared(path, cells=400, tolerances=TOLERANCES):
     """The two charts, and others beside the first."""
+
+    def chart(study: Study, true: dict[str, Any]) -> xr.Dataset:
+        known = {name: true[name] for name in study.outputs} if true else None
+        return work_precision(study, truth=known, cells=cells, tolerances=tolerances)
+
     study, drag = (sweep.study(Path(path).with_name(f"work_precision{end}.toml")) for end in ("", "_drag"))
-    true, keys = cycles(study, cells), {"cells": cells, "tolerances": tolerances}
-    coulomb = work_precision(study, truth=true, **keys)
-    dragged = work_precision(drag, truth=cycles(drag, cells), **keys)
-    coulomb, others = swept(study, coulomb), peers(study, true, cells, tolerances)
-    return coulomb, others, dragged
+    true = cycles(study, cells)
+    coulomb, dragged = swept(study, chart(study, true)), chart(drag, cycles(drag, cells))
+    return coulomb, peers(study, true, cells, tolerances), dragged
 
 
 def tables(*charts):
@@ -136,21 +124,18 @@ def claims(coulomb, others, dragged) -> Claims:
     yield from honesty("drag", dragged)
 
     yield "Cost, viscous and Coulomb"
-    yield from cheapest(whole(coulomb) | others)
+    yield from cheapest(by_method(coulomb) | others)
     yield from (Statement(name, "", "not installed") for name in PEER_CELLS if name not in others)
 
     yield "Cost, drag"
-    yield from cheapest(whole(dragged))
+    yield from cheapest(by_method(dragged))
 
 
-COST, ERROR = Log("CPU time per cell [s]", (3e-7, 0.5)), Log("largest relative error of a cell [1]", (3e-17, 3))
-
-
-@panel(COST, ERROR)
+@panel(COST.to(3e-7, 0.5), ERROR.to(3e-17, 3))
 @page(100.0, 150.0)
 def figure(axes, found, others, _):
     """The largest error over the time of a cell: a line for each method and library, through its tolerances."""
-    rows = {str(name): found.sel({"method": name}) for name in found["method"].values}
+    rows = by_method(found)
     for name, row in rows.items():  # what a tolerance does not change is one mark
         if float(row.error_worst.max()) < 2 * float(row.error_worst.min()):
             rows[name] = row.isel(rtol=[int(row.seconds.argmin("rtol"))])
