@@ -54,7 +54,7 @@ def cycles(study: Study, cells: int) -> dict[str, Any]:
 
 
 def swept(study: Study, found: xr.Dataset) -> xr.Dataset:
-    """`found` with the CPU seconds of `sweep.run` over the whole grid, per cell; above 10 s the sample's time stands."""
+    """`found` with the CPU seconds of `sweep.run` over the grid, per cell; above 10 s the sample's time stands."""
     seconds = found.seconds.copy()
 
     def statuses(rtol: float, method: str):
