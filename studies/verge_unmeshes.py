@@ -57,7 +57,7 @@ def claims(smooth, ds) -> Claims:
 
     yield "Exponents"
     several = smooth.where(smooth.kappa < 0.7, drop=True).transpose("I_c", "tau")
-    share = several.kappa.values[:, None] + 0.0 * several.s.values
+    share = several.kappa.values[:, None] * np.ones(several.tau.size)
     mu = (several.n * several.tau / several.I_v).values / (1 + share)
     cells = {"mu": mu, "a": float(several.c_v / several.I_v) / (1 + share), "e": (1 - share) / (1 + share)}
     cells = {name: values.ravel() for name, values in cells.items()}

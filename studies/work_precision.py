@@ -13,7 +13,6 @@ follows all clocks side by side, each for as many half swings as the slowest.
 """
 
 import sys
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache, partial
 from importlib import import_module
@@ -29,7 +28,6 @@ from _peers import CLOCKS, swings
 import sweep
 from sweep.cells.grid import Grid
 from sweep.explore.work_precision import TOLERANCES, precision_cells, precision_text, work_precision
-from sweep.study.model import Study
 
 PEER_CELLS = {"heyoka.py": 1, "diffrax": 2, "scipy": 10}
 """Other libraries follow every so many-th of the cells."""
@@ -39,10 +37,9 @@ PLACES = {
 """Where the names of methods stand whose marks are close: factors of time and error. Others stand above their marks."""
 
 
-def cycles(study: Study, cells: int) -> dict[str, Any]:
+def cycles(study, cells: int) -> dict[str, Any]:
     """True values by mpmath, to 20 digits; none where that is not installed or the oracle is not at hand."""
-    folder = str(Path(__file__).parents[1] / "tests" / "oracles")
-    sys.path += [] if folder in sys.path else [folder]
+    sys.path.append(str(Path(__file__).parents[1] / "tests" / "oracles"))
     try:
         truth = import_module("foliot_oracles")
     except ImportError:
@@ -53,7 +50,7 @@ def cycles(study: Study, cells: int) -> dict[str, Any]:
     return dict(zip(("period", "amplitude", "crossing_speed", "sensitivity", "multiplier"), found, strict=True))
 
 
-def swept(study: Study, found: xr.Dataset) -> xr.Dataset:
+def swept(study, found: xr.Dataset) -> xr.Dataset:
     """`found` with the CPU seconds of `sweep.run` over the grid, per cell; above 10 s the sample's time stands."""
     seconds = found.seconds.copy()
 
@@ -69,7 +66,7 @@ def swept(study: Study, found: xr.Dataset) -> xr.Dataset:
     return found.assign(seconds=seconds)
 
 
-def peers(study: Study, true: dict[str, Any], cells: int, tolerances: Sequence[float]) -> dict[str, xr.Dataset]:
+def peers(study, true: dict[str, Any], cells: int, tolerances: Any) -> dict[str, xr.Dataset]:
     """Other libraries on some of the cells, by name; none where the truth is not at hand."""
     given, found = precision_cells(study, cells), {}
     for name, follower in CLOCKS.items() if true else ():
@@ -103,7 +100,7 @@ def by_method(found: xr.Dataset) -> dict[str, xr.Dataset]:
 def prepared(path, cells=400, tolerances=TOLERANCES):
     """The two charts, and others beside the first."""
 
-    def chart(study: Study, true: dict[str, Any]) -> xr.Dataset:
+    def chart(study, true: dict[str, Any]) -> xr.Dataset:
         known = {name: true[name] for name in study.outputs} if true else None
         return work_precision(study, truth=known, cells=cells, tolerances=tolerances)
 
@@ -135,19 +132,17 @@ def claims(coulomb, others, dragged) -> Claims:
 @page(100.0, 150.0)
 def figure(axes, found, others, _):
     """The largest error over the time of a cell: a line for each method and library, through its tolerances."""
-    rows = by_method(found)
-    for name, row in rows.items():  # what a tolerance does not change is one mark
-        if float(row.error_worst.max()) < 2 * float(row.error_worst.min()):
-            rows[name] = row.isel(rtol=[int(row.seconds.argmin("rtol"))])
-    for row in rows.values():
-        draw_precision(axes, row.expand_dims("method"), "error_worst")
+    for row in by_method(found).values():
+        same = row.error_worst.max() < 2 * row.error_worst.min()  # what a tolerance does not change is one mark
+        shown = row.isel(rtol=[int(row.seconds.argmin("rtol"))]) if same else row
+        draw_precision(axes, shown.expand_dims("method"), "error_worst")
     for name, row in others.items():
         axes.plot(row.seconds, row.worst, linewidth=0.8, markersize=4, label=name, **method_look(name))
-    for name, line in zip([*rows, *others], [x for x in axes.lines if x.get_label()[0] != "_"], strict=True):
-        top = int(np.nanargmax(line.get_ydata()))
+    for line in [x for x in axes.lines if x.get_label()[0] != "_"]:
+        x, y = line.get_data()
+        name, top = line.get_label(), int(np.nanargmax(y))
         right, up = PLACES.get(name, (1.0, 5.0))
-        x, y = right * line.get_xdata()[top], up * line.get_ydata()[top]
-        direct_label(axes, x, y, name, line.get_color())
+        direct_label(axes, right * x[top], up * y[top], name, line.get_color())
     text = "each mark a tolerance,\nfrom $10^{-3}$ (top) to $10^{-13}$"
     axes.text(0.02, 0.97, text, va="top", fontsize=7, color="0.35", transform=axes.transAxes)
 
