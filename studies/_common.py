@@ -131,6 +131,11 @@ def nearest(values: xr.DataArray, value: float) -> Any:
     return abs(values - value).argmin(...)
 
 
+def by_method(ds: xr.Dataset) -> dict[str, xr.Dataset]:
+    """The part of each method."""
+    return {str(name): ds.sel({"method": name}) for name in ds["method"].values}
+
+
 def count(there: Any, what: str = "cells") -> str:
     """How many are true, or have a value: "12 cells"."""
     return f"{int((there if there.dtype == bool else there.notnull()).sum())} {what}"

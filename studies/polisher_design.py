@@ -111,7 +111,7 @@ def figure(plane, best_of, ds):
     for arm, d, colour, dashes in zip(arms, ds.d.values, COLOURS, DASHES, strict=False):
         look = {"label": f"$d={1e3 * d:.0f}$ mm", "color": colour, "linestyle": dashes}
         best_of.plot(1e3 * arm.b, 100 * best(arm).thd, **look)
-    arm = arms[int(abs(ds.d - ARM).argmin())].transpose("f", "b")
+    arm = arms[int(abs(ds.d.values - ARM).argmin())].transpose("f", "b")
     x, y, thd, top = 1e3 * arm.b.values, 1e3 * arm.f.values, 100 * arm.thd.values, best(arm)
     colour_map(plane, x, y, thd, *MAP, norm=LogNorm(2, 40), cmap="cividis_r")
     e, where = 1e3 * arm.crank.values, [(275, 330), (350, 330)]

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Claims, Statement, never, said, script, solved
+from _common import Claims, Statement, by_method, never, said, script, solved
 from _figures import Axis, Log, direct_label, method_look, page, panel
 from scipy.integrate import DOP853, RK45
 
@@ -64,7 +64,7 @@ def eigenvalue(method: str, ah, wh):
 def grown(ds: xr.Dataset) -> xr.DataArray:
     """Growth per step of the oscillator's amplitude; inf where it left the numbers."""
     size = np.hypot(ds.angle, ds.speed / np.maximum(ds.w, 1e-3))
-    return (size ** (1 / STEPS)).where(ds.status < FIRST_REFUSAL, np.inf).transpose("method", "a", "w")
+    return (size ** (1 / STEPS)).where(ds.status < FIRST_REFUSAL, np.inf).transpose("a", "w")
 
 
 def with_truth(ds: xr.Dataset, axis: str) -> xr.Dataset:
@@ -84,16 +84,15 @@ def with_truth(ds: xr.Dataset, axis: str) -> xr.Dataset:
 def claims(linear, foliots) -> Claims:
     """Growth against theory, well away from the border; what becomes of a foliot's cells."""
     yield "Oscillator"
-    for method, growth in zip(map(str, linear["method"].values), grown(linear).values, strict=True):
+    for method, one in by_method(linear).items():
         theory = eigenvalue(method, linear.a.values[:, None], linear.w.values)
-        agrees = ((growth > 1) == (theory > 1))[abs(theory - 1) > 0.1].mean()
+        agrees = ((grown(one).values > 1) == (theory > 1))[abs(theory - 1) > 0.1].mean()
         yield said(f"{method} grows where abs(R) > 1", agrees == 1, f"{agrees:.4f} of them", "all cells")
     for axis, ds in foliots.items():
         yield GRIDS[axis]
         silent = ds.told & (ds.off > 10 * np.maximum(1e-9, ds.error))
         yield never("values off by more than ten times what is stated", silent)
-        for method in map(str, ds["method"].values):
-            one = ds.sel({"method": method})
+        for method, one in by_method(ds).items():
             here = f"{one.wrong.mean():.1%}; {1 - one.told.mean():.1%}"
             yield Statement(f"{method}: off by {WRONG:.0%} and more, told; refused", "", here)
 
@@ -108,15 +107,14 @@ BORDER = {"(a) border by theory": {"color": "0.3", "linewidth": 0.9}}
 @page(148.0)
 def figure(growth, steps, linear, foliots):
     """Where the oscillator grows; the longest step that holds a foliot's period to 10 %."""
-    for method, factor in zip(map(str, linear["method"].values), grown(linear), strict=True):
+    for method, one in by_method(linear).items():
         look, theory = method_look(method), eigenvalue(method, linear.a.values, linear.w.values[:, None])
         growth.contour(linear.a, linear.w, theory, levels=[1], colors=[look["color"]], linewidths=0.9)
-        grows = (factor > 1).isel(a=slice(2, None, max(1, linear.a.size // 10)))
+        grows = (grown(one) > 1).isel(a=slice(2, None, max(1, linear.a.size // 10)))
         seen = linear.w.where(grows).min("w").where(~grows.isel(w=0))
         growth.plot(seen.a, seen, **{**look, "linestyle": ""}, markersize=4, label=method)
     ds = foliots["mu"].sortby("step")
-    for method in map(str, ds["method"].values):
-        one = ds.sel({"method": method})
+    for method, one in by_method(ds).items():
         right = one.told & (one.off <= WRONG)
         fails = ~right & (right.cumsum("step") > 0)  # the first after one that holds ends it
         longest = one.step.where(right & (fails.cumsum("step") == 0)).max("step")

@@ -13,7 +13,7 @@ absolute tolerance is a thousandth of the relative one. diffrax does all cells s
 
 import numpy as np
 import xarray as xr
-from _common import Claims, Statement, cheapest, held, measured, never, script, solved_by
+from _common import Claims, Statement, by_method, cheapest, held, measured, never, script, solved_by
 from _figures import COST, ERROR, Axis, Log, draw_costs, method_look, page, panel
 from _peers import FRICTION, STIFF
 from lag_scene import KERNEL
@@ -63,8 +63,7 @@ def prepared(lag, bounce, tell=True):
 def claims(lag, found, bounce) -> Claims:
     yield "Lag"
     ok = lag.status == Status.OK
-    for method in map(str, lag["method"].values):
-        here = lag.sel({"method": method})
+    for method, here in by_method(lag).items():
         given = here.status < FIRST_REFUSAL
         reached = f"unsolved {(~given).mean():.0%}; least lag done {here.eps.where(given.all('mu')).min():.1e} s"
         yield Statement(f"{method}: unsolved, and down to which lag it does all", "", reached)
@@ -90,8 +89,8 @@ def claims(lag, found, bounce) -> Claims:
 @page(130.0)
 def figure(share, cost, lag, found, *_):
     """How many drives each method solves over the lag; what a digit costs."""
-    for method in map(str, lag["method"].values):
-        given = lag.status.sel({"method": method}) < FIRST_REFUSAL
+    for method, here in by_method(lag).items():
+        given = here.status < FIRST_REFUSAL
         share.plot(lag.eps, 100 * given.mean("mu"), markersize=3.5, label=method, **method_look(method))
     places = {"rodas5p": (2.5, 4.0), "scipy Radau": (55.0, 3e-7), "scipy BDF": (3.0, 4.0)}
     draw_costs(cost, found, places | {"diffrax Kvaerno5": (3.0, 6.0)})

@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from _common import Claims, Statement, cheapest, held, measured, said, script
+from _common import Claims, Statement, by_method, cheapest, held, measured, said, script
 from _figures import COST, ERROR, direct_label, draw_precision, method_look, page, panel
 from _peers import CLOCKS, swings
 
@@ -91,10 +91,9 @@ def honesty(title: str, found: xr.Dataset) -> Claims:
     yield held(f"{title}: auto leaves unsolved", auto.unsolved.max(), "<= 0 %", "{:.2%}")
 
 
-def by_method(found: xr.Dataset) -> dict[str, xr.Dataset]:
-    """The rows of a chart by their names; `worst` is the largest error where all cells are solved."""
-    found = found.assign(worst=found.error_worst.where(found.unsolved + found.silent == 0))
-    return {str(name): found.sel({"method": name}) for name in found["method"].values}
+def solving(found: xr.Dataset) -> dict[str, xr.Dataset]:
+    """The rows of a chart with the `worst` error where all cells are solved."""
+    return by_method(found.assign(worst=found.error_worst.where(found.unsolved + found.silent == 0)))
 
 
 def prepared(path, cells=400, tolerances=TOLERANCES):
@@ -121,11 +120,11 @@ def claims(coulomb, others, dragged) -> Claims:
     yield from honesty("drag", dragged)
 
     yield "Cost, viscous and Coulomb"
-    yield from cheapest(by_method(coulomb) | others)
+    yield from cheapest(solving(coulomb) | others)
     yield from (Statement(name, "", "not installed") for name in PEER_CELLS if name not in others)
 
     yield "Cost, drag"
-    yield from cheapest(by_method(dragged))
+    yield from cheapest(solving(dragged))
 
 
 @panel(COST.to(3e-7, 0.5), ERROR.to(3e-17, 3))

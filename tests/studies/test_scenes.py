@@ -14,6 +14,7 @@ import stiff_lag
 import timekeeping
 import verge_oracles
 import xarray as xr
+from _common import solved
 from _losses import shares
 from chain_oracles import receptance
 from mpmath import mp, mpf
@@ -24,13 +25,6 @@ from kernels.lanes.jit import COMPILED
 
 pytestmark = pytest.mark.skipif(not COMPILED, reason="thousands of swings; the integrator's tests run as plain Python")
 FINE = {"method": "DOP853", "rtol": 1e-11, "atol": 1e-13}
-
-
-def scene(name, rtol, **values):
-    """Cells of a scene of the studies; lists are axes."""
-    axes = {key: value for key, value in values.items() if isinstance(value, list)}
-    fixed = {key: value for key, value in values.items() if key not in axes}
-    return sweep.run(sweep.study(kernel=f"{name}:KERNEL", axes=axes, fixed=fixed, rtol=rtol, allow_import=True))
 
 
 def cross_beats(tau, I_l, I_r, c, R, k, d, phi0, sway, nu, count):
@@ -69,14 +63,15 @@ def cross_beats(tau, I_l, I_r, c, R, k, d, phi0, sway, nu, count):
 def test_swings_of_a_cross_beat_are_those_of_two_masses_on_a_spring(share, R, sway):
     tau, I_l, I_r, c, phi0, k, d, nu = 9.56541e-4, 1e-4 * share, 1e-4 * (1 - share), 4.778675e-5, 0.35, 0.3, 2e-3, 1.3
     known = {"I_l": I_l, "I_r": I_r, "c_l": c, "c_r": c, "R_l": R, "R_r": R, "tau": tau, "phi0": phi0}
-    here = scene("cross_beat_scene", 1e-9, flips=[1, 2, 5, 6], stiffness=k, damper=d, sway=sway, nu=nu, **known)
+    known |= {"stiffness": k, "damper": d, "sway": sway, "nu": nu}
+    here = solved("cross_beat_scene:KERNEL", flips=[1, 2, 5, 6], rtol=1e-9, **known)
     found = cross_beats(tau, I_l, I_r, c, R, k, d, phi0, sway, nu, 6)
     np.testing.assert_allclose(here.interval, np.array(found)[[0, 1, 4, 5]], rtol=1e-8)
 
 
 def test_the_cycle_of_a_verge_is_that_of_an_event_simulation():
     p = {"tau": 0.02, "I_v": 1e-4, "I_c": 2.5e-4, "n": 0.2, "phi0": 0.35, "drop": 0.01, "c_v": 1e-4, "R_v": 3.5e-4}
-    cell = scene("verge_scene", 1e-9, **p | {"tau": [0.02], "flips": 120}).isel(tau=0)
+    cell = solved("verge_scene:KERNEL", rtol=1e-9, **p | {"tau": [0.02], "flips": 120}).isel(tau=0)
     period, *_, impacts, dry, _, _, _ = verge_oracles.cycle(p | {"e": 0.0}, 60)
     viscous = (1.0 - impacts - dry) * p["tau"] * (2 * p["n"] * p["phi0"] + p["drop"])
     assert (float(cell.clock), float(cell["drag"])) == pytest.approx((period / 2, viscous), rel=1e-8)
@@ -103,14 +98,15 @@ def test_the_period_of_a_balance_with_impulses_is_that_of_50_digits(at):
         first = (mp.sqrt(r**2 + mp.pi * zeta * w) - r) / (mp.pi * zeta)
         v = mp.findroot(lambda v: half(v)[1] - v, (first, first * mpf("1.01")), solver="secant")
         true = 2 * half(v)[0]
-    ds = scene("balance_scene", 1e-12, at=[at], zeta=float(zeta), omega_n=1.0, r=float(r), w=float(w), flips=2001)
+    ds = solved("balance_scene:KERNEL", at=[at], zeta=zeta, omega_n=1.0, r=r, w=w, flips=2001, rtol=1e-12)
     assert float(ds.clock[0]) == pytest.approx(float(true), rel=1e-11)
     assert abs(float(ds.speed[0])) == pytest.approx(float(mp.sqrt(v**2 - 2 * w)), rel=1e-7)
 
 
 def test_a_half_period_under_friction_over_the_swing_is_that_of_a_series():
     """From the speed at the switch, which the scene gives, to the next."""
-    cell = scene("friction_scene", 1e-9, mu=[1.46], a=1.0, phi0=1.0, flips=60, harmonic=1, depth=0.5).isel(mu=0)
+    given = {"mu": [1.46], "a": 1.0, "phi0": 1.0, "harmonic": 1, "depth": 0.5, "flips": 60}
+    cell = solved("friction_scene:KERNEL", **given, rtol=1e-9).isel(mu=0)
     v = abs(float(cell.speed))
     with mp.workdps(20):
         f = mp.odefun(lambda t, y: [y[1], mpf(1.46) - (1 + mp.cos(mp.pi * y[0]) / 2) * y[1]], 0, [-1, -v])
