@@ -17,6 +17,7 @@ import xarray as xr
 from _common import Claims, compared, count, last_passage, most, script, solved
 from _figures import COLOURS, Axis, S, page, panel
 from _losses import any_swing, of_quarter, quarter, shares
+from scipy.integrate import cumulative_trapezoid
 
 LARGE, SMALL = 100.0, 1.0003
 """Amplitudes over phi0 from which, and up to which, losses are called light and heavy."""
@@ -38,7 +39,7 @@ def by_shares(n: float, other: float | None) -> float:
     N = n * (1 - share) + (other or 0.0) * share
     s = (N + (share if other is None else 0.0)) / (N + 2)
     rate = 1 - n * (1 - s) if other is None else (other - n) * (1 - s)
-    log_mu = np.concatenate([[0.0], np.cumsum(np.diff(np.log10(r)) / (0.5 * (rate[1:] + rate[:-1])))])
+    log_mu = cumulative_trapezoid(1 / rate, np.log10(r), initial=0.0)
     low, high = (s[0] + part * (s[-1] - s[0]) for part in (0.25, 0.75))
     return float(np.interp(high, s, log_mu) - np.interp(low, s, log_mu))
 

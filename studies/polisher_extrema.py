@@ -69,7 +69,7 @@ def claims(ds) -> Claims:
     yield said("harmonic motion", last.thd < 0.01, f"distortion {last.thd:.1%} at 15 cm", "held so elsewhere", True)
 
 
-TURN = Axis("crank angle from $b$ [degree]", (-180, 180), range(-180, 181, 90))
+TURN = Axis("crank angle from $b$ [degree]", (-180, 180))
 
 
 @panel(TURN, Axis(r"angle of the arm, $\alpha$ [degree]"), "lower right", title="eccentricity, $e$")
@@ -85,6 +85,7 @@ def figure(motion, size, ds):
     paper, dashed = ds.sel(e=slice(0, LAST + 1e-6)), {"color": "black", "linewidth": 0.9, "linestyle": (0, (4, 2))}
     for end, label in (("plus", "extremes"), ("minus", None)):
         motion.plot(np.degrees(paper[f"theta_{end}"]), np.degrees(paper[f"eta_{end}"] + B_ANGLE), label=label, **dashed)
+    motion.set_xticks(range(-180, 181, 90))
     limit, full = 100 * float(ds.d + ds.f - ds.b), ds.where(ds.A0.notnull() & (ds.e > 0), drop=True)
     size.plot(100 * full.e, full.A1 / (full.e * ds.A1_e[0]), color=COLOURS[0], label="amplitude, $A_1$")
     size.plot(100 * full.e, full.A0 / ds.A0[0], "--", color=COLOURS[1], label="middle, $A_0$")

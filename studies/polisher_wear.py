@@ -88,7 +88,8 @@ def claims(ds, load) -> Claims:
     yield said("disc: wear by load over that by pressure, 2 mm from the edge", within, here, "3 to 5")
 
 
-RADIUS, WEAR, KEY = Axis("radius [mm]", (0, 100)), Axis("wear [µm/h]", (0, 0.24)), {"constant load": "--"}
+RADIUS, WEAR = Axis("radius [mm]", (0, 100)), Axis("wear [µm/h]", (0, 0.24))
+KEY = {"constant load": {"linestyle": "--", "linewidth": 0.9}}
 
 
 @panel(RADIUS, WEAR, "upper left", KEY, title="offset at $e=100$ mm", ncols=2)

@@ -68,7 +68,7 @@ def claims(ds) -> Claims:
 
 TURNED, ZONE = Axis(r"O$_\mathrm{DH}$ turned by $\beta$ [degree]"), Axis("zone, mean radius [cm]", (0, 27))
 PLACE, WEAR = Axis("place on the tool, outwards [cm]"), Axis("wear of the tool over its mean [1]")
-KEY, THROW = {"centre not worn": {"marker": "o", **HOLLOW}}, "throw, $e$ [cm]"
+KEY, THROW = {"centre not worn": {"marker": "o", **HOLLOW, "markersize": 4}}, "throw, $e$ [cm]"
 
 
 @panel(TURNED, ZONE, "upper center", KEY, title=THROW, ncols=4)
@@ -79,7 +79,7 @@ def figure(zone, tool, ds):
     for k, e in enumerate(ds.e.values):
         line, look = ds.sel(e=e), {"color": COLOURS[k], "label": f"{100 * e:.0f}"}
         beta, place, worn = np.degrees(line.beta), 100 * line.zone, line.wear.isel(radius=0) > 0
-        points(zone, beta, place, k, linestyle="-", linewidth=0.8)
+        points(zone, beta, place, k, linestyle="-", linewidth=0.8, markersize=4)
         zone.plot(beta, place.where(worn), MARKS[k], linestyle="", **look)
         tool.plot(100 * ds.X, line.across / line.across.mean(), linestyle=DASHES[k], **look)
 

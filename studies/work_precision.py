@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from _common import Claims, Statement, by_method, cheapest, held, measured, said, script
-from _figures import COST, ERROR, direct_label, draw_precision, method_look, page, panel
+from _figures import COST, Log, direct_label, draw_precision, method_look, page, panel
 from _peers import CLOCKS, swings
 
 import sweep
@@ -127,7 +127,7 @@ def claims(coulomb, others, dragged) -> Claims:
     yield from cheapest(solving(dragged))
 
 
-@panel(COST.to(3e-7, 0.5), ERROR.to(3e-17, 3))
+@panel(COST.to(3e-7, 0.5), Log("largest relative error of a cell [1]", (3e-17, 3)))
 @page(100.0, 150.0)
 def figure(axes, found, others, _):
     """The largest error over the time of a cell: a line for each method and library, through its tolerances."""

@@ -37,13 +37,8 @@ DRAWN = scene_kernel(
 )
 
 RAISED = scene_kernel(
-    name="raised",
-    doc="the ball of `bounce_scene` on a floor at the height 1",
-    states=bounce_scene.KERNEL.outputs[2:],
-    parameters=bounce_scene.KERNEL.parameters[:-1],
-    rates=bounce_scene.rates,
-    surface=lambda height: height - 1.0,
-    switch=bounce_scene.switch,
-    start=lambda above: (1.0 + above, 0.0),
+    **bounce_scene.SCENE
+    | {"name": "raised", "doc": "the ball of `bounce_scene` on a floor at the height 1"}
+    | {"surface": lambda height: height - 1.0, "start": lambda above: (1.0 + above, 0.0)},
     example={"g": 9.81, "e": 0.5},
 )

@@ -100,16 +100,12 @@ def test_what_comes_to_rest_slowly_is_no_cycle_of_tiny_size():
 
 def test_the_foliot_as_a_scene_has_the_cycle_of_its_own_kernel():
     """Five decades of drive, four losses."""
-    known = foliot_scene.KERNEL
-    scene = cycle_kernel(
-        name="foliot_cycle", doc="foliot", states=known.outputs[2:], parameters=known.parameters[:-1],
-        rates=foliot_scene.rates, surface=foliot_scene.surface, start=foliot_scene.start, switch=foliot_scene.switch,
-    )  # fmt: skip
     mu = np.tile(10.0 ** np.linspace(-1.0, 4.0, 6), 4)
     losses = {name: np.zeros(24) for name in ("a", "c", "R")} | {"e": np.ones(24)}
     losses["a"][:] = 0.5
     losses["e"][6:12], losses["c"][12:18], losses["R"][18:] = 0.6, 0.3, 0.2 * mu[18:]
     asked = "period", "speed", "multiplier", "period_by_mu"
+    scene = cycle_kernel(**foliot_scene.SCENE)
     found, status = solve(scene, "taylor", mu=mu, phi0=1.0, **losses, asked=asked)
     assert (status == Status.OK).all()
     smooth = losses["c"] == 0.0

@@ -38,12 +38,8 @@ def test_chaos_is_given_and_not_called_right():
 
 def test_a_motion_is_known_at_any_time_until_its_bounces_accumulate():
     """The flight behind bounce k takes 2 e^k times the fall."""
-    ball, at, e = bounce_scene.KERNEL, np.array([0.4, 0.8, 3.0]), np.array([0.5, 0.9])
-    scene = motion_kernel(
-        name="bounce_motion", doc="ball", states=ball.outputs[2:], parameters=ball.parameters[:-1],
-        rates=bounce_scene.rates, surface=bounce_scene.surface, switch=bounce_scene.switch, start=bounce_scene.start,
-    )  # fmt: skip
-    found, status = solve(scene, "taylor", e=e, along=[at])
+    at, e = np.array([0.4, 0.8, 3.0]), np.array([0.5, 0.9])
+    found, status = solve(motion_kernel(**bounce_scene.SCENE), "taylor", e=e, along=[at])
     assert list(status) == [Status.TOO_SHORT, Status.OK]
     assert np.isnan(found["height"][0, 2])
     for cell, times in ((0, at[:2]), (1, at)):
