@@ -73,9 +73,8 @@ def seasons(mu: float) -> tuple[np.ndarray, np.ndarray]:
     hour = np.arange(0, 365 * 12)
     temperature = 15 - YEAR * np.cos(2 * np.pi * hour / hour.size) - ROOM_DAY * np.cos(2 * np.pi * hour / 12)
     oil = viscosity(temperature) / viscosity(15.0)
-    fine = np.geomspace(oil.min(), oil.max(), 400)
-    periods = solved("foliot", a=fine, mu=mu, phi0=1, rtol=1e-12, outputs=["period"]).period.values
-    rate = np.interp(np.log(oil), np.log(fine), DAY * (float(cycles(mu).period[0]) / periods - 1))
+    period = solved("foliot", design="zip", a=oil, mu=mu, phi0=1, rtol=1e-12, outputs=["period"]).period.values
+    rate = DAY * (float(cycles(mu).period[0]) / period - 1)
     return rate.reshape(365, 12).mean(axis=1), oil
 
 
