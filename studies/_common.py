@@ -69,8 +69,6 @@ Claims = Iterator[Statement | str]
 """What a script says: headings, and the statements below each."""
 Groups = dict[str, list[Statement]]
 """Statements by heading."""
-Conclusion = tuple[Groups, list[str], Callable[[], Any]]
-"""What a script concludes: statements, further results as lines of text, and what draws the figure."""
 OPTIONS = ("--all", "--force")
 """Of every script."""
 NUMBER = re.compile(r"-?[\d.]+(?:e[-+]?\d+)?(?:/\d+)?")
@@ -295,7 +293,7 @@ class Script:
     notes: Callable[..., list[str]] = lambda *_: []
     source: str = "theory"
 
-    def conclude(self, *paths: str, **options: Any) -> Conclusion:
+    def conclude(self, *paths: str, **options: Any) -> tuple[Groups, list[str], Callable[[], Any]]:
         """Statements, notes and what draws the figure, from the results at these paths."""
         asked = zip(paths, self.inputs, strict=True)
         given = [read_result(path, name) if name.endswith(".h5") else path for path, name in asked]
@@ -312,7 +310,7 @@ class Script:
             return 2
         return self.report(arguments, lambda: self.conclude(*paths))
 
-    def report(self, arguments: Sequence[str], conclude: Callable[[], Conclusion]) -> int:
+    def report(self, arguments: Sequence[str], conclude: Callable[[], Any]) -> int:
         """Prints what is concluded and saves the figure beside the first of the results."""
         target = next(Path(one) for one in arguments if one not in OPTIONS).with_suffix(".png")
         complete = "--all" in arguments

@@ -23,8 +23,6 @@ except sweep.SweepError as error:
     sys.exit(str(error))
 from matplotlib.colors import ListedColormap as ListedColormap
 
-NARROW = 110.0
-"""Width in mm of panels one above the other, which can be read at the width of a phone too."""
 HOLLOW = {"linestyle": "", "markerfacecolor": "white", "markersize": 3.6}
 """Marks of what is computed, beside lines of theory."""
 Ticks = Sequence[float] | dict[float, str] | None
@@ -69,9 +67,10 @@ def panel(x: Axis, y: Axis, legend: str = "", key: dict[str, Any] | None = None,
     return declared
 
 
-def page(height: float, width: float = NARROW, columns: int = 1, **how: Any) -> Callable[..., Any]:
+def page(height: float, width: float = 110.0, columns: int = 1, **how: Any) -> Callable[..., Any]:
     """Makes a figure for print, of so many mm, of a function that draws into the panels declared above it.
 
+    Panels of 110 mm one above the other can be read at the width of a phone too.
     The function takes axes, lettered in the end if there are several, and what is drawn; `how` is of `subplots`.
     """
 

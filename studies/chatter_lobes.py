@@ -112,24 +112,21 @@ def claims(ds) -> Claims:
     (f8, K8), (f5, K5) = (least(ds, n, "main mode") for n in (8, 5))
     (g8, M8), (g5, M5) = (least(ds, n, "fifth mode") for n in (8, 5))
     off = ds.border / ds.border.sel(n_keep=8) - 1
-    used = off.sel(n_keep=5, tooth=slice(None, SPAN))
-    worst = used.isel(tooth=int(abs(used).argmax("tooth")))
+    five = off.sel(n_keep=5, tooth=slice(None, SPAN))
+    usual, worst = five.interp(tooth=CUTTER * TURNS), five.isel(abs(five).argmax(...))
     reached = ds.tooth[int((ds.border.sel(n_keep=8) > min(M5, M8)).argmax("tooth"))]
     yield most("least K: five masses against eight", "0", K5 / K8 - 1, 0.01, "moved by")
     yield most("  tooth frequencies of the lobes", "0", f5 / f8 - 1, 0.01, "moved by")
-    yield most(
-        f"border at 180 rev/min, {CUTTER} teeth", "0", off.sel(n_keep=5).interp(tooth=CUTTER * TURNS), 0.01, "moved by"
-    )
+    yield most(f"border at 180 rev/min, {CUTTER} teeth", "0", usual, 0.01, "moved by")
     yield most("border, tooth frequencies of 2 to 159 Hz", "0", worst, HELD, f"at {float(worst.tooth):.1f} Hz")
     here = f"{{:.1%}}, frequency {g5 / g8 - 1:+.1%}"
     yield held("lobes of the fifth mode: K moved by", abs(M5 / M8 - 1), f"> {HELD:.0%}", here)
     yield held("  of which teeth slower than these see nothing [Hz]", reached, f"> {2 * SPAN:.0f}", "{:.0f}")
-    reach = {}  # tooth frequency [Hz] from 2 Hz up to which a chain holds the border to HELD; 0 if not at all
-    for n in (7, 6, 5, 4):
-        first = int(np.argmax([*(abs(off.sel(n_keep=n)) > HELD), True]))
-        reach[n] = float(TEETH[first - 1]) if first else 0.0
-    text, falls = ", ".join(f"{n}: {x:.0f} Hz" for n, x in reach.items()), np.all(np.diff(list(reach.values())) < 0)
-    yield said("border held to 5 % up to a tooth frequency of, by masses", falls, text, "more with more")
+    # tooth frequency from 2 Hz up to which a chain holds the border to HELD; 0 if not at all
+    late = (abs(off.sel(n_keep=[7, 6, 5, 4])) > HELD).pad(tooth=(0, 1), constant_values=True)
+    reach = [float(TEETH[first - 1]) if first else 0.0 for first in late.argmax("tooth").values]
+    text, falls = ", ".join(f"{n}: {x:.0f} Hz" for n, x in zip((7, 6, 5, 4), reach, strict=True)), np.diff(reach) < 0
+    yield said("border held to 5 % up to a tooth frequency of, by masses", falls.all(), text, "more with more")
 
 
 TOOTH, TICKS = "tooth frequency [Hz]", (2, 5, 10, 20, 50, 100, 200, 500, 1000)

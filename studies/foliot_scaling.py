@@ -25,7 +25,7 @@ import sweep
 
 WEAK, STRONG = (None, 1e-5), (1e5, None)
 """Windows of alpha for the straight lines."""
-SHOWN = np.array([0.1, 1.463, 100.0])
+SHOWN = (0.1, 1.463, 100.0)
 """alpha of the motions whose shape is told."""
 HALF = {"alpha": 1.46299058758010465706, "aP": 6.42446119521106945636, "A": 1.39341841440363426389}
 """Where the exponent is -1/2, once in 50 digits."""
@@ -56,15 +56,15 @@ def prepared(ds):
     return ds, sweep_of_alpha(ds, [float(found.abscissa)]).isel(mu=0)
 
 
-def limits(ds) -> Claims:
-    """Values and exponents at both ends, to the next term of the series."""
-    first, last = ds.isel(mu=0), ds.isel(mu=-1)
-    weak, third, b2 = float(first.alpha), last.alpha ** (1 / 3), float(3 / last.alpha) ** (2 / 3)
-    yield compared(f"alpha = {weak:.2g}: a P alpha", "4 *", first.aP * weak, 4.0, 1.01 * weak)
-    yield compared("  A", "1 *", first.A, 1.0, 0.31 * weak)
-    what = f"alpha = {last.alpha:.2g}: a P alpha^(1/3)"
-    yield compared(what, f"4 3^(1/3) = {STRONG_P:.5f} *", last.aP * third, STRONG_P, 0.14 * b2)
-    yield compared("  A alpha^(-1/3)", f"3^(2/3)/2 = {STRONG_A:.5f} *", last.A / third, STRONG_A, 0.11 * b2)
+def claims(ds, half) -> Claims:
+    yield "Limits"
+    weak, strong = ds.isel(mu=0), ds.isel(mu=-1)
+    low, third, b2 = float(weak.alpha), strong.alpha ** (1 / 3), float(3 / strong.alpha) ** (2 / 3)
+    yield compared(f"alpha = {low:.2g}: a P alpha", "4 *", weak.aP * low, 4.0, 1.01 * low)
+    yield compared("  A", "1 *", weak.A, 1.0, 0.31 * low)
+    what = f"alpha = {strong.alpha:.2g}: a P alpha^(1/3)"
+    yield compared(what, f"4 3^(1/3) = {STRONG_P:.5f} *", strong.aP * third, STRONG_P, 0.14 * b2)
+    yield compared("  A alpha^(-1/3)", f"3^(2/3)/2 = {STRONG_A:.5f} *", strong.A / third, STRONG_A, 0.11 * b2)
     for name, window, limit in (("aP", WEAK, "-1"), ("aP", STRONG, "-1/3"), ("A", WEAK, "0"), ("A", STRONG, "1/3")):
         fit = sweep.fit_exponent(ds[name], "alpha", window)
         # the local exponent at the inner end of a window is farthest from its limit
@@ -75,26 +75,6 @@ def limits(ds) -> Claims:
     meet = sweep.fit_two_laws(ds.aP, "alpha", windows=(WEAK, STRONG))
     here = f"alpha = {meet.crossover:.5f} ± {meet.crossover_error:.1g}, a P = {meet.level:.4f}"
     yield most("the two laws of a P meet at", "3^(-1/2), 6.9282", meet.crossover * math.sqrt(3) - 1, 0.01, here)
-
-
-def shape(ds) -> Claims:
-    """The motion from a switch to its peak, and back to the angle of the switch."""
-    mu, how = SHOWN * float(ds.a**2 * ds.phi0), {"method": "closed", "outputs": ["angle", "speed"]}
-    motion = solved("foliot_motion", **how, along={"phase": np.linspace(0, 1, 8001)}, mu=mu, a=ds.a, phi0=ds.phi0)
-    top, again = motion.angle.argmax("phase"), (motion.angle > ds.phi0).sum("phase")
-    faster = motion.speed.isel(phase=0).values / -motion.speed.isel(phase=again).values
-    out, back = (motion.phase.values[k] for k in (top, again - top))
-    sooner = ", ".join(f"{x:.3f} and {y:.3f} P" for x, y in zip(out, back, strict=True))
-    strong = abs(motion.angle.isel(mu=-1))
-    high = (strong > 0.5 * strong.max()).mean()
-    yield held("faster at the switch than back there after the turn", min(faster), "> 1", "{:.4f} times or more")
-    yield said("time from the switch to the peak, shorter than back", np.all(out < back), sooner, "yes")
-    yield held("strong drive: rounder than a sine, time over A/2 [P]", high, "> 0.677", "{:.3f}", "sine 0.667")
-
-
-def claims(ds, half) -> Claims:
-    yield "Limits"
-    yield from limits(ds)
 
     yield "In between"
     slope = sweep.local_exponent(ds.aP, "alpha")
@@ -108,18 +88,18 @@ def claims(ds, half) -> Claims:
 
     yield "At every drive"
     # a weak drive is followed from rest in SI units; weaker ones take steps in proportion to 1/alpha
-    weak = ds.isel(nearest(np.log(ds.alpha), math.log(1e-3)))
-    rest = solved("foliot_scene:KERNEL", mu=[float(weak.mu)], a=ds.a, phi0=ds.phi0, flips=4, rtol=1e-10)
+    light = ds.isel(nearest(np.log(ds.alpha), math.log(1e-3)))
+    rest = solved("foliot_scene:KERNEL", mu=[float(light.mu)], a=ds.a, phi0=ds.phi0, flips=4, rtol=1e-10)
     friction, mu = float(ds.a) * np.exp(np.linspace(-0.02, 0.02, 9)), half.alpha * ds.a**2 * ds.phi0
     near = solved("foliot", method="closed", outputs=["period"], a=friction, mu=mu, phi0=ds.phi0)
     blind = sweep.local_exponent(near.period, "a")[4]
-    followed = f"from rest to 4 switches at alpha = {weak.alpha:.1e}: P"
-    yield most("self-starting, no least torque", "yes", 2 * rest.interval[0] / weak.period - 1, 1e-8, followed)
+    followed = f"from rest to 4 switches at alpha = {light.alpha:.1e}: P"
+    yield most("self-starting, no least torque", "yes", 2 * rest.interval[0] / light.period - 1, 1e-8, followed)
     yield held("smallest A - 1", ds.A.min() - 1, "> 0", "{:.2g}", "A > 1")
     yield most("at exponent -1/2 friction does not count", "yes *", blind, 1e-8, "dlnP/dlna = 0")
 
     yield "Torque"
-    for drive, alpha, percent in (("weak", ds.alpha[0], 1), ("strong", ds.alpha[-1], 3)):
+    for drive, alpha, percent in (("weak", weak.alpha, 1), ("strong", strong.alpha, 3)):
         part = QUARTER / float(sweep_of_alpha(ds, [alpha]).s[0])
         slow, fast = sweep_of_alpha(ds, float(alpha) * np.exp([-part / 2, part / 2])).period.values
         what = f"change of the torque for 15 min/day, {drive} drive [%]"
@@ -127,12 +107,21 @@ def claims(ds, half) -> Claims:
         yield most("  the rate by it", "15 min/day", math.log(slow / fast) / QUARTER - 1, 1e-3)
 
     yield "Shape of the swing"
-    yield from shape(ds)
+    mu, how = [x * float(ds.a**2 * ds.phi0) for x in SHOWN], {"method": "closed", "outputs": ["angle", "speed"]}
+    motion = solved("foliot_motion", **how, along={"phase": np.linspace(0, 1, 8001)}, mu=mu, a=ds.a, phi0=ds.phi0)
+    top, again = motion.angle.argmax("phase"), (motion.angle > ds.phi0).sum("phase")
+    faster = motion.speed.isel(phase=0).values / -motion.speed.isel(phase=again).values
+    out, back = (motion.phase.values[k] for k in (top, again - top))
+    sooner = ", ".join(f"{x:.3f} and {y:.3f} P" for x, y in zip(out, back, strict=True))
+    size = abs(motion.angle.isel(mu=-1))
+    high = (size > 0.5 * size.max()).mean()
+    yield held("faster at the switch than back there after the turn", min(faster), "> 1", "{:.4f} times or more")
+    yield said("time from the switch to the peak, shorter than back", np.all(out < back), sooner, "yes")
+    yield held("strong drive: rounder than a sine, time over A/2 [P]", high, "> 0.677", "{:.3f}", "sine 0.667")
 
     yield "Energy"
-    weak, strong = ds.isel(mu=0), ds.isel(mu=-1)
     kept, final = ds.multiplier.where(ds.alpha < 0.1).max(), weak.crossing_speed * weak.a / weak.mu
-    cube, b2 = strong.crossing_speed**3 * strong.a / (strong.mu**2 * strong.phi0), (3 / strong.alpha.item()) ** (2 / 3)
+    cube = strong.crossing_speed**3 * strong.a / (strong.mu**2 * strong.phi0)
     yield held("what a swing keeps of the one before it, alpha < 0.1", kept, "< 1e-8", "{:.0e}")
     yield compared("why -1: v a/mu, v at the switch, weak drive", "1 *", final, 1.0, 1e-6)
     yield compared("why -1/3: v^3 a/(mu^2 phi0), strong drive", "(3) order 1", cube, 3.0, b2)

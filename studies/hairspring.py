@@ -26,7 +26,7 @@ from _figures import COLOURS, DRIVE, Log, LogNorm, contours, direct_label, hatch
 import sweep
 from kernels.interface import Status
 
-SHOWN = (1e6, 1e4, 1e2, 1.0)
+SHOWN = {1e6: "10^6", 1e4: "10^4", 1e2: "10^2", 1.0: "1"}
 """alpha of the lines in the figure."""
 WINDOW = (10.0, 1000.0)
 """kappa at which s is held to (1)."""
@@ -57,10 +57,8 @@ def first_order(alpha, kappa):
 
 
 def prepared(ds):
-    """The sweep with its groups, and the springs of least sensitivity at the drives of the grid from alpha = 10 on.
-
-    `blur` is the error of interpolation of a best spring, relative.
-    """
+    """The sweep with its groups, and the springs of least s at the drives of the grid from alpha = 10 on, with what
+    their kappa is off by interpolation, relative, `blur`."""
     ds = scaled(ds)
     strong = ds.where(ds.alpha > 9.99, drop=True)
     place = sweep.where_exponent(strong.s, "kappa", 0.0)
@@ -121,20 +119,17 @@ KEY = {"self-starting": "-", "not self-starting": PUSHED, "theory of first order
 @page(150.0)
 def figure(lines, plane, ds, springs):
     """Sensitivity against the spring, and a map of it over spring and drive."""
-    for alpha, colour in zip(SHOWN, COLOURS, strict=False):
-        line = line_of(ds, alpha)
-        started = line.status == Status.OK
+    for (alpha, text), colour in zip(SHOWN.items(), COLOURS, strict=False):
+        line, cell = line_of(ds, alpha), line_of(springs, alpha)
+        started, x, y = line.status == Status.OK, 3.0, 0.45
         lines.plot(line.kappa, line.s.where(started), color=colour)
         lines.plot(line.kappa, line.s.where(~started), color=colour, **PUSHED)
-        if alpha == 1.0:
-            direct_label(lines, 3, 0.45, r"$\alpha = 1$", colour, ha="left")
-            continue
-        cell, few = line_of(springs, alpha), line.kappa.values[::10]
-        few = few[(few > alpha ** (-1 / 3)) & (few < 1.6 * alpha)]
-        lines.plot(few, first_order(alpha, few), "x", color="black", markersize=3.5, markeredgewidth=0.7)
-        lines.plot(cell.kappa, cell.s, "o", color=colour)
-        text = rf"$\alpha = 10^{{{round(math.log10(alpha))}}}$"
-        direct_label(lines, 2.4 * cell.kappa, cell.s, text, colour, ha="left")
+        if alpha > 1:
+            few, x, y = line.kappa.values[::10], 2.4 * cell.kappa, cell.s
+            few = few[(few > alpha ** (-1 / 3)) & (few < 1.6 * alpha)]
+            lines.plot(few, first_order(alpha, few), "x", color="black", markersize=3.5, markeredgewidth=0.7)
+            lines.plot(cell.kappa, cell.s, "o", color=colour)
+        direct_label(lines, x, y, rf"$\alpha = {text}$", colour, ha="left")
     lines.set(xlim=(ds.kappa.min(), 10 * ds.kappa.max()))
     day = lines.secondary_yaxis("right", functions=(lambda s: 0.01 * DAY * s, lambda rate: rate / (0.01 * DAY)))
     day.set_ylabel("rate [s/day] by 1 % of torque")

@@ -1,4 +1,4 @@
-"""Polynomial coefficients, lowest power first, written by studies/fit_viscous.py; not to be edited."""
+"""Polynomial coefficients, lowest power first, written by benchmarks/fit_viscous.py; not to be edited."""
 
 SPLIT = 0.7
 """k = 1/alpha at which the fits change over."""

@@ -41,7 +41,7 @@ def studies_text() -> str:
 
 def question(name: str) -> str:
     """First line of a study's TOML, or of what its script says of itself."""
-    for suffix, pattern in ((".toml", r"# ?(.*)"), (".py", r'(?:# |""")(.*)')):
+    for suffix, pattern in ((".toml", r"# ?(.*)"), (".py", r'"""(.*)')):
         path = folder() / f"{name}{suffix}"
         match = re.match(pattern, path.read_text(encoding="utf-8")) if path.exists() else None
         if match:

@@ -1,6 +1,6 @@
 """How few coefficients hold the viscous foliot's limit cycle to a few 1e-16?
 
-    python studies/fit_viscous.py > kernels/foliot/_viscous_fit.py
+    python benchmarks/fit_viscous.py > kernels/foliot/_viscous_fit.py
 
 fits the polynomials of that module in 50-digit arithmetic and prints it.
 LOG_TAIL of `kernels/maths/elementary.py` is fitted with it and printed on stderr.
@@ -68,7 +68,7 @@ def main():
     q, amplitude, s = interpolate(strong, tiny, top * mpf("1.0001"), 15, 3)
     gap, overshoot = interpolate(weak, tiny, exp(-2 * (SPLIT + 1)) * mpf("1.0001"), 12, 2)
     (log_coefficients,) = interpolate(log_tail, tiny, mpf("0.112"), 11, 1)
-    print('"""Polynomial coefficients, lowest power first, written by studies/fit_viscous.py; not to be edited."""')
+    print('"""Polynomial coefficients, lowest power first, written by benchmarks/fit_viscous.py; not to be edited."""')
     print(f"\nSPLIT = {float(SPLIT)!r}\n", '"""k = 1/alpha at which the fits change over."""', sep="")
     print(show("Q_STRONG", "(q/y - 1)/w, w = y^2, y = cbrt(3 k).", q), end="")
     print(show("AMPLITUDE_STRONG", "(A y/1.5 - 1)/w.", amplitude), end="")
