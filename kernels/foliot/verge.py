@@ -36,7 +36,7 @@ from kernels.integrate import linear_flow
 from kernels.interface import Field
 from kernels.lanes.codes import NEVER_STARTS, NO_METHOD, NOT_CONVERGED, OK, STEP_LIMIT, UNMESHES
 from kernels.lanes.columns import cell_by_cell
-from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.ranges import judged
 from kernels.lanes.vectors import choose, magnitude, sqrt, where
 from kernels.lanes.wiring import kernel, method
@@ -91,7 +91,7 @@ def given(units, answer, verdict):
     return (period, amplitude, speed, recoil, share, rubbed), verdict
 
 
-@jit_call
+@jit
 def _safe_step(scene, gap, v, w, force):
     """A time in which the gap does not close but at its end, and nearly does.
 
@@ -108,7 +108,7 @@ def _safe_step(scene, gap, v, w, force):
     return 2.0 * gap / (root + closing) if closing > 0.0 else (root - closing) / strength
 
 
-@jit_call
+@jit
 def _flight(scene, y, v, w, gap, watched):
     """(2) until the gap closes or the tooth escapes: y, v, w, gap, time, the foliot's way, the wheel's, the least of
     that on the way, and how it ends. After a landing the other pallet is `watched`: back at y = -1 it must find the
@@ -145,7 +145,7 @@ def _flight(scene, y, v, w, gap, watched):
     return y, v, w, gap, time, way, rim, least, TOO_MANY
 
 
-@jit_call
+@jit
 def _contact(scene, y, v):
     """(1) from y with speed v to the escape: speed there, time, and the way back before the push wins."""
     both = 1.0 + scene.kappa
@@ -160,7 +160,7 @@ def _contact(scene, y, v):
     return out, turn + time, back
 
 
-@jit_call
+@jit_apart
 def half_period(scene, v, w, gap):
     """From an escape with these speeds and this gap to the next one, seen from the pallet that is met.
 
@@ -211,7 +211,7 @@ def distance(half, v, w, gap):
     return apart + magnitude(half.gap - gap) / (1.0 + half.gap)
 
 
-@jit_call
+@jit
 def return_map(scene, rtol):
     """The half period that repeats, the clock started from rest, with the shares of the losses in the drive's work; the
     relative errors; the status.
