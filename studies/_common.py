@@ -198,11 +198,10 @@ def solved_by(kernel: Any, method: str, rtol: float, **given: Any) -> tuple[Any,
     return outputs[0], status
 
 
-def columns(rows: Sequence[Sequence[str]], between: str = "  ") -> list[str]:
+def columns(rows: Sequence[Sequence[str]]) -> list[str]:
     """Rows as lines of text with aligned columns."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    padded = ([cell.ljust(width) for cell, width in zip(row, widths, strict=True)] for row in rows)
-    return [between.join(cells).rstrip() for cells in padded]
+    return ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
 
 
 def table(groups: Groups, source: str) -> list[str]:

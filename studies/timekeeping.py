@@ -112,7 +112,7 @@ def table(clocks):
             sigma = [*(rate / ds.per_sigma).values, rate / (DAY * float(ds.s))]
             # torque that varies by more than 30 % would vanish now and then: any that a clock can have
             rows.append((name, goal, *(f"{100 * x:.2g}" if x < 0.3 else "any" for x in sigma)))
-    return ["Noise of the torque, by its correlation, and lasting change [%] for these rates:", *columns(rows, " | ")]
+    return ["Noise of the torque, by its correlation, and lasting change [%] for these rates:", *columns(rows)]
 
 
 NOISE, SCATTER = Log(r"torque noise, $\sigma$ [1]"), Log("scatter of the rate from day to day [s/day]", (1e-4, 1e4))

@@ -244,6 +244,7 @@ def test_the_script_draws_its_figure_and_every_statement_holds(told, capsys):
     arguments = [*told.paths, "--all"]
     assert told.script.main.report(arguments, lambda: told.conclusion) == 0
     assert re.search(r"  (yes|no, known)$", printed := capsys.readouterr().out, re.MULTILINE)
+    assert [s.what for s in checked(told.conclusion[0]) if s.off is not None and not s.allowed] == []
     picture = Path(told.paths[0]).with_suffix(".png")
     assert printed.rstrip().endswith(f"figure: {picture}")
     assert picture.read_bytes().startswith(b"\x89PNG")
