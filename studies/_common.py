@@ -226,9 +226,8 @@ def summary(groups: Groups, source: str) -> list[str]:
             if s.verdict in ("NO", "no, known"):
                 what = ", ".join(filter(None, dict.fromkeys((subject, s.what.strip()))))
                 which = "does not hold" if s.failed else "known not to hold"
-                numbers = {"": s.here, ", deviation ": s.deviation, ", allowed ": s.allowed}
-                here = "".join(name + number for name, number in numbers.items() if number)
-                words = f"{which}: {what}; {source}: {s.paper or '-'}; here: {here}"
+                numbers = (s.here, s.deviation and f"deviation {s.deviation}", s.allowed and f"allowed {s.allowed}")
+                words = f"{which}: {what}; {source}: {s.paper or '-'}; here: {', '.join(filter(None, numbers))}"
                 others += textwrap.wrap(words, 79, subsequent_indent="    ")
     return [*columns(rows), *others]
 

@@ -55,9 +55,7 @@ COST, ERROR = Log("CPU time per cell [s]"), Log("relative error, worst cell [1]"
 def panel(x: Axis, y: Axis, legend: str = "", key: dict[str, Any] | None = None, **how: Any) -> Callable[..., Any]:
     """Declares a panel of a page: its axes, the place of its legend ("outside ...": on the page) and its options.
 
-    Parameters
-    ----------
-    key : entries of the legend beside the lines that have names: format, or options, of a black line or mark
+    `key` has entries of the legend beside the lines that have names: format, or options, of a black line or mark.
     """
 
     def declared(figure: Any) -> Any:
@@ -182,9 +180,7 @@ def direct_label(axes: Any, x: float, y: float, text: str, colour: str = "black"
 def draw_costs(axes: Any, found: dict[str, xr.Dataset], places: dict[str, tuple[float, float]]) -> None:
     """`worst` error over `seconds` a cell of each method, in its colour, with its name beside it.
 
-    Parameters
-    ----------
-    places : by name, factors from the line's first point to where the name stands; those without are not drawn.
+    `places`: by name, factors from the line's first point to where the name stands; those without are not drawn.
     """
     for name, row in found.items():
         look, drawn = charts.method_look(name), row.worst.where(row.worst < 1.0).dropna("rtol")

@@ -1,8 +1,5 @@
 """What each loss of a foliot takes of the energy of half a swing, and the exponent of the period by these shares."""
 
-from __future__ import annotations
-
-import functools
 import math
 from typing import Any
 
@@ -10,8 +7,7 @@ import numpy as np
 import xarray as xr
 from scipy.optimize import brentq
 
-NODES = 200
-legendre = functools.cache(np.polynomial.legendre.leggauss)
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(200)
 
 
 def of_quarter(q: float) -> tuple[float, float, float]:
@@ -31,9 +27,8 @@ def taken(mu: Any, phi0: Any, R: Any, a: Any, c: Any, n: Any, e: Any, speed: Any
     what the quadrature over the speed has missed of it. Where the foliot goes at its final speed the integrals end at a
     pole, but what is missed is all lost at that speed, to each friction by its force there."""
     mu, R, a, c, n, e, top = (np.asarray(x)[..., None] for x in (mu, R, a, c, n, e, speed))
-    x, w = legendre(NODES)
-    t = 0.5 * (x + 1.0)
-    rise, w = t * t * (3.0 - 2.0 * t), 3.0 * t * (1.0 - t) * w  # fewer digits lost near the final speed
+    t = 0.5 * (NODES + 1.0)
+    rise, w = t * t * (3.0 - 2.0 * t), 3.0 * t * (1.0 - t) * WEIGHTS  # fewer digits lost near the final speed
 
     def friction(v: Any) -> Any:
         return np.array(np.broadcast_arrays(R + 0.0 * v, a * v, c * v**n))

@@ -49,7 +49,8 @@ def installed(**by_module: dict[str, Any]) -> dict[str, Any]:
 
 
 cellwise = partial(np.vectorize, otypes=[float])
-"""A function of many cells from that of one."""
+rows = partial(cellwise, signature="(),(),(),()->(row)")
+"""Functions of many cells from those of one, which give a number, or a row of numbers of a clock."""
 
 
 def ended(rates: Any, begin: Any, span: Any, rtol: float, event: Any, way: int = 0, method: str = "DOP853", **how: Any):
@@ -105,19 +106,16 @@ def half_swing(follow: Callable[..., Any], a: Any, R: Any, speed: Any) -> tuple[
     return out + back, top, -last
 
 
-def scipy_clock(rtol: float) -> Callable[..., Any]:
-    """solve_ivp by DOP853."""
+def settled(rtol: float, a: float, R: float, speed: float, count: int) -> Any:
+    """A clock by solve_ivp's DOP853."""
 
     def follow(rates: Any, begin: Any, event: Any) -> Any:
         return ended(rates, begin, (0.0, FOREVER), rtol, event)
 
-    def settled(a: float, R: float, speed: float, count: int) -> Any:
-        time, top, speed = 0.0, 1.0, START * speed
-        for _ in range(count):
-            time, top, speed = half_swing(follow, a, R, speed)
-        return np.array([2.0 * time, top, speed])
-
-    return np.vectorize(settled, otypes=[float], signature="(),(),(),()->(row)")
+    time, top, speed = 0.0, 1.0, START * speed
+    for _ in range(count):
+        time, top, speed = half_swing(follow, a, R, speed)
+    return np.array([2.0 * time, top, speed])
 
 
 def heyoka_clock(rtol: float) -> Callable[..., Any]:
@@ -156,7 +154,7 @@ def heyoka_clock(rtol: float) -> Callable[..., Any]:
         run.propagate_until(FOREVER)
         return np.array([2.0 * (log[-1][0] - log[-2][0]), top[0], log[-1][1]])
 
-    return np.vectorize(settled, otypes=[float], signature="(),(),(),()->(row)")
+    return rows(settled)
 
 
 @side_by_side
@@ -176,7 +174,7 @@ def diffrax_clocks(a: Any, R: Any, speed: Any, count: Any, rtol: Any) -> Any:
 CLOCKS = installed(
     heyoka={"heyoka.py": heyoka_clock},
     diffrax={"diffrax": lambda rtol: lambda *clocks: diffrax_clocks(*clocks, rtol)},
-    scipy={"scipy": scipy_clock},
+    scipy={"scipy": lambda rtol: rows(partial(settled, rtol))},
 )
 
 

@@ -1,7 +1,5 @@
 """What studies of a polishing machine share: how uneven a profile is, the best of one and of few settings."""
 
-from __future__ import annotations
-
 import functools
 import itertools
 from collections.abc import Callable
@@ -54,25 +52,16 @@ class Setting:
         return f"{self.uneven:.1%} at {place}, least {self.least:.2f}"
 
 
-TURN = 720
-"""Crank angles of a turn."""
 DWELL = 0.05
 """Standard error of a time of dwell: what a hand at a switch keeps."""
-SEVERAL = 10
-"""The most settings of a set that is looked for."""
-STARTS = 24
-"""Random sets that are improved."""
 WANTED = (0.02, 0.015, 0.012, 0.01)
 """Unevenness to be expected, for which the fewest settings are looked for."""
-DRAWS = 4000
-"""Sets of times of dwell that are drawn."""
-NAMES = ("b", "d", "f", "omega", "b_angle", "L", "Omega", "tool_a", "preston", "pressure")
-"""What says the machine, but for throw and offset."""
 
 
 def machine(ds: xr.Dataset) -> dict[str, float]:
-    """The numbers of a result's machine, by `NAMES`."""
-    return {name: float(ds[name]) for name in NAMES}
+    """What says a result's machine, but for throw and offset."""
+    names = ("b", "d", "f", "omega", "b_angle", "L", "Omega", "tool_a", "preston", "pressure")
+    return {name: float(ds[name]) for name in names}
 
 
 def of_machine(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -159,8 +148,8 @@ class Profiles(NamedTuple):
         return self.expected(chosen, self.times(chosen, delta), delta)
 
     def drawn(self, chosen: Any, times: Any, delta: float = DWELL) -> Any:
-        """Unevenness with drawn errors of dwell: root of the mean square, and below which 19 of 20 pieces are."""
-        errors = 1.0 + delta * np.random.default_rng(1).standard_normal((DRAWS, len(times)))
+        """Unevenness with 4000 draws of errors of dwell: root of the mean square; below which 19 of 20 pieces are."""
+        errors = 1.0 + delta * np.random.default_rng(1).standard_normal((4000, len(times)))
         found = unevenness((times * errors) @ self.rows[list(chosen)], self.weight)
         return float(np.sqrt(np.mean(found**2))), np.quantile(found, 0.95)
 
@@ -196,14 +185,15 @@ def exchanged(p: Profiles, chosen: list[int]) -> list[int]:
 
 
 def fewest(p: Profiles) -> dict[int, list[int]]:
-    """The best set of each number of settings: of all pairs and threes; of more, by exchange, from several starts."""
+    """The best sets of 2 to 10 settings: of all pairs and threes; of more, by exchange, from 24 random starts and one
+    that grows the set before."""
     random, sets = np.random.default_rng(1), {}
-    for n in range(2, SEVERAL + 1):
+    for n in range(2, 11):
         if n < 4:
             starts = np.array(list(itertools.combinations(range(len(p.rows)), n)))
             sets[n] = starts[int(of_sets(p, starts).argmin())].tolist()
             continue
-        starts = [random.choice(len(p.rows), n, replace=False).tolist() for _ in range(STARTS)]
+        starts = [random.choice(len(p.rows), n, replace=False).tolist() for _ in range(24)]
         grown = [[*sets[n - 1], k] for k in range(len(p.rows)) if k not in sets[n - 1]]
         starts.append(grown[int(of_sets(p, grown).argmin())])
         sets[n] = min((exchanged(p, start) for start in starts), key=lambda chosen: float(of_sets(p, chosen)))
@@ -227,8 +217,8 @@ def reached(p: Profiles, sets: dict[int, list[int]]) -> tuple[list[int], float, 
 
 
 def swings(ds: xr.Dataset, e: Any) -> xr.Dataset:
-    """alpha [rad] and its rate [rad/s] over a turn of the crank, by throw."""
-    along = {"crank_angle": np.linspace(0, 2 * np.pi, TURN, endpoint=False)}
+    """alpha [rad] and its rate [rad/s] at 720 angles of the crank, by throw."""
+    along = {"crank_angle": np.linspace(0, 2 * np.pi, 720, endpoint=False)}
     known = {name: ds[name] for name in ("b", "d", "f", "omega", "b_angle")}
     return solved("polisher_motion", e=e, along=along, outputs=["alpha", "alpha_rate"], rtol=1e-12, **known)
 

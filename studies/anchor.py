@@ -48,10 +48,8 @@ def claims(ds) -> Claims:
         yield compared(what, f"{A:.5g}", here, A, 0.005)
 
 
-SWING, S_SIZE = (
-    Log("amplitude [degrees]", None, (1.5, 2, 3, 5, 10, 20)),
-    Log(r"$|s|$, $s=-$d ln $P$/d ln $\mu$", (2e-6, 1)),
-)
+SWING = Log("amplitude [degrees]", None, (1.5, 2, 3, 5, 10, 20))
+S_SIZE = Log(r"$|s|$, $s=-$d ln $P$/d ln $\mu$", (2e-6, 1))
 
 
 @panel(SWING, S_SIZE, "lower right")

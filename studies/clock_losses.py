@@ -9,8 +9,6 @@ dry friction R, viscous friction a, drag c v^2 and impacts e, all at least 0. Th
 at which the best fit whose share is x has a sum of squares, over the noise, at most 3.84 above the least.
 """
 
-from __future__ import annotations
-
 import functools
 import sys
 from collections.abc import Callable
@@ -23,8 +21,7 @@ from scipy.optimize import brentq, least_squares
 
 import sweep
 
-NAMES = ("dry", "viscous", "drag", "impacts")
-SHARES = (*NAMES, "drag and impacts")
+SHARES = ("dry", "viscous", "drag", "impacts", "drag and impacts")
 SUM = np.vstack([np.eye(4), [0, 0, 1, 1]])
 """What makes `SHARES` of the four."""
 THRESHOLD = 3.8415

@@ -31,10 +31,6 @@ SMALL = 0.125
 """Depth of the differences that stand for first order."""
 HALF = 1.4629905875801047
 """alpha where s = 1/2, and friction does not count."""
-OIL = (3.0, 0.42)
-"""Viscosity of an oil at 0 and at 40 degree C, over that at 20; chosen here, as a clock oil's."""
-YEAR, ROOM_DAY = 8.0, 2.0
-"""Half the swing of the temperature over the year and over the day [K], about 15 degree C."""
 SEASONS = {0.1: "0.1", HALF: "1.46", 30.0: "30"}
 """Drives of the clocks that are followed over a year."""
 NOISES = {
@@ -46,8 +42,8 @@ NOISES = {
 
 
 def viscosity(temperature):
-    """Viscosity over that at 20 degree C, exp(B/(T + C)) through 1 there and both points of `OIL` (Vogel)."""
-    thick, thin = np.log(OIL)
+    """Viscosity over that at 20 degree C, exp(B/(T + C)) through 1 there (Vogel)."""
+    thick, thin = np.log([3.0, 0.42])  # at 0 and at 40 degree C; chosen here, as a clock oil's
     C = -40 * thin / (thick + thin)
     return np.exp(thick * C * (20 - temperature) / (20 * (temperature + C)))
 
@@ -71,7 +67,7 @@ def averages(ds: xr.Dataset) -> xr.Dataset:
 def seasons(mu: float) -> tuple[np.ndarray, np.ndarray]:
     """Mean rates [s/day] of the days of a year, and viscosities at every two hours of it, over that at 15 degree C."""
     hour = np.arange(0, 365 * 12)
-    temperature = 15 - YEAR * np.cos(2 * np.pi * hour / hour.size) - ROOM_DAY * np.cos(2 * np.pi * hour / 12)
+    temperature = 15 - 8 * np.cos(2 * np.pi * hour / hour.size) - 2 * np.cos(2 * np.pi * hour / 12)
     oil = viscosity(temperature) / viscosity(15.0)
     period = solved("foliot", design="zip", a=oil, mu=mu, phi0=1, rtol=1e-12, outputs=["period"]).period.values
     rate = DAY * (float(cycles(mu).period[0]) / period - 1)

@@ -95,10 +95,8 @@ def conclusions(ds: xr.Dataset) -> Claims:
     yield said("3. high resonances against the main one", min(lower.values()) > 100, peaks, "to some 1/100")
     true, zeta = ds.damping.sel(n_keep=8).values[:5], five.damping.values[:5]
     off, high = zeta / true - 1, f"1/(2 zeta) = {math.sqrt(1 - zeta[1] ** 2) / (2 * zeta[1]):.1f}"
-    here = f"of f5 {off[4]:.0%}"
-    yield most(
-        "4. dampers merged by (34): error of the damping of f1 to f4", "matters", abs(off[:4]).max(), 0.011, here
-    )
+    damping = "4. dampers merged by (34): damping of f1 to f4"
+    yield most(damping, "matters", abs(off[:4]).max(), 0.011, f"of f5 {off[4]:.0%}")
     yield said("   without dampers resonances are infinite; of the main one", np.all(true > 0), high, "finite")
 
 

@@ -28,8 +28,6 @@ from kernels.interface import Status
 
 SHOWN = {1e6: "10^6", 1e4: "10^4", 1e2: "10^2", 1.0: "1"}
 """alpha of the lines in the figure."""
-WINDOW = (10.0, 1000.0)
-"""kappa at which s is held to (1)."""
 
 
 def scaled(ds: xr.Dataset) -> xr.Dataset:
@@ -68,7 +66,7 @@ def prepared(ds):
 
 def claims(ds, springs) -> Claims:
     yield "The law"
-    strong, (low, high) = line_of(ds, ds.alpha.max()), WINDOW
+    strong, (low, high) = line_of(ds, ds.alpha.max()), (10.0, 1000.0)
     bare = at(strong.alpha.values, 0.0).s.item()
     part = ds.where((ds.alpha > 0.99e5) & (ds.kappa > low) & (ds.kappa < high), drop=True)
     slack = 1 / math.sqrt(1e5) + 1 / low**2  # the next order

@@ -20,7 +20,6 @@ from _figures import KAPPA, Axis, colour_map, direct_label, hatch, kinds_map, pa
 
 from kernels.interface import Status
 
-EXISTS = (Status.OK, Status.UNSTABLE, Status.GRAZING)
 KINDS = {
     "one impact": "#0072B2", "several impacts": "#56B4E9", "bounces end in contact": "#009E73",
     "off centre": "#E69F00", "period 2": "#CC79A7", "never settles": "#D55E00", "open": "0.85",
@@ -54,7 +53,7 @@ def flip_border(kappa, e: float):
 
 def claims(motion, bent, closed) -> Claims:
     yield "The symmetric cycle"
-    free = closed.where(closed.status.isin(EXISTS) & (closed.e > 0))
+    free = closed.where(closed.status.isin((Status.OK, Status.UNSTABLE, Status.GRAZING)) & (closed.e > 0))
     here = free.period.notnull() & (free.status != Status.GRAZING) & (abs(free.kappa - 1) > 1e-12)
     back = free.kappa < 2 * free.e / (1 - free.e)
     yield never("stable for kappa > 1 and no other: exceptions", here & ((free.multiplier < 1) != (free.kappa > 1)))

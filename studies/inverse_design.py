@@ -6,7 +6,6 @@ A worked example of `sweep.solver`: the kernel as a function of the crank and th
 """
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
@@ -23,14 +22,6 @@ CRANKS = np.linspace(1e-3, 0.3, 300)
 STUDY = {"kernel": "polisher", "rtol": 1e-10, "outputs": ["A1", "thd"], "axes": {"f": [0.5], "e": [0.08]}}
 machine = sweep.solver({**STUDY, "fixed": {"b": MOTOR, "d": ARM}})
 """A machine's half amplitude [rad] and distortion [1], of coupler f and crank e [m]."""
-
-
-class Design(NamedTuple):
-    """A coupler and a crank [m], and the distortion of the machine that they make."""
-
-    f: float
-    e: float
-    thd: float
 
 
 def crank(f: float, amplitude: float = AMPLITUDE) -> float:
@@ -51,12 +42,12 @@ def distortion(f: float, amplitude: float = AMPLITUDE) -> float:
     return float(machine(f, e).thd) if math.isfinite(e) else math.inf
 
 
-def best(shortest: float = 0.30, longest: float = 0.70) -> Design:
-    """The coupler within bounds whose machine is least distorted, among those of the amplitude."""
+def best(shortest: float = 0.30, longest: float = 0.70) -> tuple[float, float, float]:
+    """Coupler and crank [m] of the least distorted machine of the amplitude, and its distortion; couplers in bounds."""
     found = minimize_scalar(distortion, bounds=(shortest, longest), method="bounded", options={"xatol": 1e-9})
-    return Design(found.x, crank(found.x), found.fun)
+    return found.x, crank(found.x), found.fun
 
 
 if __name__ == "__main__":
-    design = best()
-    print(f"coupler {1e3 * design.f:.3f} mm, crank {1e3 * design.e:.4f} mm: distortion {100 * design.thd:.4f} %")
+    f, e, distorted = best()
+    print(f"coupler {1e3 * f:.3f} mm, crank {1e3 * e:.4f} mm: distortion {100 * distorted:.4f} %")
