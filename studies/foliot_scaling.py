@@ -57,11 +57,9 @@ def claims(ds, half) -> Claims:
     yield "Limits"
     weak, strong = ds.isel(mu=0), ds.isel(mu=-1)
     low, third, b2 = float(weak.alpha), strong.alpha ** (1 / 3), float(3 / strong.alpha) ** (2 / 3)
-    yield compared(f"alpha = {low:.2g}: a P alpha", "4 *", weak.aP * low, 4.0, 1.01 * low)
+    yield compared(f"alpha = {low:.2g}: aP alpha", "4 *", weak.aP * low, 4.0, 1.01 * low)
     yield compared("  A", "1 *", weak.A, 1.0, 0.31 * low)
-    yield compared(
-        f"alpha = {strong.alpha:.2g}: a P alpha^(1/3)", "4 3^(1/3) *", strong.aP * third, STRONG_P, 0.14 * b2
-    )
+    yield compared(f"alpha = {strong.alpha:.2g}: aP alpha^(1/3)", "4 3^(1/3) *", strong.aP * third, STRONG_P, 0.14 * b2)
     yield compared("  A alpha^(-1/3)", "3^(2/3)/2 *", strong.A / third, STRONG_A, 0.11 * b2)
     for name, window, limit in (("aP", WEAK, "-1"), ("aP", STRONG, "-1/3"), ("A", WEAK, "0"), ("A", STRONG, "1/3")):
         fit = sweep.fit_exponent(ds[name], "alpha", window)
