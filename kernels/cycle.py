@@ -68,9 +68,8 @@ def cycle_kernel(
     Raises
     ------
     SceneError
-        As `scene_kernel`; where the first surface watches more than one state, or one that turns; where a motion passes
-        through it: neither it nor the rates depend on `side`, and there is no switch; where something depends on `side`
-        though there is a drive or several surfaces; and where the time is asked for and there is no drive.
+        As `scene_kernel`; where the first surface watches more than one state, or one that turns; where something
+        depends on `side` though there is a drive or several surfaces; and where there is the time but no drive.
     """
     scene, parameters = scene_of(parts), tuple(parts["parameters"])
     maps = {method: ReturnMap(scene, method, drive) for method in METHODS}

@@ -88,7 +88,8 @@ class Scene:
         surfaces {name: such a function}
     most_kinks : between two switches, after which a cell is given up; None: a thousand
     slides : whether motion goes on along a kink onto which both sides press it (`sliding`), or sticks there
-    exact_start : whether what rounding takes from the surface's value at the start does not count
+    begins : None, or the parameter that is 0 where the motion begins just behind a switch at the first surface, else 1;
+        what rounding takes from the surface's value at the start does not count then
     start_time : a number, or (parameters) -> one: then the last state is the time `t`, of which the functions know
         nothing but that they may ask for it
     only_first : whether switches at the first surface alone count; others may lie between, as many as kinks
@@ -107,7 +108,7 @@ class Scene:
     switch: Functions | None = None
     most_kinks: int | None = None
     slides: bool = False
-    exact_start: bool = False
+    begins: str | None = None
     start_time: Function | float | None = None
     only_first: bool = False
 

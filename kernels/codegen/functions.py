@@ -50,7 +50,7 @@ def _digest(scene, recorded):
 
     graph, *parts = vars(recorded).values()
     nodes = [(x.kind, x.varies, plain(x.args)) for x in graph.nodes]
-    names, switches = (scene.name, scene.states, scene.parameters), (scene.exact_start, scene.only_first)
+    names, switches = (scene.name, scene.states, scene.parameters), (scene.begins, scene.only_first)
     flags = *names, scene.most_kinks, scene.slides, *switches
     text = repr((nodes, plain((*graph.kinks, *graph.powers)), plain(tuple(parts)), flags))
     return hashlib.sha256(text.encode()).hexdigest()[:16]
@@ -180,7 +180,9 @@ class Functions:
         started = dict(zip(self.states, self.recorded.started, strict=True))
 
         def lost(inputs):
-            found = None if self.scene.exact_start else Losses(inputs, started).lost(self.recorded.surface)
+            if self.scene.begins is not None:
+                return inputs[self.scene.begins] - 1.0
+            found = Losses(inputs, started).lost(self.recorded.surface)
             return 0.0 * inputs["side"] if found is None else found
 
         return self.of_inputs(lost)

@@ -61,14 +61,12 @@ class ReturnMap:
             raise SceneError(f"{scene.name}: a cycle needs a surface, or a drive")
         self.own, self.method, self.driven, self.scene = scene, method, drive is not None, returning(scene, drive)
         self.states = scene.states if scene.start_time is None else scene.states[:-1]
-        recorded, first = record(self.scene), next(iter(named_functions(self.scene.surface)))
+        recorded = record(self.scene)
         parts = needed(*recorded.rates, recorded.surface, *recorded.graph.kinks, *recorded.switched)
         self.sides = any(x.kind == INPUT and x.args[0] == "side" for x in parts)
         """Whether the motion, a surface or a switch hangs on the side."""
         if self.sides and (self.driven or isinstance(scene.surface, Mapping)):
             raise SceneError(f"{scene.name}: `side` cannot occur here; take a state of rate 0 that switches set")
-        if not (self.sides or self.driven or any(named_functions(scene.switch).get(name) for name in (first, ""))):
-            raise SceneError(f"{scene.name}: the motion passes through the surface, but not through one as side * x")
         self.held = [] if self.driven else [watched(scene)[-1]]
         """The state that is put onto the surface."""
         self.directions = [j for j in range(len(self.states)) if j not in self.held]
@@ -225,7 +223,7 @@ def returning(scene, drive):
 
     parameters = (*own.parameters, *places, FRESH)
     start = named(start, (*parameters, "side"))
-    return replace(own, name=f"{scene.name}_return", parameters=parameters, start=start, exact_start=True)
+    return replace(own, name=f"{scene.name}_return", parameters=parameters, start=start, begins=FRESH)
 
 
 @functools.cache

@@ -25,6 +25,8 @@ BLUR = 16.0
 """Tolerances of the surface's value at the start that rounding may take from it: rtol/2 in the finer run."""
 BACK = 1e-9
 """Of an event's rate before a switch, that of one which rounding may be all of behind it."""
+STILL = 1e-12
+"""Of what a surface's value is made of, that within which a motion is on it."""
 ONE_ULP = 2.0**-52
 CLOCK_OFF = 8.0
 """Roundings that a clock is off by from one event to the next in a shaken run: what is near an event in time hangs on
@@ -174,7 +176,10 @@ def raised(verdict, lanes, least):
 
 @symbolic
 def started(m, cell, tells):
-    """The cell at its start; a further surface that it starts on and falls through is met at once."""
+    """The cell at its start; a further surface that it starts on and falls through is met at once.
+
+    So is the first one, but where the start is just behind a switch there, whose jump takes the motion on through it.
+    """
     side = 0.0 * cell.flips + 1.0
     one, parameters, off = 0.0 * side + 1.0, cell.parameters, missed_by(m, cell.shake)
     state = tuple(u + 0.0 * side for u in m.started(parameters, side))
@@ -183,13 +188,14 @@ def started(m, cell, tells):
     offset, factor, u = m.jet(state, mode, one, ()).events[0]
     e, d, dd = fma(factor, u[0], offset), factor * u[1], factor * u[2]
     away = (d > 0.0) | ((d >= 0.0) & (dd > 0.0))
-    at = where((e <= 0.0) & (e >= 0.0) & away, 1.0, 0.0)
     lost = m.lost(state, mode)
+    through = (lost < 0.0) & (magnitude(e) <= STILL * m.made(state, mode)[0][0]) & (m.passable[0] * d < 0.0)
+    at = where(((e <= 0.0) & (e >= 0.0) & away) | through, 1.0, 0.0)
     blur = where(lost > 0.0, lost / magnitude(e), 0.0)  # nothing of nothing is nothing
     wrong = not_(magnitude(e) >= 0.0) | not_((cell.flips >= 1.0) & (cell.flips < math.inf))
     cell = cell._replace(
         state=tuple(fma(ONE_ULP * (-1.0) ** j * off, u, u) for j, u in enumerate(state)),
-        side=side, signs=joined(signs[:-1], (where(e < 0.0, -1.0, signs[-1]),)), on=joined((at,), on),
+        side=side, signs=joined(signs[:-1], (where((e < 0.0) | through, -1.0, signs[-1]),)), on=joined((at,), on),
         unit=time_unit(e, d, dd), own=ERRORS.started(tells, cell.own, state),
         verdict=where(wrong, BAD_INPUT, where(blur <= BLUR * cell.tolerance, 0.0, INACCURATE)),
     )  # fmt: skip
@@ -318,7 +324,7 @@ def behind_switch(m, cell, rates, switches, first, met, tells):
         signs = held_by(m, state, side, signs, parameters, unit, kinks_on, falls)
     mode = Mode(side, signs, parameters, False)
     after, extent = m.surface(state, mode), m.made(state, mode)[0][0]
-    still = magnitude(after) <= fma(1e-12, extent, 2.0 * magnitude(before))
+    still = magnitude(after) <= fma(STILL, extent, 2.0 * magnitude(before))
     rate = m.passable[0] * rates_of_events(m, state, mode, unit)[0]
     through = first & still & (rate < -BACK * magnitude(falls[0]))
     stays = still & first

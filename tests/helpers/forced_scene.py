@@ -7,6 +7,8 @@ WALLS : a body between walls; it leaves the left one at kick + e u, the right on
     way of its mode j: 1 behind the left wall, 2 behind the right one, 3 from the middle on
 POPULATION : once a season u becomes gain u (1 - bend u) - cube u^3
 THROWN : a ball that lands at v and leaves at 2 + e sqrt(v^2 - 1)
+PUSHED : a body between walls at -1 and 1, which leave it the share e of its speed, in air that takes 0.1 m/s of it a
+    metre; as it passes 0 to the left it is pushed on. A cycle ends there, or at a section that changes nothing
 """
 
 from kernels.cycle import cycle_kernel
@@ -107,3 +109,26 @@ THROWN = cycle_kernel(
     switch=lambda x, v, e: (x, 2.0 + e * sqrt(v * v - 1.0)),
     start=lambda: (1.0, 0.0),
 )
+_PLACES = {
+    "middle": lambda x: x,
+    "left": lambda x: x + 1.0,
+    "right": lambda x: 1.0 - x,
+    "section": lambda x: x - 0.25,
+}
+PUSHED = {
+    first: cycle_kernel(
+        name=f"pushed_{first}",
+        doc="body between two walls that is pushed half way",
+        states=MOVING,
+        parameters=(Field("push", "m/s", "what a push adds", default=2.0), Field("e", "1", "restitution", default=0.5)),
+        rates=lambda x, v: (v, -0.1 * v),
+        surface={first: _PLACES[first]} | _PLACES,
+        switch={
+            "middle": lambda x, v, push: (x, v - push),
+            "left": lambda x, v, e: (x, -e * v),
+            "right": lambda x, v, e: (x, -e * v),
+        },
+        start=lambda: (0.5, 1.0),
+    )
+    for first in ("middle", "section")
+}

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from columns import estimated, solve
-from forced_scene import FORCED, MOVING, POPULATION, RESTING, TABLE, THROWN, WALLS
+from forced_scene import FORCED, MOVING, POPULATION, PUSHED, RESTING, TABLE, THROWN, WALLS
 from kicked_scene import BRANCHED
 from mpmath import mp, mpc, mpf
 
@@ -160,6 +160,24 @@ def test_a_jump_that_is_not_defined_at_speed_0_begins_like_any_other():
     up = (2.0 + e * np.sqrt(4.0 + e * e - 1.0)) / (1.0 - e * e)
     assert abs(found["v"] + up).max() < 1e-9
     assert abs(found["period"] - 2.0 * up / 9.81).max() < 1e-9
+
+
+@pytest.mark.parametrize(("first", "before"), [("middle", 0.0), ("section", 0.25)])
+def test_a_cycle_ends_where_the_motion_passes_through_a_surface_with_a_jump_and_without(first, before):
+    """From each way of a length the speed loses a tenth of that; with less of a push the body stops at 1/16."""
+    push, e = np.array([2.0, 3.0, 0.5]), 0.5
+    found, status = solve(PUSHED[first], "taylor", push=push, e=e, asked=("period", "v", "x_size", "multiplier"))
+    assert list(status) == [Status.OK, Status.OK, Status.COMES_TO_REST]
+    arrives = (e * e * (push[:2] - 0.1) - 0.2 * e - 0.1) / (1.0 - e * e)
+    speed, period = arrives + push[:2], 0.0
+    for length in (1.0, 2.0, 1.0):
+        period = period + 10.0 * np.log(speed / (speed - 0.1 * length))
+        speed = e * (speed - 0.1 * length)
+    assert abs(found["period"][:2] / period - 1.0).max() < 1e-9
+    assert abs(found["v"][:2] + arrives + 0.1 * before).max() < 1e-9
+    assert abs(found["x_size"][:2] - 1.0).max() < 1e-9
+    assert abs(found["multiplier"][:2] - e * e).max() < 1e-9
+    assert abs(found["x"][2] - 0.0625) < 1e-11
 
 
 def test_what_cannot_be_a_cycle_is_refused():
