@@ -17,7 +17,7 @@ import numpy as np
 from kernels.codegen.compiled import runner, running, written_of
 from kernels.codegen.followed import followed
 from kernels.codegen.record import named_functions, record
-from kernels.codegen.to_tolerance import solver
+from kernels.codegen.to_tolerance import sliders, sliding, solver
 from kernels.expression.graph import ADD, INPUT, NUMBER, Expression, SceneError, math_recorded, needed
 from kernels.integrate.records import Mode
 from kernels.interface import Status
@@ -103,7 +103,7 @@ class ReturnMap:
     def once(self, parameters, before, flips):
         """Rows of time and states after so many switches, and the states' largest sizes on the way, to some digits.
 
-        The sizes are NaN where a single run does not get there, as where the motion slides.
+        The sizes are NaN where a single run does not get there.
         """
         rows, sizes = self._once(self.scene, parameters, before, flips, self.rough)
         left = np.flatnonzero(np.isnan(rows[0]))
@@ -131,8 +131,13 @@ class ReturnMap:
         """By one run: rows of time and states, and the largest size of each state at the ends of steps."""
         # a scene that is followed with its error is compiled so already; without, it has the same bits
         by = "told" if self.method == "taylor" and scene is self.scene else self.method
-        columns = [*parameters, *before, 0.0 * flips, flips]
-        found, many = followed(runner(scene, by), columns, np.full(len(flips), rtol)), len(before)
+        columns, r, many = [*parameters, *before, 0.0 * flips, flips], np.full(len(flips), rtol), len(before)
+        found = followed(runner(scene, by), columns, r)
+        for slider in sliders(self.scene, self.method) and sliders(scene, self.method):
+            cells = np.flatnonzero(found[-1] == Status.STICKS)
+            if len(cells):
+                along = runner(sliding(scene), slider)
+                found[:, cells] = followed(along, [c[cells] for c in columns], r[cells])
         found, sizes = np.where(found[-1] <= Status.INACCURATE, found, np.nan), 2 + len(scene.states)
         return found[[0, *range(2, 2 + many)]], found[sizes : sizes + many]
 

@@ -67,15 +67,10 @@ def solver(scene, method):
         how = to_rest(lambda columns, rtol: by_error(scene, columns, rtol), scene)
     else:
         how = to_rest(lambda columns, rtol: by_runs(runner(scene, method), columns, rtol, TIGHTEST), scene)
-    recorded = record(scene)
-    graph = recorded.graph
-    # powers of abs(u) are followed to u = 0 by series alone (`integrate.powers`); a kink may be a surface too
-    if graph.powers or recorded.shared or len(graph.kinks) == len(recorded.surfaces):
-        return how
 
     def solve(columns, rtol):
         rows, status = how(columns, rtol)
-        for slider in SLIDERS.get(method, (method,)):  # the next where one finds no end of a cell's slide
+        for slider in sliders(scene, method):  # the next where one finds no end of a cell's slide
             cells = np.flatnonzero(status == Status.STICKS)
             if len(cells):
                 some, along = [c[cells] for c in columns], runner(sliding(scene), slider)
@@ -83,6 +78,16 @@ def solver(scene, method):
         return rows, status
 
     return solve
+
+
+@functools.cache
+def sliders(scene, method):
+    """The methods by which that method follows what slides along a kink; none where nothing can."""
+    recorded = record(scene)
+    # powers of abs(u) are followed to u = 0 by series alone (`integrate.powers`); a kink may be a surface too
+    if recorded.graph.powers or recorded.shared or len(recorded.graph.kinks) == len(recorded.surfaces):
+        return ()
+    return SLIDERS.get(method, (method,))
 
 
 @functools.cache

@@ -8,6 +8,7 @@ from junction_scene import KERNEL as JUNCTION
 from kicked_scene import KICKED
 from mpmath import mp, mpf
 from scipy.integrate import solve_ivp
+from stribeck_scene import KERNEL as STRIBECK
 
 from kernels.cycle import cycle_kernel
 from kernels.foliot.cycle import FOLIOT
@@ -139,3 +140,30 @@ def test_a_phase_that_is_locked_to_its_drive_goes_on_by_whole_turns():
     own = solve_ivp(lambda t, y: [1.2 + np.cos(t) - np.sin(y[0])], (0.0, end), [0.0], rtol=1e-11, atol=1e-12)
     assert np.cos(own.y[0, -1] - found["phase"][2]) == pytest.approx(1.0, abs=1e-15)
     assert np.sin(own.y[0, -1] - found["phase"][2]) == pytest.approx(0.0, abs=1e-8)
+
+
+def stuck_and_slipping(belt):
+    """Period and largest sizes of place and speed of the mass on the belt, by scipy from where it begins to slip."""
+    begins = 1.5 - 0.1 * belt
+
+    def slips(t, y):
+        return y[1], 1.0 + 0.5 * np.exp((y[1] - belt) / 0.5) - y[0] - 0.1 * y[1]
+
+    def sticks(t, y):
+        return y[1] - belt if t > 0.05 else -1.0
+
+    sticks.terminal = True
+    events = [sticks, lambda t, y: slips(t, y)[1], lambda t, y: y[1]]
+    own = solve_ivp(slips, (0.0, 20.0), [begins, belt], rtol=1e-12, atol=1e-13, events=events)
+    turns = [np.abs(own.y_events[k][:, j]).max() for k, j in ((2, 0), (1, 1))]
+    return own.t[-1] + (begins - own.y[0, -1]) / belt, max(turns[0], begins), max(turns[1], belt)
+
+
+def test_a_cycle_in_which_the_mass_sticks_has_a_period_and_amplitudes():
+    belt = np.array([0.1, 0.3, 1.2])
+    found, status = solve(STRIBECK, "taylor", belt=belt, flips=2.0, rtol=1e-8)
+    assert (status == Status.OK).all()
+    true = np.transpose([stuck_and_slipping(one) for one in belt])
+    for name, value in zip(("period", "place_size", "speed_size"), true, strict=True):
+        assert abs(found[name] / value - 1.0).max() < 1e-8, name
+    assert abs(found["multiplier"]).max() < 1e-8
