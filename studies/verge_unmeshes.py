@@ -4,15 +4,10 @@
 
 P ~ torque^(-s). kappa = n^2 I_c/I_v is the wheel's inertia over the foliot's, alpha = n tau/(I_v a^2 phi0) the drive
 over viscous friction, a = c_v/I_v. A wheel that is thrown back by more than half a pitch, 2 n phi0 + drop, is out of
-mesh. By docs/theory/two_bodies.md, for no drop and e = 0:
-
-1. At strong drive the recoil is (1 - kappa)^2/(2 kappa) in units of n phi0, below half a pitch for
-       kappa > 3 - 2 sqrt 2 = 0.1716,                                                                    (1)
-   and such a wheel stays in mesh at any drive.
-2. Without inertia the wheel follows the foliot, and is out of mesh where that swings beyond 3 phi0, at alpha = 22.16;
-   there s = 0.3575.                                                                                     (2)
-3. Bounces of a light wheel last about e kappa/(1 - e) of a half period. Where they die out in contact, e does not
-   matter.
+mesh. By docs/theory/two_bodies.md, for no drop and e = 0, the recoil at strong drive is (1 - kappa)^2/(2 kappa) in
+units of n phi0, so that a wheel of kappa > 3 - 2 sqrt 2 = 0.1716 stays in mesh at any drive; one without inertia
+follows the foliot, and is out of mesh where that swings beyond 3 phi0, at alpha = 22.16 and s = 0.3575. Bounces of a
+light wheel last about e kappa/(1 - e) of a half period; where they die out in contact, e does not matter.
 
 The exponent s is a difference of ln P over ln torque, with 8 points a decade; the drop is 5 % of n phi0.
 """

@@ -106,7 +106,7 @@ def test_the_period_of_a_balance_with_impulses_is_that_of_50_digits(at):
 def test_a_half_period_under_friction_over_the_swing_is_that_of_a_series():
     """From the speed at the switch, which the scene gives, to the next."""
     given = {"mu": [1.46], "a": 1.0, "phi0": 1.0, "harmonic": 1, "depth": 0.5, "flips": 60}
-    cell = solved("friction_scene:KERNEL", **given, rtol=1e-9).isel(mu=0)
+    cell = solved("foliot_scene:KERNEL", **given, rtol=1e-9).isel(mu=0)
     v = abs(float(cell.speed))
     with mp.workdps(20):
         f = mp.odefun(lambda t, y: [y[1], mpf(1.46) - (1 + mp.cos(mp.pi * y[0]) / 2) * y[1]], 0, [-1, -v])
