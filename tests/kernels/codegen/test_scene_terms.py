@@ -74,6 +74,23 @@ def test_maximum_minimum_and_where_are_exact_and_bend_where_they_should():
     assert relative_error(outputs["y"], [3 * (true - at_1) - at_1])[0] < 1e-12
 
 
+@pytest.mark.skipif(COMPILED, reason="many small compilations; run with NUMBA_DISABLE_JIT=1")
+@pytest.mark.parametrize("method", ["taylor", "dop853"])
+def test_what_rests_on_a_kink_is_followed_to_the_side_that_it_bends_to_and_where_it_comes_back(method):
+    """x = k t^2 (t - r) (t - s) and y' = sign(x), up to t = 1; some come back within their first step."""
+    kernel = scene_kernel(
+        name="bent", doc="rest on a kink", states=fields("x", "v", "t", "y"), parameters=fields("k", "r", "s"),
+        rates=lambda x, v, t, k, r, s: (v, k * (2.0 * r * s - 6.0 * (r + s) * t + 12.0 * t * t), 1.0, sign(x)),
+        surface=lambda t: 1.0 - t, start=lambda: (0.0,) * 4,
+    )  # fmt: skip
+    k, r, s = np.array([[1.0, 2.0, 3.0], [1.0, 0.5, 2.0], [1.0, 1e-3, 2.0], [1.0, 0.1, 0.2], [100.0, 0.01, 0.02]]).T
+    for side in (1.0, -1.0):
+        outputs, status = solve(kernel, method, side * k, r, s, flips=1.0, rtol=1e-6)
+        assert (status == Status.OK).all()
+        wanted = side * (2.0 * np.minimum(r, 1.0) - 1.0 + 2.0 * (1.0 - np.minimum(s, 1.0)))
+        np.testing.assert_allclose(outputs["y"], wanted, atol=1e-9)
+
+
 @pytest.mark.parametrize(
     ("condition", "chosen"),
     [

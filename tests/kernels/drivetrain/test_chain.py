@@ -4,7 +4,7 @@ import chain_oracles as oracles
 import numpy as np
 import pytest
 import reduction_oracles
-from columns import checked, relative_error, solve
+from columns import checked, estimated, relative_error, solve
 from mpmath import mp, mpf
 
 from kernels.drivetrain.reduced import DRIVETRAIN
@@ -110,15 +110,32 @@ def test_damping_is_that_of_the_poles_to_rtol_or_the_cell_says_that_it_is_not(ki
             assert relative_error(np.sort(row), truth).max() <= rtol
 
 
+def nearly_critical(share):
+    """A chain with proportional damping, whose lowest mode has 1 + share of the critical one."""
+    J, k = chains("plain", 3, 1, 4)
+    return J, k, k * (1 + share) / (np.pi * solved(J, k)[0][0, 0])
+
+
 @pytest.mark.parametrize("share", [0.0, 1e-14, -1e-14, 1e-9, -1e-9, 1e-6, -1e-6])
 def test_near_critical_damping_a_mode_keeps_its_digits(share):
     """An ulp of h moves a pole by 1e-8 there, but not the product and the sum of both."""
-    J, k = chains("plain", 3, 1, 4)
-    frequency = solved(J, k)[0][0, 0]
-    h = k * (1 + share) / (np.pi * frequency)  # proportional: the lowest mode has the damping 1 + share
-    _, damping, status = solved(J, k, h)
+    _, damping, status = solved(*nearly_critical(share))
     assert damping.min() == pytest.approx(1 + share, rel=1e-12) or status[0] == Status.INACCURATE
     assert solved([1.0], [1.0], [2.0 * (1 + share)])[1][0, 0] == pytest.approx(1 + share, rel=1e-14)
+
+
+@pytest.mark.parametrize("share", [1e-4, -1e-5, 1e-6])
+def test_near_critical_damping_the_error_told_is_what_four_roundings_of_every_number_are_worth(share):
+    """By what poles move, over themselves, where each inertia, spring and damper is changed."""
+    chain, step = nearly_critical(share), 2.0**-30
+    poles, moved = oracles.poles(*(c[0] for c in chain)), 0.0
+    for place in np.ndindex(3, 3):
+        others = np.concatenate(chain)
+        others[place] *= 1.0 + step
+        others = oracles.poles(*others)
+        moved += np.array([float(min(abs(s - other) for other in others) / abs(s)) for s in poles]) / step
+    _, _, error = estimated(DRIVETRAIN, "direct", *chain, reduction=0.0, asked=["damping"])
+    assert error[0] == pytest.approx(2.0**-50 * moved.max(), rel=0.02, abs=0.0)
 
 
 @pytest.mark.parametrize(("damper", "first"), [(0.0, 0.0), (0.5, np.inf)])

@@ -71,6 +71,27 @@ def test_on_a_resonance_without_damping_the_loss_of_digits_is_told():
                 assert status == Status.OK
 
 
+def worth(J, k, h, frequency, drive, read):
+    """The sum of what H changes by with each inertia, and each spring with its damper, all relative."""
+    whole, total, share = oracles.receptance(J, k, h, frequency, drive, read), 0.0, 2.0**-30
+    for changed in 1.0 + share * np.eye(J.size):
+        for chain in ((changed * J, k, h), (J, changed * k, changed * h)):
+            total += float(abs(oracles.receptance(*chain, frequency, drive, read) - whole) / abs(whole)) / share
+    return total
+
+
+def test_the_error_told_is_what_four_roundings_of_every_inertia_and_spring_are_worth():
+    """Without damping: with it, sizes of complex numbers are sums of their parts."""
+    J, k, h = chains(4, 2, 0.0, cells=8)
+    resonances = solve(DRIVETRAIN, "direct", J, k, h, reduction=0.0)[0]["frequency"]
+    for i in range(8 if COMPILED else 3):
+        drive, frequency = 1 + i % 3, 1.001 * resonances[i, i % 4]
+        error = 2.0**-50 * (1.0 + worth(J[i], k[i], h[i], frequency, drive, 4))
+        for share, verdict in ((0.99, Status.INACCURATE), (1.01, Status.OK)):
+            _, status = receptances(*(c[i : i + 1] for c in (J, k, h)), drive, 4, [frequency], share * error)
+            assert status[0] == verdict, (i, share)
+
+
 @pytest.mark.parametrize("count", [2, 7, 33])
 def test_where_a_receptance_is_infinite_it_alone_is_left_out(count):
     J, k, h = chains(3, 2, 0.1)

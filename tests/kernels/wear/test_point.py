@@ -60,11 +60,14 @@ AWKWARD = {
     "round tool": {},
     "type B, rhombus": {"type": 1.0, "b_angle": 0.6, "tool_n": 1.0, "tool_m": 1.0},
     "square, fast workpiece": {"tool_n": 100.0, "tool_m": 100.0, "Omega": 7.0, "tau": 9.0},
+    "square, under its corner": {
+        "tool_n": 100.0, "tool_m": 100.0, "Omega": 7.0, "tau": 9.0, "r0": 8.783, "theta0": 4.287,
+    },
     "astroid": {"tool_n": 0.5, "tool_m": 0.5, "tool_a": 8.0, "tool_b": 8.0, "r0": 4.0},
     "resting workpiece": {"Omega": 0.0, "r0": 2.0},
     "crank backward": {"omega": -1.0},
     "arm that turns": {"b": 10.0, "e": 15.0, "L": 5.0, "w_x": -8.0, "beta": 1.0},
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", list(AWKWARD) if COMPILED else ["round tool"])
