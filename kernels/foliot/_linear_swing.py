@@ -126,7 +126,7 @@ def _gain(energy, scene):
 
 @jit_apart
 def segments(scene, rtol):
-    """The cycle, the relative errors of its outputs whatever rtol, and its verdict.
+    """The cycle, the relative errors of its outputs whatever rtol, the half swing on it, and the verdict.
 
     s = -dlnP/dlnmu is of the fixed point E_1(E, mu) = E. By (2), with E_1 = v^2/2 or by (4), and d for a change by that
     of mu alone, g for the push behind the turning point:
@@ -181,4 +181,4 @@ def segments(scene, rtol):
     verdict = where(legs.comes & (energy > 0.0) & passes, verdict, STICKS)
     verdict = where(d < _STIFFEST, verdict, NO_METHOD)
     cycle = Cycle(time, legs.top, sqrt(2.0 * energy), s, scene.e * scene.e * area)
-    return cycle, errors(loose_cycle, loose_s, loose_m), verdict
+    return cycle, errors(loose_cycle, loose_s, loose_m), legs, verdict

@@ -46,10 +46,9 @@ def closed(i, columns):
 def segments(i, columns):
     """The exact pieces of the swing on the cycle that `foliot` finds with them."""
     scene, units = _units.without_dimensions(read(LinearFoliot, columns, i))
-    cycle, errors, verdict = _linear_swing.segments(scene, columns.rtol[i])
+    cycle, errors, legs, verdict = _linear_swing.segments(scene, columns.rtol[i])
     columns.error[i] = errors.period if errors.period > errors.multiplier else errors.multiplier
     start = scene.e * cycle.speed
-    legs = _linear_swing.half_swing(1.0, scene, start)
     outputs, _ = _units.given(units, cycle, verdict)
     wide, moves = outputs.amplitude > 0.0, outputs.crossing_speed > 0.0
     for j in range(columns.phase.size):

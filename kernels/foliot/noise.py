@@ -126,7 +126,7 @@ def segments(first, columns, radii, turns, radii_apart, turns_apart):
     """Every half swing from exact pieces. `rtol` is meant of rates as fractions: 1e-9 of a day is 8.6e-5 s."""
     i = cells_at(first)
     scene, units = _units.without_dimensions(read(LinearFoliot, columns, i))
-    cycle, _, found = _linear_swing.segments(scene, columns.rtol[i])
+    cycle, _, legs, found = _linear_swing.segments(scene, columns.rtol[i])
 
     # the floor of (1): from rest at the switch the force must reach over the way 2, which grows with it
     d, kappa, rho, e = scene.d, scene.kappa, scene.rho, scene.e
@@ -155,7 +155,6 @@ def segments(first, columns, radii, turns, radii_apart, turns_apart):
 
     # error of the rate as a fraction: of each half swing, and of all that they pass on
     start = e * cycle.speed
-    legs = _linear_swing.half_swing(1.0, scene, start)
     kept, longer, _, energy, late = _linear_swing.passed_on(scene, start, legs)
     passed_on = energy / (cycle.speed * cycle.speed * (1.0 - e * e * kept))
     accurate = (late + magnitude(longer * start) * passed_on) / cycle.half_period <= columns.rtol[i]

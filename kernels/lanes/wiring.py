@@ -4,7 +4,8 @@ An author writes functions of one cell, the same source for numbers and for lane
 
     check(p) -> status                            p: a record of the parameters, within the limits of their fields
     solve(p, rtol, *buffers) -> outputs, status   outputs: a record of those that the method gives, or a tuple in order
-    solve(...) -> outputs, errors, status         of a method that estimates; `errors` as of a bound
+    solve(...) -> outputs, errors, status         of a method that estimates; `errors` as of a bound. What else it finds
+                                                  may stand before the status, for functions of its own room
     bound(p) -> error                             a number, or a record with one for each output that the method gives
     fill(i, columns, *buffers)                    for traces, instead of `solve`: writes the rows of cell i itself
 
@@ -226,7 +227,7 @@ class _Wiring:
         @jit
         def body(i: Any, columns: Any, *buffers: Any) -> None:
             scene, units = take(read(record, columns, i))
-            found = inner(scene, columns.rtol[i], *buffers)  # outputs, errors if it estimates, status
+            found = inner(scene, columns.rtol[i], *buffers)  # outputs, errors if it estimates, ..., status
             outputs, status = put_back(units, found[0], found[-1])
             write(columns, i, named(given, outputs))
             write(columns, i, none)
