@@ -13,7 +13,7 @@ from sliding_scene import SLIDING
 
 from kernels.interface import Status
 from kernels.lanes.jit import COMPILED
-from kernels.scene import Field, exp, scene_kernel
+from kernels.scene import Field, scene_kernel
 
 
 def own_rates(known, rates, surface, start, switch=None):
@@ -54,19 +54,6 @@ def test_names_of_a_scene_may_be_those_of_the_text_that_is_written():
     assert status[0] == Status.OK
     assert outputs["time"][0] == pytest.approx(5.0, rel=1e-14)
     assert outputs["end_speed"][0] == pytest.approx(30.0, rel=1e-14)
-
-
-@pytest.mark.skipif(COMPILED, reason="one more compilation; run with NUMBA_DISABLE_JIT=1")
-def test_a_decay_of_one_state_by_its_exponential():
-    kernel = scene_kernel(
-        name="decay", doc="u' = -r exp(u)", states=(Field("u", "1", "what decays"),),
-        parameters=(Field("r", "1/s", "rate"), Field("level", "1", "where it is timed")),
-        rates=lambda u, r: -r * exp(u), surface=lambda u, level: u - level, start=lambda: 1.0,
-    )  # fmt: skip
-    outputs, status = solve(kernel, "taylor", [2.0], [-1.0], flips=[1.0], rtol=1e-12)
-    true = (mp.exp(1) - mp.exp(-1)) / 2
-    assert status[0] == Status.OK
-    assert abs(mpf(float(outputs["time"][0])) / true - 1) < 5e-13
 
 
 @pytest.mark.skipif(COMPILED, reason="one more compilation; run with NUMBA_DISABLE_JIT=1")

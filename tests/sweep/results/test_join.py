@@ -2,22 +2,13 @@
 
 import numpy as np
 import pytest
+from running import same
 from toy_studies import build
 
 import sweep
 from kernels.interface import Status
 
 HEIGHTS = [1.0, 2.0, 4.0, 8.0]
-
-
-def same(found, whole):
-    """Every number and coordinate of cells is the same."""
-    for name in ("fall_time", "status", "method_used", "error_bound"):
-        assert found[name].dims == whole[name].dims
-        assert found[name].values.tobytes() == whole[name].values.tobytes(), name
-    for dim in whole.fall_time.dims:
-        if dim in whole.coords:
-            assert found[dim].values.tolist() == whole[dim].values.tolist()
 
 
 def of(heights=HEIGHTS, v0=(0.0, 1.0), **keys):
