@@ -33,8 +33,6 @@ LEAST = {8: (536.3851607, 248658.0543), 5: (535.0468402, 172129.8010)}
 """Least K [N m/rad] of the lobes of the main mode and of the fifth, of eight and five masses, once in 50 digits."""
 BANDS = {"main mode": (15.0, 60.0), "fifth mode": (150.0, 300.0)}
 """Where these modes chatter [Hz]."""
-COUNTED = (5.3, 13.0, 24.0, 30.0, 90.0, 300.0)
-"""Tooth frequencies [Hz] at which roots are counted on both sides of the border."""
 TURNS, CUTTER = 3.0, 8
 """Turns of the spindle a second in the source, 180 a minute; teeth of a cutter, chosen here."""
 LOOK = {8: ("-", 0), 7: ("-", 2), 6: ((0, (6, 1.5, 1.2, 1.5)), 3), 5: ((0, (5, 1.5)), 1), 4: ((0, (1.2, 1.2)), 4)}
@@ -100,7 +98,7 @@ def claims(ds) -> Claims:
             yield compared(f"least K, {n} masses: {mode}", f"{K:.6g}", least(ds, n, mode)[1], K, 1e-5)
     roots = {0.99: [], 1.01: []}
     for n in ds.n_keep.values:
-        edge = ds.border.sel(n_keep=n).interp(tooth=list(COUNTED))
+        edge = ds.border.sel(n_keep=n).interp(tooth=[5.3, 13.0, 24.0, 30.0, 90.0, 300.0])
         for part, found in roots.items():
             found += [unstable_roots(chain(ds, n), float(K.tooth), part * float(K)) for K in edge]
     yield held(f"roots to the right, 1 % below the border, {len(roots[0.99])} places", max(roots[0.99]), "0", "{:.0f}")

@@ -28,8 +28,6 @@ HALF = {"alpha": 1.46299058758010465706, "aP": 6.42446119521106945636, "A": 1.39
 """Where the exponent is -1/2, once in 50 digits."""
 STRONG_P, STRONG_A = 4 * 3 ** (1 / 3), 3 ** (2 / 3) / 2
 """At strong drive a P = STRONG_P alpha^(-1/3) and A = STRONG_A alpha^(1/3)."""
-QUARTER = 15 / (24 * 60)
-"""A rate of 15 min/day."""
 
 
 def scaled(ds: xr.Dataset) -> xr.Dataset:
@@ -95,12 +93,13 @@ def claims(ds, half) -> Claims:
     yield most("at exponent -1/2 friction does not count: dlnP/dlna", "0", blind, 1e-8)
 
     yield "Torque"
+    quarter = 15 / (24 * 60)  # a rate of 15 min/day
     for drive, alpha, percent in (("weak", weak.alpha, 1), ("strong", strong.alpha, 3)):
-        part = QUARTER / float(sweep_of_alpha(ds, [alpha]).s[0])
+        part = quarter / float(sweep_of_alpha(ds, [alpha]).s[0])
         slow, fast = sweep_of_alpha(ds, float(alpha) * np.exp([-part / 2, part / 2])).period.values
         what = f"change of the torque for 15 min/day, {drive} drive [%]"
         yield differing(what, f"{percent} *", 100 * part, percent, 0.5)
-        yield most("  the rate by it", "15 min/day", math.log(slow / fast) / QUARTER - 1, 1e-3)
+        yield most("  the rate by it", "15 min/day", math.log(slow / fast) / quarter - 1, 1e-3)
 
     yield "Shape of the swing"
     mu, along = [alpha * float(ds.a**2 * ds.phi0) for alpha in (0.1, 1.463, 100.0)], {"phase": np.linspace(0, 1, 8001)}
