@@ -190,6 +190,8 @@ class Search:
             ended = verdict > Status.INACCURATE
             over = ended & ~np.isin(status[left], FOUND)
             status[left[over]] = verdict[over]
+            for j, turn in self.turns.items():  # runs are right to a share of what they come to
+                z[j] = z[j] - turn * np.round(z[j] / turn)
             self.last[:, left[~ended]] = z[:, ~ended]
             self._settled(left[~ended])
             over = ended | (settle[left] == 0.0) | np.isin(status[left], (Status.OK, Status.COMES_TO_REST))
