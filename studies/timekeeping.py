@@ -15,7 +15,8 @@ m that begins with the speed u, and derivatives as indices, on the cycle,
     c = r U_m/(1 - r U_u),  V = (U_m^2 + 2 U_m U_u c)/(1 - U_u^2),
     loss/sigma^2 = (T_mm/2 + T_mu c + T_uu V/2 + T_u (U_mm/2 + U_mu c + U_uu V/2)/(1 - U_u))/T.        (2)
 
-After +- stands what a number may be off by: three standard errors of these seeds and days, of a loss four.
+Derived here. After +- stands what a number may be off by: three standard errors of these seeds and days, of a loss
+four.
 """
 
 import math

@@ -6,14 +6,15 @@ The torque is mu (1 + depth f), f = cos(h pi s), s the way along the drive over 
 next, below 0 on the recoil), h the harmonic; it does the same work at any depth. alpha = mu/(a^2 phi0),
 A = phi_max/phi0 and q = a P/4 as in Hoyng & Nieuwenhuizen.
 
-To first order in the depth, with a = 1, speed and angle at the next switch close the cycle if, T = 2q the half period,
+To first order in the depth, with a = 1 the force -f(t) along the swing without ripple shifts its speed by
+-int exp(t' - t) f dt'; speed and angle at the next switch close the cycle if, T = 2q being the half period,
     dlnP/ddepth = -1/(q tanh(q)^2) int_0^T (1 - cosh(t - q)/cosh q) f dt = K.                         (1)
 High harmonics are felt only where s(t) stands still: at the turning point, s = -(A - 1)/2, where s'' = alpha/2. There
 stationary phase gives
     K -> -cos(pi/4 - h pi (A - 1)/2)/(q sqrt(h alpha)),                                              (2)
 and ds/ddepth = -dK/dlnalpha grows as sqrt(h) by dA/dlnalpha = A - 1/tanh q. For weak drive, alpha h << 1, the speed
 follows the torque: P/P0 = 1/sqrt(1 - depth^2), K = -2 alpha for odd h, and K = -(5/24) alpha (h pi alpha)^2 for even h
-by inertia behind the switches. Allowed is what the next order in the depth, in 1/h or in alpha explains.
+by inertia behind the switches. Derived here; allowed is what the next order in the depth, in 1/h or in alpha explains.
 """
 
 import math

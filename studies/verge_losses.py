@@ -84,7 +84,7 @@ def claims(ds, wheel) -> Claims:
     yield held("in mesh, of clocks that have s < .38: s at a stronger drive", back, "< .38", "at most {:.3f}")
 
     yield "A clock with a light wheel"
-    # of dry friction I_v a^2 phi0
+    # its dry friction is I_v a^2 phi0, its recoil a quarter of a pitch
     line = ds.isel(R_v=1).sel(I_c=2.5e-5, method="nearest")
     clock = line.isel(tau=int(abs(line.pitches - 0.25).argmin("tau")))
     text = ", ".join(f"{name} {clock[name]:.0%}" for name in LOSSES)
@@ -95,7 +95,7 @@ def claims(ds, wheel) -> Claims:
 
     yield "By the shares of the losses"
     off = ds.s - (ds.viscous + ds.impact) / (2 + ds.viscous)
-    # what is left of the drop and of a swing that is not endless
+    # allowed is what the drop and a swing that is not endless leave
     strong, near = off.where(ds.alpha > 1e4), off.isel(R_v=0).where(ds.alpha > 100)
     yield most("s by the shares, (1), alpha > 1e+04", "0.015", strong, 0.015, count(strong))
     yield most("  the same, alpha > 100 without dry friction", "0.05", near, 0.05, count(near))

@@ -8,13 +8,16 @@ s = -dlnP/dlnmu, s' = ds/dln alpha. By docs/theory/averages.md
     ln<P0/P> = s <m> + (1 - 2s) <x> + s' var(m - 2x)/2 + var(s m + (1 - 2s) x)/2 + ...                    (1)
 
 over the year, so of the friction the power mean of exponent p = 1 - 2s + 4s'/(1 - 2s) counts, of the torque that of
-p = s + s'/s (2), here measured with a season of 2 %. Of a change of the torque in one half swing the clock gains a
-share R_k, and of the friction R_ka, in k more of them; so over n of them noise scatters the rate by 1/n times the
-root of
+p = s + s'/s (2), here measured with a season of 2 %. Of a change of the torque in one half swing the clock gains
+R_k = r + (s - r)(1 - K^k) in k more of them, K the multiplier; of the friction (1 - 2s) and r_a likewise. Over n of
+them the rate scatters by 1/n times the root of
 
     sum over k < n of (sigma R_k)^2 + (sigma_a R_ka)^2 + 2 shared sigma sigma_a R_k R_ka,                     (3)
 
-of which 5 % are three standard errors of 2000 seeds, the same in every line.
+of which 5 % are three standard errors of 2000 seeds. With lambda = a v/mu at the switch, h = lambda^2/(1 + lambda)
+and all times 1/(2/alpha + 2 lambda):
+    r = 2/alpha + lambda + (1/lambda - 1)(2/alpha + h),
+    r_a = 2/alpha + 2 lambda - (4/alpha + lambda + (1/lambda - 1)(4/alpha + h)).                               (4)
 """
 
 import math
@@ -59,7 +62,7 @@ def measured(alpha: float):
 
 
 def scatter(alpha: float, n: int, sigma: float, sigma_a: float, shared: float) -> float:
-    """(3) times sqrt(n) over `SIGMA`, by what a half swing itself gains, `r`, and those that remember its speed."""
+    """(3) times sqrt(n) over `SIGMA`."""
     s, _, u = theory(alpha)
     two, h, lost = 2 / alpha, u * u / (1 + u), 1 - np.exp(-(2 / alpha + 2 * u) * np.arange(n))
     r = (two + u + (1 / u - 1) * (two + h)) / (two + 2 * u)
