@@ -1,17 +1,11 @@
 """A scene as compiled code, made once for each method.
 
-What Python calls lies as a file in the folder of the kernels' own machine code (`cache`), named by the scene and a
-digest of its graph; all else is made of its functions (`functions`) in memory.
+What Python calls is kept among the kernels' own machine code (`cache`), by a name with a digest of the scene's graph.
 """
 
 import contextlib
 import functools
-import os
-import sys
-import tempfile
-import threading
-from pathlib import Path
-from types import ModuleType
+from types import FunctionType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,26 +19,13 @@ from kernels.integrate.driver import advance
 from kernels.integrate.pairs import DOP853, DOPRI5, kept_on_kink
 from kernels.integrate.records import Written
 from kernels.integrate.rosenbrock import RODAS5P_PAIR
-from kernels.lanes import cache
+from kernels.lanes.columns import each_refilled
 from kernels.lanes.jit import COMPILED, cached, jit_call
 
 PAIRS = {"dopri5": DOPRI5, "dop853": DOP853, "rodas5p": RODAS5P_PAIR}
 ORDERS = (12, 18)
-_BUILDING = threading.RLock()
-"""No thread may be given a module that another one is still making."""
-
-RUN = '''
-"""Cells of the scene {name}: written by kernels; do not change it here."""
-
-from kernels.codegen.compiled import kept
-from kernels.lanes.columns import each_refilled
-
-
-@kept
-def run(cells, memory, held):
-    """Each cell, a row of what a lane knows, until its last switch."""
-    each_refilled(advance, cells, memory, held)
-'''
+_RUNS = {}
+"""What runs cells of the scenes seen so far, by its name."""
 
 
 class Runner(NamedTuple):
@@ -83,31 +64,31 @@ def runner(scene, method):
     method : "taylor"; "told", the same with its error carried along; one of `PAIRS`; "fixed": steps of a fixed length
     """
     functions, m = written_of(scene)
-    if method == "taylor":
-        return Runner(scene, m, *_by_series(functions, m))
-    functions = Functions(scene, record(scene))  # derivatives come into its graph in an order of their own
-    if method == "told":
-        m = m._replace(cell=cell_of(*functions.size, True))
-        return Runner(scene, m, *_by_series(functions, m, functions.changes()))
+    if method != "taylor":
+        functions = Functions(scene, record(scene))  # derivatives come into its graph in an order of their own
+    if method in ("taylor", "told"):
+        told = method == "told"
+        m = m._replace(cell=cell_of(*functions.size, told))
+        return Runner(scene, m, *_by_series(functions, m, functions.changes() if told else None))
     if method == "fixed":
-        m = m._replace(cell=m.cell._replace(own=fixed_step.nothing_yet(m.cell.state)))
+        order, m = None, m._replace(cell=m.cell._replace(own=fixed_step.nothing_yet(m.cell.state)))
 
         @jit_call
         def leg(cell, mode, active):
             return fixed_step.to_event(m, cell, mode, active)
 
-        run = _driven(functions, m, leg, "fixed")
-        return Runner(scene, m, run, run)
-    pair = kept_on_kink(PAIRS[method]) if scene.slides else PAIRS[method]
-    factored, solved = functions.linear()
-    m = m._replace(factored=factored, solved=solved, roundings=pair.roundings, biased=1.0)
+    else:
+        pair = kept_on_kink(PAIRS[method]) if scene.slides else PAIRS[method]
+        factored, solved = functions.linear()
+        m = m._replace(factored=factored, solved=solved, roundings=pair.roundings, biased=1.0)
+        order = pair.order
 
-    @jit_call
-    def leg(cell, mode, active):
-        return adaptive.to_event(m, pair, cell, mode, active)
+        @jit_call
+        def leg(cell, mode, active):
+            return adaptive.to_event(m, pair, cell, mode, active)
 
     run = _driven(functions, m, leg, method)
-    return Runner(scene, m, run, run, pair.order)
+    return Runner(scene, m, run, run, order)
 
 
 def _by_series(functions, m, changes=None):
@@ -140,35 +121,18 @@ def _driven(functions, m, leg, kind, tells=None):
 
 def running(functions, of_lanes, kind):
     """What runs cells, of which `of_lanes` takes every lane on until one has finished."""
-    name = functions.scene.name
-    module, text = f"{kind}_{name}_{functions.digest}", RUN.lstrip().format(name=name)
-    with _BUILDING:
-        if module not in sys.modules:
-            made = sys.modules[module] = ModuleType(module)
-            made.__file__, made.advance = str(_file_of(module, text)), of_lanes
-            try:
-                # not what the file says, nor Python's compiled copy of it: others may have been there
-                exec(compile(text, made.__file__, "exec"), made.__dict__)
-            except BaseException:
-                del sys.modules[module]
-                raise
-        return sys.modules[module].run
+    name = f"{kind}_{functions.scene.name}_{functions.digest}"
+    run = FunctionType(_all_cells.__code__, {"each_refilled": each_refilled, "ADVANCE": of_lanes}, name)
+    run.__qualname__, run.__module__ = name, __name__
+    return _RUNS.setdefault(name, kept(run))
 
 
-def _file_of(name, text):
-    """The file of that text: among the kernels' machine code, or where that cannot be, a temporary one."""
-    folder = cache.FOLDER or Path(tempfile.mkdtemp(prefix="foliot_scene_"))
-    path = folder / f"{name}.py"
-    if not path.is_file() or path.read_text() != text:
-        handle, draft = tempfile.mkstemp(dir=folder, suffix=".draft")
-        with os.fdopen(handle, "w") as file:
-            file.write(text)
-        Path(draft).replace(path)
-    return path
+def _all_cells(cells, memory, held):
+    each_refilled(ADVANCE, cells, memory, held)  # noqa: F821  a name of `running`
 
 
 def kept(function):
-    """A function called from Python, whose machine code is kept: its file is named by all it was made from."""
+    """A function called from Python, whose machine code is kept: its name says all it was made from."""
     if COMPILED:
         return cached(function)
 

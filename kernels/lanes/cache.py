@@ -30,7 +30,9 @@ import llvmlite
 import numba
 from llvmlite import binding
 from numba.core.bytecode import FunctionIdentity
-from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile, _CacheLocator
+from numba.core.caching import NullCache
+from numba.core.compiler import CompileResult
+from numba.core.serialize import dumps
 
 PACKAGE = Path(__file__).parents[1]
 OLD_SECONDS = 30 * 24 * 3600
@@ -106,90 +108,35 @@ def _folder():
 FOLDER = _folder()
 
 
-class _Locator(_CacheLocator):
-    """Says that everything is in FOLDER and never out of date: the folder's name says what it was made from."""
+class _Cache(NullCache):
+    """Machine code of a function, in FOLDER a file for each signature.
 
-    def __init__(self, py_func):
-        self._py_file, self._lineno = py_func.__code__.co_filename, py_func.__code__.co_firstlineno
+    A fault of the disk, and a file that is damaged or not the user's alone, only mean to compile.
+    """
 
-    def ensure_cache_path(self):
-        """Whoever takes the folder away while we run has compiled code not kept."""
+    def __init__(self, function):
+        code, version = function.__code__, "".join(map(str, sys.version_info[:2]))
+        name = f"{Path(code.co_filename).stem}.{function.__qualname__}-{code.co_firstlineno}.py{version}"
+        self._name = name.replace("<", "").replace(">", "")
 
-    def get_cache_path(self):
-        return str(FOLDER)
-
-    def get_source_stamp(self):
-        return FOLDER.name
-
-    def get_disambiguator(self):
-        return str(self._lineno)
-
-    @classmethod
-    def from_function(cls, py_func, py_file):
-        return cls(py_func)
-
-
-class _Implementation(CompileResultCacheImpl):
-    _locator_classes = (_Locator,)
-
-
-class _Files(IndexDataCacheFile):
-    """The files of one function. One that is damaged, or not the user's alone, is as good as none."""
-
-    def _load_index(self):
-        stamp, overloads = _unpickled(self._index_path) or (None, {})
-        return overloads if stamp == self._source_stamp else {}
-
-    def _load_data(self, name):
-        return _unpickled(self._data_path(name))
-
-    def _save_index(self, overloads):
-        _write(self._index_path, self._dump((self._source_stamp, overloads)))
-
-    def _save_data(self, name, data):
-        _write(self._data_path(name), self._dump(data))
-
-
-def _unpickled(path):
-    """What a file of the user's holds; None where there is none, or it is damaged."""
-    with contextlib.suppress(Exception), Path(path).open("rb") as file:  # whatever comes of a damaged pickle
-        if _ours_alone(os.fstat(file.fileno()), path):
-            return pickle.load(file)
-    return None
-
-
-def _write(path, content):
-    """A file that only the user may read and write, in one piece."""
-    handle, draft = tempfile.mkstemp(dir=FOLDER, suffix=".draft")
-    with os.fdopen(handle, "wb") as file:
-        file.write(content)
-    Path(draft).replace(path)
-
-
-class _Cache(FunctionCache):
-    """numba's cache of one function, in FOLDER; a fault of the disk or a damaged file only means to compile."""
-
-    _impl_class = _Implementation
-
-    def __init__(self, py_func):
-        super().__init__(py_func)
-        self._cache_file = _Files(self._cache_path, self._impl.filename_base, FOLDER.name)
+    def _path(self, signature):
+        return FOLDER / f"{self._name}.{hashlib.sha256(repr(signature).encode()).hexdigest()[:16]}.nbc"
 
     @contextlib.contextmanager
-    def alone(self):
+    def alone(self, signature):
         """Has other processes wait while this one compiles what is not kept yet, for they can load it then.
 
         Gives up where its holder takes longer than anything takes to compile, and where who had it could keep nothing:
         then none need wait for another. In a folder without locks each compiles for itself.
         """
-        index, file = Path(self._cache_file._index_path), None
-        if not index.exists():
+        path, file = self._path(signature), None
+        if not path.exists():
             with contextlib.suppress(OSError):
-                file = os.open(f"{index}.lock", os.O_CREAT | os.O_WRONLY, 0o600)
+                file = os.open(f"{path}.lock", os.O_CREAT | os.O_WRONLY, 0o600)
                 for trial in range(round(MOST_COMPILE_SECONDS / 0.05)):
                     with contextlib.suppress(BlockingIOError):
                         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                        if trial and not index.exists():
+                        if trial and not path.exists():
                             fcntl.flock(file, fcntl.LOCK_UN)
                         break
                     time.sleep(0.05)
@@ -201,25 +148,30 @@ class _Cache(FunctionCache):
                     fcntl.flock(file, fcntl.LOCK_UN)
                 os.close(file)
 
-    def load_overload(self, sig, target_context):
-        try:
-            return super().load_overload(sig, target_context)
-        except Exception:  # code that is there, but is none
-            return None
+    def load_overload(self, signature, context):
+        context.refresh()
+        path = self._path(signature)
+        with contextlib.suppress(Exception), path.open("rb") as file:  # whatever comes of a damaged pickle
+            if _ours_alone(os.fstat(file.fileno()), path):
+                return CompileResult._rebuild(context, *pickle.load(file))
 
-    def save_overload(self, sig, data):
+    def save_overload(self, signature, compiled):
+        if compiled.library.has_dynamic_globals:
+            return
         with contextlib.suppress(OSError):
-            super().save_overload(sig, data)
+            handle, draft = tempfile.mkstemp(dir=FOLDER, suffix=".draft")  # only the user may read and write it
+            with os.fdopen(handle, "wb") as file:
+                file.write(dumps(compiled._reduce()))
+            Path(draft).replace(self._path(signature))
 
 
 def enable(dispatcher):
-    """Keeps the compiled versions of a function of this package, or of what it wrote into FOLDER, on the disk."""
+    """Keeps the compiled versions of a function of this package on the disk."""
     if is_ours(dispatcher) and FOLDER is not None:
         dispatcher._cache = _Cache(dispatcher.py_func)
     return dispatcher
 
 
 def is_ours(function):
-    """Whether a function, compiled or not, is of this package, or written by it."""
-    file = Path(getattr(function, "py_func", function).__code__.co_filename)
-    return PACKAGE in file.parents or file.parent == FOLDER
+    """Whether a function, compiled or not, is of this package."""
+    return PACKAGE in Path(getattr(function, "py_func", function).__code__.co_filename).parents

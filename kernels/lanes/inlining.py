@@ -198,7 +198,7 @@ class _Entry(CPUDispatcher):
         _remember(self.typingctx)
         try:
             # waiting for another process is compiling to who watches numba
-            with global_compiler_lock, getattr(self._cache, "alone", contextlib.nullcontext)():
+            with global_compiler_lock, getattr(self._cache, "alone", contextlib.nullcontext)(sig):
                 return super().compile(sig)
         finally:
             if collecting:

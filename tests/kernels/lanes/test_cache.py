@@ -237,9 +237,8 @@ def test_a_folder_that_others_may_write_to_is_not_used(filled, which, others):
     assert len(told.splitlines()) == 1
 
 
-@pytest.mark.parametrize("kind", ["*.nbi", "*.nbc"])
-def test_a_file_that_others_may_write_to_is_not_read(filled, kind):
-    (path,) = filled.rglob(kind)
+def test_a_file_that_others_may_write_to_is_not_read(filled):
+    (path,) = filled.rglob("*.nbc")
     path.write_bytes(pickle.dumps(Trap(filled / "sprung")))
     path.chmod(0o620)
     (status, hits, _), told = said(CHECK, filled)
@@ -277,13 +276,3 @@ def test_what_is_kept_is_the_users_alone_whatever_the_umask(scene_kept):
     kept = [scene_kept / "foliot", *(scene_kept / "foliot").rglob("*")]
     assert len(kept) > 4
     assert not [path for path in kept if path.stat().st_mode & 0o077]
-
-
-def test_the_text_of_a_scenes_entry_is_never_run_from_its_file(scene_kept, tmp_path):
-    shutil.copytree(scene_kept, tmp_path, dirs_exist_ok=True)
-    paths = list(tmp_path.rglob("*.py"))
-    assert paths
-    assert not list(tmp_path.rglob("*.pyc"))
-    for path in paths:
-        path.write_text("raise SystemExit")
-    assert run(OWN_SCENE, tmp_path) == ["0", "0"]
