@@ -24,7 +24,8 @@ import keyword
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Required, TypedDict
+from types import SimpleNamespace
+from typing import Any, Required, TypedDict, Unpack
 
 import numpy as np
 
@@ -56,7 +57,7 @@ from kernels.expression.graph import (
     where,
 )
 from kernels.interface import FIRST_REFUSAL, Field, Kernel, Method, OnColumns, Status
-from kernels.lanes.wiring import signed
+from kernels.lanes.wiring import signed, within
 
 __all__ = [
     "Field", "Scene", "SceneError", "arccos", "arcsin", "arctan", "cos", "cosh", "exp", "floor", "hypot", "log",
@@ -141,20 +142,7 @@ class SceneParts(TypedDict, total=False):
     example: Mapping[str, float] | None
 
 
-def scene_kernel(
-    *,
-    name: str,
-    doc: str,
-    states: Sequence[Field],
-    parameters: Sequence[Field],
-    rates: Function,
-    surface: Functions,
-    start: Function,
-    switch: Functions | None = None,
-    start_time: Function | float | None = None,
-    source: str = "a study's own",
-    example: Mapping[str, float] | None = None,
-) -> Kernel:
+def scene_kernel(**parts: Unpack[SceneParts]) -> Kernel:
     """A kernel that follows a scene from its start to its last switch.
 
     Parameters
@@ -163,6 +151,7 @@ def scene_kernel(
     states, parameters : what they are called, their units; a state's Field is also that of the output
     rates, surface, start, switch : as in `Scene`
     start_time : what `t` is at the start, where one of the functions asks for it: a number, or (parameters) -> one
+    source : where the scene comes from
     example : parameters at which the scene runs well
 
     Returns
@@ -176,14 +165,9 @@ def scene_kernel(
     SceneError
         Where the functions ask for what is not there, or do what cannot be recorded.
     """
-    parts = SceneParts(
-        name=name, doc=doc, states=states, parameters=parameters, rates=rates, start=start, surface=surface,
-        switch=switch, start_time=start_time, source=source, example=example,
-    )  # fmt: skip
-    fields, outputs = (*parameters, flips_field(40.0, MOST_FLIPS)), (*TIMES, *states)
-    return declared(
-        parts, fields, outputs, _methods(scene_of(parts), [f.name for f in fields], [f.name for f in outputs])
-    )
+    fields, outputs = (*parts["parameters"], flips_field(40.0, MOST_FLIPS)), (*TIMES, *parts["states"])
+    methods = _methods(scene_of(parts), [f.name for f in fields], [f.name for f in outputs])
+    return declared(parts, fields, outputs, methods)
 
 
 def declared(
@@ -216,7 +200,12 @@ TIMES = (
 
 
 def scene_of(parts: SceneParts) -> Scene:
-    """The scene of states and parameters that are given as fields; the time is its last state if it is asked for."""
+    """The scene of states and parameters that are given as fields; the time is its last state if it is asked for.
+
+    Raises TypeError where one of `parts` is wanting, or there is none of that name.
+    """
+    if wrong := (parts.keys() - SceneParts.__annotations__.keys()) | (SceneParts.__required_keys__ - parts.keys()):
+        raise TypeError(f"a scene wants {', '.join(SceneParts.__annotations__)}; wrong or missing: {min(wrong)!r}")
     states, parameters = (tuple(field.name for field in parts[key]) for key in ("states", "parameters"))
     surface, switch, start_time = parts.get("surface"), parts.get("switch"), parts.get("start_time")
     scene = Scene(parts["name"], parts["doc"], states, parameters, parts["rates"], surface, parts["start"], switch)
@@ -313,16 +302,12 @@ def limits_check(fields: Sequence[Field], further: OnColumns | None = None) -> O
 
     `further` writes into the status what else is refused.
     """
+    names, allowed = [f.name for f in fields], within(fields, compiled=False)
 
     def check(*columns: Any) -> None:
-        *values, status = columns
-        good = np.ones(len(status), bool)
-        for value, f in zip(values, fields, strict=True):
-            good &= (value > f.lower if f.open_lower else value >= f.lower) & (value <= f.upper) & np.isfinite(value)
-            if f.integer:
-                good &= value == np.floor(value)
-        status[...] = np.where(good, Status.OK, Status.BAD_INPUT)
+        good = allowed(SimpleNamespace(**dict(zip(names, columns, strict=False))))
+        columns[-1][...] = np.where(good, Status.OK, Status.BAD_INPUT)
         if further:
             further(*columns)
 
-    return signed(check, [*(f.name for f in fields), "status"])
+    return signed(check, [*names, "status"])

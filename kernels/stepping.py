@@ -7,8 +7,8 @@ pairs (place, speed), Moreau's method for one pair with dry friction at speed 0.
 """
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, Unpack
 
 import numpy as np
 
@@ -105,20 +105,7 @@ def _fill_plainly(time: Any, interval: Any, states: Any, reach: Any, columns: An
         column[:] = row
 
 
-def stepped_kernel(
-    *,
-    name: str,
-    doc: str,
-    states: Sequence[Field],
-    parameters: Sequence[Field],
-    rates: Function,
-    surface: Function,
-    start: Function,
-    switch: Function | None = None,
-    start_time: Function | float | None = None,
-    source: str = "a study's own",
-    example: Mapping[str, float] | None = None,
-) -> Kernel:
+def stepped_kernel(**parts: Unpack[SceneParts]) -> Kernel:
     """A kernel that follows a scene at a fixed step; the arguments are those of `kernels.scene.scene_kernel`.
 
     Returns
@@ -127,11 +114,7 @@ def stepped_kernel(
         Of the scene's parameters, `flips`, `step` and `location`; its outputs are `time` of the last switch, `interval`
         since the one before, each state just before it, and `error`, `steps`, `rate_calls`.
     """
-    if not callable(surface):
-        raise SceneError(f"the scene {name}: at a fixed step there is one surface")
-    parts = SceneParts(
-        name=name, doc=doc, states=states, parameters=parameters, rates=rates, surface=surface, start=start,
-        switch=switch, start_time=start_time, source=source, example=example,
-    )  # fmt: skip
-    fields, outputs = (*parameters, *stepping_fields()), (*TIMES, *states, *COST)
+    if not callable(parts.get("surface")):
+        raise SceneError(f"the scene {parts['name']}: at a fixed step there is one surface")
+    fields, outputs = (*parts["parameters"], *stepping_fields()), (*TIMES, *parts["states"], *COST)
     return declared(parts, fields, outputs, stepping_methods(scene_of(parts), fields, outputs, _fill_plainly))

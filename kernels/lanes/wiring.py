@@ -134,12 +134,13 @@ def _no_more(p: Any) -> float:
     return OK
 
 
-def within(fields: Sequence[Field]) -> Callable[[Any], Any]:
+def within(fields: Sequence[Field], compiled: bool = True) -> Callable[[Any], Any]:
     """A function of a record of parameters, or of lanes of them: whether each is a number within its field's limits.
 
-    NaN and infinite numbers never are; a default always is, at a limit that is open, too.
+    NaN and infinite numbers never are; a default always is, at a limit that is open, too. One that is not compiled
+    takes a record of columns, none of which has several numbers a cell.
     """
-    names, tests = {"nearest": nearest, "inf": math.inf}, []
+    names, tests = {"nearest": nearest if compiled else np.rint, "inf": math.inf}, []
     for field in fields:
         above = ">" if field.open_lower or field.lower == -math.inf else ">="
         below = "<" if field.upper == math.inf else "<="
@@ -153,8 +154,8 @@ def within(fields: Sequence[Field]) -> Callable[[Any], Any]:
             names[f"all_{field.name}"] = _every(jit(eval(f"lambda x: {test.format(x='x')}", names)))
             test = f"all_{field.name}({{x}})"
         tests.append(test.format(x=f"p.{field.name}"))
-    made: Callable[[Any], Any] = jit(eval(f"lambda p: {' & '.join(tests)}", names))
-    return made
+    made: Callable[[Any], Any] = eval(f"lambda p: {' & '.join(tests)}", names)
+    return jit(made) if compiled else made
 
 
 def _every(test: Any) -> Any:
