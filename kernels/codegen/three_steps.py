@@ -20,8 +20,8 @@ from kernels.lanes.columns import fresh, to_the_end
 from kernels.lanes.tuples import first_rows, flat
 from kernels.maths.elementary import NORMAL_HIGH, NORMAL_LOW
 
-LOCATED, BLIND = ((0.37, 2.0), (0.77, 1.0)), ((0.23, 1.0), (0.61, 1.0))
-"""Length of the finest run's steps and of those of the run between, and how many substeps a step has."""
+LOCATED, BLIND = ((1.0, 0.37, 0.77), (1.0, 2.0, 1.0)), ((1.0, 0.23, 0.61), (1.0, 1.0, 1.0))
+"""Length of the steps of the three runs, the finest one second, and how many substeps a step has."""
 SAFETY = 2.0
 """A switch found by a line or a polynomial is off by 1/(1 - 0.37) of what two runs differ by if only the order is 1."""
 GROWS = 0.1
@@ -32,29 +32,26 @@ ROUNDINGS = 8.0
 UNSURE, FALLEN = 6.0, 1.3
 """Differences in its speed there that a motion must have left behind a switch, and how often the margin, which goes
 with the speed's square, must be what it has fallen by to the finest run."""
-GRAZING = 1e-9
-"""Of an event's value at the start of a step: how close to 0 it may turn round in it unremarked."""
 
 
-def followed(runner, method, columns, step, location, substeps=1.0):
+def followed(runner, method, columns, step, location, substeps):
     """A column per cell of: time, interval, states, their reach, margin behind a switch, steps, calls, status.
 
     Parameters
     ----------
     columns : the parameters and the number of switches
-    step, location : columns
-    substeps : of a step
+    step, location, substeps : columns; of a step
     """
     cell, states = runner.m.cell, len(runner.scene.states)
     row = first_rows(cell)
     shown = [*range(row["time"], row["size"]), *range(row["own"], row["own"] + states + 3), row["verdict"]]
     results = np.full((6 + 2 * states, len(step)), np.nan)
-    for one in np.unique(location):
-        cells = location == one
-        table = fresh(len(flat(cell)), [np.broadcast_to(c, step.shape)[cells] for c in (*columns, TOLERANCE)])
+    for one in np.unique([location, substeps], axis=1).T:
+        cells = (location == one[0]) & (substeps == one[1])
+        table = fresh(len(flat(cell)), [*(c[cells] for c in columns), np.full(cells.sum(), TOLERANCE)])
         table[:, row["h"]] = step[cells]
         table[:, row["own"] + states] = np.inf
-        table[:, -4:] = GRAZING, METHODS.index(method), one, substeps
+        table[:, -3:] = METHODS.index(method), *one
         to_the_end(runner.low, table)
         results[:, cells] = table[:, shown].T
     return results
@@ -69,15 +66,11 @@ def solved(runner, method, columns, step, location):
     error, status
     """
     blind = (location == NONE) | (METHODS.index(method) == MOREAU)
-    first = followed(runner, method, columns, step, location)
-    runs, moved = [], [np.broadcast_to(c, step.shape) for c in off_by_roundings(columns)]
-    for located, unlocated in zip(LOCATED, BLIND, strict=True):
-        runs.append(np.full((6 + 2 * len(runner.scene.states), len(step)), np.nan))
-        for cells, (length, substeps) in ((~blind, located), (blind, unlocated)):
-            if cells.any():
-                those = [c[cells] for c in moved]
-                runs[-1][:, cells] = followed(runner, method, those, length * step[cells], location[cells], substeps)
-    finest, between = runs
+    lengths, substeps = np.where(blind, np.array(BLIND)[..., None], np.array(LOCATED)[..., None])
+    columns = [np.broadcast_to(c, step.shape) for c in columns]
+    threefold = [np.concatenate([c, off, off]) for c, off in zip(columns, off_by_roundings(columns), strict=True)]
+    runs = followed(runner, method, threefold, (lengths * step).ravel(), np.tile(location, 3), substeps.ravel())
+    first, finest, between = np.split(runs, 3, axis=1)
     error, unsure, grows = _compared(first, finest, between, len(runner.scene.states))
     with np.errstate(all="ignore"):
         error = np.where(blind, np.maximum(error, step / first[1]), error)

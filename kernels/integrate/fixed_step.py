@@ -37,6 +37,8 @@ SETTLED = 1e-14
 """Relative change of the part of a step after which the event is where the next trial ends."""
 HIDDEN = 1e-13
 """Of a state's size, what the rates may hide in a step (`expression.hidden`) unremarked."""
+GRAZING = 1e-9
+"""Of an event's value at the start of a step: how close to 0 it may turn round in it unremarked."""
 TOLERANCE = 1e-14 / BLUR
 """As of a motion to a tolerance, so that rounding may take 1e-14 of the surface's value at the start unremarked."""
 
@@ -55,7 +57,6 @@ class Fixed(NamedTuple):
     reach : largest size of each state since the last switch
     slim : least margin behind a switch
     trials, wide : since the last switch: trials, largest of the surface's value
-    graze : margin of grazing over an event's value at the start of a step
     method, location, substeps : the `Scheme`
     """
 
@@ -65,7 +66,6 @@ class Fixed(NamedTuple):
     calls: float
     trials: float
     wide: float
-    graze: float
     method: float
     location: float
     substeps: float
@@ -73,7 +73,7 @@ class Fixed(NamedTuple):
 
 def nothing_yet(state):
     """As zeros, for so many states."""
-    return Fixed(state, *[0.0] * 9)
+    return Fixed(state, *[0.0] * 8)
 
 
 @jit
@@ -138,7 +138,9 @@ def to_event(m, cell, mode, active):
     moving, nothing, fired = active, active & not_(active), times(0.0, on)
     stuck, lost, broken, hangs, vague = nothing, nothing, nothing, nothing, nothing
     t, cut, cuts = 0.0 * cell.h, 0.0 * cell.h, 0.0 * cell.h
-    reach, trials, wide = begun(cell)
+    begins = cell.since <= 0.0  # behind a switch
+    reach = choose(begins, reached(times(0.0, state), state), own.reach)
+    trials, wide = where(begins, 0.0, own.trials), where(begins, 0.0, own.wide)
     slim, steps, calls = own.slim, own.steps, own.calls
     for _ in range(STEP_LIMIT + 1):
         h = where(cut > 0.0, cut, cell.h)
@@ -158,7 +160,7 @@ def to_event(m, cell, mode, active):
             pressed = met & (of_event(on, which) > 0.5)
             away = of_event(start_rates, which) > 0.0
             stuck, missed = stuck | (pressed & not_(away)), moving & not_(met | blown)
-            margins = times(own.graze, reached(times(0.0, on), start))
+            margins = times(GRAZING, reached(times(0.0, on), start))
             close = any_of(tuple((magnitude(x) < y) & (o < 0.5) for x, y, o in zip(end, margins, on, strict=True)))
             hangs = hangs | (missed & (cuts > 0.5) & close)
             low = where(missed & not_(cuts > 0.5), dip(step), 0.0)
@@ -193,20 +195,6 @@ def to_event(m, cell, mode, active):
         moving = moving & not_(lost)
         if not any_lane(moving):
             break
-    own = so_far(own, reach, slim, steps, calls, trials, wide)
+    own = Fixed(reach, slim, steps, calls, trials, wide, own.method, own.location, own.substeps)
     leg = Leg(state, t / cell.unit, cell.h, fired, stuck, lost, broken, nothing, hangs, vague, trials, reach)
     return leg, own
-
-
-@symbolic
-def begun(cell):
-    """Reach, trials and the surface's largest value, which begin anew behind a switch."""
-    begins, own = cell.since <= 0.0, cell.own
-    reach = choose(begins, tuple(magnitude(u) for u in cell.state), own.reach)
-    return reach, where(begins, 0.0, own.trials), where(begins, 0.0, own.wide)
-
-
-@symbolic
-def so_far(own, reach, slim, steps, calls, trials, wide):
-    """What the lanes know of their steps."""
-    return own._replace(reach=reach, slim=slim, steps=steps, calls=calls, trials=trials, wide=wide)
