@@ -22,9 +22,7 @@ from kernels.integrate.powers import Power, core
 from kernels.integrate.records import Cell, Errors, Mode, Pieces, Written
 from kernels.integrate.taylor import BY_SERIES, BY_SUM
 from kernels.integrate.taylor_leg import Series
-from kernels.lanes.jit import jit_call
-from kernels.lanes.symbols import ANY, written
-from kernels.lanes.vectors import fma, magnitude, where
+from kernels.lanes.symbols import ANY, left_a_call, written
 
 NEXT_TO = 1.0 / 16.0
 """Of a step, what it may be changed by so that a clock is not rounded; a shorter one is taken as it is."""
@@ -66,7 +64,7 @@ class Functions:
 
     def __init__(self, scene, recorded):
         self.scene, self.recorded, self.graph = scene, recorded, recorded.graph
-        self.states, self.kinks, self.digest = scene.states, list(recorded.graph.kinks), _digest(scene, recorded)
+        self.states, self.kinks, self.digest = scene.states, tuple(recorded.graph.kinks), _digest(scene, recorded)
         self.size = n, m, kinks = len(scene.states), len(scene.parameters), len(self.kinks)
         rates = dict(zip(self.states, recorded.rates, strict=True))
         self.summed = {s: r.args[0] for s, r in rates.items() if r.kind == INPUT and r.varies}
@@ -76,16 +74,60 @@ class Functions:
         hangs = {s: {x.args[0] for x in needed(r) if x.kind == INPUT and x.args[0] in rates} for s, r in rates.items()}
         for _ in hangs:
             hangs = {s: on.union(*(hangs[other] for other in on)) for s, on in hangs.items()}
+        self.clocks = [r.kind == NUMBER and r.args[0] == 1.0 for r in recorded.rates]
+        """Which states are *clocks*, whose rate is 1."""
         self.feeds_back = any(other != s and s in hangs[other] for s, on in hangs.items() for other in on)
         """Whether the rate of a state hangs on another one whose own rate, or that of a further one, hangs on it."""
         mode, boxes = Mode(ANY, (ANY,) * (kinks + 1), (ANY,) * m, False), ((ANY, ANY),) * n
         self.any = {"state": (ANY,) * n, "changes": (ANY,) * n, "mode": mode, "boxes": boxes}
         self.any |= {"parameters": mode.parameters, "cores": (ANY,) * len(self.graph.powers)}
 
-    @functools.cached_property
-    def tangents(self):
-        """Derivatives along changes of the states."""
-        return Tangents(self.graph, self.states)
+    def written(self):
+        """The scene's `Written`, for a method that misses events by no more than an explicit one.
+
+        Derivatives come into the graph in the order that stands here.
+        """
+        recorded, scene, slides = self.recorded, self.scene, self.scene.slides
+        excesses = self._excesses(self.any["state"], self.any["boxes"], self.any["mode"])
+        # on whose side a switch's result hangs, but for further surfaces and the surface's own u
+        signs, further = {x.args[0] for x in needed(*recorded.switched) if x.kind == INPUT}, recorded.surfaces
+        deciding = tuple(
+            float(f".sign_{j}" in signs and j not in further and u is not recorded.events[0][2])
+            for j, u in enumerate(self.kinks)
+        )
+        mark, sided = 2.0 if scene.only_first else 1.0, (needed(event) for event in (recorded.surface, *self.kinks))
+        return Written(
+            hiding=tuple(tuple(float(x is not None) for x in part) for part in excesses),
+            hidden=left_a_call(self.rehearsed(self._hidden)),
+            rates=self.values(recorded.rates), surface=self.values(recorded.surface), kinks=self.values(self.kinks),
+            switched=self.values(recorded.switched), started=self.inlined(self._started),
+            natural_signs=self.inlined(self._natural_signs), underflows=self.inlined(self._underflows),
+            jet=self.series(2)[0], lost=self.inlined(self._lost), bounds=left_a_call(self.rehearsed(self._bounds)),
+            made=self.inlined(self._made),
+            speeds=self.values(recorded.speeds) if slides else None,
+            onto=self.values(recorded.onto) if slides else None,
+            on_clock=self.inlined(self._on_clock), states_off=self.inlined(self._states_off),
+            most_kinks=KINK_LIMIT if scene.most_kinks is None else float(scene.most_kinks),
+            surfaces=tuple(mark * (j in further) for j in range(len(self.kinks))) if further else None,
+            passable=tuple(float(not any(x.kind == INPUT and x.args[0] == "side" for x in parts)) for parts in sided),
+            deciding=deciding if any(deciding) else None,
+            cell=cell_of(*self.size), roundings=ROUNDINGS, biased=0.0, factored=None, solved=None,
+        )  # fmt: skip
+
+    def inlined(self, function):
+        """A function as compiled code takes it."""
+        return written(self.rehearsed(function))
+
+    def rehearsed(self, function):
+        """A function that has been called: so derivatives come into the graph in the same order always."""
+        signature = inspect.signature(function)
+        function(*(self.any.get(name, ANY) for name in signature.parameters))
+
+        def call(*arguments):
+            return function(*arguments)
+
+        call.__signature__ = signature
+        return call
 
     def inputs(self, state, mode, unit=None, changes=()):
         """{name of an input: its value}."""
@@ -94,34 +136,27 @@ class Functions:
         found |= dict(zip((*(f".sign_{j}" for j in range(len(self.kinks))), ".way"), mode.signs, strict=False))
         return found | {f".delta_{s}": delta for s, delta in zip(self.states, changes, strict=False)}
 
-    def made(self, function):
-        """The function as compiled code takes it.
-
-        It is rehearsed at once: so each expression's derivatives come into the graph in the same order always.
-        """
-        function(*(self.any.get(name, ANY) for name in inspect.signature(function).parameters))
-        return written(function)
-
-    def of_inputs(self, compute):
-        """A function of state and mode."""
-        return self.made(lambda state, mode: compute(self.inputs(state, mode)))
-
     def values(self, expressions):
-        """A function of state and mode: the values of expressions."""
-        return self.of_inputs(lambda inputs: tuple(map(Values(inputs).in_every_lane, expressions)))
+        """A function of state and mode: the values of an expression, or of those in a tuple, or in tuples of them."""
 
-    def value(self, expression):
-        """A function of state and mode: the value of an expression."""
-        return self.of_inputs(lambda inputs: Values(inputs).in_every_lane(expression))
+        def valued(x, values):
+            return tuple(valued(part, values) for part in x) if isinstance(x, tuple) else values.in_every_lane(x)
+
+        return self.inlined(lambda state, mode: valued(expressions, Values(self.inputs(state, mode))))
 
     def sizes(self, expressions):
         """A function of what expressions are made of, in size: an ulp of it is what rounding takes."""
 
-        def sizes(inputs):
-            found = Sizes(inputs)
-            return tuple(found.of(x) if x.varies else 0.0 * inputs["side"] + found.of(x) for x in expressions)
+        def sizes(state, mode):
+            found = Sizes(self.inputs(state, mode))
+            return tuple(found.of(x) if x.varies else 0.0 * mode.side + found.of(x) for x in expressions)
 
-        return self.of_inputs(sizes)
+        return self.inlined(sizes)
+
+    @functools.cached_property
+    def tangents(self):
+        """Derivatives along changes of the states."""
+        return Tangents(self.graph, self.states)
 
     def changes(self):
         """The first of `Changes`: what changes of the states change, and what rates and events are made of."""
@@ -137,162 +172,86 @@ class Functions:
         def changed(state, mode, changes):
             return tuple(map(Values(self.inputs(state, mode, None, changes)).in_every_lane, derivatives))
 
-        return self.made(changed)
+        return self.inlined(changed)
 
-    def _started(self):
-        def started(parameters, side):
-            inputs = self.inputs((), Mode(side, (), parameters, False))
-            return tuple(map(Values(inputs).in_every_lane, self.recorded.started))
+    def _started(self, parameters, side):
+        values = Values(self.inputs((), Mode(side, (), parameters, False)))
+        return tuple(map(values.in_every_lane, self.recorded.started))
 
-        return self.made(started)
-
-    def _natural_signs(self):
+    def _natural_signs(self, state, mode):
         """One kink after the other, for they may hang on signs of those before."""
+        values, signs = Values(self.inputs(state, mode)), []
+        for j, u in enumerate(self.kinks):
+            signs.append(V.where(values.value(u) < 0.0, -1.0, 1.0))
+            values.inputs[f".sign_{j}"] = signs[j]
+        return (*signs, 0.0 * mode.side + 1.0)
 
-        def natural_signs(inputs):
-            values, signs = Values(inputs), []
-            for j, u in enumerate(self.kinks):
-                signs.append(V.where(values.value(u) < 0.0, -1.0, 1.0))
-                inputs[f".sign_{j}"] = signs[j]
-            return (*signs, 0.0 * inputs["side"] + 1.0)
-
-        return self.of_inputs(natural_signs)
-
-    def _underflows(self):
-        """Whether a product of numbers that are not 0 loses its digits."""
-        found = needed(*self.recorded.timed, self.recorded.surface)
-        products = [
-            x for x in found if x.kind in (MUL, HALF_SQUARE, SCALED, DIV) and all(a.kind != NUMBER for a in x.args)
-        ]
-
-        def underflows(state, mode, unit):
-            value, lost = Values(self.inputs(state, mode, unit)).value, unit < 0.0
-            for x in products:
+    def _underflows(self, state, mode, unit):
+        value, lost = Values(self.inputs(state, mode, unit)).value, unit < 0.0
+        for x in needed(*self.recorded.timed, self.recorded.surface):
+            if x.kind in (MUL, HALF_SQUARE, SCALED, DIV) and all(a.kind != NUMBER for a in x.args):
                 small = V.magnitude(value(x)) < 1e-290
                 for factor in x.args:
                     small = small & (V.magnitude(value(factor)) > 0.0)
                 lost = lost | small
-            return lost
+        return lost
 
-        return self.made(underflows)
+    def _lost(self, state, mode):
+        inputs, started = self.inputs(state, mode), dict(zip(self.states, self.recorded.started, strict=True))
+        if self.scene.begins is not None:
+            return inputs[self.scene.begins] - 1.0
+        found = Losses(inputs, started).lost(self.recorded.surface)
+        return 0.0 * mode.side if found is None else found
 
-    def _lost(self):
-        started = dict(zip(self.states, self.recorded.started, strict=True))
+    def _on_clock(self, state, unit, h):
+        for u in itertools.compress(state, self.clocks):
+            gone_on = (V.fma(h, unit, u) - u) / unit
+            h = V.where(V.magnitude(gone_on - h) <= NEXT_TO * h, gone_on, h)
+        return h
 
-        def lost(inputs):
-            if self.scene.begins is not None:
-                return inputs[self.scene.begins] - 1.0
-            found = Losses(inputs, started).lost(self.recorded.surface)
-            return 0.0 * inputs["side"] if found is None else found
-
-        return self.of_inputs(lost)
-
-    def _of_clocks(self):
-        """`Written.on_clock` and `Written.states_off`."""
-        clocks = [r.kind == NUMBER and r.args[0] == 1.0 for r in self.recorded.rates]
-
-        def on_clock(state, unit, h):
-            for u in itertools.compress(state, clocks):
-                gone_on = (fma(h, unit, u) - u) / unit
-                h = where(magnitude(gone_on - h) <= NEXT_TO * h, gone_on, h)
-            return h
-
-        def states_off(state, by):
-            parts = (1.0 if clock else STATE_OFF * (-1.0) ** j for j, clock in enumerate(clocks))
-            return tuple(fma(part * by, u, u) for part, u in zip(parts, state, strict=True))
-
-        return {"on_clock": written(on_clock), "states_off": written(states_off)}
+    def _states_off(self, state, by):
+        parts = (1.0 if clock else STATE_OFF * (-1.0) ** j for j, clock in enumerate(self.clocks))
+        return tuple(V.fma(part * by, u, u) for part, u in zip(parts, state, strict=True))
 
     def _rates_of(self, *values):
         """The rates of expressions."""
         gradients = [[Tangents.along(self.graph, s).of(value) for s in self.states] for value in values]
         return [along(self.graph, gradient, self.recorded.rates) for gradient in gradients]
 
-    def _made_of(self):
-        parts = []
-        for offset, factor, u in self.recorded.events:
-            value = self.graph.multiply(factor, u)
-            parts.append((offset, value, *self._rates_of(value)))
+    @functools.cached_property
+    def _parts_made(self):
+        """Of each event its offset, what is added to that, and the rate of this."""
+        values = [(offset, self.graph.multiply(factor, u)) for offset, factor, u in self.recorded.events]
+        return [(offset, value, *self._rates_of(value)) for offset, value in values]
 
-        def made(inputs):
-            found = Sizes(inputs)
-            size, value = found.of, found.values.value
-            return tuple((size(x) + V.magnitude(value(offset)), value(rate)) for offset, x, rate in parts)
+    def _made(self, state, mode):
+        found = Sizes(self.inputs(state, mode))
+        size, value = found.of, found.values.value
+        return tuple((size(x) + V.magnitude(value(offset)), value(rate)) for offset, x, rate in self._parts_made)
 
-        return self.of_inputs(made)
+    def _enclosures(self, state, boxes, mode):
+        return Enclosures(self.inputs(state, mode), dict(zip(self.states, boxes, strict=True)))
 
-    def _in_boxes(self, compute):
-        """A function of state, boxes and mode, left a call."""
+    def _excesses(self, state, boxes, mode):
+        """What rates, and what events hide; None where that is nothing."""
+        found = self._enclosures(state, boxes, mode)
+        rates = [found.excess(rate) for rate in self.recorded.rates]
+        return rates, [found.excess_scaled(factor, u) for _, factor, u in self.recorded.events]
 
-        def in_boxes(state, boxes, mode):
-            boxes = dict(zip(self.states, boxes, strict=True))
-            found, nothing = compute(Enclosures(self.inputs(state, mode), boxes)), 0.0 * mode.side
-            return tuple(tuple(nothing if x is None else nothing + x for x in part) for part in found)
+    def _hidden(self, state, boxes, mode):
+        nothing, parts = 0.0 * mode.side, self._excesses(state, boxes, mode)
+        return tuple(tuple(nothing if x is None else nothing + x for x in part) for part in parts)
 
-        self.made(in_boxes)
-
-        @jit_call
-        def apart(state, boxes, mode):
-            return in_boxes(state, boxes, mode)
-
-        return apart
-
-    def _hidden(self):
-        """`Written.hidden`, and `Written.hiding`."""
-        hides = []
-
-        def excesses(found):
-            rates = [found.excess(rate) for rate in self.recorded.rates]
-            parts = rates, [found.excess_scaled(factor, u) for _, factor, u in self.recorded.events]
-            hides[:] = [tuple(float(x is not None) for x in part) for part in parts]
-            return parts
-
-        return self._in_boxes(excesses), tuple(hides)
-
-    def _bounds(self):
+    @functools.cached_property
+    def _valued(self):
+        """Each event's value, and its rate."""
         values = [self.graph.add(offset, self.graph.multiply(factor, u)) for offset, factor, u in self.recorded.events]
-        rates = self._rates_of(*values)
+        return values, self._rates_of(*values)
+
+    def _bounds(self, state, boxes, mode):
+        found, nothing, (values, rates) = self._enclosures(state, boxes, mode), 0.0 * mode.side, self._valued
         parts = (values, 0), (rates, 0), (rates, 1)
-        return self._in_boxes(lambda found: [[found.interval(x)[end] for x in part] for part, end in parts])
-
-    def written(self):
-        """The scene's `Written`."""
-        recorded, scene, speeds, onto = self.recorded, self.scene, None, None
-        hidden, hiding = self._hidden()
-        of_state = {
-            "rates": self.values(recorded.rates), "surface": self.value(recorded.surface),
-            "kinks": self.values(self.kinks), "switched": self.values(recorded.switched), "started": self._started(),
-            "natural_signs": self._natural_signs(), "underflows": self._underflows(), "jet": self.series(2)[0],
-            "lost": self._lost(), "hidden": hidden, "bounds": self._bounds(), "made": self._made_of(),
-        }  # fmt: skip
-        if scene.slides:
-            flat = [x for pair in recorded.speeds for x in pair]
-
-            def both(inputs):
-                found = map(Values(inputs).in_every_lane, flat)
-                return tuple(zip(found, found, strict=True))
-
-            speeds, onto = self.of_inputs(both), self.values(recorded.onto)
-        # on whose side a switch's result hangs, but for further surfaces and the surface's own u
-        signs = {x.args[0] for x in needed(*recorded.switched) if x.kind == INPUT}
-        deciding = tuple(
-            float(f".sign_{j}" in signs and j not in recorded.surfaces and u is not recorded.events[0][2])
-            for j, u in enumerate(self.kinks)
-        )
-        further = recorded.surfaces
-        mark = 2.0 if scene.only_first else 1.0
-        surfaces = tuple(mark * (j in further) for j in range(len(self.kinks))) if further else None
-        passable = tuple(
-            float(not any(x.kind == INPUT and x.args[0] == "side" for x in needed(event)))
-            for event in (recorded.surface, *self.kinks)
-        )
-        return Written(
-            **of_state,
-            most_kinks=KINK_LIMIT if scene.most_kinks is None else float(scene.most_kinks), cell=cell_of(*self.size),
-            roundings=ROUNDINGS, biased=0.0,
-            speeds=speeds, onto=onto, surfaces=surfaces, hiding=hiding, passable=passable,
-            deciding=deciding if any(deciding) else None, **self._of_clocks(), factored=None, solved=None,
-        )  # fmt: skip
+        return tuple(tuple(nothing + found.interval(x)[end] for x in part) for part, end in parts)
 
     def linear(self):
         """`Written.factored` and `Written.solved`: what `stiff` makes of I - h J."""
@@ -313,18 +272,7 @@ class Functions:
         def solved(factors, right):
             return stiff.solution(*(dict(zip(*pair, strict=True)) for pair in zip(places, factors, strict=True)), right)
 
-        self.made(factored)
-        written(solved)
-
-        @jit_call
-        def factored_apart(state, mode, h):
-            return factored(state, mode, h)
-
-        @jit_call
-        def solved_apart(factors, right):
-            return solved(factors, right)
-
-        return factored_apart, solved_apart
+        return left_a_call(self.rehearsed(factored)), left_a_call(solved)
 
     def of_series(self, m, order, changes=None):
         """`taylor_leg.Series` of an order; `changes` : of the error that is carried along, the first of `Changes`."""
@@ -354,27 +302,25 @@ class Functions:
             start = dict(zip(self.states, starts, strict=True))
             return {s: (start[s], unit, series[summed[s]]) if s in summed else (u,) for s, u in series.items()}
 
-        def computed(state, mode, unit, cores):
+        def expanded(state, mode, unit, cores):
             values = Values(self.inputs(state, mode, unit), rates, cores)
-            series, events = {s: values.coefficients(graph.series(s), order) for s in self.states}, []
-            for offset, factor, u in recorded.events:
-                found = values.coefficients(u, order)
-                events.append((values.value(offset), values.value(factor), found))
-            return values, series, tuple(events)
-
-        def controlled(series, events):
-            return *series.values(), *(u for s, (*_, u) in zip(self.seen, events, strict=True) if s is None)
+            series = {s: values.coefficients(graph.series(s), order) for s in self.states}
+            events = tuple((*map(values.value, event), values.coefficients(u, order)) for *event, u in recorded.events)
+            of_states = curves(state, unit, series)
+            watched = [(s, u) for s, (*_, u) in zip(self.seen, events, strict=True)]
+            return values, Pieces(
+                states=tuple(series.values()),
+                events=events,
+                controlled=(*series.values(), *(u for s, u in watched if s is None)),
+                of_states=tuple(of_states.values()),
+                of_events=tuple((u,) if s is None else of_states[s] for s, u in watched),
+                inner=(),
+                rough=(),
+            )
 
         def pieces(state, mode, unit, cores):
-            values, series, events = computed(state, mode, unit, cores)
-            of_states = curves(state, unit, series)
-            watched = list(zip(self.seen, events, strict=True))
-            of_events = tuple((u,) if s is None else of_states[s] for s, (*_, u) in watched)
-            inner, rough = (tuple(values.known[key] for key in keys) for keys in taken.values())
-            return Pieces(
-                tuple(series.values()), events, controlled(series, events), tuple(of_states.values()), of_events,
-                inner, rough,
-            )  # fmt: skip
+            values, found = expanded(state, mode, unit, cores)
+            return found._replace(**{part: tuple(values.known[key] for key in keys) for part, keys in taken.items()})
 
         def changed(values, length, changes, unit):
             found, nothing = {}, 0.0 * values.inputs["side"]
@@ -393,8 +339,7 @@ class Functions:
 
         state, mode, changes = (self.any[name] for name in ("state", "mode", "changes"))
         cores = self.any["cores"] if powers else ()
-        whole, *found = computed(state, mode, ANY, cores)
-        series = controlled(*found)
+        whole, found = expanded(state, mode, ANY, cores)
         for part, length in lengths.items():
             values = Values(self.inputs(state, mode, ANY, changes), rates, cores)
             values.known = dict(whole.known)
@@ -402,7 +347,11 @@ class Functions:
             inputs = {(x.index, 0) for x in graph.nodes if x.kind == INPUT}
             asked = values.asked - inputs
             taken[part] = [key for key, value in whole.known.items() if key in asked and value is ANY]
-        return written(pieces), [tangent(part) for part in lengths], tuple(float(u[-1] is ANY) for u in series)
+        return (
+            written(pieces),
+            [tangent(part) for part in lengths],
+            tuple(float(u[-1] is ANY) for u in found.controlled),
+        )
 
     @functools.cached_property
     def powers(self):
@@ -412,7 +361,7 @@ class Functions:
             base = node.args[0]
             kink, place = self.kinks.index(base.args[1]), self.states.index(base.args[1].args[0])
             bases[place] = 1 + kink
-            of_state, entries = map(self.value, node.args), (entry(place), entry(1 + kink))
+            of_state, entries = map(self.values, node.args), (entry(place), entry(1 + kink))
             powers.append(Power(self._with_power(node), *of_state, *entries, self._without(place)))
 
         def cores(state, mode, unit, tolerance, on, t, margins):
@@ -421,7 +370,7 @@ class Functions:
             return values, limits, coarse, found[-1][3] if found else None
 
         def on_kink(state, fires):
-            return tuple(where(fires[bases[i]], 0.0 * u, u) if i in bases else u for i, u in enumerate(state))
+            return tuple(V.where(fires[bases[i]], 0.0 * u, u) if i in bases else u for i, u in enumerate(state))
 
         return written(cores), written(on_kink)
 
@@ -432,7 +381,7 @@ class Functions:
             values = Values(self.inputs(state, mode, unit), precomputed={node: power})
             return tuple(map(values.value, self.recorded.timed))
 
-        return self.made(rates)
+        return self.inlined(rates)
 
     def _without(self, place):
         """The state with that one 0."""

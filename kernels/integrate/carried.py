@@ -23,6 +23,7 @@ Generic in one cell or lanes; `m` is a `taylor_leg.Series`, and where its `error
 """
 
 import math
+from collections import namedtuple
 from typing import NamedTuple
 
 from kernels.integrate.events import of_event
@@ -50,28 +51,22 @@ STRAIGHT = 20.0
 """Of the rate of an event, what it may change by within the time by which it is late: else it is no straight line."""
 
 
-class Changes(NamedTuple):
-    """What is written of a scene for its error; functions of (state, mode, changes) unless said otherwise.
+Changes = namedtuple("Changes", "of_rates of_events behind rates_made events_made tangent rough fed_back")
+"""What is written of a scene for its error; functions of (state, mode, changes) unless said otherwise.
 
-    of_rates, of_events, behind : what they change of each rate, of each event's value, of the state behind a switch
-    rates_made, events_made : (state, mode) -> what rates, and events but for their offsets, are made of, in size
-    tangent, rough : (state, mode, unit, inner, changes, cores) -> what each change is evaluated from (`taylor.Way`)
-    fed_back : None where no state's change comes back to it by way of another one
-    """
-
-    of_rates: object
-    of_events: object
-    behind: object
-    rates_made: object
-    events_made: object
-    tangent: object
-    rough: object
-    fed_back: object
+of_rates, of_events, behind : what they change of each rate, of each event's value, of the state behind a switch
+rates_made, events_made : (state, mode) -> what rates, and events but for their offsets, are made of, in size
+tangent, rough : (state, mode, unit, inner, changes, cores) -> what each change is evaluated from (`taylor.Way`)
+fed_back : None where no state's change comes back to it by way of another one
+"""
 
 
 class Error(NamedTuple):
     """What each state is off by, its spread, the most of both so far; and of the last step: its polynomial's rates and
-    their rates at its end, its length over the order + 1 (0 where there was none), and what it has left out of sums."""
+    their rates at its end, its length over the order + 1 (0 where there was none), and what it has left out of sums.
+
+    before : `Errors` at the start of the leg
+    """
 
     off: tuple
     spread: tuple
@@ -80,20 +75,7 @@ class Error(NamedTuple):
     bent: tuple
     weight: float
     left: tuple
-
-
-class Late(NamedTuple):
-    """The error at the event that ends a leg: of each state, of the leg's time; the spread of both; the peaks.
-
-    noise : time by which rounding may misplace the event, by itself
-    """
-
-    off: tuple
-    late: float
-    spread: tuple
-    spread_late: float
-    noise: float
-    peak: tuple
+    before: object
 
 
 @symbolic
@@ -108,7 +90,7 @@ def begun(m, state, errors, h):
     if m.error is None:
         return ()
     nothing = tuple(0.0 * h for u in state)
-    return Error(errors.off, errors.spread, errors.peak, nothing, nothing, 0.0 * h, nothing)
+    return Error(errors.off, errors.spread, errors.peak, nothing, nothing, 0.0 * h, nothing, errors)
 
 
 @symbolic
@@ -216,7 +198,7 @@ def stepped(m, error, changes, state, mode, unit, trial, steps, pieces, cores, c
 
 @symbolic
 def at_event(m, error, changes, full, state, mode, unit, ends, end, t, which, others, pieces, cores, coarse):
-    """The error at the event that ends a leg in the states `ends`, by (1).
+    """The errors at the event that ends a leg in the states `ends`, by (1).
 
     `end`, `t` : time in the last step, and since the start; `which`, `others` : the event, whether more fire with it
     """
@@ -249,31 +231,23 @@ def at_event(m, error, changes, full, state, mode, unit, ends, end, t, which, ot
     late = where(doubtful | others, math.inf, by)
     off = tuple(fma(unit * rate, late, x) for rate, x in zip(rates, error.off, strict=True))
     spread = tuple(fma(unit * rate, spread_late, x) for rate, x in zip(rates, error.spread, strict=True))
-    return Late(off, late, spread, spread_late, noise, error.peak)
+    errors = error.before
+    return errors._replace(
+        late=fma(late, unit, errors.late),
+        lag=fma(late, unit, errors.lag),
+        spread_late=fma(spread_late, unit, errors.spread_late),
+        spread_lag=fma(spread_late, unit, errors.spread_lag),
+        off=off,
+        spread=spread,
+        peak=error.peak,
+        noise=noise * unit,
+    )
 
 
 @symbolic
 def started(tells, errors, state):
     """The errors at the start, which is rounded."""
     return errors if tells is None else errors._replace(spread=tuple(ULP * magnitude(u) for u in state))
-
-
-@symbolic
-def later(tells, errors, at_event, unit):
-    """The errors at the end of a leg; of another method what that carries along."""
-    if tells is None:
-        return at_event
-    late, spread_late = at_event.late, at_event.spread_late
-    return errors._replace(
-        late=fma(late, unit, errors.late),
-        lag=fma(late, unit, errors.lag),
-        spread_late=fma(spread_late, unit, errors.spread_late),
-        spread_lag=fma(spread_late, unit, errors.spread_lag),
-        off=at_event.off,
-        spread=at_event.spread,
-        peak=at_event.peak,
-        noise=at_event.noise * unit,
-    )
 
 
 @symbolic
@@ -284,29 +258,23 @@ def faded(largest, new, spread, noise, switches):
 
 
 @symbolic
-def at_switch(tells, errors, rates, switches):
-    """The errors of the lanes that switch; `rates` are those before."""
+def at_switch(tells, errors, rates, switches, watched, cell):
+    """The errors of the lanes that switch, with the largest one, relative, where that is watched.
+
+    `rates` are those before
+    """
     if tells is None:
         return errors
+    latest = faded(errors.latest, errors.late, errors.spread_late, errors.noise, switches)
+    lagged = faded(errors.lagged, errors.lag, errors.spread_lag, errors.noise, switches)
     parts = zip(errors.once, errors.off, errors.spread, rates, strict=True)
-    return errors._replace(
-        latest=faded(errors.latest, errors.late, errors.spread_late, errors.noise, switches),
-        lagged=faded(errors.lagged, errors.lag, errors.spread_lag, errors.noise, switches),
-        once=tuple(faded(x, off, spread, magnitude(rate) * errors.noise, switches) for x, off, spread, rate in parts),
-    )
-
-
-@symbolic
-def stated(tells, errors, watched, time, since, size):
-    """The errors with the largest one, relative, of the lanes at a switch that is watched."""
-    if tells is None:
-        return errors
-    parts = tuple(x / where(largest > 0.0, largest, 1.0) for x, largest in zip(errors.once, size, strict=True))
-    error = fold(most, most(errors.latest / time, errors.lagged / since), (), parts)
-    peaks = tuple(x / where(largest > 0.0, largest, 1.0) for x, largest in zip(errors.peak, size, strict=True))
+    once = tuple(faded(x, off, spread, magnitude(rate) * errors.noise, switches) for x, off, spread, rate in parts)
+    sizes = tuple(where(size > 0.0, size, 1.0) for size in cell.size)
+    parts, peaks = (tuple(x / size for x, size in zip(xs, sizes, strict=True)) for xs in (once, errors.peak))
+    error = fold(most, most(latest / cell.time, lagged / cell.since), (), parts)
     peak = fold(most, peaks[0], (), peaks[1:])
-    error = where(peak <= SMALL, error, most(error, peak))
-    return errors._replace(error=where(watched, error, errors.error))
+    error = where(watched, where(peak <= SMALL, error, most(error, peak)), errors.error)
+    return errors._replace(error=error, latest=latest, lagged=lagged, once=once)
 
 
 @symbolic

@@ -11,8 +11,8 @@ import math
 from kernels.integrate import carried
 from kernels.integrate.records import Mode
 from kernels.lanes.codes import BAD_INPUT, GRAZING, INACCURATE, OUT_OF_RANGE, REFUSED, STEP_LIMIT, STICKS
-from kernels.lanes.jit import jit, jit_call
-from kernels.lanes.symbols import over_tuples, symbolic, taking_symbols
+from kernels.lanes.jit import jit
+from kernels.lanes.symbols import left_a_call, symbolic, taking_symbols
 from kernels.lanes.tuples import any_of, joined, reached, read, total, write
 from kernels.lanes.vectors import any_lane, choose, exponent, fma, magnitude, not_, pow2, sqrt, where
 
@@ -53,25 +53,20 @@ def time_unit(e, d, dd):
     return pow2(exponent(t))
 
 
-@symbolic
-def settled_sign(sign, near, event):
-    """The sign of a kink's u in the next moment, and 1 where the state is on it; `near`: 1 where it is nearly."""
-    _, factor, u = event
-    on = ((u[0] <= 0.0) & (u[0] >= 0.0)) | (near > 0.5)
-    back = (factor * u[1] < 0.0) | ((factor * u[1] <= 0.0) & (factor * u[2] < 0.0))
-    return where(on & back, -sign, sign), where(on, 1.0, 0.0)
-
-
-@jit_call
-@over_tuples
+@left_a_call
 def settled(m, state, side, parameters, unit, near):
-    """The sign of each kink's u, the way over the surface, 1, behind; and 1 for the kinks that the state is on."""
-    signs = m.natural_signs(state, Mode(side, (), parameters, False))
+    """The sign of each kink's u in the next moment, the way over the surface, 1, behind; and 1 for those it is on.
+
+    `near` : 1 where the state is nearly on a kink
+    """
+    signs, turned, marks = m.natural_signs(state, Mode(side, (), parameters, False)), [], []
     pieces = m.jet(state, Mode(side, signs, parameters, False), unit, ())
-    found = tuple(
-        settled_sign(sign, close, event) for sign, close, event in zip(signs[:-1], near, pieces.events[1:], strict=True)
-    )
-    return joined(tuple(sign for sign, on in found), signs[-1:]), tuple(on for sign, on in found)
+    for sign, close, (_, factor, u) in zip(signs[:-1], near, pieces.events[1:], strict=True):
+        on = ((u[0] <= 0.0) & (u[0] >= 0.0)) | (close > 0.5)
+        back = (factor * u[1] < 0.0) | ((factor * u[1] <= 0.0) & (factor * u[2] < 0.0))
+        turned.append(where(on & back, -sign, sign))
+        marks.append(where(on, 1.0, 0.0))
+    return (*turned, signs[-1]), tuple(marks)
 
 
 @symbolic
@@ -92,35 +87,24 @@ def shaken_on(shake):
     return where(magnitude(shake) > 0.5, where(shake < 0.0, -part, part), 0.0)
 
 
-@symbolic
-def judged_side(sign, on, left, speeds, among, margin):
-    """A kink's sign, 0 where it is pressed from both sides; and whether a side is too close to pressing to tell."""
-    ahead, behind = speeds
-    asked = (on > 0.5) & (left < 0.5) & ((among < 1.5) | (magnitude(sign) < 0.5))
-    new = where((ahead < 0.0) & (behind > 0.0), 0.0, sign)
-    new = where((ahead > 0.0) & (behind > 0.0), 1.0, where((ahead < 0.0) & (behind < 0.0), -1.0, new))
-    at_end = where(magnitude(ahead) < magnitude(behind), 1.0, -1.0)
-    faint = where(at_end > 0.0, magnitude(ahead), magnitude(behind))
-    unsure = asked & (faint <= margin * (magnitude(ahead) + magnitude(behind)))
-    return where(left > 0.5, at_end, where(asked, new, sign)), unsure
-
-
-@jit_call
-@over_tuples
+@left_a_call
 def pressed(m, state, mode, on, left, margin, lanes):
-    """The signs and marks of the lanes, which slide where they are pressed; and where that is too close to tell.
+    """The signs, 0 for kinks pressed from both sides, and marks of the lanes; and where that is too close to tell.
 
     `left` : 1 for the kink that the state has just slid along to its end
     """
-    among = total(on[1:])
-    judged = tuple(
-        judged_side(sign, o, gone, speeds, among, margin)
-        for sign, o, gone, speeds in zip(mode.signs[:-1], on[1:], left, m.speeds(state, mode), strict=True)
-    )
-    signs = tuple(where(lanes, new, sign) for (new, unsure), sign in zip(judged, mode.signs[:-1], strict=True))
-    marks = tuple(where(lanes & (magnitude(sign) < 0.5), 0.0, o) for sign, o in zip(signs, on[1:], strict=True))
-    unsure = any_of(tuple(faint for new, faint in judged))
-    return joined(signs, mode.signs[-1:]), joined(on[:1], marks), lanes & unsure
+    among, unsure, signs, marks = total(on[1:]), lanes & not_(lanes), [], []
+    for sign, o, gone, speeds in zip(mode.signs[:-1], on[1:], left, m.speeds(state, mode), strict=True):
+        ahead, behind = speeds
+        asked = (o > 0.5) & (gone < 0.5) & ((among < 1.5) | (magnitude(sign) < 0.5))
+        new = where((ahead < 0.0) & (behind > 0.0), 0.0, sign)
+        new = where((ahead > 0.0) & (behind > 0.0), 1.0, where((ahead < 0.0) & (behind < 0.0), -1.0, new))
+        at_end = where(magnitude(ahead) < magnitude(behind), 1.0, -1.0)
+        faint = where(at_end > 0.0, magnitude(ahead), magnitude(behind))
+        unsure = unsure | (asked & (faint <= margin * (magnitude(ahead) + magnitude(behind))))
+        signs.append(where(lanes, where(gone > 0.5, at_end, where(asked, new, sign)), sign))
+        marks.append(where(lanes & (magnitude(signs[-1]) < 0.5), 0.0, o))
+    return (*signs, mode.signs[-1]), (on[0], *marks), lanes & unsure
 
 
 @symbolic
@@ -149,8 +133,7 @@ def held_by(m, state, side, signs, parameters, unit, on, falls):
     return joined(tuple(where(x, 1.0, sign) for x, sign in zip(held, signs[:-1], strict=True)), signs[-1:])
 
 
-@jit_call
-@over_tuples
+@left_a_call
 def rates_of_events(m, state, mode, unit):
     """Of each event's value, per unit of time."""
     return tuple(factor * u[1] for offset, factor, u in m.jet(state, mode, unit, ()).events)
@@ -221,8 +204,11 @@ def onto_kinks(m, cell, left, lanes):
 
 
 @symbolic
-def arrived(m, cell, found, late, active, tells):
-    """The cell at the end of a leg; which lanes are on an event; the rates there, before rounding misses it."""
+def arrived(m, cell, found, own, active):
+    """The cell at the end of a leg; which lanes are on an event; the rates there, before rounding misses it.
+
+    `own` : what the method carries along, there
+    """
     verdict = raised(raised(cell.verdict, found.hangs | found.grazing, GRAZING), found.vague, INACCURATE)
     refused = where(found.stuck, STICKS, where(found.broken, OUT_OF_RANGE, verdict))
     verdict = where(found.lost, STEP_LIMIT, refused)
@@ -256,7 +242,7 @@ def arrived(m, cell, found, late, active, tells):
         time=where(moving, fma(found.t, cell.unit, cell.time), cell.time),
         since=where(moving, fma(found.t, cell.unit, cell.since), cell.since),
         steps=where(active, found.tried, cell.steps), before=where(active, cell.steps, cell.before),
-        own=ERRORS.later(tells, cell.own, late, cell.unit),
+        own=own,
     ), moving, rates  # fmt: skip
 
 
@@ -287,29 +273,26 @@ def turned(m, cell, moving, switches, counts):
 
 
 @symbolic
-def at_switch(m, cell, rates, switches, counts, tells):
-    """The cell with what is told of the switch that it is on, where that is the first or the last one."""
+def switched(m, cell, rates, switches, counts, first, met, tells):
+    """The cell behind the switch that it is on, and what that makes of the rates before it.
+
+    What there is to say of the switch is kept where that is the first or the last one.
+    """
     count = where(counts, cell.count + 1.0, cell.count)
     watched = counts & ((count < 1.5) | (count >= cell.flips))
-    own = ERRORS.at_switch(tells, cell.own, rates, switches)
-    return cell._replace(
-        count=count, own=ERRORS.stated(tells, own, watched, cell.time, cell.since, cell.size),
+    own = ERRORS.at_switch(tells, cell.own, rates, switches, watched, cell)
+    cell = cell._replace(
+        count=count, interval=where(watched, cell.since, cell.interval), at=choose(watched, cell.state, cell.at),
         verdict=where(watched & m.underflows(cell.state, mode_of(cell), cell.unit), OUT_OF_RANGE, cell.verdict),
-        interval=where(watched, cell.since, cell.interval), at=choose(watched, cell.state, cell.at),
-        since=where(counts, 0.0, cell.since),
+        since=where(counts, 0.0, cell.since), own=own,
     )  # fmt: skip
-
-
-@symbolic
-def behind_switch(m, cell, rates, switches, first, met, tells):
-    """The cell behind the switch that it is on, and what that makes of the rates before it."""
     side, parameters, unit, old, signs = -cell.side, cell.parameters, cell.unit, cell.state, cell.signs
     which = signs  # where one of several surfaces is met, their signs say which: 1, or else -1
     if m.surfaces is not None:
         parts = zip(signs[:-1], m.surfaces, met, strict=True)
         which = (*(where(s > 0.5, where(x, 1.0, -1.0), sign) for sign, s, x in parts), where(first, 1.0, -1.0))
     old_mode = Mode(cell.side, which, parameters, False)
-    own, rates = ERRORS.behind(tells, cell.own, old, old_mode, rates, switches)
+    own, rates = ERRORS.behind(tells, own, old, old_mode, rates, switches)
     before, gaps = m.surface(old, old_mode), m.kinks(old, old_mode)
     verdict = undecided(m, old, old_mode, gaps, BLUR * cell.tolerance, switches, cell.verdict)
     state = m.switched(old, old_mode)
@@ -331,30 +314,21 @@ def behind_switch(m, cell, rates, switches, first, met, tells):
     way = where(through | ((after < 0.0) & not_(stays)), -1.0, signs[-1])
     on = joined((where(stays, 1.0, 0.0),), kinks_on)
     new = cell._replace(state=state, side=side, signs=joined(signs[:-1], (way,)), on=on, verdict=verdict, own=own)
-    return new, rates
+    return choose(switches, new, cell), rates
 
 
 @symbolic
-def gone_on(m, cell, rates, left, moving, tells):
-    """The cell on its way to the next event; `rates` : those before the last one, `left` as of `onto_kinks`."""
+def gone_on(m, cell, rates, left, moving, grazing, tells):
+    """The cell on its way to the next event; `rates` : those before the last one, `left` as of `onto_kinks`.
+
+    Where it is `grazing` the motion may have met an event or not, so there are no values.
+    """
     if m.speeds is not None:
         cell = onto_kinks(m, cell, left, moving)
     own = ERRORS.misplaced(tells, m, cell.own, rates, cell.state, mode_of(cell), moving)
     verdict = where(moving & (cell.kinks_met > m.most_kinks), STEP_LIMIT, cell.verdict)
-    return cell._replace(own=own, verdict=verdict)
-
-
-@symbolic
-def without_values(cell):
-    """The cell of a motion that may have met an event or not."""
-    at = tuple(math.nan + 0.0 * u for u in cell.at)
-    return cell._replace(time=math.nan, interval=math.nan, at=at)
-
-
-@symbolic
-def staged(cell, stage):
-    """The cell at that stage."""
-    return cell._replace(stage=stage)
+    time, interval, *at = (where(grazing, math.nan, x) for x in (cell.time, cell.interval, *cell.at))
+    return cell._replace(own=own, verdict=verdict, time=time, interval=interval, at=tuple(at))
 
 
 @jit
@@ -372,19 +346,16 @@ def advance(m, leg, memory, i, tells):
     done = active & not_(active)
     for _ in range(EVENTS):
         moving = active & (cell.verdict < REFUSED)
-        found, late = leg(cell, mode_of(cell), moving)
-        cell, moving, rates = arrived(m, cell, found, late, active, tells)
+        found, own = leg(cell, mode_of(cell), moving)
+        cell, moving, rates = arrived(m, cell, found, own, active)
         switches, counts, first, met = meets(m, cell, moving)
         cell, left = turned(m, cell, moving, switches, counts)
         if any_lane(switches):
-            cell = at_switch(m, cell, rates, switches, counts, tells)
-            there, rates = behind_switch(m, cell, rates, switches, first, met, tells)
-            cell = choose(switches, there, cell)
-        cell = gone_on(m, cell, rates, left, moving, tells)
+            cell, rates = switched(m, cell, rates, switches, counts, first, met, tells)
+        cell = gone_on(m, cell, rates, left, moving, found.grazing, tells)
         done = active & (found.grazing | (cell.verdict >= REFUSED) | (cell.count >= cell.flips))
-        if any_lane(found.grazing):
-            cell = choose(found.grazing, without_values(cell), cell)
         if any_lane(done):
             break
-    write(memory, i, staged(cell, where(done, 3.0, where(active, 2.0, stage))))
+    write(memory, i, cell)
+    memory[0, i] = where(done, 3.0, where(active, 2.0, stage))
     return any_lane(done)

@@ -3,6 +3,7 @@
 Generic in one cell or lanes; `m` and `mode` as in `steps`.
 """
 
+from collections import namedtuple
 from typing import NamedTuple
 
 from kernels.integrate.steps import ONE, dop853, dopri5, rate
@@ -16,7 +17,7 @@ from kernels.integrate.tableaux import (
 )
 from kernels.integrate.taylor import TINY
 from kernels.lanes.jit import jit, jit_call
-from kernels.lanes.symbols import over_tuples, symbolic
+from kernels.lanes.symbols import left_a_call, symbolic, written
 from kernels.lanes.tuples import after, times
 from kernels.lanes.vectors import fma, magnitude, sqrt, where
 
@@ -73,8 +74,7 @@ def dop853_tried(m, state, mode, h):
     return Trial(new, stages, rate(m, new, mode), at_least(error, CHANCE_3 * worst_3 * worst_3))
 
 
-@jit_call
-@over_tuples
+@left_a_call
 def dop853_series(m, state, trial, mode, h):
     """What the dense output is made of: seven terms."""
     k0, k5, k6, k7, k8, k9, k10, k11 = trial.stages
@@ -138,27 +138,18 @@ def dopri5_vague(m, state, terms, mode, h, part):
     return times(0.0 * part, terms[0])
 
 
-@jit
-@over_tuples
+@written
 def dopri5_dense(m, state, terms, mode, h, part):
     """The state at that part of the step."""
     weights = tuple(part * fma(part, fma(part, fma(part, d, c), b), a) for a, b, c, d in DOPRI5_DENSE)
     return after(state, h, weights, terms)
 
 
-class Pair(NamedTuple):
-    """An embedded pair of methods, as functions: a step with its error, its dense output, how far that may be off.
+Pair = namedtuple("Pair", "tried series dense vague first order roundings")
+"""An embedded pair of methods, as functions: a step with its error, its dense output, how far that may be off.
 
-    `first` is the first step of a leg, in units; a step makes as many `roundings` of its own length at most.
-    """
-
-    tried: object
-    series: object
-    dense: object
-    vague: object
-    first: object
-    order: float
-    roundings: float
+`first` is the first step of a leg, in units; a step makes as many `roundings` of its own length at most.
+"""
 
 
 @jit

@@ -12,7 +12,7 @@ every state's rate changes by the power as u's does: with (1 - n) u^n in the pow
 are right, and what hangs on u is off by less than u times that time. Generic in one cell or lanes.
 """
 
-from typing import NamedTuple
+from collections import namedtuple
 
 from kernels.integrate.taylor import SLACK
 from kernels.lanes.jit import jit_call
@@ -28,21 +28,14 @@ SHORT = 0.9
 """Of the way to rest, that a step may take: at the end of it the series may turn round instead."""
 
 
-class Power(NamedTuple):
-    """What is written of a scene for one of its powers.
+Power = namedtuple("Power", "rates base exponent of_base of_kink without")
+"""What is written of a scene for one of its powers.
 
-    rates : (state, mode, unit, value) -> the rates per unit of time, with that value of the power
-    base, exponent : (state, mode) -> abs(u); n
-    of_base, of_kink : the entry of u in a tuple of states, of its kink in one of events
-    without : (state, mode) -> the state at u = 0
-    """
-
-    rates: object
-    base: object
-    exponent: object
-    of_base: object
-    of_kink: object
-    without: object
+rates : (state, mode, unit, value) -> the rates per unit of time, with that value of the power
+base, exponent : (state, mode) -> abs(u); n
+of_base, of_kink : the entry of u in a tuple of states, of its kink in one of events
+without : (state, mode) -> the state at u = 0
+"""
 
 
 @jit_call

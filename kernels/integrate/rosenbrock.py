@@ -11,6 +11,7 @@ from kernels.integrate.pairs import CHANCE_5, Pair, Trial, at_least, of_size
 from kernels.integrate.steps import ONE, rate
 from kernels.integrate.tableaux import RODAS5P, RODAS5P_COUPLED, RODAS5P_GAMMA
 from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.symbols import left_a_call
 from kernels.lanes.tuples import after, times
 from kernels.lanes.vectors import where
 
@@ -26,29 +27,16 @@ def factored(m, state, mode, h):
     return m.factored(state, mode, RODAS5P_GAMMA * h)
 
 
-@jit
-def increment(m, mode, factors, h, place, weights, before):
-    """An increment by (1), from where the stage is and those before, weighted."""
-    free = times(RODAS5P_GAMMA * h, rate(m, place, mode))
-    return m.solved(factors, after(free, RODAS5P_GAMMA, weights, before))
-
-
-@jit_call
+@left_a_call
 def stepped(m, state, mode, factors, h):
     """The state after the step; the first increment, and the last two."""
-    a, c = RODAS5P, RODAS5P_COUPLED
-    w0 = m.solved(factors, times(RODAS5P_GAMMA * h, rate(m, state, mode)))
-    w1 = increment(m, mode, factors, h, after(state, 1.0, a[0], (w0,)), c[0], (w0,))
-    w2 = increment(m, mode, factors, h, after(state, 1.0, a[1], (w0, w1)), c[1], (w0, w1))
-    w3 = increment(m, mode, factors, h, after(state, 1.0, a[2], (w0, w1, w2)), c[2], (w0, w1, w2))
-    w4 = increment(m, mode, factors, h, after(state, 1.0, a[3], (w0, w1, w2, w3)), c[3], (w0, w1, w2, w3))
-    place = after(state, 1.0, a[4], (w0, w1, w2, w3, w4))
-    w5 = increment(m, mode, factors, h, place, c[4], (w0, w1, w2, w3, w4))
-    place = after(place, 1.0, ONE, (w5,))
-    w6 = increment(m, mode, factors, h, place, c[5], (w0, w1, w2, w3, w4, w5))
-    place = after(place, 1.0, ONE, (w6,))
-    w7 = increment(m, mode, factors, h, place, c[6], (w0, w1, w2, w3, w4, w5, w6))
-    return after(place, 1.0, ONE, (w7,)), w0, w6, w7
+    place, increments = state, [m.solved(factors, times(RODAS5P_GAMMA * h, rate(m, state, mode)))]
+    for k, coupled in enumerate(RODAS5P_COUPLED):
+        done = tuple(increments)
+        place = after(state, 1.0, RODAS5P[k], done) if k < len(RODAS5P) else after(place, 1.0, ONE, done[-1:])
+        free = times(RODAS5P_GAMMA * h, rate(m, place, mode))
+        increments.append(m.solved(factors, after(free, RODAS5P_GAMMA, coupled, done)))
+    return after(place, 1.0, ONE, tuple(increments[-1:])), increments[0], increments[-2], increments[-1]
 
 
 @jit_call

@@ -6,7 +6,7 @@
 from kernels.integrate.records import Mode
 from kernels.integrate.tableaux import DOP853, DOP853_OF, DOPRI5, DOPRI5_OF, RK4, RK4_OF
 from kernels.lanes.jit import jit, jit_call
-from kernels.lanes.symbols import over_tuples, symbolic
+from kernels.lanes.symbols import left_a_call, symbolic
 from kernels.lanes.tuples import after, joined, paired, times
 from kernels.lanes.vectors import choose, fma
 
@@ -70,8 +70,7 @@ def verlet(m, state, mode, h):
     return paired(placed, after(state, 0.5 * h, (1.0, 1.0), (k0, rate(m, placed, mode))))
 
 
-@jit_call
-@over_tuples
+@left_a_call
 def moreau(m, state, mode, h):
     """Moreau's time-stepping for one pair (x, v) with dry friction at v = 0: half a drift, a kick, half a drift.
 

@@ -22,7 +22,7 @@ from numba.core.imputils import impl_ret_borrowed
 from numba.core.typing.templates import builtin_registry
 from numba.extending import lower_builtin, type_callable
 
-from kernels.lanes.jit import COMPILED, F
+from kernels.lanes.jit import COMPILED, F, jit_call
 
 _SIGNATURES = {}
 """Of calls that have been typed."""
@@ -213,6 +213,14 @@ def symbolic(function: F) -> F:
         return impl_ret_borrowed(context, builder, signature.return_type, value)
 
     return function
+
+
+def left_a_call(function):
+    """As `symbolic`, but left a call: for what is long and used in several places."""
+    names = ", ".join(inspect.signature(function).parameters)
+    call = eval(f"lambda {names}: inner({names})", {"inner": written(function)})
+    call.__name__ = call.__qualname__ = function.__name__
+    return jit_call(call)
 
 
 @symbolic
