@@ -33,8 +33,8 @@ one to the other side, so that what hangs on the difference of two shows it."""
 
 def cell_of(states, parameters, kinks, tells=False):
     """A cell of zeros, as large as a scene's."""
-    u = (0.0,) * states
-    errors = Errors(0.0, 0.0, 0.0, 0.0, u, 0.0, 0.0, u, 0.0, 0.0, 0.0, u, u) if tells else ()
+    u, with_times = (0.0,) * states, (0.0,) * (states + 2)
+    errors = Errors(0.0, 0.0, with_times, with_times, 0.0, with_times, u) if tells else ()
     marks = (0.0,) * (kinks + 1)
     wanted, so_far = (0.0, (0.0,) * parameters, 0.0, 0.0, 0.0), (0.0, 0.0, u, u, 0.0)
     return Cell(*wanted, *so_far, u, 0.0, marks, 0.0, 0.0, marks, 0.0, 0.0, 0.0, 0.0, 0.0, errors)
@@ -213,21 +213,19 @@ class Functions:
         parts = (1.0 if clock else STATE_OFF * (-1.0) ** j for j, clock in enumerate(self.clocks))
         return tuple(V.fma(part * by, u, u) for part, u in zip(parts, state, strict=True))
 
-    def _rates_of(self, *values):
-        """The rates of expressions."""
-        gradients = [[Tangents.along(self.graph, s).of(value) for s in self.states] for value in values]
-        return [along(self.graph, gradient, self.recorded.rates) for gradient in gradients]
-
     @functools.cached_property
-    def _parts_made(self):
-        """Of each event its offset, what is added to that, and the rate of this."""
-        values = [(offset, self.graph.multiply(factor, u)) for offset, factor, u in self.recorded.events]
-        return [(offset, value, *self._rates_of(value)) for offset, value in values]
+    def _event_parts(self):
+        """Of each event its offset, what is added to that, both, and the rate of both."""
+        parts = [(offset, self.graph.multiply(factor, u)) for offset, factor, u in self.recorded.events]
+        whole = [self.graph.add(*part) for part in parts]
+        gradients = [[Tangents.along(self.graph, s).of(x) for s in self.states] for x in whole]
+        rates = [along(self.graph, gradient, self.recorded.rates) for gradient in gradients]
+        return [(*part, x, rate) for part, x, rate in zip(parts, whole, rates, strict=True)]
 
     def _made(self, state, mode):
         found = Sizes(self.inputs(state, mode))
         size, value = found.of, found.values.value
-        return tuple((size(x) + V.magnitude(value(offset)), value(rate)) for offset, x, rate in self._parts_made)
+        return tuple((size(x) + V.magnitude(value(offset)), value(rate)) for offset, x, _, rate in self._event_parts)
 
     def _enclosures(self, state, boxes, mode):
         return Enclosures(self.inputs(state, mode), dict(zip(self.states, boxes, strict=True)))
@@ -242,14 +240,9 @@ class Functions:
         nothing, parts = 0.0 * mode.side, self._excesses(state, boxes, mode)
         return tuple(tuple(nothing if x is None else nothing + x for x in part) for part in parts)
 
-    @functools.cached_property
-    def _valued(self):
-        """Each event's value, and its rate."""
-        values = [self.graph.add(offset, self.graph.multiply(factor, u)) for offset, factor, u in self.recorded.events]
-        return values, self._rates_of(*values)
-
     def _bounds(self, state, boxes, mode):
-        found, nothing, (values, rates) = self._enclosures(state, boxes, mode), 0.0 * mode.side, self._valued
+        found, nothing = self._enclosures(state, boxes, mode), 0.0 * mode.side
+        _, _, values, rates = zip(*self._event_parts, strict=True)
         parts = (values, 0), (rates, 0), (rates, 1)
         return tuple(tuple(nothing + found.interval(x)[end] for x in part) for part, end in parts)
 

@@ -47,6 +47,8 @@ VAGUE = 0.05
 """Of what a step leaves out, what is not known of it."""
 SMALL = 0.05
 """Of the largest size of a state, the error on the way up to which first order tells of it."""
+TIMES = 1.0, 1.0
+"""The rates of the time, and of the time since the last switch, whose errors go along as those of states do."""
 STRAIGHT = 20.0
 """Of the rate of an event, what it may change by within the time by which it is late: else it is no straight line."""
 
@@ -90,7 +92,7 @@ def begun(m, state, errors, h):
     if m.error is None:
         return ()
     nothing = tuple(0.0 * h for u in state)
-    return Error(errors.off, errors.spread, errors.peak, nothing, nothing, 0.0 * h, nothing, errors)
+    return Error(errors.off[:-2], errors.spread[:-2], errors.peak, nothing, nothing, 0.0 * h, nothing, errors)
 
 
 @symbolic
@@ -98,7 +100,7 @@ def wider(m, margins, state, mode, errors):
     """The events' margins, with their errors at the start of a leg."""
     if m.error is None:
         return margins
-    changes, vague = (m.error.of_events(state, mode, x) for x in (errors.off, errors.spread))
+    changes, vague = (m.error.of_events(state, mode, x) for x in (errors.off[:-2], errors.spread[:-2]))
     told = errors.told > 0.5
     return tuple(
         where(told, fma(DOUBT, magnitude(x) + magnitude(y), margin), margin)
@@ -150,8 +152,11 @@ def changes(m, error, state, mode, unit, pieces, cores):
 
 
 @symbolic
-def moved(m, error, changes, state, mode, unit, x, pieces, coarse):
-    """The error after a time x; its spread, with what rounding and cores of powers take; and what sums leave out."""
+def moved(m, error, changes, state, mode, unit, x, lanes, pieces, cores, coarse):
+    """The error after a time x; its spread, with what rounding and cores of powers take; and what sums leave out.
+
+    With the weight of a step to x, in lanes that are in no core of a power.
+    """
     n = m.order + 1
     power, share = natural_power(x, n), 1.0 / n
     lasts = tuple(curve[-1][-1] for curve in pieces.of_states)
@@ -160,18 +165,9 @@ def moved(m, error, changes, state, mode, unit, x, pieces, coarse):
     spread = tuple(further(y, ULP * fma(x * unit, noise, magnitude(u))) for y, noise, u in parts)
     for left in coarse:
         spread = tuple(further(y, by) for y, by in zip(spread, left, strict=True))
-    left = tuple(
-        where(summed > 0.5, unit * power * share * last, 0.0) for summed, last in zip(m.summed, lasts, strict=True)
-    )
-    return error._replace(off=off, spread=spread, left=left)
-
-
-@symbolic
-def weighed(m, error, lanes, cores, x):
-    """The error with the weight of a step to x, in lanes that are in no core of a power."""
-    lanes = outside(cores, lanes)
-    weight = where(lanes, x, 0.0) * (1.0 / (m.order + 1.0))
-    return error._replace(weight=weight, left=tuple(where(weight > 0.0, left, 0.0) for left in error.left))
+    weight, parts = where(outside(cores, lanes), x, 0.0) * share, zip(m.summed, lasts, strict=True)
+    left = tuple(where((summed > 0.5) & (weight > 0.0), unit * power * share * last, 0.0) for summed, last in parts)
+    return error._replace(off=off, spread=spread, weight=weight, left=left)
 
 
 @symbolic
@@ -187,7 +183,7 @@ def stepped(m, error, changes, state, mode, unit, trial, steps, pieces, cores, c
     """The error behind a step of the lanes that take one."""
     if m.error is None:
         return ()
-    new = weighed(m, moved(m, error, changes, state, mode, unit, trial, pieces, coarse), steps, cores, trial)
+    new = moved(m, error, changes, state, mode, unit, trial, steps, pieces, cores, coarse)
     due = tuple(slope(trial, u) for u in pieces.states)
     bent = tuple(curvature(trial, u) for u in pieces.states)
     off, spread = choose(steps, new.off, error.off), choose(steps, new.spread, error.spread)
@@ -205,8 +201,7 @@ def at_event(m, error, changes, full, state, mode, unit, ends, end, t, which, ot
     if m.error is None:
         return ()
     rates = m.scene.rates(ends, mode)
-    error = moved(m, error, changes, state, mode, unit, end, pieces, coarse)
-    error = weighed(m, error, end <= math.inf, cores, end)
+    error = moved(m, error, changes, state, mode, unit, end, end <= math.inf, pieces, cores, coarse)
     parts = zip(m.error.of_rates(ends, mode, rates), pieces.states, strict=True)
     bends = tuple(unit * unit * x - curvature(end, u) for x, u in parts)
     defects = tuple(unit * rate - slope(end, u) for rate, u in zip(rates, pieces.states, strict=True))
@@ -229,32 +224,23 @@ def at_event(m, error, changes, full, state, mode, unit, ends, end, t, which, ot
     most_by = magnitude(by) + magnitude(spread_late) + noise
     doubtful = (magnitude(bend) * most_by * STRAIGHT > magnitude(per_time)) | (most_by * ORDERLY > t)
     late = where(doubtful | others, math.inf, by)
-    off = tuple(fma(unit * rate, late, x) for rate, x in zip(rates, error.off, strict=True))
-    spread = tuple(fma(unit * rate, spread_late, x) for rate, x in zip(rates, error.spread, strict=True))
-    errors = error.before
+    errors, rates = error.before, (*rates, *TIMES)
+    off = zip(rates, (*error.off, *errors.off[-2:]), strict=True)
+    spread = zip(rates, (*error.spread, *errors.spread[-2:]), strict=True)
     return errors._replace(
-        late=fma(late, unit, errors.late),
-        lag=fma(late, unit, errors.lag),
-        spread_late=fma(spread_late, unit, errors.spread_late),
-        spread_lag=fma(spread_late, unit, errors.spread_lag),
-        off=off,
-        spread=spread,
-        peak=error.peak,
+        off=tuple(fma(unit * rate, late, x) for rate, x in off),
+        spread=tuple(fma(unit * rate, spread_late, x) for rate, x in spread),
         noise=noise * unit,
+        peak=error.peak,
     )
 
 
 @symbolic
 def started(tells, errors, state):
     """The errors at the start, which is rounded."""
-    return errors if tells is None else errors._replace(spread=tuple(ULP * magnitude(u) for u in state))
-
-
-@symbolic
-def faded(largest, new, spread, noise, switches):
-    """The largest error so far at a switch, fading."""
-    new = magnitude(new) + magnitude(spread) + noise
-    return where(switches, most(FADES * largest, new), largest)
+    if tells is None:
+        return errors
+    return errors._replace(spread=(*(ULP * magnitude(u) for u in state), *errors.spread[-2:]))
 
 
 @symbolic
@@ -265,16 +251,16 @@ def at_switch(tells, errors, rates, switches, watched, cell):
     """
     if tells is None:
         return errors
-    latest = faded(errors.latest, errors.late, errors.spread_late, errors.noise, switches)
-    lagged = faded(errors.lagged, errors.lag, errors.spread_lag, errors.noise, switches)
-    parts = zip(errors.once, errors.off, errors.spread, rates, strict=True)
-    once = tuple(faded(x, off, spread, magnitude(rate) * errors.noise, switches) for x, off, spread, rate in parts)
+    parts, once = zip(errors.once, errors.off, errors.spread, (*rates, *TIMES), strict=True), []
+    for largest, off, spread, rate in parts:
+        new = magnitude(off) + magnitude(spread) + magnitude(rate) * errors.noise
+        once.append(where(switches, most(FADES * largest, new), largest))
     sizes = tuple(where(size > 0.0, size, 1.0) for size in cell.size)
-    parts, peaks = (tuple(x / size for x, size in zip(xs, sizes, strict=True)) for xs in (once, errors.peak))
-    error = fold(most, most(latest / cell.time, lagged / cell.since), (), parts)
-    peak = fold(most, peaks[0], (), peaks[1:])
+    shares = tuple(x / size for x, size in zip(once, (*sizes, cell.time, cell.since), strict=True))
+    peaks = tuple(x / size for x, size in zip(errors.peak, sizes, strict=True))
+    error, peak = fold(most, shares[0], (), shares[1:]), fold(most, peaks[0], (), peaks[1:])
     error = where(watched, where(peak <= SMALL, error, most(error, peak)), errors.error)
-    return errors._replace(error=error, latest=latest, lagged=lagged, once=once)
+    return errors._replace(error=error, once=tuple(once))
 
 
 @symbolic
@@ -282,9 +268,11 @@ def behind(tells, errors, state, mode, rates, switches):
     """The errors behind a switch, and what it makes of the rates before it, as of changes of the states."""
     if tells is None:
         return errors, rates
-    lag, spread_lag = where(switches, 0.0, errors.lag), where(switches, errors.noise, errors.spread_lag)
-    off, spread, rates = (choose(switches, tells.behind(state, mode, x), x) for x in (errors.off, errors.spread, rates))
-    return errors._replace(off=off, lag=lag, spread=spread, spread_lag=spread_lag), rates
+    off, spread = (
+        choose(switches, (*tells.behind(state, mode, x[:-2]), x[-2], since), x)
+        for x, since in ((errors.off, 0.0), (errors.spread, errors.noise))
+    )
+    return errors._replace(off=off, spread=spread), choose(switches, tells.behind(state, mode, rates), rates)
 
 
 @symbolic
@@ -292,7 +280,6 @@ def misplaced(tells, m, errors, rates, state, mode, lanes):
     """The errors behind an event that is misplaced by itself: for that time the rates were those before it."""
     if tells is None:
         return errors
-    parts = zip(errors.spread, rates, m.rates(state, mode), strict=True)
-    return errors._replace(
-        spread=tuple(where(lanes, further(x, magnitude(f - g) * errors.noise), x) for x, f, g in parts)
-    )
+    parts = zip(errors.spread[:-2], rates, m.rates(state, mode), strict=True)
+    spread = tuple(where(lanes, further(x, magnitude(f - g) * errors.noise), x) for x, f, g in parts)
+    return errors._replace(spread=(*spread, *errors.spread[-2:]))

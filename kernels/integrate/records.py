@@ -106,26 +106,20 @@ class Cell(NamedTuple):
 
 
 class Errors(NamedTuple):
-    """What a lane knows of its error.
+    """What a lane knows of its error: of each state, then of the time and of the time since the last switch.
 
     told, error : whether it is heeded; the largest of the last switch, relative
-    late, lag, off : of time, of time since the last switch, of each state; and the spread of each
+    off, spread : the error, and what is not known of it
     noise : time by which rounding may misplace the last event
-    latest, lagged, once : the largest so far at a switch, fading
+    once : the largest so far at a switch, fading
     peak : the largest so far of each state
     """
 
     told: float
     error: float
-    late: float
-    lag: float
     off: tuple
-    spread_late: float
-    spread_lag: float
     spread: tuple
     noise: float
-    latest: float
-    lagged: float
     once: tuple
     peak: tuple
 
