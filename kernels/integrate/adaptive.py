@@ -147,11 +147,7 @@ def to_event(m, pair, cell, mode, active):
         t, tried = where(moved, t + taken, t), where(moving, tried + 1.0, tried)
         last_h, last_error = where(moved, h, last_h), where(moved, at_least(error, FORGOTTEN), last_error)
         h = where(again, shorter, where(moved & not_(done), longer, h))
-        state, start, start_rates = (
-            choose(moved, new, state),
-            choose(moved, end, start),
-            choose(moved, end_rates, start_rates),
-        )
+        state, start, start_rates = choose(moved, (new, end, end_rates), (state, start, start_rates))
         on, fired = choose(moved, times(0.0, on), on), choose(done, marks(which, on), fired)
         wide, reach = reached(wide, start), reached(reach, state)
         moving = moving & not_(done | given_up)

@@ -107,32 +107,6 @@ def pressed(m, state, mode, on, left, margin, lanes):
     return (*signs, mode.signs[-1]), (on[0], *marks), lanes & unsure
 
 
-@symbolic
-def undecided(m, state, mode, gaps, margin, switches, verdict):
-    """The verdict: INACCURATE where a kink whose side decides what the switch does is too close to tell its side."""
-    if m.deciding is None:
-        return verdict
-    close = tuple(
-        (decides > 0.5) & (magnitude(gap) > 0.0) & (magnitude(gap) <= margin * size)
-        for decides, gap, (size, _) in zip(m.deciding, gaps, m.made(state, mode)[1:], strict=True)
-    )
-    return where(switches & any_of(close) & (verdict < INACCURATE), INACCURATE, verdict)
-
-
-@symbolic
-def held_by(m, state, side, signs, parameters, unit, on, falls):
-    """The signs behind a switch: 1 for a surface that the motion is on and does not leave, which holds it.
-
-    `falls` : the rates of the events before the switch
-    """
-    rates = rates_of_events(m, state, Mode(side, signs, parameters, False), unit)
-    held = tuple(
-        (s > 0.5) & (o > 0.5) & ((magnitude(rate) <= BACK * magnitude(fall)) | ((1.0 - passable) * rate < 0.0))
-        for s, o, rate, fall, passable in zip(m.surfaces, on, rates[1:], falls[1:], m.passable[1:], strict=True)
-    )
-    return joined(tuple(where(x, 1.0, sign) for x, sign in zip(held, signs[:-1], strict=True)), signs[-1:])
-
-
 @left_a_call
 def rates_of_events(m, state, mode, unit):
     """Of each event's value, per unit of time."""
@@ -247,29 +221,26 @@ def arrived(m, cell, found, own, active):
 
 
 @symbolic
-def meets(m, cell, moving):
-    """The lanes that switch; whose switch counts; those at the first surface, at each further one (() for none)."""
-    first = moving & first_of(cell.signs[-1], cell.on[0])
-    if m.surfaces is None:
-        return first, first, first, ()
-    parts = zip(cell.on[1:], m.surfaces, cell.signs[:-1], strict=True)
-    met = tuple(moving & (s > 0.5) & first_of(sign, o) for o, s, sign in parts)
-    counts = first | any_of(tuple(x & (s < 1.5) for x, s in zip(met, m.surfaces, strict=True)))
-    return first | any_of(met), counts, first, met
+def turned(m, cell, moving):
+    """The cell with the signs behind what it has met; 1 for the kink that it has slid along to its end.
 
-
-@symbolic
-def turned(m, cell, moving, switches, counts):
-    """The cell with the signs behind what it has met; 1 for the kink that it has slid along to its end."""
-    on, signs, left = cell.on, cell.signs, ()
+    And the lanes that switch; whose switch counts; those at the first surface, at each further one (() for none).
+    """
+    on, signs, left, met = cell.on, cell.signs, (), ()
+    switches = counts = first = moving & first_of(signs[-1], on[0])
+    if m.surfaces is not None:
+        parts = zip(on[1:], m.surfaces, signs[:-1], strict=True)
+        met = tuple(moving & (s > 0.5) & first_of(sign, o) for o, s, sign in parts)
+        counts = first | any_of(tuple(x & (s < 1.5) for x, s in zip(met, m.surfaces, strict=True)))
+        switches = first | any_of(met)
     if m.speeds is not None:  # at the end of a slide the kink's sign is 0, and stays so
         held = tuple(moving & (magnitude(sign) < 0.5) for sign in signs[:-1])
         left = tuple(where(x & (o > 0.5) & not_(switches), 1.0, 0.0) for x, o in zip(held, on[1:], strict=True))
-        on = joined(on[:1], tuple(where(x, 1.0, o) for x, o in zip(held, on[1:], strict=True)))
+        on = (on[0], *(where(x, 1.0, o) for x, o in zip(held, on[1:], strict=True)))
     turned = tuple(where(moving & (o > 0.5), -sign, sign) for sign, o in zip(signs[:-1], on[1:], strict=True))
     kinks_met = where(counts, 0.0, where(moving, cell.kinks_met + 1.0, cell.kinks_met))
-    signs = joined(turned, (where(moving & (on[0] > 0.5), 1.0, signs[-1]),))
-    return cell._replace(on=on, signs=signs, kinks_met=kinks_met), left
+    signs = (*turned, where(moving & (on[0] > 0.5), 1.0, signs[-1]))
+    return cell._replace(on=on, signs=signs, kinks_met=kinks_met), left, switches, counts, first, met
 
 
 @symbolic
@@ -293,8 +264,14 @@ def switched(m, cell, rates, switches, counts, first, met, tells):
         which = (*(where(s > 0.5, where(x, 1.0, -1.0), sign) for sign, s, x in parts), where(first, 1.0, -1.0))
     old_mode = Mode(cell.side, which, parameters, False)
     own, rates = ERRORS.behind(tells, own, old, old_mode, rates, switches)
-    before, gaps = m.surface(old, old_mode), m.kinks(old, old_mode)
-    verdict = undecided(m, old, old_mode, gaps, BLUR * cell.tolerance, switches, cell.verdict)
+    before, gaps, verdict = m.surface(old, old_mode), m.kinks(old, old_mode), cell.verdict
+    if m.deciding is not None:  # a kink whose side decides what the switch does may be too close to tell its side
+        parts = zip(m.deciding, gaps, m.made(old, old_mode)[1:], strict=True)
+        close = tuple(
+            (decides > 0.5) & (magnitude(gap) > 0.0) & (magnitude(gap) <= BLUR * cell.tolerance * size)
+            for decides, gap, (size, _) in parts
+        )
+        verdict = raised(verdict, switches & any_of(close), INACCURATE)
     state = m.switched(old, old_mode)
     gaps_behind = m.kinks(state, Mode(side, signs, parameters, False))
     near = tuple(
@@ -303,8 +280,18 @@ def switched(m, cell, rates, switches, counts, first, met, tells):
     )
     signs, kinks_on = settled(m, state, side, parameters, unit, near)
     falls = rates_of_events(m, old, old_mode, unit)
-    if m.surfaces is not None:
-        signs = held_by(m, state, side, signs, parameters, unit, kinks_on, falls)
+    if m.surfaces is not None:  # one that the motion is on and does not leave holds it
+        rates_behind = rates_of_events(m, state, Mode(side, signs, parameters, False), unit)
+        parts = zip(m.surfaces, kinks_on, rates_behind[1:], falls[1:], m.passable[1:], signs[:-1], strict=True)
+        held = tuple(
+            where(
+                (s > 0.5) & (o > 0.5) & ((magnitude(x) <= BACK * magnitude(fall)) | ((1.0 - passable) * x < 0.0)),
+                1.0,
+                sign,
+            )
+            for s, o, x, fall, passable, sign in parts
+        )
+        signs = (*held, signs[-1])
     mode = Mode(side, signs, parameters, False)
     after, extent = m.surface(state, mode), m.made(state, mode)[0][0]
     still = magnitude(after) <= fma(STILL, extent, 2.0 * magnitude(before))
@@ -348,8 +335,7 @@ def advance(m, leg, memory, i, tells):
         moving = active & (cell.verdict < REFUSED)
         found, own = leg(cell, mode_of(cell), moving)
         cell, moving, rates = arrived(m, cell, found, own, active)
-        switches, counts, first, met = meets(m, cell, moving)
-        cell, left = turned(m, cell, moving, switches, counts)
+        cell, left, switches, counts, first, met = turned(m, cell, moving)
         if any_lane(switches):
             cell, rates = switched(m, cell, rates, switches, counts, first, met, tells)
         cell = gone_on(m, cell, rates, left, moving, found.grazing, tells)

@@ -16,7 +16,6 @@ from kernels.lanes.vectors import any_lane, fma, magnitude, not_, sqrt, where
 
 METHODS = ("euler", "semi_implicit", "verlet", "rk4", "dopri5", "dop853", "moreau")
 EULER, SEMI_IMPLICIT, VERLET, RK4, DOPRI5, DOP853, MOREAU = range(7)
-ORDER = (1, 1, 2, 4, 5, 8, 1)
 CALLS = (1.0, 1.0, 2.0, 4.0, 6.0, 12.0, 2.0)
 """Calls of the rates in a step."""
 NONE, LINEAR, HERMITE, ROOT = range(4)

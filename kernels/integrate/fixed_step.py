@@ -71,11 +71,6 @@ class Fixed(NamedTuple):
     substeps: float
 
 
-def nothing_yet(state):
-    """As zeros, for so many states."""
-    return Fixed(state, *[0.0] * 8)
-
-
 @jit
 def number(x):
     """A number of `events`, the same in all lanes, as an integer."""
@@ -101,20 +96,6 @@ def located(m, scheme, mode, step, which, seeking):
         new, trials = leap(m, scheme, step.state, mode, part * h), 1.0 + 0.0 * h
     calls = trials * (E.CALLS[scheme.method] * scheme.substeps)
     return part, choose(curved, new, step.state), where(curved, calls, 0.0)
-
-
-@symbolic
-def margin_behind(which, step, wide):
-    """How far behind the switch the motion would turn round, over the surface's largest value so far; infinite if not.
-
-    From the rates at the ends of the step: what bends the surface's value back is their difference.
-    """
-    start, end, first, last = step.start[0], step.end[0], step.start_rates[0], step.end_rates[0]
-    part = where(start > end, start / (start - end), 0.0)
-    at_switch = (last - first) * part + first
-    back = (which > -0.5) & (which < 0.5) & (last > first) & (start > 0.0)
-    bend = where(back, (last - first) / step.h, 1.0)
-    return where(back, at_switch * at_switch / (2.0 * bend * where(wide > 0.0, wide, 1.0)), math.inf)
 
 
 @symbolic
@@ -170,11 +151,7 @@ def to_event(m, cell, mode, active):
                 part, found, more = located(m, scheme, mode, step, which, seeking)
                 other = seeking & (part < 0.999999) & (part > 0.0)
                 other = other & passed_another(events(m, found, mode)[0], which, on)
-                new, taken, more = (
-                    choose(seeking, found, new),
-                    where(seeking, part * h, taken),
-                    where(seeking, more, 0.0),
-                )
+                new, taken, more = choose(seeking, (found, part * h, more), (new, taken, 0.0))
                 again, shorter = again | other, where(other, part * h, shorter)
         lost, broken = lost | (again & (cuts > CUTS)), broken | blown
         given_up = stuck | lost | broken
@@ -183,8 +160,13 @@ def to_event(m, cell, mode, active):
             vague = vague | (moved & not_(shows_all(m, state, new, mode, taken)))
         below = (which < -0.5) & (end[0] <= 0.0) & natural  # not yet above where it began
         done = moved & (which > -0.5)
-        behind = margin_behind(which, step, wide)
-        slim = where(done & (mode.signs[-1] > 0.0) & (behind < slim), behind, slim)
+        # how far behind the switch it would turn round, over the surface's largest value: by the rates at both ends
+        first, last, above = start_rates[0], end_rates[0], start[0]
+        back = done & (which < 0.5) & (mode.signs[-1] > 0.0) & (last > first) & (above > 0.0)
+        at_switch = (last - first) * where(above > end[0], above / (above - end[0]), 0.0) + first
+        bend = where(back, (last - first) / h, 1.0)
+        behind = at_switch * at_switch / (2.0 * bend * where(wide > 0.0, wide, 1.0))
+        slim = where(back & (behind < slim), behind, slim)
         state, t, fired = choose(moved, new, state), where(moved, t + taken, t), choose(done, marks(which, on), fired)
         on, reach = choose(moved & not_(below), times(0.0, on), on), choose(moving, reached(reach, state), reach)
         cut, cuts = where(again, shorter, 0.0), where(again, cuts + 1.0, 0.0)

@@ -77,7 +77,8 @@ def core(p, state, mode, unit, tolerance, on, t, margins):
         at_kink = p.of_base(p.rates(p.without(state, mode), mode, unit, nothing))
         settles = nears & (at_kink <= 0.0) & (at_kink >= 0.0) & (n < 1.0)
         left = t_base / (1.0 - n)
-        rests = settles & no_matter(base, left, t, margin)
+        # so little is left of u that its way to rest does not matter
+        rests = settles & ((SLACK * base * left <= margin * (t + left)) | (base <= SLACK * margin))
         core = where(rests, value * (1.0 - n), core)
         longest = where(settles & not_(rests), SHORT * left, longest)
     if any_lane(leaves):
@@ -119,12 +120,6 @@ def size_in_unit(u, rate):
 def mean_power(last, n):
     """The mean of what grows as t^n up to `last`."""
     return last / (n + 1.0)
-
-
-@symbolic
-def no_matter(u, left, t, margin):
-    """Whether so little is left of u that its way to rest, in the time `left`, does not matter."""
-    return (SLACK * u * left <= margin * (t + left)) | (u <= SLACK * margin)
 
 
 @symbolic
