@@ -44,7 +44,9 @@ def to_rest(how, scene):
 
     def solve(columns, rtol):
         outputs, status = how(columns, rtol)
-        cells = np.flatnonzero(_may_rest(columns[-1], outputs, status))
+        flips, (time, interval, *_) = columns[-1], outputs
+        faint = (np.isin(status, FAINT) & ~(interval * flips > SHORT * time)) | (interval <= STILL * time)
+        cells = np.flatnonzero((flips >= LEAST) & (np.isin(status, ENDED) | faint))
         if not len(cells):
             return outputs, status
 
@@ -72,12 +74,6 @@ def to_rest(how, scene):
         return outputs, status
 
     return solve
-
-
-def _may_rest(flips, outputs, status):
-    time, interval = outputs[:2]
-    faint = (np.isin(status, FAINT) & ~(interval * flips > SHORT * time)) | (interval <= STILL * time)
-    return (flips >= LEAST) & (np.isin(status, ENDED) | faint)
 
 
 def _last_right(solved, flips):

@@ -8,7 +8,6 @@ import functools
 from types import FunctionType
 from typing import Any, NamedTuple
 
-import numpy as np
 from numba.core.errors import NumbaError
 
 from kernels.codegen.functions import Functions, cell_of, entry
@@ -71,7 +70,7 @@ def runner(scene, method):
         m = m._replace(cell=cell_of(*functions.size, told))
         return Runner(scene, m, *_by_series(functions, m, functions.changes() if told else None))
     if method == "fixed":
-        order, m = None, m._replace(cell=m.cell._replace(own=fixed_step.nothing_yet(m.cell.state)))
+        order, m = None, m._replace(cell=m.cell._replace(own=fixed_step.Fixed(m.cell.state, *[0.0] * 8)))
 
         @jit_call
         def leg(cell, mode, active):
@@ -120,28 +119,15 @@ def _driven(functions, m, leg, kind, tells=None):
 
 
 def running(functions, of_lanes, kind):
-    """What runs cells, of which `of_lanes` takes every lane on until one has finished."""
+    """What runs cells, of which `of_lanes` takes every lane on until one has finished; its machine code is kept."""
     name = f"{kind}_{functions.scene.name}_{functions.digest}"
     run = FunctionType(_all_cells.__code__, {"each_refilled": each_refilled, "ADVANCE": of_lanes}, name)
     run.__qualname__, run.__module__ = name, __name__
-    return _RUNS.setdefault(name, kept(run))
+    return _RUNS.setdefault(name, cached(run) if COMPILED else run)
 
 
 def _all_cells(cells, memory, held):
     each_refilled(ADVANCE, cells, memory, held)  # noqa: F821  a name of `running`
-
-
-def kept(function):
-    """A function called from Python, whose machine code is kept: its name says all it was made from."""
-    if COMPILED:
-        return cached(function)
-
-    @functools.wraps(function)
-    def call(*arguments):
-        with np.errstate(all="ignore"):  # 1/0 is inf here as in compiled code
-            return function(*arguments)
-
-    return call
 
 
 @contextlib.contextmanager

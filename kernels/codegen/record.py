@@ -81,18 +81,8 @@ def _once(scene):
     offset, factor, u = _affine(graph, surface)
     wayward = offset if offset.kind == NUMBER and not offset.args[0] else way * offset
     events = ((wayward, way * factor, u), *kinks)
-    recorded = Recorded(
-        graph,
-        rates,
-        timed,
-        surface,
-        switched,
-        started,
-        events,
-        _nested(events, dict(zip(states.values(), rates, strict=True))),
-        numbers,
-        shared,
-    )
+    nested = _nested(events, dict(zip(states.values(), rates, strict=True)))
+    recorded = Recorded(graph, rates, timed, surface, switched, started, events, nested, numbers, shared)
     return slid(recorded, scene.states) if scene.slides else recorded
 
 

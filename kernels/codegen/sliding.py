@@ -20,15 +20,6 @@ def _side(graph, signs):
     return lambda x: graph.again(x, signs, done)
 
 
-def _sign(graph, j):
-    return graph.constant(f".sign_{j}")
-
-
-def _free(graph, j):
-    """0 while the motion slides along the kink, else 1."""
-    return _sign(graph, j) * _sign(graph, j)
-
-
 def _jump(x, behind, ahead):
     """What an expression is more on one side than on the other: terms that are the same cancel before any rounding."""
     before, after = behind(x), ahead(x)
@@ -51,10 +42,12 @@ def slid(recorded, states):
     `speeds` are for each kink u'(f+) and u'(f-), the other signs as they are.
     """
     graph, kinks = recorded.graph, list(recorded.graph.kinks)
-    free = [_free(graph, j) for j in range(len(kinks))]
+    signs = [graph.constant(f".sign_{j}") for j in range(len(kinks))]
+    free = [sign * sign for sign in signs]  # 0 while the motion slides along the kink, else 1
     slides = [1.0 - f for f in free]
     behind, ahead = (
-        _side(graph, {j: _sign(graph, j) + way * slide for j, slide in enumerate(slides)}) for way in (-1.0, 1.0)
+        _side(graph, {j: sign + way * slide for j, (sign, slide) in enumerate(zip(signs, slides, strict=True))})
+        for way in (-1.0, 1.0)
     )
     below, jumps = [behind(r) for r in recorded.rates], [_jump(r, behind, ahead) for r in recorded.rates]
     gradients = [[Tangents.along(graph, s).of(u) for s in states] for u in kinks]
@@ -67,7 +60,7 @@ def slid(recorded, states):
     stays = [free[graph.kinks[s]] if s in graph.kinks else graph.of(1.0) for s in at]
     rates = tuple(k * (f + share * jump) for k, f, jump in zip(stays, below, jumps, strict=True))
     products = [w * (down + rise) * down for w in slides]
-    events = [(graph.of(0.0), graph.of(1.0), _sign(graph, j) * u - products[j]) for j, u in enumerate(kinks)]
+    events = [(graph.of(0.0), graph.of(1.0), signs[j] * u - products[j]) for j, u in enumerate(kinks)]
     unit = graph.constant(".unit")
     return replace(
         recorded,

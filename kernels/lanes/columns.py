@@ -10,7 +10,6 @@ then come its cell's inputs. `advance(memory, i)` takes every lane on until one 
 events or steps, and returns whether one has; i is the index of all lanes.
 """
 
-import functools
 import inspect
 import operator
 
@@ -40,7 +39,7 @@ def entry(*shared):
 
     def decorate(function):
         per_cell = [name not in shared for name in inspect.signature(function).parameters]
-        return functools.wraps(function)(entry_of(function, per_cell, kept=True)) if COMPILED else function
+        return entry_of(function, per_cell, kept=True)
 
     return decorate
 
@@ -127,7 +126,8 @@ def fresh(numbers, inputs):
 
 def to_the_end(run, cells):
     """Runs every cell, (n_cells, numbers that a lane knows), by a compiled `each_refilled`."""
-    run(cells, np.zeros((cells.shape[1], GROUP)), np.zeros(GROUP, np.int64))
+    with np.errstate(all="ignore"):  # of plain Python
+        run(cells, np.zeros((cells.shape[1], GROUP)), np.zeros(GROUP, np.int64))
 
 
 @jit

@@ -153,18 +153,14 @@ def _for_symbols(function):
     return call
 
 
+@functools.cache
 def _scope_of(module):
     """Globals of a module, with its functions for symbols."""
-    if module not in _SCOPES:
-        scope = _SCOPES[module] = dict(vars(sys.modules[module]))
-        for name, x in scope.items():
-            if isinstance(x, FunctionType) or isinstance(getattr(x, "_numba_type_", None), types.Callable):
-                scope[name] = _for_symbols(x)
-    return _SCOPES[module]
-
-
-_SCOPES = {}
-"""Globals for symbols by the name of their module."""
+    scope = dict(vars(sys.modules[module]))
+    for name, x in scope.items():
+        if isinstance(x, FunctionType) or isinstance(getattr(x, "_numba_type_", None), types.Callable):
+            scope[name] = _for_symbols(x)
+    return scope
 
 
 def taking_symbols(module):

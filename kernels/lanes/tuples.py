@@ -58,10 +58,7 @@ def boxes(state, new, change):
 @symbolic
 def total(xs):
     """The sum of a tuple, from left to right."""
-    result = xs[0]
-    for x in xs[1:]:
-        result = result + x
-    return result
+    return fold(operator.add, xs[0], (), xs[1:])
 
 
 @symbolic
