@@ -165,8 +165,9 @@ def scene_kernel(**parts: Unpack[SceneParts]) -> Kernel:
     SceneError
         Where the functions ask for what is not there, or do what cannot be recorded.
     """
+    scene = scene_of(parts)
     fields, outputs = (*parts["parameters"], flips_field(40.0, MOST_FLIPS)), (*TIMES, *parts["states"])
-    methods = _methods(scene_of(parts), [f.name for f in fields], [f.name for f in outputs])
+    methods = _methods(scene, [f.name for f in fields], [f.name for f in outputs])
     return declared(parts, fields, outputs, methods)
 
 
@@ -202,7 +203,7 @@ TIMES = (
 def scene_of(parts: SceneParts) -> Scene:
     """The scene of states and parameters that are given as fields; the time is its last state if it is asked for.
 
-    Raises TypeError where one of `parts` is wanting, or there is none of that name.
+    Raises TypeError where one of `parts` is missing, or there is none of that name.
     """
     if wrong := (parts.keys() - SceneParts.__annotations__.keys()) | (SceneParts.__required_keys__ - parts.keys()):
         raise TypeError(f"a scene wants {', '.join(SceneParts.__annotations__)}; wrong or missing: {min(wrong)!r}")

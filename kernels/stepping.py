@@ -114,7 +114,8 @@ def stepped_kernel(**parts: Unpack[SceneParts]) -> Kernel:
         Of the scene's parameters, `flips`, `step` and `location`; its outputs are `time` of the last switch, `interval`
         since the one before, each state just before it, and `error`, `steps`, `rate_calls`.
     """
-    if not callable(parts.get("surface")):
-        raise SceneError(f"the scene {parts['name']}: at a fixed step there is one surface")
+    scene = scene_of(parts)
+    if not callable(scene.surface):
+        raise SceneError(f"the scene {scene.name}: at a fixed step there is one surface")
     fields, outputs = (*parts["parameters"], *stepping_fields()), (*TIMES, *parts["states"], *COST)
-    return declared(parts, fields, outputs, stepping_methods(scene_of(parts), fields, outputs, _fill_plainly))
+    return declared(parts, fields, outputs, stepping_methods(scene, fields, outputs, _fill_plainly))

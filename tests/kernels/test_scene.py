@@ -11,9 +11,12 @@ from mpmath import mp, mpf
 from rich_scene import RICH
 from sliding_scene import SLIDING
 
+from kernels.cycle import cycle_kernel
 from kernels.interface import Status
 from kernels.lanes.jit import COMPILED
 from kernels.scene import Field, scene_kernel
+from kernels.stepping import stepped_kernel
+from kernels.trajectory import motion_kernel, section_kernel
 
 
 def own_rates(known, rates, surface, start, switch=None):
@@ -38,6 +41,16 @@ def test_a_scenes_functions_are_not_asked_again_at_every_call(known):
             solve(kernel, method.name, flips=[2.0], **known.example)
             asked.append(rates.calls)
         assert asked[1] == asked[0], method.name
+
+
+@pytest.mark.parametrize("make", [scene_kernel, stepped_kernel, cycle_kernel, motion_kernel, section_kernel])
+def test_an_argument_that_is_missing_or_misspelt_is_refused(make):
+    field = (Field("x", "1", "x"),)
+    parts = {"name": "line", "doc": "", "states": field, "parameters": (), "rates": lambda: 1.0, "start": lambda: 0.0}
+    with pytest.raises(TypeError, match="surfaces"):
+        make(**parts, surface=lambda x: 1.0 - x, surfaces=None)
+    with pytest.raises(TypeError, match="parameters"):
+        make(**{name: part for name, part in parts.items() if name != "parameters"}, surface=lambda x: 1.0 - x)
 
 
 @pytest.mark.skipif(COMPILED, reason="one more compilation; run with NUMBA_DISABLE_JIT=1")
