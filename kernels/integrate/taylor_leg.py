@@ -255,7 +255,7 @@ def to_event(m, cell, mode, active, hides, asks, apart, at_kink):
     Returns
     -------
     leg : Leg
-    late : `carried.Late`, or ()
+    errors : `Errors` at the event, or ()
     """
     state, unit, h, on, tolerance, errors = cell.state, cell.unit, cell.h, cell.on, cell.tolerance, cell.own
     moving, t, span, tried = active, 0.0 * h, h, 0.0 * h
