@@ -1,7 +1,6 @@
 """Results as Datasets: finished or not, by plain readers too, in pieces, and what is no result."""
 
 import contextlib
-import json
 from concurrent.futures import ThreadPoolExecutor
 
 import h5py
@@ -13,10 +12,8 @@ from running import interrupted
 import sweep
 from kernels.interface import Status
 from sweep import SweepError, open_result, run
-from sweep.cells.fingerprint import fingerprint
 from sweep.cli import main
 from sweep.file.store import unfinished_of
-from sweep.study.model import Study
 
 
 def stone():
@@ -55,16 +52,6 @@ def test_attributes_follow_cf(stored):
         assert found.status.attrs["flag_values"].dtype == np.int8
         flags = dict(zip(found.status.attrs["flag_meanings"].split(), found.status.attrs["flag_values"], strict=True))
         assert flags == {s.name: int(s) for s in Status}
-
-
-def test_the_file_alone_suffices_to_run_it_again(stored, tmp_path):
-    with open_result(stored) as found:
-        study = Study.from_json(found.attrs["study_json"], allow_import=True)
-        assert json.loads(found.attrs["fingerprint"]) == fingerprint(study)
-        with run(study, tmp_path / "again.h5", progress=False) as again:
-            for name in found.data_vars:
-                assert again[name].values.tobytes() == found[name].values.tobytes()
-            assert again.attrs["study_json"] == found.attrs["study_json"]
 
 
 def test_an_unfinished_result_is_not_taken_for_a_finished_one_where_that_is_asked(unfinished, stored):

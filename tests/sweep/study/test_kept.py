@@ -60,9 +60,13 @@ def settings_of(draw):
 
 
 def same(study, again):
+    """Studies are equal whose JSON is, so what that leaves out is asked for as well."""
     assert again == study
     assert hash(again) == hash(study)
     assert again.dims == study.dims
+    for name, value in vars(study).items():
+        if name not in ("kernel", "text"):
+            assert repr(getattr(again, name)) == repr(value), name
     for name, axis in study.axes.items():
         assert again.axes[name].values.tobytes() == axis.values.tobytes()
 
