@@ -64,12 +64,13 @@ class Cycles(namedtuple("Cycles", "parameters flips r z scale shift off rows slo
 
     def some(self, cells):
         """A copy of those cells."""
-        return Cycles(*(column[..., cells] for column in self))
+        return Cycles(*(column.take(cells, axis=-1) for column in self))
 
     def put(self, cells, part, keep=slice(None)):
         """Takes what has been found for these cells, or for some of them."""
+        kept = np.arange(len(cells))[keep]
         for column, values in zip(self, part, strict=True):
-            column[..., cells[keep]] = values[..., keep]
+            column[..., cells[kept]] = values.take(kept, axis=-1)
 
 
 def jacobian(the_map, cycles, h, levels, swept=()):
