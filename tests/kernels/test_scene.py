@@ -65,8 +65,8 @@ def test_names_of_a_scene_may_be_those_of_the_text_that_is_written():
     )  # fmt: skip
     outputs, status = solve(kernel, "taylor_once", [1.0], 2.0, 0.0, 0.0, 0.0, 0.0, 3.0, 5.0, flips=1.0)
     assert status[0] == Status.OK
-    assert outputs["time"][0] == pytest.approx(5.0, rel=1e-14)
-    assert outputs["end_speed"][0] == pytest.approx(30.0, rel=1e-14)
+    assert outputs["time"][0] == pytest.approx(5.0, rel=1e-14, abs=0.0)
+    assert outputs["end_speed"][0] == pytest.approx(30.0, rel=1e-14, abs=0.0)
 
 
 @pytest.mark.skipif(COMPILED, reason="one more compilation; run with NUMBA_DISABLE_JIT=1")

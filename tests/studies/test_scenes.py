@@ -205,14 +205,14 @@ def test_lobes_fulfil_the_equation_of_the_delay_in_50_digits(lobes, n, i):
 def test_responses_of_the_milling_machine_are_those_of_the_damped_chain():
     chain = fula.chain(sweep.run(sweep.study(fula.__file__.replace(".py", ".toml"))), 8)
     true = receptance(chain["J"], chain["k"], chain["h"], 230.0, 1, 1)
-    assert fula.response(chain, np.array([230.0]))[0] == pytest.approx(complex(true), rel=1e-12)
+    assert fula.response(chain, np.array([230.0]))[0] == pytest.approx(complex(true), rel=1e-12, abs=0.0)
 
 
 def test_the_law_of_correlated_noise_is_that_of_a_sum_of_products():
     coords = {"s": 0.4, "T": 1.0, "averaging_time": 20.0}
     lag, w = abs(np.subtract.outer(np.arange(40), np.arange(40))), np.repeat([-1.0, 1.0], 20) / 20
     expected = 86400 * 0.4 * math.sqrt(w @ math.exp(-1 / 7.0) ** lag @ w / 2)
-    assert float(timekeeping.law(xr.Dataset(coords=coords), 7.0)) == pytest.approx(expected, rel=1e-12)
+    assert float(timekeeping.law(xr.Dataset(coords=coords), 7.0)) == pytest.approx(expected, rel=1e-12, abs=0.0)
 
 
 def test_the_borders_of_stability_are_the_textbooks():

@@ -105,7 +105,7 @@ def test_of_a_tool_within_the_rim_load_over_its_area_is_the_pressure():
         pressed, _, _ = wear([2.0, 6.0], pressure=3.0 / area, **changed)
         value, error, status = wear([2.0, 6.0], workpiece_radius=40.0, **LOAD, **changed)
         assert status == Status.OK
-        assert value == pytest.approx(pressed, rel=2e-12)
+        assert value == pytest.approx(pressed, rel=2e-12, abs=0.0)
         assert (error <= 1e-9 * value).all()
 
 
@@ -129,7 +129,7 @@ def test_under_a_resting_arm_wear_is_the_share_of_the_ring_under_the_tool():
     half = math.acos((radius**2 + offset**2 - a**2) / (2 * radius * offset))
     value, error, status = wear(radius, **changed)
     assert status == Status.OK
-    assert value[0] == pytest.approx(spin * radius * half / math.pi, rel=1e-13)
+    assert value[0] == pytest.approx(spin * radius * half / math.pi, rel=1e-13, abs=0.0)
     assert abs(value[0] - spin * radius * half / math.pi) <= error[0] + 1e-13
 
 
@@ -138,7 +138,7 @@ def test_the_centre_of_the_workpiece_wears_by_the_arm_alone_and_beside_it_hardly
     swing = -0.5 * np.diff(np.arccos((b * b + d * d - c * c) / (2 * b * d)))[0]
     value, error, status = wear(0.0, tool_a=30.0, tool_b=30.0)
     assert status == Status.OK
-    assert value[0] == pytest.approx(4 * swing * math.hypot(50.0, 1.0) / (2 * math.pi), rel=1e-13)
+    assert value[0] == pytest.approx(4 * swing * math.hypot(50.0, 1.0) / (2 * math.pi), rel=1e-13, abs=0.0)
     assert error[0] < 1e-12
     near, _, _ = wear([0.0, 1e-7, 1e-4])
     assert abs(near[1:] / near[0] - 1) == pytest.approx([0.0, 0.0], abs=1e-4)
@@ -199,7 +199,7 @@ def test_wear_too_faint_for_a_float64_at_one_radius_is_left_out_there_alone():
     value, error, status = wear(radius, 1e-6, preston=PAPER["preston"] * 2.0**-500, pressure=2.0**500 * scale)
     assert status == Status.PARTLY_OUT_OF_RANGE
     assert np.isnan(value).tolist() == np.isnan(error).tolist() == faint.tolist()
-    assert value[~faint] == pytest.approx(here[~faint] * scale, rel=1e-12)
+    assert value[~faint] == pytest.approx(here[~faint] * scale, rel=1e-12, abs=0.0)
 
 
 def test_more_than_the_digits_allow_is_inaccurate():
