@@ -97,7 +97,7 @@ def _by_series(functions, m, changes=None):
 
     def run(order):
         series = functions.of_series(m, order, changes)
-        asks, apart = any(series.endless) or None, any(series.unseen) or None
+        asks, apart = any(series.bent + series.bent_events) or None, any(series.bent_events) or None
 
         @jit_call
         def leg(cell, mode, active):

@@ -10,7 +10,7 @@ import inspect
 import itertools
 
 from kernels.expression import stiff
-from kernels.expression.graph import DIV, HALF_SQUARE, INPUT, MUL, NUMBER, SCALED, Expression, needed
+from kernels.expression.graph import ADD, CHOSEN, DIV, HALF_SQUARE, INPUT, MUL, NUMBER, SCALED, Expression, needed
 from kernels.expression.hidden import Enclosures
 from kernels.expression.rounding import Losses, Sizes
 from kernels.expression.series import V, Values
@@ -57,6 +57,13 @@ def _digest(scene, recorded):
 def entry(j):
     """A function of tuples: their entry j."""
     return written(lambda xs: xs[j])
+
+
+def linear(x):
+    """Whether it is a sum of states and a constant, with constant factors."""
+    if x.kind in (ADD, SCALED, CHOSEN):
+        return all(map(linear, x.args[x.kind == CHOSEN :]))
+    return x.kind == INPUT or not x.varies
 
 
 class Functions:
@@ -270,16 +277,20 @@ class Functions:
     def of_series(self, m, order, changes=None):
         """`taylor_leg.Series` of an order; `changes` : of the error that is carried along, the first of `Changes`."""
         ways = {s: BY_SUM if s in self.summed else BY_SERIES for s in self.states} | {None: BY_SERIES}
-        pieces, tangents, endless = self.series(order, True, changes is not None)
+        pieces, tangents = self.series(order, True, changes is not None)
+        bent, bent_events = (
+            tuple(float(not linear(x)) for x in xs)
+            for xs in (self.recorded.rates, [u for *_, u in self.recorded.events])
+        )
         return Series(
             m, order, pieces, *self.powers, tuple(ways[s] for s in self.states), tuple(ways[s] for s in self.seen),
-            tuple(float(s in self.summed) for s in self.states), tuple(float(s is None) for s in self.seen), endless,
+            tuple(float(s in self.summed) for s in self.states), tuple(float(s is None) for s in self.seen),
+            bent, bent_events,
             changes and Changes(*changes, *tangents, self.feeds_back or None),
         )  # fmt: skip
 
     def series(self, order, powers=False, tells=False):
-        """`Series.pieces` of an order; if it tells, with `Changes.tangent` and `Changes.rough`, which go on from them;
-        and `Series.endless`.
+        """`Series.pieces` of an order; if it tells, with `Changes.tangent` and `Changes.rough`, which go on from them.
 
         With `powers` these are constants in their cores.
         """
@@ -332,7 +343,7 @@ class Functions:
 
         state, mode, changes = (self.any[name] for name in ("state", "mode", "changes"))
         cores = self.any["cores"] if powers else ()
-        whole, found = expanded(state, mode, ANY, cores)
+        whole, _ = expanded(state, mode, ANY, cores)
         for part, length in lengths.items():
             values = Values(self.inputs(state, mode, ANY, changes), rates, cores)
             values.known = dict(whole.known)
@@ -340,11 +351,7 @@ class Functions:
             inputs = {(x.index, 0) for x in graph.nodes if x.kind == INPUT}
             asked = values.asked - inputs
             taken[part] = [key for key, value in whole.known.items() if key in asked and value is ANY]
-        return (
-            written(pieces),
-            [tangent(part) for part in lengths],
-            tuple(float(u[-1] is ANY) for u in found.controlled),
-        )
+        return written(pieces), [tangent(part) for part in lengths]
 
     @functools.cached_property
     def powers(self):

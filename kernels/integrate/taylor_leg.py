@@ -3,7 +3,8 @@
 Each step takes the length that the series allow, is halved where no event is proved to fall all along or to stay
 clear (`taylor`), and ends the leg where one has fallen through 0. A leg may begin where symmetry makes the last terms
 of a series 0, though it goes on. So its first step, and one that last terms tell nothing of, is taken only where the
-rates at the series' states are the series' derivatives, and events their own series (`agree`, `events_agree`).
+rates at the series' states are the series' derivatives, and events their own series (`agree`); but for rates and
+events that are linear in the states, of which the last terms tell all.
 `m` is what is written of the scene for one order (`Series`).
 """
 
@@ -42,9 +43,10 @@ from kernels.lanes.tuples import all_of, any_of, joined, reached, total
 from kernels.lanes.vectors import any_lane, choose, fma, horner, magnitude, not_, where
 from kernels.maths.intervals import most
 
-ASKED_AT, REFUSALS = (0.6, 1.0), 20.0
-"""Parts of a step at which rates and events are asked whether the series are theirs; and how often in a leg a step may
-be refused for that: what is so much shorter than the first guess is not, or rounding would stop it."""
+WITHIN, REFUSALS = 0.6, 20.0
+"""Part of a first step at which rates and events are asked, besides its end, whether the series are theirs; and how
+often in a leg a step may be refused for that: what is so much shorter than the first guess is not, or rounding would
+stop it."""
 BEYOND = 1e6
 """Times the step before, that one is at most where the series leave nothing out: of a motion that is a polynomial it
 would grow so far that halving it no more comes back to what an event next to 0 asks for."""
@@ -60,7 +62,7 @@ class Series(NamedTuple):
     on_kink : (state, fires) -> the state, 0 where a kink of a power fires
     ways, watched : how each state, and what each event watches, is evaluated (`taylor.Way`)
     summed, unseen : 1 for each state that is the sum of another one, for each event of more than one state
-    endless : of `Pieces.controlled`, 1 for each series whose last coefficient is not 0 for every motion
+    bent, bent_events : 1 for each state whose rate, for each event that, is not linear in the states
     error : `carried.Changes`; None where no error is carried along
     """
 
@@ -73,7 +75,8 @@ class Series(NamedTuple):
     watched: tuple
     summed: tuple
     unseen: tuple
-    endless: tuple
+    bent: tuple
+    bent_events: tuple
     error: object
 
 
@@ -154,43 +157,40 @@ def shows_all(m, pieces, state, mode, unit, trial, tolerance):
 @symbolic
 def tells_nothing(m, pieces, h):
     """Whether the last terms of a series tell nothing of it."""
-    return any_of(
-        tuple((endless > 0.5) & vanishes(h, u) for endless, u in zip(m.endless, pieces.controlled, strict=True))
-    )
+    every = joined(pieces.states, tuple(u for _, _, u in pieces.events))
+    bent = joined(m.bent, m.bent_events)
+    return any_of(tuple((is_bent > 0.5) & vanishes(h, u) for is_bent, u in zip(bent, every, strict=True)))
 
 
 @jit_call
 @over_tuples
-def agree(m, pieces, mode, unit, x, tolerance):
-    """Whether, a time x on, the rates at the series' states are the series' derivatives, to the tolerance."""
+def agree(m, pieces, mode, unit, x, tolerance, apart):
+    """Whether, a time x on, rates and events at the series' states are those of the series, to the tolerance; events
+    besides to their rounding."""
     state = tuple(way.value(x, curve) for way, curve in zip(m.ways, pieces.of_states, strict=True))
-    allowed = (m.order + 1.0) * fma(SLACK, tolerance, ROUNDING)
-    return all_of(
+    allowed = (m.order + 1.0) * (tolerance + ROUNDING)
+    same = all_of(
         tuple(
-            x * magnitude(unit * rate - slope(x, u)) <= allowed * size(x, u)
-            for rate, u in zip(m.scene.rates(state, mode), pieces.states, strict=True)
+            (bent < 0.5) | (x * magnitude(unit * rate - slope(x, u)) <= allowed * size(x, u))
+            for bent, rate, u in zip(m.bent, m.scene.rates(state, mode), pieces.states, strict=True)
         )
     )
-
-
-@jit_call
-@over_tuples
-def events_agree(m, pieces, mode, x, tolerance):
-    """Whether, a time x on, each event of more than one state has its series' value, to the tolerance and rounding."""
-    state = tuple(way.value(x, curve) for way, curve in zip(m.ways, pieces.of_states, strict=True))
-    values = joined((m.scene.surface(state, mode),), m.scene.kinks(state, mode))
-    return all_of(
-        tuple(
-            (unseen < 0.5)
-            | (
-                magnitude(value - fma(factor, horner(x, u), offset))
-                <= fma(ROUNDING, extent, SLACK * tolerance * (magnitude(offset) + magnitude(factor) * size(x, u)))
-            )
-            for unseen, value, (extent, _), (offset, factor, u) in zip(
-                m.unseen, values, m.scene.made(state, mode), pieces.events, strict=True
+    if apart is not None:
+        kinks = tuple(sign * u for sign, u in zip(mode.signs[:-1], m.scene.kinks(state, mode), strict=True))
+        values = joined((mode.signs[-1] * m.scene.surface(state, mode),), kinks)
+        same = same & all_of(
+            tuple(
+                (bent < 0.5)
+                | (
+                    magnitude(value - fma(factor, horner(x, u), offset))
+                    <= fma(ROUNDING, extent, SLACK * tolerance * (magnitude(offset) + magnitude(factor) * size(x, u)))
+                )
+                for bent, value, (extent, _), (offset, factor, u) in zip(
+                    m.bent_events, values, m.scene.made(state, mode), pieces.events, strict=True
+                )
             )
         )
-    )
+    return same
 
 
 @jit
@@ -248,8 +248,8 @@ def to_event(m, cell, mode, active, hides, asks, apart, at_kink):
     ----------
     cell : `Cell` at the start of the leg; its h is the first guess of a step
     hides : None where neither rates nor events can hide anything
-    asks : None where every series is a polynomial
-    apart : None where each event watches one state
+    asks : None where all rates and events are linear in the states: the last terms of all their series tell the rest
+    apart : None where all events are
     at_kink : None, or the entry of a tuple of the kink whose u is the rate of the surface
 
     Returns
@@ -264,7 +264,8 @@ def to_event(m, cell, mode, active, hides, asks, apart, at_kink):
     now, margins = passed, tuple(0.0 * h for _ in on)
     stuck, lost, broken, grazing = nothing, nothing, nothing, nothing
     power_h, allowed = natural_power(h, m.order - 1), SLACK * tolerance
-    refused, longest, furthest, reach = 0.0 * h, 0.0 * h + FAR, 0.0 * h + FAR, tuple(magnitude(u) for u in state)
+    refused, longest, furthest = 0.0 * h, 0.0 * h + FAR, 0.0 * h + FAR
+    reach = tuple(magnitude(u) for u in state)
     error = carried.begun(m, state, errors, h)
     for step in range(STEP_LIMIT):
         cores, limits, coarse, full = m.cores(state, mode, unit, tolerance, on, t, margins)
@@ -299,16 +300,6 @@ def to_event(m, cell, mode, active, hides, asks, apart, at_kink):
         seen = trial >= 0.0
         if hides is not None:
             seen = shows_all(m, pieces, state, mode, unit, trial, tolerance)
-        if asks is not None:
-            untold = not_(t > 0.0) | tells_nothing(m, pieces, trial)
-            untold = outside(cores, moving & (refused < REFUSALS) & untold)
-            if any_lane(untold):
-                for part in ASKED_AT:
-                    seen = seen & (not_(untold) | agree(m, pieces, mode, unit, part * trial, tolerance))
-                    if apart is not None:
-                        seen = seen & (not_(untold) | events_agree(m, pieces, mode, part * trial, tolerance))
-                refused = where(untold & not_(seen), refused + 1.0, refused)
-        longest = where(seen, longest / COME_UP, COME_UP * trial)
         steps = moving & seen
         clears, fallings = judged(m, pieces, facts, margins, now, trial)
         if at_kink is not None:
@@ -322,6 +313,17 @@ def to_event(m, cell, mode, active, hides, asks, apart, at_kink):
         moving = moving & not_(unsure)
         steps = steps & fine & not_(unsure)
         ends = tuple(way.value(trial, curve) for way, curve in zip(m.ways, pieces.of_states, strict=True))
+        if asks is not None:
+            untold = not_(t > 0.0) | tells_nothing(m, pieces, trial)
+            untold = outside(cores, steps & (refused < REFUSALS) & untold)
+            if any_lane(untold):
+                same = agree(m, pieces, mode, unit, trial, tolerance, apart)
+                if any_lane(untold & not_(t > 0.0)):
+                    same = same & agree(m, pieces, mode, unit, WITHIN * trial, tolerance, apart)
+                untold = untold & not_(same)
+                steps, seen = steps & not_(untold), seen & not_(untold)
+                refused = where(untold, refused + 1.0, refused)
+        longest = where(seen, longest / COME_UP, COME_UP * trial)
         passed = tuple(
             before | (steps & falling & (fma(factor, way.value(trial, curve), offset) <= 0.0))
             for before, falling, way, curve, (offset, factor, u) in zip(
