@@ -183,7 +183,7 @@ def declared(
     return Kernel(
         name=parts["name"],
         doc=parts["doc"],
-        source=parts.get("source", "a study's own"),
+        source=parts.get("source", "a model of your own"),
         parameters=tuple(parameters),
         outputs=tuple(outputs),
         check=limits_check(parameters, check),

@@ -215,7 +215,7 @@ def table(groups: Groups, source: str) -> list[str]:
 
 def summary(groups: Groups, source: str) -> list[str]:
     """How many claims hold, part by part, and those that do not hold, in 79 columns."""
-    rows, others, subject = [(f"claims held to {source}", "hold")], [""], ""
+    rows, others, subject = [(f"claims, compared with {source}", "hold")], [""], ""
     for heading, lines in groups.items():
         checked = [s for s in lines if s.holds is not None]
         if checked:
@@ -332,7 +332,7 @@ def what_came_out(name: str) -> list[str]:
     for row in page.read_text(encoding="utf-8").splitlines() if page.exists() else ():
         if row.startswith(f"| `{name}` |"):
             _, _, question, answer, checked, _ = row.split("|")
-            text = f"As shipped: {question} {answer} How it was checked, and its limits: {checked}"
+            text = f"Answer of the study as supplied. {question} {answer} Checks and limits: {checked}"
             return textwrap.wrap(" ".join(re.sub(r"\[(.+?)\]\(.+?\)", r"\1", text).split()), 79)
     return []
 

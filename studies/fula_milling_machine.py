@@ -77,7 +77,7 @@ def conclusions(ds: xr.Dataset) -> Claims:
     f, five = np.linspace(0.5, 400, 4000), ds.sel(n_keep=5)
     H8, H5, short = response(chain(ds, 8), f), response(chain(ds, 5), f), response(chain(ds, 8), f, np.float32)
     worst, first = abs(H5 / H8 - 1)[f <= SPAN].max(), abs(five.frequency_error[:4]).max()
-    neglect = "   above: the dampers merged, which hold to w h e = 0.1 at [Hz]"
+    neglect = "   merged dampers: accurate up to [Hz]"
     yield held("1. below 1000 rad/s: largest error of the receptance", worst, "< 5 %", "{:.1%}", "good")
     yield held("   the same, of f1 to f4", first, "< 0.25 %", "{:.2%}", "good")
     yield held(neglect, five.valid_to, f"< {1.5 * SPAN:.0f}", "{:.0f}", "159", refuted=True)
@@ -86,8 +86,8 @@ def conclusions(ds: xr.Dataset) -> Claims:
     bands = itertools.pairwise((0.0, 20.0, SPAN, 200.0, 300.0, 400.0))
     growth = {high: error[(f > low) & (f <= high)].max() for low, high in bands}
     by_band, largest = ", ".join(f"{x:.3f} to {high:.0f} Hz" for high, x in growth.items()), growth[400.0]
-    bits = "   that is the computer: eight masses in 24 bits, of that"
-    yield said("2. amplitudes differ more at higher f, by", np.all(np.diff([*growth.values()]) > 0), by_band, "grows")
+    bits = "   share of rounding, eight masses in 24 bits"
+    yield said("2. difference of amplitudes, 5 and 8 masses", np.all(np.diff([*growth.values()]) > 0), by_band, "grows")
     yield held(bits, lost / largest, "> 1/10", "{:.0e}", "the cause", refuted=True)
     size = abs(H8)
     lower = {f[i]: size.max() / size[i] for i in find_peaks(size)[0] if f[i] > 60}
@@ -112,7 +112,7 @@ def claims(ds) -> Claims:
     f = np.array([187.3, 200.0, 226.9])
     errors = (error_of_five(ds, f, how) for how in ("source", "dampers", "mu"))
     for at, real, dampers, mu in zip(f, *errors, strict=True):
-        kept = f"error at {at:g} Hz, {real:.4f}: what of it is left with exact dampers"
+        kept = f"error at {at:g} Hz, {real:.4f}: share that remains with exact dampers"
         yield held(kept, dampers / real, "< 1/10", "{:.4f}", "would vanish", refuted=True)
         yield most("  with mu = 1 - (w/w0)^2", "0", mu, 1e-12)
 

@@ -22,7 +22,7 @@ from kernels.interface import Status
 
 KINDS = {
     "one impact": "#0072B2", "several impacts": "#56B4E9", "bounces end in contact": "#009E73",
-    "off centre": "#E69F00", "period 2": "#CC79A7", "never settles": "#D55E00", "open": "0.85",
+    "off centre": "#E69F00", "period 2": "#CC79A7", "never settles": "#D55E00", "undecided": "0.85",
 }  # fmt: skip
 """Motions of the clock, and their colours."""
 LEVER_E = 0.6
@@ -70,7 +70,7 @@ def claims(motion, bent, closed) -> Claims:
     yield most("period by events = 2T", "0", same.period / twice - 1, 1e-9, count(both))
     yield most("swing by events = Y, whatever the torque", "0", same.Y / way - 1, 1e-9, count(both))
     yield held("stable cycles that events does not settle on", lost.mean(), "< 1 %", "{:.2%}")
-    yield from (Statement(f"  {name}", "", count(kind == i)) for i, name in enumerate(KINDS) if name != "open")
+    yield from (Statement(f"  {name}", "", count(kind == i)) for i, name in enumerate(KINDS) if name != "undecided")
     yield held("  none of these", (kind == len(KINDS) - 1).mean(), "< 2 %", "{:.2%}")
 
     yield "A curved lever"
@@ -106,6 +106,7 @@ def figure(clock, lever, motion, bent, *_):
     lever.axvline(1.0, color="black", linewidth=0.9)
     direct_label(lever, 0.3, -7, "stable")
     direct_label(lever, 0.22, 3, "unstable")
+    direct_label(lever, 2.5, 4, "no cycle")
 
 
 def prepared(ds, lever):

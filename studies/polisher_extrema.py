@@ -66,7 +66,7 @@ def claims(ds) -> Claims:
     yield said("all smaller turn, all larger lock", sharp, f"locks from {100 * float(locked.e[0]):.2f} cm on", "-")
     yield differing("A0 = A1 there, degree", "-", degrees(there.A1), degrees(there.A0), 1e-5)
     yield said(what, near.transmission_angle < 0.3 * angle, text, "-")
-    yield said("harmonic motion", last.thd < 0.01, f"distortion {last.thd:.1%} at 15 cm", "held so elsewhere", True)
+    yield said("harmonic motion", last.thd < 0.01, f"distortion {last.thd:.1%} at 15 cm", "assumed elsewhere", True)
 
 
 TURN = Axis("crank angle from $b$ [degree]", (-180, 180))

@@ -35,7 +35,7 @@ EXIT_CODES = {
     COMPLETE: "complete",
     FAULT: "a fault in foliot",
     MISTAKE: "a mistake in the study or command, or too little disk space or memory",
-    INCOMPLETE: "not complete yet (--until, a cluster or output that is lost); the same command continues",
+    INCOMPLETE: "not complete (--until, lost cluster, output); the same command continues",
     CELLS_FAILED: "complete, but some cells FAILED; sweep show names them",
     INTERRUPTED: "stopped by Ctrl-C; the same command continues",
     TERMINATED: "stopped by SIGTERM; the same command continues",

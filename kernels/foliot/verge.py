@@ -282,7 +282,7 @@ def check(p):
 
 VERGE = kernel(
     "verge",
-    doc="limit cycle of crown wheel and foliot as two bodies with friction and restitution, or that they unmesh",
+    doc="limit cycle of crown wheel and foliot as two bodies with friction and restitution",
     source="two bodies, friction, contact and restitution; derived here",
     parameters=(
         Field("tau", "N m", "torque on the crown wheel", lower=0.0, open_lower=True),

@@ -111,7 +111,7 @@ def _waveform(first, columns, turn):
 
 POLISHER = kernel(
     "polisher",
-    doc="how far a polishing machine's crank swings its arm, and how well",
+    doc="swing of a polishing machine's arm: middle, amplitude, distortion, speeds",
     source="Cordero-Davila et al., Opticheskii Zhurnal 78(3):55 (2011), (37)-(40); stable forms and verdict are ours",
     parameters=PARAMETERS,
     outputs=OUTPUTS,

@@ -100,7 +100,7 @@ def work_precision(
         True values in the cells that `precision_cells` names; NaN in all outputs where there is nothing to give. Errors
         are then over these outputs alone.
     note : callable, optional
-        Told how many cells are left out.
+        Told how much there is to do, and how many cells are left out.
     isolate, cell_timeout
         As of `run`: cells are tried in processes of their own first, and left out where a method fails.
 
@@ -142,6 +142,7 @@ def work_precision(
     for name in {*names, reference or able[0]} - {"auto", *able} | {reference} & {"auto"}:
         hint = did_you_mean(name, able) or f"; there are auto, {', '.join(able)}"
         raise SweepError(f"no method {name} that can do this study{hint}")
+    note(f"methods: {len(names)}, tolerances: {len(tolerances)}, cells: {Grid(part).size} ...")
     if isolate or cell_timeout is not None:
         part = _without_failing(part, ["auto", *able], cell_timeout, note)
     against = _given(part, truth) if truth is not None else _best(part, [reference] if reference else able)
