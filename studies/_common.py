@@ -332,7 +332,7 @@ def what_came_out(name: str) -> list[str]:
     for row in page.read_text(encoding="utf-8").splitlines() if page.exists() else ():
         if row.startswith(f"| `{name}` |"):
             _, _, question, answer, checked, _ = row.split("|")
-            text = f"Answer of the study as supplied. {question} {answer} Checks and limits: {checked}"
+            text = f"Answer of the study as supplied. {question} {answer} How it was checked, and its limits: {checked}"
             return textwrap.wrap(" ".join(re.sub(r"\[(.+?)\]\(.+?\)", r"\1", text).split()), 79)
     return []
 

@@ -261,7 +261,9 @@ def test_cells_at_which_a_kernel_dies_are_left_out():
     notes = []
     keys = {"tolerances": [1e-6], "isolate": True, "note": notes.append}
     found = sweep.work_precision(tall(40, "bad:DYING"), **keys)
-    assert [("3 of 40" in note, "height=11" in note) for note in notes] == [(True, True)]
+    begun, *others = notes
+    assert "cells: 40" in begun
+    assert [("3 of 40" in note, "height=11" in note) for note in others] == [(True, True)]
     assert (found.attrs["cells"], float(found.ok.min())) == (37, 1.0)
     with pytest.raises(sweep.SweepError, match="failed"):
         sweep.work_precision(tall(5, "bad:HOPELESS"), **keys)
