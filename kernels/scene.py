@@ -228,7 +228,7 @@ def _methods(scene: Scene, parameters: list[str], outputs: list[str]) -> tuple[M
     by_series, n = runner(scene, "taylor"), len(parameters)
     docs = {
         "taylor": f"{SERIES}; the error propagated, or three runs compared",
-        "taylor_once": "the same in one run, each step accurate to rtol; the total error is not known",
+        "taylor_once": "the same in one run, each step accurate to rtol; total error unknown (bound inf)",
         "rodas5p": f"for stiff equations: Rosenbrock's method Rodas5P, L-stable, {LOCATED}",
         "dop853": f"Dormand-Prince 8(5,3) {LOCATED}",
         "dopri5": f"Dormand-Prince 5(4) {LOCATED}",
