@@ -94,10 +94,10 @@ class Cluster:
         async def settled(asked: Any) -> Done:
             try:
                 try:
-                    return await asked  # type: ignore[no-any-return]
+                    return await answer(asked)
                 except distributed.KilledWorker:
                     async with self._suspects:
-                        return await ask()  # type: ignore[no-any-return]
+                        return await answer(ask())
             except SweepError:
                 raise
             except (CancelledError, OSError) as fault:
@@ -110,6 +110,20 @@ class Cluster:
             return asyncio.run_coroutine_threadsafe(settled(ask()), self._client.loop.asyncio_loop)
         except Exception as fault:
             raise _lost(fault) from fault
+
+
+async def answer(asked: Any) -> Done:
+    """The result of dask's future, which is let go of where this is cancelled.
+
+    dask fetches many results at once. Cancelled while it waits for those, it would answer nobody any more.
+    """
+    waiting = asyncio.ensure_future(asked)
+    try:
+        return await asyncio.shield(waiting)
+    except asyncio.CancelledError:
+        waiting.add_done_callback(lambda done: done.cancelled() or done.exception())  # else it is told on stderr
+        asked.release()
+        raise
 
 
 def _lost(fault: BaseException) -> Incomplete:

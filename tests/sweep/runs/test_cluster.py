@@ -1,5 +1,6 @@
 """Runs on a real scheduler with worker processes on this machine; some of these are killed."""
 
+import asyncio
 import contextlib
 import io
 import os
@@ -149,6 +150,23 @@ def test_a_block_of_which_every_worker_dies_ends_the_run_and_is_named(client, ou
     with pytest.raises(SweepError, match=r"12 to 13.*KilledWorker.*isolated"):
         elsewhere(study, output, cluster=client, block_cells=1, until=datetime.now() + timedelta(seconds=300))
     same(quiet(study, output), quiet(study))  # nobody dies of it here
+
+
+def test_what_is_given_up_leaves_the_client_as_it_was(client):
+    """dask fetches results together: what is cancelled meanwhile must not end that for all others."""
+    from sweep.runs.cluster import answer
+
+    def fetched(count):
+        there = [client.submit(abs, -1, pure=False) for _ in range(count)]
+        client.gather(there)
+        return [asyncio.run_coroutine_threadsafe(answer(one), client.loop.asyncio_loop) for one in there]
+
+    for k in range(60):
+        given_up = fetched(6)
+        time.sleep(5e-5 * k)
+        for future in given_up:
+            future.cancel()
+        assert fetched(1)[0].result(30) == 1
 
 
 def test_a_cluster_without_workers_is_waited_for_and_says_so(output):
