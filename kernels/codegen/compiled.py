@@ -127,6 +127,7 @@ def running(functions, of_lanes, kind):
 
 
 def _all_cells(cells, memory, held):
+    """Each cell, a row of what a lane knows, until its last switch; ADVANCE is of the scene (`running`)."""
     each_refilled(ADVANCE, cells, memory, held)  # noqa: F821  a name of `running`
 
 
