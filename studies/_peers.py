@@ -196,7 +196,7 @@ def modes(belt: float, fall: float, until: float, rtol: float) -> float:
         return u[1], fall * u[1] - u[0] + 1.0
 
     t, place, last = 0.0, 0.0, 1.0 + fall * belt
-    while t + (last - place) / belt < until:
+    while t < until and t + (last - place) / belt < until:  # the last slip may be cut short, beyond `last`
         t += (last - place) / belt
         t, (place, _) = ended(slips, (last, belt), (t, until), rtol, lambda _, u: belt - float(u[1]), -1)
     return place + belt * (until - t)
