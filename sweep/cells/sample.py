@@ -59,12 +59,14 @@ def _picked(grid: Grid, cells: Any) -> Study:
         name = min(study.kernel.parameters, key=lambda p: p.default is not None).name
         axes = {name: np.resize(fixed.pop(name), len(cells))}
     method = "auto" if "method" in study.axes else study.method
-    layout: dict[str, Any] = {"design": "zip", "blocks": (), "where": "", "summary": None, "method": method}
-    return replace(study, **layout, axes={name: _axis(name, values) for name, values in axes.items()}, fixed=fixed)
+    return zipped(study, axes, fixed=fixed, method=method)
 
 
-def _axis(name: str, values: Any) -> Axis:
-    return Axis(name, frozen(values), "values")
+def zipped(study: Study, columns: Mapping[str, Any], **keys: Any) -> Study:
+    """The study with these columns as its axes, value by value, and other `keys`; all its cells are asked and kept."""
+    axes = {name: Axis(name, frozen(values), "values") for name, values in columns.items()}
+    layout: dict[str, Any] = {"design": "zip", "blocks": (), "where": "", "summary": None}
+    return replace(study, **layout, axes=axes, **keys)
 
 
 def require_asked(study: Study) -> None:
@@ -102,11 +104,11 @@ def multiplied(study: Study, factors: Mapping[str, Any]) -> Study:
     for p in study.kernel.parameters:
         if isinstance(p.default, str) and p.name in study.fixed and not differs(p, study.fixed) and p.default in by:
             by[p.name] = by[p.default]
-    axes = {name: _axis(name, (axis.values.T * by.get(name, 1.0)).T) for name, axis in study.axes.items()}
+    axes = {name: (axis.values.T * by.get(name, 1.0)).T for name, axis in study.axes.items()}
     fixed = {name: value * by.get(name, 1.0) for name, value in study.fixed.items()}
     fixed = {name: frozen(value) if np.ndim(value) else value for name, value in fixed.items()}
     along = {name: frozen(values * by.get(name, 1.0)) for name, values in study.along.items()}
-    return replace(study, axes=axes, fixed=fixed, along=along)
+    return zipped(study, axes, fixed=fixed, along=along)
 
 
 def relative_error(values: Any, true: Any, size: float = 0.0) -> Any:

@@ -167,12 +167,9 @@ def chart(arguments: argparse.Namespace) -> None:
 )
 def check(arguments: argparse.Namespace) -> Outcome:
     """Solve some OK cells again by another method and compare; exit status 1 if one is beyond its rtol."""
-    from sweep.explore.recheck import check
-    from sweep.words import paragraph
-
     with opened(arguments) as dataset:
-        found = check(dataset, study_from(arguments, dataset), arguments.sample, arguments.seed)
-    tell(arguments, found, paragraph(str(found)))
+        found = dataset.sweep.check(arguments.sample, arguments.seed, allow_import=arguments.allow_import)
+    tell(arguments, vars(found), found)
     return Outcome(DIFFERENT if found.beyond else COMPLETE, str(found))
 
 
@@ -182,7 +179,6 @@ def check(arguments: argparse.Namespace) -> Outcome:
 )
 def cell(arguments: argparse.Namespace) -> None:
     """One cell: its values, the meaning of its status, and the result of each method."""
-    from sweep.explore.recheck import report_cell
-
     with opened(arguments) as dataset:
-        tell(arguments, report_cell(dataset, study_from(arguments, dataset)))
+        found = dataset.sweep.cell(allow_import=arguments.allow_import)
+    tell(arguments, vars(found), found)

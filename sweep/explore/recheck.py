@@ -3,297 +3,196 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import xarray as xr
+from scipy.special import betaincinv
 
 from kernels.interface import FIRST_REFUSAL, Status
-from sweep.cells.grid import Grid
-from sweep.cells.sample import relative_error, solved
+from sweep.cells.sample import relative_error, solved, zipped
 from sweep.cells.schema import ERROR_BOUND, METHOD_USED, STATUS
-from sweep.cells.solve import GIVEN_UP, among, turns
+from sweep.cells.solve import GIVEN_UP, among, usable_methods
 from sweep.errors import SweepError
-from sweep.results.statuses import cell_values, flag_words
-from sweep.study.model import SMALLEST_RTOL, Axis, Study, frozen, short
-from sweep.words import Table, page, paragraph
+from sweep.results.filter import cells_at
+from sweep.results.statuses import cell_values, flag_words, statuses_of
+from sweep.study.model import SMALLEST_RTOL, Study, short
+from sweep.study.read import study as study_of
+from sweep.words import Table, page
 
 CLOSER = 100.0
 """A second opinion is asked for at rtol over this, or at the smallest rtol."""
-GOOD = 10.0
-"""Its own error is to be below rtol over this, or where none is, below rtol."""
 CONFIDENCE = 0.95
+WORDS = {int(status): status for status in Status}
 NOTHING = 1e-12
 """A state of a scene that is nowhere larger at its switches, in SI, lies on the surface and is 0 to rounding."""
 
 
-def require_cells(name: str, dataset: xr.Dataset) -> None:
-    """Raises SweepError where a Dataset keeps no cells."""
-    if STATUS not in dataset:
-        raise SweepError(f"sweep {name}: this is a summary, which keeps no cells; run its study without [summary]")
-
-
-def study_of(cells: xr.Dataset, study: Study) -> Study:
-    """A zip of cells of a result, those along "cell", by all parameters and rtol, from the study that they came from.
-
-    Raises
-    ------
-    SweepError
-        A parameter's value is no longer there, or stands in another unit.
-    """
-    columns, size = dict[str, Any](), cells[STATUS].size
-    for field in study.kernel.parameters:
-        name = study.follows.get(field.name, field.name)
-        if name not in cells.coords:
-            raise SweepError(f"{name}: the dataset has lost this coordinate; take a cell of the result as it was read")
-        values: Any = cells[name].values
-        if field.choices and values.dtype.kind not in "fiu":
-            values = np.vectorize(field.choices.get, otypes=[float])(values)
-        elif cells[name].attrs.get("units", field.unit) != field.unit:
-            raise SweepError(f"{name}: stands in another unit; take a cell of the result as it was read")
-        columns[field.name] = values if "cell" in cells[name].dims else np.broadcast_to(values, (size, *values.shape))
-    columns["rtol"] = np.full(size, cells["rtol"].values if "rtol" in study.axes else study.rtol)
-    axes = {name: Axis(name, frozen(values), "values") for name, values in columns.items()}
-    return replace(study, axes=axes, fixed={}, follows={}, design="zip", blocks=(), where="", summary=None)
-
-
-def able(study: Study) -> dict[int, Any]:
-    """The methods that can do some of a study's cells, of which all parameters are axes, and whether each can."""
-    *columns, rtol = (axis.values for axis in study.axes.values())
-    turned = (turn for turn in turns(study, Grid(study)) if not turn.early)
-    return {t.number: np.all([rtol > 0, *(term.holds(columns) for term in t.absent)], axis=0) for t in turned}
-
-
-@dataclass(frozen=True)
 class CellReport:
-    """What a result says of one cell, and what each method of the kernel says when it is asked again.
+    """What a result says of its one cell, and each method of the kernel when it is asked again.
+
+    Raises SweepError where the Dataset has more cells than one, or none.
 
     Attributes
     ----------
-    values : dict of str to float
-        Outputs that are numbers, in SI units.
-    status : Status
-    method : str
-        That solved the cell, or "none".
-    error_bound, rtol : float
-        Error of the values, and the accuracy that the study asks for.
-    methods : dict of str to tuple
-        Status, error bound and outputs by each method that can do the cell, at the same rtol.
-    differs : dict of str to float
-        The largest relative difference of each method's outputs from `values`, NaN where only one is NaN. Outputs that
-        say how a cell was solved, such as a number of steps, are left out; {} where only these or traces are there.
+    place, values, units : dict of str
+        Parameters with their units; outputs that are numbers, in SI units, and these.
+    status, method, error_bound, rtol : Status, str, float, float
+        The method that solved the cell, or "none"; the error of the values, and the one that the study asks for.
+    methods, differs : dict of str
+        By each method that can do the cell, at the same rtol: status, error bound and outputs; the largest of
+        `deviations`, NaN if outputs only say how the cell was solved.
     """
 
-    place: dict[str, str]
-    values: dict[str, float]
-    units: dict[str, str]
-    status: Status
-    method: str
-    error_bound: float
-    rtol: float
-    methods: dict[str, tuple[Status, float, dict[str, float]]]
-    differs: dict[str, float]
+    def __init__(self, dataset: xr.Dataset, allow_import: bool) -> None:
+        if longer := [f"{dim} ({n} values)" for dim, n in statuses_of(dataset).sizes.items() if n != 1]:
+            raise SweepError(f"sweep cell: name one cell; these axes have several values still: {', '.join(longer)}")
+        study, cells, columns = again(dataset, [0], allow_import)
+        cell, fixed = cells.isel(cell=0), {name: column[0] for name, column in columns.items()}
+        self.rtol = float(fixed.pop("rtol"))
+        required = (field.name for field in study.kernel.parameters if field.default is None)
+        shown, self.place = {*study.terms, *study.axes, *required}, dict[str, str]()
+        for name, value in ((str(name), cell[name]) for name in cell.coords if name in shown):
+            text = short(value.values) if value.dtype.kind in "fiu" else str(value.item())
+            self.place[name] = f"{text} {value.attrs.get('units', '1')}".removesuffix(" 1")
+        self.values = {name: cell[name].item() for name in study.outputs if not cell[name].dims}
+        self.units = {name: cell[name].attrs.get("units", "") for name in self.values}
+        self.status, self.method = WORDS[cell[STATUS].item()], flag_words(cell[METHOD_USED])[cell[METHOD_USED].item()]
+        self.error_bound = cell[ERROR_BOUND].item() if ERROR_BOUND in cell else np.nan
+        self.methods, self.differs = dict[str, tuple[Status, float, dict[str, float]]](), dict[str, float]()
+        part = zipped(study, {"rtol": [self.rtol]}, fixed=fixed, follows={})
+        for method in (study.kernel.methods[k].name for k in usable_methods(part)):
+            found = solved(replace(part, method=method))
+            outputs = {name: float(found.outputs[name][0]) for name in self.values}
+            self.methods[method] = WORDS[int(found.status[0])], float(found.error[0]), outputs
+            off = deviations(study, found.outputs, cells).values()
+            self.differs[method] = max((float(one[0]) for one in off), default=np.nan)
 
     def __str__(self) -> str:
         special = "" if self.status is Status.OK else f" ({self.status.kind})"
-        outputs = ((name, f"{value:.10g}", self.units[name]) for name, value in self.values.items())
-        headings = ("method", "status", "error", *["differs by"] * bool(self.differs))
-        off = {name: (f"{share:.2g}",) for name, share in self.differs.items()}
-        asked = [(k, status.name, f"{error:.2g}", *off.get(k, ())) for k, (status, error, _) in self.methods.items()]
-        return page(
-            paragraph("cell: " + ", ".join(f"{name} = {value}" for name, value in self.place.items())),
-            paragraph(
-                f"{self.status.name}{special}: {self.status.doc}\n"
-                f"solved by {self.method}; error bound {self.error_bound:.2g}, requested rtol {self.rtol:g}"
-            ),
-            Table(outputs, ("output", "value", "unit")).text(),
-            Table(asked, headings, "Each method of the kernel at the same rtol, computed now:").text(),
-        )
+        rows = [
+            ("cell", ", ".join(f"{name} = {value}" for name, value in self.place.items())),
+            ("status", f"{self.status.name}{special}: {self.status.doc}"),
+            ("solved by", f"{self.method}; error bound {self.error_bound:.2g}, requested rtol {self.rtol:g}"),
+        ]
+        rows += [(name, f"{value:.10g} {self.units[name]}") for name, value in self.values.items()]
+        asked = [(k, v[0].name, f"{v[1]:.2g}", f"{self.differs[k]:.2g}") for k, v in self.methods.items()]
+        title = "Each method of the kernel at the same rtol, computed now:"
+        return page(Table(rows).text(), Table(asked, ("method", "status", "error", "differs by"), title).text())
 
 
-def report_cell(dataset: xr.Dataset, study: Study) -> CellReport:
-    """What there is to say of the one cell of a Dataset.
-
-    Raises
-    ------
-    SweepError
-        The Dataset has more cells than one, or none.
-    """
-    require_cells("cell", dataset)
-    longer = {str(dim): n for dim, n in dataset[STATUS].sizes.items() if n != 1}
-    if longer:
-        axes = ", ".join(f"{dim} ({n} values)" for dim, n in longer.items())
-        raise SweepError(f"sweep cell: name one cell; these axes have several values still: {axes}")
-    cell = dataset.squeeze(list(dataset[STATUS].dims)).compute()
-    again = study_of(cell.expand_dims("cell"), study)
-    values = {name: cell[name].item() for name in study.outputs if not cell[name].dims}
-    compared = [field.name for field in study.asked if field.name in values and not field.of_method]
-    words, methods, differs = {int(status): status for status in Status}, {}, dict[str, float]()
-    for method in (study.kernel.methods[k].name for k, can in able(again).items() if can):
-        found = solved(replace(again, method=method))
-        outputs = {name: float(found.outputs[name][0]) for name in values}
-        methods[method] = words[int(found.status[0])], float(found.error[0]), outputs
-        if compared:
-            pair = np.array([[some[name] for name in compared] for some in (outputs, values)])
-            if ":" in study.kernel_name:
-                pair[abs(pair) <= NOTHING] = 0.0
-            off = np.where(np.isnan(pair).sum(axis=0) == 1, np.nan, relative_error(*pair))
-            differs[method] = float(off.max())
-    shown = {*study.terms, *study.axes, *(field.name for field in study.kernel.parameters if field.default is None)}
-    place = dict[str, str]()
-    for name, value in ((name, cell[name]) for name in cell.coords if name in shown):
-        unit = value.attrs.get("units", "1")
-        text = short(value.values) if value.dtype.kind in "fiu" else str(value.item())
-        place[str(name)] = text if unit == "1" else f"{text} {unit}"
-    return CellReport(
-        place,
-        values,
-        {name: cell[name].attrs.get("units", "") for name in values},
-        words[cell[STATUS].item()],
-        flag_words(cell[METHOD_USED])[cell[METHOD_USED].item()],
-        float(cell[ERROR_BOUND]) if ERROR_BOUND in cell else np.nan,
-        float(again.axes["rtol"].values[0]),
-        methods,
-        differs,
-    )
-
-
-@dataclass(frozen=True)
 class Checked:
-    """What came of solving a sample of OK cells again.
+    """What comes of solving some OK cells of a result again. Raises SweepError where it has none.
+
+    They are asked for at rtol over `CLOSER`. The second opinion is another method's wherever one gets to rtol; else
+    the same method's.
 
     Attributes
     ----------
-    cells, sample, judged : int
-        OK cells of the result, those drawn, and those for which there was a second opinion.
-    by_another : int
-        Judged cells whose second opinion came from another method.
+    cells, sample, judged, by_another : int
+        OK cells of the result, those drawn, those for which there was a second opinion, and one of another method.
     beyond : int
         Judged cells in which an output differs by more than rtol and the error of the second opinion, or of which the
         second opinion is that there is no such answer.
     limit : float
         Share of all OK cells that may be beyond rtol, at 95 % confidence.
     worst : dict
-        The cell that differs most: its place, output, both values and methods, and the difference in units of rtol.
+        The cell that differs most: its place, output, both values and who gives them (a method, or the status that says
+        that there is none), and the difference in units of rtol.
     """
 
-    cells: int
-    sample: int
-    judged: int
-    by_another: int
-    beyond: int
-    limit: float
-    worst: dict[str, Any]
+    def __init__(self, dataset: xr.Dataset, sample: int, seed: int, allow_import: bool) -> None:
+        if sample < 1:
+            raise SweepError(f"sample: expected 1 or more, found {sample}")
+        ok = np.flatnonzero(statuses_of(dataset).values == Status.OK)
+        if not len(ok):
+            raise SweepError("no cell is OK, so there is nothing to check")
+        drawn = np.sort(np.random.default_rng(seed).choice(ok, min(sample, len(ok)), replace=False))
+        study, cells, columns = again(dataset, drawn, allow_import)
+        rtol, closer = columns["rtol"], columns | {"rtol": np.maximum(columns["rtol"] / CLOSER, SMALLEST_RTOL)}
+        methods, used = study.kernel.methods, cells[METHOD_USED].values
+        own = np.array([methods[k].name for k in used], object)
+
+        # methods that say what they are right to come before others, and a cell's own after all
+        order = sorted(methods, key=lambda method: method.bound is None and not method.estimates)
+        source, error, values = own.copy(), np.inf * rtol, {name: np.array(cells[name]) for name in study.outputs}
+        for others, k in itertools.product((True, False), np.unique(used)):
+            some = np.flatnonzero((used == k) & (error > rtol))
+            part = zipped(study, {name: column[some] for name, column in closer.items()}, fixed={}, follows={})
+            asked = [method for method in order if (method is not methods[k]) == others]
+            found = solved(replace(part, kernel=replace(study.kernel, methods=tuple(asked)), method="auto"))
+            # that there is no such answer is an answer, which differs from any value
+            none = (found.status >= FIRST_REFUSAL) & ~among(found.status, GIVEN_UP)
+            error[some] = np.where(none, 0.0, np.where(found.status <= Status.INACCURATE, found.error, np.inf))
+            source[some] = [asked[n].name if n >= 0 else WORDS[s].name for n, s in np.c_[found.used, found.status]]
+            for name, column in found.outputs.items():
+                values[name][some] = column
+
+        off, judged = deviations(study, cells, values), error <= rtol
+        largest = np.max([*off.values()], axis=0)
+        self.cells, self.sample, self.judged = len(ok), len(drawn), int(judged.sum())
+        self.by_another, self.beyond = (int((judged & some).sum()) for some in (source != own, largest > rtol + error))
+        # the largest share of which so few would be found in so many, by Clopper and Pearson; of all cells, their own
+        share = betaincinv(self.beyond + 1, self.judged - self.beyond, CONFIDENCE) if self.beyond < self.judged else 1.0
+        self.limit = self.beyond / self.judged if self.judged == self.cells else float(share)
+        self.worst = dict[str, Any]()
+        if self.judged:
+            i = np.where(judged, largest / rtol, -1.0).argmax()
+            output = max(off, key=lambda name: off[name][i])
+            pair = [np.ravel(some[output][i]) for some in (cells, values)]
+            place = np.argmax(abs(pair[0] - pair[1]))
+            said = [(own[i], float(pair[0][place])), (source[i], float(pair[1][place]))]
+            self.worst = {"cell": cell_values(dataset, int(drawn[i])), "output": output, "values": said}
+            self.worst["off"] = float(largest[i] / rtol[i])
 
     def __str__(self) -> str:
-        same = self.judged - self.by_another
-        lines = [
-            f"{self.sample:,} of {self.cells:,} OK cells solved again, to a tolerance down to rtol/{CLOSER:g}: "
-            f"{self.by_another:,} by another method, {same:,} by the same"
-            + (" (which cannot find an error that both have in common)" if same else "")
+        rows = [
+            ("solved again", f"{self.sample:,} of {self.cells:,} OK cells, to a tolerance down to rtol/{CLOSER:g}"),
+            ("by another method", f"{self.by_another:,}"),
+            ("by the same", f"{self.judged - self.by_another:,}; an error that both have in common is not found"),
+            ("by none", f"{self.sample - self.judged:,}, which no method solves to rtol again"),
+            ("beyond rtol", f"{self.beyond or 'none'} of {self.judged:,}"),
+            ("of all OK cells", f"at most {100 * self.limit:.2g} % beyond, with {100 * CONFIDENCE:g} % confidence"),
         ]
-        if self.judged < self.sample:
-            lines.append(f"not judged: {self.sample - self.judged:,}, which no method solves to rtol again")
-        if self.judged:
-            found = f"{self.beyond:,} of {self.judged:,}" if self.beyond else "none"
-            share = f"; of all OK cells at most {100 * self.limit:.2g} %, with {100 * CONFIDENCE:g} % confidence"
-            lines.append(f"beyond rtol: {found}{share if self.judged < self.cells else ''}")
         if self.worst:
             place = ", ".join(f"{name} = {value}" for name, value in self.worst["cell"].items())
-            (name, value), (other, again) = self.worst["values"]
-            lines.append(
-                f"largest deviation: {self.worst['output']} by {self.worst['off']:.2g} rtol at {place}: "
-                f"{value:.12g} by {name}, {again:.12g} by {other}"
-            )
-        return "\n".join(lines)
+            values = " against ".join(f"{value:.12g} ({who})" for who, value in self.worst["values"])
+            rows += [
+                ("largest deviation", f"{self.worst['output']} by {self.worst['off']:.2g} rtol at {place}: {values}")
+            ]
+        return Table(rows).text()
 
 
-def check(dataset: xr.Dataset, study: Study, sample: int = 200, seed: int = 0) -> Checked:
-    """Solve some OK cells of a result again, and compare.
+def again(dataset: xr.Dataset, numbers: Any, allow_import: bool) -> tuple[Study, xr.Dataset, dict[str, Any]]:
+    """A result's study, some cells along "cell", and their parameters and rtol as the kernel has them."""
+    study, cells = study_of(dataset, allow_import=allow_import), cells_at(dataset, numbers).compute()
+    columns = {"rtol": np.full(len(numbers), cells.get("rtol", study.rtol))}
+    for field in study.kernel.parameters:
+        name = study.follows.get(field.name, field.name)
+        column = cells.coords.get(name)
+        if column is None or column.attrs.get("units", field.unit) != field.unit:
+            raise SweepError(f"{name}: is lost or in another unit; take cells of the result as it was read")
+        values: Any = column.values
+        if field.choices and values.dtype.kind not in "fiu":
+            values = np.vectorize(field.choices.get, otypes=[float])(values)
+        shape = values.shape if "cell" in column.dims else (len(numbers), *values.shape)
+        columns[field.name] = np.broadcast_to(values, shape)
+    return study, cells, columns
 
-    The second opinion is another method's wherever one gets to a tenth of rtol; else the same method's, far more
-    closely. Outputs are compared as `OK` promises: relative to themselves, traces to their amplitude, and the states of
-    a scene of one's own to their largest value in the sample, since a result does not keep their size on the way; a
-    state that the surface holds at 0 is left out.
 
-    Parameters
-    ----------
-    dataset : Dataset
-        Of cells, as they were read or any part of them.
-    study : Study
-        What it came from.
-    sample, seed : int
-        How many cells, and which.
+def deviations(study: Study, outputs: Any, true: Any) -> dict[str, Any]:
+    """How far outputs are from others of the same cells, in each; infinite where one alone is NaN.
 
-    Raises
-    ------
-    SweepError
-        The result is a summary or has no OK cell; `sample` is below 1.
+    As `OK` promises: relative to themselves, traces to their amplitude, and the states of a scene of one's own to their
+    largest value in these cells, since a result does not keep their size on the way; those that the surface holds at 0
+    are the same. Outputs that say how a cell was solved, such as a number of steps, are left out.
     """
-    from scipy.stats import beta
-
-    require_cells("check", dataset)
-    if sample < 1:
-        raise SweepError(f"sample: expected 1 or more, found {sample}")
-    ok = np.flatnonzero(dataset[STATUS].values.ravel() == Status.OK)
-    if not len(ok):
-        raise SweepError("no cell is OK, so there is nothing to check")
-    drawn = np.sort(np.random.default_rng(seed).choice(ok, min(sample, len(ok)), replace=False))
-    places = zip(dataset[STATUS].dims, np.unravel_index(drawn, dataset[STATUS].shape), strict=True)
-    cells = dataset.isel({dim: xr.DataArray(place, dims="cell") for dim, place in places}).compute()
-    cells = cells.transpose("cell", ...)
-    used, methods = cells[METHOD_USED].values, [method.name for method in study.kernel.methods]
-    again = study_of(cells, study)
-    rtol, (by, error, values) = again.axes["rtol"].values, _second_opinions(again, used)
-
-    judged, own = by >= 0, ":" in study.kernel_name
-    sizes = {field.name: float(abs(cells[field.name]).max()) if own else 0.0 for field in study.asked}
-    compared = [f.name for f in study.asked if not f.of_method and (not own or sizes[f.name] > NOTHING)]
-    off = np.stack([relative_error(cells[name].values, values[name], sizes[name]) for name in compared])
-    beyond, number = int((judged & (off.max(axis=0) > rtol + error)).sum()), int(judged.sum())
-    worst = dict[str, Any]()
-    if number:
-        i = int(np.where(judged, off.max(axis=0) / rtol, -1.0).argmax())
-        output = compared[off[:, i].argmax()]
-        value, again = cells[output].values[i], values[output][i]
-        place = np.unravel_index(np.argmax(abs(value - again)), again.shape)
-        worst = {
-            "cell": cell_values(dataset, int(drawn[i])),
-            "output": output,
-            "values": ((methods[used[i]], value[place].item()), (methods[by[i]], again[place].item())),
-            "off": float(off[:, i].max() / rtol[i]),
-        }
-    by_another = int((judged & (by != used)).sum())
-    # the largest share of which so few would be found in so many, by Clopper and Pearson; of all cells, their own
-    share = float(beta.ppf(CONFIDENCE, beyond + 1, number - beyond)) if beyond < number else 1.0
-    limit = beyond / number if number == len(ok) else share
-    return Checked(len(ok), len(drawn), number, by_another, beyond, limit, worst)
-
-
-def _second_opinions(study: Study, used: Any) -> tuple[Any, Any, dict[str, Any]]:
-    """Of cells that some methods solved: the numbers of methods that solve them closely, their errors, and outputs.
-
-    The number is -1 where no method does. Outputs are NaN, and differ from any value, where a method finds that the
-    scene has no such answer.
-    """
-    methods, size, rtol = study.kernel.methods, len(used), study.axes["rtol"].values
-    closer = study.axes | {"rtol": Axis("rtol", np.maximum(rtol / CLOSER, SMALLEST_RTOL), "values")}
-    by, error, settled = np.full(size, -1), np.full(size, np.nan), np.zeros(size, bool)
-    values = {name: np.full((size, *shape), np.nan) for name, shape in study.shapes.items()}
-    # methods that say what they are right to come before others, and a cell's own after all
-    order = sorted(able(study).items(), key=lambda k: methods[k[0]].bound is None and not methods[k[0]].estimates)
-    for own, (k, can) in itertools.product((False, True), order):
-        some = np.flatnonzero(can & ~settled & ((used == k) == own))
-        if not len(some):
-            continue
-        axes = {name: replace(axis, values=frozen(axis.values[some])) for name, axis in closer.items()}
-        again = solved(replace(study, axes=axes, method=methods[k].name))
-        void = (again.status >= FIRST_REFUSAL) & ~among(again.status, GIVEN_UP)
-        known = np.where(void, 0.0, np.where(again.status <= Status.INACCURATE, again.error, np.inf))
-        settled[some] = known <= rtol[some] / GOOD
-        taken = settled[some] | ((known <= rtol[some]) & (by[some] < 0))
-        by[some[taken]], error[some[taken]] = k, known[taken]
-        for name, column in again.outputs.items():
-            values[name][some[taken]] = column[taken]
-    return by, error, values
+    found = {}
+    for name in (field.name for field in study.asked if not field.of_method):
+        pair, size = [np.asarray(some[name]) for some in (outputs, true)], 0.0
+        if ":" in study.kernel_name:
+            pair = [np.where(abs(values) <= NOTHING, 0.0, values) for values in pair]
+            size = min(float(np.nanmax(abs(values), initial=0.0)) for values in pair)
+        found[name] = relative_error(pair[0], pair[1], size)
+    return found

@@ -35,6 +35,7 @@ from sweep.explore.scattered import MOST_AXES, REFINED_TO, Box, axes_of, heights
 from sweep.file import disk
 from sweep.file.disk import check_target
 from sweep.file.open import store_cells
+from sweep.results.statuses import statuses_of
 from sweep.runs.run import run
 from sweep.study.model import Axis, Study, frozen
 from sweep.study.read import study as as_study
@@ -194,8 +195,7 @@ def _require(dataset: xr.Dataset, study: Study, names: Sequence[str], tolerance:
     axes = study.axes.values()
     if not 0 < tolerance < 1:
         raise SweepError(f"tolerance: expected a number between 0 and 1, found {tolerance}")
-    if STATUS not in dataset:
-        raise SweepError("a summary keeps no cells; refine a result that has them")
+    statuses_of(dataset)
     if any(axis.words is not None or axis.values.ndim > 1 for axis in axes):
         raise SweepError("only number axes can be refined")
     if study.design != "product" and not axes_of(dataset):

@@ -11,7 +11,7 @@ import xarray as xr
 
 from sweep.cells.schema import ANCILLARY, STATUS
 from sweep.errors import SweepError
-from sweep.results.statuses import cell_values, flag_words, pieces
+from sweep.results.statuses import cell_values, flag_words, pieces, statuses_of
 from sweep.words import Table, listed
 
 
@@ -114,12 +114,10 @@ def diff(a: xr.Dataset, b: xr.Dataset | None = None, rtol: float = 0.0) -> Diffe
     (False, 2)
     """
     a, b = two_results("diff", a, b)
-    if any(STATUS not in d for d in (a, b)):
-        raise SweepError("a summary keeps no cells to compare")
     kernels = [str(d.attrs.get("kernel", "")) for d in (a, b)]
     if kernels[0] != kernels[1]:
         raise SweepError(f"the results are of different kernels, {kernels[0]} and {kernels[1]}")
-    if set(a[STATUS].dims) != set(b[STATUS].dims):
+    if set(statuses_of(a).dims) != set(statuses_of(b).dims):
         dims = [listed(map(str, d[STATUS].dims), word="and") for d in (a, b)]
         raise SweepError(f"the cells run along {dims[0]} in one result and along {dims[1]} in the other")
     for dim in (dim for dim in a[STATUS].dims if dim not in a.coords):

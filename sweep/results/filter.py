@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from sweep.cells.schema import STATUS
-from sweep.results.statuses import flag_words
+from sweep.results.statuses import flag_words, statuses_of
 from sweep.study.condition import Condition
 from sweep.words import did_you_mean, listed, require_dataset
 
@@ -54,12 +55,15 @@ def where(dataset: xr.Dataset, condition: str) -> xr.Dataset:
         return flag_words(dataset[name]).values() or sorted(set(map(str, np.unique(dataset[name].values))))
 
     chosen = Condition(condition, variable, words, "--where ")
-    if STATUS not in dataset:
-        raise chosen.refusal("a summary keeps no cells to choose from")
-    truth = chosen.truth()
-    dims = [str(dim) for dim in dataset[STATUS].dims]
+    status, truth = statuses_of(dataset), chosen.truth()
+    dims = [str(dim) for dim in status.dims]
     if others := sorted({str(dim) for dim in truth.dims} - set(dims)):
         raise chosen.refusal(f"runs along {listed(others)}, not the cells")
-    flat = dataset if dims == ["cell"] else dataset.stack(cell=dims, create_index=False)
-    mask = truth.broadcast_like(dataset[STATUS]).transpose(*dims).values.ravel()
-    return flat.transpose("cell", ...).isel(cell=np.flatnonzero(mask))
+    return cells_at(dataset, np.flatnonzero(truth.broadcast_like(status).transpose(*dims)))
+
+
+def cells_at(dataset: xr.Dataset, numbers: Any) -> xr.Dataset:
+    """Cells by their numbers in C order, along one dimension `cell`, with their parameters as coordinates."""
+    dataset = dataset if dataset[STATUS].dims else dataset.expand_dims("cell")
+    places = zip(dataset[STATUS].dims, np.unravel_index(numbers, dataset[STATUS].shape), strict=True)
+    return dataset.isel({dim: xr.DataArray(place, dims="cell") for dim, place in places}).transpose("cell", ...)

@@ -13,6 +13,7 @@ import numpy as np
 from kernels.interface import KINDS, Status
 from sweep.cells.reduce import BY_METHOD, BY_STATUS
 from sweep.cells.schema import METHOD_USED, STATUS
+from sweep.errors import SweepError
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -85,6 +86,13 @@ def kind_of(name: str) -> str:
 def is_summary(dataset: Cells) -> bool:
     """Whether a result holds reductions, not cells."""
     return BY_STATUS in dataset and STATUS not in dataset
+
+
+def statuses_of(dataset: xr.Dataset) -> xr.DataArray:
+    """What became of each cell. Raises SweepError where the result is a summary."""
+    if STATUS not in dataset:
+        raise SweepError("this is a summary, which keeps no cells; run its study without [summary]")
+    return dataset[STATUS]
 
 
 def flag_words(variable: xr.DataArray) -> dict[int, str]:

@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Any
 import xarray as xr
 from xarray.backends import BackendEntrypoint
 
+import sweep
+
 if TYPE_CHECKING:
     from sweep.explore.recheck import CellReport, Checked
     from sweep.words import Table
@@ -23,7 +25,7 @@ class SweepAccessor:
     """Look at a result, in one line each.
 
     Works on a Dataset of `sweep.run` and `sweep.open_result`, on one that `xarray.open_dataset` read from such a file,
-    and on parts of these.
+    and on parts of these. `allow_import` allows a kernel named "module:NAME", whose module is imported.
 
     Examples
     --------
@@ -54,28 +56,21 @@ class SweepAccessor:
 
     def plot(self, path: str | os.PathLike[str] | None = None, **keys: Any) -> Any:
         """The figure of one output: as `sweep.plot`, logarithmic along axes whose grid is."""
-        from sweep.show.figures import plot
-
-        return plot(self._dataset, path, **keys)
+        return sweep.plot(self._dataset, path, **keys)
 
     def in_units(self, units: Mapping[str, str] | None = None, **more: str) -> xr.Dataset:
         """The Dataset with some variables in other units: as `sweep.in_units`, e.g. `A0="degree"`."""
-        from sweep.results.units import in_units
-
-        return in_units(self._dataset, {**(units or {}), **more})
+        return sweep.in_units(self._dataset, {**(units or {}), **more})
 
     def where(self, condition: str) -> xr.Dataset:
         """The cells for which a condition holds: as `sweep.where`."""
-        from sweep.results.filter import where
-
-        return where(self._dataset, condition)
+        return sweep.where(self._dataset, condition)
 
     def fit(self, y: str, x: str, **options: Any) -> xr.Dataset:
         """The exponent of an output along an axis, of cells that have values: as `sweep.fit_exponent`."""
-        from sweep.laws.lines import fit_exponent
         from sweep.show.laws import output_of
 
-        return fit_exponent(self._dataset[output_of(self._dataset, y)], x, **options)
+        return sweep.fit_exponent(self._dataset[output_of(self._dataset, y)], x, **options)
 
     def statuses(self) -> Table:
         """How many cells have each status, what it says, and where: as `sweep show`."""
@@ -85,32 +80,23 @@ class SweepAccessor:
 
     def cell(self, *, allow_import: bool = False, **values: float | str) -> CellReport:
         """What there is to say of one cell, named by the values of its axes: as the command `sweep cell`."""
-        from sweep.explore.recheck import report_cell
+        from sweep.explore.recheck import CellReport
         from sweep.show.laws import pick
-        from sweep.study.read import study
 
-        part = pick(self._dataset, [f"{name}={value}" for name, value in values.items()])
-        return report_cell(part, study(self._dataset, allow_import=allow_import))
+        return CellReport(pick(self._dataset, [f"{name}={value}" for name, value in values.items()]), allow_import)
 
     def check(self, sample: int = 200, seed: int = 0, *, allow_import: bool = False) -> Checked:
-        """Solve some OK cells, so many at most, again by another method and compare: as the command `sweep check`.
+        """Solve some OK cells, so many at most, again by another method and compare: as the command `sweep check`."""
+        from sweep.explore.recheck import Checked
 
-        `allow_import` allows a kernel named "module:NAME", whose module is imported.
-        """
-        from sweep.explore.recheck import check
-        from sweep.study.read import study
-
-        return check(self._dataset, study(self._dataset, allow_import=allow_import), sample, seed)
+        return Checked(self._dataset, sample, seed, allow_import)
 
 
 class SweepEngine(BackendEntrypoint):
     """`xarray.open_dataset("foliot.h5", engine="sweep")`: as `sweep.open_result`, with its checks and dask chunks."""
 
     description = "Results of foliot, finished or not"
-    open_dataset_parameters = ("filename_or_obj", "drop_variables")
 
     def open_dataset(self, filename_or_obj: Any, *, drop_variables: Any = ()) -> xr.Dataset:
         """The result, without the variables that are to be dropped."""
-        from sweep.file.open import open_result
-
-        return open_result(filename_or_obj).drop_vars(drop_variables or ())
+        return sweep.open_result(filename_or_obj).drop_vars(drop_variables or ())

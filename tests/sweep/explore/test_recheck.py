@@ -79,7 +79,7 @@ def test_a_cell_is_what_the_result_and_each_method_say(clocks):
     assert told.differs[told.method] == pytest.approx(0.5)
     assert re.search(rf"^  {told.method} +OK +\S+ +0\.5$", str(told), re.MULTILINE)
     none = clocks.assign({name: clocks[name] * np.nan for name in FOLIOT["outputs"]}).sweep.cell(mu=0.3, R=0.1)
-    assert re.search(rf"^  {none.method} +OK +\S+ +nan$", str(none), re.MULTILINE)
+    assert re.search(rf"^  {none.method} +OK +\S+ +inf$", str(none), re.MULTILINE)
     refused = sweep.run(FOLIOT | {"axes": {"mu": [1e-3], "R": [0.1]}}).sweep.cell()
     assert refused.status == Status.NEVER_STARTS
     assert {status for status, *_ in refused.methods.values()} == {Status.NEVER_STARTS}
@@ -111,11 +111,12 @@ def test_what_is_no_cell_is_refused(clocks):
             look(allow_import=True)
 
 
-def test_traces_are_not_said_to_be_the_same():
+def test_traces_differ_relative_to_their_amplitude():
     keys = {"kernel": "foliot_motion", "outputs": ["angle"], "along": {"phase": [0.1, 0.4]}}
-    told = str(sweep.run(keys | {"axes": {"mu": [0.5]}, "fixed": {"phi0": 1.0, "a": 0.3}}).sweep.cell())
-    assert "segments" in told
-    assert "differs" not in told
+    ds = sweep.run(keys | {"axes": {"mu": [0.5]}, "fixed": {"phi0": 1.0, "a": 0.3}})
+    assert "segments" in str(ds.sweep.cell())
+    differs = ds.assign(angle=ds.angle * 0.8).sweep.cell().differs
+    assert differs == pytest.approx(dict.fromkeys(differs, 0.25), rel=1e-3)
 
 
 def test_a_scene_whose_parameters_all_have_defaults_is_asked_again_and_what_is_0_to_rounding_is_the_same():
