@@ -186,17 +186,14 @@ def quantity(count: float) -> str:
     return f"{count:.3g} {units[0]}"
 
 
-def require_dataset(name: str, given: Any, maker: str = "", attribute: str = "") -> None:
+def require_dataset(name: str, given: Any, maker: str = "") -> None:
     """Refuses what is no Dataset: a SweepError with the way from what was given to one, where there is a way.
 
-    Where not every Dataset will do for the function `name`, `maker` makes those that do, and only they have the
-    `attribute`.
+    `maker` makes those that will do for the function `name`, where not every Dataset will.
     """
     import xarray as xr  # most of a short run's time
 
     if isinstance(given, xr.Dataset):
-        if attribute and attribute not in given.attrs:
-            raise SweepError(f"sweep.{name}: expected a Dataset of sweep.{maker}, found another")
         return
     cure = f"sweep.{maker} gives one" if maker else "sweep.run and sweep.open_result give one"
     if not maker and isinstance(given, str | os.PathLike):

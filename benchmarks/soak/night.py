@@ -111,11 +111,11 @@ class Night:
         truth = sweep.run(study, progress=False).fall_time.values
         verdict = sweep.verify(self.output)
         with sweep.open_result(self.output) as found:
-            told, status, times = account(found), found.status.values, found.fall_time.values
+            told, status, times = account(found).by_kind, found.status.values, found.fall_time.values
         kinds = [night_kernel.deed(height) for height in self.heights]
         expected = np.array([EXPECTED.get(kind, Status.FAILED) for kind in kinds])
         good = expected == Status.OK
-        self.done.update({"cells": told.total, "ok": told.ok, "refused": told.refused, "FAILED": told.failed})
+        self.done.update({"cells": sum(told.values()), **{kind: told[kind] for kind in ("ok", "refused", "FAILED")}})
         self.done.update(f"FAILED, for it {kind}" for kind in kinds if kind in night_kernel.FAILING)
         self.done["wrong: status"] += int((status != expected).sum())
         self.done["wrong: bits"] += int((times[good].view(np.int64) != truth[good].view(np.int64)).sum())

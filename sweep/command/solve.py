@@ -91,7 +91,7 @@ def _computed(arguments: argparse.Namespace, study: Study, target: Path) -> Outc
     # read without xarray, which takes longer to load than a small run
     with StoredFile(unfinished_of(target) if ending == "unfinished" else target) as found:
         text = f"{target}: {'' if ending == 'complete' else f'{ending}; '}{summary_text(found)}"
-        failed = account(found).failed
+        failed = account(found).by_kind["FAILED"]
     say(text)
     return Outcome(INCOMPLETE if ending == "unfinished" else CELLS_FAILED if failed else COMPLETE, text)
 

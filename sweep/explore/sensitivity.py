@@ -8,7 +8,6 @@ import numpy as np
 import xarray as xr
 
 from sweep.errors import SweepError
-from sweep.laws.loglog import is_logarithmic
 from sweep.study.designs import LEVELS, problem, require_salib
 from sweep.study.model import Study
 
@@ -78,12 +77,10 @@ def sensitivity(dataset: xr.Dataset, y: str | xr.DataArray) -> xr.Dataset:
     if study.design == "saltelli":
         words, told = SOBOL, sobol.analyze(given, values, calc_second_order=False, seed=SEED)
     else:
-        # where cells lie along each axis, from 0 to 1; only the order of neighbours counts
-        columns = [dataset[name].values for name in study.axes]
-        columns = [np.log(column) if is_logarithmic(np.unique(column)) else column for column in columns]
-        shares = np.stack([(column - column.min()) / (np.ptp(column) or 1.0) for column in columns], axis=1)
+        # of where cells lie only the order of neighbours counts
+        places = np.stack([dataset[name].values for name in study.axes], axis=1)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            words, told = MORRIS, morris.analyze(given, shares, values, num_levels=LEVELS, seed=SEED)
+            words, told = MORRIS, morris.analyze(given, places, values, num_levels=LEVELS, seed=SEED)
     indices = {name: ("parameter", np.asarray(told[key], float), {"long_name": t}) for key, (name, t) in words.items()}
     return xr.Dataset(indices, {"parameter": given["names"]}, {"design": study.design})

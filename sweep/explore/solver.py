@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import warnings
 from collections import namedtuple
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from sweep.cells.block import BadCell, Guard
 from sweep.cells.grid import Grid, empty_cells
 from sweep.cells.solve import Solver
 from sweep.errors import SweepError
-from sweep.study.model import SETTINGS, Study
+from sweep.study.model import SETTINGS, Axis, Study
 from sweep.study.read import Given
 from sweep.study.read import study as as_study
 from sweep.words import listed
@@ -39,8 +40,10 @@ class PointSolver:
         if study.summary is not None:
             raise SweepError("summary: a solver gives cells; leave it out")
         self.names, self.fields = tuple(study.axes), (*study.outputs, "status")
-        self._study, self._grid = study, _Points(study)
-        self._solver = Guard(Solver(study, self._grid), _warn)
+        self._study = replace(study, design="zip", blocks=(), axes=dict(study.axes))  # the axes are those of each call
+        grid = Grid(self._study)
+        grid.size = np.iinfo(np.int64).max
+        self._solver = Guard(Solver(self._study, grid), _warn)
         self._solved: Any = namedtuple("solved", self.fields)  # type: ignore[misc]  # as many as the study asks for
         one = inspect.Parameter.POSITIONAL_OR_KEYWORD
         self._signature = inspect.Signature([inspect.Parameter(name, one) for name in self.names])
@@ -72,30 +75,13 @@ class PointSolver:
         except (TypeError, ValueError) as error:
             expected = listed(self.names, word="and")
             raise SweepError(f"expected numbers, or arrays of them, for {expected}: {error}") from None
-        shape = points.shape[1:]
-        self._grid.given = points.reshape(len(self.names), -1)
-        cells = empty_cells(self._study, self._grid.given.shape[1])
+        shape, columns = points.shape[1:], points.reshape(len(self.names), -1)
+        for name, column in zip(self.names, columns, strict=True):
+            self._study.axes[name] = Axis(name, column, "values")
+        cells = empty_cells(self._study, columns.shape[1])
         self._solver.solve(0, cells)
-        columns = (column.reshape(shape + column.shape[1:]) for column in (*cells.outputs.values(), cells.status))
-        return self._solved(*(column if column.ndim else column.item() for column in columns))
-
-
-class _Points(Grid):
-    """Cells whose values on the axes are set before they are solved: `given`, shape (axes, cells)."""
-
-    def __init__(self, study: Study) -> None:
-        super().__init__(study)
-        self.size, self.given = np.iinfo(np.int64).max, np.empty((len(study.axes), 0))
-        self._places = {name: place for place, name in enumerate(study.axes)}
-
-    def column(self, name: str, start: int, stop: int) -> Any:
-        return self.given[self._places[name], start:stop]
-
-    def values(self, name: str, cells: Any) -> Any:
-        return self.given[self._places[name], cells]
-
-    def cell(self, index: int) -> dict[str, str]:
-        return {name: repr(float(values[index])) for name, values in zip(self._places, self.given, strict=True)}
+        found = (column.reshape(shape + column.shape[1:]) for column in (*cells.outputs.values(), cells.status))
+        return self._solved(*(column if column.ndim else column.item() for column in found))
 
 
 def _warn(cell: BadCell) -> None:

@@ -11,7 +11,7 @@ import xarray as xr
 
 from sweep.cells.schema import ANCILLARY, STATUS
 from sweep.errors import SweepError
-from sweep.results.statuses import cell_values, flag_words, pieces, statuses_of
+from sweep.results.statuses import cell_text, cell_values, flag_words, pieces, statuses_of
 from sweep.words import Table, listed
 
 
@@ -157,7 +157,7 @@ def diff(a: xr.Dataset, b: xr.Dataset | None = None, rtol: float = 0.0) -> Diffe
 
 
 def _example(piece: xr.Dataset, place: int) -> str:
-    return "e.g. " + " ".join(f"{name}={value}" for name, value in cell_values(piece, place).items())
+    return f"e.g. {cell_text(cell_values(piece, place))}"
 
 
 def two_results(name: str, a: Any, b: Any) -> tuple[xr.Dataset, xr.Dataset]:

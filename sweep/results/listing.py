@@ -9,7 +9,7 @@ from pathlib import Path
 
 from sweep.errors import SweepError
 from sweep.file.open import stored
-from sweep.results.statuses import Account, account, count_statuses
+from sweep.results.statuses import account
 from sweep.words import Table, as_path
 
 UNFINISHED = re.compile(r"(.+\.(?:h5|nc))\.unfinished")
@@ -31,10 +31,8 @@ class Listed:
     cells : int
     done : float
         Share of the cells that are computed.
-    statuses : dict of str to int
-        Cells of each.
-    account : Account
-        What became of the cells.
+    statuses, account : dict of str to int
+        Cells of each status, and under each of the words of `kernels.interface.KINDS`.
     when, version : str
         When it ended, or began where it has not; by which version of foliot.
     fault : str
@@ -46,7 +44,7 @@ class Listed:
     cells: int = 0
     done: float = 0.0
     statuses: dict[str, int] = field(default_factory=dict)
-    account: Account = field(default_factory=Account)
+    account: dict[str, int] = field(default_factory=dict)
     when: str = ""
     version: str = ""
     fault: str = ""
@@ -56,7 +54,7 @@ class Listed:
         """Texts below `HEADINGS`."""
         if self.fault:
             return self.path.name, "", "", "", "", "", self.fault
-        cells = ", ".join(f"{n:,} {kind}" for kind, n in self.account.by_kind.items() if n)
+        cells = ", ".join(f"{n:,} {kind}" for kind, n in self.account.items() if n)
         done = f"{int(1000 * self.done) / 10:g} %"
         return self.path.name, f"{self.cells:,}", done, cells, self.when[:16], self.version, self.question
 
@@ -104,14 +102,14 @@ def list_results(folder: str | os.PathLike[str] = ".") -> Listing:
 def _listed(path: Path) -> Listed:
     try:
         with stored(path) as file:
-            attrs, cells = file.attrs, account(file)
+            attrs, found = file.attrs, account(file)
             return Listed(
                 path=path,
                 question=str(attrs.get("question") or attrs.get("title", "")),
-                cells=cells.total,
-                done=(cells.total - cells.pending) / cells.total,
-                statuses={count.name: count.cells for count in count_statuses(file, examples=False)},
-                account=cells,
+                cells=found.total,
+                done=(found.total - found.by_kind["pending"]) / found.total,
+                statuses=found.statuses,
+                account=found.by_kind,
                 when=str(attrs.get("end", attrs.get("start", ""))),
                 version=str(attrs.get("versions", "")).partition(",")[0].removeprefix("foliot "),
             )

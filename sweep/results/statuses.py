@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Hashable, Iterator, Mapping, Sequence
-from dataclasses import astuple, dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -27,59 +27,47 @@ NUMBERS_AT_ONCE = 1 << 22
 
 @dataclass(frozen=True)
 class Account:
-    """What became of all cells: each is counted under one of the words of `kernels.interface.KINDS`.
+    """What became of all cells.
 
-    `failed` are those that FAILED, and those of a status that this version does not know.
+    Attributes
+    ----------
+    statuses : dict of str to int
+        Cells of every status that occurs, in the order of its number.
+    examples : dict of str to dict
+        Coordinates of the first cell of each but OK; none of a summary.
     """
 
-    ok: int = 0
-    remarked: int = 0
-    refused: int = 0
-    unsolved: int = 0
-    failed: int = 0
-    pending: int = 0
-    not_asked: int = 0
+    statuses: dict[str, int]
+    examples: dict[str, dict[str, str]]
 
     @property
     def total(self) -> int:
         """All cells."""
-        return sum(self.by_kind.values())
+        return sum(self.statuses.values())
 
     @property
     def by_kind(self) -> dict[str, int]:
-        """Cells under each of the words."""
-        return dict(zip(KINDS, astuple(self), strict=True))
+        """Cells under each of the words of `kernels.interface.KINDS`."""
+        counts = dict.fromkeys(KINDS, 0)
+        for name, cells in self.statuses.items():
+            counts[kind_of(name)] += cells
+        return counts
 
     def __str__(self) -> str:
         counts = [f"{cells:,} {kind}" for kind, cells in self.by_kind.items() if cells]
         return f"{self.total:,} cells: {', '.join(counts) or 'none'}"
 
 
-@dataclass(frozen=True)
-class StatusCount:
-    """How many cells have a status, and the coordinates of the first of them."""
-
-    name: str
-    cells: int
-    total: int
-    example: dict[str, str] = field(default_factory=dict)
-
-    def __str__(self) -> str:
-        text = f"{self.cells:,} of {self.total:,} cells: {self.name}"
-        cell = " ".join(f"{k}={v}" for k, v in self.example.items())
-        return f"{text}, e.g. {cell}" if cell else text
-
-
 def account(dataset: Cells) -> Account:
-    """What became of the cells of a result, of a summary too."""
-    counts = dict.fromkeys(KINDS, 0)
-    for count in count_statuses(dataset, examples=False):
-        counts[kind_of(count.name)] += count.cells
-    return Account(*counts.values())
+    """What became of the cells of a result, of a summary too. Reads a few million of them at a time."""
+    found = _counts(dataset, BY_STATUS, STATUS, {int(status): status.name for status in Status})
+    shown = () if is_summary(dataset) else (name for name in found if name != Status.OK.name)
+    examples = {name: cell_values(dataset, found[name][1]) for name in shown}
+    return Account({name: cells for name, (cells, _) in found.items()}, examples)
 
 
 def kind_of(name: str) -> str:
-    """The word under which a status is counted."""
+    """The word under which a status is counted; one that this version does not know counts as FAILED."""
     return (Status[name] if name in Status.__members__ else Status.FAILED).kind
 
 
@@ -102,20 +90,6 @@ def flag_words(variable: xr.DataArray) -> dict[int, str]:
     return {-1: "none", **words} if words else {}
 
 
-def count_statuses(dataset: Cells, examples: bool = True) -> list[StatusCount]:
-    """Every status that occurs, in the order of its number, with its first cell; OK without one, a summary without any.
-
-    Reads a few million cells at a time.
-    """
-    counts = _counts(dataset, BY_STATUS, STATUS, {int(status): status.name for status in Status})
-    shown = examples and not is_summary(dataset)
-    total = sum(cells for cells, _ in counts.values())
-    return [
-        StatusCount(name, cells, total, cell_values(dataset, first) if shown and name != Status.OK.name else {})
-        for name, (cells, first) in counts.items()
-    ]
-
-
 def count_methods(dataset: Cells) -> dict[str, int]:
     """How many cells each method solved; those that none did are left out."""
     words = {} if is_summary(dataset) else flag_words(dataset[METHOD_USED])
@@ -125,9 +99,13 @@ def count_methods(dataset: Cells) -> dict[str, int]:
 
 def summary_text(dataset: Cells) -> str:
     """After a run: what the cells were solved with, and what became of those that are not OK."""
-    used = ", ".join(f"{name} {cells:,}" for name, cells in count_methods(dataset).items())
-    others = (str(count) for count in count_statuses(dataset) if count.name != Status.OK.name)
-    return "\n".join([f"{account(dataset)}" + (f"; solved by {used}" if used else ""), *others])
+    found, used = account(dataset), ", ".join(f"{name} {cells:,}" for name, cells in count_methods(dataset).items())
+    lines = [f"{found}; solved by {used}" if used else str(found)]
+    for name, cells in found.statuses.items():
+        if name != Status.OK.name:
+            example = cell_text(found.examples.get(name, {}))
+            lines.append(f"{cells:,} of {found.total:,} cells: {name}" + (f", e.g. {example}" if example else ""))
+    return "\n".join(lines)
 
 
 def _counts(dataset: Cells, by_word: str, codes: str, words: Mapping[int, str]) -> dict[str, tuple[int, int]]:
@@ -183,3 +161,8 @@ def cell_values(dataset: Cells, index: int) -> dict[str, str]:
             value = coordinate.values[tuple(at[str(d)] for d in coordinate.dims)].item()
             cell[str(name)] = value if isinstance(value, str) else repr(float(f"{value:.6g}"))
     return cell
+
+
+def cell_text(cell: Mapping[str, str]) -> str:
+    """A cell, in one line."""
+    return " ".join(f"{name}={value}" for name, value in cell.items())

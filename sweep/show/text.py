@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,9 +15,9 @@ from sweep.cells.schema import ANCILLARY, METHOD_USED, STATUS
 from sweep.results.statuses import (
     account,
     boxes,
+    cell_text,
     cell_values,
     count_methods,
-    count_statuses,
     flag_words,
     flat_pieces,
     is_summary,
@@ -48,7 +48,7 @@ def result_text(path: Path, dataset: xr.Dataset) -> str:
             break
     failed = []
     for number in numbers[:MOST_FAILED]:
-        place = "" if summed else _named(cell_values(dataset, number))
+        place = "" if summed else cell_text(cell_values(dataset, number))
         failed.append((f"cell {number}", place, known.get(number, "")))
     return page(
         paragraph("\n".join(head(path, dataset))),
@@ -61,7 +61,7 @@ def result_text(path: Path, dataset: xr.Dataset) -> str:
 def head(path: Path, dataset: xr.Dataset) -> list[str]:
     """Name and completeness, title, question, and what became of the cells."""
     found = account(dataset)
-    total, waiting = found.total, found.pending
+    total, waiting = found.total, found.by_kind["pending"]
     share = f"{math.floor(1000 * (total - waiting) / total) / 10:g} %"
     done = f"unfinished: {total - waiting:,} of {total:,} cells ({share})" if waiting else f"complete, {total:,} cells"
     texts = [f"{path}: {done}", dataset.attrs.get("title", ""), dataset.attrs.get("question", ""), str(found)]
@@ -160,17 +160,13 @@ def _extent(output: xr.DataArray) -> str:
 
 def status_table(dataset: xr.Dataset, title: str = "") -> Table:
     """Every status that occurs: cells, kind, meaning; but for OK also where on the axes it occurs, and an example."""
-    rows: list[tuple[str, ...]] = []
+    rows, found = list[tuple[str, ...]](), account(dataset)
     places = {} if is_summary(dataset) else _places(dataset)
-    for count in count_statuses(dataset):
-        texts = [Status[count.name].doc if count.name in Status.__members__ else "", places.get(count.name, "")]
-        texts += [f"e.g. {_named(count.example)}"] if count.example else []
-        rows.append((f"{count.cells:,}", count.name, kind_of(count.name), "; ".join(filter(None, texts))))
+    for name, cells in found.statuses.items():
+        texts = [Status[name].doc if name in Status.__members__ else "", places.get(name, "")]
+        texts += [f"e.g. {cell_text(found.examples[name])}"] if found.examples.get(name) else []
+        rows.append((f"{cells:,}", name, kind_of(name), "; ".join(filter(None, texts))))
     return Table(rows, ("cells", "status", "kind", "meaning, and where"), title)
-
-
-def _named(cell: Mapping[str, str]) -> str:
-    return " ".join(f"{name}={value}" for name, value in cell.items())
 
 
 def _places(dataset: xr.Dataset) -> dict[str, str]:

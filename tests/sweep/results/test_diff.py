@@ -7,7 +7,7 @@ from toy_studies import build
 
 import sweep
 from kernels.interface import Status
-from sweep.results.statuses import count_statuses
+from sweep.results.statuses import account
 
 AXES = {"height": [1.0, 2.0, 4.0], "v0": [0.0, 1.0]}
 
@@ -101,4 +101,5 @@ def test_cells_of_large_results_are_found_wherever_they_are():
     assert found.examples["0", str(int(Status.BAD_INPUT))] == "e.g. x=3.0 y=7.0"
     assert (found.outputs["time"].cells, found.outputs["time"].largest) == (2, 0.5)
     assert found.outputs["time"].example == "e.g. x=1.0 y=5.0"
-    assert [(c.cells, c.example) for c in count_statuses(other)] == [(5_999_999, {}), (1, {"x": "3.0", "y": "7.0"})]
+    assert account(other).statuses == {"OK": 5_999_999, "BAD_INPUT": 1}
+    assert account(other).examples == {"BAD_INPUT": {"x": "3.0", "y": "7.0"}}

@@ -54,7 +54,7 @@ def test_bad_cells_fail_by_name_and_all_others_have_the_bits_of_a_run_without_th
         kept = good(found)
         whole = quiet(tall(SOUND, "bad:RAISING"), isolate=True)
         assert kept.fall_time.values.tobytes() == whole.fall_time.sel(height=kept.height).values.tobytes()
-        assert account(found).failed == len(BAD[name])
+        assert account(found).by_kind["FAILED"] == len(BAD[name])
     told = [line.partition("FAILED ")[2] for line in log.getvalue().splitlines() if "FAILED" in line]
     assert sorted(text.partition(":")[0] for text in told) == [f"(height={int(height)})" for height in BAD[name]]
     reasons = {"11": "ZeroDivisionError: eleven", "22": "SIGSEGV", "33": "ended with 7", "44": "longer than 10 s"}
@@ -164,9 +164,9 @@ def test_a_kernel_that_fails_on_a_cluster_costs_a_cell_too(tmp_path):
             keys = {**KEYS[name], "workers": None, "cluster": address}
             with quiet(tall(SOUND, name), tmp_path / f"{name[4:]}.h5", **keys) as found:
                 assert heights_of(found, Status.FAILED) == BAD[name]
-                assert account(found).ok == SOUND - len(BAD[name])
+                assert account(found).by_kind["ok"] == SOUND - len(BAD[name])
 
 
 def test_what_compiling_takes_is_not_taken_for_what_a_cell_takes():
     found = quiet(tall(20, "bad:LATE"), workers=1, cell_timeout=0.3)
-    assert account(found).ok == 20
+    assert account(found).by_kind["ok"] == 20

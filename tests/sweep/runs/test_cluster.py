@@ -103,9 +103,9 @@ def test_a_run_on_a_cluster_ends_at_its_time_and_continues(client, output):
     study = tall(30_000, "slow:SLOW")  # half a minute of two workers at the least
     until = datetime.now() + timedelta(seconds=10)
     with elsewhere(study, output, cluster=client, block_cells=40, until=until) as found:
-        told = account(found)
-    assert 0 < told.ok < 30_000
-    assert told.ok + told.pending == 30_000
+        told = account(found).by_kind
+    assert 0 < told["ok"] < 30_000
+    assert told["ok"] + told["pending"] == 30_000
     continues(study, output)
 
 
@@ -185,7 +185,7 @@ def test_a_cluster_without_workers_is_waited_for_and_says_so(output):
     log, until = io.StringIO(), datetime.now() + timedelta(seconds=2)
     keys = {"until": until, "progress": log}
     with served(workers=0) as (address, _), elsewhere(tall(30), output, cluster=address, **keys) as found:
-        assert account(found).pending == 30
+        assert account(found).by_kind["pending"] == 30
     assert "the cluster has no workers" in log.getvalue()
 
 

@@ -60,7 +60,7 @@ def solved(output):
     """How many cells are kept; 0 before the run has begun."""
     try:
         with sweep.open_result(output) as found:
-            return account(found).ok
+            return account(found).by_kind["ok"]
     except SweepError:
         return 0
 
