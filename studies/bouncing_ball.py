@@ -2,7 +2,7 @@
 
     python studies/bouncing_ball.py bouncing_ball.h5
 
-`sweep plot bouncing_ball.h5 --y x` draws the diagram alone. A ball that bounces once a period leaves the table at
+`sweep plot bouncing_ball.h5` draws the diagram alone. A ball that bounces once a period leaves the table at
 half of the speed that gravity takes from it in that time, so that it arrives at -pi, and the table moves at
 
     push cos t = pi (1 - e)/(1 + e)                                                                      (1)

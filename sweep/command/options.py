@@ -75,7 +75,9 @@ def output(metavar: str, text: str | None = None, ending: str = "", checked: boo
 STUDY = option("study", metavar="STUDY.toml", type=Path)
 RESULT = option("result", metavar="OUT.h5", type=Path)
 OTHER = option("other", metavar="OTHER.h5", type=Path)
-OUTPUT_Y = option("--y", "default: the first output; of a scene of one's own its interval", metavar="OUTPUT")
+OUTPUT_Y = option(
+    "--y", "default: the first output, but no time; of a section the first state that changes", metavar="OUTPUT"
+)
 ALLOW_IMPORT = switch("--allow-import", 'allow a kernel "module:NAME" of your own')
 FORCE = switch("--force", "overwrite what is there")
 UNFINISHED = switch("--unfinished", "accept a result that is not complete yet")

@@ -99,8 +99,9 @@ class Plan:
 
     def __str__(self) -> str:
         def shares(found: dict[str, float]) -> str:
-            texts = ", ".join(f"{name} {100 * share:.3g} %" for name, share in found.items())
-            return f"{texts} of a sample of {self.sampled:,} cell{'s' * (self.sampled > 1)}"
+            # cells that are refused have no method, and a status that says why
+            texts = ", ".join(f"{name} {100 * share:.3g} %" for name, share in found.items() if name != "none")
+            return f"{texts or 'none'} of a sample of {self.sampled:,} cell{'s' * (self.sampled > 1)}"
 
         when = "just now; the machine code is kept" if _is_kept(self.kernel) else "of it, before the first cell"
         shape = " x ".join(f"{name} {n:,}" for name, n in self.shape.items())

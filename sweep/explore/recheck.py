@@ -69,14 +69,14 @@ class CellReport:
             off = deviations(study, found.outputs, cells).values()
             self.differs[method] = max((float(one[0]) for one in off), default=np.nan)
 
-    def __str__(self) -> str:
+    def __repr__(self) -> str:
         special = "" if self.status is Status.OK else f" ({self.status.kind})"
         rows = [
             ("cell", ", ".join(f"{name} = {value}" for name, value in self.place.items())),
             ("status", f"{self.status.name}{special}: {self.status.doc}"),
             ("solved by", f"{self.method}; error bound {self.error_bound:.2g}, requested rtol {self.rtol:g}"),
         ]
-        rows += [(name, f"{value:.10g} {self.units[name]}") for name, value in self.values.items()]
+        rows += [(name, f"{value:.10g} {self.units[name]}".removesuffix(" 1")) for name, value in self.values.items()]
         asked = [(k, v[0].name, f"{v[1]:.2g}", f"{self.differs[k]:.2g}") for k, v in self.methods.items()]
         title = "Each method of the kernel at the same rtol, computed now:"
         return page(Table(rows).text(), Table(asked, ("method", "status", "error", "differs by"), title).text())
@@ -146,7 +146,7 @@ class Checked:
             self.worst = {"cell": cell_values(dataset, int(drawn[i])), "output": output, "values": said}
             self.worst["off"] = float(largest[i] / rtol[i])
 
-    def __str__(self) -> str:
+    def __repr__(self) -> str:
         rows = [
             ("solved again", f"{self.sample:,} of {self.cells:,} OK cells, to a tolerance down to rtol/{CLOSER:g}"),
             ("by another method", f"{self.by_another:,}"),

@@ -84,7 +84,7 @@ def stored(output: Path) -> StoredFile:
     for place in (output, unfinished_of(output), output):
         with contextlib.suppress(FileNotFoundError, NotADirectoryError):
             return StoredFile(place)
-    raise SweepError(f"{output}: no such file, nor a run that is writing it")
+    raise SweepError(f"{output}: no such file, and no run is writing it")
 
 
 def in_memory(plan: Schema, arrays: Mapping[str, Any]) -> xr.Dataset:

@@ -73,7 +73,7 @@ def pick(dataset: xr.Dataset, choices: Sequence[str]) -> xr.Dataset:
 def output_of(dataset: xr.Dataset, y: str | None) -> str:
     """The output `y`, by default the one that is drawn. Raises SweepError where there is no such output."""
     outputs = [str(name) for name in dataset.data_vars if name not in ANCILLARY]
-    return preferred(outputs) if y is None else one_of(y, outputs, f"--y {y}: no such output")
+    return preferred(dataset, outputs) if y is None else one_of(y, outputs, f"--y {y}: no such output")
 
 
 @dataclass(frozen=True)

@@ -135,7 +135,7 @@ def _grid(coordinate: xr.DataArray) -> tuple[str, str]:
     elif len(values) <= 6:
         shown = ", ".join(f"{v:.6g}" for v in values)
     else:
-        shown = f"{values[0]:.6g} to {values[-1]:.6g}"
+        shown = _span(values)
     return f"{len(values):,} value{'s' * (len(values) > 1)}", shown
 
 
@@ -155,7 +155,8 @@ def _extent(output: xr.DataArray) -> str:
         return f"{output.sizes[output.dims[-1]]} bins"
     if output.nbytes > LARGEST_SCAN:
         return ""
-    return _span(output.values[np.isfinite(output.values)]) or "no values"
+    values, words = output.values[np.isfinite(output.values)], flag_words(output)
+    return _span(np.array([words[code] for code in np.unique(values).tolist()]) if words else values) or "no values"
 
 
 def status_table(dataset: xr.Dataset, title: str = "") -> Table:

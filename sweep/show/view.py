@@ -17,7 +17,7 @@ from sweep.cells.schema import ANCILLARY
 from sweep.errors import SweepError
 from sweep.explore.scattered import MOST_AXES, Box, axes_of, interpolated
 from sweep.laws.loglog import is_logarithmic
-from sweep.results.statuses import flag_words
+from sweep.results.statuses import flag_words, is_summary
 from sweep.words import did_you_mean, listed
 
 GREEK = frozenset(
@@ -32,6 +32,8 @@ POINTS, PIXELS = 20_000, 2_000
 """Points along a line and cells along the side of a map that are drawn; beyond, every second, third ... one."""
 PASSAGE = "passage"
 """What a section runs along: its values are points beside each other, which are drawn over a parameter."""
+SAME = 1e-9
+"""A state of a section that changes by less than this share of its size, or of 1, is kept by the surface."""
 HARD_SPACE = "\u00a0"
 """Where no line is broken."""
 SIDE = 201
@@ -108,7 +110,7 @@ def view(dataset: xr.Dataset, y: str | None = None, x: str | None = None) -> Vie
     known = outputs(dataset)
     if not known:
         raise SweepError("there is nothing to draw: no output runs along an axis")
-    name = one_of(y or preferred(known), known, f"there is no output {y!r} to draw")
+    name = one_of(y or preferred(dataset, known), known, f"there is no output {y!r} to draw")
     if x is None:
         dataset = evened(dataset, axes=2)
     output, cells = dataset[name], dataset["status"].dims if "status" in dataset else ()
@@ -169,10 +171,18 @@ def evened(dataset: xr.Dataset, axes: int = MOST_AXES) -> xr.Dataset:
     return interpolated(dataset, {name: box.values(k, even if k < axes else middle) for k, name in enumerate(names)})
 
 
-def preferred(outputs: Sequence[str]) -> str:
-    """The output that is shown where none is asked for: the first; of a scene, whose `time` is that of its last switch,
-    the `interval` behind it."""
-    return outputs[1] if [*outputs[:2]] == ["time", "interval"] else outputs[0]
+def preferred(dataset: xr.Dataset, outputs: Sequence[str]) -> str:
+    """The output that is shown where none is asked for: the first, but no `time` and no number of cells.
+
+    Of a section the first state that its surface does not keep the same at every passage.
+    """
+    for name in outputs:
+        column = dataset[name]
+        if name == "time" or (is_summary(dataset) and name.endswith("_count")):
+            continue
+        if PASSAGE not in column.dims or float(column.max() - column.min()) > SAME * max(1.0, float(abs(column).max())):
+            return name
+    return outputs[0]
 
 
 def coordinate(y: xr.DataArray, name: str) -> xr.DataArray:

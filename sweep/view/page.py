@@ -105,7 +105,7 @@ class Page:
         self.dataset = even
         if not names:
             raise SweepError(f"{name}: there is nothing to look at: no output runs along an axis of numbers")
-        self.output = select(label="output", options=names, value=preferred(names), **WIDE)
+        self.output = select(label="output", options=names, value=preferred(even, names), **WIDE)
         self.shows = pn.widgets.RadioButtonGroup(options=values, **WIDE)
         self.x = select(label="across the page", options=number_axes(even, self.output.value), **WIDE)
         self.up = select(label="up the page", **WIDE)

@@ -68,7 +68,8 @@ def test_two_long_axes_make_a_map_with_a_logarithmic_colour_scale():
 def test_a_section_is_points_over_a_parameter_by_their_status():
     ds = dataset(mu=log(11)).expand_dims(passage=np.arange(101.0, 133.0))
     ds = ds.assign(status=ds.status.isel(passage=0).copy(data=[0] * 7 + [1] * 4))
-    (axes,) = plot(ds).axes
+    kept = {"time": ds.period.passage * ds.period, "angle": 0.0 * ds.period + 1e-17}
+    (axes,) = plot(ds[["status"]].assign(kept | {"period": ds.period})).axes  # a state, not what the surface says of it
     fine, unsure = drawn(axes)
     np.testing.assert_array_equal(np.unique(fine.get_xdata()), ds.mu[:7])
     assert len(fine.get_ydata()) == 7 * 32
