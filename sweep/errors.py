@@ -24,6 +24,12 @@ class Incomplete(SweepError):
     """A run had to end early through no mistake of the user's; the command line exits with 3."""
 
 
+def reason(fault: BaseException) -> str:
+    """What a fault says: the system's own words, or the first line of its text; its kind where that is empty."""
+    text = fault.strerror if isinstance(fault, OSError) and fault.strerror else str(fault)
+    return text.partition("\n")[0] or type(fault).__name__
+
+
 def missing(what: str, extra: str) -> SweepError:
     """The fault that a library is not installed: what needs which, and the extra that brings it."""
     commands = f"in a checkout pip install -e '.[{extra}]', elsewhere pip install 'foliot[{extra}]'"

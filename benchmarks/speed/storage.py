@@ -134,7 +134,7 @@ def many(folder: Path, count: int) -> None:
     study, path = foliot("closed", 100 * count), folder / "many.h5"
     mark = fingerprint(study)
     schema = output_schema(study, mark)
-    cuts = cuts_of(study, schema, boxes(schema.grid.shape, 100))
+    cuts = cuts_of(study, schema, boxes(schema.shape, 100))
     begun = time.perf_counter()
     with alone(path), made(path, schema, cuts) as store:
         framed, table = time.perf_counter() - begun, store.work

@@ -18,22 +18,15 @@ from sweep.study.model import AUTO, SETTINGS, Study
 Floats = NDArray[np.float64]
 
 
-class Box:
-    """Places in C order: names and lengths of the dimensions, and the number of places."""
-
-    def __init__(self, dims: tuple[str, ...], shape: tuple[int, ...]) -> None:
-        self.dims, self.shape, self.size = dims, shape, math.prod(shape)
-
-
-class Grid(Box):
-    """The cells of a study; its dims are the axes of a product, ("cell",) of axes that run together.
+class Grid:
+    """The cells of a study: lengths of the dimensions, and the number of cells.
 
     `varying` names the axis of every column that varies, by the column's number.
     """
 
     def __init__(self, study: Study) -> None:
-        super().__init__(tuple(study.grid_shape), tuple(study.grid_shape.values()))
-        self.study = study
+        self.study, self.shape = study, tuple(study.grid_shape.values())
+        self.size = math.prod(self.shape)
         self._runs = {name: study.run(name) for name in study.axes}
         sources = enumerate(study.follows.get(field.name, field.name) for field in study.kernel.parameters)
         self.varying = {place: name for place, name in sources if name in study.axes}

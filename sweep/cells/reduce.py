@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from kernels.interface import Field, Status
 from sweep.cells import schema
-from sweep.cells.grid import Box, Cells, SolveCells, empty_cells
+from sweep.cells.grid import Cells, SolveCells, empty_cells
 from sweep.cells.partition import row_blocks
 from sweep.cells.schema import Column, Coordinate, Schema
 
@@ -251,7 +251,7 @@ def output_schema(study: Study, fingerprint: Mapping[str, str]) -> Schema:
             attrs = {"units": units[name], "long_name": f"{end} edge of a bin"}
             found.append(Coordinate(f"{name}_bin_{end}", (f"{name}_bin",), values, attrs))
     attributes = {**schema.attributes(study, fingerprint), "over": " ".join(over)}
-    return Schema(Box(tuple(kept), tuple(kept.values())), columns, tuple(found), attributes)
+    return Schema(kept, columns, tuple(found), attributes)
 
 
 def gathered(study: Study, rows: Rows) -> dict[str, Any]:

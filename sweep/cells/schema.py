@@ -7,13 +7,15 @@ import math
 import platform
 from collections.abc import Mapping
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from kernels.interface import Field, Status
 from sweep.cells.fingerprint import version
-from sweep.cells.grid import Box, Cells, Grid
+from sweep.cells.grid import Cells
+from sweep.study.model import setting
 
 if TYPE_CHECKING:
     from sweep.study.model import Study
@@ -59,9 +61,9 @@ class Coordinate:
 
 @dataclass(frozen=True)
 class Schema:
-    """Everything of a result except its numbers."""
+    """Everything of a result except its numbers; the grid by the lengths of its dimensions."""
 
-    grid: Box
+    grid: Mapping[str, int]
     columns: tuple[Column, ...]
     coordinates: tuple[Coordinate, ...]
     attrs: Mapping[str, Any]
@@ -71,16 +73,17 @@ class Schema:
         """Length of every dimension, those of the grid first."""
         own = {d: n for column in self.columns for d, n in zip(column.dims, column.shape, strict=True)}
         own |= {d: n for c in self.coordinates for d, n in zip(c.dims, np.shape(c.values), strict=True)}
-        return {**dict(zip(self.grid.dims, self.grid.shape, strict=True)), **own}
+        return {**self.grid, **own}
 
-    def shape(self, column: Column) -> tuple[int, ...]:
-        """Shape of a column over the whole grid."""
-        return (*self.grid.shape, *column.shape)
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Shape of the grid."""
+        return tuple(self.grid.values())
 
 
 def cell_schema(study: Study, fingerprint: Mapping[str, str]) -> Schema:
     """The schema of a result of cells."""
-    return Schema(Grid(study), columns(study), coordinates(study), attributes(study, fingerprint))
+    return Schema(study.grid_shape, columns(study), coordinates(study), attributes(study, fingerprint))
 
 
 def columns(study: Study) -> tuple[Column, ...]:
@@ -118,17 +121,12 @@ def cells_of(arrays: Mapping[str, Any]) -> Cells:
 def coordinates(study: Study) -> tuple[Coordinate, ...]:
     """Axes, fixed parameters and shared coordinates."""
     fields = {f.name: f for f in (*study.kernel.parameters, *study.kernel.along)}
-    settings = {
-        "method": {"long_name": "method asked for"},
-        "rtol": {"units": "1", "long_name": "relative error asked for"},
-    }
     found = []
     for dim, names in study.dims.items():
         for name in names:
-            axis, field = study.axes[name], fields.get(name)
-            attrs = settings.get(name, {"long_name": name}) if field is None else _attrs(field)
-            dims = (dim,) if field is None else (dim, *field.dims)
-            found.append(Coordinate(name, dims, axis.values if axis.words is None else np.array(axis.words), attrs))
+            axis, field = study.axes[name], fields.get(name) or setting(name, study.kernel)
+            values = axis.values if axis.words is None else np.array(axis.words)
+            found.append(Coordinate(name, (dim, *field.dims), values, _attrs(field)))
     found += [Coordinate(k, fields[k].dims, np.float64(v), _attrs(fields[k])) for k, v in study.fixed.items()]
     used = {d for f in (*study.kernel.parameters, *study.asked) for d in f.dims}
     found += [Coordinate(k, (k,), v, _attrs(fields[k])) for k, v in study.along.items() if k in used]
@@ -137,6 +135,17 @@ def coordinates(study: Study) -> tuple[Coordinate, ...]:
             attrs = {"units": "1", "long_name": f"number of the {dim}"}
             found.append(Coordinate(dim, (dim,), np.arange(1, length + 1), attrs))
     return tuple(found)
+
+
+def now() -> str:
+    """The time as ISO 8601 in UTC."""
+    return datetime.now(UTC).isoformat(timespec="seconds")
+
+
+def ending(rate: float) -> dict[str, str]:
+    """Attributes that are known when all cells are computed, so many a second."""
+    end = now()
+    return {"created": end, "end": end, "cells_per_second": f"{rate:.6e}"}
 
 
 def attributes(study: Study, fingerprint: Mapping[str, str]) -> dict[str, Any]:

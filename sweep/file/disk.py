@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from sweep.errors import SweepError
+from sweep.errors import SweepError, reason
 
 
 def open_file(path: Path | str, flags: int) -> int:
@@ -177,7 +177,6 @@ def refusing(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as fault:
-        reason = fault.strerror or str(fault).splitlines()[0]
         full = fault.errno in (errno.ENOSPC, errno.EDQUOT)
         cure = "; free some space, then run the same command again" if full else ""
-        raise SweepError(f"{path}: cannot be written ({reason}){cure}") from fault
+        raise SweepError(f"{path}: cannot be written ({reason(fault)}){cure}") from fault

@@ -58,11 +58,11 @@ def cuts_of(study: Study, schema: Schema, blocks: Partition) -> dict[str, Cut]:
     """The tables of a study's result, whose output has a schema, and in which blocks are computed."""
     ending = Cut((Column("ending", "S240", (), (), {}),), (1,), Partition(1, 1))
     if study.summary is None:
-        return {"cells": Cut(schema.columns, schema.grid.shape, blocks), "ending": ending}
+        return {"cells": Cut(schema.columns, schema.shape, blocks), "ending": ending}
     rows, columns = row_blocks(study), part_columns(study)
     row_bytes = sum(column.cell_bytes for column in columns)
-    groups = boxes(schema.grid.shape, GATHERED_BYTES // (row_bytes * rows.per_row))
-    cells = Cut(schema.columns, schema.grid.shape, groups)
+    groups = boxes(schema.shape, GATHERED_BYTES // (row_bytes * rows.per_row))
+    cells = Cut(schema.columns, schema.shape, groups)
     return {"rows": Cut(columns, (rows.count,), blocks), "cells": cells, "ending": ending}
 
 
@@ -144,7 +144,7 @@ def _lay_out(skeleton: _Skeleton, schema: Schema, cuts: Mapping[str, Cut], align
                 chunk = (*box_shape(cut.grid, cut.blocks.cells), *column.shape)
                 data = _make(file, path, (*cut.grid, *column.shape), column.dtype, chunk, column)
                 if name == "cells":
-                    over = dims[path] = (*schema.grid.dims, *column.dims)
+                    over = dims[path] = (*schema.grid, *column.dims)
                     # xarray's way to mark what belongs to the coordinates of a variable, and of all
                     beside = [c.name for c in schema.coordinates if c.dims != (c.name,) and set(c.dims) <= {*over}]
                     _say(data, column.attrs, beside)
@@ -184,7 +184,7 @@ def _write_coordinates(file: Any, schema: Schema, sizes: dict[str, int], dims: d
         data = _make(file, c.name, values.shape, values.dtype, values.shape)
         data[...] = values
         _say(data, attrs)
-    away = [c.name for c in schema.coordinates if c.dims and not {*c.dims} & {c.name, *schema.grid.dims}]
+    away = [c.name for c in schema.coordinates if c.dims and not {*c.dims} & {c.name, *schema.grid}]
     _say(file, {**schema.attrs, "study_json": study}, away)
 
 

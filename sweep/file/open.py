@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import time
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
-from datetime import UTC, datetime
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -92,7 +92,8 @@ def in_memory(plan: Schema, arrays: Mapping[str, Any]) -> xr.Dataset:
     import xarray as xr
 
     variables = {
-        c.name: ((*plan.grid.dims, *c.dims), arrays[c.name].reshape(plan.shape(c)), dict(c.attrs)) for c in plan.columns
+        c.name: ((*plan.grid, *c.dims), arrays[c.name].reshape((*plan.shape, *c.shape)), dict(c.attrs))
+        for c in plan.columns
     }
     coordinates = {c.name: (c.dims, c.values, dict(c.attrs)) for c in plan.coordinates}
     return xr.Dataset(variables, coordinates, dict(plan.attrs))
@@ -113,10 +114,9 @@ def store_cells(
     """
     if path is None:
         return in_memory(cell_schema(study, mark or {}), arrays).assign_attrs(attrs or {})
-    output, now = Path(os.path.realpath(as_path(path))), datetime.now(UTC).isoformat(timespec="seconds")
-    schema = cell_schema(study, mark or fingerprint(study))
-    schema = replace(schema, attrs={**schema.attrs, "start": now, **(attrs or {})})
-    blocks = boxes(schema.grid.shape, max(1, BLOCK_BYTES // sum(column.cell_bytes for column in schema.columns)))
+    output, schema = Path(os.path.realpath(as_path(path))), cell_schema(study, mark or fingerprint(study))
+    schema = replace(schema, attrs={**schema.attrs, **(attrs or {})})
+    blocks = boxes(schema.shape, max(1, BLOCK_BYTES // sum(column.cell_bytes for column in schema.columns)))
     begin = time.monotonic()
     with alone(output), contextlib.ExitStack() as stack:
         disk.check_target(output, force=force)
@@ -129,8 +129,7 @@ def store_cells(
         for block in range(blocks.count):
             rows = slice(*blocks.bounds(block))
             store.put(block, {name: column[rows] for name, column in arrays.items()})
-        rate = schema.grid.size / max(time.monotonic() - begin, 1e-9)
-        store.finish({"created": now, "end": now, "cells_per_second": f"{rate:.6e}"})
+        store.finish(math.prod(schema.shape) / max(time.monotonic() - begin, 1e-9))
     return open_result(output)
 
 
@@ -145,8 +144,6 @@ class Verdict:
 
     Attributes
     ----------
-    whole : bool
-        Finished, and all that it says is as it was written.
     findings : tuple of str
         What is wrong or missing, a line each; none where it is whole.
     blocks : tuple of int or None
@@ -160,10 +157,11 @@ class Verdict:
     checked: str
     findings: tuple[str, ...]
     blocks: tuple[int, ...] | None = None
-    whole: bool = field(init=False)
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "whole", not self.findings)
+    @property
+    def whole(self) -> bool:
+        """Finished, and all that it says is as it was written."""
+        return not self.findings
 
     def __str__(self) -> str:
         return "\n  ".join([f"{self.path}: {self.state}; {self.checked}", *self.findings])

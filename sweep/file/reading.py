@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import errno
 import functools
-import itertools
 import json
 import math
 import operator
@@ -24,10 +23,10 @@ import numpy as np
 import xxhash
 
 from kernels.interface import Status
-from sweep.cells.partition import Partition, box_shape, row_blocks
+from sweep.cells.partition import Partition, box_shape, box_slices, row_blocks
 from sweep.cells.reduce import gathered, pending
 from sweep.cells.schema import METHOD_USED, STATUS, Coordinate
-from sweep.errors import SweepError
+from sweep.errors import SweepError, reason
 from sweep.file import disk
 from sweep.study.model import Study, study_together
 
@@ -77,7 +76,7 @@ class StoredFile:
         except (FileNotFoundError, NotADirectoryError):
             raise
         except OSError as fault:
-            raise SweepError(f"{path}: cannot be read ({fault.strerror})") from fault
+            raise SweepError(f"{path}: cannot be read ({reason(fault)})") from fault
         try:
             with raw, h5py.File(raw, "r") as h5:
                 self._read(h5, key)
@@ -85,10 +84,9 @@ class StoredFile:
             self.close()
             if isinstance(fault, OSError) and fault.errno and fault.errno not in OF_DAMAGE:
                 raise SweepError(f"{path}: cannot be read ({os.strerror(fault.errno)})") from fault
-            reason = (str(fault).splitlines() or [type(fault).__name__])[0]
             raise Damaged(
                 f"{path}: not the result of a sweep (exports are for xarray and other programs), or damaged "
-                f"({reason}); move it away or choose another name"
+                f"({reason(fault)}); move it away or choose another name"
             ) from fault
 
     def _read(self, h5: Any, key: bytes | None) -> None:
@@ -278,11 +276,8 @@ class Numbers:
         out = np.empty((*(w.stop - w.start for w in wanted), *self.own), self.dtype)
         near = tuple(slice(w.start // m, -(-w.stop // m)) for w, m in zip(wanted, table.box, strict=True))
         counts = [-(-n // m) for n, m in zip(table.grid, table.box, strict=True)]
-        blocks = np.ravel(np.arange(table.blocks.count).reshape(counts)[near]).tolist()
-        corners = itertools.product(*(range(boxes.start, boxes.stop) for boxes in near))
-        for block, corner in zip(blocks, corners, strict=True):
-            ends = zip(corner, table.box, table.grid, strict=True)
-            box = [slice(c * m, min((c + 1) * m, n)) for c, m, n in ends]
+        for block in np.ravel(np.arange(table.blocks.count).reshape(counts)[near]).tolist():
+            box = box_slices(table.grid, *table.blocks.bounds(block))
             both = [slice(max(w.start, b.start), min(w.stop, b.stop)) for w, b in zip(wanted, box, strict=True)]
             view = out[_within(both, wanted)]
             shape = (*(b.stop - b.start for b in box), *self.own)

@@ -17,12 +17,13 @@ import time
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from sweep.cells.schema import Schema
+from sweep.cells.schema import Schema, ending, now
 from sweep.errors import Incomplete, SweepError
 from sweep.file import disk
 from sweep.file.frame import PAGE, Cut, create
@@ -57,7 +58,7 @@ def alone(output: Path) -> Iterator[None]:
 def begun(output: Path, schema: Schema, cuts: Mapping[str, Cut], shared: bool = False) -> Store:
     """A result of which nothing is computed yet, with room on the disk for all of it. Raises SweepError."""
     with disk.replacing(unfinished_of(output), held=True) as part:
-        create(part, schema, cuts, shared)
+        create(part, replace(schema, attrs={**schema.attrs, "start": now()}), cuts, shared)
     return Store(output)
 
 
@@ -158,17 +159,17 @@ class Store(StoredFile):
                 disk.sync_numbers(self.fd)
                 self.work.write_digests(waiting)
 
-    def finish(self, texts: Mapping[str, str]) -> None:
-        """Puts the result in its place, with what is known at the end; of a summary, its rows are gathered first.
+    def finish(self, rate: float) -> None:
+        """Puts the result, of so many cells a second, in its place; of a summary, its rows are gathered first.
 
         Raises SweepError where it cannot, and the result stays where it is.
         """
         self.commit()
-        cells, ending = self.tables["cells"], self.tables["ending"]
+        cells, end, text = self.tables["cells"], self.tables["ending"], json.dumps(ending(rate))
         with disk.refusing(self.output):
             if self._elsewhere:
                 disk.forget(self.fd)
-            last = {ending: {0: ending.write(0, {"ending": np.array([json.dumps(dict(texts))], "S240")})}}
+            last = {end: {0: end.write(0, {"ending": np.array([text], "S240")})}}
             if cells is not self.work:
                 last[cells] = {b: cells.write(b, self.gathered(b)) for b in range(cells.blocks.count)}
             disk.sync_numbers(self.fd)

@@ -93,8 +93,8 @@ def join(
 
     grid, arrays = Grid(study), dict[str, Any]()
     for name in (*study.outputs, *ANCILLARY):
-        values = whole[name].transpose(*grid.dims, ...).values
-        arrays[name] = np.ascontiguousarray(values.reshape(grid.size, *values.shape[len(grid.dims) :]))
+        values = whole[name].transpose(*study.grid_shape, ...).values
+        arrays[name] = np.ascontiguousarray(values.reshape(grid.size, *values.shape[len(grid.shape) :]))
     if path is not None:
         sources = [Path(d.encoding["source"]) for d in results if "source" in d.encoding]
         check_target(as_path(path), force=force, read=sources)

@@ -28,7 +28,7 @@ import distributed
 
 from sweep.cells.block import Bench, Blocks, Done, Found, faults_reported
 from sweep.cells.fingerprint import difference, fingerprint
-from sweep.errors import Incomplete, SweepError
+from sweep.errors import Incomplete, SweepError, reason
 from sweep.file import disk
 from sweep.file.reading import StoredFile
 from sweep.runs.isolate import Processes
@@ -129,7 +129,7 @@ async def answer(asked: Any) -> Done:
 def _lost(fault: BaseException) -> Incomplete:
     """What is reported where the scheduler does not answer any more."""
     return Incomplete(
-        f"cluster: the scheduler is lost ({_reason(fault)}); what is finished is kept, run the same command again to "
+        f"cluster: the scheduler is lost ({reason(fault)}); what is finished is kept, run the same command again to "
         "continue"
     )
 
@@ -149,15 +149,10 @@ def _connected(address: Any) -> Any:
     try:
         return distributed.Client(**keys, timeout=CONNECT_SECONDS, set_as_default=False)
     except Exception as fault:
-        reason = _reason(fault)
+        why = reason(fault)
     # the half-made client ends here and now: if it did while another one begins, each would wait for the other
     gc.collect()
-    raise SweepError(f"cluster: no dask scheduler answers at {address} ({reason})")
-
-
-def _reason(fault: BaseException) -> str:
-    """The first line of what a fault says; its kind where that is empty."""
-    return str(fault).partition("\n")[0] or type(fault).__name__
+    raise SweepError(f"cluster: no dask scheduler answers at {address} ({why})")
 
 
 class Remote:

@@ -10,10 +10,10 @@ import contextlib
 import os
 import platform
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ThreadPoolExecutor, wait
-from dataclasses import dataclass, replace
-from datetime import UTC, datetime
+from dataclasses import dataclass
+from datetime import datetime
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
@@ -106,10 +106,6 @@ class Task:
         """What its result holds."""
         return output_schema(self.study, self.fingerprint)
 
-    def said(self, attrs: Mapping[str, str]) -> Schema:
-        """What its result holds, with further attributes."""
-        return replace(self.schema, attrs={**self.schema.attrs, **attrs})
-
 
 class Loop:
     """Times a sample of the grid, and cuts it into blocks; then computes them.
@@ -129,7 +125,7 @@ class Loop:
         hold: bool = True,
     ) -> None:
         self.task, self._reused, study = task, reused, task.study
-        self.began, self._failed, self.progress = _now(), 0, Progress(1, False)
+        self._failed, self.progress = 0, Progress(1, False)
         self._check_signals = stack.enter_context(signals_held()) if hold else lambda: None
         self._cluster: Cluster | None = None
         if task.cluster is not None and to_do:
@@ -179,11 +175,6 @@ class Loop:
         """How many cells a block has."""
         start, stop = self.blocks.cells(job)
         return stop - start
-
-    def endings(self) -> dict[str, str]:
-        """What a result says of its run that is known at the end."""
-        end = _now()
-        return {"created": end, "end": end, "cells_per_second": f"{self.progress.rate:.6e}"}
 
     def compute(
         self,
@@ -268,8 +259,3 @@ class Loop:
         self._check_signals()
         if passed(self.task.end):
             raise TimeUp(f"it is {datetime.now():%H:%M}")
-
-
-def _now() -> str:
-    """The time as ISO 8601 in UTC."""
-    return datetime.now(UTC).isoformat(timespec="seconds")

@@ -12,6 +12,7 @@ import numpy as np
 
 from sweep.cells.block import Blocks
 from sweep.cells.reduce import gathered
+from sweep.cells.schema import ending, now
 from sweep.errors import SweepError
 from sweep.file.open import in_memory, memory, open_result
 from sweep.file.store import unfinished_of
@@ -107,17 +108,18 @@ def run(
             raise SweepError(f"sweep.run: no such keyword {key}{hint}")
     task = Task(as_study(study, **keys), path, **options)
     if path is not None:
-        ending = run_to_file(task)
-        if ending == "not begun":
+        outcome = run_to_file(task)
+        if outcome == "not begun":
             raise SweepError("until: the time was up before the first cell could be computed")
-        return open_result(unfinished_of(task.output) if ending == "unfinished" else task.output)
+        return open_result(unfinished_of(task.output) if outcome == "unfinished" else task.output)
+    start = now()
     with contextlib.ExitStack() as stack:
         loop = Loop(task, stack)
         sink = _Memory(loop.blocks)
         loop.compute(range(loop.blocks.count), sink)
         loop.progress.end()
     found = sink.arrays if task.study.summary is None else gathered(task.study, sink.arrays)
-    return in_memory(task.said({"start": loop.began, **loop.endings()}), found)
+    return in_memory(task.schema, found).assign_attrs(start=start, **ending(loop.progress.rate))
 
 
 def complete(study: Study, path: str | os.PathLike[str], **options: Any) -> Ending:

@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 from sweep.cells.block import Blocks
 from sweep.cells.fingerprint import difference
+from sweep.cells.partition import Partition
 from sweep.errors import SweepError
 from sweep.file import disk
 from sweep.file.frame import cuts_of, expected_size
@@ -65,12 +66,12 @@ def run_to_file(task: Task) -> Ending:
                 # signals are held back from here on, wherever they would leave half a file behind
                 loop = Loop(task, running, None if store is None else store.work.blocks, to_do, known)
                 if store is None:
-                    store = stack.enter_context(_begun(task, loop))
+                    store = stack.enter_context(_begun(task, loop.blocks.partition))
                 for block in damaged:
                     task.note(f"{loop.blocks.label(block)} were damaged on the disk and are computed again")
                 shared = None if task.cluster is None else store.shared()
                 loop.compute(store.missing(), _Stored(store, loop.blocks, known), shared, store.tick)
-                store.finish(loop.endings())
+                store.finish(loop.progress.rate)
                 loop.progress.end()
             return "complete"
         except (KeyboardInterrupt, Terminated, TimeUp) as reason:
@@ -87,17 +88,16 @@ def run_to_file(task: Task) -> Ending:
             raise
 
 
-def _begun(task: Task, loop: Loop) -> Store:
+def _begun(task: Task, blocks: Partition) -> Store:
     """A new file, if there is room for it. Raises SweepError."""
-    schema = task.said({"start": loop.began})
-    cuts = cuts_of(task.study, schema, loop.blocks.partition)
-    needed, free = expected_size(schema, cuts), shutil.disk_usage(task.output.parent).free
+    cuts = cuts_of(task.study, task.schema, blocks)
+    needed, free = expected_size(task.schema, cuts), shutil.disk_usage(task.output.parent).free
     if needed > free:
         raise SweepError(
             f"{task.output}: needs {quantity(needed)}, only {quantity(free)} are free here; free some space, "
             "choose another folder with -o, fewer outputs, or keep a [summary] instead of every cell"
         )
-    return begun(task.output, schema, cuts, task.cluster is not None)
+    return begun(task.output, task.schema, cuts, task.cluster is not None)
 
 
 def _standing(task: Task) -> tuple[Literal["nothing", "complete", "damaged", "reused"], Sequence[int]]:

@@ -309,9 +309,9 @@ def load_kernel(name: object, allow_import: bool = False, folders: Iterable[Path
 def setting(name: str, kernel: Kernel) -> Field:
     """Method or rtol as a field: what may be an axis although it is no parameter."""
     if name == "rtol":
-        return Field("rtol", "1", "wanted relative error", lower=SMALLEST_RTOL, upper=math.nextafter(1.0, 0.0))
+        return Field("rtol", "1", "relative error asked for", lower=SMALLEST_RTOL, upper=math.nextafter(1.0, 0.0))
     choices = {"auto": AUTO} | {m.name: i for i, m in enumerate(kernel.methods)}
-    return Field("method", "1", "how a cell is solved", choices=choices)
+    return Field("method", "1", "method asked for", choices=choices)
 
 
 def short(value: Any) -> str:

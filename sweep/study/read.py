@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from sweep.errors import Mistake, StudyError, SweepError
+from sweep.errors import Mistake, StudyError, SweepError, reason
 from sweep.study.keys import read_keys
 from sweep.study.mistakes import show
 from sweep.study.model import Block, Study, study_together
@@ -103,7 +103,7 @@ def _text(path: Path) -> str:
     except UnicodeDecodeError as error:
         raise SweepError(f"{path} is not a text file in UTF-8 (byte {error.start})") from None
     except (OSError, ValueError) as error:
-        raise SweepError(f"{path} cannot be read: {getattr(error, 'strerror', None) or error}") from None
+        raise SweepError(f"{path} cannot be read: {reason(error)}") from None
     if not text.strip():
         raise SweepError(f"{path} is empty; `sweep kernels` lists what can be swept")
     return text

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels.interface import Field
-from sweep.errors import Mistake
+from sweep.errors import Mistake, reason
 from sweep.study.mistakes import Entry, exact_float, finite, limits, one_of, show, text, whole
 from sweep.study.model import Axis, frozen
 from sweep.study.units import scale
@@ -242,7 +242,7 @@ def _columns(file: Any, folder: Path, field: Field, numbered: bool) -> Floats:
                 except ValueError as error:
                     bad.append(f"{line}{error}")
     except (OSError, RuntimeError) as error:  # a link to itself is a RuntimeError
-        raise ValueError(f"{path} cannot be read: {getattr(error, 'strerror', error)}") from None
+        raise ValueError(f"{path} cannot be read: {reason(error)}") from None
     except (UnicodeDecodeError, csv.Error) as error:
         raise ValueError(f"{path} is not a csv file: {error}") from None
     if bad:

@@ -55,7 +55,7 @@ def test_the_size_of_a_result_is_known_before_it_is_computed(tmp_path, cells):
     keys = {"axes": {"height": np.linspace(1.0, 2.0, 50_000)}, "outputs": ["fall_time"], "method": "exact"}
     study = toy_studies.build(**keys)
     schema = output_schema(study, {})
-    found = expected_size(schema, cuts_of(study, schema, boxes(schema.grid.shape, cells)))
+    found = expected_size(schema, cuts_of(study, schema, boxes(schema.shape, cells)))
     with run(tmp_path / "out.h5", cells, **keys) as ds:
         assert sweep.study(ds, allow_import=True) == study
     assert (tmp_path / "out.h5").stat().st_size == pytest.approx(found, rel=0.05)
