@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -25,8 +26,11 @@ class Incomplete(SweepError):
 
 
 def reason(fault: BaseException) -> str:
-    """What a fault says: the system's own words, or the first line of its text; its kind where that is empty."""
-    text = fault.strerror if isinstance(fault, OSError) and fault.strerror else str(fault)
+    """What a fault says: the system's words for its number, or the first line of its text, or its kind."""
+    if isinstance(fault, OSError):
+        text = os.strerror(fault.errno) if fault.errno else fault.strerror or str(fault)
+    else:
+        text = str(fault)
     return text.partition("\n")[0] or type(fault).__name__
 
 

@@ -70,10 +70,6 @@ class Sample:
         return np.interp((edges[:-1] + edges[1:]) / 2, self.positions, self.costs) * np.diff(edges)
 
 
-UNSAMPLED = Sample(np.zeros(1), np.ones(1))
-"""Stands in where no cell is left to compute: every block weighs its cells."""
-
-
 def take_sample(solver: SolveCells, columns: Sequence[Column], size: int, clock: Callable[[], float]) -> Sample:
     """Times a few cells at up to 64 places of the grid, in a few hundredths of a second or a hundredth of the run.
 

@@ -48,8 +48,11 @@ def reserve(fd: int, size: int) -> None:
 
 
 def remove(path: Path) -> None:
-    """Removes a file; one that is gone already is no fault. Raises OSError."""
-    path.unlink(missing_ok=True)
+    """Removes a file or a folder; one that is gone already is no fault. Raises OSError."""
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        path.unlink(missing_ok=True)
 
 
 def write_all(fd: int, pieces: Sequence[Any], offset: int) -> None:
@@ -102,16 +105,16 @@ def replacing(target: Path, held: bool = False) -> Iterator[Path]:
     with refusing(target), lock as ours, contextlib.ExitStack() as stack:
         if not ours:
             raise SweepError(f"{target}: is being written by another process")
-        discard(part)  # what one has left that was killed
-        stack.callback(discard, part)
+        remove(part)  # what one has left that was killed
+        stack.callback(remove, part)
         part.touch()  # says in plain words that there is no such folder, or no permission
         yield part
         for inner in (*part.rglob("*"), part):
             sync_folder(inner)
         if target.is_dir() or (part.is_dir() and target.exists()):
             # a folder cannot be replaced in one step, and stands aside meanwhile
-            discard(old)
-            stack.callback(lambda: discard(old) if target.exists() else rename(old, target))
+            remove(old)
+            stack.callback(lambda: remove(old) if target.exists() else rename(old, target))
             rename(target, old)
         rename(part, target)
         sync_folder(target.parent)
@@ -120,14 +123,6 @@ def replacing(target: Path, held: bool = False) -> Iterator[Path]:
 def part_of(target: Path) -> Path:
     """Where it is written before it takes its place."""
     return target.with_name(f".{target.name}.tmp")
-
-
-def discard(path: Path) -> None:
-    """Removes a file or a folder, if it is there."""
-    if path.is_dir() and not path.is_symlink():
-        shutil.rmtree(path, ignore_errors=True)
-    else:
-        path.unlink(missing_ok=True)
 
 
 @contextlib.contextmanager

@@ -83,7 +83,7 @@ class StoredFile:
         except DAMAGE as fault:
             self.close()
             if isinstance(fault, OSError) and fault.errno and fault.errno not in OF_DAMAGE:
-                raise SweepError(f"{path}: cannot be read ({os.strerror(fault.errno)})") from fault
+                raise SweepError(f"{path}: cannot be read ({reason(fault)})") from fault
             raise Damaged(
                 f"{path}: not the result of a sweep (exports are for xarray and other programs), or damaged "
                 f"({reason(fault)}); move it away or choose another name"

@@ -51,7 +51,7 @@ def alone(output: Path) -> Iterator[None]:
     with disk.refusing(output), disk.locked(lock_of(output)) as ours:
         if not ours:
             raise SweepError(f"{output}: another run is at work on this output; wait for it, or choose another with -o")
-        disk.discard(disk.part_of(unfinished_of(output)))  # of a run that was killed
+        disk.remove(disk.part_of(unfinished_of(output)))  # of a run that was killed
         yield
 
 

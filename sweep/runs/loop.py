@@ -24,7 +24,7 @@ from sweep.cells.partition import Partition
 from sweep.cells.reduce import output_schema
 from sweep.cells.sample import require_asked
 from sweep.cells.schema import Schema
-from sweep.cells.timing import UNSAMPLED, Sample, work_clock
+from sweep.cells.timing import Sample, work_clock
 from sweep.errors import SweepError, missing
 from sweep.runs.extend import Reused
 from sweep.runs.isolate import Processes
@@ -110,9 +110,9 @@ class Task:
 class Loop:
     """Times a sample of the grid, and cuts it into blocks; then computes them.
 
-    The workers of the task's cluster do so, where anything is `to_do`, or threads here. How the rows are cut may be
-    settled already (`partition`), and some cells may be known (`reused`), or all, and none is timed. Until `stack`
-    ends, Ctrl-C and SIGTERM are held back, if they are to be (`hold`): a plan keeps nothing, and need not.
+    The workers of the task's cluster do so, or threads here. How the rows are cut may be settled already (`partition`),
+    and some cells may be known (`reused`). Until `stack` ends, Ctrl-C and SIGTERM are held back, if they are to be
+    (`hold`): a plan keeps nothing, and need not.
     """
 
     def __init__(
@@ -120,7 +120,6 @@ class Loop:
         task: Task,
         stack: contextlib.ExitStack,
         partition: Partition | None = None,
-        to_do: bool = True,
         reused: Reused | None = None,
         hold: bool = True,
     ) -> None:
@@ -128,7 +127,7 @@ class Loop:
         self._failed, self.progress = 0, Progress(1, False)
         self._check_signals = stack.enter_context(signals_held()) if hold else lambda: None
         self._cluster: Cluster | None = None
-        if task.cluster is not None and to_do:
+        if task.cluster is not None:
             try:
                 from sweep.runs.cluster import Cluster
             except ImportError:
@@ -140,7 +139,7 @@ class Loop:
             stack.callback(self.processes.end)
         self._threads = ThreadPoolExecutor(task.cores)
         stack.callback(self._threads.shutdown, wait=False)
-        self.sample = self._sample() if to_do else UNSAMPLED
+        self.sample = self._sample()
         # a block of a cluster takes so long that the scheduler's millisecond is nothing
         least = 0.0 if self._cluster is None else 0.5
         self.blocks = Blocks(study, partition or cut(study, self._crew, self.sample, task.block_cells, least))

@@ -59,12 +59,12 @@ def run_to_file(task: Task) -> Ending:
             store = None
         try:
             with contextlib.ExitStack() as running:
-                known, to_do = None, store is None or bool(store.missing())
-                if to_do and standing == "reused":
+                known = None
+                if standing == "reused":
                     reused = Reused(task.output, task.study, task.retry_failed)
                     known = running.enter_context(contextlib.closing(reused))
                 # signals are held back from here on, wherever they would leave half a file behind
-                loop = Loop(task, running, None if store is None else store.work.blocks, to_do, known)
+                loop = Loop(task, running, None if store is None else store.work.blocks, known)
                 if store is None:
                     store = stack.enter_context(_begun(task, loop.blocks.partition))
                 for block in damaged:
