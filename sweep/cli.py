@@ -10,11 +10,13 @@ import contextlib
 import os
 import sys
 from collections.abc import Sequence
+from typing import NoReturn
 
 from sweep.command import look, solve
 from sweep.command.options import command, option
 from sweep.command.reading import Outcome, explained, say
-from sweep.errors import COMPLETE, EXIT_CODES, missing
+from sweep.errors import COMPLETE, EXIT_CODES, MISTAKE, missing
+from sweep.words import paragraph
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -74,6 +76,14 @@ COMMANDS = {
 """In the order in which `sweep --help` names them."""
 
 
+class Parser(argparse.ArgumentParser):
+    """One whose mistakes are as wide as any other message."""
+
+    def error(self, message: str) -> NoReturn:
+        self.print_usage(sys.stderr)
+        self.exit(MISTAKE, paragraph(f"{self.prog}: error: {message}") + "\n")
+
+
 def parser() -> argparse.ArgumentParser:
     """All commands and their options."""
     from importlib import metadata
@@ -83,7 +93,7 @@ def parser() -> argparse.ArgumentParser:
     except metadata.PackageNotFoundError:
         version = "(not installed)"
     codes = "\n".join(f"  {code:3}  {text}" for code, text in EXIT_CODES.items())
-    top = argparse.ArgumentParser(
+    top = Parser(
         prog="sweep",
         description="Sweep a kernel over a grid of parameters.",
         epilog=f"exit status:\n{codes}",

@@ -101,13 +101,18 @@ class Table:
 
 
 def paragraph(text: str) -> str:
-    """Lines of text, each wrapped at the width of the terminal."""
-    return "\n".join("\n".join(_wrapped(line, width())) for line in text.splitlines())
+    """Lines of text, each wrapped at the width of the terminal; the rest of one stands below its last column."""
+    room, lines = width(), list[str]()
+    for line in text.splitlines():
+        columns = (match.end() for match in re.finditer("^ +|  +", line))
+        below = " " * max((column for column in columns if column <= room - LAST), default=0)
+        lines += _wrapped(line, room, below) if len(line) > room else [line]
+    return "\n".join(lines)
 
 
-def _wrapped(text: str, size: int) -> list[str]:
+def _wrapped(text: str, size: int, below: str = "") -> list[str]:
     """Words are kept whole, lest a path be torn."""
-    return textwrap.wrap(text, max(size, 1), break_on_hyphens=False, break_long_words=False)
+    return textwrap.wrap(text, max(size, 1), subsequent_indent=below, break_on_hyphens=False, break_long_words=False)
 
 
 def page(*sections: str) -> str:

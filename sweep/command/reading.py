@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TextIO
 
 import sweep
 from sweep.errors import FAULT, INCOMPLETE, INTERRUPTED, MISTAKE, Incomplete, SweepError
+from sweep.words import paragraph, printable
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -88,11 +89,10 @@ def opened(arguments: argparse.Namespace, name: str = "result") -> Iterator[xr.D
         yield sweep.in_units(found, {name: unit for name, _, unit in units.values()}) if units else found
 
 
-def say(text: object, file: TextIO | None = None) -> None:
-    """Prints, to stdout unless said otherwise, what may hold text of other people."""
-    from sweep.words import printable
-
-    print(printable(str(text)), file=file)
+def say(text: object, file: TextIO | None = None, wide: bool = False) -> None:
+    """Prints, to stdout unless said otherwise, what may hold text of other people; no wider than the terminal."""
+    shown = printable(str(text))
+    print(shown if wide else paragraph(shown), file=file)
 
 
 def tell(arguments: argparse.Namespace, found: Any, text: object = None) -> None:
@@ -100,7 +100,7 @@ def tell(arguments: argparse.Namespace, found: Any, text: object = None) -> None
     if arguments.json:
         print(json.dumps(plain(found), ensure_ascii=False, indent=1))
     else:
-        say(found if text is None else text)
+        say(found if text is None else text, wide=getattr(arguments, "all", False))
 
 
 def plain(value: Any) -> Any:

@@ -16,7 +16,7 @@ import numpy as np
 
 from sweep.cells.timing import GOLDEN
 from sweep.runs.log import log
-from sweep.words import SHORTEST, duration, one_digit, printable, speed
+from sweep.words import SHORTEST, duration, one_digit, paragraph, printable, speed
 
 QUIET_SECONDS = 1.0
 """A run that ends sooner says nothing."""
@@ -121,7 +121,7 @@ class Progress:
         if self._stream is not None:
             stamp = "" if self._live else time.strftime("%Y-%m-%d %H:%M:%S  ")
             try:
-                self._stream.write(f"{stamp}{self._name}: {text}\n")
+                self._stream.write(paragraph(f"{stamp}{self._name}: {text}") + "\n")
                 self._stream.flush()
             except (OSError, ValueError):
                 self._stream = None

@@ -19,7 +19,7 @@ from sweep.file.open import open_result
 from sweep.show.view import coordinate, evened, lines_of, outputs, preferred
 from sweep.view import region
 from sweep.view.region import Choice, number_axes, other_axes, row, shown
-from sweep.words import Table
+from sweep.words import Table, paragraph
 
 try:
     import panel as pn
@@ -85,7 +85,7 @@ def serve(path: str | os.PathLike[str], port: int = 0, show: bool = True) -> Non
     server = pn.serve(session, port=port, address=ADDRESS, show=show, start=False, title=result.name, verbose=False)
     # pages and websockets alike, for tornado accepts any name in which Host and Origin agree
     server._tornado.add_handlers(OTHER_HOSTS, [(".*", ErrorHandler, {"status_code": 403})])
-    print(f"http://{ADDRESS}:{server.port}/ shows {result}; Ctrl-C ends it", flush=True)
+    print(paragraph(f"http://{ADDRESS}:{server.port}/ shows {result}; Ctrl-C ends it"), flush=True)
     server.run_until_shutdown()
 
 

@@ -29,6 +29,15 @@ def test_a_table_is_text_and_html_and_nothing_without_rows():
     assert table.Table([], ("name",), "Title").text() == table.Table([], ("name",)).html() == ""
 
 
+def test_the_rest_of_a_long_line_stands_below_its_last_column(monkeypatch):
+    monkeypatch.setattr("shutil.get_terminal_size", lambda fallback: os.terminal_size((80, 24)))
+    path = "/a/path/that/is/longer/than/any/line/of/a/terminal/and/must/not/be/torn/results.h5"
+    told = table.paragraph(f"study.toml: 1 mistake\n  axes.mu  {WORDS}, see\n  axes.mu  {path}").splitlines()
+    assert told[0] == "study.toml: 1 mistake"
+    assert all(len(row) <= 80 or path in row for row in told)
+    assert {row.index(row.split()[0]) for row in told[2:] if "axes" not in row} == {11}
+
+
 def test_what_a_terminal_would_obey_is_shown():
     assert table.printable("a\x1b[31m\x7f\x9f\xa0\n\tb\r") == "a\\x1b[31m\\x7f\\x9f\xa0\n\tb\\x0d"
     assert table.printable("\x00\x1f \udc80") == "\\x00\\x1f \\udc80"
