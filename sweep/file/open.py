@@ -195,14 +195,14 @@ def verify(path: str | os.PathLike[str]) -> Verdict:
     output = as_path(path)
     try:
         with stored(output) as file:
-            return _verdict(output, file)
+            return verdict(output, file)
     except Damaged as fault:
         checked = "its structure is damaged, or it is not the result of a sweep"
         return Verdict(output, "damaged", checked, (str(fault),))
 
 
-def _verdict(output: Path, file: StoredFile) -> Verdict:
-    """Compares all digests."""
+def verdict(output: Path, file: StoredFile) -> Verdict:
+    """What comparing all digests of an open file says of an output."""
     mendable, work, lost, findings = file.is_as_made(), file.work, set[int](), list[str]()
     if not mendable:
         findings.append("its structure is not as it was made: damaged, or changed by another program")

@@ -31,12 +31,11 @@ def obstacle(old: Mapping[str, str], new: Mapping[str, str]) -> str:
     return "" if changed else "nothing differs but words"
 
 
-def has_failed(output: Path) -> bool:
+def has_failed(file: StoredFile) -> bool:
     """Whether a cell of a finished result FAILED. Raises SweepError where it keeps no cells."""
-    with StoredFile(output) as file:
-        if STATUS not in (columns := file.tables["cells"].columns):
-            raise SweepError(f"{output}: a summary does not keep the cells that FAILED; compute it anew with --force")
-        return any((piece == Status.FAILED).any() for piece in flat_pieces(columns[STATUS]))
+    if STATUS not in (columns := file.tables["cells"].columns):
+        raise SweepError(f"{file.path}: a summary does not keep the cells that FAILED; compute it anew with --force")
+    return any((piece == Status.FAILED).any() for piece in flat_pieces(columns[STATUS]))
 
 
 class Reused:

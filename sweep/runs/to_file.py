@@ -13,7 +13,7 @@ from sweep.cells.partition import Partition
 from sweep.errors import SweepError
 from sweep.file import disk
 from sweep.file.frame import cuts_of, expected_size
-from sweep.file.open import verify
+from sweep.file.open import verdict
 from sweep.file.reading import StoredFile
 from sweep.file.store import Store, alone, begun, found, lock_of, reopened, unfinished_of
 from sweep.runs.extend import Reused, has_failed, obstacle
@@ -108,23 +108,19 @@ def _standing(task: Task) -> tuple[Literal["nothing", "complete", "damaged", "re
     if not disk.mark(task.output):
         return "nothing", ()
     with StoredFile(task.output) as file:
-        stored = file.fingerprint
-    if task.force:
-        return "nothing", ()
-    if stored == dict(task.fingerprint):
-        verdict = verify(task.output)
-        if task.repair and verdict.blocks is not None:
-            return "damaged", verdict.blocks
-        verdict.require_whole()
-        return "reused" if task.retry_failed and has_failed(task.output) else "complete", ()
-    hindrance = obstacle(stored, task.fingerprint)
-    if task.extend and not hindrance:
-        verify(task.output).require_whole()
-        return "reused", ()
+        if task.force:
+            return "nothing", ()
+        hindrance, ours = obstacle(file.fingerprint, task.fingerprint), file.fingerprint == dict(task.fingerprint)
+        if ours or (task.extend and not hindrance):
+            checked = verdict(task.output, file)
+            if ours and task.repair and checked.blocks is not None:
+                return "damaged", checked.blocks
+            checked.require_whole()
+            return "complete" if ours and not (task.retry_failed and has_failed(file)) else "reused", ()
     what = f"cannot be extended, for {hindrance}" if task.extend else "holds the result of another study or version"
     extendable = "; where its axes have only got more values, --extend computes the new cells alone"
     cure = f"choose another name, or overwrite it with --force{'' if hindrance else extendable}"
-    raise SweepError(f"{task.output}: {what}; {cure}\n{_changes(stored, task)}")
+    raise SweepError(f"{task.output}: {what}; {cure}\n{_changes(file.fingerprint, task)}")
 
 
 def _changes(stored: Mapping[str, str], task: Task) -> str:
