@@ -27,7 +27,7 @@ import xarray as xr
 from kernels.interface import Status
 from sweep.cells.schema import ANCILLARY
 from sweep.explore.mesh import Mesh, stretch
-from sweep.explore.refine import LEVELS, Refiner
+from sweep.explore.refine import LEVELS, Refinement, Refiner
 from sweep.explore.scattered import heights
 from sweep.study.model import Axis
 
@@ -85,7 +85,7 @@ def refined(function, axes, tolerance):
     first = first.assign_coords(dict(zip(names, grid, strict=True)))
     cells = Refiner(first, study, ["value"], tolerance, MOST_CELLS, solved)
     cells.refine()
-    return cells.points, cells.cells["value"], cells.report(first)
+    return cells.points, cells.cells["value"], Refinement(cells, first)
 
 
 def true_error(function, points, values):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import dataclasses
 import enum
 import json
 import math
@@ -114,8 +113,8 @@ def plain(value: Any) -> Any:
     for method in ("to_dict", "tolist", "_asdict"):
         if hasattr(value, method):
             return plain(getattr(value, method)())
-    if dataclasses.is_dataclass(value):
-        value = {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
     if isinstance(value, Mapping):
         return {str(name): plain(one) for name, one in value.items()}
-    return [plain(one) for one in value] if isinstance(value, list | tuple | set) else str(value)
+    if isinstance(value, list | tuple | set):
+        return [plain(one) for one in value]
+    return plain(vars(value)) if hasattr(value, "__dict__") else str(value)

@@ -169,7 +169,7 @@ def check(arguments: argparse.Namespace) -> Outcome:
     """Solve some OK cells again by another method and compare; exit status 1 if one is beyond its rtol."""
     with opened(arguments) as dataset:
         found = dataset.sweep.check(arguments.sample, arguments.seed, allow_import=arguments.allow_import)
-    tell(arguments, vars(found), found)
+    tell(arguments, found)
     return Outcome(DIFFERENT if found.beyond else COMPLETE, str(found))
 
 
@@ -181,4 +181,4 @@ def cell(arguments: argparse.Namespace) -> None:
     """One cell: its values, the meaning of its status, and the result of each method."""
     with opened(arguments) as dataset:
         found = dataset.sweep.cell(allow_import=arguments.allow_import)
-    tell(arguments, vars(found), found)
+    tell(arguments, found)

@@ -8,7 +8,6 @@ import time
 from collections import Counter
 from collections.abc import Callable
 from contextlib import ExitStack
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -40,7 +39,6 @@ RUN_SECONDS = 0.15
 """What any run to a file takes beside its cells: opening, a sample, the end."""
 
 
-@dataclass(frozen=True)
 class Plan:
     """A forecast; `str` of it is what `sweep plan` prints.
 
@@ -67,25 +65,37 @@ class Plan:
         Which axes are superfluous, since they change nothing but the units; "" where none is.
     """
 
-    title: str
-    kernel: str
-    cells: int
-    shape: dict[str, int]
-    outputs: tuple[str, ...]
-    blocks: int
-    cells_per_block: int
-    workers: int
-    output_bytes: int
-    memory_bytes: int
-    free_bytes: int
-    folder: str
-    cell_seconds: float
-    seconds: float
-    compile_seconds: float
-    methods: dict[str, float]
-    statuses: dict[str, float]
-    sampled: int
-    scaling: str
+    def __init__(self, task: Task) -> None:
+        study, before, begun = task.study, work_clock.compiled, time.monotonic()
+        self.title, self.kernel, self.outputs = study.title, study.kernel_name, study.outputs
+        self.shape, self.workers = study.grid_shape, task.cores
+        with ExitStack() as stack:
+            loop = Loop(task, stack, hold=False)
+            sample, blocks, apart = loop.sample, loop.blocks, loop.processes
+            starting = 0.0 if apart is None else time.monotonic() - begun - apart.seconds
+            self.cells, self.cell_seconds = blocks.rows.size, sample.cost
+            self.seconds = RUN_SECONDS + sample.cost * self.cells / min(self.workers, blocks.count)
+            solver = Guard(apart or Solver(study), lambda cell: None)
+            looked_at = _looked_at(study, solver, min(LOOK_SECONDS, SHARE * self.seconds))
+        self.methods, self.statuses, self.sampled = looked_at
+        self.scaling, allowed = NO_ADVICE, max(SHARE * self.seconds, ADVICE_SECONDS)
+        if not apart and ADVICE_CELLS * sample.cost < allowed:
+            with faults_reported(f"{self.kernel}: the kernel failed"):
+                self.scaling = scaling(study).advice
+        # every run of a kernel that may crash, or never end, begins processes, and compiles it, anew
+        compiling = starting if apart else work_clock.compiled - before
+        self.compile_seconds = compiling if compiling > SILENT_SECONDS else 0.0
+        self.seconds += starting if apart else 0.0 if self._is_kept else self.compile_seconds
+        self.blocks, self.cells_per_block = blocks.count, blocks.cells(0)[1]
+        self.output_bytes = expected_size(task.schema, cuts_of(study, task.schema, blocks.partition))
+        self.memory_bytes = 2 * self.workers * (blocks.partition.cells * blocks.row_bytes + strip_bytes(study))
+        self.folder = str(Path.cwd() if task.path is None else task.output.parent)
+        self.free_bytes = shutil.disk_usage(self.folder).free
+
+    @property
+    def _is_kept(self) -> bool:
+        """Whether the machine code of the kernel is there for the next run."""
+        return machine_code_folder() is not None and ":" not in self.kernel
 
     @property
     def warnings(self) -> list[str]:
@@ -103,7 +113,7 @@ class Plan:
             texts = ", ".join(f"{name} {100 * share:.3g} %" for name, share in found.items() if name != "none")
             return f"{texts or 'none'} of a sample of {self.sampled:,} cell{'s' * (self.sampled > 1)}"
 
-        when = "just now; the machine code is kept" if _is_kept(self.kernel) else "of it, before the first cell"
+        when = "just now; the machine code is kept" if self._is_kept else "of it, before the first cell"
         shape = " x ".join(f"{name} {n:,}" for name, n in self.shape.items())
         rows = {
             "kernel": self.kernel,
@@ -158,51 +168,8 @@ def plan(
     >>> sweep.plan(study).cells
     2
     """
-    study, before, begun = as_study(study), work_clock.compiled, time.monotonic()
-    task = Task(study, path, workers, progress=False, isolate=isolate, cell_timeout=cell_timeout, note=note)
-    folder, crew = Path.cwd() if path is None else task.output.parent, task.cores
-    with ExitStack() as stack:
-        loop = Loop(task, stack, hold=False)
-        sample, blocks, apart = loop.sample, loop.blocks, loop.processes
-        starting = 0.0 if apart is None else time.monotonic() - begun - apart.seconds
-        seconds = RUN_SECONDS + sample.cost * blocks.rows.size / min(crew, blocks.count)
-        solver = Guard(apart or Solver(study), lambda cell: None)
-        methods, statuses, looked_at = _looked_at(study, solver, min(LOOK_SECONDS, SHARE * seconds))
-    advice, allowed = NO_ADVICE, max(SHARE * seconds, ADVICE_SECONDS)
-    if not apart and ADVICE_CELLS * sample.cost < allowed:
-        with faults_reported(f"{study.kernel_name}: the kernel failed"):
-            advice = scaling(study).advice
-    # every run of a kernel that may crash, or never end, begins processes, and compiles it, anew
-    compiling = starting if apart else work_clock.compiled - before
-    compiling = compiling if compiling > SILENT_SECONDS else 0.0
-    seconds += starting if apart else 0.0 if _is_kept(study.kernel_name) else compiling
-    schema = task.schema
-    return Plan(
-        title=study.title,
-        kernel=study.kernel_name,
-        cells=blocks.rows.size,
-        shape=study.grid_shape,
-        outputs=study.outputs,
-        blocks=blocks.count,
-        cells_per_block=blocks.cells(0)[1],
-        workers=crew,
-        output_bytes=expected_size(schema, cuts_of(study, schema, blocks.partition)),
-        memory_bytes=2 * crew * (blocks.partition.cells * blocks.row_bytes + strip_bytes(study)),
-        free_bytes=shutil.disk_usage(folder).free,
-        folder=str(folder),
-        cell_seconds=sample.cost,
-        seconds=seconds,
-        compile_seconds=compiling,
-        methods=methods,
-        statuses=statuses,
-        sampled=looked_at,
-        scaling=advice,
-    )
-
-
-def _is_kept(kernel: str) -> bool:
-    """Whether the machine code of a kernel is there for the next run."""
-    return machine_code_folder() is not None and ":" not in kernel
+    keys: dict[str, Any] = {"isolate": isolate, "cell_timeout": cell_timeout, "note": note}
+    return Plan(Task(as_study(study), path, workers, progress=False, **keys))
 
 
 def _looked_at(study: Study, solver: Guard, seconds: float) -> tuple[dict[str, float], dict[str, float], int]:

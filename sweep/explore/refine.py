@@ -19,7 +19,6 @@ import math
 import os
 import shutil
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -35,6 +34,7 @@ from sweep.explore.scattered import MOST_AXES, REFINED_TO, Box, axes_of, heights
 from sweep.file import disk
 from sweep.file.disk import check_target
 from sweep.file.open import store_cells
+from sweep.results.filter import cells_at
 from sweep.results.statuses import statuses_of
 from sweep.runs.run import run
 from sweep.study.model import Axis, Study, frozen
@@ -58,7 +58,6 @@ SAME = 2.0**-40
 """Distance of places along an axis, from 0 to 1, that are the same."""
 
 
-@dataclass(frozen=True)
 class Refinement:
     """What came of it.
 
@@ -85,15 +84,21 @@ class Refinement:
         How far values scatter, relative, where more cells do not lessen that, so that none were added; 0 where they do.
     """
 
-    dataset: xr.Dataset
-    added: int
-    uniform: int
-    error: float
-    tolerance: float
-    complete: bool
-    jumps: int
-    unseen: dict[str, str]
-    noise: float
+    def __init__(self, cells: Refiner, dataset: xr.Dataset) -> None:
+        found, box, points = cells.found, cells.box, cells.points
+        left = found.valued & found.finest & found.wanted
+        steps = [np.diff(np.unique(column)) for column in points.T]
+        widths = np.ptp(points[found.corners[found.valued]], axis=1).max(axis=0, initial=0.0)
+        self.dataset, self.added = dataset, len(points) - cells.first
+        self.uniform = int(math.prod(round(1 / step[step > SAME].min()) + 1 for step in steps))
+        self.error, self.tolerance = float(found.size[found.valued & ~left].max(initial=0.0)), cells.tolerance
+        self.complete, self.jumps = not (found.size > self.tolerance).any(), int(left.sum())
+        apart = zip(cells.axes, widths, box.low, box.high, box.logarithmic, strict=True)
+        self.unseen = {
+            name: f"a factor {(high / low) ** width:.3g}" if logarithmic else f"{width * (high - low):.3g}"
+            for name, width, low, high, logarithmic in apart
+        }
+        self.noise = max(cells.noise.values())
 
     def __str__(self) -> str:
         text = f"{self.dataset[STATUS].size:,} cells, {self.added:,} of them added"
@@ -185,7 +190,7 @@ def refine(
     values = {name: arrays.pop(name) for name in cells.axes}
     whole = study_of(values, "product" if len(values) == 1 else "zip")
     attrs = {REFINED_TO: json.dumps(dict.fromkeys(names, tolerance))}
-    found = cells.report(store_cells(whole, path, arrays, force, attrs=attrs))
+    found = Refinement(cells, store_cells(whole, path, arrays, force, attrs=attrs))
     shutil.rmtree(rounds or "", ignore_errors=True)
     return found
 
@@ -255,12 +260,10 @@ class Refiner:
         solve: Callable[[Mapping[str, Array]], xr.Dataset],
     ) -> None:
         self.tolerance, self.most, self._solve = tolerance, most_cells, solve
-        self.axes, first = list(study.axes), dataset.load()
-        if first[STATUS].ndim > 1:
-            # all along one dimension, which is the first one of traces too
-            first = first.stack(cell=list(first[STATUS].dims), create_index=False).transpose("cell", ...)
+        self.axes, self.first = list(study.axes), dataset[STATUS].size
+        first = cells_at(dataset.load(), np.arange(self.first))
         self.cells: dict[str, Any] = {name: first[name].values for name in (*self.axes, *study.outputs, *ANCILLARY)}
-        self.box, self.first = Box.of(first, self.axes), first[STATUS].size
+        self.box = Box.of(first, self.axes)
         self.points = self.box.points(self.cells)  # from 0 to 1, shape (cells, axes)
         # the two cells that each was put between; of the first ones, itself
         self.origins = np.stack([np.arange(self.first)] * 2, axis=1)
@@ -298,28 +301,6 @@ class Refiner:
                 stretched_at = 0
             else:
                 return
-
-    def report(self, dataset: xr.Dataset) -> Refinement:
-        """What came of it, with the dataset of all cells."""
-        found, box = self.found, self.box
-        left = found.valued & found.finest & found.wanted
-        steps = [np.diff(np.unique(column)) for column in self.points.T]
-        widths = np.ptp(self.points[found.corners[found.valued]], axis=1).max(axis=0, initial=0.0)
-        apart = zip(self.axes, widths, box.low, box.high, box.logarithmic, strict=True)
-        return Refinement(
-            dataset=dataset,
-            added=len(self.points) - self.first,
-            uniform=int(math.prod(round(1 / step[step > SAME].min()) + 1 for step in steps)),
-            error=float(found.size[found.valued & ~left].max(initial=0.0)),
-            tolerance=self.tolerance,
-            complete=not (found.size > self.tolerance).any(),
-            jumps=int(left.sum()),
-            unseen={
-                name: f"a factor {(high / low) ** width:.3g}" if logarithmic else f"{width * (high - low):.3g}"
-                for name, width, low, high, logarithmic in apart
-            },
-            noise=max(self.noise.values()),
-        )
 
     def _add(self, points: Array, ends: Indices | None = None) -> None:
         """Solves further cells, maybe in the middles between two others.

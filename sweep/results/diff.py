@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -34,7 +34,6 @@ class Distance:
     example: str = ""
 
 
-@dataclass
 class Difference:
     """What two results differ in; `str` of it is what `sweep diff` prints.
 
@@ -54,14 +53,36 @@ class Difference:
         A cell of each of these.
     """
 
-    cells: int
-    only_a: int
-    only_b: int
-    missing: tuple[str, ...]
-    rtol: float
-    outputs: dict[str, Distance] = field(default_factory=dict)
-    statuses: dict[tuple[str, str], int] = field(default_factory=dict)
-    examples: dict[tuple[str, str], str] = field(default_factory=dict)
+    def __init__(self, a: xr.Dataset, b: xr.Dataset, rtol: float) -> None:
+        first, second = xr.align(a, b, join="inner", copy=False)
+        cells = first[STATUS].dims
+        total = [math.prod(d[STATUS].shape) for d in (a, b, first)]
+        self.cells, self.only_a, self.only_b = total[2], total[0] - total[2], total[1] - total[2]
+        names = [{str(n) for n in d.data_vars} - set(ANCILLARY) for d in (a, b)]
+        self.missing, self.rtol = tuple(sorted(names[0] ^ names[1])), rtol
+        self.outputs = {str(name): Distance() for name in a.data_vars if str(name) in names[0] & names[1]}
+        self.statuses, self.examples = dict[tuple[str, str], int](), dict[tuple[str, str], str]()
+        words, compared = [flag_words(d[STATUS]) for d in (first, second)], [*self.outputs, STATUS]
+        for x, y in zip(*(pieces(d[compared], cells) for d in (first, second)), strict=True):
+            for name, distance in self.outputs.items():
+                one = x[name].transpose(*cells, ...)
+                here, there = one.values, y[name].transpose(*one.dims).values
+                # 0 of equal values and of two NaN, infinite where one alone is NaN
+                with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
+                    apart = np.abs(here - there) / np.maximum(np.abs(here), np.abs(there))
+                apart[(here == there) | (np.isnan(here) & np.isnan(there))] = 0.0
+                apart[np.isnan(apart)] = np.inf
+                apart = apart.max(axis=tuple(range(len(cells), one.ndim)), initial=0.0)
+                distance.cells += int((apart > rtol).sum())
+                if apart.size and apart.max() > distance.largest:
+                    distance.largest, distance.example = float(apart.max()), _example(x, int(apart.argmax()))
+            codes = np.stack([x[STATUS].values.ravel(), y[STATUS].transpose(*cells).values.ravel()])
+            pairs, places, counts = np.unique(codes, axis=1, return_index=True, return_counts=True)
+            for old, new, place, count in zip(*pairs.tolist(), places.tolist(), counts.tolist(), strict=True):
+                if old != new:
+                    pair = words[0].get(old, str(old)), words[1].get(new, str(new))
+                    self.statuses[pair] = self.statuses.get(pair, 0) + count
+                    self.examples.setdefault(pair, _example(x, place))
 
     @property
     def same(self) -> bool:
@@ -125,35 +146,7 @@ def diff(a: xr.Dataset, b: xr.Dataset | None = None, rtol: float = 0.0) -> Diffe
         along = [name for name, c in a.coords.items() if c.dims[:1] == (dim,)]
         if a.sizes[dim] != b.sizes[dim] or not all(name in b.coords and a[name].equals(b[name]) for name in along):
             raise SweepError(f"the points along {dim} are not the same in both; compare results of one design")
-    first, second = xr.align(a, b, join="inner", copy=False)
-
-    cells = first[STATUS].dims
-    total = [math.prod(d[STATUS].shape) for d in (a, b, first)]
-    names = [{str(n) for n in d.data_vars} - set(ANCILLARY) for d in (a, b)]
-    found = Difference(total[2], total[0] - total[2], total[1] - total[2], tuple(sorted(names[0] ^ names[1])), rtol)
-    found.outputs.update({str(name): Distance() for name in a.data_vars if str(name) in names[0] & names[1]})
-    words, compared = [flag_words(d[STATUS]) for d in (first, second)], [*found.outputs, STATUS]
-    for x, y in zip(*(pieces(d[compared], cells) for d in (first, second)), strict=True):
-        for name, distance in found.outputs.items():
-            one = x[name].transpose(*cells, ...)
-            here, there = one.values, y[name].transpose(*one.dims).values
-            # 0 of equal values and of two NaN, infinite where one alone is NaN
-            with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-                apart = np.abs(here - there) / np.maximum(np.abs(here), np.abs(there))
-            apart[(here == there) | (np.isnan(here) & np.isnan(there))] = 0.0
-            apart[np.isnan(apart)] = np.inf
-            apart = apart.max(axis=tuple(range(len(cells), one.ndim)), initial=0.0)
-            distance.cells += int((apart > rtol).sum())
-            if apart.size and apart.max() > distance.largest:
-                distance.largest, distance.example = float(apart.max()), _example(x, int(apart.argmax()))
-        codes = np.stack([x[STATUS].values.ravel(), y[STATUS].transpose(*cells).values.ravel()])
-        pairs, places, counts = np.unique(codes, axis=1, return_index=True, return_counts=True)
-        for old, new, place, count in zip(*pairs.tolist(), places.tolist(), counts.tolist(), strict=True):
-            if old != new:
-                pair = words[0].get(old, str(old)), words[1].get(new, str(new))
-                found.statuses[pair] = found.statuses.get(pair, 0) + count
-                found.examples.setdefault(pair, _example(x, place))
-    return found
+    return Difference(a, b, rtol)
 
 
 def _example(piece: xr.Dataset, place: int) -> str:

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import os
 import re
-from dataclasses import dataclass, field
 from pathlib import Path
 
 from sweep.errors import SweepError
 from sweep.file.open import stored
-from sweep.results.statuses import account
+from sweep.results.statuses import Account, account
 from sweep.words import Table, as_path
 
 UNFINISHED = re.compile(r"(.+\.(?:h5|nc))\.unfinished")
@@ -19,7 +18,6 @@ LATER = ("when", "version")
 """Of these, what is printed by `sweep list --all` only."""
 
 
-@dataclass(frozen=True)
 class Listed:
     """One result.
 
@@ -39,15 +37,18 @@ class Listed:
         Why it cannot be read; all else is empty then.
     """
 
-    path: Path
-    question: str = ""
-    cells: int = 0
-    done: float = 0.0
-    statuses: dict[str, int] = field(default_factory=dict)
-    account: dict[str, int] = field(default_factory=dict)
-    when: str = ""
-    version: str = ""
-    fault: str = ""
+    def __init__(self, path: Path) -> None:
+        self.path, self.fault, attrs, found = path, "", dict[str, str](), Account({}, {})
+        try:
+            with stored(path) as file:
+                attrs, found = file.attrs, account(file)
+        except (SweepError, OSError) as fault:
+            self.fault = str(fault).removeprefix(f"{path}: ")
+        self.question = str(attrs.get("question") or attrs.get("title", ""))
+        self.cells, self.statuses, self.account = found.total, found.statuses, found.by_kind
+        self.done = 1.0 - self.account["pending"] / max(1, self.cells)
+        self.when = str(attrs.get("end", attrs.get("start", "")))
+        self.version = str(attrs.get("versions", "")).partition(",")[0].removeprefix("foliot ")
 
     @property
     def row(self) -> tuple[str, ...]:
@@ -55,7 +56,7 @@ class Listed:
         if self.fault:
             return self.path.name, "", "", "", "", "", self.fault
         cells = ", ".join(f"{n:,} {kind}" for kind, n in self.account.items() if n)
-        done = f"{int(1000 * self.done) / 10:g} %"
+        done = f"{1000 * (self.cells - self.account['pending']) // self.cells / 10:g} %"
         return self.path.name, f"{self.cells:,}", done, cells, self.when[:16], self.version, self.question
 
 
@@ -96,22 +97,4 @@ def list_results(folder: str | os.PathLike[str] = ".") -> Listing:
     names = {entry.name for entry in place.iterdir()}
     found = {name for name in names if name.endswith((".h5", ".nc"))}
     found |= {match[1] for name in names if (match := UNFINISHED.fullmatch(name))}
-    return Listing(_listed(place / name) for name in sorted(found))
-
-
-def _listed(path: Path) -> Listed:
-    try:
-        with stored(path) as file:
-            attrs, found = file.attrs, account(file)
-            return Listed(
-                path=path,
-                question=str(attrs.get("question") or attrs.get("title", "")),
-                cells=found.total,
-                done=(found.total - found.by_kind["pending"]) / found.total,
-                statuses=found.statuses,
-                account=found.by_kind,
-                when=str(attrs.get("end", attrs.get("start", ""))),
-                version=str(attrs.get("versions", "")).partition(",")[0].removeprefix("foliot "),
-            )
-    except (SweepError, OSError) as fault:
-        return Listed(path, fault=str(fault).removeprefix(f"{path}: "))
+    return Listing(Listed(place / name) for name in sorted(found))
