@@ -184,7 +184,7 @@ def holds_beside_infinity(axes):
     points, values, found = refined(pole, axes, POLE_TOLERANCE)
     spent = time.process_time() - start
     places = np.random.default_rng(5).random((PLACES[axes], axes))
-    wide = axes**0.5 * 2.0 ** -LEVELS[axes][1] / (START[axes] - 1)
+    wide = axes**0.5 * 2.0 ** -(LEVELS[axes] // 2) / (START[axes] - 1)
     places = places[np.linalg.norm(places, axis=1) < POLE - 2 * wide]
     logs = heights(values)
     error = abs(Mesh(points, logs).between(places)[0] - np.log(pole(places))).max()

@@ -45,13 +45,12 @@ if TYPE_CHECKING:
     import xarray as xr
 
 MOST_CELLS = 1_000_000
-LEVELS = {1: (20, 10, 20), 2: (10, 5, 5), 3: (6, 3, 3)}
-FURTHER_LEVELS = (4, 2, 2)
-"""How often a step of the first grid may be halved, by number of axes: inside of a status, for a jump has no straight
-line; across a border between statuses; and beside one, where values may go to infinity."""
-GROWTH, SETTLED = 1.5, 1.02
-"""Factors of the number of cells after which boxes are stretched anew: on the way, and at the end, since those who
-read the result stretch it by all of its cells."""
+LEVELS, FURTHER_LEVELS = {1: 20, 2: 10, 3: 6}, 4
+"""How often a step of the first grid may be halved, by number of axes, inside of a status, for a jump has no straight
+line; across a border between statuses half as often, and so beside one with several axes, where values may go to
+infinity."""
+GROWTH = 1.5
+"""Factor of the number of cells after which boxes are stretched anew."""
 NOISE_SIZE = 8.0
 """The error of a simplex in noise, as a multiple of how far cells are off, at most."""
 SAME = 2.0**-40
@@ -295,12 +294,9 @@ class Refiner:
                 if not used[ends].any():
                     used[ends] = True
                     cuts.append(ends)
-            if cuts := cuts[: max(0, self.most - len(self.points))]:
-                self._add(self.points[np.array(cuts)].mean(axis=1), np.array(cuts))
-            elif len(self.points) > SETTLED * stretched_at:
-                stretched_at = 0
-            else:
+            if not (cuts := cuts[: max(0, self.most - len(self.points))]):
                 return
+            self._add(self.points[np.array(cuts)].mean(axis=1), np.array(cuts))
 
     def _add(self, points: Array, ends: Indices | None = None) -> None:
         """Solves further cells, maybe in the middles between two others.
@@ -326,7 +322,8 @@ class Refiner:
         of_corners, of_ends, rows = mesh.kind[mesh.corners], mesh.kind[mesh.edges], np.arange(len(mesh.corners))
         alike = (of_corners == of_corners[:, :1]).all(axis=1)
         valued = alike & (of_corners[:, 0] >= 0)
-        inside, border, beside = (2.0**-level for level in LEVELS.get(axes, FURTHER_LEVELS))
+        levels = LEVELS.get(axes, FURTHER_LEVELS)
+        inside, border = 2.0**-levels, 2.0 ** -(levels // 2)
         # of edges, in steps of the first grid along the axis where they are longest
         extent = (abs(points[mesh.edges[:, :, 0]] - points[mesh.edges[:, :, 1]]) * self._steps).max(axis=2)
 
@@ -340,10 +337,10 @@ class Refiner:
 
         # beside one: as near as the simplices across it may stay wide
         least = np.full(len(rows), inside)
-        if not alike.all():
+        if axes > 1 and not alike.all():
             tree = cKDTree(points[np.unique(mesh.corners[~alike])] * self._steps)
             apart = tree.query(points * self._steps, p=math.inf)[0]
-            least[alike & (apart <= border)[mesh.corners].any(axis=1)] = beside
+            least[alike & (apart <= border)[mesh.corners].any(axis=1)] = border
         stuck = at_pole(height, self.origins, axes)[ends.max(axis=1)]
         finest = (extent[rows, cut] <= least) | (valued & np.isfinite(size) & stuck)
 

@@ -28,7 +28,7 @@ from sweep.show.charts import (
     save,
     style,
 )
-from sweep.show.view import View, edges, label, setting, view
+from sweep.show.view import View, edges, label, setting
 from sweep.words import require_dataset
 
 HATCHES = ("////", "\\\\\\\\", "....", "xxxx", "----")
@@ -86,7 +86,7 @@ def plot(
     drawn = precision_figure if "reference" in dataset.attrs else laws_figure if "chosen" in dataset.attrs else None
     if drawn and (y or x):
         raise SweepError("y and x choose what is shown of a result; this Dataset has one picture, without them")
-    figure = drawn(dataset) if drawn else view_figure(view(dataset, y, x), dataset.attrs.get("title", ""))
+    figure = drawn(dataset) if drawn else view_figure(View(dataset, y, x), dataset.attrs.get("title", ""))
     if path is not None:
         save(figure, path)
     return figure

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import textwrap
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import cycle
 from typing import Any
 
@@ -46,21 +45,52 @@ OTHERS = ("#CC79A7", "#E69F00", "#8C510A", "#FF9DA7", "#444444", "#FF7F50")
 """Colours of the other statuses; one keeps its colour in all pictures of a result."""
 
 
-@dataclass(frozen=True)
 class View:
     """An output `y` along coordinate `x` of dimension `along`, once for each value of dimension `across`.
 
-    `y` and `status` have the dimensions (across, along), or (along,) where `across` is None; `held` says where
-    the other axes stand.
+    By default the `preferred` output, along what a trace runs along, else the longest axis. `y` and `status` have the
+    dimensions (across, along), or (along,) where `across` is None; `held` says where the other axes stand.
+
+    Raises
+    ------
+    SweepError
+        If there is no such output or axis.
     """
 
-    y: xr.DataArray
-    status: NDArray[np.int_]
-    meanings: dict[int, str]
-    x: str
-    along: str
-    across: str | None
-    held: str
+    def __init__(self, dataset: xr.Dataset, y: str | None = None, x: str | None = None) -> None:
+        known = outputs(dataset)
+        if not known:
+            raise SweepError("there is nothing to draw: no output runs along an axis")
+        name = one_of(y or preferred(dataset, known), known, f"there is no output {y!r} to draw")
+        if x is None:
+            dataset = evened(dataset, axes=2)
+        output, cells = dataset[name], dataset["status"].dims if "status" in dataset else ()
+        known = lines_of(output)
+        if x is None:
+            along_it = [str(dim) for dim in output.dims if dim in known]
+            traces = [dim for dim in along_it if cells and dim not in cells and dim != PASSAGE]
+            axes = traces or [dim for dim in along_it if dim != PASSAGE] or known
+            if not axes:
+                raise SweepError(f"{name} has no number axis to draw it along")
+            x = max(axes, key=lambda axis: output[axis].size)
+        self.x = one_of(x, known, f"there is no number axis {x!r} to draw {name} along")
+        self.along = along = str(output[x].dims[0])
+        others = sorted((str(d) for d in output.dims if d != along), key=lambda d: -dataset.sizes[d])
+        self.across = across = others[0] if others else None
+        held = {dim: dataset.sizes[dim] // 2 for dim in others[1:]}
+        self.held = ", ".join(setting(coordinate(output, dim)[index]) for dim, index in held.items())
+        shown = dataset[[name] + (["status"] if "status" in dataset else [])].isel(held)
+        # no more cells than a picture can show
+        mapped = across is not None and shown.sizes[across] > FAMILY
+        most = dict.fromkeys((across, along), PIXELS) if mapped else {along: POINTS}
+        shown = shown.isel({d: slice(None, None, -(-shown.sizes[d] // n)) for d, n in most.items() if d}).compute()
+        for dim in (along, across):
+            if dim is not None and is_number_axis(shown[name], dim) and dim in shown.coords:
+                shown = shown.sortby(dim)
+        self.y = values = shown[name].transpose(*([across] if across else []), along)
+        status = shown["status"] if "status" in shown else xr.zeros_like(values, int)
+        self.status = status.broadcast_like(values).transpose(*values.dims).values.astype(int)
+        self.meanings = flag_words(status)
 
     @property
     def mapped(self) -> bool:
@@ -97,49 +127,6 @@ class View:
     def codes(self) -> list[int]:
         """Statuses other than OK that occur."""
         return [int(code) for code in np.unique(self.status) if code != 0]
-
-
-def view(dataset: xr.Dataset, y: str | None = None, x: str | None = None) -> View:
-    """Choose what is drawn: `y` (the `preferred` output) along `x` (what a trace runs along, else the longest axis).
-
-    Raises
-    ------
-    SweepError
-        If there is no such output or axis.
-    """
-    known = outputs(dataset)
-    if not known:
-        raise SweepError("there is nothing to draw: no output runs along an axis")
-    name = one_of(y or preferred(dataset, known), known, f"there is no output {y!r} to draw")
-    if x is None:
-        dataset = evened(dataset, axes=2)
-    output, cells = dataset[name], dataset["status"].dims if "status" in dataset else ()
-    known = lines_of(output)
-    if x is None:
-        along_it = [str(dim) for dim in output.dims if dim in known]
-        traces = [dim for dim in along_it if cells and dim not in cells and dim != PASSAGE]
-        axes = traces or [dim for dim in along_it if dim != PASSAGE] or known
-        if not axes:
-            raise SweepError(f"{name} has no number axis to draw it along")
-        x = max(axes, key=lambda axis: output[axis].size)
-    one_of(x, known, f"there is no number axis {x!r} to draw {name} along")
-    along = str(output[x].dims[0])
-    others = sorted((str(d) for d in output.dims if d != along), key=lambda d: -dataset.sizes[d])
-    across = others[0] if others else None
-    held = {dim: dataset.sizes[dim] // 2 for dim in others[1:]}
-    shown = dataset[[name] + (["status"] if "status" in dataset else [])].isel(held)
-    # no more cells than a picture can show
-    mapped = across is not None and shown.sizes[across] > FAMILY
-    most = dict.fromkeys((across, along), PIXELS) if mapped else {along: POINTS}
-    shown = shown.isel({d: slice(None, None, -(-shown.sizes[d] // n)) for d, n in most.items() if d}).compute()
-    for dim in (along, across):
-        if dim is not None and is_number_axis(shown[name], dim) and dim in shown.coords:
-            shown = shown.sortby(dim)
-    values = shown[name].transpose(*([across] if across else []), along)
-    status = shown["status"] if "status" in shown else xr.zeros_like(values, int)
-    codes = status.broadcast_like(values).transpose(*values.dims).values.astype(int)
-    words = ", ".join(setting(coordinate(output, dim)[index]) for dim, index in held.items())
-    return View(values, codes, flag_words(status), x, along, across, words)
 
 
 def outputs(dataset: xr.Dataset) -> list[str]:

@@ -21,7 +21,7 @@ from sweep.laws.exponents import local_exponent
 from sweep.laws.loglog import is_logarithmic
 from sweep.results.export import export
 from sweep.results.statuses import flag_words
-from sweep.show.view import View, coordinate, is_number_axis, lines_of, view
+from sweep.show.view import View, coordinate, is_number_axis, lines_of
 from sweep.study.model import SETTINGS, Axis, Study
 from sweep.study.read import to_toml
 
@@ -94,12 +94,13 @@ def shown(dataset: xr.Dataset, choice: Choice) -> View:
     """
     columns = dataset[[choice.output, *([STATUS] if STATUS in dataset else [])]]
     places = {PLACE + str(dim): (dim, np.arange(size)) for dim, size in columns.sizes.items()}
-    found = view(part(columns.assign_coords(places), choice), choice.output, choice.x)
+    found = View(part(columns.assign_coords(places), choice), choice.output, choice.x)
     if not choice.exponent:
         return found
     if not found.joined:
         raise SweepError(f"{choice.x} is no axis of the study; a local exponent needs neighbours along one")
-    return replace(found, y=local_exponent(found.y, choice.x))
+    found.y = local_exponent(found.y, choice.x)
+    return found
 
 
 def row(dataset: xr.Dataset, places: Mapping[str, int]) -> list[tuple[str, ...]]:

@@ -11,7 +11,7 @@ from xarray.core import indexing
 
 import sweep
 from sweep.show.charts import COLOURS
-from sweep.show.view import view
+from sweep.show.view import View
 from sweep.view import region
 from sweep.view.region import Choice, shown
 
@@ -80,7 +80,7 @@ def test_lines_are_drawn_with_their_statuses_at_the_foot_where_they_have_no_valu
     columns = {"y": (("a", "x"), values, {"units": "s"}), "status": (("a", "x"), status, FLAGS)}
     from sweep.view.picture import Picture  # every worker reads this file, and one of them needs bokeh
 
-    found = view(xr.Dataset(columns, {"x": [1.0, 2.0, 3.0], "a": [0.5, 0.7]}), x="x")
+    found = View(xr.Dataset(columns, {"x": [1.0, 2.0, 3.0], "a": [0.5, 0.7]}), x="x")
     linear = dict.fromkeys(("x", "y", "values"), "linear")
     drawn = Picture(found, linear)
     drawn.show(found, True)
