@@ -19,13 +19,13 @@ from sweep.laws.loglog import Array, alike
 from sweep.laws.noise import ROUNDING, Regression, corrected, inliers, regress
 from sweep.laws.shapes import ONE, Law
 
-DAMPINGS = np.array([1e-7, 1e-2, 0.3, 10.0, 1e3])
+DAMPINGS = np.array([1e-6, 0.03, 1.0, 30.0])
 """Of Gauss-Newton steps, which are tried at once; the best is taken."""
-FURTHER = np.array([1.0, 4.0, 16.0])
+FURTHER = np.array([2.0, 8.0])
 """Times the step before, which are tried beside them: along a valley, Gauss-Newton steps are short."""
-STEPS, ENOUGH = 10, 2e-3
+STEPS, ENOUGH = 10, 0.01
 """Steps at most, three times as many of a law that is wanted; and what a step must take away of a deviance for
-another one: so much of 0.5 and of what it is above the best, or the square for a law that is wanted."""
+another one: so much of 0.5 and of what it is above the best, or the cube for a law that is wanted."""
 STEP = 1e-6
 """Of q, for derivatives."""
 MOST_LINES, MOST_Q, MOST_KEPT = 16, 3, 300
@@ -224,7 +224,7 @@ class _Search:
         self.q[taken], self.square[taken] = there[place], squares[place]
         after = self.deviance()
         above = after.reshape(len(self.laws), -1) - after.reshape(len(self.laws), -1).min(axis=0)
-        enough = np.where(self.wanted, ENOUGH**2, ENOUGH * (0.5 + above.reshape(-1)))
+        enough = np.where(self.wanted, ENOUGH**3, ENOUGH * (0.5 + above.reshape(-1)))
         return np.asarray(rows[(before - after >= enough)[rows]])
 
     def take_cases(self) -> None:

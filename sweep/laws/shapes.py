@@ -111,6 +111,11 @@ def _bent(bend: Callable[[Any, Any], Any], over_x: bool = False) -> Curve:
     return curve
 
 
+def _peak(q: Array, s: Array, span: float) -> Parts:
+    """q: where it is, and the logarithm of its width."""
+    return 0.0, 1.0, np.exp(-0.5 * ((s - q[0]) / np.exp(q[1])) ** 2), s
+
+
 def _three(q: Array, s: Array, span: float) -> Parts:
     """q: where the first two laws meet, the logarithm of how much further the other two do, and of the width."""
     first, second = (_ramp(s - q[0] - further, np.exp(q[2])) for further in (0.0, np.exp(q[1])))
@@ -154,6 +159,7 @@ CORRECTION = Law("correction to scaling", "A x^p (1 + B x^-D)", _correction, 2, 
 LOG_Q = (Number(-3.0, 8.0, (-1.0, 1.0, 3.0, 5.0)),)
 LOG_CORRECTION = Law("logarithmic correction", "A x^p (1 + B ln(x/x0))^c", _log_correction, 3, LOG_Q, P)
 LOGARITHM = Number(-2 + 1e-9, 2 - 1e-9, (-1.9, -1.5, -0.5, 0.5, 1.5, 1.9))
+PEAK_Q = (PLACE, Number(math.log(0.05), math.log(1 / 3), tuple(np.log((0.07, 0.14, 0.24)))))
 OTHER_FUNCTIONS = (
     Law("logarithm", "A x^p (1 + B ln x)", _logarithm, 2, (LOGARITHM,), P, power=False),
     Law("exponential", "A exp(-x/X)", lambda q, s, span: (0.0, 1.0, np.exp(span * (s - 1))), 2, power=False),
@@ -168,6 +174,7 @@ OTHER_FUNCTIONS = (
         P,
         power=False,
     ),
+    Law("peak", "A x^p exp(B exp(-ln(x/X)^2 / C))", _peak, 3, PEAK_Q, P),
     Law("lognormal", "A exp(-B ln(x/X)^2)", lambda q, s, span: (0.0, 1.0, s, s**2), 3, power=False),
     Law(
         "two exponentials",

@@ -207,8 +207,10 @@ def _verdict(t: Array, tried: dict[str, Found]) -> tuple[str, float]:
         return "three laws", evidence
     if evidence > BEYOND_DOUBT:
         return "two laws" if 0 <= two.numbers[0] <= 1 else "no meeting in the window", evidence
-    if any(gain(line, one) > BEYOND_DOUBT and min(gain(law, one) for law in bends) > -BEYOND_DOUBT for one in others):
-        return "no power law", evidence
+    for one in others:  # of those that are power laws in part, one that rules out two laws
+        least = BEYOND_DOUBT if one.law.power else -BEYOND_DOUBT
+        if gain(line, one) > BEYOND_DOUBT and min(gain(law, one) for law in bends) > least:
+            return "no power law", evidence
     bends_more = max(gain(line, one) for one in (*bends, *others)) > BEYOND_DOUBT
     return "undecided" if bends_more else "one law", evidence
 
@@ -267,8 +269,8 @@ def compare_laws(y: xr.DataArray, dim: str, window: Window | None = None, *, sig
     many times e^5 more likely, and a margin that correlated, uneven or outlying noise does not bridge, which one law is
     tried with. Beside a function that is no power law, a power law with as few numbers is taken where it is not ruled
     out. The laws are one, two (with bends of four shapes) and three power laws, an offset, a correction to
-    scaling; and functions that are none: logarithm, exponential, stretched exponential, a cut-off at one end or
-    at both, lognormal, two exponentials.
+    scaling, a peak on one law; and functions that are none: logarithm, exponential, stretched exponential, a cut-off
+    at one end or at both, lognormal, two exponentials.
 
     Parameters
     ----------

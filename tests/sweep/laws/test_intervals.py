@@ -204,7 +204,7 @@ def test_few_points_tell_nothing_of_noise_unless_it_is_said():
     y = curve(t, broken(t) + noise_of("even", 12, 20, seed=4))
     silent, said = sweep.fit_two_laws(y, "mu"), sweep.fit_two_laws(y, "mu", noise=True)
     assert (silent.noisy == 0).all()
-    assert shares(silent)[0] > 0.95
+    assert shares(silent)[0] > 0.9
     assert shares(said)[0] > 0.9
 
 

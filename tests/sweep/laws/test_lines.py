@@ -117,8 +117,8 @@ def mixture(columns, z, phis, trends, ends, confidence):
 
     (n, k), u = columns.shape, np.interp(T, [T[0], T[-1]], [-1, 1])
     logs, values, errors = np.empty((3, len(phis), len(trends) * len(ends)))
-    weight = np.gradient(phis) * (1 - phis) ** -(0.3 + 24 / n) if len(phis) > 1 else np.ones(1)
-    weight = weight / weight.sum() * (1 - 2.3 / n) + 2.3 / n * (phis == 0)
+    weight = np.gradient(phis) * (1 - phis) ** -(1.7 + 4.5 / n) if len(phis) > 1 else np.ones(1)
+    weight = weight / weight.sum() * (1 - 1.1 / n) + 1.1 / n * (phis == 0)
     for i, phi in enumerate(phis):
         for j, (a, c) in enumerate((a, c) for a in trends for c in ends):
             size = np.exp(a * u + c * abs(u) - np.mean(a * u + c * abs(u)))
@@ -133,7 +133,7 @@ def mixture(columns, z, phis, trends, ends, confidence):
     one = ((share * (errors**2 + (values - middle[:, None]) ** 2)).sum(axis=1) / by_phi) ** 0.5
     error = (share * (errors**2 + (values - slope) ** 2)).sum() ** 0.5
     end = stats.t.pdf(stats.t.ppf((1 + confidence) / 2, n - k), n - k)
-    level = (by_phi * (1 - np.maximum(phis, 0)) ** 0.5 * end / one).sum()
+    level = (by_phi * end / one).sum()
     return slope, error, lambda x: (by_phi * stats.t.pdf((x - middle) / one, n - k) / one).sum(), level
 
 
