@@ -20,10 +20,9 @@ import os
 import shutil
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from kernels.interface import Status
@@ -84,14 +83,13 @@ class Refinement:
     """
 
     def __init__(self, cells: Refiner, dataset: xr.Dataset) -> None:
-        found, box, points = cells.found, cells.box, cells.points
-        left = found.valued & found.finest & found.wanted
+        box, points, left = cells.box, cells.points, cells.valued & cells.left
         steps = [np.diff(np.unique(column)) for column in points.T]
-        widths = np.ptp(points[found.corners[found.valued]], axis=1).max(axis=0, initial=0.0)
+        widths = np.ptp(points[cells.corners[cells.valued]], axis=1).max(axis=0, initial=0.0)
         self.dataset, self.added = dataset, len(points) - cells.first
         self.uniform = int(math.prod(round(1 / step[step > SAME].min()) + 1 for step in steps))
-        self.error, self.tolerance = float(found.size[found.valued & ~left].max(initial=0.0)), cells.tolerance
-        self.complete, self.jumps = not (found.size > self.tolerance).any(), int(left.sum())
+        self.error, self.tolerance = float(cells.size[cells.valued & ~left].max(initial=0.0)), cells.tolerance
+        self.complete, self.jumps = not (cells.size > self.tolerance).any(), int(left.sum())
         apart = zip(cells.axes, widths, box.low, box.high, box.logarithmic, strict=True)
         self.unseen = {
             name: f"a factor {(high / low) ** width:.3g}" if logarithmic else f"{width * (high - low):.3g}"
@@ -231,17 +229,6 @@ def _folder_of_rounds(path: str | os.PathLike[str] | None, dataset: xr.Dataset, 
     return rounds
 
 
-class Judged(NamedTuple):
-    """Simplices, and what is to become of them."""
-
-    corners: Indices
-    size: Array  # the error of straight lines in each
-    ends: Indices  # of the edge to cut, (m, 2)
-    wanted: NDArray[np.bool_]  # the error is too large
-    finest: NDArray[np.bool_]  # but the edge is not to be cut
-    valued: NDArray[np.bool_]  # inside of one status
-
-
 class Refiner:
     """Cells joined to simplices, whose edges are cut until outputs can be interpolated.
 
@@ -285,12 +272,12 @@ class Refiner:
             if len(self.points) >= GROWTH * stretched_at:
                 stretches = {name: stretch(self.points, heights(self.cells[name])) for name in self.noise}
                 stretched_at = len(self.points)
-            parts = [self._judged(name, stretches[name]) for name in self.noise]
-            self.found = found = Judged(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+            parts = zip(*(self._judged(name, stretches[name]) for name in self.noise), strict=True)
+            self.corners, self.size, self.valued, edges, wanted, self.left = map(np.concatenate, parts)
             # worst first, as many as are allowed; none shares an end with one before: a cut changes what is known there
             used, cuts = np.zeros(len(self.points), dtype=bool), []
-            todo = np.flatnonzero(found.wanted & ~found.finest)
-            for ends in found.ends[todo[np.argsort(np.round(-np.log(found.size[todo]), 6), kind="stable")]]:
+            todo = np.flatnonzero(wanted & ~self.left)
+            for ends in edges[todo[np.argsort(np.round(-np.log(self.size[todo]), 6), kind="stable")]]:
                 if not used[ends].any():
                     used[ends] = True
                     cuts.append(ends)
@@ -314,8 +301,13 @@ class Refiner:
         itself = before + np.arange(len(points))
         self.origins = np.concatenate([self.origins, np.stack([itself] * 2, axis=1) if ends is None else ends])
 
-    def _judged(self, name: str, matrix: Array) -> Judged:
-        """Errors of an output's straight lines between cells, and borders between statuses that are to be cut."""
+    def _judged(self, name: str, matrix: Array) -> tuple[Indices, Array, Any, Indices, Any, Any]:
+        """Simplices as an output wants them, each with what is to become of it.
+
+        Their corners; how far straight lines are off, infinite across a border between statuses that is to be cut;
+        whether they are inside of one status; the ends of the edge to cut; whether the error is too large; and whether
+        that is left as it is, since the edge is short or cuts lessen nothing.
+        """
         points, axes, height = self.points, len(self.axes), heights(self.cells[name])
         finite = np.logical_and.reduce([np.isfinite(self.cells[each]) for each in self.noise])
         mesh = Mesh(points, height, kinds(self.cells[STATUS], finite), matrix)
@@ -350,4 +342,4 @@ class Refiner:
         self._to_cut[name].append((len(points), volume))
         self.noise[name] = max(self.noise[name], scatter(height, self.origins, axes, self._to_cut[name]))
         wanted = size > max(self.tolerance, NOISE_SIZE * self.noise[name])
-        return Judged(mesh.corners, size, ends, wanted, finest, valued)
+        return mesh.corners, size, valued, ends, wanted, wanted & finest

@@ -48,22 +48,6 @@ WORK = ("rate_calls", "steps", "events")
 ESTIMATES = ("error", "wear_error")
 """Outputs by which a method says how wrong it may be."""
 
-LONG_NAMES = {
-    "error_median": "median relative error of a cell, over its outputs",
-    "error_worst": "largest relative error of a cell that the method calls right",
-    "seconds": "time per cell on one core",
-    "ok": "share of cells that the method calls right",
-    "remarked": "share of cells with another remark",
-    "inaccurate": "share of cells that it says are not accurate to rtol",
-    "unsolved": "share of cells that it gives no values for though there are some",
-    "silent": "share of cells off by more than rtol and the error of the reference, without a status that says so",
-    "worst_cell": "where the largest error is",
-    "unsolved_as": "the status of the first of these cells, and where it is",
-    "silent_at": "the first cell that is silently wrong",
-    "methods_used": "which methods solved how many cells",
-    **{name: f"{name.replace('_', ' ')} per cell, mean" for name in WORK},
-}
-
 
 def precision_cells(study: Study, cells: int = CELLS) -> dict[str, Any]:
     """Values of the study's axes in the cells that `work_precision` takes, in their order: what truth is given for."""
@@ -148,17 +132,17 @@ def work_precision(
     against = _given(part, truth) if truth is not None else _best(part, [reference] if reference else able)
     source, _, floor = against
     rows = [_measured(part, name, rtol, against) for name in names for rtol in tolerances]
-    columns = {key: np.array([row[key] for row in rows]).reshape(len(names), -1) for key in rows[0]}
-    columns["seconds"] = _seconds(part, names, tolerances)
-    about = {key: {"units": "s" if key == "seconds" else "1", "long_name": LONG_NAMES[key]} for key in columns}
+    dims, columns = ("method", "rtol"), dict[str, Any]()
+    for key, (_, text) in rows[0].items():
+        values = np.array([row[key][0] for row in rows]).reshape(len(names), -1)
+        columns[key] = dims, values, {"units": "1", "long_name": text}
+    about = {"units": "s", "long_name": "time per cell on one core"}
+    columns["seconds"] = dims, _seconds(part, names, tolerances), about
     open_cells = int(np.isinf(floor).sum())
     basis = {"reference": source, "reference_error": float(max(floor[np.isfinite(floor)], default=math.nan))}
     basis |= {"cells": len(floor) - open_cells, "open_cells": open_cells}
-    found = xr.Dataset(
-        {key: (("method", "rtol"), values, about[key]) for key, values in columns.items()},
-        {"method": names, "rtol": tolerances},
-        {"title": part.title, "kernel": part.kernel_name, **basis},
-    )
+    about = {"title": part.title, "kernel": part.kernel_name}
+    found = xr.Dataset(columns, {"method": names, "rtol": tolerances}, {**about, **basis})
     return found.assign_attrs(omissions="; ".join(_omissions(found, part, able if methods is None else None)))
 
 
@@ -275,8 +259,8 @@ def _best(study: Study, names: Sequence[str]) -> Reference:
     return best
 
 
-def _measured(study: Study, name: str, rtol: float, against: Reference) -> dict[str, Any]:
-    """What is measured of a method at a tolerance, but for its time."""
+def _measured(study: Study, name: str, rtol: float, against: Reference) -> dict[str, tuple[Any, str]]:
+    """What is measured of a method at a tolerance, but for its time, and what each of it is."""
     source, truth, floor = against
     sound, void, judged = np.isfinite(floor), np.isnan(floor), (~np.isinf(floor)).sum()
     outputs, status, used, _ = solved(replace(study, method=name, rtol=rtol))
@@ -290,26 +274,31 @@ def _measured(study: Study, name: str, rtol: float, against: Reference) -> dict[
     sure, unsolved = valued & ~np.isin(status, UNSURE), sound & ~valued
     wrong, worst = sure & ~(error <= rtol + floor) | void & ok, error[sure].max(initial=0.0)
     shares = {
-        "ok": sound & ok,
-        "remarked": valued & ~ok & ~inaccurate,
-        "inaccurate": valued & inaccurate,
-        "unsolved": unsolved,
-        "silent": wrong,
+        "ok": (sound & ok, "that the method calls right"),
+        "remarked": (valued & ~ok & ~inaccurate, "with another remark"),
+        "inaccurate": (valued & inaccurate, "that it says are not accurate to rtol"),
+        "unsolved": (unsolved, "that it gives no values for though there are some"),
+        "silent": (wrong, "off by more than rtol and the error of the reference, without a status that says so"),
     }
 
     def first(some: Any) -> str:
         return _cell(study, int(some.argmax())) if some.any() else ""
 
     counts = {method: int((used == i).sum()) for i, method in enumerate(methods)}
+    taken = ", ".join(f"{m} {100 * n / max((used >= 0).sum(), 1):.3g} %" for m, n in counts.items() if n)
+    median = np.median(error[valued]) if valued.any() else math.nan
+    largest = worst if sure.any() else math.nan
+    refusal = f"{NAMES[int(status[unsolved][0])]} at {first(unsolved)}" if unsolved.any() else ""
+    work = {key: outputs[key][valued].mean() if valued.any() else math.nan for key in WORK if key in outputs}
     return {
-        "error_median": np.median(error[valued]) if valued.any() else math.nan,
-        "error_worst": worst if sure.any() else math.nan,
-        **{key: cells.sum() / judged for key, cells in shares.items()},
-        **{key: outputs[key][valued].mean() if valued.any() else math.nan for key in WORK if key in outputs},
-        "worst_cell": first(sure & (error == worst)),
-        "unsolved_as": f"{NAMES[int(status[unsolved][0])]} at {first(unsolved)}" if unsolved.any() else "",
-        "silent_at": first(wrong),
-        "methods_used": ", ".join(f"{m} {100 * n / max((used >= 0).sum(), 1):.3g} %" for m, n in counts.items() if n),
+        "error_median": (median, "median relative error of a cell, over its outputs"),
+        "error_worst": (largest, "largest relative error of a cell that the method calls right"),
+        **{key: (cells.sum() / judged, f"share of cells {text}") for key, (cells, text) in shares.items()},
+        **{key: (mean, f"{key.replace('_', ' ')} per cell, mean") for key, mean in work.items()},
+        "worst_cell": (first(sure & (error == worst)), "where the largest error is"),
+        "unsolved_as": (refusal, "the status of the first of these cells, and where it is"),
+        "silent_at": (first(wrong), "the first cell that is silently wrong"),
+        "methods_used": (taken, "which methods solved how many cells"),
     }
 
 
