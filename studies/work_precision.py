@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from _common import Claims, Statement, by_method, cheapest, held, measured, said, script
-from _figures import COST, Log, direct_label, draw_precision, method_look, page, panel
+from _figures import COST, Log, draw_precision, method_look, page, panel
 from _peers import CLOCKS, swings
 
 import sweep
@@ -31,10 +31,6 @@ from sweep.explore.work_precision import TOLERANCES, precision_cells, precision_
 
 PEER_CELLS = {"heyoka.py": 1, "diffrax": 2, "scipy": 10}
 """Other libraries follow every so many-th of the cells."""
-PLACES = {
-    "auto": (0.6, 1.0), "coulomb": (0.85, 9.0), "quadrature": (1.7, 9.0), "segments": (1.9, 1.0), "sdirk4": (1.9, 2.0),
-}  # fmt: skip
-"""Where the names of methods stand whose marks are close: factors of time and error. Others stand above their marks."""
 
 
 def cycles(study, cells: int) -> dict[str, Any]:
@@ -127,7 +123,7 @@ def claims(coulomb, others, dragged) -> Claims:
     yield from cheapest(solving(dragged))
 
 
-@panel(COST.to(3e-7, 0.5), Log("largest relative error of a cell [1]", (3e-17, 3)))
+@panel(COST.to(3e-7, 0.5), Log("largest relative error of a cell [1]", (3e-17, 3)), "beside")
 @page(100.0, 150.0)
 def figure(axes, found, others, _):
     """The largest error over the time of a cell: a line for each method and library, through its tolerances."""
@@ -137,11 +133,6 @@ def figure(axes, found, others, _):
         draw_precision(axes, shown.expand_dims("method"), "error_worst")
     for name, row in others.items():
         axes.plot(row.seconds, row.worst, linewidth=0.8, markersize=4, label=name, **method_look(name))
-    for line in [x for x in axes.lines if x.get_label()[0] != "_"]:
-        x, y = line.get_data()
-        name, top = line.get_label(), int(np.nanargmax(y))
-        right, up = PLACES.get(name, (1.0, 5.0))
-        direct_label(axes, right * x[top], up * y[top], name, line.get_color())
     text = "each mark a tolerance,\nfrom $10^{-3}$ (top) to $10^{-13}$"
     axes.text(0.02, 0.97, text, va="top", fontsize=7, color="0.35", transform=axes.transAxes)
 
