@@ -1,18 +1,25 @@
 """What a scene's functions do, recorded: the graphs of its rates, surface, switch and start."""
 
+import contextlib
 import copy
 import functools
 import inspect
+import math
+import threading
 from collections.abc import Mapping
 from dataclasses import dataclass
+from types import SimpleNamespace
 
 import numpy as np
 
 from kernels.codegen.sliding import slid
-from kernels.expression.graph import ADD, FUNCTIONS, NUMBER, SCALED, Expression, Graph, SceneError, math_recorded
+from kernels.expression.graph import ADD, FUNCTIONS, NAMED, NUMBER, SCALED, Expression, Graph, SceneError, power
 
 RESERVED = ("side", "flips", "time", "interval", "rtol", "status")
 """Names that a scene's states and parameters cannot have."""
+_OF_MATH = NAMED | {f"a{name}": NAMED[f"arc{name}"] for name in ("sin", "cos", "tan")} | {"fabs": abs, "pow": power}
+_RECORDING = threading.RLock()
+"""One thread at a time changes the names of a module."""
 
 
 @dataclass(frozen=True)
@@ -141,6 +148,21 @@ def _called(graph, scene, role, function, named, length):
     except Exception as error:
         said = f"{type(error).__name__}: {error}".splitlines()[0][:200]
         raise SceneError(f"{role} of the scene {scene.name} cannot be recorded: {said}; {FUNCTIONS}") from error
+
+
+@contextlib.contextmanager
+def math_recorded(function):
+    """Within it, names of `math` in the module of a function stand for what is recorded, and does numbers as well."""
+    scope = getattr(function, "__globals__", {})
+    ours = {id(getattr(math, name)): of for name, of in _OF_MATH.items() if hasattr(math, name)}
+    ours[id(math)] = SimpleNamespace(**vars(math) | {n: of for n, of in _OF_MATH.items() if hasattr(math, n)})
+    with _RECORDING:
+        before = {name: x for name, x in scope.items() if id(x) in ours}
+        scope.update({name: ours[id(x)] for name, x in before.items()})
+        try:
+            yield
+        finally:
+            scope.update(before)
 
 
 def _affine(graph, surface):

@@ -16,9 +16,9 @@ import numpy as np
 
 from kernels.codegen.compiled import runner, running, written_of
 from kernels.codegen.followed import followed
-from kernels.codegen.record import named_functions, record
+from kernels.codegen.record import math_recorded, named_functions, record
 from kernels.codegen.to_tolerance import sliders, sliding, solver
-from kernels.expression.graph import ADD, INPUT, NUMBER, Expression, SceneError, math_recorded, needed
+from kernels.expression.graph import ADD, INPUT, NUMBER, Expression, SceneError, needed
 from kernels.integrate.records import Mode
 from kernels.interface import Status
 from kernels.lanes.columns import DONE, fresh, to_the_end

@@ -10,14 +10,11 @@ input of the graph; an integrator stops at a kink and turns the sign round. floo
 sign tells whether the integer is even.
 """
 
-import contextlib
 import functools
 import math
 import sys
-import threading
 from dataclasses import dataclass
 from numbers import Real
-from types import SimpleNamespace
 
 FLOAT_MAX = sys.float_info.max
 NUMBER, INPUT, ADD, MUL, HALF_SQUARE, SCALED, DIV = "number", "input", "add", "mul", "half_square", "scaled", "div"
@@ -80,17 +77,11 @@ class Expression:
 
     def __array_ufunc__(self, ufunc, method, *inputs, **named):
         """numpy's functions that have a counterpart here; also what numpy makes of a product with its numbers."""
-        known = _OF_NUMPY.get(ufunc.__name__)
-        if known is None or method != "__call__" or named:
-            raise SceneError(f"numpy's {ufunc.__name__} is not recorded; {FUNCTIONS}")
-        return known(*(self.graph.of(value) for value in inputs))
+        return _of_numpy(ufunc, method != "__call__" or named)(*map(self.graph.of, inputs))
 
     def __array_function__(self, function, types, arguments, named):
         """numpy's functions that are none of single numbers: where, clip."""
-        known = _OF_NUMPY.get(function.__name__)
-        if known is None or named:
-            raise SceneError(f"numpy's {function.__name__} is not recorded; {FUNCTIONS}")
-        return known(*arguments)
+        return _of_numpy(function, named)(*arguments)
 
 
 for _name, _operator in {
@@ -218,32 +209,6 @@ class Graph:
         """x where a constant sign is above 0, else y, whatever the other one is; no series is taken of it."""
         return x if x is y else self.function(CHOSEN, sign, x, y)
 
-    def partials(self, x):
-        """The derivative of an operation: each argument with a factor, None for 1; and what their sum is divided by."""
-        u, w = (*x.args, None)[:2]
-        found = {
-            ADD: lambda: ([(u, None), (w, None)], None),
-            SCALED: lambda: ([(w, u)], None),
-            MUL: lambda: ([(u, w), (w, u)], None),
-            HALF_SQUARE: lambda: ([(u, u)], None),
-            DIV: lambda: ([(u, None), (w, -x)], w),
-            "sqrt": lambda: ([(u, None)], 2.0 * x),
-            "exp": lambda: ([(u, x)], None),
-            "log": lambda: ([(u, None)], u),
-            "sin": lambda: ([(u, self.function("cos", u))], None),
-            "cos": lambda: ([(u, -self.function("sin", u))], None),
-            "power": lambda: ([(u, w * (x / u))], None),
-            "power_of_side": lambda: ([(u.args[1], w * self.over_base(x))], None),
-            "tanh": lambda: ([(u, 1.0 - x * x)], None),
-            "arctan": lambda: ([(u, 1.0 / (1.0 + u * u))], None),
-            "arcsin": lambda: ([(u, 1.0 / self.function("sqrt", (1.0 - u) * (1.0 + u)))], None),
-            "arccos": lambda: ([(u, -1.0 / self.function("sqrt", (1.0 - u) * (1.0 + u)))], None),
-            "sinh": lambda: ([(u, self.function("cosh", u))], None),
-            "cosh": lambda: ([(u, self.function("sinh", u))], None),
-            "hypot": lambda: ([(u, u / x), (w, w / x)], None),
-        }
-        return found[x.kind]()
-
     def floor(self, x):
         """The largest integer not above x: between two kinks a constant."""
         x = self.of(x)
@@ -355,10 +320,10 @@ def _function(name, of_number):
     return call
 
 
-_OF_NUMBERS = {
-    name: getattr(math, name) for name in ("sqrt", "exp", "log", "sin", "cos", "sinh", "cosh", "tanh", "hypot")
-}
-sqrt, exp, log, sin, cos, sinh, cosh, tanh, hypot = (_function(name, of) for name, of in _OF_NUMBERS.items())
+sqrt, exp, log, sin, cos, sinh, cosh, tanh, hypot = (
+    _function(name, getattr(math, name))
+    for name in ("sqrt", "exp", "log", "sin", "cos", "sinh", "cosh", "tanh", "hypot")
+)
 arcsin, arccos, arctan = (_function(f"arc{name}", getattr(math, f"a{name}")) for name in ("sin", "cos", "tan"))
 pi = math.pi
 
@@ -413,11 +378,11 @@ def _chosen(above, x, y):
     return share * x + (1.0 - share) * y
 
 
-_NAMED = {
+NAMED = {
     f.__name__: f
     for f in (sqrt, exp, log, sin, cos, tan, arcsin, arccos, arctan, sinh, cosh, tanh, hypot, floor, maximum, minimum)
 }
-_OF_NUMPY = _NAMED | {
+_OF_NUMPY = NAMED | {
     "add": lambda x, y: x + y, "subtract": lambda x, y: x - y, "multiply": lambda x, y: x * y,
     "divide": lambda x, y: x / y, "power": power, "float_power": power, "negative": lambda x: -x, "absolute": abs,
     "fabs": abs, "square": lambda x: x * x, "sign": sign, "ceil": lambda x: -floor(-x), "remainder": mod,
@@ -426,21 +391,10 @@ _OF_NUMPY = _NAMED | {
     "greater_equal": lambda x, y: x >= y, "less_equal": lambda x, y: x <= y,
     "where": where, "clip": lambda x, low, high: minimum(maximum(x, low), high),
 }  # fmt: skip
-_OF_MATH = _NAMED | {"asin": arcsin, "acos": arccos, "atan": arctan, "fabs": abs, "pow": power}
-_RECORDING = threading.RLock()
-"""One thread at a time changes the names of a module."""
 
 
-@contextlib.contextmanager
-def math_recorded(function):
-    """Within it, names of `math` in the module of a function stand for what is recorded, and does numbers as well."""
-    scope = getattr(function, "__globals__", {})
-    ours = {id(getattr(math, name)): of for name, of in _OF_MATH.items() if hasattr(math, name)}
-    ours[id(math)] = SimpleNamespace(**vars(math) | {n: of for n, of in _OF_MATH.items() if hasattr(math, n)})
-    with _RECORDING:
-        before = {name: x for name, x in scope.items() if id(x) in ours}
-        scope.update({name: ours[id(x)] for name, x in before.items()})
-        try:
-            yield
-        finally:
-            scope.update(before)
+def _of_numpy(function, options):
+    """What stands for a function of numpy's, which is called with no options."""
+    if options or function.__name__ not in _OF_NUMPY:
+        raise SceneError(f"numpy's {function.__name__} is not recorded; {FUNCTIONS}")
+    return _OF_NUMPY[function.__name__]

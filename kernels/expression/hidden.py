@@ -12,6 +12,7 @@ import math
 
 from kernels.expression.graph import ADD, DIV, HALF_SQUARE, INPUT, MUL, SCALED
 from kernels.expression.series import F, V, Values, added
+from kernels.expression.tangent import partials
 from kernels.lanes.symbols import taking_symbols
 from kernels.maths import intervals
 
@@ -111,7 +112,7 @@ class Enclosures:
         else:
             kind = "arcsin" if x.kind == "arccos" else x.kind
             own = getattr(OF, f"hidden_by_{kind}")(value, inside, self._once(x, self._plain))
-        slopes = x.graph.partials(x)[0]
+        slopes = partials(x)[0]
         return added(
             own, *(self._passed_on(u, self._largest(slope)) for u, slope in slopes if self.excess(u) is not None)
         )

@@ -7,6 +7,7 @@ losses go on as errors do. Along a motion it is enough to know them roughly, an 
 
 from kernels.expression.graph import ADD, DIV, HALF_SQUARE, INPUT, MUL, NUMBER, SCALED, needed
 from kernels.expression.series import V, Values, added, product
+from kernels.expression.tangent import partials
 from kernels.lanes.symbols import taking_symbols
 from kernels.maths import pairs
 
@@ -28,7 +29,7 @@ def slopes(values, x):
         return [(u, 1.0 / V.magnitude(values.value(u)))]
     if x.kind in ("power", "power_of_side"):
         return [(u, V.magnitude(values.value(x.args[1]) * V.magnitude(values.value(x)) / values.value(u)))]
-    return [(u, V.magnitude(values.value(slope))) for u, slope in x.graph.partials(x)[0]]
+    return [(u, V.magnitude(values.value(slope))) for u, slope in partials(x)[0]]
 
 
 class Losses:

@@ -14,6 +14,7 @@ Source: Jorba & Zou, Exp. Math. 14:99 (2005), proposition 2.1. Sums are chains o
 """
 
 from kernels.expression.graph import INPUT, NUMBER, SCALED
+from kernels.expression.tangent import partials
 from kernels.lanes import vectors
 from kernels.lanes.symbols import taking_symbols
 from kernels.maths import elementary
@@ -145,7 +146,7 @@ class Values:
     def _of_slopes(self, x, k):
         if k == 0:
             return getattr(F, x.kind)(*map(self.value, x.args))
-        sums = [self._rate_sum(u, slope, k) for u, slope in x.graph.partials(x)[0] if u.varies]
+        sums = [self._rate_sum(u, slope, k) for u, slope in partials(x)[0] if u.varies]
         return product(added(*sums), 1.0 / k)
 
     _tanh = _arctan = _arcsin = _arccos = _sinh = _cosh = _hypot = _of_slopes

@@ -7,7 +7,7 @@ change between events.
 
 from collections import defaultdict
 
-from kernels.expression.graph import ADD, CHOSEN, INPUT, SCALED, needed
+from kernels.expression.graph import ADD, CHOSEN, DIV, HALF_SQUARE, INPUT, MUL, SCALED, needed
 
 SHORT, FED_BACK, LONG = {12: 4, 18: 4}, {12: 6, 18: 6}, {12: 9, 18: 12}
 """Order of the changes' series on a step of the motion's: terms fall by about a quarter each, so to some 1e-3. Those of
@@ -19,6 +19,34 @@ def short(rates, feeds_back, order):
     kinds = {x.kind for x in needed(*rates) if x.varies}
     grow_first = kinds & {"exp", "sin", "cos", "sinh", "cosh"} or kinds <= {INPUT, ADD, SCALED}
     return (LONG if grow_first else FED_BACK if feeds_back else SHORT)[order]
+
+
+def partials(x):
+    """The derivative of an operation: each argument with a factor, None for 1; and what their sum is divided by."""
+    u, w = (*x.args, None)[:2]
+    of = x.graph.function
+    found = {
+        ADD: lambda: ([(u, None), (w, None)], None),
+        SCALED: lambda: ([(w, u)], None),
+        MUL: lambda: ([(u, w), (w, u)], None),
+        HALF_SQUARE: lambda: ([(u, u)], None),
+        DIV: lambda: ([(u, None), (w, -x)], w),
+        "sqrt": lambda: ([(u, None)], 2.0 * x),
+        "exp": lambda: ([(u, x)], None),
+        "log": lambda: ([(u, None)], u),
+        "sin": lambda: ([(u, of("cos", u))], None),
+        "cos": lambda: ([(u, -of("sin", u))], None),
+        "power": lambda: ([(u, w * (x / u))], None),
+        "power_of_side": lambda: ([(u.args[1], w * x.graph.over_base(x))], None),
+        "tanh": lambda: ([(u, 1.0 - x * x)], None),
+        "arctan": lambda: ([(u, 1.0 / (1.0 + u * u))], None),
+        "arcsin": lambda: ([(u, 1.0 / of("sqrt", (1.0 - u) * (1.0 + u)))], None),
+        "arccos": lambda: ([(u, -1.0 / of("sqrt", (1.0 - u) * (1.0 + u)))], None),
+        "sinh": lambda: ([(u, of("cosh", u))], None),
+        "cosh": lambda: ([(u, of("sinh", u))], None),
+        "hypot": lambda: ([(u, u / x), (w, w / x)], None),
+    }
+    return found[x.kind]()
 
 
 class Tangents:
@@ -53,7 +81,7 @@ class Tangents:
         if x.kind == CHOSEN:
             changes = (self._graph.of(0.0) if d is None else d for d in map(self.of, x.args[1:]))
             return self._graph.chosen(x.args[0], *changes)
-        parts, divisor = self._graph.partials(x)
+        parts, divisor = partials(x)
         deltas = [(self.of(u), factor) for u, factor in parts]
         terms = [d if factor is None else self._graph.multiply(factor, d) for d, factor in deltas if d is not None]
         if not terms:
