@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from numba.core.errors import NumbaError
 
-from kernels.codegen.functions import Functions, cell_of, entry
+from kernels.codegen.functions import Functions, cell_of
 from kernels.codegen.record import record
 from kernels.expression.graph import FUNCTIONS, SceneError
 from kernels.integrate import adaptive, fixed_step, taylor_leg
@@ -66,56 +66,37 @@ def runner(scene, method):
     if method != "taylor":
         functions = Functions(scene, record(scene))  # derivatives come into its graph in an order of their own
     if method in ("taylor", "told"):
-        told = method == "told"
-        m = m._replace(cell=cell_of(*functions.size, told))
-        return Runner(scene, m, *_by_series(functions, m, functions.changes() if told else None))
+        m = m._replace(cell=cell_of(*functions.size, method == "told"))
+        changes, runs = functions.changes() if method == "told" else None, []
+        for order in ORDERS:
+            series = functions.of_series(m, order, changes)
+            kind = f"taylor_{order}" if changes is None else f"taylor_{order}_told"
+            runs.append(_driven(functions, m._replace(error=series.error), taylor_leg.to_event, series, kind))
+        return Runner(scene, m, *runs)
     if method == "fixed":
-        order, m = None, m._replace(cell=m.cell._replace(own=fixed_step.Fixed(m.cell.state, *[0.0] * 8)))
-
-        @jit_call
-        def leg(cell, mode, active):
-            return fixed_step.to_event(m, cell, mode, active)
-
-    else:
-        pair = kept_on_kink(PAIRS[method]) if scene.slides else PAIRS[method]
-        factored, solved = functions.linear()
-        m = m._replace(factored=factored, solved=solved, roundings=pair.roundings, biased=1.0)
-        order = pair.order
-
-        @jit_call
-        def leg(cell, mode, active):
-            return adaptive.to_event(m, pair, cell, mode, active)
-
-    run = _driven(functions, m, leg, method)
-    return Runner(scene, m, run, run, order)
+        own = fixed_step.Fixed(m.cell.state, *[0.0] * 4, fixed_step.Scheme(*[0.0] * 3))
+        m = m._replace(cell=m.cell._replace(own=own))
+        run = _driven(functions, m, fixed_step.to_event, m, method)
+        return Runner(scene, m, run, run)
+    pair = kept_on_kink(PAIRS[method]) if scene.slides else PAIRS[method]
+    factored, solved = functions.linear()
+    m = m._replace(factored=factored, solved=solved, roundings=pair.roundings, biased=1.0)
+    run = _driven(functions, m, adaptive.to_event, pair._replace(scene=m), method)
+    return Runner(scene, m, run, run, pair.order)
 
 
-def _by_series(functions, m, changes=None):
-    """The loops of both orders; with an error that is carried along by these changes (`Functions.of_series`)."""
-    nested = functions.recorded.nested
-    at_kink, hides = entry(nested) if nested else None, any(map(any, m.hiding)) or None
+def _driven(functions, m, to_event, method, kind):
+    """What runs cells, leg by leg: `to_event` of the method, a record of what it takes of the scene."""
 
-    def run(order):
-        series = functions.of_series(m, order, changes)
-        asks, apart = any(series.bent + series.bent_events) or None, any(series.bent_events) or None
-
-        @jit_call
-        def leg(cell, mode, active):
-            return taylor_leg.to_event(series, cell, mode, active, hides, asks, apart, at_kink)
-
-        return _driven(functions, m, leg, f"taylor_{order}", series.error)
-
-    return map(run, ORDERS)
-
-
-def _driven(functions, m, leg, kind, tells=None):
-    """What runs cells, leg by leg; `tells` : `carried.Changes` where the error is carried along."""
+    @jit_call
+    def leg(cell, mode, active):
+        return to_event(method, cell, mode, active)
 
     @jit_call
     def of_lanes(memory, i):
-        return advance(m, leg, memory, i, tells)
+        return advance(m, leg, memory, i)
 
-    return running(functions, of_lanes, kind if tells is None else f"{kind}_told")
+    return running(functions, of_lanes, kind)
 
 
 def running(functions, of_lanes, kind):

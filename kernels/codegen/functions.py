@@ -96,6 +96,7 @@ class Functions:
         """
         recorded, scene, slides = self.recorded, self.scene, self.scene.slides
         excesses = self._excesses(self.any["state"], self.any["boxes"], self.any["mode"])
+        hiding = [[x is not None for x in part] for part in excesses]
         # on whose side a switch's result hangs, but for further surfaces and the surface's own u
         signs, further = {x.args[0] for x in needed(*recorded.switched) if x.kind == INPUT}, recorded.surfaces
         deciding = tuple(
@@ -104,12 +105,12 @@ class Functions:
         )
         mark, sided = 2.0 if scene.only_first else 1.0, (needed(event) for event in (recorded.surface, *self.kinks))
         return Written(
-            hiding=tuple(tuple(float(x is not None) for x in part) for part in excesses),
+            hiding=tuple(tuple(map(float, part)) for part in hiding) if any(map(any, hiding)) else None,
             hidden=left_a_call(self.rehearsed(self._hidden)),
             rates=self.values(recorded.rates), surface=self.values(recorded.surface), kinks=self.values(self.kinks),
             switched=self.values(recorded.switched), started=self.inlined(self._started),
             natural_signs=self.inlined(self._natural_signs), underflows=self.inlined(self._underflows),
-            jet=self.series(2)[0], lost=self.inlined(self._lost), bounds=left_a_call(self.rehearsed(self._bounds)),
+            jet=self._jet(), lost=self.inlined(self._lost), bounds=left_a_call(self.rehearsed(self._bounds)),
             made=self.inlined(self._made),
             speeds=self.values(recorded.speeds) if slides else None,
             onto=self.values(recorded.onto) if slides else None,
@@ -118,7 +119,7 @@ class Functions:
             surfaces=tuple(mark * (j in further) for j in range(len(self.kinks))) if further else None,
             passable=tuple(float(not any(x.kind == INPUT and x.args[0] == "side" for x in parts)) for parts in sided),
             deciding=deciding if any(deciding) else None,
-            cell=cell_of(*self.size), roundings=ROUNDINGS, biased=0.0, factored=None, solved=None,
+            cell=cell_of(*self.size), roundings=ROUNDINGS, biased=0.0,
         )  # fmt: skip
 
     def inlined(self, function):
@@ -203,6 +204,10 @@ class Functions:
                 lost = lost | small
         return lost
 
+    def _jet(self):
+        pieces, _ = self.series(2)
+        return written(lambda state, mode, unit: pieces(state, mode, unit, ()).events)
+
     def _lost(self, state, mode):
         inputs, started = self.inputs(state, mode), dict(zip(self.states, self.recorded.started, strict=True))
         if self.scene.begins is not None:
@@ -278,15 +283,14 @@ class Functions:
         """`taylor_leg.Series` of an order; `changes` : of the error that is carried along, the first of `Changes`."""
         ways = {s: BY_SUM if s in self.summed else BY_SERIES for s in self.states} | {None: BY_SERIES}
         pieces, tangents = self.series(order, True, changes is not None)
-        bent, bent_events = (
-            tuple(float(not linear(x)) for x in xs)
-            for xs in (self.recorded.rates, [u for *_, u in self.recorded.events])
-        )
+        rates, events = self.recorded.rates, [u for *_, u in self.recorded.events]
+        bent, bent_events = (tuple(float(not linear(x)) for x in xs) for xs in (rates, events))
+        nested = self.recorded.nested
         return Series(
             m, order, pieces, *self.powers, tuple(ways[s] for s in self.states), tuple(ways[s] for s in self.seen),
             tuple(float(s in self.summed) for s in self.states), tuple(float(s is None) for s in self.seen),
-            bent, bent_events,
-            changes and Changes(*changes, *tangents, self.feeds_back or None),
+            bent if any(bent + bent_events) else None, bent_events if any(bent_events) else None,
+            entry(nested) if nested else None, changes and Changes(*changes, *tangents, self.feeds_back or None),
         )  # fmt: skip
 
     def series(self, order, powers=False, tells=False):

@@ -80,8 +80,9 @@ def next_length(pair, h, last_h, error, before):
 
 
 @jit
-def to_event(m, pair, cell, mode, active):
+def to_event(pair, cell, mode, active):
     """Follow the active lanes until an event falls through 0, and stop there; see `taylor_leg`."""
+    m = pair.scene
     state, unit, on, tolerance = cell.state, cell.unit, cell.on, cell.tolerance
     h = pair.first(m, state, mode, unit, cell.h)
     moving, nothing, fired = active, active & not_(active), times(0.0, on)

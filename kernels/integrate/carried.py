@@ -19,7 +19,8 @@ l'' = f'(U) - U'' at the end, l = h (2 l'/(p + 2) - h l''/((p + 1) (p + 2))).
 A motion may forget an error that was so large on the way that the truth went elsewhere, which first order does not see.
 So where the *peak* of an error is above SMALL of the state's largest size, that is what is stated.
 
-Generic in one cell or lanes; `m` is a `taylor_leg.Series`, and where its `error` is None none is carried: all is ().
+Generic in one cell or lanes; `m` is a `taylor_leg.Series`, or at switches `Written`, and where its `error` is None none
+is carried: all is ().
 """
 
 import math
@@ -160,7 +161,7 @@ def moved(m, error, changes, state, mode, unit, x, lanes, pieces, cores, coarse)
     n = m.order + 1
     power, share = natural_power(x, n), 1.0 / n
     lasts = tuple(curve[-1][-1] for curve in pieces.of_states)
-    off, spread = (tuple(way.value(x, curve) for way, curve in zip(m.ways, curves, strict=True)) for curves in changes)
+    off, spread = (tuple(way.at(x, curve)[0] for way, curve in zip(m.ways, curves, strict=True)) for curves in changes)
     parts = zip(spread, m.error.rates_made(state, mode), state, strict=True)
     spread = tuple(further(y, ULP * fma(x * unit, noise, magnitude(u))) for y, noise, u in parts)
     for left in coarse:
@@ -214,7 +215,7 @@ def at_event(m, error, changes, full, state, mode, unit, ends, end, t, which, ot
         )
     )
     parts = zip(pieces.events, m.watched, pieces.of_events, strict=True)
-    bends = tuple(event[1] * way.rates(end, curve)[2] for event, way, curve in parts)
+    bends = tuple(event[1] * way.at(end, curve)[2] for event, way, curve in parts)
     noise, bend = (of_event(values, which) for values in (noises, bends))
     change, vague, per_unit = (
         of_event(m.error.of_events(ends, mode, changed), which) for changed in (error.off, error.spread, rates)
@@ -236,20 +237,20 @@ def at_event(m, error, changes, full, state, mode, unit, ends, end, t, which, ot
 
 
 @symbolic
-def started(tells, errors, state):
+def started(m, errors, state):
     """The errors at the start, which is rounded."""
-    if tells is None:
+    if m.error is None:
         return errors
     return errors._replace(spread=(*(ULP * magnitude(u) for u in state), *errors.spread[-2:]))
 
 
 @symbolic
-def at_switch(tells, errors, rates, switches, watched, cell):
+def at_switch(m, errors, rates, switches, watched, cell):
     """The errors of the lanes that switch, with the largest one, relative, where that is watched.
 
     `rates` are those before
     """
-    if tells is None:
+    if m.error is None:
         return errors
     parts, once = zip(errors.once, errors.off, errors.spread, (*rates, *TIMES), strict=True), []
     for largest, off, spread, rate in parts:
@@ -264,21 +265,21 @@ def at_switch(tells, errors, rates, switches, watched, cell):
 
 
 @symbolic
-def behind(tells, errors, state, mode, rates, switches):
+def behind(m, errors, state, mode, rates, switches):
     """The errors behind a switch, and what it makes of the rates before it, as of changes of the states."""
-    if tells is None:
+    if m.error is None:
         return errors, rates
     off, spread = (
-        choose(switches, (*tells.behind(state, mode, x[:-2]), x[-2], since), x)
+        choose(switches, (*m.error.behind(state, mode, x[:-2]), x[-2], since), x)
         for x, since in ((errors.off, 0.0), (errors.spread, errors.noise))
     )
-    return errors._replace(off=off, spread=spread), choose(switches, tells.behind(state, mode, rates), rates)
+    return errors._replace(off=off, spread=spread), choose(switches, m.error.behind(state, mode, rates), rates)
 
 
 @symbolic
-def misplaced(tells, m, errors, rates, state, mode, lanes):
+def misplaced(m, errors, rates, state, mode, lanes):
     """The errors behind an event that is misplaced by itself: for that time the rates were those before it."""
-    if tells is None:
+    if m.error is None:
         return errors
     parts = zip(errors.spread[:-2], rates, m.rates(state, mode), strict=True)
     spread = tuple(where(lanes, further(x, magnitude(f - g) * errors.noise), x) for x, f, g in parts)

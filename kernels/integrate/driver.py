@@ -60,8 +60,8 @@ def settled(m, state, side, parameters, unit, near):
     `near` : 1 where the state is nearly on a kink
     """
     signs, turned, marks = m.natural_signs(state, Mode(side, (), parameters, False)), [], []
-    pieces = m.jet(state, Mode(side, signs, parameters, False), unit, ())
-    for sign, close, (_, factor, u) in zip(signs[:-1], near, pieces.events[1:], strict=True):
+    events = m.jet(state, Mode(side, signs, parameters, False), unit)
+    for sign, close, (_, factor, u) in zip(signs[:-1], near, events[1:], strict=True):
         on = ((u[0] <= 0.0) & (u[0] >= 0.0)) | (close > 0.5)
         back = (factor * u[1] < 0.0) | ((factor * u[1] <= 0.0) & (factor * u[2] < 0.0))
         turned.append(where(on & back, -sign, sign))
@@ -110,7 +110,7 @@ def pressed(m, state, mode, on, left, margin, lanes):
 @left_a_call
 def rates_of_events(m, state, mode, unit):
     """Of each event's value, per unit of time."""
-    return tuple(factor * u[1] for offset, factor, u in m.jet(state, mode, unit, ()).events)
+    return tuple(factor * u[1] for offset, factor, u in m.jet(state, mode, unit))
 
 
 @symbolic
@@ -132,7 +132,7 @@ def raised(verdict, lanes, least):
 
 
 @symbolic
-def started(m, cell, tells):
+def started(m, cell):
     """The cell at its start; a further surface that it starts on and falls through is met at once.
 
     So is the first one, but where the start is just behind a switch there, whose jump takes the motion on through it.
@@ -142,7 +142,7 @@ def started(m, cell, tells):
     state = tuple(u + 0.0 * side for u in m.started(parameters, side))
     signs, on = settled(m, state, side, parameters, one, tuple(0.0 * side for sign in cell.signs[:-1]))
     mode = Mode(side, signs, parameters, False)
-    offset, factor, u = m.jet(state, mode, one, ()).events[0]
+    offset, factor, u = m.jet(state, mode, one)[0]
     e, d, dd = fma(factor, u[0], offset), factor * u[1], factor * u[2]
     away = (d > 0.0) | ((d >= 0.0) & (dd > 0.0))
     lost = m.lost(state, mode)
@@ -153,7 +153,7 @@ def started(m, cell, tells):
     cell = cell._replace(
         state=tuple(fma(ONE_ULP * (-1.0) ** j * off, u, u) for j, u in enumerate(state)),
         side=side, signs=joined(signs[:-1], (where((e < 0.0) | through, -1.0, signs[-1]),)), on=joined((at,), on),
-        unit=time_unit(e, d, dd), own=ERRORS.started(tells, cell.own, state),
+        unit=time_unit(e, d, dd), own=ERRORS.started(m, cell.own, state),
         verdict=where(wrong, BAD_INPUT, where(blur <= BLUR * cell.tolerance, 0.0, INACCURATE)),
     )  # fmt: skip
     if m.speeds is not None:
@@ -244,14 +244,14 @@ def turned(m, cell, moving):
 
 
 @symbolic
-def switched(m, cell, rates, switches, counts, first, met, tells):
+def switched(m, cell, rates, switches, counts, first, met):
     """The cell behind the switch that it is on, and what that makes of the rates before it.
 
     What there is to say of the switch is kept where that is the first or the last one.
     """
     count = where(counts, cell.count + 1.0, cell.count)
     watched = counts & ((count < 1.5) | (count >= cell.flips))
-    own = ERRORS.at_switch(tells, cell.own, rates, switches, watched, cell)
+    own = ERRORS.at_switch(m, cell.own, rates, switches, watched, cell)
     cell = cell._replace(
         count=count, interval=where(watched, cell.since, cell.interval), at=choose(watched, cell.state, cell.at),
         verdict=where(watched & m.underflows(cell.state, mode_of(cell), cell.unit), OUT_OF_RANGE, cell.verdict),
@@ -263,7 +263,7 @@ def switched(m, cell, rates, switches, counts, first, met, tells):
         parts = zip(signs[:-1], m.surfaces, met, strict=True)
         which = (*(where(s > 0.5, where(x, 1.0, -1.0), sign) for sign, s, x in parts), where(first, 1.0, -1.0))
     old_mode = Mode(cell.side, which, parameters, False)
-    own, rates = ERRORS.behind(tells, own, old, old_mode, rates, switches)
+    own, rates = ERRORS.behind(m, own, old, old_mode, rates, switches)
     before, gaps, verdict = m.surface(old, old_mode), m.kinks(old, old_mode), cell.verdict
     if m.deciding is not None:  # a kink whose side decides what the switch does may be too close to tell its side
         parts = zip(m.deciding, gaps, m.made(old, old_mode)[1:], strict=True)
@@ -305,31 +305,28 @@ def switched(m, cell, rates, switches, counts, first, met, tells):
 
 
 @symbolic
-def gone_on(m, cell, rates, left, moving, grazing, tells):
+def gone_on(m, cell, rates, left, moving, grazing):
     """The cell on its way to the next event; `rates` : those before the last one, `left` as of `onto_kinks`.
 
     Where it is `grazing` the motion may have met an event or not, so there are no values.
     """
     if m.speeds is not None:
         cell = onto_kinks(m, cell, left, moving)
-    own = ERRORS.misplaced(tells, m, cell.own, rates, cell.state, mode_of(cell), moving)
+    own = ERRORS.misplaced(m, cell.own, rates, cell.state, mode_of(cell), moving)
     verdict = where(moving & (cell.kinks_met > m.most_kinks), STEP_LIMIT, cell.verdict)
     time, interval, *at = (where(grazing, math.nan, x) for x in (cell.time, cell.interval, *cell.at))
     return cell._replace(own=own, verdict=verdict, time=time, interval=interval, at=tuple(at))
 
 
 @jit
-def advance(m, leg, memory, i, tells):
-    """Every lane on from event to event, until one has finished; whether one has.
-
-    `tells` : `carried.Changes` where the error is carried along, else None
-    """
+def advance(m, leg, memory, i):
+    """Every lane on from event to event, until one has finished; whether one has."""
     cell = read(memory, i, m.cell)
     stage = cell.stage
     fresh = (stage > 0.5) & (stage < 1.5)
     active = fresh | ((stage > 1.5) & (stage < 2.5))
     if any_lane(fresh):
-        cell = choose(fresh, started(m, cell, tells), cell)
+        cell = choose(fresh, started(m, cell), cell)
     done = active & not_(active)
     for _ in range(EVENTS):
         moving = active & (cell.verdict < REFUSED)
@@ -337,8 +334,8 @@ def advance(m, leg, memory, i, tells):
         cell, moving, rates = arrived(m, cell, found, own, active)
         cell, left, switches, counts, first, met = turned(m, cell, moving)
         if any_lane(switches):
-            cell, rates = switched(m, cell, rates, switches, counts, first, met, tells)
-        cell = gone_on(m, cell, rates, left, moving, found.grazing, tells)
+            cell, rates = switched(m, cell, rates, switches, counts, first, met)
+        cell = gone_on(m, cell, rates, left, moving, found.grazing)
         done = active & (found.grazing | (cell.verdict >= REFUSED) | (cell.count >= cell.flips))
         if any_lane(done):
             break

@@ -25,7 +25,7 @@ from kernels.integrate.events import (
 from kernels.integrate.records import Leg, Mode, Step
 from kernels.integrate.steps import ONE, events, rate
 from kernels.lanes.jit import jit, jit_call
-from kernels.lanes.symbols import over_tuples, symbolic
+from kernels.lanes.symbols import symbolic
 from kernels.lanes.tuples import after, any_of, boxes, marks, reached, times
 from kernels.lanes.vectors import any_lane, choose, magnitude, not_, where
 
@@ -46,9 +46,9 @@ TOLERANCE = 1e-14 / BLUR
 class Scheme(NamedTuple):
     """A method at a fixed step, how it locates events (both numbers of `events`), and the substeps of a step."""
 
-    method: int
-    location: int
-    substeps: int
+    method: float
+    location: float
+    substeps: float
 
 
 class Fixed(NamedTuple):
@@ -56,19 +56,16 @@ class Fixed(NamedTuple):
 
     reach : largest size of each state since the last switch
     slim : least margin behind a switch
-    trials, wide : since the last switch: trials, largest of the surface's value
-    method, location, substeps : the `Scheme`
+    wide : largest of the surface's value since the last switch
+    scheme : the same in all lanes
     """
 
     reach: tuple
     slim: float
     steps: float
     calls: float
-    trials: float
     wide: float
-    method: float
-    location: float
-    substeps: float
+    scheme: Scheme
 
 
 @jit
@@ -101,19 +98,27 @@ def located(m, scheme, mode, step, which, seeking):
 @symbolic
 def shows_all(m, state, new, mode, h):
     """Whether a step hides no more of a state than its stages tell; NaN does."""
-    change = times(h, after(rate(m, new, mode), -1.0, ONE, (rate(m, state, mode),)))
     seen = h <= math.inf
+    if m.hiding is None:
+        return seen
+    change = times(h, after(rate(m, new, mode), -1.0, ONE, (rate(m, state, mode),)))
     for hidden, u, w in zip(m.hidden(state, boxes(state, new, change), mode)[0], state, new, strict=True):
         seen = seen & (h * hidden <= HIDDEN * (magnitude(u) + magnitude(w)))
     return seen
 
 
+@symbolic
+def turns_close(step, on):
+    """Whether an event that the motion does not start on ends next to 0."""
+    parts = zip(step.start, step.end, on, strict=True)
+    return any_of(tuple((magnitude(end) < GRAZING * magnitude(start)) & (o < 0.5) for start, end, o in parts))
+
+
 @jit
-@over_tuples
 def to_event(m, cell, mode, active):
     """Follow the active lanes until a step ends on an event; see `taylor_leg`. Also what they know of their steps."""
     state, on, own = cell.state, cell.on, cell.own
-    scheme = Scheme(number(own.method), number(own.location), number(own.substeps))
+    scheme = Scheme(number(own.scheme.method), number(own.scheme.location), number(own.scheme.substeps))
     natural = scheme.location == E.NONE
     mode = Mode(mode.side, mode.signs, mode.parameters, natural)
     moving, nothing, fired = active, active & not_(active), times(0.0, on)
@@ -121,11 +126,11 @@ def to_event(m, cell, mode, active):
     t, cut, cuts = 0.0 * cell.h, 0.0 * cell.h, 0.0 * cell.h
     begins = cell.since <= 0.0  # behind a switch
     reach = choose(begins, reached(times(0.0, state), state), own.reach)
-    trials, wide = where(begins, 0.0, own.trials), where(begins, 0.0, own.wide)
+    trials, wide = where(begins, 0.0, cell.steps), where(begins, 0.0, own.wide)
     slim, steps, calls = own.slim, own.steps, own.calls
+    start, start_rates = events(m, state, mode)
     for _ in range(STEP_LIMIT + 1):
         h = where(cut > 0.0, cut, cell.h)
-        start, start_rates = events(m, state, mode)
         new = leap(m, scheme, state, mode, h)
         end, end_rates = events(m, new, mode)
         step = Step(state, new, h, start, start_rates, end, end_rates)
@@ -141,9 +146,7 @@ def to_event(m, cell, mode, active):
             pressed = met & (of_event(on, which) > 0.5)
             away = of_event(start_rates, which) > 0.0
             stuck, missed = stuck | (pressed & not_(away)), moving & not_(met | blown)
-            margins = times(GRAZING, reached(times(0.0, on), start))
-            close = any_of(tuple((magnitude(x) < y) & (o < 0.5) for x, y, o in zip(end, margins, on, strict=True)))
-            hangs = hangs | (missed & (cuts > 0.5) & close)
+            hangs = hangs | (missed & (cuts > 0.5) & turns_close(step, on))
             low = where(missed & not_(cuts > 0.5), dip(step), 0.0)
             again, shorter = (pressed & away) | (low > 0.0), where(low > 0.0, low * h, shorter)
             seeking = met & not_(pressed)
@@ -156,8 +159,7 @@ def to_event(m, cell, mode, active):
         lost, broken = lost | (again & (cuts > CUTS)), broken | blown
         given_up = stuck | lost | broken
         moved = moving & not_(again | given_up)
-        if any_of(tuple(hides > 0.5 for hides in m.hiding[0])):
-            vague = vague | (moved & not_(shows_all(m, state, new, mode, taken)))
+        vague = vague | (moved & not_(shows_all(m, state, new, mode, taken)))
         below = (which < -0.5) & (end[0] <= 0.0) & natural  # not yet above where it began
         done = moved & (which > -0.5)
         # how far behind the switch it would turn round, over the surface's largest value: by the rates at both ends
@@ -167,7 +169,8 @@ def to_event(m, cell, mode, active):
         bend = where(back, (last - first) / h, 1.0)
         behind = at_switch * at_switch / (2.0 * bend * where(wide > 0.0, wide, 1.0))
         slim = where(back & (behind < slim), behind, slim)
-        state, t, fired = choose(moved, new, state), where(moved, t + taken, t), choose(done, marks(which, on), fired)
+        state, start, start_rates = choose(moved, (new, end, end_rates), (state, start, start_rates))
+        t, fired = where(moved, t + taken, t), choose(done, marks(which, on), fired)
         on, reach = choose(moved & not_(below), times(0.0, on), on), choose(moving, reached(reach, state), reach)
         cut, cuts = where(again, shorter, 0.0), where(again, cuts + 1.0, 0.0)
         steps, trials = where(moving & not_(again), steps + 1.0, steps), where(moving, trials + 1.0, trials)
@@ -177,6 +180,5 @@ def to_event(m, cell, mode, active):
         moving = moving & not_(lost)
         if not any_lane(moving):
             break
-    own = Fixed(reach, slim, steps, calls, trials, wide, own.method, own.location, own.substeps)
     leg = Leg(state, t / cell.unit, cell.h, fired, stuck, lost, broken, nothing, hangs, vague, trials, reach)
-    return leg, own
+    return leg, Fixed(reach, slim, steps, calls, wide, own.scheme)

@@ -145,10 +145,11 @@ def dopri5_dense(m, state, terms, mode, h, part):
     return after(state, h, weights, terms)
 
 
-Pair = namedtuple("Pair", "tried series dense vague first order roundings")
+Pair = namedtuple("Pair", "tried series dense vague first order roundings scene", defaults=(None,))
 """An embedded pair of methods, as functions: a step with its error, its dense output, how far that may be off.
 
-`first` is the first step of a leg, in units; a step makes as many `roundings` of its own length at most.
+`first` is the first step of a leg, in units; a step makes as many `roundings` of its own length at most. `scene` is
+the `Written` of the scene that it follows.
 """
 
 

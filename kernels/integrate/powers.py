@@ -16,8 +16,8 @@ from collections import namedtuple
 
 from kernels.integrate.taylor import SLACK
 from kernels.lanes.jit import jit_call
-from kernels.lanes.symbols import fold, over_tuples, symbolic
-from kernels.lanes.tuples import all_of, joined
+from kernels.lanes.symbols import symbolic
+from kernels.lanes.tuples import all_of, joined, times
 from kernels.lanes.vectors import any_lane, choose, fma, magnitude, not_, where
 from kernels.maths.elementary import power
 
@@ -39,7 +39,6 @@ without : (state, mode) -> the state at u = 0
 
 
 @jit_call
-@over_tuples
 def core(p, state, mode, unit, tolerance, on, t, margins):
     """The mean of a power in its core, and how far from there a step may go.
 
@@ -56,44 +55,62 @@ def core(p, state, mode, unit, tolerance, on, t, margins):
     coarse : what (1) leaves of each state
     full : the rates with the power as it is
     """
-    n, base = p.exponent(state, mode), p.base(state, mode)
-    margin, leaves = p.of_kink(margins), (p.of_kink(on) > 0.5) & (t <= 0.0)
-    value, nothing = power(base, n), 0.0 * mode.side
+    n, base, nothing = p.exponent(state, mode), p.base(state, mode), 0.0 * mode.side
+    value, margin, leaves = power(base, n), p.of_kink(margins), (p.of_kink(on) > 0.5) & (t <= 0.0)
     full = p.rates(state, mode, unit, value)
-    core, longest, nears = nothing - 1.0, nothing + FAR, p.of_kink(joined((0.0,), mode.signs)) * p.of_base(full) < 0.0
-    coarse = tuple(nothing for u in state)
+    core, longest, coarse = nothing - 1.0, nothing + FAR, times(nothing, state)
+    nears = p.of_kink(joined((0.0,), mode.signs)) * p.of_base(full) < 0.0
     if any_lane(nears):
-        bare = p.rates(state, mode, unit, nothing)
-        over = 1.0 / magnitude(p.of_base(full))
-        t_base, d = base * over, magnitude(p.of_base(full) - p.of_base(bare)) * over
-        uneven = t_base * (t_base + d)
-        small = tuple(
-            magnitude(x - y) * uneven <= tolerance * size_in_unit(u, x)
-            for x, y, u in zip(full, bare, state, strict=True)
-        )
-        inside = nears & (d <= UNEVEN) & all_of(small)
-        coarse = tuple(where(inside, magnitude(x - y) * uneven, 0.0) for x, y in zip(full, bare, strict=True))
-        core = where(inside, mean_power(value, n), -1.0)
-        at_kink = p.of_base(p.rates(p.without(state, mode), mode, unit, nothing))
-        settles = nears & (at_kink <= 0.0) & (at_kink >= 0.0) & (n < 1.0)
-        left = t_base / (1.0 - n)
-        # so little is left of u that its way to rest does not matter
-        rests = settles & ((SLACK * base * left <= margin * (t + left)) | (base <= SLACK * margin))
-        core = where(rests, value * (1.0 - n), core)
-        longest = where(settles & not_(rests), SHORT * left, longest)
+        core, longest, coarse = towards(p, state, mode, unit, tolerance, t, n, base, value, full, margin, nears)
     if any_lane(leaves):
-        bare, whole = p.rates(state, mode, unit, nothing), p.rates(state, mode, unit, nothing + 1.0)
-        by_power = tuple(magnitude(x - y) for x, y in zip(whole, bare, strict=True))
-        shares = tuple(size_in_unit(u, y) / z for u, y, z in zip(state, bare, by_power, strict=True))
-        capacity = fold(least_share, nothing + FAR, (), shares)
-        speed, of_base = magnitude(p.of_base(bare)), p.of_base(by_power)
-        reach = core_time(capacity, speed, of_base, n, tolerance)
-        mean = mean_power(power(speed * reach, n), n)
-        core, longest = where(leaves, mean, core), where(leaves, reach, longest)
-        last = (n + 1.0) * mean
-        uneven = reach * fma(of_base, last / speed, reach)
-        coarse = choose(leaves, tuple(z * last * uneven for z in by_power), coarse)
+        behind = away(p, state, mode, unit, tolerance, n)
+        core, longest, coarse = choose(leaves, behind, (core, longest, coarse))
     return core, longest, coarse, full
+
+
+@symbolic
+def towards(p, state, mode, unit, tolerance, t, n, base, value, full, margin, nears):
+    """`core`, how far a step may go, and what is left out, where u comes to 0."""
+    nothing = 0.0 * mode.side
+    bare = p.rates(state, mode, unit, nothing)
+    over = 1.0 / magnitude(p.of_base(full))
+    t_base, d = base * over, magnitude(p.of_base(full) - p.of_base(bare)) * over
+    uneven = t_base * (t_base + d)
+    left_out = tuple(magnitude(x - y) * uneven for x, y in zip(full, bare, strict=True))
+    small = tuple(x <= tolerance * size_in_unit(u, rate) for x, u, rate in zip(left_out, state, full, strict=True))
+    inside = nears & (d <= UNEVEN) & all_of(small)
+    at_kink = p.of_base(p.rates(p.without(state, mode), mode, unit, nothing))
+    settles = nears & (at_kink <= 0.0) & (at_kink >= 0.0) & (n < 1.0)
+    left = t_base / (1.0 - n)
+    # so little is left of u that its way to rest does not matter
+    rests = settles & ((SLACK * base * left <= margin * (t + left)) | (base <= SLACK * margin))
+    core = where(rests, value * (1.0 - n), where(inside, mean_power(value, n), -1.0))
+    longest = where(settles & not_(rests), SHORT * left, FAR)
+    return core, longest, tuple(where(inside, x, 0.0) for x in left_out)
+
+
+@symbolic
+def away(p, state, mode, unit, tolerance, n):
+    """The same where u = rate t leaves 0: as long as it may be taken for small by (1), at most 1 unit."""
+    nothing = 0.0 * mode.side
+    bare, whole = p.rates(state, mode, unit, nothing), p.rates(state, mode, unit, nothing + 1.0)
+    by_power, capacity = tuple(magnitude(x - y) for x, y in zip(whole, bare, strict=True)), nothing + FAR
+    for u, y, z in zip(state, bare, by_power, strict=True):
+        share = size_in_unit(u, y) / z
+        capacity = where(share < capacity, share, capacity)
+    rate, of_base = magnitude(p.of_base(bare)), p.of_base(by_power)
+    drag = power(rate, n)
+    room = 0.5 * tolerance * capacity / drag  # D t^2 <= half the tolerance times the size
+    over = rate / (of_base * drag)
+    slow = power(_no_more_than_one(room), 1.0 / (n + 2.0))
+    even = power(_no_more_than_one(room * over), 1.0 / (2.0 * n + 1.0))
+    mild = where(n > 0.0, power(_no_more_than_one(UNEVEN * over), 1.0 / where(n > 0.0, n, 1.0)), 1.0)
+    reach = where(slow < even, slow, even)
+    reach = where(reach < mild, reach, mild)
+    mean = mean_power(power(rate * reach, n), n)
+    last = (n + 1.0) * mean
+    uneven = reach * fma(of_base, last / rate, reach)
+    return mean, reach, tuple(z * last * uneven for z in by_power)
 
 
 @symbolic
@@ -102,12 +119,6 @@ def outside(cores, lanes):
     for core in cores:
         lanes = lanes & (core < 0.0)
     return lanes
-
-
-@symbolic
-def least_share(x, share):
-    """The smaller one; x beside NaN."""
-    return where(share < x, share, x)
 
 
 @symbolic
@@ -120,21 +131,6 @@ def size_in_unit(u, rate):
 def mean_power(last, n):
     """The mean of what grows as t^n up to `last`."""
     return last / (n + 1.0)
-
-
-@symbolic
-def core_time(capacity, rate, most, n, tolerance):
-    """How long u = rate t may be taken for small, by (1); at most 1 unit.
-
-    `capacity` is the least size of a state over what the power, were it 1, would add to its rate; `most` is that of u.
-    """
-    drag = power(rate, n)
-    whole = 0.5 * tolerance * capacity / drag  # D t^2 <= half the tolerance times the size
-    slow = power(_no_more_than_one(whole), 1.0 / (n + 2.0))
-    even = power(_no_more_than_one(whole * (rate / (most * drag))), 1.0 / (2.0 * n + 1.0))
-    mild = where(n > 0.0, power(_no_more_than_one(UNEVEN * (rate / (most * drag))), 1.0 / where(n > 0.0, n, 1.0)), 1.0)
-    shorter = where(slow < even, slow, even)
-    return where(shorter < mild, shorter, mild)
 
 
 @symbolic

@@ -23,7 +23,8 @@ class Mode(NamedTuple):
 Written = namedtuple(
     "Written",
     "rates surface kinks switched started natural_signs underflows jet lost hidden bounds made most_kinks cell "
-    "roundings biased speeds onto surfaces hiding passable deciding on_clock states_off factored solved",
+    "roundings biased speeds onto surfaces hiding passable deciding on_clock states_off factored solved error",
+    defaults=(None, None, None),
 )
 """What is written of a scene: functions of (state, mode) unless said otherwise, and its numbers.
 
@@ -31,7 +32,7 @@ rates, surface, kinks, switched : rates; the surface's value; what is 0 at each 
 started : (parameters, side) -> the state
 natural_signs : 1 or -1 for each kink, the side on which the state is, and the way over the surface, 1
 underflows : (state, mode, unit) -> whether a product loses its digits
-jet : (state, mode, unit, ()) -> `Pieces` of order 2
+jet : (state, mode, unit) -> of each event its offset, factor and series of order 2
 lost : what rounding takes from the surface's value at the start; -1 where that is just behind a switch
 hidden, bounds : (state, boxes, mode) -> what a box hides of rates and events; the events' values and rates in it
 made : what each event's value is made of, in size, and its rate
@@ -43,12 +44,13 @@ speeds : of each kink's u ahead of it and behind it, the other signs as they are
 onto : the state put back onto the kink that it slides along, or None
 surfaces : 1 for each kink that is a further surface, at which the motion switches too, 2 where such switches do
     not count; None where there is none
-hiding : 1 for each rate, and for each event, that can hide something
+hiding : 1 for each rate, and for each event, that can hide something; None where none can
 passable : 1 for the surface, and for each kink, that does not depend on the side: a motion may pass through it
 deciding : 1 for each kink whose side decides what a switch does; None where there is none
 on_clock : (state, unit, h) -> the step next to h > 0 by which each *clock*, a state whose rate is 1, is not rounded
 states_off : (state, by) -> the state, its clocks off by so many parts of themselves, others by fewer
 factored, solved : None, or of a scene that may be stiff (`expression.stiff`)
+error : `carried.Changes`; None where no error is carried along
 """
 
 

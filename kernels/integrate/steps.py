@@ -25,7 +25,7 @@ def rate(m, state, mode):
 @symbolic
 def events(m, state, mode):
     """Value and rate of each event."""
-    found = m.jet(state, mode, 0.0 * mode.side + 1.0, ()).events
+    found = m.jet(state, mode, 0.0 * mode.side + 1.0)
     values = tuple(fma(factor, u[0], offset) for offset, factor, u in found)
     return values, tuple(factor * u[1] for offset, factor, u in found)
 

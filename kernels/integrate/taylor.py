@@ -119,14 +119,6 @@ def vanishes(h, series):
     return not_((last < before) & (before < VANISHING * last))
 
 
-@symbolic
-def worse(first, second):
-    """Of two pairs (what is left out, size) the one that is worse in its size; a state that stays 0 never is."""
-    (x, of_x), (y, of_y) = first, second
-    smaller = (y * of_x <= x * of_y) & not_(x <= 0.0)
-    return where(smaller, x, y), where(smaller, of_x, of_y)
-
-
 @jit
 def next_step(h, ratio, order):
     """The step on which 1 is left out instead of `ratio`, within 1 %."""
@@ -214,19 +206,6 @@ def of_sum(t, curve):
     return fma(unit * t, mean(t, w), start), unit * horner(t, w), unit * bend
 
 
-@jit
-def value_of_series(t, curve):
-    """u at t."""
-    return horner(t, curve[0])
-
-
-@jit
-def value_of_sum(t, curve):
-    """u at t."""
-    start, unit, w = curve
-    return fma(unit * t, mean(t, w), start)
-
-
 @written
 def tail_of_series(h, curve):
     """A bound on A of (1): sum over k > 3 of k abs(u_k) h^(k-2), with 4 (5/4)^(k-4) >= k for k."""
@@ -245,15 +224,13 @@ def tail_of_sum(h, curve):
 
 
 class Way(NamedTuple):
-    """How what has a curve is evaluated at t: u; u, u' and about u''/2; a bound on A of (1)."""
+    """How what has a curve is evaluated at t: u, u' and about u''/2; a bound on A of (1)."""
 
-    value: object
-    rates: object
+    at: object
     tail: object
 
 
-BY_SERIES = Way(value_of_series, of_series, tail_of_series)
-BY_SUM = Way(value_of_sum, of_sum, tail_of_sum)
+BY_SERIES, BY_SUM = Way(of_series, tail_of_series), Way(of_sum, tail_of_sum)
 
 
 @symbolic

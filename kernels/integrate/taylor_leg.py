@@ -8,10 +8,10 @@ events that are linear in the states, of which the last terms tell all.
 `m` is what is written of the scene for one order (`Series`).
 """
 
-import math
 from typing import NamedTuple
 
 from kernels.integrate import carried
+from kernels.integrate.events import finite
 from kernels.integrate.powers import FAR, outside
 from kernels.integrate.records import Leg
 from kernels.integrate.taylor import (
@@ -35,11 +35,10 @@ from kernels.integrate.taylor import (
     slope,
     stays_apart,
     vanishes,
-    worse,
 )
 from kernels.lanes.jit import jit, jit_call
-from kernels.lanes.symbols import fold, over_tuples, symbolic
-from kernels.lanes.tuples import all_of, any_of, joined, reached, total
+from kernels.lanes.symbols import fold, left_a_call, symbolic
+from kernels.lanes.tuples import all_of, any_of, reached, times
 from kernels.lanes.vectors import any_lane, choose, fma, horner, magnitude, not_, where
 from kernels.maths.intervals import most
 
@@ -62,7 +61,9 @@ class Series(NamedTuple):
     on_kink : (state, fires) -> the state, 0 where a kink of a power fires
     ways, watched : how each state, and what each event watches, is evaluated (`taylor.Way`)
     summed, unseen : 1 for each state that is the sum of another one, for each event of more than one state
-    bent, bent_events : 1 for each state whose rate, for each event that, is not linear in the states
+    bent : 1 for each state whose rate is not linear in the states; None where all rates and events are
+    bent_events : 1 for each event that is not; None where all are
+    at_kink : the entry of a tuple of the kink whose u is the rate of the surface, or None
     error : `carried.Changes`; None where no error is carried along
     """
 
@@ -75,59 +76,54 @@ class Series(NamedTuple):
     watched: tuple
     summed: tuple
     unseen: tuple
-    bent: tuple
-    bent_events: tuple
+    bent: object
+    bent_events: object
+    at_kink: object
     error: object
 
 
 @symbolic
-def facts_of(offset, factor, u):
-    """Coefficients 0 to 3 of an event."""
-    return fma(factor, u[0], offset), factor * u[1], factor * u[2], factor * u[3]
+def facts_of(events):
+    """Coefficients 0 to 3 of each event."""
+    return tuple(
+        (fma(factor, u[0], offset), factor * u[1], factor * u[2], factor * u[3]) for offset, factor, u in events
+    )
 
 
 @symbolic
-def judged(m, pieces, facts, margins, now, trial):
-    """Which events are proved to stay clear on a step, and which to fall all along."""
+def judged(m, at_kink, pieces, facts, margins, now, trial, lanes, fallings):
+    """Whether each event is proved to stay clear on a step or to fall all along; which fall, in these lanes by that.
+
+    `at_kink` : that of m, by which the surface's proof is its rate's, or None
+    """
     rests = tuple(
         magnitude(event[1]) * way.tail(trial, curve)
         for way, event, curve in zip(m.watched, pieces.events, pieces.of_events, strict=True)
     )
-    clears = tuple(
-        clear(e, d, dd, ddd, rest, trial, margin)
-        for (e, d, dd, ddd), rest, margin in zip(facts, rests, margins, strict=True)
-    )
-    fallings = tuple(
-        falls(d, dd, ddd, rest, trial) | begun for (e, d, dd, ddd), rest, begun in zip(facts, rests, now, strict=True)
-    )
-    return clears, fallings
+    parts = list(zip(facts, rests, margins, now, strict=True))
+    clears = tuple(clear(e, d, dd, ddd, rest, trial, margin) for (e, d, dd, ddd), rest, margin, _ in parts)
+    down = tuple(falls(d, dd, ddd, rest, trial) | begun for (_, d, dd, ddd), rest, _, begun in parts)
+    if at_kink is not None:
+        _, d, dd, _ = facts[0]
+        clear_kink, falls_kink = at_kink(clears), at_kink(down)
+        lead = where(at_kink(facts)[0] > 0.0, d, 0.0)
+        clears = (rises(lead, dd) & (clear_kink | falls_kink), *clears[1:])
+        down = ((rises(-lead, -dd) & clear_kink) | now[0], *down[1:])
+    sure = all_of(tuple(x | y for x, y in zip(clears, down, strict=True)))
+    return sure, tuple((lanes & x) | (y & not_(lanes)) for x, y in zip(down, fallings, strict=True))
 
 
 @jit_call
-@over_tuples
 def doubted(m, pieces, state, unit, facts, margins, now, trial, unsure, fallings):
     """Steps of the unsure lanes halved until each event is proved to fall or to stay clear; which fall."""
     stays_apart(trial)
     for _ in range(HALVINGS):
-        clears, down = judged(m, pieces, facts, margins, now, trial)
-        proved = all_of(tuple(x | y for x, y in zip(clears, down, strict=True)))
-        fallings = tuple((unsure & x) | (y & not_(unsure)) for x, y in zip(down, fallings, strict=True))
-        unsure = unsure & not_(proved)
+        sure, fallings = judged(m, None, pieces, facts, margins, now, trial, unsure, fallings)
+        unsure = unsure & not_(sure)
         if not any_lane(unsure):
             break
         trial = where(unsure, m.scene.on_clock(state, unit, 0.5 * trial), trial)
     return trial, unsure, fallings
-
-
-@symbolic
-def by_kink(facts, now, clears, fallings, at_kink):
-    """The surface's proof where its rate is a kink's u: `at_kink` takes the kink's entry from a tuple."""
-    _, d, dd, _ = facts[0]
-    clear_kink, falls_kink = at_kink(clears), at_kink(fallings)
-    lead = where(at_kink(facts)[0] > 0.0, d, 0.0)
-    clear_0 = rises(lead, dd) & (clear_kink | falls_kink)
-    falls_0 = (rises(-lead, -dd) & clear_kink) | now[0]
-    return joined((clear_0,), clears[1:]), joined((falls_0,), fallings[1:])
 
 
 @symbolic
@@ -136,6 +132,8 @@ def shows_all(m, pieces, state, mode, unit, trial, tolerance):
 
     Of an event that can hide something the series is asked for its last term too, for the states' do not tell of it.
     """
+    if m.scene.hiding is None:
+        return trial >= 0.0
     boxes = tuple(box(trial, s) for s in pieces.states)
     of_rates, of_events = m.scene.hidden(state, boxes, mode)
     power = natural_power(trial, m.order - 1)
@@ -155,42 +153,58 @@ def shows_all(m, pieces, state, mode, unit, trial, tolerance):
 
 
 @symbolic
-def tells_nothing(m, pieces, h):
-    """Whether the last terms of a series tell nothing of it."""
-    every = joined(pieces.states, tuple(u for _, _, u in pieces.events))
-    bent = joined(m.bent, m.bent_events)
-    return any_of(tuple((is_bent > 0.5) & vanishes(h, u) for is_bent, u in zip(bent, every, strict=True)))
+def unlike(m, pieces, cores, mode, unit, x, t, tolerance, lanes):
+    """Of the lanes those of which rates or events at the end of a step are not the series'.
+
+    Asked are first steps, and those of which last terms tell nothing.
+    """
+    if m.bent is None:
+        return lanes & not_(lanes)
+    begins = not_(t > 0.0)
+    curves = (
+        *zip(m.bent, pieces.states, strict=True),
+        *zip(m.bent_events or (), (u for *_, u in pieces.events), strict=False),
+    )
+    tells_nothing = tuple((bent > 0.5) & vanishes(x, u) for bent, u in curves)
+    asked = outside(cores, lanes & (begins | any_of(tells_nothing)))
+    return disagree(m, pieces, mode, unit, x, tolerance, begins, asked)
 
 
-@jit_call
-@over_tuples
-def agree(m, pieces, mode, unit, x, tolerance, apart):
+@jit
+def disagree(m, pieces, mode, unit, x, tolerance, begins, lanes):
+    """Of the lanes those that do not `agree` at the end of a step; of a leg's first one, also within it."""
+    if any_lane(lanes):
+        same = agree(m, pieces, mode, unit, x, tolerance)
+        if any_lane(lanes & begins):
+            same = same & agree(m, pieces, mode, unit, WITHIN * x, tolerance)
+        lanes = lanes & not_(same)
+    return lanes
+
+
+@left_a_call
+def agree(m, pieces, mode, unit, x, tolerance):
     """Whether, a time x on, rates and events at the series' states are those of the series, to the tolerance; events
     besides to their rounding."""
-    state = tuple(way.value(x, curve) for way, curve in zip(m.ways, pieces.of_states, strict=True))
+    state = tuple(way.at(x, curve)[0] for way, curve in zip(m.ways, pieces.of_states, strict=True))
     allowed = (m.order + 1.0) * (tolerance + ROUNDING)
-    same = all_of(
-        tuple(
-            (bent < 0.5) | (x * magnitude(unit * rate - slope(x, u)) <= allowed * size(x, u))
-            for bent, rate, u in zip(m.bent, m.scene.rates(state, mode), pieces.states, strict=True)
-        )
+    same = tuple(
+        (bent < 0.5) | (x * magnitude(unit * rate - slope(x, u)) <= allowed * size(x, u))
+        for bent, rate, u in zip(m.bent, m.scene.rates(state, mode), pieces.states, strict=True)
     )
-    if apart is not None:
-        kinks = tuple(sign * u for sign, u in zip(mode.signs[:-1], m.scene.kinks(state, mode), strict=True))
-        values = joined((mode.signs[-1] * m.scene.surface(state, mode),), kinks)
-        same = same & all_of(
-            tuple(
-                (bent < 0.5)
-                | (
-                    magnitude(value - fma(factor, horner(x, u), offset))
-                    <= fma(ROUNDING, extent, SLACK * tolerance * (magnitude(offset) + magnitude(factor) * size(x, u)))
-                )
-                for bent, value, (extent, _), (offset, factor, u) in zip(
-                    m.bent_events, values, m.scene.made(state, mode), pieces.events, strict=True
-                )
-            )
+    if m.bent_events is None:
+        return all_of(same)
+    kinks = tuple(sign * u for sign, u in zip(mode.signs[:-1], m.scene.kinks(state, mode), strict=True))
+    values = (mode.signs[-1] * m.scene.surface(state, mode), *kinks)
+    parts = zip(m.bent_events, values, m.scene.made(state, mode), pieces.events, strict=True)
+    same_events = tuple(
+        (bent < 0.5)
+        | (
+            magnitude(value - fma(factor, horner(x, u), offset))
+            <= fma(ROUNDING, extent, SLACK * tolerance * (magnitude(offset) + magnitude(factor) * size(x, u)))
         )
-    return same
+        for bent, value, (extent, _), (offset, factor, u) in parts
+    )
+    return all_of(same) & all_of(same_events)
 
 
 @jit
@@ -200,8 +214,8 @@ def first_root(found, number, way, curve, event, facts, passed, met, span, toler
     offset, factor, u = event
     first = met & passed
     if any_lane(first):
-        first = first & ((which < 0.0) | (fma(factor, way.value(end, curve), offset) <= 0.0))
-        at, only_just = crossing(way.rates, curve, (offset, factor, u[0]), facts, span, tolerance, first)
+        first = first & ((which < 0.0) | (fma(factor, way.at(end, curve)[0], offset) <= 0.0))
+        at, only_just = crossing(way.at, curve, (offset, factor, u[0]), facts, span, tolerance, first)
         end, which, hangs = where(first, at, end), where(first, number, which), (hangs & not_(first)) | only_just
     return end, which, hangs
 
@@ -220,7 +234,7 @@ def ended(m, pieces, facts, passed, met, span, tolerance, state):
         met
         & before
         & (
-            magnitude(fma(factor, way.value(end, curve), offset))
+            magnitude(fma(factor, way.at(end, curve)[0], offset))
             <= near * (magnitude(offset) + magnitude(factor * u[0]))
         )
         for before, way, curve, (offset, factor, u) in zip(
@@ -229,28 +243,66 @@ def ended(m, pieces, facts, passed, met, span, tolerance, state):
     )
     fires = tuple(x | y for x, y in zip(beside, own, strict=True))
     others = any_of(tuple(x & not_(y) for x, y in zip(beside, own, strict=True)))
-    at_root = tuple(way.value(end, curve) for way, curve in zip(m.ways, pieces.of_states, strict=True))
-    return end, which, hangs, fires, others, m.on_kink(choose(met, at_root, state), fires)
+    at_root = tuple(way.at(end, curve)[0] for way, curve in zip(m.ways, pieces.of_states, strict=True))
+    fired, ends = tuple(where(x, 1.0, 0.0) for x in fires), m.on_kink(choose(met, at_root, state), fires)
+    return end, which, hangs, fired, others, ends
 
 
 @symbolic
-def shorter(h, limit):
-    """The step, no longer than a limit; NaN of that stays."""
-    return where(h < limit, h, limit)
+def length(m, pieces, state, unit, tolerance, h, power_h, moving, limits, longest, furthest):
+    """The step that the series allow, from the one before; h^(p-1) of it, and whether it leaves out too little."""
+    (left_out, over), *others = ((last_term(h, u), size(h, u)) for u in pieces.controlled)
+    for last, whole in others:  # which is the worse one in its size; a state that stays 0 never is
+        smaller = (last * over <= left_out * whole) & not_(left_out <= 0.0)
+        left_out, over = where(smaller, left_out, last), where(smaller, over, whole)
+    ratio = where(left_out <= 0.0, 0.0, left_out * power_h / (tolerance * over))
+    h = where(moving, next_step(h, ratio, m.order), h)
+    h = where((ratio > 0.0) | (h < furthest), h, furthest)
+    for limit in limits:
+        h = where(h < limit, h, limit)
+    h = m.scene.on_clock(state, unit, where(h > longest, longest, h))
+    power_h = natural_power(h, m.order - 1)
+    return h, power_h, all_of(tuple(keeps(h, power_h, u, SLACK * tolerance) for u in pieces.controlled))
+
+
+@symbolic
+def in_none(xs):
+    """A condition for each of a tuple, that no lane meets."""
+    return tuple(x < x for x in xs)
+
+
+@symbolic
+def begun(pieces, facts, state, on, tolerance, active):
+    """Of a leg's first step: the events behind already, the margins of all; broken and stuck lanes."""
+    sound = finite(state)
+    broken = active & not_(sound & finite(tuple(u[-1] for u in pieces.states)))
+    now = tuple((o < 0.5) & (fact[0] <= 0.0) for o, fact in zip(on, facts, strict=True))
+    pressed = tuple((o > 0.5) & not_(rises(fact[1], fact[2])) for o, fact in zip(on, facts, strict=True))
+    margins = tuple(
+        SLACK * tolerance * (magnitude(offset) + magnitude(factor * u[0])) for offset, factor, u in pieces.events
+    )
+    return now, margins, broken, active & any_of(pressed) & sound
+
+
+@symbolic
+def passing(m, pieces, x, steps, fallings, passed):
+    """Which events have fallen through 0 by the end of a step of these lanes; and the states there."""
+    parts = zip(passed, fallings, m.watched, pieces.of_events, pieces.events, strict=True)
+    passed = tuple(
+        before | (steps & falling & (fma(factor, way.at(x, curve)[0], offset) <= 0.0))
+        for before, falling, way, curve, (offset, factor, u) in parts
+    )
+    return passed, tuple(way.at(x, curve)[0] for way, curve in zip(m.ways, pieces.of_states, strict=True))
 
 
 @jit
-@over_tuples
-def to_event(m, cell, mode, active, hides, asks, apart, at_kink):
+def to_event(m, cell, mode, active):
     """Follow the motion of the active lanes until an event falls through 0, and stop there.
 
     Parameters
     ----------
+    m : Series
     cell : `Cell` at the start of the leg; its h is the first guess of a step
-    hides : None where neither rates nor events can hide anything
-    asks : None where all rates and events are linear in the states: the last terms of all their series tell the rest
-    apart : None where all events are
-    at_kink : None, or the entry of a tuple of the kink whose u is the rate of the surface
 
     Returns
     -------
@@ -259,80 +311,45 @@ def to_event(m, cell, mode, active, hides, asks, apart, at_kink):
     """
     state, unit, h, on, tolerance, errors = cell.state, cell.unit, cell.h, cell.on, cell.tolerance, cell.own
     moving, t, span, tried = active, 0.0 * h, h, 0.0 * h
-    nothing = active & not_(active)
-    passed = tuple(nothing for _ in on)
-    now, margins = passed, tuple(0.0 * h for _ in on)
-    stuck, lost, broken, grazing = nothing, nothing, nothing, nothing
-    power_h, allowed = natural_power(h, m.order - 1), SLACK * tolerance
+    nothing, never, margins = active & not_(active), in_none(on), times(0.0, on)
+    stuck, lost, broken, grazing, now, passed = nothing, nothing, nothing, nothing, never, never
     refused, longest, furthest = 0.0 * h, 0.0 * h + FAR, 0.0 * h + FAR
-    reach = tuple(magnitude(u) for u in state)
+    power_h, reach = natural_power(h, m.order - 1), reached(times(0.0, state), state)
     error = carried.begun(m, state, errors, h)
     for step in range(STEP_LIMIT):
+        # a step that the series allow
         cores, limits, coarse, full = m.cores(state, mode, unit, tolerance, on, t, margins)
         pieces = m.pieces(state, mode, unit, cores)
         error = carried.since(m, error, full, state, mode, unit, pieces)
-        facts = tuple(facts_of(offset, factor, u) for offset, factor, u in pieces.events)
-        left = tuple((last_term(h, u), size(h, u)) for u in pieces.controlled)
-        left_out, over = fold(worse, left[0], (), left[1:])
-        ratio = where(left_out <= 0.0, 0.0, left_out * power_h / (tolerance * over))
-        h = where(moving, next_step(h, ratio, m.order), h)
-        h = where((ratio > 0.0) | (h < furthest), h, furthest)
-        h = fold(shorter, h, (), limits)
-        h = where(h > longest, longest, h)
-        h = m.scene.on_clock(state, unit, h)
-        power_h = natural_power(h, m.order - 1)
-        fine = all_of(tuple(keeps(h, power_h, u, allowed) for u in pieces.controlled))
+        facts = facts_of(pieces.events)
+        h, power_h, fine = length(m, pieces, state, unit, tolerance, h, power_h, moving, limits, longest, furthest)
         trial = h
         if step == 0:
-            undefined = not_(total(tuple(magnitude(u) for u in state)) < math.inf)
-            broken = active & (undefined | not_(total(tuple(magnitude(u[-1]) for u in pieces.states)) < math.inf))
-            now = tuple((o < 0.5) & (fact[0] <= 0.0) for o, fact in zip(on, facts, strict=True))
-            pressed = tuple((o > 0.5) & not_(rises(fact[1], fact[2])) for o, fact in zip(on, facts, strict=True))
-            stuck = active & any_of(pressed) & not_(undefined)
-            trial = where(any_of(now), 0.0, h)
-            margins = tuple(
-                SLACK * tolerance * (magnitude(offset) + magnitude(factor * u[0]))
-                for offset, factor, u in pieces.events
-            )
+            now, margins, broken, stuck = begun(pieces, facts, state, on, tolerance, active)
             margins = carried.wider(m, margins, state, mode, errors)
-            moving = moving & not_(broken | stuck)
+            trial, moving = where(any_of(now), 0.0, h), moving & not_(broken | stuck)
         tried = where(moving, tried + 1.0, tried)
-        seen = trial >= 0.0
-        if hides is not None:
-            seen = shows_all(m, pieces, state, mode, unit, trial, tolerance)
+        # so long that each event is proved to fall all along or to stay clear
+        seen = shows_all(m, pieces, state, mode, unit, trial, tolerance)
         steps = moving & seen
-        clears, fallings = judged(m, pieces, facts, margins, now, trial)
-        if at_kink is not None:
-            clears, fallings = by_kink(facts, now, clears, fallings, at_kink)
-        unsure = steps & not_(all_of(tuple(x | y for x, y in zip(clears, fallings, strict=True))))
+        sure, fallings = judged(m, m.at_kink, pieces, facts, margins, now, trial, steps, never)
+        unsure = steps & not_(sure)
         if any_lane(unsure):
             trial, unsure, fallings = doubted(m, pieces, state, unit, facts, margins, now, trial, unsure, fallings)
         furthest = where(trial > 0.0, BEYOND * trial, furthest)
         broken = broken | (unsure & not_(power_h < FAR))  # it goes off to where no event is
         grazing = grazing | (unsure & not_(broken))
-        moving = moving & not_(unsure)
-        steps = steps & fine & not_(unsure)
-        ends = tuple(way.value(trial, curve) for way, curve in zip(m.ways, pieces.of_states, strict=True))
-        if asks is not None:
-            untold = not_(t > 0.0) | tells_nothing(m, pieces, trial)
-            untold = outside(cores, steps & (refused < REFUSALS) & untold)
-            if any_lane(untold):
-                same = agree(m, pieces, mode, unit, trial, tolerance, apart)
-                if any_lane(untold & not_(t > 0.0)):
-                    same = same & agree(m, pieces, mode, unit, WITHIN * trial, tolerance, apart)
-                untold = untold & not_(same)
-                steps, seen = steps & not_(untold), seen & not_(untold)
-                refused = where(untold, refused + 1.0, refused)
+        moving, steps = moving & not_(unsure), steps & fine & not_(unsure)
+        # of which the series are those of rates and events
+        untold = unlike(m, pieces, cores, mode, unit, trial, t, tolerance, steps & (refused < REFUSALS))
+        if any_lane(untold):
+            refused = where(untold, refused + 1.0, refused)
+            steps, seen = steps & not_(untold), seen & not_(untold)
         longest = where(seen, longest / COME_UP, COME_UP * trial)
-        passed = tuple(
-            before | (steps & falling & (fma(factor, way.value(trial, curve), offset) <= 0.0))
-            for before, falling, way, curve, (offset, factor, u) in zip(
-                passed, fallings, m.watched, pieces.of_events, pieces.events, strict=True
-            )
-        )
+        # to its end, or until an event that it passes
+        passed, ends = passing(m, pieces, trial, steps, fallings, passed)
         meets = steps & any_of(passed)
-        span = where(meets, trial, span)
-        steps = steps & not_(meets)
+        span, steps = where(meets, trial, span), steps & not_(meets)
         changes = carried.changes(m, error, state, mode, unit, pieces, cores)
         error = carried.still(m, error, h)
         if any_lane(steps):
@@ -340,18 +357,16 @@ def to_event(m, cell, mode, active, hides, asks, apart, at_kink):
         state = choose(steps, ends, state)
         reach = reached(reach, state)
         t = where(steps, t + trial, t)
-        now = tuple(x & meets for x in now)
-        moving = moving & not_(meets)
+        now, moving = never, moving & not_(meets)
         if not any_lane(moving):
             break
     lost = moving
     met = active & not_(lost | stuck | broken | grazing)
-    end, which, hangs, fires, others, ends = ended(m, pieces, facts, passed, met, span, tolerance, state)
+    end, which, hangs, fired, others, ends = ended(m, pieces, facts, passed, met, span, tolerance, state)
     t = where(met, t + end, t)
     h = where(met & (t > 0.0) & (h > LONGEST * t), LONGEST * t, h)
     late = carried.at_event(
         m, error, changes, full, state, mode, unit, ends, end, t, which, others, pieces, cores, coarse
     )
     reach = choose(met, reached(reach, ends), reach)
-    fired = tuple(where(x, 1.0, 0.0) for x in fires)
     return Leg(ends, t, h, fired, stuck, lost, broken, grazing, hangs, nothing, tried, reach), late

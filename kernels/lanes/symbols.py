@@ -4,17 +4,13 @@ numba compiles no comprehension over a tuple, and takes some hundredths of a sec
 `symbolic` function is plain Python without loops over steps and without branches on values. Where compiled code calls
 it, it is run once with symbols of its arguments to know the result's type, and once more to write the LLVM code; so
 tuples of any length, records and their `_replace`, and branches on what is None or how long it is, cost nothing. It
-makes no array.
-`over_tuples` does the same for the comprehensions of a function that has loops and branches. In plain Python they are
-functions like any other, of the same bits.
+makes no array. In plain Python it is a function like any other, of the same bits.
 """
 
-import ast
 import functools
 import inspect
 import operator
 import sys
-import textwrap
 from types import FunctionType, SimpleNamespace
 
 from numba import types
@@ -225,37 +221,3 @@ def fold(function, first, shared, *tuples):
     for entries in zip(*tuples, strict=True):
         first = function(first, *entries, *shared)
     return first
-
-
-class _Lifter(ast.NodeTransformer):
-    """Takes each comprehension over tuples out into a symbolic function of the local names that it uses."""
-
-    def __init__(self, name, local):
-        self.lifted, self._name, self._local = {}, name, local
-
-    def visit_Call(self, node):
-        folds = getattr(node.func, "id", "") == "fold"
-        if not folds and not (getattr(node.func, "id", "") == "tuple" and isinstance(node.args[0], ast.GeneratorExp)):
-            return self.generic_visit(node)
-        names = [n for n in ast.walk(node) if isinstance(n, ast.Name)]
-        own = {n.id for n in names if isinstance(n.ctx, ast.Store)}
-        used = sorted(({n.id for n in names} & self._local) - own)
-        name = f"{self._name}_{len(self.lifted)}"
-        self.lifted[name] = f"def {name}({', '.join(used)}):\n    return {ast.unparse(node)}\n"
-        return ast.parse(f"{name}({', '.join(used)})", mode="eval").body
-
-
-def over_tuples(function):
-    """Lets a function with loops and branches hold `tuple(f(x, y) for x, y in zip(xs, ys))` and `fold`."""
-    if not COMPILED:
-        return function
-    (definition,) = ast.parse(textwrap.dedent(inspect.getsource(function))).body
-    definition.decorator_list = []
-    code = function.__code__
-    lifter = _Lifter(f"_{function.__name__}", {*code.co_varnames, *code.co_cellvars})
-    text = ast.unparse(ast.fix_missing_locations(lifter.visit(definition)))
-    scope = function.__globals__
-    exec("\n".join([*lifter.lifted.values(), text]), scope)
-    for name in lifter.lifted:
-        scope[name] = symbolic(scope[name])
-    return scope[function.__name__]
