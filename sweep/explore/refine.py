@@ -220,9 +220,7 @@ def _folder_of_rounds(path: str | os.PathLike[str] | None, dataset: xr.Dataset, 
     target, source = as_path(path), dataset.encoding.get("source")
     rounds = target.with_name(f"{target.name}.rounds")
     with disk.refusing(target):
-        # rounds that are newer than what is there lead to another result
-        latest = max((file.stat().st_mtime for file in rounds.glob("*.h5")), default=0.0)
-        if force or (target.exists() and latest <= target.stat().st_mtime):
+        if force or target.exists():
             shutil.rmtree(rounds, ignore_errors=True)
         check_target(target, force=force, read=[Path(source)] if source else [])
         rounds.mkdir(exist_ok=True)

@@ -12,7 +12,6 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
@@ -63,7 +62,6 @@ class Group(dict[str, Fraction]):
         return math.prod(values[name] ** float(power) for name, power in self.items())  # type: ignore[return-value]
 
 
-@dataclass(frozen=True)
 class Scaling:
     """What scalings say about a study.
 
@@ -79,10 +77,45 @@ class Scaling:
         What `sweep plan` says of superfluous axes; "" where there are none.
     """
 
-    groups: tuple[Group, ...]
-    scales: dict[str, Group]
-    free: int
-    advice: str
+    def __init__(self, study: Study) -> None:
+        held, tried = _held(study)
+        fields = [f.name for f in (*study.kernel.parameters, *study.kernel.along)]
+        weights = {f: [row[f] for row in held.values()] for f in fields if any(row.get(f) for row in held.values())}
+        arrays = any(field.dims for field in study.kernel.parameters)
+        present = [] if arrays else [name for name in weights if name not in study.along]
+
+        def group(powers: Weights, most: int = 1) -> Group:
+            """Their product, raised to whole powers where their denominator is no larger."""
+            common = math.lcm(*(power.denominator for power in powers.values()))
+            factor = common if common <= most else 1
+            return Group({name: factor * powers[name] for name in present if powers.get(name)})
+
+        groups = list[Group]()
+        for i, name in enumerate(present):
+            if name not in held:
+                # R/mu rather than R/(a^2 phi0)
+                like = next((other for other in present[:i] if weights[other] == weights[name]), None)
+                against = {like: -ONE} if like else {lead: -row[name] for lead, row in held.items()}
+                groups.append(group({**against, name: ONE}, LARGEST_COMMON))
+        # an output that scales with what is in no group cannot be freed of units
+        stuck = [row for lead, row in held.items() if lead not in present]
+        free_outputs = [output.name for output in study.asked if not any(row[output.name] for row in stuck)]
+        self.scales = {name: group({lead: -row[name] for lead, row in held.items()}) for name in free_outputs}
+        self.groups = tuple(groups)
+
+        axes = [name for name in study.axes if name in weights]
+        unswept = np.array([row for name, row in weights.items() if name not in axes], float)
+        self.free = free = len(held) - int(np.linalg.matrix_rank(unswept) if unswept.size else 0)
+        left, swept = len(axes) - free, ", ".join(axes)
+        others = ", ".join(name for name in study.axes if name in fields and name not in axes)
+        where, basis = f" for each {others}" if others else "", f"tried on {tried} cells at random"
+        varied = [str(group) for group in groups if not group.keys().isdisjoint(axes)]
+        matter = f"only {', '.join(varied)} matter{'s' * (len(varied) == 1)}; " if varied else ""
+        kind = "one-dimensional" if left == 1 else f"{left}-dimensional"
+        advice = f"{kind} in {swept}{where}: {matter}{free} of these axes can be left out; {basis}"
+        if left == 0:
+            advice = f"every output is a power of {swept} times a constant; a single cell tells all{where}; {basis}"
+        self.advice = advice if free else ""
 
     def rescaled(self, dataset: xr.Dataset) -> xr.Dataset:
         """A result of the study with its outputs freed of units, and a coordinate for each dimensionless group.
@@ -140,44 +173,7 @@ def scaling(study: Given) -> Scaling:
     >>> print(sweep.scaling(study).advice)
     one-dimensional in mu, a: only mu/(phi0 a^2) matters; 1 of these axes can be left out; tried on ... cells at random
     """
-    study = as_study(study)
-    held, tried = _held(study)
-    fields = [f.name for f in (*study.kernel.parameters, *study.kernel.along)]
-    weights = {f: [row[f] for row in held.values()] for f in fields if any(row.get(f) for row in held.values())}
-    arrays = any(field.dims for field in study.kernel.parameters)
-    present = [] if arrays else [name for name in weights if name not in study.along]
-
-    def group(powers: Weights, most: int = 1) -> Group:
-        """Their product, raised to whole powers where their denominator is no larger."""
-        common = math.lcm(*(power.denominator for power in powers.values()))
-        factor = common if common <= most else 1
-        return Group({name: factor * powers[name] for name in present if powers.get(name)})
-
-    groups = []
-    for i, name in enumerate(present):
-        if name not in held:
-            # R/mu rather than R/(a^2 phi0)
-            like = next((other for other in present[:i] if weights[other] == weights[name]), None)
-            against = {like: -ONE} if like else {lead: -row[name] for lead, row in held.items()}
-            groups.append(group({**against, name: ONE}, LARGEST_COMMON))
-    # an output that scales with what is in no group cannot be freed of units
-    stuck = [row for lead, row in held.items() if lead not in present]
-    free_outputs = [output.name for output in study.asked if not any(row[output.name] for row in stuck)]
-    scales = {name: group({lead: -row[name] for lead, row in held.items()}) for name in free_outputs}
-
-    axes = [name for name in study.axes if name in weights]
-    unswept = np.array([row for name, row in weights.items() if name not in axes], float)
-    free = len(held) - int(np.linalg.matrix_rank(unswept) if unswept.size else 0)
-    left, swept = len(axes) - free, ", ".join(axes)
-    others = ", ".join(name for name in study.axes if name in fields and name not in axes)
-    where, basis = f" for each {others}" if others else "", f"tried on {tried} cells at random"
-    varied = [str(group) for group in groups if not group.keys().isdisjoint(axes)]
-    matter = f"only {', '.join(varied)} matter{'s' * (len(varied) == 1)}; " if varied else ""
-    kind = "one-dimensional" if left == 1 else f"{left}-dimensional"
-    advice = f"{kind} in {swept}{where}: {matter}{free} of these axes can be left out; {basis}"
-    if left == 0:
-        advice = f"every output is a power of {swept} times a constant; a single cell tells all{where}; {basis}"
-    return Scaling(tuple(groups), scales, free, advice if free else "")
+    return Scaling(as_study(study))
 
 
 def _held(study: Study) -> tuple[dict[str, Weights], int]:
