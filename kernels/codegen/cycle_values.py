@@ -1,10 +1,13 @@
 """What is said of the limit cycles that a search has found (`limit_cycle`), each value with its error.
 
 Derivatives are central differences of runs to a tolerance r, at h, 2 h and 4 h of the size of each state and of each
-parameter; the sixth order by Richardson's rule is given, and what it differs by from the fourth, with the runs' own
-r/h, is its error. With rho, J and T as in `limit_cycle` and to first order, the root is off by
+parameter; the sixth order by Richardson's rule is given, and what it differs by from the fourth is what it leaves out.
+The noise of the runs, r/h at most, is what second and fourth derivatives leave of the sums of both sides: all slopes
+are believed to have as much as the worst one. With rho, J and T as in `limit_cycle` and to first order, the root is
+off by
     dz = (I - J)^-1 (rho + r),  dT = (dT/dz) dz + r T,                                                     (1)
-and the period changes with a parameter p by dT/dp + (dT/dz) (I - J)^-1 dP/dp.
+and the period changes with a parameter p by dT/dp + (dT/dz) (I - J)^-1 dP/dp. Derivatives at that root are off by the
+second derivatives times dz besides, which is most of their error where a multiplier is close to 1.
 """
 
 import math
@@ -21,6 +24,10 @@ SURE = 0.05
 """How far below 1 Newton's own multiplier tells that the cycle is stable."""
 SHORTER, ROUGHER = 0.1, 20.0
 """Of the steps of differences, those that are tried where errors are more than so many of the runs' over a step."""
+ROUNDING, ROUNDINGS = 2.3e-16, 1e-15
+"""The noise of a period that no state changes by a bit, relative, and the least of another one, and of states."""
+LINEAR = 0.25
+"""Of 1 - J, what slopes may be off by."""
 ONE = 1e-8
 """To what a multiplier must be known where it cannot be told from 1: what is 1 leaves no cycle by itself; what is 1 in
 modulus alone lets disturbances neither grow nor fade."""
@@ -40,95 +47,110 @@ def described(search, swept, modes, asked, rtol, tight):
     asked : names of outputs
     rtol, tight : columns, of what is wanted and of tight runs
     """
-    the_map, cycles, found = search.map, search.cycles, {}
+    the_map, cycles, unknown = search.map, search.cycles, np.full(len(rtol), math.inf)
+    found = {name: (z.copy(), unknown.copy()) for name, z in zip(the_map.states, cycles.z, strict=True)}
+    there, unclear, error = np.isin(cycles.status, FOUND), np.zeros(len(rtol), bool), unknown
 
-    def keep(cells, parts):
-        """Takes what is no worse than what is known of these cells."""
-        for name, (value, off) in parts.items():
-            value, off = (x[modes] if x.ndim > 1 else x for x in (value, np.where(off >= 0.0, off, math.inf)))
-            shape = *value.shape[:-1], len(rtol)
-            values, errors = found.setdefault(name, (np.full(shape, math.nan), np.full(shape, math.inf)))
+    def by_differences(h, left):
+        """Takes what is no worse than what is known of those cells; h = 0: by Newton's. The largest error of each."""
+        cells = np.flatnonzero(left)
+        if not len(cells):
+            return error
+        some = cycles.some(cells)
+        if h:
+            parts, cycles.status[cells], unclear[cells] = differences(the_map, some, swept, h)
+        else:
+            parts, *_ = closed(the_map, some)
+        for name, part in (parts | moving(search, some, parts, asked)).items():
+            value, off = (x[modes] if x.ndim > 1 else x for x in part)
+            nothing = np.full((*value.shape[:-1], len(rtol)), math.nan)
+            values, errors = found.setdefault(name, (nothing, np.full_like(nothing, math.inf)))
+            off = np.where(off >= 0.0, off, math.inf)
             better = off <= errors[..., cells]
             values[..., cells] = np.where(better, value, values[..., cells])
             errors[..., cells] = np.where(better, off, errors[..., cells])
+        return most(np.array([most(np.atleast_2d(found.get(name, (None, unknown))[1])) for name in asked]))
 
-    def error():
-        unknown = math.nan, np.full(len(rtol), math.inf)
-        return most(np.array([most(np.atleast_2d(found.get(name, unknown)[1])) for name in asked]))
-
-    def by_differences(left):
-        for h in (the_map.step, SHORTER * the_map.step):
-            if not left.any():
-                return
-            cells = np.flatnonzero(left)
-            parts = differences(the_map, cycles.some(cells), swept, h)
-            cycles.status[cells], unclear[cells] = judged(cycles.status[cells], parts)
-            keep(cells, parts | moving(search, cells, parts, asked))
-            left = left & ~(error() <= np.maximum(rtol, ROUGHER / the_map.step * cycles.r))
-
-    unclear, there = np.zeros(len(rtol), bool), np.isin(cycles.status, FOUND)
-    keep(slice(None), {name: (z, z + math.nan) for name, z in zip(the_map.states, cycles.z, strict=True)})
     sure = (abs(cycles.multiplier) < 1.0 - SURE) & (cycles.off <= CLOSED * cycles.r)
-    cells = np.flatnonzero(there & sure)
-    parts, _ = closed(the_map, cycles.some(cells))
-    keep(cells, parts | moving(search, cells, parts, asked))
-    by_differences(there & ~(error() <= rtol))
-    left = there & (unclear | ~(error() <= rtol)) & (cycles.r > tight)
-    cells = np.flatnonzero(left)
-    cycles.put(cells, newton(the_map, cycles.some(cells)._replace(r=tight[cells]), search.swept))
-    by_differences(left)
-    return {name: values for name, (values, _) in found.items()}, error()
+    error = by_differences(0.0, there & sure)
+    for r in (cycles.r, tight):
+        left = there & (unclear | ~(error <= rtol)) & ((r is not tight) | (cycles.r > tight))
+        cells = np.flatnonzero(left & (cycles.r > r))
+        cycles.put(cells, newton(the_map, cycles.some(cells)._replace(r=r[cells]), search.swept))
+        error = by_differences(the_map.step, left)
+        rough = ~(error <= np.maximum(rtol, ROUGHER / the_map.step * cycles.r))
+        error = by_differences(SHORTER * the_map.step, left & rough)
+    return {name: values for name, (values, _) in found.items()}, error
 
 
 def closed(the_map, cycles):
-    """{name: values and errors} of period and states by (1), with the cycle's slopes; sizes of dT/dz (I - J)^-1/T."""
-    at, n = the_map.directions, len(the_map.directions)
+    """{name: values and errors} of period and states by (1), with the cycle's slopes.
+
+    And in size, by directions and over scales, dz, (I - J)^-1 and dT/dz (I - J)^-1/T.
+    """
+    n, at = len(the_map.directions), the_map.directions
     (T, *P), W = cycles.rows, abs(settling(cycles.slopes, identity(n, len(cycles.r))))
     rho = abs(((np.array(P) - cycles.z - cycles.shift) / cycles.scale)[at]) + cycles.r
     spread, late = np.zeros(cycles.z.shape), times(abs(cycles.slopes[:1, :n]), W) / T
     spread[at] = SAFETY * times(W, rho[:, None])[:, 0]
     off = SAFETY * (times(late, rho[:, None])[0, 0] + cycles.r)
-    return {"period": (T, off)} | dict(zip(the_map.states, zip(P, spread, strict=True), strict=True)), late[0]
+    states = zip(the_map.states, zip(P, spread, strict=True), strict=True)
+    return {"period": (T, off)} | dict(states), spread[at], W, late[0]
 
 
 def differences(the_map, cycles, swept, h):
-    """The same by differences at h, and multipliers and sensitivities."""
-    n, runs = len(the_map.directions), (cycles.parameters, cycles.z, cycles.flips, cycles.r)
-    (rows, status), (slopes, right) = the_map.passed(*runs), jacobian(the_map, cycles, h, (1.0, 2.0, 4.0), swept)
+    """The same by differences at h, and multipliers and sensitivities; and what is `judged` by them."""
+    n, at, runs = len(the_map.directions), the_map.directions, (cycles.parameters, cycles.z, cycles.flips, cycles.r)
+    (rows, status), (slopes, sums, right) = the_map.passed(*runs), jacobian(the_map, cycles, h, (1.0, 2.0, 4.0), swept)
     low, lower = ((4.0 * slopes[:, :, k] - slopes[:, :, k + 1]) / 3.0 for k in (0, 1))
-    high, noise, right = (16.0 * low - lower) / 15.0, 1.5 * cycles.r / h, right & (status == Status.OK)
-    found, late = closed(the_map, cycles._replace(rows=rows, slopes=high))
+    high, right = (16.0 * low - lower) / 15.0, right & (status == Status.OK)
+    found, spread, W, late = closed(the_map, cycles._replace(rows=rows, slopes=high))
+    middle = np.concatenate([rows[:1], (rows[1:] / cycles.scale)[at]])[:, None, None]
+    even = (sums - 2.0 * middle) / np.concatenate([rows[:1], 0.0 * rows[:n] + 1.0])[:, None, None]
+    if n:
+        even[:1, n:] = 0.0  # of how the period goes with a parameter these are most of what is left out
+    shown = most(most(abs(even[:, :, 0] - 0.3125 * even[:, :, 1] + even[:, :, 2] / 64.0))) / (2.0 * h)
+    bent = most(most(abs(even[:, :n, 0]))) / (h * h)
+    here = np.minimum(np.maximum(shown, ROUNDINGS / h), 1.5 * cycles.r / h) + cycles.r
+    noise = here + bent * np.add.reduce(spread)
+    of_time = np.where((slopes[0, :n] == 0.0).all(axis=(0, 1)), ROUNDING / h, noise)
     J, signs = high[1:, :n], (-1.0) ** np.arange(n)[:, None]
-    felt = noise * (most(abs(J.swapaxes(0, 1))) > 0.0)[:, None]  # a state that is set to a number has no noise
+    felt = here * (most(abs(J.swapaxes(0, 1))) > 0.0)[:, None]  # a state that is set to a number has no noise
     real, imaginary, unsure = eigenvalues(J, low[1:, :n], J + felt * signs, J + felt * signs[:, None])
     multiplier, modulus = largest(real, imaginary), np.sqrt(real * real + imaginary * imaginary)
-    found["multiplier"] = multiplier, SAFETY * most(unsure[:1]) / np.maximum(1.0, abs(multiplier))
+    off = SAFETY * unsure * (noise / here)
+    found["multiplier"] = multiplier, most(off[:1]) / np.maximum(1.0, abs(multiplier))
     for name, part in (("multipliers_real", real), ("multipliers_imaginary", imaginary)):
-        found[name] = part, SAFETY * unsure / np.maximum(1.0, modulus)
+        found[name] = part, off / np.maximum(1.0, modulus)
     for k, name in enumerate(swept.values(), n):
         pull, other = (settling(D, D[1:, k : k + 1]) for D in (high, low))
         value, rough = ((D[0, k] + times(D[:1, :n], z)[0, 0]) / rows[0] for D, z in ((high, pull), (low, other)))
-        doubt = noise * (1.0 + np.add.reduce(late)) * (1.0 + np.add.reduce(abs(pull[:, 0])))
+        doubt = (of_time + noise * np.add.reduce(late)) * (1.0 + np.add.reduce(abs(pull[:, 0])))
         found[name] = value, SAFETY * (abs(value - rough) + doubt) / np.maximum(1.0, abs(value))
-    return {name: (value, np.where(right, error, math.inf)) for name, (value, error) in found.items()}
+    # to first order only where the noise leaves 1 - J what it is
+    linear = right & (noise * most(np.add.reduce(W, axis=1)) < LINEAR)
+    found = {name: (value, np.where(linear, error, math.inf)) for name, (value, error) in found.items()}
+    unsure = np.where(right, SAFETY * unsure, math.inf)
+    return found, *judged(cycles.status, real, imaginary, unsure, *found["multiplier"])
 
 
-def judged(status, parts):
-    """Statuses, and whether they are unclear: what no disturbance tells apart is no cycle by itself; one may grow."""
-    names = "multipliers_real", "multipliers_imaginary", "multiplier"
-    (real, unsure), (imaginary, _), (multiplier, error) = (parts[name] for name in names)
-    one, grows = (abs(real - 1.0) <= unsure) & (imaginary <= unsure), abs(multiplier) - 1.0
-    unclear = (one & (unsure >= ONE)).any(axis=0) | ((abs(grows) <= error) & (error >= ONE))
+def judged(status, real, imaginary, unsure, multiplier, error):
+    """Statuses, and whether they are unclear: what no disturbance tells apart is no cycle by itself; one may grow.
+
+    `unsure` : of each multiplier, where the cycle is as it stands; `error` : of the largest one
+    """
+    from_one, grows = np.maximum(abs(real - 1.0), imaginary), abs(multiplier) - 1.0
+    unclear = ((from_one <= unsure) & (unsure >= ONE)).any(axis=0) | ((abs(grows) <= error) & (error >= ONE))
     stable = np.where(status == Status.PERIOD_2, status, np.where(grows > error, Status.UNSTABLE, Status.OK))
-    clear = np.where(unclear, status, stable)
-    return np.where((one & (unsure < ONE)).any(axis=0), Status.NO_CYCLE, clear), unclear
+    one = ((from_one <= ONE) & (unsure < ONE)).any(axis=0)
+    return np.where(one, Status.NO_CYCLE, np.where(unclear, status, stable)), unclear
 
 
-def moving(search, cells, parts, asked):
+def moving(search, cycles, parts, asked):
     """{name: values and errors} of the largest size of each state in the cycle, where it is asked for, and of turns."""
-    cycles, the_map, found = search.cycles.some(cells), search.map, {}
+    the_map, found = search.map, {}
     for j, turn in search.turns.items():
-        found[f"{the_map.states[j]}_turns"] = np.round(cycles.shift[j] / turn), np.zeros(len(cells))
+        found[f"{the_map.states[j]}_turns"] = np.round(cycles.shift[j] / turn), np.zeros(len(cycles.r))
     names = [f"{name}_size" for name in the_map.states]
     if asked.isdisjoint(names):
         return found

@@ -74,10 +74,10 @@ class Cycles(namedtuple("Cycles", "parameters flips r z scale shift off rows slo
 
 
 def jacobian(the_map, cycles, h, levels, swept=()):
-    """Central slopes of T and P at z (1 + n, moves, levels, cells), and where all of their runs are right.
+    """Central slopes of T and P at z (1 + n, moves, levels, cells), sums of both sides, and where all runs are right.
 
     Moves are the states that the map depends on, by h of their scale, then the parameters that are swept, by h of
-    themselves, at several levels times that; slopes are by these units, those of P in units of scale.
+    themselves, at several levels times that; slopes are by these units, and P is in units of scale.
     """
     at, first, count = the_map.directions, len(cycles.parameters), len(cycles.r)
     moves, signs = [*(first + j for j in at), *swept], (1.0, -1.0)
@@ -89,12 +89,12 @@ def jacobian(the_map, cycles, h, levels, swept=()):
     places = places.reshape(len(origin), -1)
     found, status = the_map.passed(places[:first], places[first:], np.tile(cycles.flips, many), np.tile(cycles.r, many))
     pairs = found[[0, *(1 + j for j in at)]].reshape(1 + len(at), len(moves), len(levels), 2, count)
+    pairs[1:] = pairs[1:] / cycles.scale[at][:, None, None, None]
     slopes = (pairs[:, :, :, 0] - pairs[:, :, :, 1]) / (2.0 * h * np.array(levels)[:, None])
-    slopes[1:] = slopes[1:] / cycles.scale[at][:, None, None]
     for k, j in enumerate(at):
         if j in the_map.modes:  # one that no switch of the cycle sets is no direction, as a parameter is none
             slopes[1 + k, k] = np.where(abs(slopes[1 + k, k] - 1.0) <= NEAR, 0.0, slopes[1 + k, k])
-    return slopes, (status == Status.OK).reshape(many, count).all(axis=0)
+    return slopes, np.add.reduce(pairs, axis=3), (status == Status.OK).reshape(many, count).all(axis=0)
 
 
 def settling(slopes, moved):
@@ -120,7 +120,7 @@ def newton(the_map, cycles, swept=()):
         r = np.where(before[left] > FAR, np.maximum(some.r, the_map.rough), some.r)
         some.rows[:], status = the_map.passed(some.parameters, some.z, some.flips, r)
         right, anew = status == Status.OK, np.flatnonzero(~steady[left])
-        slopes, well = jacobian(the_map, some._replace(r=r).some(anew), STEP, (1.0,), swept)
+        slopes, _, well = jacobian(the_map, some._replace(r=r).some(anew), STEP, (1.0,), swept)
         some.slopes[:, :, anew], right[anew] = slopes[:, :, 0], right[anew] & well
         rho = ((some.rows[1:] - some.z - some.shift) / some.scale)[at]
         some.off[:] = np.where(right, np.maximum(most(abs(rho)), CLOSED * r), math.inf)
