@@ -3,7 +3,8 @@
 With P(z) the states `flips` switches later and T(z) the time that takes, a cycle is a root of
     rho = P(z) - z - s = 0,  s whole numbers of the states' own turns (a phase that goes on by 2 pi),         (1)
 and its multipliers are the eigenvalues of J = dP/dz on the surface; rho and J are in units of the states' sizes, and J
-is made of central differences of runs to a tolerance.
+is made of central differences of runs to a tolerance. (Tangents as further states of the scene would know neither
+slides nor powers of abs(u), and take twice the time to compile and three times that of a run, for the same digits.)
 Newton's method begins where the motion from the start is after some switches. Where it finds nothing, or a cycle that
 is not stable, it begins again after more of them. A cycle found at another value of a parameter is followed to the
 cell's own along the branch's tangent (I - J)^-1 dP/dp, in steps of its own, so that it hangs on no other cell.
@@ -139,7 +140,7 @@ def newton(the_map, cycles, swept=()):
 
 
 def equilibrium(the_map, parameters, z, side, size):
-    """From states z: where the rates are 0, by Newton's method; and how far off, infinite where motions go from it.
+    """From states z: where the rates are 0, by Newton's method; how far off that is; whether motions come to it.
 
     `size` : of the motion, not of what is left of it, to which the differences are in proportion
     """
@@ -152,7 +153,7 @@ def equilibrium(the_map, parameters, z, side, size):
             J[:, j] = (the_map.rates(parameters, up, side) - the_map.rates(parameters, down, side)) / (2.0 * h)
         step = solved(J, the_map.rates(parameters, z, side)[:, None])[:, 0]
         z = z - step
-    return z, np.where((eigenvalues(J)[0] < 0.0).all(axis=0), most(abs(step)), math.inf)
+    return z, most(abs(step)), (eigenvalues(J)[0] < 0.0).all(axis=0)
 
 
 class Search:
@@ -173,6 +174,7 @@ class Search:
         shapes = (states,), (states,), (states,), (), (1 + states,), (1 + n, n + len(self.swept)), ()
         unknown, status = (np.full((*s, count), np.nan) for s in shapes), np.full(count, Status.NOT_CONVERGED, np.int8)
         self.cycles, self.last = Cycles(parameters, flips, r, *unknown, status), np.full((states, count), np.nan)
+        self.fades = np.zeros(count, bool)
         if branch:
             ends, parameters[branch[0]] = parameters[branch[0]].copy(), branch[1]
         self._from_later_and_later(settle)
@@ -195,7 +197,7 @@ class Search:
                 z[j] = z[j] - turn * np.round(z[j] / turn)
             self.last[:, left[~ended]] = z[:, ~ended]
             self._settled(left[~ended])
-            over = ended | (settle[left] == 0.0) | np.isin(status[left], (Status.OK, Status.COMES_TO_REST))
+            over = ended | (settle[left] == 0.0) | (status[left] == Status.OK) | self.fades[left]
             left = left[~over]
             if not len(left):
                 break
@@ -227,7 +229,7 @@ class Search:
         return some, np.where(abs(some.multiplier) < math.inf, moved, np.nan), by_half
 
     def _settled(self, left, doubled=False):
-        """Takes what Newton's method makes of where motions are, if that is a cycle, or an equilibrium they come to."""
+        """Takes what Newton's method makes of where motions are, if that is a cycle; or how small swings fade."""
         if not len(left):
             return
         before = self.cycles.status[left]
@@ -240,11 +242,7 @@ class Search:
             some.status[:] = np.where(stable, Status.OK, Status.UNSTABLE)
             good &= stable | ~np.isin(before, FOUND)
         self.cycles.put(left, some, good)
-        still = np.flatnonzero((moved <= NEAR) & (some.off <= NEAR) & (size < 1.0))
-        if len(still) and not (doubled or self.map.driven):
-            fine = newton(self.map, some.some(still)._replace(r=np.full(len(still), self.map.fine)), self.swept)
-            off, (first, _) = most(fine.off * fine.scale / (1.0 - size[still])), self._from_start(left[still], 1.0)
-            self._rests(left[still], fine.z, off, first)
+        self.fades[left] = (moved <= NEAR) & (some.off <= NEAR) & (size < 1.0)
 
     def _doubled(self, left):
         """Where iterates alternate about a cycle, that of twice as many switches."""
@@ -253,17 +251,16 @@ class Search:
         self.cycles.flips[left[self.cycles.status[left] != Status.PERIOD_2]] *= 0.5
 
     def _at_equilibrium(self, left):
-        """Where a motion ended close to a stable equilibrium of its rates."""
-        if len(left):
-            first, last = self._from_start(left, 1.0)[0], self.last[:, left]
-            parameters, size = self.cycles.parameters[:, left], most(np.fmax(abs(first), abs(last)))
-            for side in (1.0, -1.0):
-                self._rests(left, *equilibrium(self.map, parameters, last, side, size), first)
-
-    def _rests(self, left, z, off, first):
-        """COMES_TO_REST at z, where that is known and the motion ended closer to it than a cycle after its start."""
-        far, near = (most(abs(x - z)) for x in (first, self.last[:, left]))
-        self._rest(left, z, (near <= 0.5 * far) & (off <= RESTS * (far + most(abs(z)))))
+        """COMES_TO_REST where a motion ended closer to an equilibrium, at which it stays, than it was after a cycle."""
+        if not len(left):
+            return
+        first, last = self._from_start(left, 1.0)[0], self.last[:, left]
+        parameters, size = self.cycles.parameters[:, left], most(np.fmax(abs(first), abs(last)))
+        for side in (1.0, -1.0):
+            z, off, stays = equilibrium(self.map, parameters, last, side, size)
+            far, near = (most(abs(x - z)) for x in (first, last))
+            known = (stays | self.fades[left]) & (off <= RESTS * (far + most(abs(z))))
+            self._rest(left, z, known & (near <= 0.5 * far))
 
     def _rest(self, left, z, rests):
         self.cycles.z[:, left[rests]], self.cycles.status[left[rests]] = z[:, rests], Status.COMES_TO_REST
