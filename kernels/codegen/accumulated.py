@@ -31,16 +31,17 @@ FINE = 1e-9
 """The tolerance at most: a wide one takes bounces for grazing that are still large."""
 AWAY, TRIES = 0.9, 3
 """Of the last switches that are right, to be away from those that are so by chance; how often, where some are not."""
-ROUGHLY = 1e-6
-"""To what rtol the states' sizes are wanted."""
 SLOWEST = 1.0 - 1e-5
 """The largest q."""
 LEFT = 4.0
 """Enough where intervals shrink as n^-p, p > 4/3, where (1) misses D n/(2 p (p - 1)) and moves by D/(2 p) a switch."""
 
 
-def to_rest(how, scene):
-    """The function of columns `how`, followed by (1) where the scene does not reach the wanted number of switches."""
+def to_rest(how, scene, by):
+    """The function of columns `how`, followed by (1) where the scene does not reach the wanted number of switches.
+
+    `by` : what `how` runs the scene by (`runner`), which is compiled by then
+    """
 
     def solve(columns, rtol):
         outputs, status = how(columns, rtol)
@@ -50,16 +51,17 @@ def to_rest(how, scene):
         if not len(cells):
             return outputs, status
 
+        tolerance = np.minimum(0.5 * rtol[cells], FINE)
+
         def solved(those, flips):
             """Rows of outputs, and which cells are right to half of the tolerance."""
-            inputs = [*(c[cells[those]] for c in columns[:-1]), flips.astype(float)]
-            rows, verdict = how(inputs, np.minimum(0.5 * rtol[cells[those]], FINE))
+            rows, verdict = how([*(c[cells[those]] for c in columns[:-1]), flips.astype(float)], tolerance[those])
             return rows, verdict == Status.OK
 
         last = _last_right(solved, columns[-1][cells])
         those = np.flatnonzero(last >= LEAST)
         early = [*(c[cells[those]] for c in columns[:-1]), np.full(len(those), 2.0)]
-        sizes = followed(runner(scene, "taylor"), early, np.full(len(those), ROUGHLY))[2 + len(scene.states) : -1]
+        sizes = followed(runner(scene, by), early, tolerance[those])[2 + len(scene.states) : -1]
         for _ in range(TRIES):
             if not len(those):
                 break

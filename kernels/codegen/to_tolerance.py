@@ -64,9 +64,9 @@ SLIDERS = {"taylor": ("dop853", "rodas5p")}
 def solver(scene, method):
     """The function of columns and rtol that solves cells by a method: rows of time, interval and states; the status."""
     if method == "taylor":
-        how = to_rest(lambda columns, rtol: by_error(scene, columns, rtol), scene)
+        how = to_rest(lambda columns, rtol: by_error(scene, columns, rtol), scene, "told")
     else:
-        how = to_rest(lambda columns, rtol: by_runs(runner(scene, method), columns, rtol, TIGHTEST), scene)
+        how = to_rest(lambda columns, rtol: by_runs(runner(scene, method), columns, rtol, TIGHTEST), scene, method)
 
     def solve(columns, rtol):
         rows, status = how(columns, rtol)
