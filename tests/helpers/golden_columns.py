@@ -35,7 +35,7 @@ FILE = Path(__file__).parents[1] / "golden" / "digests.json"
 RTOLS = (1e-3, 1e-6, 1e-9, 1e-12, 1e-15)
 SCENES = {"rich": rich_scene.RICH, "lag": lag_scene.KERNEL, "sliding": sliding_scene.SLIDING}
 """Scenes of one's own: with every kind of term, stiff, and sliding along a kink."""
-OF_SCENE = {"lag": ("taylor", "rodas5p")}
+OF_SCENE = {"lag": ("taylor", "rodas5p"), "sliding": ("taylor", "dop853", "rodas5p")}
 """Methods of a scene whose bits are kept, where the others' are kept of its neighbours."""
 NEAR, USUAL, WILD = 0, 4, 60
 MANY, FEW = {NEAR: 43, USUAL: 43, WILD: 44}, {NEAR: 33, USUAL: 8, WILD: 6}

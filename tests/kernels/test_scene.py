@@ -1,5 +1,6 @@
 """A scene of one's own: what it may be made of, and that it is right."""
 
+import golden_columns as golden
 import mpmath
 import numpy as np
 import own_scene
@@ -35,12 +36,12 @@ def test_a_scenes_functions_are_not_asked_again_at_every_call(known):
     else:
         rates = counted(sliding_scene.rates)
         kernel = own_rates(SLIDING, rates, sliding_scene.surface, sliding_scene.start)
-    for method in kernel.methods:
+    for method in golden.OF_SCENE.get(known.name, [method.name for method in kernel.methods]):
         asked = []
         for _ in range(2):
-            solve(kernel, method.name, flips=[2.0], **known.example)
+            solve(kernel, method, flips=[2.0], **known.example)
             asked.append(rates.calls)
-        assert asked[1] == asked[0], method.name
+        assert asked[1] == asked[0], method
 
 
 @pytest.mark.parametrize("make", [scene_kernel, stepped_kernel, cycle_kernel, motion_kernel, section_kernel])
