@@ -1,5 +1,6 @@
 """Hypothesis profiles; the helpers of the tests (`oracles`, `columns`, `toy`, `havoc`), studies and docs as modules."""
 
+import gc
 import os
 import signal
 import sys
@@ -20,6 +21,8 @@ TESTS = Path(__file__).parent
 PLACES = ("tests/oracles", "tests/helpers", "benchmarks/soak", "studies", "docs")
 sys.path += [str(TESTS.parent / place) for place in PLACES]
 
+gc.disable()  # until all tests are read, a fifth of whose time it takes
+
 # a shell ignores Ctrl-C for what it runs in the background, and children inherit that; here it is under test
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
@@ -38,8 +41,8 @@ LONG = {file: place for place, file in enumerate(listed("long.txt"))}
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers():
-    """One more than cores: some tests wait for processes, for clocks, or for what another worker compiles."""
-    return (os.cpu_count() or 1) + 1
+    """Two more than cores: some tests wait for processes, for clocks, or for what another worker compiles."""
+    return (os.cpu_count() or 1) + 2
 
 
 APART = ("tests/studies/test_claims.py", "tests/kernels/test_contract.py")
@@ -67,6 +70,12 @@ def pytest_ignore_collect(collection_path, config):
     path = f"tests/{collection_path.relative_to(TESTS).as_posix()}"
     unread = config.option.markexpr == "quick" and path.endswith(".py") and not any(q.startswith(path) for q in QUICK)
     return unread or None
+
+
+def pytest_collection_finish():
+    """What is there by now stays: looking through it for garbage takes a twentieth of the time of tests."""
+    gc.freeze()
+    gc.enable()
 
 
 @pytest.hookimpl(tryfirst=True)
