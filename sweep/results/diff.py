@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -12,7 +11,7 @@ import xarray as xr
 from sweep.cells.schema import ANCILLARY, STATUS
 from sweep.errors import SweepError
 from sweep.results.statuses import cell_text, cell_values, flag_words, pieces, statuses_of
-from sweep.words import Table, listed
+from sweep.words import Table, listed, require_dataset
 
 
 @dataclass
@@ -108,7 +107,7 @@ class Difference:
         return "\n".join([*lines, Table(rows).text()] if rows else lines)
 
 
-def diff(a: xr.Dataset, b: xr.Dataset | None = None, rtol: float = 0.0) -> Difference:
+def diff(a: xr.Dataset, b: xr.Dataset, rtol: float = 0.0) -> Difference:
     """Differences between two results of one kernel.
 
     Cells with equal parameters are compared; where both results are lists of cells, those with equal number.
@@ -134,7 +133,8 @@ def diff(a: xr.Dataset, b: xr.Dataset | None = None, rtol: float = 0.0) -> Diffe
     >>> found.same, found.outputs["period"].cells
     (False, 2)
     """
-    a, b = two_results("diff", a, b)
+    require_dataset("diff", a)
+    require_dataset("diff", b)
     kernels = [str(d.attrs.get("kernel", "")) for d in (a, b)]
     if kernels[0] != kernels[1]:
         raise SweepError(f"the results are of different kernels, {kernels[0]} and {kernels[1]}")
@@ -151,14 +151,3 @@ def diff(a: xr.Dataset, b: xr.Dataset | None = None, rtol: float = 0.0) -> Diffe
 
 def _example(piece: xr.Dataset, place: int) -> str:
     return f"e.g. {cell_text(cell_values(piece, place))}"
-
-
-def two_results(name: str, a: Any, b: Any) -> tuple[xr.Dataset, xr.Dataset]:
-    """What a function of two results, `sweep.name`, was given. Raises SweepError."""
-    if isinstance(a, xr.Dataset) and isinstance(b, xr.Dataset):
-        return a, b
-    found = " and ".join(type(each).__name__ for each in (a, b) if each is not None)
-    raise SweepError(
-        f"sweep.{name}: expected two Datasets, found {found or 'none'}; "
-        f'write sweep.{name}(first, second), and open a file first, e.g. first = sweep.open_result("first.h5")'
-    )

@@ -18,16 +18,16 @@ from sweep.cells.schema import ANCILLARY, STATUS
 from sweep.errors import SweepError
 from sweep.file.disk import check_target
 from sweep.file.open import memory, store_cells
-from sweep.results.diff import diff, two_results
+from sweep.results.diff import diff
 from sweep.study.model import SETTINGS, Axis, Block, Study, frozen, setting
-from sweep.words import as_path, listed
+from sweep.words import as_path, listed, require_dataset
 
 PAIR = ("first", "second")
 
 
 def join(
     a: xr.Dataset,
-    b: xr.Dataset | None = None,
+    b: xr.Dataset,
     path: str | os.PathLike[str] | None = None,
     *,
     axis: str | None = None,
@@ -69,9 +69,9 @@ def join(
     >>> sweep.join(low, low, axis="version", labels=["0.1", "0.2"]).period.dims
     ('version', 'mu')
     """
-    results = two_results("join", a, b)
-    labels = tuple(labels) if np.iterable(labels) else (labels,)
+    results, labels = (a, b), tuple(labels) if np.iterable(labels) else (labels,)
     for dataset in results:
+        require_dataset("join", dataset)
         if STATUS not in dataset or "study_json" not in dataset.attrs:
             raise SweepError("only results that keep their cells can be joined")
         if bool((dataset[STATUS] == Status.PENDING).any()):
