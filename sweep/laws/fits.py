@@ -246,7 +246,7 @@ class _Search:
             doubt *= np.sqrt(self.square / left)[:, None]
         found = []
         for row, law in enumerate(self.laws[k] for k in self.law.tolist()):
-            own = np.r_[: len(law.q), MOST_Q : MOST_Q + law.columns]
+            own = [*range(len(law.q)), *range(MOST_Q, MOST_Q + law.columns)]
             of_points = jacobian[row][:, own] / self.root[:, None], off[row] / self.root, self.errors
             of_law = doubt[row, own], float(deviance[row]), int(self.errors is None)
             found.append(Found(law, numbers[row, own], *of_points, *of_law))

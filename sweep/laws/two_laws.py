@@ -33,6 +33,8 @@ SCATTERED = 0.5
 OTHER_SHAPES = 20.0
 """Difference of AICc from which on a bend of another shape is ruled out; more than for a second law, since the truth
 may be between the shapes that are tried."""
+APART = 5.0
+"""Widths of a bend from one to the next of three laws, from which on the middle law is seen between them."""
 BEYOND_SHAPES = 0.5
 """Share of what other shapes add to where the laws meet, added again: the true one may be none of them."""
 
@@ -203,8 +205,9 @@ def _verdict(t: Array, tried: dict[str, Found]) -> tuple[str, float]:
     nearest = min((*bends, *others), key=lambda fit: fit.aicc)
     aicc = three.aicc if three and gain(line, three) > BEYOND_DOUBT else math.inf
     # three, if with a bend more even beside what noise of any kind leaves of fewer
-    if aicc < nearest.aicc - OTHER_SHAPES and aicc < nearest.beside(t, "noise")[1] - BEYOND_DOUBT:
-        return "three laws", evidence
+    if three and aicc < nearest.aicc - OTHER_SHAPES and aicc < nearest.beside(t, "noise")[1] - BEYOND_DOUBT:
+        apart = math.exp(three.numbers[1] - three.numbers[2])  # of a step and a lopsided peak 1 to 5
+        return "three laws" if apart > APART else "no power law", evidence
     if evidence > BEYOND_DOUBT:
         return "two laws" if 0 <= two.numbers[0] <= 1 else "no meeting in the window", evidence
     for one in others:  # of those that are power laws in part, one that rules out two laws

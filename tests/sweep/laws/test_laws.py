@@ -203,6 +203,13 @@ def test_a_broad_peak_on_one_law_is_not_called_two(factor, noise):
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.01])
+@pytest.mark.parametrize("z", [0.3 * np.tanh(T), np.log1p(0.5 * np.exp(-(T**2) / np.where(T < 0, 3, 14)))])
+def test_a_step_and_a_lopsided_peak_are_not_called_three_laws(z, noise):
+    scatter = noise * np.random.default_rng(4).standard_normal(X.size)
+    assert int(sweep.fit_two_laws(line(z - 0.5 * T + scatter), "x").regimes) == 0
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.01])
 def test_three_laws_are_told_and_a_meeting_outside_the_window_is_none(noise):
     scatter = noise * np.random.default_rng(3).standard_normal(X.size)
     assert str(sweep.fit_two_laws(line(TRUTHS["three laws"] + scatter), "x").verdict.values) == "three laws"
