@@ -66,10 +66,7 @@ fed_back : None where no state's change comes back to it by way of another one
 
 class Error(NamedTuple):
     """What each state is off by, its spread, the most of both so far; and of the last step: its polynomial's rates and
-    their rates at its end, its length over the order + 1 (0 where there was none), and what it has left out of sums.
-
-    before : `Errors` at the start of the leg
-    """
+    their rates at its end, its length over the order + 1 (0 where there was none), and what it has left out of sums."""
 
     off: tuple
     spread: tuple
@@ -78,7 +75,6 @@ class Error(NamedTuple):
     bent: tuple
     weight: float
     left: tuple
-    before: object
 
 
 @symbolic
@@ -93,7 +89,7 @@ def begun(m, state, errors, h):
     if m.error is None:
         return ()
     nothing = tuple(0.0 * h for u in state)
-    return Error(errors.off[:-2], errors.spread[:-2], errors.peak, nothing, nothing, 0.0 * h, nothing, errors)
+    return Error(errors.off[:-2], errors.spread[:-2], errors.peak, nothing, nothing, 0.0 * h, nothing)
 
 
 @symbolic
@@ -194,7 +190,7 @@ def stepped(m, error, changes, state, mode, unit, trial, steps, pieces, cores, c
 
 
 @symbolic
-def at_event(m, error, changes, full, state, mode, unit, ends, end, t, which, others, pieces, cores, coarse):
+def at_event(m, error, errors, changes, full, state, mode, unit, ends, end, t, which, others, pieces, cores, coarse):
     """The errors at the event that ends a leg in the states `ends`, by (1).
 
     `end`, `t` : time in the last step, and since the start; `which`, `others` : the event, whether more fire with it
@@ -225,7 +221,7 @@ def at_event(m, error, changes, full, state, mode, unit, ends, end, t, which, ot
     most_by = magnitude(by) + magnitude(spread_late) + noise
     doubtful = (magnitude(bend) * most_by * STRAIGHT > magnitude(per_time)) | (most_by * ORDERLY > t)
     late = where(doubtful | others, math.inf, by)
-    errors, rates = error.before, (*rates, *TIMES)
+    rates = (*rates, *TIMES)
     off = zip(rates, (*error.off, *errors.off[-2:]), strict=True)
     spread = zip(rates, (*error.spread, *errors.spread[-2:]), strict=True)
     return errors._replace(

@@ -366,7 +366,7 @@ def to_event(m, cell, mode, active):
     t = where(met, t + end, t)
     h = where(met & (t > 0.0) & (h > LONGEST * t), LONGEST * t, h)
     late = carried.at_event(
-        m, error, changes, full, state, mode, unit, ends, end, t, which, others, pieces, cores, coarse
+        m, error, errors, changes, full, state, mode, unit, ends, end, t, which, others, pieces, cores, coarse
     )
     reach = choose(met, reached(reach, ends), reach)
     return Leg(ends, t, h, fired, stuck, lost, broken, grazing, hangs, nothing, tried, reach), late
