@@ -169,9 +169,9 @@ def fit_lines(
     """What a function finds of each line of y in a window, described, with `points`, how many of its values are there.
 
     `function` of ln x (n,), rising, and ln y, relative standard errors (None where `sigma` is) and bounds (m, n) of m
-    lines without gaps, and of the options, gives numbers and words (m,) by name, or those of each line; of two laws
-    (m, 2). Of lines that are not positive, or have too few points, the numbers are NaN and the words say so; raises
-    SweepError where that is so of all lines.
+    lines without gaps, and of the options, gives numbers and words (m,) by name, or those of each line; of two laws (m,
+    2); or, of one line alone, what becomes the result. Of lines that are not positive, or have too few points, the
+    numbers are NaN and the words say so; raises SweepError where that is so of all lines.
     """
     check_options(sigma=sigma, **options)
     dimension, x = positive_axis(y, dim, repeated=True)
@@ -202,6 +202,8 @@ def fit_lines(
         grid = np.ix_(which, at)
         with np.errstate(all="ignore"):  # what overflows is infinite
             found = function(t[at], z[grid], *(None if one is None else one[grid] for one in given), **options)
+        if isinstance(found, xr.Dataset):
+            return described(found.assign_attrs(y=title(y), x=dim), y.coords[dim], y)
         if not isinstance(found, dict):
             found = {name: np.array([one[name] for one in found]) for name in found[0]}
         for name, column in found.items():

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sweep.laws.loglog import Array, alike
-from sweep.laws.noise import ROUNDING, Regression, corrected, inliers, regress
+from sweep.laws.noise import ROUNDING, Regression, corrected, inliers, regress, shaped
 from sweep.laws.shapes import ONE, Law
 
 DAMPINGS = np.array([1e-6, 0.03, 1.0, 30.0])
@@ -84,7 +84,9 @@ class Found(NamedTuple):
 
     def denied(self, t: Array, noise: str) -> bool:
         """Whether the points are not the law and noise; unless that is independent, by polynomials beside the law."""
-        more = 0 if self.sigma is not None or noise == "even" else 3
+        if self.sigma is None and noise == "even":
+            return bool(shaped(t, self.off))
+        more = 0 if self.sigma is not None else 3
         columns = self.jacobian[:, np.isfinite(self.errors)]
         beside = np.polynomial.chebyshev.chebvander(2 * (t - t[0]) / (t[-1] - t[0]) - 1, 1 + more)[:, 2:]
         every = np.concatenate([columns, beside], axis=1)

@@ -308,15 +308,11 @@ def compare_laws(y: xr.DataArray, dim: str, window: Window | None = None, *, sig
         raise SweepError(
             f"{title(y)} runs along {', '.join(map(str, y.dims))}; compare laws of one line, choose with .sel"
         )
-    found = xr.Dataset()
 
-    def compared(t: Array, z: Array, sigma: Array | None, bounds: None) -> dict[str, Any]:
-        nonlocal found
-        found = _table(t, z[0], sorted(fitted(LAWS, t, z, sigma)[0].values(), key=lambda fit: fit.aicc))
-        return {"regimes": np.zeros(1)}
+    def compared(t: Array, z: Array, sigma: Array | None, bounds: None) -> xr.Dataset:
+        return _table(t, z[0], sorted(fitted(LAWS, t, z, sigma)[0].values(), key=lambda fit: fit.aicc))
 
-    fit_lines(compared, "", y, dim, window, sigma)
-    return described(found.assign_attrs(y=title(y), x=dim), y.coords[dim], y)
+    return fit_lines(compared, "", y, dim, window, sigma)
 
 
 def _table(t: Array, z: Array, tried: list[Found]) -> xr.Dataset:
