@@ -71,7 +71,7 @@ def test_swings_of_a_cross_beat_are_those_of_two_masses_on_a_spring(share, R, sw
 
 def test_the_cycle_of_a_verge_is_that_of_an_event_simulation():
     p = {"tau": 0.02, "I_v": 1e-4, "I_c": 2.5e-4, "n": 0.2, "phi0": 0.35, "drop": 0.01, "c_v": 1e-4, "R_v": 3.5e-4}
-    cell = solved("verge_scene:KERNEL", rtol=1e-9, **p | {"tau": [0.02], "flips": 120}).isel(tau=0)
+    cell = solved("verge_scene:KERNEL", rtol=4e-10, **p | {"tau": [0.02], "flips": 120}).isel(tau=0)
     period, *_, impacts, dry, _, _, _ = verge_oracles.cycle(p | {"e": 0.0}, 60)
     viscous = (1.0 - impacts - dry) * p["tau"] * (2 * p["n"] * p["phi0"] + p["drop"])
     assert (float(cell.clock), float(cell["drag"])) == pytest.approx((period / 2, viscous), rel=1e-8)
@@ -106,7 +106,7 @@ def test_the_period_of_a_balance_with_impulses_is_that_of_50_digits(at):
 def test_a_half_period_under_friction_over_the_swing_is_that_of_a_series():
     """From the speed at the switch, which the scene gives, to the next."""
     given = {"mu": [1.46], "a": 1.0, "phi0": 1.0, "harmonic": 1, "depth": 0.5, "flips": 60}
-    cell = solved("foliot_scene:KERNEL", **given, rtol=1e-9).isel(mu=0)
+    cell = solved("foliot_scene:KERNEL", **given, rtol=4e-10).isel(mu=0)
     v = abs(float(cell.speed))
     with mp.workdps(20):
         f = mp.odefun(lambda t, y: [y[1], mpf(1.46) - (1 + mp.cos(mp.pi * y[0]) / 2) * y[1]], 0, [-1, -v])
