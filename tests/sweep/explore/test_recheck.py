@@ -120,7 +120,7 @@ def test_traces_differ_relative_to_their_amplitude():
 
 
 def test_a_scene_whose_parameters_all_have_defaults_is_asked_again_and_what_is_0_to_rounding_is_the_same():
-    keys = {"kernel": "kicked_scene:KICKED", "fixed": {"kick": 1.0}, "allow_import": True}
+    keys = {"kernel": "kicked_scene:KICKED", "fixed": {"kick": 1.0}, "allow_import": True, "outputs": ["period", "x"]}
     assert sampled(sweep.study(**keys, axes={"rtol": [1e-6, 1e-3]}), 5).axes["zeta"].values.tolist() == [0.0]
     ds = sweep.run(sweep.study(**keys, axes={"zeta": [0.1]}, rtol=1e-6))
     assert ds.sweep.check(allow_import=True).beyond == 0
