@@ -12,19 +12,23 @@ This rests on the inside of numba's compiler, so other versions of numba than th
 """
 
 import contextlib
+import functools
 import gc
+from types import CodeType
 
 import numba
 from llvmlite.binding import Linkage
 from numba import njit, types
+from numba.core import base, ir
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import Compiler
+from numba.core.compiler import Compiler, Flags
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.compiler_machinery import register_pass
 from numba.core.errors import TypingError
 from numba.core.imputils import lower_constant
 from numba.core.registry import CPUDispatcher
-from numba.core.typed_passes import NativeLowering
+from numba.core.typed_passes import NativeLowering, NopythonRewrites
+from numba.core.untyped_passes import InlineClosureLikes, WithLifting
 from numba.extending import models, register_model
 
 TRIED = ("0.68",)
@@ -140,15 +144,24 @@ class _BorrowingLowering(NativeLowering):
         return super().run_pass(state)
 
 
+_NEEDLESS = NopythonRewrites, WithLifting
+"""Passes for what no inlined function has, a twentieth of the time: sums of whole arrays as one loop, and `with`; the
+one for functions within a function is left out where there are none."""
+
+
 class _PartCompiler(Compiler):
     """numba's compiler, into a `_PartLibrary` and without what Python would need to call it."""
 
     def define_pipelines(self):
+        nested = any(isinstance(x, CodeType) for x in self.state.func_id.code.co_consts)
+        needless = _NEEDLESS if nested else (*_NEEDLESS, InlineClosureLikes)
         pipelines = super().define_pipelines()
         for pipeline in pipelines:
             pipeline._ENFORCING = False  # or numba looks for dead variables after each pass, a tenth of its time
             pipeline.passes = [
-                (_BorrowingLowering if kind is NativeLowering else kind, text) for kind, text in pipeline.passes
+                (_BorrowingLowering if kind is NativeLowering else kind, text)
+                for kind, text in pipeline.passes
+                if kind not in needless
             ]
         return pipelines
 
@@ -202,6 +215,9 @@ class _Entry(CPUDispatcher):
                 return super().compile(sig)
         finally:
             if collecting:
+                if not gc.get_freeze_count():  # all that is new counts as old: or it would be looked through at once
+                    gc.freeze()
+                    gc.unfreeze()
                 gc.enable()
 
 
@@ -234,11 +250,52 @@ class _EntryCompiler(Compiler):
         super().__init__(typing_context, target_context, library, *rest)
 
 
+def _asked_once(ask):
+    """numba's question what comes of a function for arguments of these types: it asks again for each operation."""
+    known = {}
+
+    def get_call_type(function, context, args, kws):
+        key = function, context, tuple(args)
+        if kws:
+            return ask(function, context, args, kws)
+        try:
+            if key not in known:
+                known[key] = ask(function, context, args, kws)
+            return known[key]
+        except TypeError:  # the type of a constant slice has no hash
+            return ask(function, context, args, kws)
+
+    return get_call_type
+
+
+def _values(flags):
+    """What numba's `Flags.values` gives, which asks for each by its name: a thirtieth of the time of a large kernel."""
+    return {name: flags._values.get(name, option.default) for name, option in flags.options.items()}
+
+
+def _variables(instruction, value):
+    """What numba's `Inst._rec_list_vars` gives, which makes a list of each value: a twentieth of the time."""
+    found = []
+    for x in value.values() if isinstance(value, dict) else value if isinstance(value, list | tuple) else (value,):
+        if isinstance(x, ir.Var):
+            found.append(x)
+        elif isinstance(x, ir.Inst):
+            found += x.list_vars()
+        elif isinstance(x, list | tuple | dict):
+            found += _variables(instruction, x)
+    return found
+
+
 def _is_tried():
     return not numba.config.DISABLE_JIT and numba.__version__.startswith(TRIED)
 
 
 if _is_tried():
+    # asked some ten thousand times in a large kernel
+    types.BaseFunction.get_call_type = _asked_once(types.BaseFunction.get_call_type)
+    base._has_loc = functools.lru_cache(None)(base._has_loc)
+    Flags.values = _values
+    ir.Inst._rec_list_vars = _variables
     # loads numba's functions of arrays without scipy.linalg, a seventh of a warm run; `dot` loads it when compiled
     from numba.np import linalg
 

@@ -13,6 +13,7 @@ import operator
 import sys
 from types import FunctionType, SimpleNamespace
 
+from llvmlite import ir
 from numba import types
 from numba.core.imputils import impl_ret_borrowed
 from numba.core.typing.templates import builtin_registry
@@ -20,8 +21,8 @@ from numba.extending import lower_builtin, type_callable
 
 from kernels.lanes.jit import COMPILED, F, jit_call
 
-_SIGNATURES = {}
-"""Of calls that have been typed."""
+_KINDS, _SIGNATURES, _COUNTED = {}, {}, {}
+"""Types of functions, of calls that have been typed, and whether a type has arrays in it, which numba counts."""
 
 
 class _Symbol:
@@ -105,13 +106,18 @@ class _Writer:
             kinds, values = zip(*map(self.closed, x), strict=True) if x else ((), ())
             kind = types.BaseTuple.from_types(kinds, type(x) if hasattr(x, "_fields") else None)
             return kind, self.builder and self.context.make_tuple(self.builder, kind, values)
-        kind = types.float64 if isinstance(x, float) else types.unliteral(self.typing_context.resolve_value_type(x))
+        if isinstance(x, float):
+            return types.float64, self.builder and ir.DoubleType()(x)
+        kind = types.unliteral(self.typing_context.resolve_value_type(x))
         return kind, self.builder and self.context.get_constant_generic(self.builder, kind, x)
 
     def call(self, function, arguments):
         """What a compiled function, or one of that type, gives for the arguments."""
         of_arguments = [self.closed(x) for x in arguments]
-        kind = function if isinstance(function, types.Type) else self.typing_context.resolve_value_type(function)
+        if isinstance(function, types.Type):
+            kind = function
+        elif (kind := _KINDS.get(function)) is None:
+            kind = _KINDS[function] = self.typing_context.resolve_value_type(function)
         key = kind, tuple(types.unliteral(of_one) for of_one, _ in of_arguments)
         if key not in _SIGNATURES:
             _SIGNATURES[key] = kind.get_call_type(self.typing_context, key[1], {})
@@ -122,10 +128,13 @@ class _Writer:
         values = [self.context.cast(self.builder, value, of_one, want) for (of_one, value), want in wanted]
         called = self.context.get_function(kind, signature)
         value = called(self.builder, values)
-        if self.context.enable_nrt:  # arrays are their caller's, and counted again only where they are handed back
-            self.context.nrt.decref(self.builder, signature.return_type, value)
+        returned = signature.return_type
+        if returned not in _COUNTED:
+            _COUNTED[returned] = self.context.data_model_manager[returned].contains_nrt_meminfo()
+        if _COUNTED[returned] and self.context.enable_nrt:  # arrays are their caller's, and counted where handed back
+            self.context.nrt.decref(self.builder, returned, value)
         self.context.add_linking_libs(getattr(called, "libs", ()))
-        return self.opened(signature.return_type, lambda: value)
+        return self.opened(returned, lambda: value)
 
 
 def _writer_of(arguments):

@@ -76,11 +76,25 @@ class LaneIndexType(_Primitive):
 _lanes, _mask, _lane_index = LanesType(), MaskType(), LaneIndexType()
 
 
+class _Written(ir.Constant):
+    """A constant vector in LLVM's words, which llvmlite writes out lane by lane: a tenth of the text and its time."""
+
+    def __init__(self, ty, words):
+        self.type, self.constant, self._words = ty, (), words
+
+    def _to_string(self):
+        return f"{self.type} {self._words}"
+
+    def _get_reference(self):
+        return self._words
+
+
 def _repeat(builder, value, like):
     """A scalar LLVM value in every lane of a vector type."""
-    undefined = ir.Constant(like, ir.Undefined)
-    one = builder.insert_element(undefined, value, ir.Constant(ir.IntType(32), 0))
-    return builder.shuffle_vector(one, undefined, ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), [0] * WIDTH))
+    if isinstance(value, ir.Constant):
+        return _Written(like, f"splat ({value})")
+    undefined, lanes = _Written(like, "undef"), _Written(ir.VectorType(ir.IntType(32), WIDTH), "zeroinitializer")
+    return builder.shuffle_vector(builder.insert_element(undefined, value, ir.IntType(32)(0)), undefined, lanes)
 
 
 @lower_cast(types.Number, LanesType)
@@ -234,7 +248,7 @@ def exponent(x):
 
 def _constant(ty, value):
     """A constant of the type `ty`: in every lane of a vector."""
-    return ir.Constant(ty, [value] * WIDTH if isinstance(ty, ir.VectorType) else value)
+    return _repeat(None, ty.element(value), ty) if isinstance(ty, ir.VectorType) else ty(value)
 
 
 def _as_integers(ty):
