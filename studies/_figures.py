@@ -23,6 +23,7 @@ try:
 except sweep.SweepError as error:
     sys.exit(str(error))
 from matplotlib.colors import ListedColormap as ListedColormap
+from matplotlib.transforms import Bbox
 
 HOLLOW = {"linestyle": "", "markerfacecolor": "white", "markersize": 3.6}
 """Marks of what is computed, beside lines of theory."""
@@ -56,9 +57,8 @@ COST, ERROR = Log("CPU time per cell [s]"), Log("relative error, worst cell [1]"
 def panel(x: Axis, y: Axis, legend: str = "", key: dict[str, Any] | None = None, **how: Any) -> Callable[..., Any]:
     """Declares a panel of a page: its axes, the place of its legend and its options.
 
-    A legend "outside ..." is on the page; "beside" are names of lines beside their marks.
-
-    `key` has entries of the legend beside the lines that have names: format, or options, of a black line or mark.
+    A legend "outside ..." is on the page; "beside", names stand at their lines' marks. `key` has entries of the legend
+    beside the lines that have names: format, or options, of a black line or mark.
     """
 
     def declared(figure: Any) -> Any:
@@ -107,8 +107,7 @@ def _finish(axes: Any, x: Axis, y: Axis, legend: dict[str, Any], key: dict[str, 
     if legend.get("loc") == "beside":
         name_lines(axes)
     elif legend:
-        handles, labels = axes.get_legend_handles_labels()
-        named = dict(zip(labels, handles, strict=True))
+        named = dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
         (axes.figure if "outside" in legend["loc"] else axes).legend(named.values(), named, **legend)
 
 
@@ -182,74 +181,33 @@ def direct_label(axes: Any, x: float, y: float, text: str, colour: str = "black"
     axes.text(x, y, text, color=colour, bbox=box, **{"fontsize": 8, "ha": "center", "va": "center", **how})
 
 
-WAYS = np.array([(0, 1), (1, 0), (-1, 0), (0, -1), (0.6, 1), (-0.6, 1), (1, 1), (-1, 1), (0.6, -1), (-0.6, -1)])
-"""From a mark to its name."""
-FAR = (5.0, 7.0, 10.0, 14.0, 19.0, 25.0)
-"""Points between them."""
-
-
-ORDERS = 24
-"""Orders in which names take their places; the one that leaves them nearest to their marks is drawn."""
-
-
 def name_lines(axes: Any) -> None:
-    """Writes each line's name beside one of its marks, clear of marks, lines, patches and other names.
-
-    The upper marks come first, and above them. No mark of another line may be as near to the middle of a name.
-    """
+    """Writes each line's name beside one of its marks, where it covers fewest marks, lines and texts, and nearest."""
     axes.figure.draw_without_rendering()
     point, room = axes.figure.dpi / 72.0, axes.get_window_extent()
-    known = [line.get_xydata()[np.isfinite(line.get_xydata()).all(axis=1)] for line in axes.lines]
-    lines = [(line, xy) for line, xy in zip(axes.lines, known, strict=True) if line.get_label()[0] != "_" and len(xy)]
-    marks = [line.get_transform().transform(xy) / point for line, xy in lines]
-    strokes = [np.linspace(at[:-1], at[1:], 100).reshape(-1, 2) for at in marks]
+    lines = [line for line in axes.lines if line.get_label()[0] != "_" and np.isfinite(line.get_xydata()).any()]
+    known = [line.get_xydata()[np.isfinite(line.get_xydata()).all(axis=1)] for line in lines]
+    marks = [axes.transData.transform(xy) for xy in known]
+    covered = np.concatenate([*marks, *(np.linspace(at[:-1], at[1:], 100).reshape(-1, 2) for at in marks)])
     boxes = [shown.get_window_extent() for shown in (*axes.texts, *axes.patches)]
-    standing = [(np.array([box.x0 + box.x1, box.y0 + box.y1]), np.array([box.width, box.height])) for box in boxes]
-    standing = [(middle / 2.0 / point, half / 2.0 / point) for middle, half in standing]
-    names, halves = [], []
-    for line, xy in lines:
-        look = {"fontsize": 8, "color": line.get_color(), "ha": "center", "va": "center"}
-        names.append(axes.annotate(line.get_label(), xy[0], (0, 0), textcoords="offset points", **look))
-        box = names[-1].get_window_extent()
-        halves.append(np.array([box.width, box.height]) / 2.0 / point)
-
-    def nearest(k: int, taken: list[Any]) -> tuple[float, int, Any]:
-        """How far the k-th name is from which mark, and its middle, where other names have been `taken`."""
-        own, half = marks[k], halves[k]
-        others, crossing = (np.concatenate([*some[:k], *some[k + 1 :]]) for some in (marks, strokes))
-        for far, i, way in itertools.product(FAR, np.argsort(-own[:, 1]), WAYS):
-            middle = own[i] + way * (half + far)
-            inside = (middle - half > room.min / point).all() and (middle + half < room.max / point).all()
-            free = all((abs(middle - at) > half + size + 1.0).any() for at, size in taken)
-            nearer = np.hypot(*(others - middle).T).min(initial=np.inf) > np.hypot(*(own[i] - middle))
-            gaps = (
-                np.hypot(*np.maximum(abs(some - middle) - half, 0.0).T).min(initial=np.inf) - least
-                for some, least in ((own, 4.0), (others, 4.0), (strokes[k], 2.0), (crossing, 4.0))
-            )
-            if inside and free and nearer and min(gaps) > 0.0:
-                return far, i, middle
-        return 2.0 * FAR[-1], 0, own[0] + FAR[0]
-
-    found, orders = [], np.random.default_rng(0)
-    for _ in range(ORDERS):
-        places, taken = {}, list(standing)
-        for k in orders.permutation(len(lines)):
-            places[k] = nearest(k, taken)
-            taken.append((places[k][2], halves[k]))
-        found.append((sum(far for far, *_ in places.values()), len(found), places))
-    for k, (_, i, middle) in min(found)[2].items():
-        names[k].xy, names[k].xyann = lines[k][1][i], middle - marks[k][i]
+    ways = list(itertools.product((5.0, 8.0, 12.0, 18.0), ((0, 1), (1, 0), (-1, 0), (0, -1), (0.6, 1), (-0.6, 1))))
+    for line, xy, at in zip(lines, known, marks, strict=True):
+        look = {"color": line.get_color(), "fontsize": 8, "ha": "center", "va": "center"}
+        name = axes.annotate(line.get_label(), xy[0], (0, 0), textcoords="offset points", **look)
+        half, found = 0.5 * np.array(name.get_window_extent().size), []
+        for i, (far, way) in itertools.product(range(len(at)), ways):
+            middle = at[i] + way * (half + far * point)
+            box = Bbox([middle - half, middle + half])
+            outside = not (room.contains(*box.min) and room.contains(*box.max))
+            hidden = box.padded(3.0 * point).count_contains(covered) + 100 * (box.count_overlaps(boxes) + outside)
+            found.append((hidden, far, i, *(middle - at[i]) / point, box))
+        _, _, i, *shift, box = min(found, key=lambda place: place[:3])
+        name.xy, name.xyann = xy[i], shift
+        boxes.append(box)
 
 
-def draw_costs(axes: Any, found: dict[str, xr.Dataset], places: dict[str, tuple[float, float]]) -> None:
-    """`worst` error over `seconds` a cell of each method, in its colour, with its name beside it.
-
-    `places`: by name, factors from the line's first point to where the name stands; those without are not drawn.
-    """
-    for name, row in found.items():
-        look, drawn = charts.method_look(name), row.worst.where(row.worst < 1.0).dropna("rtol")
-        if name in places and drawn.size:
-            axes.plot(row.seconds.sel(rtol=drawn.rtol), drawn.clip(1e-16), markersize=4, linewidth=0.9, **look)
-            right, up = places[name]
-            x, y = float(row.seconds.sel(rtol=drawn.rtol[0])), float(drawn[0])
-            direct_label(axes, right * x, up * y, name, look["color"], fontsize=7)
+def draw_costs(axes: Any, found: dict[str, xr.Dataset], names: Sequence[str]) -> None:
+    """`worst` error over `seconds` a cell of those of the methods `names` that there are, each in its colour."""
+    for name in filter(found.__contains__, names):
+        drawn = found[name].where(found[name].worst < 1.0).dropna("rtol")
+        axes.plot(drawn.seconds, drawn.worst.clip(1e-16), markersize=4, linewidth=0.9, label=name, **method_look(name))

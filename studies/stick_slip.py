@@ -96,7 +96,7 @@ BELT = Log("speed of the belt [1]", (0.01, 0.4), (0.01, 0.03, 0.1, 0.3))
 
 
 @panel(BELT, Log("relative error of the time [1]", (1e-16, 1e4)))
-@panel(COST.to(5e-6, 2e-2), ERROR.to(1e-16, 10))
+@panel(COST.to(5e-6, 2e-2), ERROR.to(1e-16, 10), "beside")
 @page(130.0)
 def figure(error, cost, ds, unslid, found):
     """The error over the belt's speed, of a method that slides and of those that do not; costs."""
@@ -112,7 +112,7 @@ def figure(error, cost, ds, unslid, found):
         given = float(unslid[name].notnull().mean())
         text = "no value in any cell" if given == 0 else f"a value in {given:.0%} of the cells"
         direct_label(error, 0.063, 10.0 ** (2.6 - 1.9 * k), f"{name}: {text}", "0.35")
-    draw_costs(cost, found, {"dop853 (slides)": (2.0, 15.0), "scipy DOP853, modes by hand": (0.45, 20.0)})
+    draw_costs(cost, found, ["dop853 (slides)", "scipy DOP853, modes by hand"])
     none = "scipy Radau, BDF, LSODA,\ndiffrax Kvaerno5:\nno value in any cell"
     direct_label(cost, 0.95, 0.2, none, "0.35", ha="right", transform=cost.transAxes)
 

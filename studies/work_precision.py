@@ -51,9 +51,8 @@ def swept(study, found: xr.Dataset) -> xr.Dataset:
     seconds = found.seconds.copy()
 
     def statuses(rtol: float, method: str):
-        return sweep.run(
-            replace(study, method=method, rtol=float(rtol)), progress=False, workers=1
-        ).status.values.ravel()
+        wanted = replace(study, method=method, rtol=float(rtol))
+        return sweep.run(wanted, progress=False, workers=1).status.values.ravel()
 
     for name, row in by_method(found).items():
         quick = row.rtol.values[row.seconds.values * Grid(study).size < 10.0]
