@@ -11,10 +11,7 @@ is called grazing.
 
 from typing import NamedTuple
 
-from numba import types
-from numba.extending import lower_builtin, type_callable
-
-from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.symbols import symbolic, written
 from kernels.lanes.vectors import any_lane, exponent, fma, horner, magnitude, nearest, not_, pow2, sqrt, where
 
@@ -156,20 +153,6 @@ def rises(d, dd):
     return (d > 0.0) | ((d >= 0.0) & (dd > 0.0))
 
 
-def stays_apart(x):
-    """Keeps the function that calls it out of line: what is rarely needed must not cost what is needed often."""
-
-
-def _lower_stays_apart(context, builder, signature, values):
-    builder.function.attributes.discard("alwaysinline")
-    builder.function.attributes.add("noinline")
-    return context.get_dummy_value()
-
-
-type_callable(stays_apart)(lambda context: lambda x: types.void)
-lower_builtin(stays_apart, types.Any)(_lower_stays_apart)
-
-
 @symbolic
 def falls(d, dd, ddd, rest, h):
     """Whether an event falls all along a step, by (1): from its coefficients 1 to 3, `rest` is A."""
@@ -242,7 +225,7 @@ def foreseen(e, d, dd, ddd, h):
     return where((t > 0.0) & (t < h), t, 0.5 * h)
 
 
-@jit_call
+@jit_apart
 def crossing(at, curve, event, facts, h, tolerance, searching):
     """Where an event falls through 0 in (0, h], given that it falls all along, and whether it only just does.
 
@@ -255,7 +238,6 @@ def crossing(at, curve, event, facts, h, tolerance, searching):
     event : offset, factor and u(0) of the event offset + factor u
     facts : coefficients 0 to 3 of the event
     """
-    stays_apart(h)
     offset, factor, start = event
     before, enough = 0.0 * h, 0.01 * tolerance + 1e-17
     low, high, t, left = 0.0 * h, h, foreseen(*facts, h), searching

@@ -33,10 +33,9 @@ from kernels.integrate.taylor import (
     rises,
     size,
     slope,
-    stays_apart,
     vanishes,
 )
-from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.symbols import fold, left_a_call, symbolic
 from kernels.lanes.tuples import all_of, any_of, reached, times
 from kernels.lanes.vectors import any_lane, choose, fma, horner, magnitude, not_, where
@@ -113,10 +112,9 @@ def judged(m, at_kink, pieces, facts, margins, now, trial, lanes, fallings):
     return sure, tuple((lanes & x) | (y & not_(lanes)) for x, y in zip(down, fallings, strict=True))
 
 
-@jit_call
+@jit_apart
 def doubted(m, pieces, state, unit, facts, margins, now, trial, unsure, fallings):
     """Steps of the unsure lanes halved until each event is proved to fall or to stay clear; which fall."""
-    stays_apart(trial)
     for _ in range(HALVINGS):
         sure, fallings = judged(m, None, pieces, facts, margins, now, trial, unsure, fallings)
         unsure = unsure & not_(sure)
