@@ -29,9 +29,9 @@ FEWEST_FOR_BEND = 8
 """Points from which on a bend is looked for among noise."""
 SCATTERS = 0.3
 """Share of the distances from a corrected law that is noise between neighbours, from which on they are noise."""
-AS_WELL = 10.0
-"""Difference of AICc up to which another D is not ruled out; half of it for one law and for a logarithmic
-correction, whose exponent is far harder to tell."""
+AS_WELL, HARDER = 13.0, 5.0
+"""Difference of AICc up to which another D is not ruled out, and up to which one law and a logarithmic correction are
+not, whose exponent is far harder to tell."""
 FADES = np.exp([0, -6, -5, -4, -3, -2, -1, 1, 2, 3, 4, 5, 6]), 0.3, 80.0
 """How fast a correction may fade, per window: those tried about the best, to the power of its relative error, and the
 least and largest."""
@@ -284,7 +284,7 @@ def _corrected(
             strength, fades = CORRECTION.q[0], np.clip(best * steps**far, least, most).tolist()
             laws = [CORRECTION._replace(name=str(d), q=(strength, Number(d, d, (d,)))) for d in fades]
             own, *others = fitted(laws, t, row[None], None if known is None else known[None])[0].values()
-            others += [law for law in (one, tried[LOG_CORRECTION.name]) if law.aicc < found.aicc + AS_WELL / 2]
+            others += [law for law in (one, tried[LOG_CORRECTION.name]) if law.aicc < found.aicc + HARDER]
             ends = [*union(t, own, others, [-1], word, confidence, AS_WELL)[1][:, 0] / np.ptp(t), exponent]
         verdict = VERDICTS[1 if not fits else 0 if abs(left) < 1 else 2]
         of = {"exponent": sign * exponent, "correction_exponent": sign * fade, "correction": left, "verdict": verdict}
