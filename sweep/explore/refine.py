@@ -220,9 +220,9 @@ def _folder_of_rounds(path: str | os.PathLike[str] | None, dataset: xr.Dataset, 
     target, source = as_path(path), dataset.encoding.get("source")
     rounds = target.with_name(f"{target.name}.rounds")
     with disk.refusing(target):
-        if force or target.exists():
-            shutil.rmtree(rounds, ignore_errors=True)
         check_target(target, force=force, read=[Path(source)] if source else [])
+        if force:
+            shutil.rmtree(rounds, ignore_errors=True)
         rounds.mkdir(exist_ok=True)
     return rounds
 

@@ -237,9 +237,13 @@ def test_the_bits_do_not_depend_on_workers_or_on_a_file(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["fine.h5"]
     assert sweep.verify(tmp_path / "fine.h5").whole
     another = sweep.study(kernel="foliot", axes={"mu": [1.0, 1.5, 2.0]}, fixed=FIXED, outputs=["period"], title="Else")
-    (tmp_path / "fine.h5.rounds").mkdir()  # as a call leaves them that is killed when it has ended
+    kept = tmp_path / "fine.h5.rounds" / "1.h5"
+    kept.parent.mkdir()
+    kept.touch()
     with pytest.raises(sweep.SweepError, match="--force"):
         sweep.refine(sweep.run(another), "period", 0.1, path=tmp_path / "fine.h5")
+    assert kept.exists()
+    sweep.refine(sweep.run(another), "period", 0.1, path=tmp_path / "fine.h5", force=True).dataset.close()
     assert [path.name for path in tmp_path.iterdir()] == ["fine.h5"]
 
 
