@@ -45,6 +45,8 @@ WITHIN, REFUSALS = 0.6, 20.0
 """Part of a first step at which rates and events are asked, besides its end, whether the series are theirs; and how
 often in a leg a step may be refused for that: what is so much shorter than the first guess is not, or rounding would
 stop it."""
+AGAIN = 20
+"""Steps of a leg, of which one that is not fine is tried again, shorter, where an event is neither met nor missed."""
 BEYOND = 1e6
 """Times the step before, that one is at most where the series leave nothing out: of a motion that is a polynomial it
 would grow so far that halving it no more comes back to what an event next to 0 asks for."""
@@ -334,6 +336,8 @@ def to_event(m, cell, mode, active):
         unsure = steps & not_(sure)
         if any_lane(unsure):
             trial, unsure, fallings = doubted(m, pieces, state, unit, facts, margins, now, trial, unsure, fallings)
+            if step < AGAIN:
+                unsure = unsure & (fine | not_(power_h < FAR))
         furthest = where(trial > 0.0, BEYOND * trial, furthest)
         broken = broken | (unsure & not_(power_h < FAR))  # it goes off to where no event is
         grazing = grazing | (unsure & not_(broken))

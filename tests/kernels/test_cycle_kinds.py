@@ -111,6 +111,29 @@ def test_what_winds_round_an_equilibrium_rests_there():
     assert abs(found["v"]).max() < 1e-11
 
 
+def test_a_round_cycle_begins_where_the_surface_is_met_without_curvature():
+    """r' = r (size - r^2) at the speed 1 + r^2: a run begins where the second derivative of y is rounding alone."""
+    round_cycle = cycle_kernel(
+        name="round",
+        doc="what comes to a circle",
+        states=(Field("x", "1", "x"), Field("y", "1", "y")),
+        parameters=(Field("size", "1", "its square"),),
+        rates=lambda x, y, size: (
+            x * (size - x * x - y * y) - y * (1.0 + x * x + y * y),
+            y * (size - x * x - y * y) + x * (1.0 + x * x + y * y),
+        ),
+        surface=lambda y: y,
+        start=lambda: (1.5, 0.0),
+    )
+    size = np.array([0.3, 0.7, 1.3, 1.9])
+    found, status = solve(round_cycle, "taylor", size)
+    assert (status == Status.OK).all()
+    true = {"period": 2.0 * np.pi / (1.0 + size), "x": -np.sqrt(size), "x_size": np.sqrt(size), "y_size": np.sqrt(size)}
+    true |= {"multiplier": np.exp(-2.0 * size * true["period"]), "period_by_size": -size / (1.0 + size)}
+    for name, value in true.items():
+        assert abs(found[name] - value).max() < 1e-9, name
+
+
 def test_a_mode_of_three_values_and_three_surfaces():
     kick, e, length, left = np.array([1.0, 2.0]), np.array([0.5, 0.8]), 2.0, np.array([0.0, -0.7])
     found, status = solve(
