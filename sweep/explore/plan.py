@@ -107,7 +107,7 @@ class Plan:
             if needed > there
         ]
 
-    def __str__(self) -> str:
+    def __repr__(self) -> str:
         def shares(found: dict[str, float]) -> str:
             # cells that are refused have no method, and a status that says why
             texts = ", ".join(f"{name} {100 * share:.3g} %" for name, share in found.items() if name != "none")

@@ -97,7 +97,7 @@ class Refinement:
         }
         self.noise = max(cells.noise.values())
 
-    def __str__(self) -> str:
+    def __repr__(self) -> str:
         text = f"{self.dataset[STATUS].size:,} cells, {self.added:,} of them added"
         if len(self.unseen) == 1:
             text += f"; an even grid as fine has {self.uniform:,}"

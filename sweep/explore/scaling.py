@@ -24,7 +24,7 @@ from sweep.study.model import Study, differs
 from sweep.study.read import Given
 from sweep.study.read import study as as_study
 from sweep.study.units import exponents
-from sweep.words import require_dataset
+from sweep.words import Table, require_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -116,6 +116,14 @@ class Scaling:
         if left == 0:
             advice = f"every output is a power of {swept} times a constant; a single cell tells all{where}; {basis}"
         self.advice = advice if free else ""
+
+    def __repr__(self) -> str:
+        rows = [
+            ("groups", ", ".join(map(str, self.groups)) or "none"),
+            ("scales", ", ".join(f"{name}: {group or 1}" for name, group in self.scales.items()) or "none"),
+            ("axes", self.advice or "none of them can be left out"),
+        ]
+        return Table(rows).text()
 
     def rescaled(self, dataset: xr.Dataset) -> xr.Dataset:
         """A result of the study with its outputs freed of units, and a coordinate for each dimensionless group.

@@ -89,7 +89,7 @@ class Difference:
         apart = any(distance.cells for distance in self.outputs.values())
         return not (self.only_a or self.only_b or self.missing or self.statuses or apart)
 
-    def __str__(self) -> str:
+    def __repr__(self) -> str:
         lines = [
             f"{self.cells:,} cells in both, {self.only_a:,} in the first alone, {self.only_b:,} in the second alone"
         ]

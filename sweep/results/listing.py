@@ -50,6 +50,9 @@ class Listed:
         self.when = str(attrs.get("end", attrs.get("start", "")))
         self.version = str(attrs.get("versions", "")).partition(",")[0].removeprefix("foliot ")
 
+    def __repr__(self) -> str:
+        return Table([self.row], HEADINGS).text("", True)
+
     @property
     def row(self) -> tuple[str, ...]:
         """Texts below `HEADINGS`."""

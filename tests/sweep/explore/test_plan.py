@@ -52,7 +52,7 @@ def test_the_ends_of_axes_are_in_the_sample_whose_size_is_told(tmp_path, end, is
         found = sweep.plan(stone(axes=axes, rtol=0.5), path=tmp_path / "out.h5", isolate=isolate)
         assert 0 < found.statuses["BAD_INPUT"] < 0.6  # of a sample that is small on a busy machine
         assert found.methods.keys() == {"none", "rough"}
-        assert f"{found.sampled:,} cells" in str(found)
+        assert f"{found.sampled:,} cells" in repr(found)
         assert " 0 %" not in str(found)
 
 

@@ -131,7 +131,7 @@ def test_where_values_scatter_no_more_cells_are_added_and_the_scatter_is_told():
     assert found.added < 800
     assert 2e-4 < found.noise < 2e-3
     assert 1e-3 < found.error < 1e-2
-    assert "scatter" in str(found)
+    assert "scatter" in repr(found)
     height = np.linspace(1.0, 2.0, 5000)
     off = abs(np.interp(height, found.dataset.height, found.dataset.fall_time) - curve(height))
     assert off.max() < 1.5e-2

@@ -30,6 +30,7 @@ def groups(study):
 def test_a_viscous_foliot_over_three_axes_is_one_dimensional():
     found = scaling(foliot("mu", "a", "phi0"))
     assert [str(group) for group in found.groups] == ["mu/(phi0 a^2)"]
+    assert "mu/(phi0 a^2)" in repr(found)
     assert {name: str(group) for name, group in found.scales.items()} == {
         "period": "a",
         "amplitude": "1/phi0",

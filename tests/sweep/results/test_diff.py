@@ -20,7 +20,7 @@ def result():
 def test_a_result_is_the_same_as_itself(result):
     found = sweep.diff(result, result.copy(deep=True))
     assert found.same
-    assert "bit for bit" in str(found)
+    assert "bit for bit" in repr(found)
     assert all((distance.cells, distance.largest) == (0, 0.0) for distance in found.outputs.values())
     assert sweep.diff(result, result.transpose("v0", "phase", "height")).same
 
