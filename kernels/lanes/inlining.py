@@ -27,6 +27,7 @@ from numba.core.compiler_machinery import register_pass
 from numba.core.errors import TypingError
 from numba.core.imputils import lower_constant
 from numba.core.registry import CPUDispatcher
+from numba.core.targetconfig import ConfigStack
 from numba.core.typed_passes import NativeLowering, NopythonRewrites
 from numba.core.untyped_passes import InlineClosureLikes, WithLifting
 from numba.extending import models, register_model
@@ -208,7 +209,8 @@ class _Entry(CPUDispatcher):
     def compile(self, sig):
         collecting = gc.isenabled()
         gc.disable()
-        _remember(self.typingctx)
+        if "resolve_function_type" not in vars(self.typingctx):
+            self.typingctx.resolve_function_type = _asked_once(self.typingctx.resolve_function_type)
         try:
             # waiting for another process is compiling to who watches numba
             with global_compiler_lock, getattr(self._cache, "alone", contextlib.nullcontext)(sig):
@@ -219,25 +221,6 @@ class _Entry(CPUDispatcher):
                     gc.freeze()
                     gc.unfreeze()
                 gc.enable()
-
-
-def _remember(context):
-    """Has numba ask once what comes out of a function for arguments of these types."""
-    if "resolve_function_type" in vars(context):
-        return
-    known, ask = {}, context.resolve_function_type
-
-    def resolve(function, args, kws):
-        key = function, tuple(args)
-        try:
-            return ask(function, args, kws) if kws else known[key]
-        except KeyError:
-            known[key] = ask(function, args, kws)
-            return known[key]
-        except TypeError:  # the type of a constant slice has no hash
-            return ask(function, args, kws)
-
-    context.resolve_function_type = resolve
 
 
 class _EntryCompiler(Compiler):
@@ -251,21 +234,33 @@ class _EntryCompiler(Compiler):
 
 
 def _asked_once(ask):
-    """numba's question what comes of a function for arguments of these types: it asks again for each operation."""
-    known = {}
+    """numba's question `ask(..., args, kws)` what comes of a function for arguments of these types.
 
-    def get_call_type(function, context, args, kws):
-        key = function, context, tuple(args)
-        if kws:
-            return ask(function, context, args, kws)
+    numba asks again for each operation. While it compiles one function, the first answer is kept, and not beyond: it
+    depends on that function's flags, and numba notes with each answer what is to be called.
+    """
+    known, of = {}, None
+
+    def asked(*question):
+        nonlocal of
+        *about, args, kws = question
+        key, flags = (*about, tuple(args)), ConfigStack.top_or_none()
         try:
-            if key not in known:
-                known[key] = ask(function, context, args, kws)
-            return known[key]
+            hash(key)
         except TypeError:  # the type of a constant slice has no hash
-            return ask(function, context, args, kws)
+            return ask(*question)
+        if kws or flags is None:
+            return ask(*question)
+        if flags is of and key in known:
+            return known[key]
+        answer = ask(*question)
+        if flags is not of:  # or another function was compiled meanwhile
+            known.clear()
+            of = flags
+        known[key] = answer
+        return answer
 
-    return get_call_type
+    return asked
 
 
 def _values(flags):

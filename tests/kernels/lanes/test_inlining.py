@@ -5,6 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from numba import njit
+from numba.extending import overload
 
 from kernels.lanes.jit import COMPILED, jit_call
 
@@ -49,3 +51,19 @@ def test_arrays_that_parts_borrow_are_kept_and_those_they_make_are_freed():
         add(lent)
     assert (lent.b == 300.0).all()
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss < 1.5 * before
+
+
+def is_nan(x):
+    """Given a meaning below."""
+
+
+@overload(is_nan)
+def _(x):
+    return lambda x: x != x
+
+
+def test_a_function_of_numba_beside_ours_has_the_flags_that_it_asks_for():
+    ones_and_zeros(2)
+    fast, strict = njit(fastmath=True)(lambda x: is_nan(x)), njit(lambda x: is_nan(x))
+    fast(1.0)
+    assert strict(np.nan)
