@@ -185,13 +185,14 @@ def name_lines(axes: Any) -> None:
     """Writes each line's name beside one of its marks, where it covers fewest marks, lines and texts, and nearest."""
     axes.figure.draw_without_rendering()
     point, room = axes.figure.dpi / 72.0, axes.get_window_extent()
-    lines = [line for line in axes.lines if line.get_label()[0] != "_" and np.isfinite(line.get_xydata()).any()]
-    known = [line.get_xydata()[np.isfinite(line.get_xydata()).all(axis=1)] for line in lines]
-    marks = [axes.transData.transform(xy) for xy in known]
-    covered = np.concatenate([*marks, *(np.linspace(at[:-1], at[1:], 100).reshape(-1, 2) for at in marks)])
+    known = {line: line.get_xydata() for line in axes.lines if line.get_label()[0] != "_"}
+    known = {line: shown for line, xy in known.items() if len(shown := xy[np.isfinite(xy).all(axis=1)])}
+    marks = [axes.transData.transform(xy) for xy in known.values()]
+    along = (np.linspace(at[:-1], at[1:], 100).reshape(-1, 2) for at in marks)
+    covered = np.concatenate([np.empty((0, 2)), *marks, *along])
     boxes = [shown.get_window_extent() for shown in (*axes.texts, *axes.patches)]
     ways = list(itertools.product((5.0, 8.0, 12.0, 18.0), ((0, 1), (1, 0), (-1, 0), (0, -1), (0.6, 1), (-0.6, 1))))
-    for line, xy, at in zip(lines, known, marks, strict=True):
+    for (line, xy), at in zip(known.items(), marks, strict=True):
         look = {"color": line.get_color(), "fontsize": 8, "ha": "center", "va": "center"}
         name = axes.annotate(line.get_label(), xy[0], (0, 0), textcoords="offset points", **look)
         half, found = 0.5 * np.array(name.get_window_extent().size), []

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from _common import Claims, Statement, by_method, cheapest, held, measured, said, script
-from _figures import COST, Log, draw_precision, method_look, page, panel
+from _figures import COST, Log, draw_costs, draw_precision, page, panel
 from _peers import CLOCKS, swings
 
 import sweep
@@ -130,8 +130,7 @@ def figure(axes, found, others, _):
         same = row.error_worst.max() < 2 * row.error_worst.min()  # what a tolerance does not change is one mark
         shown = row.isel(rtol=[int(row.seconds.argmin("rtol"))]) if same else row
         draw_precision(axes, shown.expand_dims("method"), "error_worst")
-    for name, row in others.items():
-        axes.plot(row.seconds, row.worst, linewidth=0.8, markersize=4, label=name, **method_look(name))
+    draw_costs(axes, others, list(others))
     text = "each mark a tolerance,\nfrom $10^{-3}$ (top) to $10^{-13}$"
     axes.text(0.02, 0.97, text, va="top", fontsize=7, color="0.35", transform=axes.transAxes)
 
