@@ -18,7 +18,7 @@ from sweep.file.reading import StoredFile
 from sweep.file.store import Store, alone, begun, found, lock_of, reopened, unfinished_of
 from sweep.runs.extend import Reused, has_failed, obstacle
 from sweep.runs.loop import Loop, Task
-from sweep.runs.pool import Terminated, TimeUp
+from sweep.runs.pool import Terminated, TimeUp, signals_held
 from sweep.words import quantity
 
 Ending = Literal["done before", "complete", "unfinished", "not begun"]
@@ -47,6 +47,10 @@ def run_to_file(task: Task) -> Ending:
             store.resume(damaged)
         elif store is not None and is_ours:
             damaged = stack.enter_context(store).resume()
+            if not store.missing():  # it was killed between its last block and its end
+                with signals_held():
+                    store.finish(0.0)
+                return "complete"
         else:
             if store is not None:
                 store.close()  # or its room on the disk is not free

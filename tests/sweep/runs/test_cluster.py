@@ -86,6 +86,21 @@ def test_nothing_is_asked_of_a_cluster_where_nothing_is_left_to_compute(output):
         assert found.sizes["height"] == 3
 
 
+def test_a_run_of_which_only_the_end_is_missing_needs_no_cluster(output, monkeypatch):
+    def killed(self, rate):
+        self.commit()
+        raise SweepError("stop here")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Store, "finish", killed)
+        with pytest.raises(SweepError, match="stop here"):
+            quiet(tall(3), output)
+    assert kept(output)
+    with elsewhere(tall(3), output, cluster="tcp://127.0.0.1:1") as found:
+        assert account(found).by_kind["pending"] == 0
+    assert list(output.parent.iterdir()) == [output]
+
+
 def test_a_lost_scheduler_is_one_line_and_the_run_continues(output):
     study = tall(1000, "slow:SLOW")
     with served(workers=2) as (address, process):
