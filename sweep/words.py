@@ -101,7 +101,7 @@ class Table:
 
 
 def paragraph(text: str) -> str:
-    """Lines of text, each wrapped at the width of the terminal; the rest of one stands below its last column."""
+    """Lines, each wrapped at the terminal's width; continuation lines are indented to its last column."""
     room, lines = width(), list[str]()
     for line in text.splitlines():
         columns = (match.end() for match in re.finditer("^ +|  +", line))

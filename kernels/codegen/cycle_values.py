@@ -25,9 +25,9 @@ SURE = 0.05
 SHORTER, ROUGHER = 0.1, 20.0
 """Of the steps of differences, those that are tried where errors are more than so many of the runs' over a step."""
 ROUNDING, ROUNDINGS = 2.3e-16, 1e-15
-"""The noise of a period that no state changes by a bit, relative, and the least of another one, and of states."""
+"""Relative noise of a period that depends on no state; least noise of any other period and of states."""
 LINEAR = 0.25
-"""Of 1 - J, what slopes may be off by."""
+"""Largest error of slopes, as a share of I - J, for which first order holds."""
 ONE = 1e-8
 """To what a multiplier must be known where it cannot be told from 1: what is 1 leaves no cycle by itself; what is 1 in
 modulus alone lets disturbances neither grow nor fade."""
@@ -135,7 +135,7 @@ def differences(the_map, cycles, swept, h):
 
 
 def judged(status, real, imaginary, unsure, multiplier, error):
-    """Statuses, and whether they are unclear: what no disturbance tells apart is no cycle by itself; one may grow.
+    """Statuses, and whether they are unclear. A multiplier of 1 is no isolated cycle; one larger than 1 is unstable.
 
     `unsure` : of each multiplier, where the cycle is as it stands; `error` : of the largest one
     """

@@ -93,7 +93,9 @@ def facts_of(events):
 
 @symbolic
 def judged(m, at_kink, pieces, facts, margins, now, trial, lanes, fallings):
-    """Whether each event is proved to stay clear on a step or to fall all along; which fall, in these lanes by that.
+    """Whether each event is proved to stay clear on a step or to fall all along; and which events fall.
+
+    In `lanes` they are those that fall by this proof, elsewhere those of `fallings`.
 
     `at_kink` : that of m, by which the surface's proof is its rate's, or None
     """
@@ -250,7 +252,10 @@ def ended(m, pieces, facts, passed, met, span, tolerance, state):
 
 @symbolic
 def length(m, pieces, state, unit, tolerance, h, power_h, moving, limits, longest, furthest):
-    """The step that the series allow, from the one before; h^(p-1) of it, and whether it leaves out too little."""
+    """The step that the series allow, from the one before; h^(p-1) of it.
+
+    And whether what it leaves out is within the tolerance.
+    """
     (left_out, over), *others = ((last_term(h, u), size(h, u)) for u in pieces.controlled)
     for last, whole in others:  # which is the worse one in its size; a state that stays 0 never is
         smaller = (last * over <= left_out * whole) & not_(left_out <= 0.0)

@@ -76,7 +76,9 @@ STUDY = option("study", metavar="STUDY.toml", type=Path)
 RESULT = option("result", metavar="OUT.h5", type=Path)
 OTHER = option("other", metavar="OTHER.h5", type=Path)
 OUTPUT_Y = option(
-    "--y", "default: the first output, but no time; of a section the first state that changes", metavar="OUTPUT"
+    "--y",
+    "default: the first output other than time; of a section the first state that differs between passages",
+    metavar="OUTPUT",
 )
 ALLOW_IMPORT = switch("--allow-import", 'allow a kernel "module:NAME" of your own')
 FORCE = switch("--force", "overwrite what is there")

@@ -300,7 +300,7 @@ class Refiner:
         self.origins = np.concatenate([self.origins, np.stack([itself] * 2, axis=1) if ends is None else ends])
 
     def _judged(self, name: str, matrix: Array) -> tuple[Indices, Array, Any, Indices, Any, Any]:
-        """Simplices as an output wants them, each with what is to become of it.
+        """Simplices, and for one output which edge of each is to be cut.
 
         Their corners; how far straight lines are off, infinite across a border between statuses that is to be cut;
         whether they are inside of one status; the ends of the edge to cut; whether the error is too large; and whether
