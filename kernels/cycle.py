@@ -125,7 +125,7 @@ def _outputs(parts: SceneParts, turning: list[str], many: int) -> tuple[list[Fie
     states, swept = parts["states"], [f.name for f in parts["parameters"] if not f.integer]
     outputs = [
         Field("period", "s", "period of the limit cycle"),
-        *(replace(f, doc=f"{f.doc}, just before the switch that ends a cycle") for f in states),
+        *(replace(f, doc=f"{f.doc}, just before the switch that ends a cycle", sized=True) for f in states),
         *(Field(f"{f.name}_size", f.unit, f"largest size in the cycle of: {f.doc}") for f in states),
         *(Field(f"{name}_turns", "1", "whole turns a cycle", integer=True) for name in turning),
         Field("multiplier", "1", "of small disturbances, a cycle; the largest, or its modulus"),

@@ -129,6 +129,7 @@ class Field:
     `gaps`: an output that may be NaN or infinite in a cell that is OK, as what it names need not exist there.
     `of_method`: an output that tells how a cell was solved, such as an error or a number of steps, so that another
     method gives another value.
+    `sized`: an output that is accurate to a share of the largest size it had on the way, not of itself.
     """
 
     name: str
@@ -143,6 +144,7 @@ class Field:
     integer: bool = False
     gaps: bool = False
     of_method: bool = False
+    sized: bool = False
 
 
 @dataclass(frozen=True)

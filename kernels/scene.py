@@ -166,7 +166,7 @@ def scene_kernel(**parts: Unpack[SceneParts]) -> Kernel:
         Where the functions ask for what is not there, or do what cannot be recorded.
     """
     scene = scene_of(parts)
-    fields, outputs = (*parts["parameters"], flips_field(40.0, MOST_FLIPS)), (*TIMES, *parts["states"])
+    fields, outputs = (*parts["parameters"], flips_field(40.0, MOST_FLIPS)), (*TIMES, *states_of(parts))
     methods = _methods(scene, [f.name for f in fields], [f.name for f in outputs])
     return declared(parts, fields, outputs, methods)
 
@@ -198,6 +198,11 @@ TIMES = (
     Field("interval", "s", "time between the last two switches, or from the start to the only one"),
 )
 """The first outputs of every scene."""
+
+
+def states_of(parts: SceneParts) -> list[Field]:
+    """A scene's states as outputs."""
+    return [replace(field, sized=True) for field in parts["states"]]
 
 
 def scene_of(parts: SceneParts) -> Scene:

@@ -14,7 +14,7 @@ import numpy as np
 from kernels.codegen.return_map import at_times
 from kernels.codegen.to_tolerance import at_switches
 from kernels.interface import FIRST_REFUSAL, UNSOLVED, Field, Kernel, Status
-from kernels.scene import SceneParts, estimating_kernel, scene_of
+from kernels.scene import SceneParts, estimating_kernel, scene_of, states_of
 
 __all__ = ["motion_kernel", "section_kernel"]
 
@@ -34,7 +34,7 @@ def section_kernel(**parts: Unpack[SceneParts]) -> Kernel:
     Kernel
         Along `passage`, the numbers of the switches that a study asks for, rising: `time` and each state just before.
     """
-    scene, states = scene_of(parts), parts["states"]
+    scene, states = scene_of(parts), states_of(parts)
     along = Field("passage", "1", "number of the switch, from the start", lower=1.0, upper=MOST, integer=True)
     outputs = [replace(f, dims=("passage",), gaps=True) for f in (Field("time", "s", "time of the switch"), *states)]
 
@@ -54,7 +54,7 @@ def motion_kernel(**parts: Unpack[SceneParts]) -> Kernel:
         Along `at`, rising times after the start: each state then. TOO_SHORT where the motion does not come to all of
         them, as where its switches accumulate: then later states are NaN.
     """
-    scene, states = scene_of(parts), parts["states"]
+    scene, states = scene_of(parts), states_of(parts)
     along = Field("at", "s", "time after the start", lower=0.0, open_lower=True)
     outputs = [replace(f, dims=("at",), gaps=True) for f in states]
 

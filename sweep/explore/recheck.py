@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Container, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -25,8 +26,9 @@ CLOSER = 100.0
 """A second opinion is asked for at rtol over this, or at the smallest rtol."""
 CONFIDENCE = 0.95
 WORDS = {int(status): status for status in Status}
-NOTHING = 1e-12
-"""A state of a scene that is nowhere larger at its switches, in SI, lies on the surface and is 0 to rounding."""
+APART, ROUNDING = 0.1, 1e-15
+"""Two opinions differ by more than this share of a value only if it is 0 to rounding: by some such share of its size.
+"""
 
 
 class CellReport:
@@ -62,11 +64,13 @@ class CellReport:
         self.error_bound = cell[ERROR_BOUND].item() if ERROR_BOUND in cell else np.nan
         self.methods, self.differs = dict[str, tuple[Status, float, dict[str, float]]](), dict[str, float]()
         part = zipped(study, {"rtol": [self.rtol]}, fixed=fixed, follows={})
-        for method in (study.kernel.methods[k].name for k in usable_methods(part)):
-            found = solved(replace(part, method=method))
+        able = [study.kernel.methods[k].name for k in usable_methods(part)]
+        opinions = {method: solved(replace(part, method=method)) for method in able}
+        values = [found.outputs for found in opinions.values()]
+        for method, found in opinions.items():
             outputs = {name: float(found.outputs[name][0]) for name in self.values}
             self.methods[method] = WORDS[int(found.status[0])], float(found.error[0]), outputs
-            off = deviations(study, found.outputs, cells).values()
+            off = deviations(study, found.outputs, cells, values[:2]).values()
             self.differs[method] = max((float(one[0]) for one in off), default=np.nan)
 
     def __repr__(self) -> str:
@@ -83,15 +87,16 @@ class CellReport:
 
 
 class Checked:
-    """What comes of solving some OK cells of a result again. Raises SweepError where it has none.
+    """What comes of solving some OK cells of a result again. Raises SweepError where nothing can be compared.
 
     They are asked for at rtol over `CLOSER`. The second opinion is another method's wherever one gets to rtol; else
     the same method's.
 
     Attributes
     ----------
-    cells, sample, judged, by_another : int
-        OK cells of the result, those drawn, those for which there was a second opinion, and one of another method.
+    cells, sample, judged, by_another, no_answer : int
+        OK cells of the result, those drawn, those for which there was a second opinion, those of which it is another
+        method's value, and those of which it is that there is no such answer.
     beyond : int
         Judged cells in which an output differs by more than rtol and the error of the second opinion, or of which the
         second opinion is that there is no such answer.
@@ -110,29 +115,19 @@ class Checked:
             raise SweepError("no cell is OK, so there is nothing to check")
         drawn = np.sort(np.random.default_rng(seed).choice(ok, min(sample, len(ok)), replace=False))
         study, cells, columns = again(dataset, drawn, allow_import)
+        if all(field.of_method for field in study.asked):
+            raise SweepError("all outputs say how a cell was solved, so there is none by which methods can be compared")
         rtol, closer = columns["rtol"], columns | {"rtol": np.maximum(columns["rtol"] / CLOSER, SMALLEST_RTOL)}
-        methods, used = study.kernel.methods, cells[METHOD_USED].values
-        own = np.array([methods[k].name for k in used], object)
-
-        # methods that say what they are right to come before others, and a cell's own after all
-        order = sorted(methods, key=lambda method: method.bound is None and not method.estimates)
-        source, error, values = own.copy(), np.inf * rtol, {name: np.array(cells[name]) for name in study.outputs}
-        for others, k in itertools.product((True, False), np.unique(used)):
-            some = np.flatnonzero((used == k) & (error > rtol))
-            part = zipped(study, {name: column[some] for name, column in closer.items()}, fixed={}, follows={})
-            asked = [method for method in order if (method is not methods[k]) == others]
-            found = solved(replace(part, kernel=replace(study.kernel, methods=tuple(asked)), method="auto"))
-            # that there is no such answer is an answer, which differs from any value
-            none = (found.status >= FIRST_REFUSAL) & ~among(found.status, GIVEN_UP)
-            error[some] = np.where(none, 0.0, np.where(found.status <= Status.INACCURATE, found.error, np.inf))
-            source[some] = [asked[n].name if n >= 0 else WORDS[s].name for n, s in np.c_[found.used, found.status]]
-            for name, column in found.outputs.items():
-                values[name][some] = column
-
-        off, judged = deviations(study, cells, values), error <= rtol
+        used, methods = cells[METHOD_USED].values, study.kernel.methods
+        source, another, none, error, values = opinion(study, closer, used, rtol)
+        opinions = [values]
+        if any(field.sized for field in study.asked):
+            opinions.append(opinion(study, closer, used, rtol, without={*source}).values)
+        off, judged = deviations(study, cells, values, opinions), error <= rtol
         largest = np.max([*off.values()], axis=0)
         self.cells, self.sample, self.judged = len(ok), len(drawn), int(judged.sum())
-        self.by_another, self.beyond = (int((judged & some).sum()) for some in (source != own, largest > rtol + error))
+        counts = (another & ~none, none, largest > rtol + error)
+        self.by_another, self.no_answer, self.beyond = (int((judged & some).sum()) for some in counts)
         # the largest share of which so few would be found in so many, by Clopper and Pearson; of all cells, their own
         share = betaincinv(self.beyond + 1, self.judged - self.beyond, CONFIDENCE) if self.beyond < self.judged else 1.0
         self.limit = self.beyond / self.judged if self.judged == self.cells else float(share)
@@ -142,15 +137,17 @@ class Checked:
             output = max(off, key=lambda name: off[name][i])
             pair = [np.ravel(some[output][i]) for some in (cells, values)]
             place = np.argmax(abs(pair[0] - pair[1]))
-            said = [(own[i], float(pair[0][place])), (source[i], float(pair[1][place]))]
+            said = [(methods[used[i]].name, float(pair[0][place])), (source[i], float(pair[1][place]))]
             self.worst = {"cell": cell_values(dataset, int(drawn[i])), "output": output, "values": said}
             self.worst["off"] = float(largest[i] / rtol[i])
 
     def __repr__(self) -> str:
+        same = self.judged - self.by_another - self.no_answer
         rows = [
             ("solved again", f"{self.sample:,} of {self.cells:,} OK cells, to a tolerance down to rtol/{CLOSER:g}"),
             ("by another method", f"{self.by_another:,}"),
-            ("by the same", f"{self.judged - self.by_another:,}; an error that both have in common is not found"),
+            ("by the same", f"{same:,}; an error that both have in common is not found"),
+            ("no answer", f"{self.no_answer:,}, of which a method says that there is none"),
             ("by none", f"{self.sample - self.judged:,}, which no method solves to rtol again"),
             ("beyond rtol", f"{self.beyond or 'none'} of {self.judged:,}"),
             ("of all OK cells", f"at most {100 * self.limit:.2g} % beyond, with {100 * CONFIDENCE:g} % confidence"),
@@ -181,18 +178,56 @@ def again(dataset: xr.Dataset, numbers: Any, allow_import: bool) -> tuple[Study,
     return study, cells, columns
 
 
-def deviations(study: Study, outputs: Any, true: Any) -> dict[str, Any]:
+class Opinion(NamedTuple):
+    """What is found for each cell, by whom: a method, or the status that says that there is none; the error of it."""
+
+    source: Any
+    another: Any
+    none: Any
+    error: Any
+    values: dict[str, Any]
+
+
+def opinion(study: Study, columns: dict[str, Any], used: Any, rtol: Any, without: Container[str] = ()) -> Opinion:
+    """Cells solved by another method than the `used` one, and `without` some, where one gets to rtol; else by that."""
+    methods = study.kernel.methods
+    # methods that say what they are right to come before others, and a cell's own after all
+    order = sorted(methods, key=lambda method: method.bound is None and not method.estimates)
+    source, error = np.array([methods[k].name for k in used], object), np.full(len(used), np.inf)
+    another, none, values = np.zeros(len(used), bool), np.zeros(len(used), bool), dict[str, Any]()
+    for others, k in itertools.product((True, False), np.unique(used)):
+        some = np.flatnonzero((used == k) & (error > rtol))
+        part = zipped(study, {name: column[some] for name, column in columns.items()}, fixed={}, follows={})
+        apart = [method for method in order if method is not methods[k] and method.name not in without]
+        asked = apart if others else [methods[k]]
+        found = solved(replace(part, kernel=replace(study.kernel, methods=tuple(asked)), method="auto"))
+        # that there is no such answer is an answer, which differs from any value
+        none[some] = (found.status >= FIRST_REFUSAL) & ~among(found.status, GIVEN_UP)
+        right = np.where(found.status <= Status.INACCURATE, found.error, np.inf)
+        error[some], another[some] = np.where(none[some], 0.0, right), others
+        source[some] = [asked[n].name if n >= 0 else WORDS[s].name for n, s in np.c_[found.used, found.status]]
+        for name, column in found.outputs.items():
+            values.setdefault(name, np.full((len(used), *column.shape[1:]), np.nan))[some] = column
+    return Opinion(source, another, none, error, values)
+
+
+def deviations(study: Study, outputs: Any, true: Any, opinions: Sequence[Any]) -> dict[str, Any]:
     """How far outputs are from others of the same cells, in each; infinite where one alone is NaN.
 
     As `OK` promises: relative to themselves, traces to their amplitude, and the states of a scene of one's own to their
-    largest value in these cells, since a result does not keep their size on the way; those that the surface holds at 0
-    are the same. Outputs that say how a cell was solved, such as a number of steps, are left out.
+    largest value in these cells, since a result does not keep their size on the way. Where a state is 0 at every
+    switch, two opinions have no digit in common, and what they differ by is rounding, which tells that size. Outputs
+    that say how a cell was solved, such as a number of steps, are left out.
     """
     found = {}
-    for name in (field.name for field in study.asked if not field.of_method):
-        pair, size = [np.asarray(some[name]) for some in (outputs, true)], 0.0
-        if ":" in study.kernel_name:
-            pair = [np.where(abs(values) <= NOTHING, 0.0, values) for values in pair]
+    for field in (field for field in study.asked if not field.of_method):
+        pair, size = [np.asarray(some[field.name]) for some in (outputs, true)], 0.0
+        if field.sized:
             size = min(float(np.nanmax(abs(values), initial=0.0)) for values in pair)
-        found[name] = relative_error(pair[0], pair[1], size)
+            two = np.stack([some[field.name] for some in opinions])
+            two = two[:, np.isfinite(two).all(axis=0) & two.any(axis=0)]
+            gap = np.ptp(two, axis=0)
+            if gap.size and np.median(gap / abs(two).max(axis=0)) > APART:
+                size = max(size, float(gap.max()) / ROUNDING)
+        found[field.name] = relative_error(pair[0], pair[1], size)
     return found

@@ -95,6 +95,9 @@ def test_a_count_of_steps_is_no_difference_of_methods():
 
 
 def test_what_is_no_cell_is_refused(clocks):
+    keys = {"kernel": "foliot_steps", "method": "rk4", "outputs": ["steps"], "rtol": 0.01, "axes": {"mu": [1.0]}}
+    with pytest.raises(sweep.SweepError, match="compared"):
+        sweep.run(keys | {"fixed": {"phi0": 1.0, "a": 1.0, "step": 0.05}}).sweep.check()
     with pytest.raises(sweep.SweepError, match="mu"):
         clocks.sweep.cell(R=0.1)
     with pytest.raises(sweep.SweepError, match="unit"):
@@ -127,7 +130,16 @@ def test_a_scene_whose_parameters_all_have_defaults_is_asked_again_and_what_is_0
     report = ds.sweep.cell(allow_import=True)
     assert abs(report.values["x"]) < 1e-15
     report = ds.assign(x=-ds.x - 1e-17).sweep.cell(allow_import=True)
-    assert report.differs[report.method] == 0
+    assert report.differs[report.method] == pytest.approx(0, abs=1e-12)
+
+
+def test_deviations_of_a_small_motion_are_those_of_the_same_motion_in_larger_units():
+    keys = {"kernel": "kicked_scene:SECTION", "allow_import": True, "along": {"passage": [1, 2, 3]}, "rtol": 1e-6}
+    ds = sweep.run(sweep.study(**keys, axes={"zeta": [0.1, 0.2]}, fixed={"kick": 1e-13, "v0": 3e-13}))
+    assert ds.sweep.check(allow_import=True).beyond == 0
+    assert ds.assign(x=ds.x + 1e-12).sweep.check(allow_import=True).beyond == 2
+    found = ds.assign(v=ds.v * 1.5).sweep.check(allow_import=True)
+    assert (found.beyond, found.worst["output"]) == (2, "v")
 
 
 def test_a_dataset_without_statuses_says_what_can_be_done_with_it():
@@ -188,5 +200,5 @@ def test_a_value_where_another_method_finds_that_there_is_none_is_beyond(clocks)
         | {"status": refused.status * 0, "method_used": refused.method_used.isel(mu=[1, 1]).drop_vars("mu")}
     )
     found = false.sweep.check()
-    assert (found.judged, found.beyond) == (2, 1)
+    assert (found.judged, found.by_another, found.no_answer, found.beyond) == (2, 1, 1, 1)
     assert found.worst["off"] == np.inf
