@@ -151,7 +151,9 @@ def equilibrium(the_map, parameters, z, side, size):
             up, down = z.copy(), z.copy()
             up[j], down[j] = z[j] + h, z[j] - h
             J[:, j] = (the_map.rates(parameters, up, side) - the_map.rates(parameters, down, side)) / (2.0 * h)
-        step = solved(J, the_map.rates(parameters, z, side)[:, None])[:, 0]
+        rates = the_map.rates(parameters, z, side)
+        J[range(n), range(n)] -= (J == 0.0).all(axis=1) & (rates == 0.0)  # what no rate changes stays
+        step = solved(J, rates[:, None])[:, 0]
         z = z - step
     return z, most(abs(step)), (eigenvalues(J)[0] < 0.0).all(axis=0)
 
@@ -197,7 +199,7 @@ class Search:
                 z[j] = z[j] - turn * np.round(z[j] / turn)
             self.last[:, left[~ended]] = z[:, ~ended]
             self._settled(left[~ended])
-            over = ended | (settle[left] == 0.0) | (status[left] == Status.OK) | self.fades[left]
+            over = ended | (settle[left] == 0.0) | (status[left] == Status.OK)
             left = left[~over]
             if not len(left):
                 break
