@@ -183,6 +183,11 @@ def seconds_of(name: str, text: float | str) -> float:
     return found
 
 
+def percent(share: float) -> str:
+    """`7 %`, `99.9 %`: rounded down, so that 100 % are all; but what rounding of the share took is given back."""
+    return f"{math.floor(1000 * share + 1e-9) / 10:g} %"
+
+
 def quantity(count: float) -> str:
     """Bytes as people say them: `812 B`, `1.3 kB`, `42 MB`."""
     units = ["B", "kB", "MB", "GB", "TB", "PB"]

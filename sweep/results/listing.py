@@ -9,7 +9,7 @@ from pathlib import Path
 from sweep.errors import SweepError
 from sweep.file.open import stored
 from sweep.results.statuses import Account, account
-from sweep.words import Table, as_path
+from sweep.words import Table, as_path, percent
 
 UNFINISHED = re.compile(r"(.+\.(?:h5|nc))\.unfinished")
 """What a sweep that still runs has beside its output."""
@@ -46,7 +46,7 @@ class Listed:
             self.fault = str(fault).removeprefix(f"{path}: ")
         self.question = str(attrs.get("question") or attrs.get("title", ""))
         self.cells, self.statuses, self.account = found.total, found.statuses, found.by_kind
-        self.done = 1.0 - self.account["pending"] / max(1, self.cells)
+        self.done = found.done
         self.when = str(attrs.get("end", attrs.get("start", "")))
         self.version = str(attrs.get("versions", "")).partition(",")[0].removeprefix("foliot ")
 
@@ -59,8 +59,7 @@ class Listed:
         if self.fault:
             return self.path.name, "", "", "", "", "", self.fault
         cells = ", ".join(f"{n:,} {kind}" for kind, n in self.account.items() if n)
-        done = f"{1000 * (self.cells - self.account['pending']) // self.cells / 10:g} %"
-        return self.path.name, f"{self.cells:,}", done, cells, self.when[:16], self.version, self.question
+        return self.path.name, f"{self.cells:,}", percent(self.done), cells, self.when[:16], self.version, self.question
 
 
 class Listing(tuple[Listed, ...]):

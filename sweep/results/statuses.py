@@ -53,6 +53,11 @@ class Account:
             counts[kind_of(name)] += cells
         return counts
 
+    @property
+    def done(self) -> float:
+        """Share of the cells that are computed."""
+        return 1.0 - self.by_kind["pending"] / max(1, self.total)
+
     def __str__(self) -> str:
         counts = [f"{cells:,} {kind}" for kind, cells in self.by_kind.items() if cells]
         return f"{self.total:,} cells: {', '.join(counts) or 'none'}"

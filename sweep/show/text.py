@@ -25,7 +25,7 @@ from sweep.results.statuses import (
 )
 from sweep.runs.log import log_path, read_lines
 from sweep.study.model import short
-from sweep.words import Table, page, paragraph
+from sweep.words import Table, page, paragraph, percent
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -61,9 +61,9 @@ def result_text(path: Path, dataset: xr.Dataset) -> str:
 def head(path: Path, dataset: xr.Dataset) -> list[str]:
     """Name and completeness, title, question, and what became of the cells."""
     found = account(dataset)
-    total, waiting = found.total, found.by_kind["pending"]
-    share = f"{math.floor(1000 * (total - waiting) / total) / 10:g} %"
-    done = f"unfinished: {total - waiting:,} of {total:,} cells ({share})" if waiting else f"complete, {total:,} cells"
+    total, waiting, done = found.total, found.by_kind["pending"], f"complete, {found.total:,} cells"
+    if waiting:
+        done = f"unfinished: {total - waiting:,} of {total:,} cells ({percent(found.done)})"
     texts = [f"{path}: {done}", dataset.attrs.get("title", ""), dataset.attrs.get("question", ""), str(found)]
     return list(dict.fromkeys(str(text) for text in texts if text))
 
