@@ -28,7 +28,7 @@ class Incomplete(SweepError):
 def reason(fault: BaseException) -> str:
     """What a fault says: the system's words for its number, or the first line of its text, or its kind."""
     if isinstance(fault, OSError):
-        text = os.strerror(fault.errno) if fault.errno else fault.strerror or str(fault)
+        text = fault.strerror or (os.strerror(fault.errno) if fault.errno else str(fault))
     else:
         text = str(fault)
     return text.partition("\n")[0] or type(fault).__name__

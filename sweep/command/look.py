@@ -44,7 +44,8 @@ def studies(arguments: argparse.Namespace) -> None:
     from sweep.show.studies import copy_study, studies_text
 
     name = arguments.name
-    say("\n".join(map(str, copy_study(name, force=arguments.force))) if name else studies_text())
+    for text in copy_study(name, force=arguments.force) if name else [studies_text()]:
+        say(text)
 
 
 @command("sweep show foliot.h5", o.RESULT)
@@ -62,7 +63,7 @@ def verify(arguments: argparse.Namespace) -> None:
     verdict = sweep.verify(arguments.result)
     if not verdict.whole:
         raise SweepError(str(verdict))
-    tell(arguments, verdict)
+    tell(arguments, {**vars(verdict), "whole": verdict.whole}, verdict)
 
 
 @command(

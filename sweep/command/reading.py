@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TextIO
 
 import sweep
-from sweep.errors import FAULT, INCOMPLETE, INTERRUPTED, MISTAKE, Incomplete, SweepError
+from sweep.errors import FAULT, INCOMPLETE, INTERRUPTED, MISTAKE, Incomplete, SweepError, reason
 from sweep.words import paragraph, printable
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ def explained(error: BaseException) -> Outcome:
         case MemoryError():
             return Outcome(MISTAKE, "out of memory; choose fewer cells, fewer outputs or fewer workers")
         case OSError():
-            return Outcome(MISTAKE, f"{error.filename or 'the system'}: {error.strerror or error}")
+            return Outcome(MISTAKE, f"{error.filename or 'the system'}: {reason(error)}")
     said = "Please report it; with SWEEP_TRACEBACK=1 in the environment the same command says where."
     return Outcome(FAULT, f"a fault in foliot: {type(error).__name__}: {error}\n{said}")
 
@@ -89,9 +89,12 @@ def opened(arguments: argparse.Namespace, name: str = "result") -> Iterator[xr.D
 
 
 def say(text: object, file: TextIO | None = None, wide: bool = False) -> None:
-    """Prints, to stdout unless said otherwise, what may hold text of other people; no wider than the terminal."""
+    """Prints, to stdout unless said otherwise, what may hold text of other people; no wider than the terminal.
+
+    A path is printed as it is, in one line, for others to take.
+    """
     shown = printable(str(text))
-    print(shown if wide else paragraph(shown), file=file)
+    print(shown if wide or isinstance(text, Path) else paragraph(shown), file=file)
 
 
 def tell(arguments: argparse.Namespace, found: Any, text: object = None) -> None:

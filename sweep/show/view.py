@@ -31,8 +31,9 @@ POINTS, PIXELS = 20_000, 2_000
 """Points along a line and cells along the side of a map that are drawn; beyond, every second, third ... one."""
 PASSAGE = "passage"
 """What a section runs along: its values are points beside each other, which are drawn over a parameter."""
-SAME = 1e-9
-"""A state of a section that changes by less than this share of its size, or of 1, is kept by the surface."""
+SAME, ROUNDING = 1e-9, 1e-14
+"""A state of a section that changes by less than this share of its size, or whose size is less than that share of the
+largest state's, is kept by the surface."""
 HARD_SPACE = "\u00a0"
 """Where no line is broken."""
 SIDE = 201
@@ -163,11 +164,15 @@ def preferred(dataset: xr.Dataset, outputs: Sequence[str]) -> str:
 
     Of a section the first state that its surface does not keep the same at every passage.
     """
+    states = [name for name in outputs if PASSAGE in dataset[name].dims and name != "time"]
+    largest = max((float(abs(dataset[name]).max()) for name in states), default=0.0)
     for name in outputs:
         column = dataset[name]
         if name == "time" or (is_summary(dataset) and name.endswith("_count")):
             continue
-        if PASSAGE not in column.dims or float(column.max() - column.min()) > SAME * max(1.0, float(abs(column).max())):
+        if name not in states:
+            return name
+        if float(column.max() - column.min()) > max(SAME * float(abs(column).max()), ROUNDING * largest):
             return name
     return outputs[0]
 

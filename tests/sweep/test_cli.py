@@ -3,6 +3,7 @@
 What it prints, word for word, stands in `tests/snapshots/`.
 """
 
+import json
 import os
 import shutil
 import subprocess
@@ -180,6 +181,12 @@ def test_an_export_has_the_cells_units_and_digits_asked_for(done, call):
     assert (code, "unit" in err) == (2, True)
 
 
+def test_the_path_of_what_is_written_is_one_line_however_long_and_json_says_whether_it_is_whole(done, call):
+    path = f"my results {'of stones ' * 12}.csv"
+    assert call("export", "stones.h5", "-o", path)[1] == f"{path}\n"
+    assert json.loads(call("verify", "stones.h5", "--json")[1])["whole"] is True
+
+
 def test_two_results_are_joined(done, call):
     Path("old").mkdir()
     for name in ("old/a.h5", "a.h5"):
@@ -232,6 +239,8 @@ def test_a_mistake_ends_in_one_message_and_status_2(here, call, argv, message):
         (MemoryError(), 2, "memory"),
         (OSError(28, "No space left on device", "/x"), 2, "/x: No space"),
         (OSError("odd"), 2, "odd"),
+        (OSError(-2, "Name or service not known"), 2, "Name or service"),
+        (OSError(28, None), 2, "No space left"),
         (KeyError("x"), 1, "KeyError"),
     ],
 )

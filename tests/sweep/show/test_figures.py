@@ -75,6 +75,10 @@ def test_a_section_is_points_over_a_parameter_by_their_status():
     assert len(fine.get_ydata()) == 7 * 32
     assert len(unsure.get_ydata()) == 4 * 32
     assert axes.get_ylabel() == "period of the cycle [s]"
+    speed = (1e-13 * kept["time"]).drop_attrs()
+    small = {"angle": 1e-25 * speed, "place": 5e-3 * speed, "speed": speed}  # rounding, and two states
+    (axes,) = plot(ds[["status"]].assign(kept | small)).axes
+    assert axes.get_ylabel().startswith("place")
 
 
 def test_further_axes_are_held_at_their_middle_and_the_title_says_so():
