@@ -47,10 +47,6 @@ def run_to_file(task: Task) -> Ending:
             store.resume(damaged)
         elif store is not None and is_ours:
             damaged = stack.enter_context(store).resume()
-            if not store.missing():  # it was killed between its last block and its end
-                with signals_held():
-                    store.finish(0.0)
-                return "complete"
         else:
             if store is not None:
                 store.close()  # or its room on the disk is not free
@@ -61,6 +57,10 @@ def run_to_file(task: Task) -> Ending:
                 )
             disk.remove(unfinished_of(task.output))
             store = None
+        if store is not None and not store.missing():  # its end alone is missing, or the columns made there are damaged
+            with signals_held():
+                store.finish(0.0)
+            return "complete"
         try:
             with contextlib.ExitStack() as running:
                 known = None
