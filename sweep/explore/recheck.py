@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Container, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -26,9 +25,8 @@ CLOSER = 100.0
 """A second opinion is asked for at rtol over this, or at the smallest rtol."""
 CONFIDENCE = 0.95
 WORDS = {int(status): status for status in Status}
-APART, ROUNDING = 0.1, 1e-15
-"""Two opinions differ by more than this share of a value only if it is 0 to rounding: by some such share of its size.
-"""
+APART, TINY = 0.1, 1e-9
+"""Share of itself and of the largest state, to leave out a state that is 0 but for rounding."""
 
 
 class CellReport:
@@ -58,19 +56,17 @@ class CellReport:
         for name, value in ((str(name), cell[name]) for name in cell.coords if name in shown):
             text = short(value.values) if value.dtype.kind in "fiu" else str(value.item())
             self.place[name] = f"{text} {value.attrs.get('units', '1')}".removesuffix(" 1")
-        self.values = {name: cell[name].item() for name in study.outputs if not cell[name].dims}
+        self.values = {name: cell[name].item() for name in study.outputs if name in cell and not cell[name].dims}
         self.units = {name: cell[name].attrs.get("units", "") for name in self.values}
         self.status, self.method = WORDS[cell[STATUS].item()], flag_words(cell[METHOD_USED])[cell[METHOD_USED].item()]
         self.error_bound = cell[ERROR_BOUND].item() if ERROR_BOUND in cell else np.nan
         self.methods, self.differs = dict[str, tuple[Status, float, dict[str, float]]](), dict[str, float]()
         part = zipped(study, {"rtol": [self.rtol]}, fixed=fixed, follows={})
-        able = [study.kernel.methods[k].name for k in usable_methods(part)]
-        opinions = {method: solved(replace(part, method=method)) for method in able}
-        values = [found.outputs for found in opinions.values()]
-        for method, found in opinions.items():
+        for method in (study.kernel.methods[k].name for k in usable_methods(part)):
+            found = solved(replace(part, method=method))
             outputs = {name: float(found.outputs[name][0]) for name in self.values}
             self.methods[method] = WORDS[int(found.status[0])], float(found.error[0]), outputs
-            off = deviations(study, found.outputs, cells, values[:2]).values()
+            off = deviations(study, found.outputs, cells).values()
             self.differs[method] = max((float(one[0]) for one in off), default=np.nan)
 
     def __repr__(self) -> str:
@@ -100,6 +96,8 @@ class Checked:
     beyond : int
         Judged cells in which an output differs by more than rtol and the error of the second opinion, or of which the
         second opinion is that there is no such answer.
+    left_out : list of str
+        States that are 0 in each cell but for rounding.
     limit : float
         Share of all OK cells that may be beyond rtol, at 95 % confidence.
     worst : dict
@@ -115,15 +113,28 @@ class Checked:
             raise SweepError("no cell is OK, so there is nothing to check")
         drawn = np.sort(np.random.default_rng(seed).choice(ok, min(sample, len(ok)), replace=False))
         study, cells, columns = again(dataset, drawn, allow_import)
-        if all(field.of_method for field in study.asked):
-            raise SweepError("all outputs say how a cell was solved, so there is none by which methods can be compared")
-        rtol, closer = columns["rtol"], columns | {"rtol": np.maximum(columns["rtol"] / CLOSER, SMALLEST_RTOL)}
-        used, methods = cells[METHOD_USED].values, study.kernel.methods
-        source, another, none, error, values = opinion(study, closer, used, rtol)
-        opinions = [values]
-        if any(field.sized for field in study.asked):
-            opinions.append(opinion(study, closer, used, rtol, without={*source}).values)
-        off, judged = deviations(study, cells, values, opinions), error <= rtol
+        rtol, used, methods = columns["rtol"], cells[METHOD_USED].values, study.kernel.methods
+        closer = columns | {"rtol": np.maximum(rtol / CLOSER, SMALLEST_RTOL)}
+        # methods that say what they are right to come before others, and a cell's own after all
+        order = sorted(methods, key=lambda method: method.bound is None and not method.estimates)
+        source, error, values = np.array([""] * len(used), object), np.full(len(used), np.inf), dict[str, Any]()
+        another, none = np.zeros((2, len(used)), bool)
+        for others, k in itertools.product((True, False), np.unique(used)):
+            some = np.flatnonzero((used == k) & (error > rtol))
+            part = zipped(study, {name: column[some] for name, column in closer.items()}, fixed={}, follows={})
+            asked = tuple(method for method in order if (method is not methods[k]) == others)
+            found = solved(replace(part, kernel=replace(study.kernel, methods=asked), method="auto"))
+            # that there is no such answer is an answer, which differs from any value
+            none[some] = (found.status >= FIRST_REFUSAL) & ~among(found.status, GIVEN_UP)
+            right = np.where(found.status <= Status.INACCURATE, found.error, np.inf)
+            error[some], another[some] = np.where(none[some], 0.0, right), others
+            source[some] = [asked[n].name if n >= 0 else WORDS[s].name for n, s in np.c_[found.used, found.status]]
+            for name, column in found.outputs.items():
+                values.setdefault(name, np.full((len(used), *column.shape[1:]), np.nan))[some] = column
+        off, judged = deviations(study, cells, values), error <= rtol
+        if not off:
+            raise SweepError("no output can be compared: all say how a cell was solved, or are 0 but for rounding")
+        self.left_out = [f.name for f in study.asked if f.name in cells and f.name not in off and not f.of_method]
         largest = np.max([*off.values()], axis=0)
         self.cells, self.sample, self.judged = len(ok), len(drawn), int(judged.sum())
         counts = (another & ~none, none, largest > rtol + error)
@@ -152,6 +163,7 @@ class Checked:
             ("beyond rtol", f"{self.beyond or 'none'} of {self.judged:,}"),
             ("of all OK cells", f"at most {100 * self.limit:.2g} % beyond, with {100 * CONFIDENCE:g} % confidence"),
         ]
+        rows += [("left out", f"{', '.join(self.left_out)}: 0 but for rounding")] if self.left_out else []
         if self.worst:
             place = ", ".join(f"{name} = {value}" for name, value in self.worst["cell"].items())
             values = " against ".join(f"{value:.12g} ({who})" for who, value in self.worst["values"])
@@ -175,59 +187,29 @@ def again(dataset: xr.Dataset, numbers: Any, allow_import: bool) -> tuple[Study,
             values = np.vectorize(field.choices.get, otypes=[float])(values)
         shape = values.shape if "cell" in column.dims else (len(numbers), *values.shape)
         columns[field.name] = np.broadcast_to(values, shape)
-    return study, cells, columns
+    # beside other states it is seen that a state is 0 but for rounding
+    more = (field.name for field in study.kernel.outputs if field.sized and field.name not in study.outputs)
+    return replace(study, outputs=(*study.outputs, *more)), cells, columns
 
 
-class Opinion(NamedTuple):
-    """What is found for each cell, by whom: a method, or the status that says that there is none; the error of it."""
-
-    source: Any
-    another: Any
-    none: Any
-    error: Any
-    values: dict[str, Any]
-
-
-def opinion(study: Study, columns: dict[str, Any], used: Any, rtol: Any, without: Container[str] = ()) -> Opinion:
-    """Cells solved by another method than the `used` one, and `without` some, where one gets to rtol; else by that."""
-    methods = study.kernel.methods
-    # methods that say what they are right to come before others, and a cell's own after all
-    order = sorted(methods, key=lambda method: method.bound is None and not method.estimates)
-    source, error = np.array([methods[k].name for k in used], object), np.full(len(used), np.inf)
-    another, none, values = np.zeros(len(used), bool), np.zeros(len(used), bool), dict[str, Any]()
-    for others, k in itertools.product((True, False), np.unique(used)):
-        some = np.flatnonzero((used == k) & (error > rtol))
-        part = zipped(study, {name: column[some] for name, column in columns.items()}, fixed={}, follows={})
-        apart = [method for method in order if method is not methods[k] and method.name not in without]
-        asked = apart if others else [methods[k]]
-        found = solved(replace(part, kernel=replace(study.kernel, methods=tuple(asked)), method="auto"))
-        # that there is no such answer is an answer, which differs from any value
-        none[some] = (found.status >= FIRST_REFUSAL) & ~among(found.status, GIVEN_UP)
-        right = np.where(found.status <= Status.INACCURATE, found.error, np.inf)
-        error[some], another[some] = np.where(none[some], 0.0, right), others
-        source[some] = [asked[n].name if n >= 0 else WORDS[s].name for n, s in np.c_[found.used, found.status]]
-        for name, column in found.outputs.items():
-            values.setdefault(name, np.full((len(used), *column.shape[1:]), np.nan))[some] = column
-    return Opinion(source, another, none, error, values)
-
-
-def deviations(study: Study, outputs: Any, true: Any, opinions: Sequence[Any]) -> dict[str, Any]:
+def deviations(study: Study, outputs: Any, true: Any) -> dict[str, Any]:
     """How far outputs are from others of the same cells, in each; infinite where one alone is NaN.
 
     As `OK` promises: relative to themselves, traces to their amplitude, and the states of a scene of one's own to their
-    largest value in these cells, since a result does not keep their size on the way. Where a state is 0 at every
-    switch, two opinions have no digit in common, and what they differ by is rounding, which tells that size. Outputs
-    that say how a cell was solved, such as a number of steps, are left out.
+    largest value in these cells, since a result does not keep their size on the way. A state far smaller than another,
+    without a digit in common in most cells, is 0 but for rounding, and left out; so are outputs that say how a cell was
+    solved, such as a number of steps.
     """
-    found = {}
-    for field in (field for field in study.asked if not field.of_method):
-        pair, size = [np.asarray(some[field.name]) for some in (outputs, true)], 0.0
-        if field.sized:
-            size = min(float(np.nanmax(abs(values), initial=0.0)) for values in pair)
-            two = np.stack([some[field.name] for some in opinions])
-            two = two[:, np.isfinite(two).all(axis=0) & two.any(axis=0)]
-            gap = np.ptp(two, axis=0)
-            if gap.size and np.median(gap / abs(two).max(axis=0)) > APART:
-                size = max(size, float(gap.max()) / ROUNDING)
-        found[field.name] = relative_error(pair[0], pair[1], size)
+    found = dict[str, Any]()
+    sizes = {
+        f.name: [np.nanmax(abs(np.asarray(some[f.name])), initial=0.0) for some in (outputs, true) if f.name in some]
+        for f in study.asked
+        if f.sized
+    }
+    tiny = TINY * max(itertools.chain(*sizes.values()), default=0.0)
+    for name in (f.name for f in study.asked if f.name in outputs and f.name in true and not f.of_method):
+        values, right = np.asarray(outputs[name]), np.asarray(true[name])
+        rounding = name in sizes and max(sizes[name]) <= tiny and np.median(relative_error(values, right)) > APART
+        if not rounding:
+            found[name] = relative_error(values, right, min(sizes.get(name, [0.0])))
     return found
