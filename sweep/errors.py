@@ -26,11 +26,10 @@ class Incomplete(SweepError):
 
 
 def reason(fault: BaseException) -> str:
-    """What a fault says: the system's words for its number, or the first line of its text, or its kind."""
-    if isinstance(fault, OSError):
-        text = fault.strerror or (os.strerror(fault.errno) if fault.errno else str(fault))
-    else:
-        text = str(fault)
+    """What a fault says, or its kind; of HDF5's account, which has several lines, the system's words for its number."""
+    text = (isinstance(fault, OSError) and fault.strerror) or str(fault)
+    if "\n" in text and isinstance(fault, OSError) and fault.errno:
+        return os.strerror(fault.errno)
     return text.partition("\n")[0] or type(fault).__name__
 
 

@@ -106,7 +106,7 @@ def paragraph(text: str) -> str:
     for line in text.splitlines():
         columns = (match.end() for match in re.finditer("^ +|  +", line))
         below = " " * max((column for column in columns if column <= room - LAST), default=0)
-        lines += _wrapped(line, room, below) if len(line) > room else [line]
+        lines += _wrapped(line, room, below) if len(line) > room and " " in line.strip() else [line]
     return "\n".join(lines)
 
 

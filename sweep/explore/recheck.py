@@ -90,9 +90,8 @@ class Checked:
 
     Attributes
     ----------
-    cells, sample, judged, by_another, no_answer : int
-        OK cells of the result, those drawn, those for which there was a second opinion, those of which it is another
-        method's value, and those of which it is that there is no such answer.
+    cells, sample, judged, by_another : int
+        OK cells of the result, those drawn, those for which there was a second opinion, those where by another method.
     beyond : int
         Judged cells in which an output differs by more than rtol and the error of the second opinion, or of which the
         second opinion is that there is no such answer.
@@ -118,16 +117,16 @@ class Checked:
         # methods that say what they are right to come before others, and a cell's own after all
         order = sorted(methods, key=lambda method: method.bound is None and not method.estimates)
         source, error, values = np.array([""] * len(used), object), np.full(len(used), np.inf), dict[str, Any]()
-        another, none = np.zeros((2, len(used)), bool)
+        another = np.zeros(len(used), bool)
         for others, k in itertools.product((True, False), np.unique(used)):
             some = np.flatnonzero((used == k) & (error > rtol))
             part = zipped(study, {name: column[some] for name, column in closer.items()}, fixed={}, follows={})
             asked = tuple(method for method in order if (method is not methods[k]) == others)
             found = solved(replace(part, kernel=replace(study.kernel, methods=asked), method="auto"))
             # that there is no such answer is an answer, which differs from any value
-            none[some] = (found.status >= FIRST_REFUSAL) & ~among(found.status, GIVEN_UP)
+            none = (found.status >= FIRST_REFUSAL) & ~among(found.status, GIVEN_UP)
             right = np.where(found.status <= Status.INACCURATE, found.error, np.inf)
-            error[some], another[some] = np.where(none[some], 0.0, right), others
+            error[some], another[some] = np.where(none, 0.0, right), others
             source[some] = [asked[n].name if n >= 0 else WORDS[s].name for n, s in np.c_[found.used, found.status]]
             for name, column in found.outputs.items():
                 values.setdefault(name, np.full((len(used), *column.shape[1:]), np.nan))[some] = column
@@ -137,8 +136,7 @@ class Checked:
         self.left_out = [f.name for f in study.asked if f.name in cells and f.name not in off and not f.of_method]
         largest = np.max([*off.values()], axis=0)
         self.cells, self.sample, self.judged = len(ok), len(drawn), int(judged.sum())
-        counts = (another & ~none, none, largest > rtol + error)
-        self.by_another, self.no_answer, self.beyond = (int((judged & some).sum()) for some in counts)
+        self.by_another, self.beyond = (int((judged & some).sum()) for some in (another, largest > rtol + error))
         # the largest share of which so few would be found in so many, by Clopper and Pearson; of all cells, their own
         share = betaincinv(self.beyond + 1, self.judged - self.beyond, CONFIDENCE) if self.beyond < self.judged else 1.0
         self.limit = self.beyond / self.judged if self.judged == self.cells else float(share)
@@ -153,12 +151,10 @@ class Checked:
             self.worst["off"] = float(largest[i] / rtol[i])
 
     def __repr__(self) -> str:
-        same = self.judged - self.by_another - self.no_answer
         rows = [
             ("solved again", f"{self.sample:,} of {self.cells:,} OK cells, to a tolerance down to rtol/{CLOSER:g}"),
             ("by another method", f"{self.by_another:,}"),
-            ("by the same", f"{same:,}; an error that both have in common is not found"),
-            ("no answer", f"{self.no_answer:,}, of which a method says that there is none"),
+            ("by the same", f"{self.judged - self.by_another:,}; an error that both have in common is not found"),
             ("by none", f"{self.sample - self.judged:,}, which no method solves to rtol again"),
             ("beyond rtol", f"{self.beyond or 'none'} of {self.judged:,}"),
             ("of all OK cells", f"at most {100 * self.limit:.2g} % beyond, with {100 * CONFIDENCE:g} % confidence"),
@@ -166,10 +162,9 @@ class Checked:
         rows += [("left out", f"{', '.join(self.left_out)}: 0 but for rounding")] if self.left_out else []
         if self.worst:
             place = ", ".join(f"{name} = {value}" for name, value in self.worst["cell"].items())
-            values = " against ".join(f"{value:.12g} ({who})" for who, value in self.worst["values"])
-            rows += [
-                ("largest deviation", f"{self.worst['output']} by {self.worst['off']:.2g} rtol at {place}: {values}")
-            ]
+            said = " against ".join(f"{value:.12g} ({who})" for who, value in self.worst["values"])
+            by = f"{self.worst['output']} by {self.worst['off']:.2g} rtol"
+            rows += [("largest deviation", f"{by} at {place}: {said}")]
         return Table(rows).text()
 
 
@@ -200,12 +195,8 @@ def deviations(study: Study, outputs: Any, true: Any) -> dict[str, Any]:
     without a digit in common in most cells, is 0 but for rounding, and left out; so are outputs that say how a cell was
     solved, such as a number of steps.
     """
-    found = dict[str, Any]()
-    sizes = {
-        f.name: [np.nanmax(abs(np.asarray(some[f.name])), initial=0.0) for some in (outputs, true) if f.name in some]
-        for f in study.asked
-        if f.sized
-    }
+    found, both, sized = dict[str, Any](), (outputs, true), [field.name for field in study.asked if field.sized]
+    sizes = {name: [np.nanmax(abs(np.asarray(x[name])), initial=0.0) for x in both if name in x] for name in sized}
     tiny = TINY * max(itertools.chain(*sizes.values()), default=0.0)
     for name in (f.name for f in study.asked if f.name in outputs and f.name in true and not f.of_method):
         values, right = np.asarray(outputs[name]), np.asarray(true[name])
