@@ -28,7 +28,7 @@ class Incomplete(SweepError):
 def reason(fault: BaseException) -> str:
     """What a fault says, or its kind; of HDF5's account, which has several lines, the system's words for its number."""
     text = (isinstance(fault, OSError) and fault.strerror) or str(fault)
-    if "\n" in text and isinstance(fault, OSError) and fault.errno:
+    if isinstance(fault, OSError) and fault.errno and ("\n" in text or not fault.strerror):
         return os.strerror(fault.errno)
     return text.partition("\n")[0] or type(fault).__name__
 
