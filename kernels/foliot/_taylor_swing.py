@@ -123,7 +123,7 @@ def _runner(form):
     return runner(Scene(form.name, "half swing of a foliot", form.states, terms, *functions, most_kinks=1), "taylor")
 
 
-def half_swings(form, rough, terms, start, tolerance, of_order):
+def half_swings(form, rough, terms, start, tolerance):
     """The half swings of cells, rows of a `Swung` and of statuses.
 
     Tangents that a form does not follow are NaN by mu, so that the sensitivity is none; by v0 they are 0, which
@@ -133,14 +133,13 @@ def half_swings(form, rough, terms, start, tolerance, of_order):
     ----------
     form, rough : the number in FORMS of each cell's, and whether its terms are to be some roundings off
     terms, start : {name: column}, and the speed v0
-    tolerance, of_order : of a step, and the one that chooses the order of the series
     """
     swung, kind = np.empty((len(Swung._fields) + 1, len(start))), 2 * form + rough
     for k in np.unique(kind):
         own, (cells,) = FORMS[k // 2], np.nonzero(kind == k)
         columns = [*(terms[name][cells] for name in own.terms), start[cells], np.ones(len(cells))]
         columns = off_by_roundings(columns) if k % 2 else columns
-        rows = followed(_runner(own), columns, of_order[cells], tolerance[cells])
+        rows = followed(_runner(own), columns, tolerance[cells])
         found = dict(zip(("time", "interval", *own.states), rows, strict=False))
         found = {"decay": columns[own.terms.index("drag")] * found["time"]} | found
         for row, name in enumerate(Swung._fields):
@@ -261,12 +260,10 @@ def cycles(cells, rtol, rippled, asked):
         if not len(i):
             break
 
-        # the half swings, each in the form that its cell needs; Newton's step of each, and the cycle by it. A search
-        # without tangents is by the lower order at any tolerance: no slower, and the higher one need not be compiled
+        # the half swings, each in the form that its cell needs; Newton's step of each, and the cycle by it
         bare, now, used = linear[i] & ((stage[i] < ROUGH) | (not asked[_SENSITIVITY])), v[i], tolerance[i]
         of_cells = {name: column[i] for name, column in terms.items()}
-        needed, of_order = np.where(bare, searched, form[i]), np.where(bare & (stage[i] < ROUGH), _COARSE, used)
-        swung = half_swings(needed, stage[i] == ROUGH, of_cells, cells[_E][i] * now, used, of_order)
+        swung = half_swings(np.where(bare, searched, form[i]), stage[i] == ROUGH, of_cells, cells[_E][i] * now, used)
         _, step_of, found, verdict = stepped([column[i] for column in cells], now, swung[:-1], rtol[i])
         end, change, slope, cancels = step_of
         free = (swung[-1] < FIRST_REFUSAL) & np.isfinite(step_of[:3]).all(axis=0) & (end > 0.0)
