@@ -12,7 +12,9 @@ may be exp(-1e12), so the unknown is z = -ln(1 - v1/V), and the pole of 1/F at v
 its integral is z/f'(V). Everything is taken at y with z = exp(y)/V, so that exp(y) is v1 at strong drive.
 
 Notation: D = d V and G = gamma V^n are the shares of 1 - rho at V; far = v1/V, near = 1 - v1/V; a = d v1 and
-b = gamma v1^n; M = m0 + m1 s + m2 s^n. Units and records: see `_units`. Derived here.
+b = gamma v1^n; f = rho + a s + b s^n, f_B = rho + a E s + b E^n s^n and M = m0 + m1 s + m2 s^n; W and T are the
+integrals of (4) and of (3) over v1, so that v1^2 W = 2 and half period = v1 T. Units and records: see `_units`. Derived
+here.
 """
 
 import math
@@ -23,6 +25,8 @@ import numpy as np
 from kernels.foliot._units import Cycle, errors
 from kernels.lanes.codes import NOT_CONVERGED, OK, OUT_OF_RANGE
 from kernels.lanes.jit import jit, jit_call
+from kernels.lanes.symbols import symbolic
+from kernels.lanes.tuples import total
 from kernels.lanes.vectors import any_lane, fma, magnitude, not_, sqrt, where
 from kernels.maths.decimals import legendre, precise
 from kernels.maths.elementary import exp, expm1, is_normal, log, log1p
@@ -47,9 +51,9 @@ _S, _REST, _LOG_S, _WEIGHT = map(np.array, zip(*_RULE, strict=True))
 Terminal = namedtuple("Terminal", "log_V D G")
 """ln V of f(V) = 1, and the shares D and G of 1 - rho there; without drag V is infinite and D = 0."""
 
-Speeds = namedtuple("Speeds", "v1 log_v1 z far near F1 slope a b kept power terms")
-"""v1, ln v1, z, far, near; F1 = 1 - f(v1), and that over `near`, which tends to V f'(V); a, b; 1 - far^n, far^n; and
-1 - e^2, m0, m1, m2."""
+Speeds = namedtuple("Speeds", "v1 log_v1 z far near F1 slope friction kept power lost m")
+"""v1, ln v1, z, far, near; F1 = 1 - f(v1), and that over `near`, which tends to V f'(V); rho, a, b; 1 - far^n, far^n;
+1 - e^2; and m0, m1, m2."""
 
 
 @jit
@@ -82,12 +86,19 @@ def _terminal(scene):
 
 @jit
 def _leg(scene, a, b):
-    """1 - e^2, and the coefficients m0, m1, m2 of M for friction rho + a s + b s^n."""
+    """1 - e^2, and m0, m1, m2."""
     n, e = scene.n, scene.e
     outward = e > 0.0
     less = -expm1(n * log(magnitude(e)))  # 1 - E^n
     m1, m2 = a * (1.0 + e), b * where(outward, 2.0 - less, less)
-    return (1.0 - e) * (1.0 + e), where(outward, 2.0 * scene.rho, 0.0), m1, m2
+    return (1.0 - e) * (1.0 + e), (where(outward, 2.0 * scene.rho, 0.0), m1, m2)
+
+
+@symbolic
+def _law(terms, s, p):
+    """The sum of terms of degree 0, 1 and n, where s^n is p."""
+    constant, linear, powered = terms
+    return fma(linear, s, fma(powered, p, constant))
 
 
 @jit
@@ -105,12 +116,14 @@ def _speeds(scene, terminal, y):
     v1 = exp(y) * ratio
     F1, log_v1 = fma(G, kept, D * near), y + log_ratio
     a, b = scene.d * v1, G * power
-    return Speeds(v1, log_v1, z, far, near, F1, slope, a, b, kept, power, _leg(scene, a, b))
+    lost, m = _leg(scene, a, b)
+    return Speeds(v1, log_v1, z, far, near, F1, slope, (scene.rho, a, b), kept, power, lost, m)
 
 
 @jit
-def _pole(e, far, near, rest, s):
+def _pole(e, speeds, rest, s):
     """1/x - E/x' of the poles of 1/F and of 1/B: x = 1 - s v1/V, x' = 1 - s E v1/V; the second only for e <= 0."""
+    far, near = speeds.far, speeds.near
     x = fma(far, rest, near)
     E = where(e > 0.0, 0.0, -e)
     beside = fma(far, fma(1.0 - E, s, rest), near)
@@ -118,13 +131,13 @@ def _pole(e, far, near, rest, s):
 
 
 @jit
-def _defect(z, rule, e, far, near):
+def _defect(e, speeds, rule):
     """What the rule misses of the integral of `_pole` over s; 0 where it is far enough for the rule to miss nothing.
 
     The integral is ln((1 - E v1/V)/(1 - v1/V)) V/v1.
     """
-    close = z > _NEAR
-    far = where(close, far, 1.0)
+    z, near, close = speeds.z, speeds.near, speeds.z > _NEAR
+    far = where(close, speeds.far, 1.0)
     gap = where(e > 0.0, 0.0, 1.0 + e) * far
     mild = z < 600.0
     inward = where(mild, log1p(gap / where(mild, near, 1.0)), z + log(near + gap))
@@ -135,20 +148,20 @@ def _defect(z, rule, e, far, near):
 def _way(y, scene):
     """Whether the right side of (2) is below its left at y; Newton's step by logarithms; which one is the last."""
     scene, terminal = scene
-    n, e, (_, D, G) = scene.n, scene.e, terminal
-    _, log_v1, z, far, near, F1, v_slope, a, b, _, _, (lost, m0, m1, m2) = _speeds(scene, terminal, y)
-    total, rule = 0.0 * y, 0.0 * y
+    speeds = _speeds(scene, terminal, y)
+    n, e, z, far, F1, lost, m = scene.n, scene.e, speeds.z, speeds.far, speeds.F1, speeds.lost, speeds.m
+    _, a, b = speeds.friction
+    W, rule = 0.0 * y, 0.0 * y
     for j in range(_NODES):
         q = -expm1(n * _LOG_S[j])
-        F = fma(a, _REST[j], fma(b, q, F1))
-        M = fma(m1, _S[j], fma(m2, 1.0 - q, m0))
-        total = fma(_WEIGHT[j] * _S[j], fma(lost, F, M) / (F * (F + M)), total)
-        rule = fma(_WEIGHT[j], _pole(e, far, near, _REST[j], _S[j]), rule)
-    total = total + _defect(z, rule, e, far, near) / (where(z > _NEAR, far, 1.0) * fma(n, G, D))
-    M1 = m0 + m1 + m2
-    rate = fma(lost, F1, M1) / (v_slope * (F1 + M1))
+        F, M = _law((F1, a, b), _REST[j], q), _law(m, _S[j], 1.0 - q)
+        W = fma(_WEIGHT[j] * _S[j], fma(lost, F, M) / (F * (F + M)), W)
+        rule = fma(_WEIGHT[j], _pole(e, speeds, _REST[j], _S[j]), rule)
+    W = W + _defect(e, speeds, rule) / (where(z > _NEAR, far, 1.0) * fma(n, terminal.G, terminal.D))
+    M1 = total(m)
+    rate = fma(lost, F1, M1) / (speeds.slope * (F1 + M1))
     stretch = where(z > 1e-300, z / where(z > 1e-300, far, 1.0), 1.0)
-    excess, slope = fma(2.0, log_v1, log(0.5 * total)), stretch * rate / total
+    excess, slope = fma(2.0, speeds.log_v1, log(0.5 * W)), stretch * rate / W
     step = -excess / slope
     # only Newton's own step ends the search: a bracket that has shrunk to a point holds no root for that
     return excess < 0.0, step, where(magnitude(step) <= SETTLED, math.inf, math.nan)
@@ -156,97 +169,101 @@ def _way(y, scene):
 
 @jit_call
 def _strong(scene, speeds):
-    """The integrals of (3) over v1 and of s/B, and the sensitivity, by scaling speeds with v1.
+    """T, the integral of s/B, and the sensitivity, by scaling speeds with v1.
 
-    Write W for the integral in (4) and T for that of (3) over v1; then v1^2 W = 2 mu and half period = v1 T/mu, where W
-    and T depend on rho, a and b over mu. With the logarithmic derivatives of W and the derivatives of T
-        W g_a = a int s^2 (1/F^2 + e^3/B^2) ds,  g_b with b s^(n+1) and e E^n e, g_rho alike;  g their sum,
-        h_a = int s (1/F^2 - E^2/B^2) ds,  h_b with s^n and E^(n+1), h_rho with 1 and E,
-    w = dln v1/dln mu is (1 + g)/(2 + g_a + n g_b), and s = 1 - w + (rho h_rho + (1 - w) a h_a + (1 - n w) b h_b)/T.
-    Where friction is weak 1 - w and h are small, so differences are taken as products of what does not cancel:
-        1 - g = int s ((1 - e^2) - (f/F)^2 + (E f_B/B)^2) ds/W,  f = rho + a s + b s^n, f_B that at E s,
-        1/F^2 - E^2/B^2 = ((1 - E) F + M)(E F + B)/(F B)^2,  for each term with its own power of E.
+    W and T depend on the terms of friction over mu, c_k = rho, a, b of degrees n_k = 0, 1, n:
+        g_k = dlnW/dln c_k = c_k/W int s^(n_k+1) (1/F^2 + e E^(n_k+1)/B^2) ds,                       (5)
+        h_k = dT/dc_k = int s^n_k (1/F^2 - E^(n_k+1)/B^2) ds.                                       (6)
+    a grows as v1 does, b as v1^n. So with v1^2 W = 2 mu and half period = v1 T/mu, g being the sum of g_k,
+        w = dln v1/dln mu = (1 + g)/(2 + g_1 + n g_2),                                              (7)
+        s = 1 - w + (rho h_0 + (1 - w) a h_1 + (1 - n w) b h_2)/T.                                  (8)
+    Where friction is weak 1 - w and h are small, and summed of products that do not cancel: with i = (n_k + 1)/2
+        (1 - g) W = (1 - e^2)/2 - int s (f/F - E f_B/B) (f/F + E f_B/B) ds,                         (9)
+        f/F - E f_B/B = ((f - E f_B) F + f M)/(F B),
+        1/F^2 - E^(2i)/B^2 = ((1 - E^i) F + M) (E^i F + B)/(F B)^2.                                (10)
     """
-    rho, n, e = scene.rho, scene.n, scene.e
-    F1, a, b, (lost, m0, m1, m2) = speeds.F1, speeds.a, speeds.b, speeds.terms
+    rho, n, e, F1, lost, m = scene.rho, scene.n, scene.e, speeds.F1, speeds.lost, speeds.m
+    friction, (_, a, b) = speeds.friction, speeds.friction
+
+    # of each term: E^i and 1 - E^i of (10), e E^(n_k+1) of (5), and f_B and f - E f_B
     E = magnitude(e)
     log_E = log(E)
-    root, root_n = sqrt(E), exp(0.5 * n * log_E)  # sqrt(E), E^(n/2)
-    j0, j1, j2 = (1.0 - E) / (1.0 + root), 1.0 - E, -expm1((0.5 * n + 0.5) * log_E)  # 1 - sqrt(E), 1 - E ...
-    k0, k1, k2 = rho * (1.0 - E), a * (1.0 - E) * (1.0 + E), -b * expm1((n + 1.0) * log_E)  # f - E f_B
-    back = e * (E * E)
-    way = time = rise = excess = g_a = g_b = h_rho = h_a = h_b = 0.0 * F1
+    root, root_n = sqrt(E), exp(0.5 * n * log_E)  # E^(1/2), E^(n/2)
+    E_n, i0, i1, i2 = root_n * root_n, root, E, root * root_n
+    rest0, rest1, rest2 = (1.0 - E) / (1.0 + root), 1.0 - E, -expm1((0.5 * n + 0.5) * log_E)
+    back1, back2 = e * (E * E), e * E * E_n
+    behind = rho, a * E, b * E_n
+    apart = rho * (1.0 - E), a * (1.0 - E) * (1.0 + E), -b * expm1((n + 1.0) * log_E)
+
+    W = T = rise = excess = g1 = g2 = h0 = h1 = h2 = 0.0 * F1
     for j in range(_NODES):
         s, w, ws = _S[j], _WEIGHT[j], _WEIGHT[j] * _S[j]
         q = -expm1(n * _LOG_S[j])
         p = 1.0 - q  # s^n
-        F = fma(a, _REST[j], fma(b, q, F1))
-        M = fma(m1, s, fma(m2, p, m0))
-        B = F + M
+        F, M = _law((F1, a, b), _REST[j], q), _law(m, s, p)
+        B, f, f_B = F + M, _law(friction, s, p), _law(behind, s, p)
         both = 1.0 / (F * B)
-        way = fma(ws * fma(lost, F, M), both, way)
-        time = fma(w * fma(1.0 + e, F, M), both, time)
+        W = fma(ws * fma(lost, F, M), both, W)
+        T = fma(w * fma(1.0 + e, F, M), both, T)
         rise = fma(ws * F, both, rise)
-        f, f_B = fma(a, s, fma(b, p, rho)), fma(a * E, s, fma(b * (root_n * root_n), p, rho))
-        less, more = fma(fma(k1, s, fma(k2, p, k0)), F, f * M), fma(f, B, E * f_B * F)  # f/F -+ E f_B/B
+        less, more = fma(_law(apart, s, p), F, f * M), fma(f, B, E * f_B * F)
         both = both * both
         excess = fma(ws * both, less * more, excess)
-        g_a = fma(ws * s * both, fma(back, F * F, B * B), g_a)
-        g_b = fma(ws * p * both, fma(e * E * (root_n * root_n), F * F, B * B), g_b)
-        h_rho = fma(w * both, fma(j0, F, M) * fma(root, F, B), h_rho)
-        h_a = fma(ws * both, fma(j1, F, M) * fma(E, F, B), h_a)
-        h_b = fma(w * p * both, fma(j2, F, M) * fma(root * root_n, F, B), h_b)
-    g_a, g_b = a * g_a / way, b * g_b / way
-    slower = ((lost * 0.5 - excess) / way + g_a + n * g_b) / (2.0 + g_a + n * g_b)  # 1 - w
-    h = rho * h_rho + slower * (a * h_a) + fma(n, slower, 1.0 - n) * (b * h_b)
-    return time, rise, slower + h / time
+        g1 = fma(ws * s * both, fma(back1, F * F, B * B), g1)
+        g2 = fma(ws * p * both, fma(back2, F * F, B * B), g2)
+        h0 = fma(w * both, fma(rest0, F, M) * fma(i0, F, B), h0)
+        h1 = fma(ws * both, fma(rest1, F, M) * fma(i1, F, B), h1)
+        h2 = fma(w * p * both, fma(rest2, F, M) * fma(i2, F, B), h2)
+
+    g1, g2 = a * g1 / W, b * g2 / W
+    slower = ((lost * 0.5 - excess) / W + g1 + n * g2) / (2.0 + g1 + n * g2)  # 1 - w, by (7)
+    h = rho * h0 + slower * (a * h1) + fma(n, slower, 1.0 - n) * (b * h2)
+    return T, rise, slower + h / T
 
 
 @jit_call
 def _weak(scene, terminal, speeds):
     """As `_strong`, by scaling speeds with V, so that nothing is divided by 1 - v1/V.
 
-    At fixed z all integrands change smoothly with -ln mu: ln V by `stretch`, which keeps D + G + rho = 1, and with it D
-    by D_, G by G_ and rho by rho. A name with _ is a derivative by -ln mu at fixed z: way_ of the integral
-    of (4), time_ of (3) over v1, miss_ of what the rule misses of the pole, 1/K times its integral, K = V f'(V).
-    The change of z that keeps (2) is then worth `ratio`, the way's share over the time's at the end v = v1 of both
-    integrals, where their integrands are infinitely steep at weak drive and their ratio is not.
+    At fixed z all integrands change smoothly with -ln mu; a name with _ is a derivative by that. As rho + D + G = 1,
+        stretch = -dln(V/sqrt(mu))/dln mu = -(D/2 + rho + (1 - n/2) G)/K,  K = D + n G = V f'(V),   (11)
+        D_ = D (1/2 + stretch),  G_ = G (1 + n (stretch - 1/2)).                                    (12)
+    The change of z that keeps (2) is worth `ratio`, the way's share over the time's at the end v = v1 of both
+    integrals, where their integrands are infinitely steep at weak drive and their ratio is not; hence
+        s = 1/2 + stretch + T_/T - (2 stretch + W_/W) ratio.                                        (13)
+    `miss`, 1/K times what the rule misses of `_pole`, is what it misses of T.
     """
     rho, n, e, (_, D, G) = scene.rho, scene.n, scene.e, terminal
-    z, far, near, F1 = speeds.z, speeds.far, speeds.near, speeds.F1
-    b, kept, power = speeds.b, speeds.kept, speeds.power
-    lost, m0, m1, m2 = _leg(scene, D * far, b)
-    _, _, m1_D, m2_G = _leg(scene, far, power)
+    far, near, F1, kept, power = speeds.far, speeds.near, speeds.F1, speeds.kept, speeds.power
     K = fma(n, G, D)
     stretch = -(0.5 * D + rho + (1.0 - 0.5 * n) * G) / K
     D_, G_ = D * (0.5 + stretch), G * fma(n, stretch - 0.5, 1.0)
-    way = time = rise = rule = way_ = time_ = 0.0 * z
+    lost, m = _leg(scene, D * far, speeds.friction[2])
+    _, (m0, m1_D, m2_G) = _leg(scene, far, power)
+    m_ = m0, D_ * m1_D, G_ * m2_G
+    W = T = rise = rule = W_ = T_ = 0.0 * far
     for j in range(_NODES):
-        w, ws = _WEIGHT[j], _WEIGHT[j] * _S[j]
+        s, w, ws = _S[j], _WEIGHT[j], _WEIGHT[j] * _S[j]
         q = -expm1(n * _LOG_S[j])
-        p = 1.0 - q
-        x, x_n = fma(far, _REST[j], near), fma(power, q, kept)
-        F, F_ = fma(D, x, G * x_n), fma(D_, x, G_ * x_n)
-        M = fma(m1, _S[j], fma(m2, p, m0))
-        B = F + M
-        B_ = F_ + fma(D_ * m1_D, _S[j], fma(G_ * m2_G, p, m0))
+        x, x_n = fma(far, _REST[j], near), fma(power, q, kept)  # 1 - s v1/V, 1 - (s v1/V)^n
+        F, F_, M, M_ = fma(D, x, G * x_n), fma(D_, x, G_ * x_n), _law(m, s, 1.0 - q), _law(m_, s, 1.0 - q)
+        B, B_ = F + M, F_ + M_
         both = 1.0 / (F * B)
         inverse_F, inverse_B = B * both, F * both
-        way = fma(ws * fma(lost, F, M), both, way)
-        time = fma(w * fma(1.0 + e, F, M), both, time)
+        W = fma(ws * fma(lost, F, M), both, W)
+        T = fma(w * fma(1.0 + e, F, M), both, T)
         rise = fma(ws, inverse_B, rise)
         change_F, change_B = F_ * inverse_F * inverse_F, e * (B_ * inverse_B * inverse_B)
-        way_ = fma(ws, fma(e, change_B, -change_F), way_)
-        time_ = fma(-w, change_F + change_B, time_)
-        rule = fma(w, _pole(e, far, near, _REST[j], _S[j]), rule)
-    miss = _defect(z, rule, e, far, near) / K
+        W_ = fma(ws, fma(e, change_B, -change_F), W_)
+        T_ = fma(-w, change_F + change_B, T_)
+        rule = fma(w, _pole(e, speeds, _REST[j], s), rule)
+    miss = _defect(e, speeds, rule) / K
     miss_ = -miss * fma(n, G_, D_) / K
-    far = where(z > _NEAR, far, 1.0)
-    way, time = way + miss / far, time + miss
-    way_, time_ = way_ + miss_ / far, time_ + miss_
-    M1 = m0 + m1 + m2
-    ratio = fma(1.0 + e, F1, M1) * way / (fma(lost, F1, M1) * time)
-    return time, rise, 0.5 + (stretch + time_ / time) - (2.0 * stretch + way_ / way) * ratio
+    far = where(speeds.z > _NEAR, far, 1.0)
+    W, T, W_, T_ = W + miss / far, T + miss, W_ + miss_ / far, T_ + miss_
+    M1 = total(m)
+    ratio = fma(1.0 + e, F1, M1) * W / (fma(lost, F1, M1) * T)
+    return T, rise, 0.5 + (stretch + T_ / T) - (2.0 * stretch + W_ / W) * ratio
 
 
 @jit
@@ -258,7 +275,7 @@ def quadrature(scene, rtol):
     from the strong limit of each friction term alone and from the weak limit V z = 2 V f'(V)/V.
     """
     d, gamma, n, slack, e, terminal = scene.d, scene.gamma, scene.n, scene.slack, scene.e, _terminal(scene)
-    lost, m0, m1, m2 = _leg(scene, d, gamma)
+    lost, (m0, m1, m2) = _leg(scene, d, gamma)
     product = slack * (slack + m0)
     steady = 0.5 * log(4.0 * product / fma(lost, slack, m0))
     viscous = (1.0 / 3.0) * log(6.0 * product / m1)
@@ -272,7 +289,7 @@ def quadrature(scene, rtol):
 
     # what comes of it, where the pole is far and where it is near
     speeds = _speeds(scene, terminal, y)
-    v1, F1, (_, m0, m1, m2) = speeds.v1, speeds.F1, speeds.terms
+    v1, F1 = speeds.v1, speeds.F1
     near = speeds.z > _NEAR
     time, rise, s = 0.0 * y, 0.0 * y, 0.0 * y
     if any_lane(not_(near)):
@@ -282,7 +299,7 @@ def quadrature(scene, rtol):
         time, rise, s = where(near, late, time), where(near, high, rise), where(near, weak, s)
     amplitude = 1.0 + where(e > 0.0, v1 * v1 * (e * e) * rise, 0.0)
     half = v1 * time
-    cycle = Cycle(half, amplitude, v1, s, e * e * (F1 / (F1 + (m0 + m1 + m2))))
+    cycle = Cycle(half, amplitude, v1, s, e * e * (F1 / (F1 + total(speeds.m))))
     fine = is_normal(half) & is_normal(v1)
     return cycle, where(unsettled, NOT_CONVERGED, where(fine, OK, OUT_OF_RANGE))
 
