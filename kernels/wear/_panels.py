@@ -67,21 +67,21 @@ def work_centre(scene, c, s):
 def _settled(x, scene, piece):
     """A split at x moved by one step of Newton's rule onto a zero of the arm's gap, if it is next to one; else x.
 
-    On the outline the gap g of `_dwell` (3) is a function of x by the arm's angle eta = from w, chi -+ gamma, of both
-    sides Y of the outline and both halves of psi (`_contour`, (3)): four ways, of which that with the least |g| counts.
-    With the gaps top = unit cos^2(eta/2) - high and bottom = unit sin^2(eta/2) - low,
-        dg/dx = -+ unit sin(eta)/2 deta/dx,  deta/dx = +-(chi' -+ gamma').
-    The integrand goes like 1/sqrt(g) there: where the point is near the line of centres, a split that was found from a
-    circle about the work's centre is off by much more than rounding of g. The step is taken where both g over its unit
-    and g over dg/dx are below _AT_TURN.
+    The integrand goes like 1/sqrt(g) at such a zero. Where the point of the outline is near the line of centres, a
+    split that was found from a circle about the work's centre is off it by much more than g rounds. By (3) of
+    `_dwell` and (3) of `_contour` the gaps are functions of x, for each side and each half of psi, +-1:
+        top = unit cos^2(eta/2) - high,  bottom = unit sin^2(eta/2) - low,  eta = turn + half (chi - side gamma),  (1)
+        dtop/dx = -dbottom/dx = -unit sin(eta)/2 half (chi' - side gamma').                          (2)
+    Of these the least gap counts, where both g/unit and the step g/(dg/dx) are below _AT_TURN.
     """
     unit = scene.arm.unit
     sight = about_pivot(scene, piece, outline(piece, x, scene.tool))
+    if not sight.blur < math.inf:
+        return x
     least, step = _AT_TURN * unit, 0.0
-    if sight.blur < math.inf:
-        for k in range(4):
-            side, half = 1.0 if k < 2 else -1.0, 1.0 if k % 2 else -1.0
-            c, s = phi_of(sight, side)
+    for side in (1.0, -1.0):
+        c, s = phi_of(sight, side)
+        for half in (-1.0, 1.0):
             cosine, sine = from_frame(scene.ride, c, half * s)
             top, bottom, _ = _dwell.gaps(scene.arm, cosine, sine)
             gap, growth = (top, -1.0) if magnitude(top) < magnitude(bottom) else (bottom, 1.0)
