@@ -128,11 +128,15 @@ def _gain(energy, scene):
 def segments(scene, rtol):
     """The cycle, the relative errors of its outputs whatever rtol, the half swing on it, and the verdict.
 
-    s = -dlnP/dlnmu is of the fixed point E_1(E, mu) = E. By (2), with E_1 = v^2/2 or by (4), and d for a change by that
-    of mu alone, g for the push behind the turning point:
-        dA = -C1,  dt1 = -S1/back,  dg = kappa dA + 1,  dt2 = (dA - C2 dg)/v,  dv = S2 dg + v' dt2,
-        dJ1 = 2 back (J1/back^2) dg + u^2 dt1,  dJ2 = 2 g2 (J2/g2^2) dg + v^2 dt2,
-    where dA = dt1 = 0 for e < 0. What is called of_... is a sum of the magnitudes of terms: the changes round so.
+    s = -dlnP/dlnmu is of the fixed point E_1(E, mu) = E. With d for a change by that of mu alone, at the same start,
+    and g for the push behind the turning point, (2) gives
+        dA = -C1,  dt1 = -S1/back,  dg = kappa dA + 1,  dt2 = (dA - C2 dg)/v,  dv = S2 dg + v' dt2,  (6)
+    where dA = dt1 = 0 for e < 0; with E_1 = v^2/2 or by (4),
+        dE_1 = v dv,  or  2 - 2 rho dA - d (dJ1 + dJ2),                                             (7)
+        dJ1 = 2 back (J1/back^2) dg + u^2 dt1,  dJ2 = 2 g2 (J2/g2^2) dg + v^2 dt2.
+    E itself changes by dE = dE_1/(1 - e^2 dE_1/dE_0), and the start by e dE/sqrt(2 E), hence
+        s = -(dt1 + dt2 + dT/dv_0 e dE/sqrt(2 E))/T.                                                (8)
+    What is called of_... is the sum of the magnitudes of a change's terms, by which it rounds.
     """
     d, rho, kappa, rises = scene.d, scene.rho, scene.kappa, scene.e > 0.0
     # the energy before the switch, by Newton from rest: a half swing's gain falls with E, which makes a bracket
@@ -142,7 +146,7 @@ def segments(scene, rtol):
     lost, speed, end, time = _lost(scene, legs), legs.speed, legs.end, legs.time
     start = magnitude(scene.e) * sqrt(2.0 * energy)
 
-    # what the torque changes of both legs and of their losses, and so of E_1 and of the time
+    # (6) and (7): what the torque changes of both legs and of their losses, and so of E_1
     dtop, dt1 = where(rises, -legs.c1, 0.0), where(rises, -legs.s1 / legs.back, 0.0)
     of_top, of_t1 = magnitude(dtop), magnitude(dt1)
     dg, of_g = fma(kappa, dtop, 1.0), fma(kappa, of_top, 1.0)
@@ -155,12 +159,11 @@ def segments(scene, rtol):
     work, of_work = 2.0 - 2.0 * rho * dtop - d * losses, 2.0 + 2.0 * rho * of_top + d * of_losses
     gain, of_gain = where(balanced, work, speed * dspeed), where(balanced, of_work, speed * of_speed)
 
-    # s, by these and by what E changes of the time; and dlnT/dlnE
+    # (8); and dlnT/dlnE
     area, by_start, of_start, _, _ = passed_on(scene, start, legs)
     by_gain = magnitude(scene.e) / sqrt(2.0 * energy) / lost
     chain, longer = by_start * (by_gain * gain), dt1 + dt2
-    of_chain = magnitude(by_start) * (by_gain * of_gain)
-    of_chain = of_chain + of_start * (by_gain * magnitude(gain))
+    of_chain = magnitude(by_start) * (by_gain * of_gain) + of_start * (by_gain * magnitude(gain))
     s, terms = -(longer + chain) / time, (magnitude(longer) + magnitude(chain)) / time
     of_terms, by_energy = (of_t1 + of_t2 + of_chain) / time, 0.5 * start * magnitude(by_start) / time
 
