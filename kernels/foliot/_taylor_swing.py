@@ -59,10 +59,9 @@ and sensitivity hang steeply; how much less where it did not do, and how often t
 _TOLD, _TOLD_ROUGH, _TOLD_STEEP = 4.0, 32.0, 128.0
 """Error that is stated over what rough and fine half swings differ by, of which the fine one's should be a fifteenth;
 where the torque varies, or the drag is of a degree below 2: cores of abs(v)^n have a low order; and of the sensitivity
-where the torque varies, on which it depends steeply. Besides, an output is off by what the last one's Newton step would
-still change, at the rate at which it changed from the speed before."""
+where the torque varies, on which it depends steeply."""
 _ROUNDING = 2e-14
-"""Of a half swing's speed and time; a cycle's are off by 1/(1 - multiplier) as much."""
+"""Of a half swing's speed and time."""
 
 Swung = namedtuple("Swung", "time x v x_mu v_mu x_start v_start decay top up_mu up_start")
 """What a half swing comes to: its time, and states at the switch."""
@@ -77,11 +76,11 @@ SEARCHED = Form("foliot_ripple_search", ("x", "v", "top"), _BARE)
 FORMS = SMOOTH, RIPPLED, LINEAR, SEARCHED
 _UNKNOWN = {"x_mu": np.nan, "v_mu": np.nan, "up_mu": np.nan}
 _FIRST = {"x": 1.0, "v_start": 1.0, "top": 1.0, "up_start": 1.0}
-_STEP = (*TERMS, "first", "stiff", "end", "change", "slope", "cancels", *Outputs._fields)
-_CELL = (*Foliot._fields, "depth", "harmonic")
-_E, _SENSITIVITY = Foliot._fields.index("e"), Outputs._fields.index("sensitivity")
-_DECAY, _TOP = Swung._fields.index("decay"), Swung._fields.index("top")
-"""Positions of columns."""
+Cell = namedtuple("Cell", (*Foliot._fields, "depth", "harmonic"))
+"""Columns of cells."""
+Step = namedtuple("Step", (*TERMS, "first", "stiff", "end", "change", "slope", "cancels", "outputs"))
+"""Of a half swing: the cell's terms, the speed that Newton's method begins with and the stiffness; F, Newton's step
+from the speed before the half swing, and dF/dv1; the cycle, and how its sensitivity cancels."""
 
 
 @functools.cache
@@ -124,7 +123,7 @@ def _runner(form):
 
 
 def half_swings(form, rough, terms, start, tolerance):
-    """The half swings of cells, rows of a `Swung` and of statuses.
+    """The half swings of cells, a `Swung` of columns, and their statuses.
 
     Tangents that a form does not follow are NaN by mu, so that the sensitivity is none; by v0 they are 0, which
     takes from time and amplitude what Newton's last step would better.
@@ -134,7 +133,8 @@ def half_swings(form, rough, terms, start, tolerance):
     form, rough : the number in FORMS of each cell's, and whether its terms are to be some roundings off
     terms, start : {name: column}, and the speed v0
     """
-    swung, kind = np.empty((len(Swung._fields) + 1, len(start))), 2 * form + rough
+    swung, verdict = Swung(*np.empty((len(Swung._fields), len(start)))), np.empty(len(start))
+    kind = 2 * form + rough
     for k in np.unique(kind):
         own, (cells,) = FORMS[k // 2], np.nonzero(kind == k)
         columns = [*(terms[name][cells] for name in own.terms), start[cells], np.ones(len(cells))]
@@ -142,17 +142,18 @@ def half_swings(form, rough, terms, start, tolerance):
         rows = followed(_runner(own), columns, tolerance[cells])
         found = dict(zip(("time", "interval", *own.states), rows, strict=False))
         found = {"decay": columns[own.terms.index("drag")] * found["time"]} | found
-        for row, name in enumerate(Swung._fields):
-            swung[row, cells] = found.get(name, _UNKNOWN.get(name, 0.0))
-        swung[-1, cells] = rows[-1]
-    return swung
+        for name, column in zip(Swung._fields, swung, strict=True):
+            column[cells] = found.get(name, _UNKNOWN.get(name, 0.0))
+        verdict[cells] = rows[-1]
+    return swung, verdict
 
 
 @jit
 def step(p, rtol):
-    """Terms of `_half_swing`, with friction of any degree as it is down to rest; the speed that Newton's method begins
-    with, and the stiffness; Newton's step from v1, the speed before the half swing, to F, with (1) made good for; and
-    the cycle by it."""
+    """The `Step` of a half swing that followed the speed v1, with (1) made good for; and the verdict.
+
+    Terms are those of `_half_swing`, with friction of any degree as it is down to rest.
+    """
     scene, units = _units.without_dimensions(p)
     problem = problem_of(scene, (p.depth, p.harmonic), 0.0 * p.e)
     first, _ = first_speed(problem.pace)
@@ -179,8 +180,8 @@ _step = kernel(
     "foliot_swing",
     doc="",
     source="",
-    parameters=[Field(name, "1", "") for name in (*_CELL, "v1", *Swung._fields)],
-    outputs=[Field(name, "1", "") for name in _STEP],
+    parameters=[Field(name, "1", "") for name in (*Cell._fields, "v1", *Swung._fields)],
+    outputs=[Field(name, "1", "") for name in (*Step._fields[:-1], *Outputs._fields)],
     methods=(method("step", "", step),),
 ).methods[0].solve  # fmt: skip
 
@@ -199,7 +200,7 @@ def by_taylor(parameters):
         columns[-1][...] = np.where(begun(cells_of(columns), columns[n])[2], 0.0, np.inf)
 
     def cells_of(columns):
-        return columns[:n] if rippled else (*columns[:n], np.zeros(len(columns[n])), np.ones(len(columns[n])))
+        return Cell(*columns[:n], *([] if rippled else [np.zeros(len(columns[n])), np.ones(len(columns[n]))]))
 
     names = [*parameters, "rtol", "asked"]
     return Method(
@@ -212,10 +213,11 @@ def by_taylor(parameters):
 
 
 def stepped(cells, v, swung, rtol):
-    """Columns of what `step` gives, and statuses."""
-    found, status = np.empty((len(_STEP), len(rtol))), np.empty(len(rtol), np.int8)
+    """The `Step` of columns, and statuses."""
+    alone = len(Step._fields) - 1
+    found, status = np.empty((alone + len(Outputs._fields), len(rtol))), np.empty(len(rtol), np.int8)
     _step(*cells, v, *swung, rtol, *found, status)
-    return found[:8], found[8:12], found[12:], status
+    return Step(*found[:alone], found[alone:]), status
 
 
 def begun(cells, rtol):
@@ -225,29 +227,37 @@ def begun(cells, rtol):
     creeps inwards, overdamped, before it comes to the switch.
     """
     some = np.ones(len(rtol))
-    found, *_ = stepped(cells, some, [-some if name == "v" else some for name in Swung._fields], rtol)
-    terms, (drag, _, inwards, gamma, degree, kappa, v, stiff) = dict(zip(TERMS, found, strict=False)), found
+    found, _ = stepped(cells, some, [-some if name == "v" else some for name in Swung._fields], rtol)
     with np.errstate(over="ignore"):  # an infinite square compares as the square itself would
-        creeps = (kappa > inwards) & (drag * drag >= 4.0 * kappa) & (cells[_E] >= 0.0)
-    return terms, v, (stiff < _STIFFEST) & ((degree >= _MILDEST) | ~(gamma > 0.0)) & ~creeps
+        creeps = (found.kappa > found.inwards) & (found.drag * found.drag >= 4.0 * found.kappa) & (cells.e >= 0.0)
+    smooth = (found.degree >= _MILDEST) | ~(found.gamma > 0.0)
+    return dict(zip(TERMS, found, strict=False)), found.first, (found.stiff < _STIFFEST) & smooth & ~creeps
 
 
 @np.errstate(all="ignore")
 def cycles(cells, rtol, rippled, asked):
     """Limit cycles of many cells by Newton's method on v1, each cell at its own stage.
 
-    `cells` are columns of a `Foliot`, depth and harmonic; `rippled` says that torque varies, where without drag the
-    search follows no tangents, which make steps shorter, and `asked` which of the outputs must be right: without the
-    sensitivity no tangents are followed where none are needed. The result is outputs, relative errors, one row for each
-    output, and statuses: NOT_CONVERGED where half swings come to rest or the bracket closes on nothing.
+    `rippled` says that torque varies, where without drag the search follows no tangents, which make steps shorter, and
+    `asked` which of the outputs must be right: without the sensitivity no tangents are followed where none are needed.
+    The result is outputs, relative errors, one row for each output, and statuses: NOT_CONVERGED where half swings come
+    to rest or the bracket closes on nothing.
+
+    An error of F counts 1/(1 - dF/dv1)-fold in v1, and Y-fold in exp(-Y); without tangents errors of steps add up over
+    the waves of the torque. So the tolerance wanted of the last half swings is
+        share rtol (1 - dF/dv1)/((1 + Y) (1 + waves)).                                               (2)
+    When they give an output with a relative difference `apart`, its error is stated as
+        told apart + 2 (rate apart + step) + (ROUNDING + tolerance (1 + waves))/(1 - dF/dv1),          (3)
+    where `step` is the relative one that Newton's method would still go, and `rate` what it is of the way that v1 went
+    since the half swing before. The last term is more where the sensitivity cancels, and (1 + Y)-fold of exp(-Y).
     """
-    n = len(rtol)
+    n, of_sensitivity = len(rtol), Outputs._fields.index("sensitivity")
     terms, v, possible = begun(cells, rtol)
-    terms |= dict(zip(RIPPLE, (cells[-2], cells[-1] * (0.5 * np.pi)), strict=True))
-    dragged, varies = terms["gamma"] > 0.0, cells[-2] > 0.0
+    terms |= dict(zip(RIPPLE, (cells.depth, cells.harmonic * (0.5 * np.pi)), strict=True))
+    dragged, varies, tangents = terms["gamma"] > 0.0, cells.depth > 0.0, asked[of_sensitivity]
     linear, rough = ~dragged & rippled, (dragged & (terms["degree"] < 2.0)) | varies
     told = np.tile(np.where(rough, _TOLD_ROUGH, _TOLD), (len(Outputs._fields), 1))
-    told[_SENSITIVITY, varies] = _TOLD_STEEP
+    told[of_sensitivity, varies] = _TOLD_STEEP
     share, final = np.where(rough, _SHARE_ROUGH, _SHARE), np.where(varies, LAST, FINE)
     form, searched = np.where(linear, FORMS.index(LINEAR), int(rippled)), FORMS.index(SEARCHED)
     low, high, stuck, again = np.full(n, -1.0), np.full(n, np.inf), np.zeros(n, int), np.zeros(n, int)
@@ -261,45 +271,44 @@ def cycles(cells, rtol, rippled, asked):
             break
 
         # the half swings, each in the form that its cell needs; Newton's step of each, and the cycle by it
-        bare, now, used = linear[i] & ((stage[i] < ROUGH) | (not asked[_SENSITIVITY])), v[i], tolerance[i]
-        of_cells = {name: column[i] for name, column in terms.items()}
-        swung = half_swings(np.where(bare, searched, form[i]), stage[i] == ROUGH, of_cells, cells[_E][i] * now, used)
-        _, step_of, found, verdict = stepped([column[i] for column in cells], now, swung[:-1], rtol[i])
-        end, change, slope, cancels = step_of
-        free = (swung[-1] < FIRST_REFUSAL) & np.isfinite(step_of[:3]).all(axis=0) & (end > 0.0)
-        relative, gap, decay = np.abs(change / end), 1.0 - slope, np.where(swung[_DECAY] < 750.0, swung[_DECAY], 0.0)
+        bare, now, used = linear[i] & ((stage[i] < ROUGH) | (not tangents)), v[i], tolerance[i]
+        own, of_cells = np.where(bare, searched, form[i]), {name: column[i] for name, column in terms.items()}
+        swung, ended = half_swings(own, stage[i] == ROUGH, of_cells, cells.e[i] * now, used)
+        by, verdict = stepped([column[i] for column in cells], now, swung, rtol[i])
+        free = (ended < FIRST_REFUSAL) & np.isfinite([by.end, by.change, by.slope]).all(axis=0) & (by.end > 0.0)
+        relative, gap = np.abs(by.change / by.end), 1.0 - by.slope
+        decay = np.where(swung.decay < 750.0, swung.decay, 0.0)
         stuck[i] = np.where(free, 0, stuck[i] + 1)
         lost = (stuck[i] > STUCK) | ((stage[i] == SEARCH) & (high[i] - low[i] <= _COARSE * now))
 
-        # the error by how far fine ones are from rough ones, and by the speed; done where that will do or nothing helps
-        moved, apart = np.abs(now / before[i] - 1.0), np.abs(found / outputs[:, i] - 1.0)
+        # the error (3), where the last two are done; the end where that will do or nothing helps
+        moved, apart = np.abs(now / before[i] - 1.0), np.abs(by.outputs / outputs[:, i] - 1.0)
         rate = np.where(moved > 0.0, relative / moved, 0.0)
         by_tolerance[:, i] = np.where(stage[i] == LAST, by_tolerance[:, i] + apart, told[:, i] * apart)
-        # without tangents the errors of steps add up over the waves
-        waves = np.where(linear[i] & (not asked[_SENSITIVITY]), terms["wave"][i] / np.pi * (1.0 + swung[_TOP]), 0.0)
-        floor = np.tile((_ROUNDING + used * (1.0 + waves)) / gap, (len(found), 1))
-        floor[3] *= 1.0 + cancels
+        waves = np.where(linear[i] & (not tangents), terms["wave"][i] / np.pi * (1.0 + swung.top), 0.0)
+        floor = np.tile((_ROUNDING + used * (1.0 + waves)) / gap, (len(Outputs._fields), 1))
+        floor[of_sensitivity] *= 1.0 + by.cancels
         floor[4] *= 1.0 + decay
-        ended, stated = free & (stage[i] == final[i]), by_tolerance[:, i] + 2.0 * (rate * apart + relative) + floor
-        outputs[:, i[free]], errors[:, i] = found[:, free], np.where(ended, stated, np.inf)
+        stated, done = by_tolerance[:, i] + 2.0 * (rate * apart + relative) + floor, free & (stage[i] == final[i])
+        outputs[:, i[free]], errors[:, i] = by.outputs[:, free], np.where(done, stated, np.inf)
         right = errors[:, i][asked].max(axis=0) <= rtol[i]
-        last = ended & (right | (again[i] >= AGAIN) | (used <= _LEAST))
+        last = done & (right | (again[i] >= AGAIN) | (used <= _LEAST))
         status[i[last]] = verdict[last]
-        repeated = i[ended & ~last]
+        repeated = i[done & ~last]
         share[repeated], again[repeated] = _TIGHTER * share[repeated], again[repeated] + 1
 
         # the next speed: Newton's, or where that leaves the bracket one that narrows it
         noise = np.where(linear[i], _NOISE_BARE, _NOISE) * used * now
-        low[i] = np.where(~free | (end - now > noise), now, low[i])
-        high[i] = np.where(free & (now - end > noise), now, high[i])
-        new = now + change
+        low[i] = np.where(~free | (by.end - now > noise), now, low[i])
+        high[i] = np.where(free & (now - by.end > noise), now, high[i])
+        new = now + by.change
         inside = free & (new > low[i]) & (new < high[i]) & (new < 8.0 * now + 8.0)
         between = np.where(high[i] < np.inf, 0.5 * (np.maximum(low[i], 0.0) + high[i]), 2.0 * now + 1.0)
         checked = inside & (stage[i] >= ROUGH) & (stage[i] < final[i]) & (relative < _CHECKED)
         before[i], v[i] = now, np.where(inside, new, between)
 
-        # the next stage and its tolerance: an error of F counts 1/(1 - slope)-fold in v1. Where the search is cheap,
-        # it goes on until what Newton's method leaves is below what is wanted
+        # the next stage and its tolerance, at last (2). Where the search is cheap, it goes on until what Newton's
+        # method leaves is below what is wanted
         wanted = np.fmax(share[i] * rtol[i] * gap / (1.0 + decay) / (1.0 + waves), _LEAST)
         near = np.clip(0.01 * np.sqrt(rtol[i] * gap), FINER * wanted, _COARSE)
         left, converged = relative * relative, relative < np.sqrt(near)
