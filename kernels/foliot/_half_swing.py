@@ -12,9 +12,12 @@ dry friction.
 
 Drag of a degree that is no whole number has a slope f' that is not smooth at rest, and of a step that begins or ends
 there the estimated error is up to 70 times too low, and up to 8 times. So a step is at most a share of the time to
-rest, or since, and rest itself is passed without one: below a slow speed w drag is held at what it is there. As in
-that short time Y = ln(1 + f(w)/(tau + kappa A + rho)) outwards, and likewise inwards, (3) with f(0) + f(w) for f(0) is
-what J exp(-Y) is with the slope followed to rest.
+rest, or since, and rest itself is passed without one: below slow speeds, w outwards and w' inwards, drag is held at
+what it is there, so that accelerations are constant,
+    outwards w/t = tau + kappa x + rho + d w + gamma w^n,  inwards w'/t' = tau + kappa A - rho - gamma w'^n.      (4)
+As in that short time Y = ln(1 + gamma w^n/(tau + kappa A + rho)) outwards, and likewise inwards, (3) with f(0) + f(w)
+for f(0) is what J exp(-Y) is with the slope followed to rest:
+    J = (tau + kappa A - rho - gamma w'^n)/(tau + kappa A + rho + gamma w^n).                        (5)
 """
 
 import math
@@ -246,29 +249,28 @@ def _moved(state, leg, steady, time):
 
 
 @jit
-def _turned(state, leg, slow):
-    """The state behind the turning point; J; way and its tangent by v0 there; and the time taken.
+def _turned(state, time, leg, slow):
+    """The state behind the turning point by (4), J, the way and its tangent by v0 there, and the time.
 
     Power-law friction that is not smooth at rest is constant from the speed of the state to rest, and from there to
-    the speed `slow`: J takes both, and with the integral Y outside is what it is without a step through rest.
+    the speed `slow`.
     """
     zero, v, problem, turns = 0.0 * slow, state[1], leg.problem, leg.problem.e > 0.0
     still = turns | not_(v < 0.0)
     speed = where(slow > 0.0, larger(v, zero), zero)
     held = _held_at(problem, speed)
-    braking = problem.outwards + held + pull(state[0], problem) + problem.d * speed
-    before = speed / braking
+    before = speed / (problem.outwards + held + pull(state[0], problem) + problem.d * speed)
     x, _, x_mu, v_mu, x_start, v_start, decay = _moved(state, leg, problem.outwards + held, before)
+
     force = pull(x, problem)
     free = problem.inwards + force
     speed = where(still & (free > 0.0), slow * smaller(free / problem.inwards, zero + 1.0), zero)
     held_in = _held_at(problem, speed)
-    goes = free > held_in
     jump = where(turns, (problem.inwards - held_in + force) / (problem.outwards + held + force), 1.0)
-    after_rest = where(goes, speed / (free - held_in), 0.0)
+    after_rest = where(free > held_in, speed / (free - held_in), 0.0)
     rest = (x, 0.0 * x, x_mu, jump * v_mu, x_start, jump * v_start, decay)
     behind = _moved(rest, leg, problem.inwards - held_in, after_rest)
-    return choose(still, behind, state), jump, x, x_start, before + after_rest
+    return choose(still, behind, state), jump, x, x_start, time + (before + after_rest)
 
 
 @jit_call
@@ -321,9 +323,8 @@ def half_swing(step, start, problem, tolerance, active):
     for _ in range(HELP_LIMIT):
         if not any_lane(moving):
             break
-        behind, jumped, there, there_by_start, spent = _turned(state, falling, slow)
         forgotten = where(turning & not_(varied), state[6] + _FORGOTTEN, forgotten)
-        turned, old = (behind, jumped, there, there_by_start, time + spent), (state, jump, top, top_by_start, time)
+        turned, old = _turned(state, time, falling, slow), (state, jump, top, top_by_start, time)
         state, jump, top, top_by_start, time = choose(turning, turned, old)
 
         side, steady = where(rising, 1.0, falling.side), where(rising, problem.outwards, problem.inwards)
