@@ -225,10 +225,7 @@ def integrand(kind, nodes, count, scene):
             nodes.doubt[j] = nodes.value[j] * (pose.noise + doubt)
         else:  # int v dtheta over the strokes, where v does not hang on psi
             strokes = _dwell.strokes(arm, pose.c, pose.s, pose.top, pose.bottom)
-            back, forth = (
-                magnitude(ride.speed * strokes.back - ride.spin),
-                magnitude(ride.speed * strokes.forth - ride.spin),
-            )
-            total = strokes.back_dwell * back + strokes.forth_dwell * forth
+            back, forth = ride.speed * strokes.back - ride.spin, ride.speed * strokes.forth - ride.spin
+            total = strokes.back_dwell * magnitude(back) + strokes.forth_dwell * magnitude(forth)
             nodes.value[j] = pose.growth * scene.r * total
             nodes.doubt[j] = 4.0 * _EPS * pose.growth * scene.r * total

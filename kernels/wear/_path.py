@@ -16,8 +16,9 @@ from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.vectors import fma, magnitude, nearest, sqrt
 from kernels.maths.pairs import two_product
 from kernels.polisher import linkage
-from kernels.polisher.linkage import Lengths, Margins
+from kernels.wear._dwell import Arm
 from kernels.wear._pressure import Areas
+from kernels.wear._scene import Ride
 from kernels.wear._tool import Tool, excess, power, sincos
 
 STEPS = 24
@@ -33,15 +34,12 @@ _BISECTIONS = 80
 
 
 class Course(NamedTuple):
-    """Of a point about the tool: the linkage, rates of crank and work, L, centre of the work, radius, and the tool."""
+    """Of a point about the tool: the arm and its side, the ride, centre of the work, radius, and the tool."""
 
-    lengths: Lengths
-    margin: Margins
+    arm: Arm
     side: float
     b_angle: float
-    speed: float
-    spin: float
-    reach: float
+    ride: Ride
     x: float
     y: float
     beta: float
@@ -72,17 +70,17 @@ class Place(NamedTuple):
 @jit_apart
 def position(step, s):
     """The `Place` of the point at a time s of a step."""
-    course = step.course
-    crank = linkage.crank_at(step.cranked + course.speed * s, course.b_angle)
-    alpha, rate, _ = linkage.motion(course.lengths, course.margin, course.side, crank)
-    rate, r, spin = course.speed * rate, course.r, course.spin
+    course, ride = step.course, step.course.ride
+    crank = linkage.crank_at(step.cranked + ride.speed * s, course.b_angle)
+    alpha, rate, _ = linkage.motion(course.arm.lengths, course.arm.margin, course.side, crank)
+    rate, r, spin = ride.speed * rate, course.r, ride.spin
     sine, cosine = sincos(step.turned + spin * s)
     sine, cosine = r * sine, r * cosine
     sine_arm, cosine_arm = sincos(alpha + (course.b_angle + course.beta))
     px, py = course.x + cosine, course.y + sine
     vx, vy = rate * py - spin * sine, spin * cosine - rate * px
     return Place(
-        px * cosine_arm + py * sine_arm - course.reach,
+        px * cosine_arm + py * sine_arm - ride.reach,
         py * cosine_arm - px * sine_arm,
         vx * cosine_arm + vy * sine_arm,
         vy * cosine_arm - vx * sine_arm,
@@ -104,14 +102,14 @@ def facing(course, place):
 @jit_apart
 def bend(course):
     """(1), from samples of the arm's motion that are dense about the dead points, half as much again."""
-    speed, spin, r = course.speed, course.spin, course.r
+    arm, speed, spin, r = course.arm, course.ride.speed, course.ride.spin, course.r
     rate, acceleration = 0.0, 0.0
     for k in range(_SAMPLES + 160):
         theta = _TURN * k / _SAMPLES
         if k >= _SAMPLES:
             j = k - _SAMPLES
             theta = (math.pi if j % 2 else 0.0) + (1.0 if j % 4 < 2 else -1.0) * 2.0 ** (-(j // 4))
-        _, first, second = linkage.motion(course.lengths, course.margin, course.side, linkage.crank_at(theta, 0.0))
+        _, first, second = linkage.motion(arm.lengths, arm.margin, course.side, linkage.crank_at(theta, 0.0))
         rate, acceleration = max(rate, magnitude(first)), max(acceleration, magnitude(second))
     rate, acceleration = magnitude(speed) * rate, speed * speed * acceleration
     far = sqrt(course.x * course.x + course.y * course.y) + r
@@ -177,7 +175,7 @@ def crossing(step, low, high):
     s = 0.5 * (low + high)
     there = position(step, s)
     gx, gy = _slope(tool.a, tool.n, there.x), _slope(tool.b, tool.m, there.y)
-    far = step.course.reach + magnitude(there.x) + magnitude(there.y)
+    far = step.course.ride.reach + magnitude(there.x) + magnitude(there.y)
     pace = magnitude(gx * there.vx + gy * there.vy)
     return s, 8.0 * _EPS * far * (magnitude(gx) + magnitude(gy)) / pace if pace > 0.0 else math.inf
 

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kernels.lanes.jit import jit, jit_apart
+from kernels.lanes.records import read
 from kernels.lanes.vectors import magnitude, sqrt
 from kernels.maths.decimals import PI, cosine, multiples, precise
 from kernels.maths.elementary import in_unit
@@ -182,12 +183,14 @@ def table_of(arm, tool, ride, radius, tolerance, memory):
 
 
 @jit_apart
-def areas_of(p, rtol, first, q, rtol_q, memory):
-    """The areas of contact of a cell in its unit of length, none where none are needed.
+def areas_of(i, p, columns, memory):
+    """The areas of contact of cell i, p, in its unit of length, none where none are needed.
 
     Those that `memory` has, unless it is the first or has another geometry, load or tolerance than the cell q before.
     """
-    alike = not first and rtol == rtol_q and (p.load > 0.0) == (q.load > 0.0)
+    before, rtol = max(i - 1, 0), columns.rtol[i]
+    q = read(_scene.Machine, columns, before)
+    alike = i > 0 and rtol == columns.rtol[before] and (p.load > 0.0) == (q.load > 0.0)
     alike = alike and p.b == q.b and p.d == q.d and p.f == q.f and p.e == q.e and p.type == q.type and p.L == q.L
     alike = alike and p.b_angle == q.b_angle and p.beta == q.beta and p.w_x == q.w_x and p.w_y == q.w_y
     alike = alike and p.tool_a == q.tool_a and p.tool_b == q.tool_b and p.tool_n == q.tool_n and p.tool_m == q.tool_m

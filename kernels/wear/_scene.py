@@ -7,7 +7,8 @@ from kernels.interface import FIRST_REFUSAL, Field
 from kernels.lanes.codes import BAD_INPUT, CHANGE_POINT, DOUBLE_CRANK, OK, OUT_OF_RANGE
 from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.vectors import magnitude, not_, sqrt, where
-from kernels.maths.elementary import in_unit, mantissa_exponent, scale
+from kernels.maths.elementary import in_unit, mantissa_exponent
+from kernels.maths.wide import number, times, wide
 from kernels.polisher import extremes, linkage
 from kernels.wear import _dwell
 from kernels.wear._dwell import Arm
@@ -98,10 +99,8 @@ def without_units(p):
 @jit_apart
 def with_units(value, preston, pressure, units):
     """`value` times preston, pressure and 2^units, without overflow on the way."""
-    m, e = mantissa_exponent(preston)
-    m_p, e_p = mantissa_exponent(pressure)
-    m_v, e_v = mantissa_exponent(value if value > 0.0 else 1.0)
-    return scale(m * m_p * m_v, e + e_p + e_v + units) if value > 0.0 else value
+    preston, pressure, (m, e) = wide((preston, pressure, value))
+    return number(times(times(preston, pressure), (m, e + units))) if value > 0.0 else value
 
 
 ANGLE = {"default": 0.0, "lower": -ANGLE_LIMIT, "upper": ANGLE_LIMIT}

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kernels.lanes.jit import jit, jit_apart
+from kernels.lanes.tuples import read, write
 from kernels.lanes.vectors import magnitude, where
 from kernels.maths import elementary
 from kernels.maths.elementary import expm1, log1p
@@ -39,7 +40,7 @@ _NEAR = 1e-3
 """Between angles at which the rest of the scene is much the same."""
 _ASIDE = 0.38
 """Where on an arc it is tried for contact: not amid it, where a circle about the pivot may touch a vertex."""
-STACK = (_DEPTH, 6)
+STACK = (6, _DEPTH)
 """Shape of a stack of `End`s."""
 
 
@@ -222,13 +223,11 @@ def crossings(piece, tool, circle, start, found, count, stack):
     """
     first, top, square = count, np.int64(1), circle.radius * circle.radius
     left = _end(piece, 0.0, tool, circle, start)
-    _put(stack, top - 1, _end(piece, 1.0, tool, circle, start))
+    write(stack, top - 1, _end(piece, 1.0, tool, circle, start))
     for _ in range(_INTERVAL_LIMIT):
         if top == 0:
             return count
-        row = stack[top - 1]
-        right = End(row[0], row[1], row[2], row[3], row[4], row[5])
-        x = math.nan
+        right, x = read(stack, top - 1, left), math.nan
         least = _least_square(left.u, right.u) + _least_square(left.v, right.v)
         most = max(left.u * left.u, right.u * right.u) + max(left.v * left.v, right.v * right.v)
         slack = _ROUNDING * (square + most)
@@ -238,7 +237,7 @@ def crossings(piece, tool, circle, start, found, count, stack):
                 if (left.excess > 0.0) != (right.excess > 0.0):
                     x = _root(piece, left.x, right.x, tool, circle, start)
             elif right.x - left.x > _NARROW and top < _DEPTH:
-                _put(stack, top, _end(piece, 0.5 * (left.x + right.x), tool, circle, start))
+                write(stack, top, _end(piece, 0.5 * (left.x + right.x), tool, circle, start))
                 top += 1
                 continue
             else:
@@ -251,12 +250,6 @@ def crossings(piece, tool, circle, start, found, count, stack):
         left = right
         top -= 1
     return -1
-
-
-@jit
-def _put(stack, k, end):
-    row = stack[k]
-    row[0], row[1], row[2], row[3], row[4], row[5] = end
 
 
 @jit_apart

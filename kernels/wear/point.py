@@ -22,7 +22,7 @@ from kernels.lanes.records import read
 from kernels.lanes.vectors import magnitude, sqrt
 from kernels.lanes.wiring import kernel, tracing
 from kernels.maths import quadrature
-from kernels.maths.elementary import in_unit, is_normal, mantissa_exponent, scale
+from kernels.maths.elementary import in_unit, is_normal
 from kernels.polisher import linkage
 from kernels.wear import _path, _pressure, _scene
 from kernels.wear._path import INSIDE, ONCE, OUTSIDE, STEPS, Course, Step, position
@@ -93,21 +93,18 @@ def _way_in_step(step, h, curve, rtol, room):
         now = before if verdict == ONCE else verdict == INSIDE or (tiny and after)
         if tiny:
             error += (high - low) * _speed(high, step)[0]
-        if now and not inside:
-            entered = low
-        if inside and not now:
-            way, doubt = _polished(step, entered, low, rtol, room)
-            total, error = total + way, error + doubt
-        inside = now
+        crossed, then = low, now
         if verdict == ONCE and before != after:
-            s, blur = _path.crossing(step, low, high)
+            crossed, blur = _path.crossing(step, low, high)
+            then = after
             error += min(blur, high - low) * _speed(high, step)[0]
-            if after:
+        for s, here in ((low, now), (crossed, then)):
+            if here and not inside:
                 entered = s
-            else:
+            if inside and not here:
                 way, doubt = _polished(step, entered, s, rtol, room)
                 total, error = total + way, error + doubt
-            inside = after
+            inside = here
         low, one = high, two
         top -= 1
     if inside:
@@ -122,7 +119,7 @@ def way(course, areas, theta0, tau, rtol, room):
 
     A step is a share of a turn of the crank or the work, whichever is faster; what both turn by in it is kept as pairs.
     """
-    speed, spin = course.speed, course.spin
+    speed, spin = course.ride.speed, course.ride.spin
     if speed == 0.0 and spin == 0.0:
         return 0.0, 0.0, True
     if speed == 0.0:
@@ -153,18 +150,13 @@ def way(course, areas, theta0, tau, rtol, room):
 @jit
 def _follow(i, columns, room, memory):
     """(1), split at every entry and exit; one cell at a time, for no two split alike."""
-    before = max(i - 1, 0)
-    p, rtol, r0, tau = read(Machine, columns, i), columns.rtol[i], columns.r0[i], columns.tau[i]
-    areas = _pressure.areas_of(p, rtol, i == 0, read(Machine, columns, before), columns.rtol[before], memory)
+    p, rtol, r0 = read(Machine, columns, i), columns.rtol[i], columns.r0[i]
+    areas = _pressure.areas_of(i, p, columns, memory)
     setup = _scene.without_units(p)
-    arm, ride, unit, tool = setup.arm, setup.ride, setup.unit, setup.tool
+    ride, unit, tool = setup.ride, setup.unit, setup.tool
     x, y, r = signed_in_unit(p.w_x, unit), signed_in_unit(p.w_y, unit), in_unit(r0, unit)
-    side = linkage.side_of(p.type)
-    course = Course(
-        arm.lengths, arm.margin, side, p.b_angle, ride.speed, ride.spin, ride.reach, x, y, p.beta, r, tool
-    )  # fmt: skip
-    m, e = mantissa_exponent(tau if tau > 0.0 else 1.0)
-    time = scale(m, e + setup.pace) if tau > 0.0 else 0.0
+    course = Course(setup.arm, linkage.side_of(p.type), p.b_angle, ride, x, y, p.beta, r, tool)
+    time = in_unit(columns.tau[i], -setup.pace)
     wear, doubt, status = math.nan, math.nan, setup.verdict
     if _scene.turns_fully(status):
         if r0 > p.workpiece_radius > 0.0 or r > 4.0 * (ride.reach + ride.w + tool.a + tool.b):

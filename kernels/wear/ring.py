@@ -45,9 +45,8 @@ def _contour(i, columns, room, memory):
 
     The status is about errors over the largest wear of the profile: that of every radius is stated beside it.
     """
-    h = max(i - 1, 0)
     p, rtol = read(Machine, columns, i), columns.rtol[i]
-    areas = _pressure.areas_of(p, rtol, i == 0, read(Machine, columns, h), columns.rtol[h], memory)
+    areas = _pressure.areas_of(i, p, columns, memory)
     setup, rim, hard = _scene.without_units(p), p.workpiece_radius, max(p.pressure, p.load)
     turns = _scene.turns_fully(setup.verdict)
     leaves = areas.panels > 0 and not areas.lowest > _pressure.FAINT * areas.largest  # the tool may leave the workpiece
