@@ -3,7 +3,7 @@
     y = L^b f(x / L^a)                                                                              (1)
 
 In logarithms the curves of all L are one, ln y = b ln L + g(ln x - a ln L). With g a polynomial, b and g are linear
-for given a: a is searched over all of its range, so there is no start to be stuck at.
+for given a: it is a law of one q, searched over all of its range, so there is no start to be stuck at.
 """
 
 from __future__ import annotations
@@ -18,8 +18,10 @@ from numpy.typing import NDArray
 
 from sweep.errors import SweepError
 from sweep.laws.curves import check_options, check_output, described, log_of, positive_axis, relative_sigma, title
+from sweep.laws.fits import Found, fitted
 from sweep.laws.loglog import Array
-from sweep.laws.noise import ROUNDING, regress
+from sweep.laws.noise import regress
+from sweep.laws.shapes import Law, Number, Parts
 
 FEWEST_POINTS, MOST_DEGREE = 10, 18
 
@@ -67,36 +69,34 @@ def fit_collapse(y: xr.DataArray, dim: str, over: str, *, sigma: Any = None, con
     points, count = _points(y, dim, over, sigma)
     # exponents that leave neighbours in L with something in common, and no more than 8
     most = min(8.0, 0.9 * float(np.ptp(points.t)) / float(np.diff(np.unique(points.size)).min()))
-    a = points.best(-most, most, 81)
-    inside = points.shared(a)
+    start = points.fit(*np.linspace(-most, most, 81)).numbers[0]
+    inside, far = points.shared(start), 0.3 * (1 + abs(start))
     if (among := int(inside.sum())) < FEWEST_POINTS:
         raise SweepError(
             f"of {count} points {among} lie among those of another curve; at least {FEWEST_POINTS} are needed"
         )
     points = Points(*(column[inside] for column in points))
-    a = points.best(a - 0.3 * (1 + abs(a)), a + 0.3 * (1 + abs(a)), 41)
-    columns, b, off = points.curve(a)
-    k, rounding = columns.shape[1], ROUNDING * (1 + abs(points.z).max())
-    least = points.square(a) + float((points.root**2).sum()) * (rounding**2 + 1e-20 * float(np.ptp(points.z)) ** 2)
-    if min(points.square(a + step) for step in (-0.25, 0.25)) < least * (1 + 12.0 / max(1, points.z.size - k)):
+    found = points.fit(*np.linspace(start - far, start + far, 41))
+    off, columns, exact = found.off, found.jacobian, 1e-6 * (1 + np.ptp(points.z)) if sigma is None else 0.0
+    moved = [points.fit(found.numbers[0] + by) for by in (-0.25, 0.25)]
+    if any(one.deviance < found.deviance + 12 or abs(one.off).max() < 1e-4 * exact for one in moved):
         raise SweepError(
             "the curves collapse for any exponents of x: f is a power law, so a and b are not determined apart"
         )
-    found = {"x_exponent": a, "y_exponent": b, "scatter": float(np.sqrt(np.mean(off**2))), "points": points.t.size}
     # whether a level, a slope and a bow of each curve describe the points far better than the common one
-    u = points.t - points.t.mean()
+    u, k = points.t - points.t.mean(), columns.shape[1]
     own = [here * u**power for here in points.size == np.unique(points.size)[1:, None] for power in range(3)]
     basis, beside = np.linalg.qr(columns)[0], np.column_stack(own)
-    left, moved, _ = np.linalg.svd(beside - basis @ (basis.T @ beside), full_matrices=False)
-    beside = left[:, moved > 1e-6 * moved.max()][:, : max(0, off.size - k - 3)]
+    left, moves, _ = np.linalg.svd(beside - basis @ (basis.T @ beside), full_matrices=False)
+    beside = left[:, moves > 1e-6 * moves.max()][:, : max(0, off.size - k - 3)]
     every, places = np.column_stack([columns, beside]), np.arange(float(off.size))
-    told = regress(places, every, off[None], "correlated", k, None if sigma is None else 1 / points.root)
-    fits = bool(not told.denied[0] or (sigma is None and abs(off).max() <= 1e-6 * (1 + np.ptp(points.z))))
-    for name, ends in zip(("x_exponent", "y_exponent"), told.interval([0, 1], confidence)[:, :, 0].T, strict=True):
-        low, high = ends if fits else (math.nan, math.nan)
-        found |= {f"{name}_low": found[name] + min(low, 0.0), f"{name}_high": found[name] + max(high, 0.0)}
-    found |= {"dropped": count - points.t.size, "fits": int(fits)}
-    result = xr.Dataset(found).assign(verdict="one curve" if fits else "not one curve")
+    line = regress(places, every, off[None], "correlated", k, found.sigma)
+    fits = not line.denied[0] or abs(off).max() <= exact
+    result = xr.Dataset({"scatter": np.sqrt(np.mean(off**2)), "points": off.size, "dropped": count - off.size})
+    for number, name in enumerate(("x_exponent", "y_exponent")):
+        low, high = found.interval(line, [number], confidence)[:, 0] if fits else (math.nan, math.nan)
+        result = result.assign({name: found.numbers[number], f"{name}_low": low, f"{name}_high": high})
+    result = result.assign(fits=int(fits), verdict="one curve" if fits else "not one curve")
     law = f"{title(y)} = {over}^b f({dim} / {over}^a)"
     return described(result.assign_attrs(law=law, y=title(y), x=dim, over=over, confidence=confidence), y[dim], y)
 
@@ -108,23 +108,22 @@ class Points(NamedTuple):
     z: Array
     size: Array
     """ln L."""
-    root: Array
-    """One over the standard error of z; 1 where it is not known."""
+    errors: Array
+    """Standard errors of z; NaN where they are not known."""
 
-    def curve(self, a: float) -> tuple[Array, float, Array]:
-        """Derivatives of z by a, b and the numbers of g, a polynomial; b; and the distances of the points, for an a."""
-        u = self.t - a * self.size
-        half = max(float(np.ptp(u)) / 2, 1e-300)
-        basis = chebyshev.chebvander((u - u.min()) / half - 1, min(MOST_DEGREE, max(3, u.size // 7)))
-        columns = np.column_stack([self.size - self.size.mean(), basis])
-        numbers = np.linalg.lstsq(columns * self.root[:, None], self.z * self.root, rcond=1e-10)[0]
-        steep = chebyshev.chebval((u - u.min()) / half - 1, chebyshev.chebder(numbers[1:])) / half
-        off: Array = self.z - columns @ numbers
-        return np.column_stack([-self.size * steep, columns]), float(numbers[0]), off
+    def fit(self, *a: float) -> Found:
+        """The common curve, a polynomial in ln(x / L^a), for the best a between the first and last of tries."""
+        degree, size = min(MOST_DEGREE, max(3, self.z.size // 7)), self.size - self.size.mean()
 
-    def square(self, a: float) -> float:
-        """Sum of squares about the common curve."""
-        return float(((self.root * self.curve(a)[2]) ** 2).sum())
+        def curve(q: Array, s: Array, span: float) -> Parts:
+            u = self.t - q[0] * self.size
+            v = u - u.min(axis=1, keepdims=True)
+            v /= np.maximum(v.max(axis=1, keepdims=True) / 2, 1e-300)
+            return 0.0, size, *np.moveaxis(chebyshev.chebvander(v - 1, degree), -1, 0)
+
+        law = Law("collapse", "", curve, 2 + degree, (Number(a[0], a[-1], a),))
+        errors = self.errors[None] if np.isfinite(self.errors).all() else None
+        return fitted((law,), np.arange(float(self.z.size)), self.z[None], errors, law)[0][law.name]
 
     def shared(self, a: float) -> NDArray[np.bool_]:
         """Which points lie, in x / L^a, between the first and the last of another curve."""
@@ -133,17 +132,6 @@ class Points(NamedTuple):
             here = self.size == size
             found |= ~here & (u >= u[here].min()) & (u <= u[here].max())
         return found
-
-    def best(self, low: float, high: float, tries: int) -> float:
-        """The a of the least square between two, from the best of some tries."""
-        from scipy.optimize import minimize_scalar
-
-        grid = np.linspace(low, high, tries)
-        # weight against exponents that pull curves apart until nothing is compared
-        squares = [self.square(a) / max(float(self.shared(a).mean()), 1e-3) ** 4 for a in grid]
-        k = int(np.argmin(squares))
-        around = float(grid[max(k - 1, 0)]), float(grid[min(k + 1, tries - 1)])
-        return float(minimize_scalar(self.square, bounds=around, method="bounded", options={"xatol": 1e-9}).x)
 
 
 def _points(y: xr.DataArray, dim: str, over: str, sigma: Any) -> tuple[Points, int]:
@@ -161,5 +149,4 @@ def _points(y: xr.DataArray, dim: str, over: str, sigma: Any) -> tuple[Points, i
     if place.size < FEWEST_POINTS:
         few = f"a collapse needs at least {FEWEST_POINTS} positive points of {title(y)}, found {place.size}"
         raise SweepError(few)
-    root = np.ones(place.size) if sigma is None else 1 / errors[fine]
-    return Points(t[order][place], z[fine], np.log(sizes)[curve], root), z.size
+    return Points(t[order][place], z[fine], np.log(sizes)[curve], errors[fine]), z.size

@@ -174,7 +174,8 @@ def exponent_map(y: xr.DataArray, dim: str, levels: Sequence[float] = BORDERS) -
     -------
     Dataset
         `exponent` and its `exponent_error`, of the shape of y, and the lines along `point`: both coordinates under the
-        names of the dimensions with `_on_border` behind, `level`, and `line`, the number of the line, from 0 on.
+        names of the dimensions with `_on_border` behind, `level`, and `line`, the number of the line, from 0 on. Lines
+        are linear between points, in logarithms of axes that are logarithmic; where the exponent is NaN no line goes.
 
     Raises
     ------
@@ -191,36 +192,26 @@ def exponent_map(y: xr.DataArray, dim: str, levels: Sequence[float] = BORDERS) -
     ('mu', 'R')
     """
     local = local_exponent(y, dim, error=True)
-    lines = contours(local.exponent, levels).rename({str(d): f"{d}_on_border" for d in y.dims})
-    return local.assign(lines.data_vars).assign_attrs(y=title(y), x=dim)
-
-
-def contours(field: xr.DataArray, levels: Sequence[float]) -> xr.Dataset:
-    """Lines on which a field over two parameters has given values, by linear interpolation between its cells.
-
-    Along `point`: both coordinates, `level`, and `line`, the number of the line. Logarithms are taken of an axis whose
-    grid is logarithmic. Where the field is NaN no line goes.
-    """
-    curves.check_output(field)
-    if field.ndim != 2:
-        raise SweepError(f"{title(field)} has {field.ndim} dimensions; a map needs two, choose with .sel or --at")
-    for name in field.dims:
-        if name not in field.coords or field[name].dtype.kind not in "fiu" or field.sizes[name] < 2:
+    if y.ndim != 2:
+        raise SweepError(f"{title(y)} has {y.ndim} dimensions; a map needs two, choose with .sel")
+    for name in y.dims:
+        if name not in y.coords or y[name].dtype.kind not in "fiu" or y.sizes[name] < 2:
             raise SweepError(f"{name} has no two numbers to draw a map over")
     try:
         import contourpy
     except ImportError:
         raise missing("lines on maps need contourpy", "plot") from None
-    names = [str(field.dims[1]), str(field.dims[0])]  # across, down
-    logarithmic = [is_logarithmic(field[name].values) for name in names]
-    x, y = (np.log(field[n].values) if take else field[n].values for n, take in zip(names, logarithmic, strict=True))
-    generator = contourpy.contour_generator(x, y, np.ma.masked_invalid(field.values.astype(np.float64)))
+    names = [str(y.dims[1]), str(y.dims[0])]  # across, down
+    logarithmic = [is_logarithmic(y[name].values) for name in names]
+    across, down = (np.log(y[n].values) if take else y[n].values for n, take in zip(names, logarithmic, strict=True))
+    generator = contourpy.contour_generator(across, down, np.ma.masked_invalid(local.exponent.values))
     by_level = ((level, line) for level in levels for line in generator.lines(float(level)))
     lines = [np.insert(np.array(line, np.float64), 2, level, axis=1) for level, line in by_level]
     points = np.concatenate([np.empty((0, 3)), *lines])
     points[:, :2][:, logarithmic] = np.exp(points[:, :2][:, logarithmic])
-    units = str(field.attrs.get("units", "1"))
-    about = [*(dict(field[name].attrs) for name in names), {"units": units, "long_name": f"{title(field)} on the line"}]
-    found = xr.Dataset({n: ("point", points[:, k], about[k]) for k, n in enumerate((*names, "level"))})
+    about = [*(dict(y[name].attrs) for name in names), {"units": "1", "long_name": "exponent on the line"}]
+    names = [f"{name}_on_border" for name in names]
+    borders = {n: ("point", points[:, k], about[k]) for k, n in enumerate((*names, "level"))}
     number = np.repeat(np.arange(len(lines)), [len(line) for line in lines])
-    return found.assign(line=("point", number, {"units": "1", "long_name": "number of the line"}))
+    borders["line"] = "point", number, {"units": "1", "long_name": "number of the line"}
+    return local.assign(borders).assign_attrs(y=title(y), x=dim)

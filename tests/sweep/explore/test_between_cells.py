@@ -8,7 +8,6 @@ from scipy.interpolate import LinearNDInterpolator
 import sweep
 from sweep.explore.mesh import stretch
 from sweep.explore.scattered import axes_of, heights, on_lines
-from sweep.laws.exponents import contours
 
 MU, A = np.geomspace(1e-3, 1e3, 121), np.geomspace(0.1, 10, 41)
 
@@ -36,36 +35,38 @@ def test_lines_of_an_exponent_are_where_theory_has_them():
 
 @pytest.mark.parametrize("logarithmic", [(True, False), (False, False), (True, True), (False, True)])
 def test_each_axis_is_interpolated_as_its_grid_is_spaced(logarithmic):
-    grids = [np.geomspace(1, 1e4, 9) if take else np.linspace(-1, 9, 10) for take in logarithmic]
+    """The exponent of exp(u^2/2) is u where u = ln x, and that of exp(x) is x."""
+    grids = [np.geomspace(1, 1e4, 9) if take else np.linspace(3, 9, 40) for take in logarithmic]
     u, v = (np.log(g) if take else g for g, take in zip(grids, logarithmic, strict=True))
-    field = xr.DataArray(u[:, None] - 0.7 * v, dict(zip("xy", grids, strict=True)), ("x", "y"), attrs={"units": "m"})
-    found = contours(field, (0.3, -0.4, 1e9))
-    assert set(found.level.values) == {0.3, -0.4}
-    x, y = (np.log(found[n]) if take else found[n] for n, take in zip("xy", logarithmic, strict=True))
-    np.testing.assert_allclose(x - 0.7 * y, found.level, atol=1e-12)
+    z = (u**2 / 2 if logarithmic[0] else u)[:, None] - 0.7 * v * np.log(grids[0])[:, None]
+    y = xr.DataArray(np.exp(z), dict(zip("xy", grids, strict=True)), ("x", "y"))
+    found = sweep.exponent_map(y, "x", (0.3, 1.4, 1e9))
+    assert set(found.level.values) == {0.3, 1.4}
+    borders = ("x_on_border", "y_on_border")
+    x, y = (np.log(found[n]) if take else found[n] for n, take in zip(borders, logarithmic, strict=True))
+    np.testing.assert_allclose(x - 0.7 * y, found.level, atol=1e-9 if logarithmic[0] else 1e-4)
     np.testing.assert_array_equal(found.line == 0, found.level == 0.3)
-    assert found.level.attrs["units"] == "m"
 
 
 def test_no_line_crosses_what_has_no_value():
-    found = contours(period().where(abs(np.log(period().a)) > 0.5), (1.5,))
+    found = sweep.exponent_map(period().where(abs(np.log(period().a)) > 0.5), "mu", (-0.5,))
     assert len(set(found.line.values)) == 2
-    assert not ((found.a > 0.7) & (found.a < 1.4)).any()
-    assert contours(period(), (1e9,)).sizes["point"] == 0
+    assert not ((found.a_on_border > 0.7) & (found.a_on_border < 1.4)).any()
+    assert sweep.exponent_map(period(), "mu", (1e9,)).sizes["point"] == 0
 
 
 def test_what_is_no_map_is_refused():
-    field = xr.DataArray([[0.0, 1.0], [2.0, 3.0]], {"x": [0, 1], "y": [0.0, 3.0]}, ("x", "y"), name="z")
-    contours(field, (1.5,))  # two values an axis are enough
+    y = period()[:9, :2]
+    sweep.exponent_map(y, "mu")  # two values of the other axis are enough
     for wrong, message in (
-        (field[:, 0], "1 dimensions"),
-        (field.expand_dims("t"), "3 dimensions"),
-        (field[:, :1], "y has no two numbers"),
-        (field.assign_coords(y=["a", "b"]), "y has no two numbers"),
-        (field.drop_vars("x"), "x has no two numbers"),
+        (y[:, 0], "1 dimensions"),
+        (y.expand_dims("t"), "3 dimensions"),
+        (y[:, :1], "a has no two numbers"),
+        (y.assign_coords(a=["a", "b"]), "a has no two numbers"),
+        (y.drop_vars("a"), "a has no two numbers"),
     ):
         with pytest.raises(sweep.SweepError, match=message):
-            contours(wrong, (1.0,))
+            sweep.exponent_map(wrong, "mu")
 
 
 # values inside a box
