@@ -85,6 +85,10 @@ def _ramp(v: Any, width: Any) -> Any:
     return width * np.logaddexp(0, v / width)
 
 
+def _one_width(v: Any, k: Any) -> Any:
+    return _ramp(v, 1.0)
+
+
 def _two_widths(v: Any, k: Any) -> Any:
     """Widths exp(k) below and exp(-k) above."""
     shift = 2 * math.log(2) * np.sinh(k)
@@ -112,8 +116,13 @@ def _bent(bend: Callable[[Any, Any], Any], over_x: bool = False) -> Curve:
 
 
 def _peak(q: Array, s: Array, span: float) -> Parts:
+    """q: where it is, and the logarithms of its widths below and above, over one another for the last."""
+    return 0.0, 1.0, np.exp(-0.5 * ((s - q[0]) / np.exp(q[1] + q[2] * (s > q[0]))) ** 2), s
+
+
+def _step(q: Array, s: Array, span: float) -> Parts:
     """q: where it is, and the logarithm of its width."""
-    return 0.0, 1.0, np.exp(-0.5 * ((s - q[0]) / np.exp(q[1])) ** 2), s
+    return 0.0, 1.0, np.tanh((s - q[0]) / np.exp(q[1])), s
 
 
 def _three(q: Array, s: Array, span: float) -> Parts:
@@ -128,26 +137,14 @@ SKEWED, SCALES = (PLACE, WIDTH, Number(-2.0, 2.0, (0.0,))), (PLACE, WIDTH, Numbe
 POWER = Number(-60.0, 60.0, (-12.0, -6.0, -2.5, -1.0, 1.0, 2.5, 6.0, 12.0))
 P, P_TWO = (("p", -1),), (("p low", -2), ("p high", -1))
 ONE = Law("one law", "A x^p", lambda q, s, span: (0.0, 1.0, s), 2, exponents=P)
-TWO = Law("two laws", "bend fading exponentially", _bent(lambda v, k: _ramp(v, 1.0)), 3, (PLACE, WIDTH), P_TWO)
+TWO = Law("two laws", "bend fading exponentially", _bent(_one_width), 3, (PLACE, WIDTH), P_TWO)
 BENDS = (
     TWO,
+    Law("two laws, two widths", "one width below, one above", _bent(_two_widths), 3, SKEWED, P_TWO, case="two laws"),
     Law(
-        "two laws, two widths", "one width below, another above", _bent(_two_widths), 3, SKEWED, P_TWO, case="two laws"
+        "two laws, hyperbola", "bend fading as 1/ln x", _bent(lambda v, k: 0.5 * (v + np.hypot(v, 1))), 3, TWO.q, P_TWO
     ),
-    TWO._replace(
-        name="two laws, hyperbola",
-        formula="bend fading as 1/ln x",
-        curve=_bent(lambda v, k: 0.5 * (v + np.hypot(v, 1))),
-    ),
-    Law(
-        "two laws, three scales",
-        "bend of three widths, one in the other",
-        _bent(_three_scales),
-        3,
-        SCALES,
-        P_TWO,
-        case="two laws",
-    ),
+    Law("two laws, three scales", "bend of three widths", _bent(_three_scales), 3, SCALES, P_TWO, case="two laws"),
 )
 SECOND = Number(0.02, 0.9, (0.15, 0.3, 0.45, 0.6)), Number(-2.5, 0.0, tuple(np.log((0.2, 0.35, 0.5))))
 THREE_Q = (*SECOND, WIDTH._replace(starts=WIDTH.starts[:3]))
@@ -159,30 +156,20 @@ CORRECTION = Law("correction to scaling", "A x^p (1 + B x^-D)", _correction, 2, 
 LOG_Q = (Number(-3.0, 8.0, (-1.0, 1.0, 3.0, 5.0)),)
 LOG_CORRECTION = Law("logarithmic correction", "A x^p (1 + B ln(x/x0))^c", _log_correction, 3, LOG_Q, P)
 LOGARITHM = Number(-2 + 1e-9, 2 - 1e-9, (-1.9, -1.5, -0.5, 0.5, 1.5, 1.9))
-PEAK_Q = (PLACE, Number(math.log(0.05), math.log(1 / 3), tuple(np.log((0.07, 0.14, 0.24)))))
+BOTH = Number(0.5, 60.0, (1.0, 2.5, 6.0, 12.0))
+FLANK = Number(math.log(0.05), math.log(1 / 3), tuple(np.log((0.07, 0.14, 0.24))))
+NO_SHAPE, TWO_FLANKS = Number(0.0, 0.0, (0.0,)), Number(-1.5, 1.5, (-0.7, 0.7))
+STEP_Q = PLACE._replace(least=0.1, most=0.9), WIDTH._replace(most=math.log(0.15))
 OTHER_FUNCTIONS = (
     Law("logarithm", "A x^p (1 + B ln x)", _logarithm, 2, (LOGARITHM,), P, power=False),
     Law("exponential", "A exp(-x/X)", lambda q, s, span: (0.0, 1.0, np.exp(span * (s - 1))), 2, power=False),
     Law("stretched exponential", "A exp(-(x/X)^b)", _stretched, 2, (POWER,), power=False),
     Law("cut-off", "A exp(-x/X) x^p", lambda q, s, span: (0.0, 1.0, np.exp(span * (s - 1)), s), 3, (), P, False),
-    Law(
-        "cut-off at both ends",
-        "A exp(-(x/X)^b - (Y/x)^b) x^p",
-        _between,
-        4,
-        (Number(0.5, 60.0, (1.0, 2.5, 6.0, 12.0)),),
-        P,
-        power=False,
-    ),
-    Law("peak", "A x^p exp(B exp(-ln(x/X)^2 / C))", _peak, 3, PEAK_Q, P),
+    Law("cut-off at both ends", "A exp(-(x/X)^b - (Y/x)^b) x^p", _between, 4, (BOTH,), P, power=False),
+    Law("peak", "A x^p exp(B exp(-ln(x/X)^2 / C))", _peak, 3, (PLACE, FLANK, NO_SHAPE), P),
+    Law("lopsided peak", "a peak of two widths", _peak, 3, (PLACE, FLANK, TWO_FLANKS), P, case="peak"),
+    Law("step", "A x^p exp(B tanh(ln(x/X) / C))", _step, 3, STEP_Q, P),
     Law("lognormal", "A exp(-B ln(x/X)^2)", lambda q, s, span: (0.0, 1.0, s, s**2), 3, power=False),
-    Law(
-        "two exponentials",
-        "A exp(-x/X), with a bend to exp(-x/Y)",
-        _bent(lambda v, k: _ramp(v, 1.0), True),
-        3,
-        TWO.q,
-        power=False,
-    ),
+    Law("two exponentials", "A exp(-x/X), with a bend to exp(-x/Y)", _bent(_one_width, True), 3, TWO.q, power=False),
 )
 LAWS = (ONE, *OTHER_FUNCTIONS, OFFSET, CORRECTION, *BENDS, THREE)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -33,8 +34,6 @@ SCATTERED = 0.5
 OTHER_SHAPES = 20.0
 """Difference of AICc from which on a bend of another shape is ruled out; more than for a second law, since the truth
 may be between the shapes that are tried."""
-APART = 5.0
-"""Widths of a bend from one to the next of three laws, from which on the middle law is seen between them."""
 BEYOND_SHAPES = 0.5
 """Share of what other shapes add to where the laws meet, added again: the true one may be none of them."""
 
@@ -190,32 +189,31 @@ def _widened(t: Array, z: Array, best: Array, low: Array, high: Array) -> tuple[
     return np.minimum(low, reach[0]), np.maximum(high, reach[1])
 
 
+def _above(tried: Iterable[Found]) -> Array:
+    """AICc and BIC of laws above the least (laws, 2). A law is ruled out if both are beyond BEYOND_DOUBT."""
+    criteria = np.array([law.criteria for law in tried])
+    above: Array = criteria - criteria.min(axis=0)
+    return above
+
+
 def _verdict(t: Array, tried: dict[str, Found]) -> tuple[str, float]:
     """One of VERDICTS, if no straight line denies one law, and by how much two are better than one and than functions.
 
-    By AICc, and BIC for many points. The noise of the line may be of any kind, that of all others is even.
+    The noise of the line may be of any kind, that of all others is even.
     """
-    two, line, three = tried[TWO.name], tried[ONE.name], tried.get(THREE.name)
-    bends, others = ([tried[law.name] for law in laws if law.name in tried] for laws in (BENDS, OTHER_FUNCTIONS))
-
-    def gain(simple: Found, better: Found) -> float:
-        return min(one - other for one, other in zip(simple.criteria, better.criteria, strict=True))
-
-    evidence = min(gain(one, two) for one in (line, *others))
-    nearest = min((*bends, *others), key=lambda fit: fit.aicc)
-    aicc = three.aicc if three and gain(line, three) > BEYOND_DOUBT else math.inf
+    three, nearest = tried.pop(THREE.name, None), min(tried.values(), key=lambda found: found.aicc)
+    above, two = _above(tried.values()), np.array([found.law in BENDS for found in tried.values()])
+    evidence = float((above[~two].min(axis=0) - above[two].min(axis=0)).min())
     # three, if with a bend more even beside what noise of any kind leaves of fewer
-    if three and aicc < nearest.aicc - OTHER_SHAPES and aicc < nearest.beside(t, "noise")[1] - BEYOND_DOUBT:
-        apart = math.exp(three.numbers[1] - three.numbers[2])  # of a step and a lopsided peak 1 to 5
-        return "three laws" if apart > APART else "no power law", evidence
+    if three and three.aicc < nearest.aicc - OTHER_SHAPES and three.aicc < nearest.beside(t, "noise")[1] - BEYOND_DOUBT:
+        return "three laws", evidence
     if evidence > BEYOND_DOUBT:
-        return "two laws" if 0 <= two.numbers[0] <= 1 else "no meeting in the window", evidence
-    for one in others:  # of those that are power laws in part, one that rules out two laws
-        least = BEYOND_DOUBT if one.law.power else -BEYOND_DOUBT
-        if gain(line, one) > BEYOND_DOUBT and min(gain(law, one) for law in bends) > least:
-            return "no power law", evidence
-    bends_more = max(gain(line, one) for one in (*bends, *others)) > BEYOND_DOUBT
-    return "undecided" if bends_more else "one law", evidence
+        return "two laws" if 0 <= tried[TWO.name].numbers[0] <= 1 else "no meeting in the window", evidence
+    alive, power = above.min(axis=1) <= BEYOND_DOUBT, np.array([found.law.power for found in tried.values()])
+    if alive[[*tried].index(ONE.name)]:
+        return "one law", evidence
+    undecided = bool((alive & two).any()) and not (~power & (above.max(axis=1) <= BEYOND_DOUBT)).any()
+    return "undecided" if undecided else "no power law", evidence
 
 
 def crossover(low_fit: xr.Dataset, high_fit: xr.Dataset) -> xr.Dataset:
@@ -272,8 +270,8 @@ def compare_laws(y: xr.DataArray, dim: str, window: Window | None = None, *, sig
     many times e^5 more likely, and a margin that correlated, uneven or outlying noise does not bridge, which one law is
     tried with. Beside a function that is no power law, a power law with as few numbers is taken where it is not ruled
     out. The laws are one, two (with bends of four shapes) and three power laws, an offset, a correction to
-    scaling, a peak on one law; and functions that are none: logarithm, exponential, stretched exponential, a cut-off
-    at one end or at both, lognormal, two exponentials.
+    scaling, a peak or a step on one law; and functions that are none: logarithm, exponential, stretched exponential, a
+    cut-off at one end or at both, lognormal, two exponentials.
 
     Parameters
     ----------
@@ -317,9 +315,8 @@ def compare_laws(y: xr.DataArray, dim: str, window: Window | None = None, *, sig
 
 def _table(t: Array, z: Array, tried: list[Found]) -> xr.Dataset:
     """All that `compare_laws` says of laws, the best first."""
-    off, criteria, span = np.stack([f.off for f in tried]), np.array([f.criteria for f in tried]).T, t[-1] - t[0]
-    worse = (criteria - criteria.min(axis=1, keepdims=True)).min(axis=0)
-    columns: dict[str, Any] = dict(zip(("aicc", "bic"), criteria, strict=True))
+    off, worse, span = np.stack([f.off for f in tried]), _above(tried).min(axis=1), t[-1] - t[0]
+    columns: dict[str, Any] = dict(zip(("aicc", "bic"), np.transpose([f.criteria for f in tried]), strict=True))
     columns |= {"worse": worse, "scatter": np.sqrt((off**2).mean(axis=1))}
     columns |= {"numbers": [f.law.numbers for f in tried], "residual": [f.residual for f in tried]}
     chances = [float(gammaincc((t.size - f.law.numbers) / 2, f.deviance / 2)) for f in tried if f.sigma is not None]

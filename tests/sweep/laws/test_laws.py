@@ -203,10 +203,18 @@ def test_a_broad_peak_on_one_law_is_not_called_two(factor, noise):
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.01])
-@pytest.mark.parametrize("z", [0.3 * np.tanh(T), np.log1p(0.5 * np.exp(-(T**2) / np.where(T < 0, 3, 14)))])
-def test_a_step_and_a_lopsided_peak_are_not_called_three_laws(z, noise):
-    scatter = noise * np.random.default_rng(4).standard_normal(X.size)
-    assert int(sweep.fit_two_laws(line(z - 0.5 * T + scatter), "x").regimes) == 0
+@pytest.mark.parametrize(
+    ("law", "z"),
+    [
+        ("step", 0.3 * np.tanh(T)),
+        ("step", 0.3 * np.tanh(4 * T)),
+        ("lopsided peak", np.log1p(0.5 * np.exp(-(T**2) / np.where(T < 0, 3, 14)))),
+    ],
+)
+def test_a_step_and_a_lopsided_peak_are_not_called_three_laws(law, z, noise):
+    y = line(z - 0.5 * T + noise * np.random.default_rng(4).standard_normal(X.size))
+    assert str(sweep.fit_two_laws(y, "x").verdict.values) == "no power law"
+    assert sweep.compare_laws(y, "x").attrs["chosen"] == law
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.01])
