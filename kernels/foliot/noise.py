@@ -173,23 +173,22 @@ def _uniforms():
     return np.empty(n), np.empty(n), np.empty(n), np.empty(n)
 
 
-PARAMETERS = (
-    Field("sigma", "1", "standard deviation of the torque of a half swing over mu", lower=0.0),
-    Field("tau_c", "1", "correlation time of the noise in half swings (to 1/e); 0: white", default=0.0, lower=0.0),
-    Field("half_swings", "1", "length of the run", lower=1.0, upper=HALF_SWING_LIMIT, integer=True),
-    Field("seed", "1", "names the noise; cells of equal seed share it", default=0.0, lower=0.0,
-          upper=philox.SEED_LIMIT, integer=True),
-    Field("averaging_time", "s", "averaging time of the scatter", default=SECONDS_PER_DAY, lower=0.0, open_lower=True),
-    Field("sigma_a", "1", "standard deviation of the friction of a half swing over a", default=0.0, lower=0.0),
-    Field("shared", "1", "correlation of the friction's noise with the torque's: 1 one noise, 0 independent ones",
-          default=1.0, lower=-1.0, upper=1.0),
-)  # fmt: skip
-
 FOLIOT_NOISE = kernel(
     "foliot_noise",
     doc="rate of a verge and foliot whose torque and friction are noisy",
     source="derived here; the foliot of Hoyng & Nieuwenhuizen, arXiv:1604.06681",
-    parameters=(*FOLIOT.parameters, *PARAMETERS),
+    parameters=(
+        *FOLIOT.parameters,
+        Field("sigma", "1", "standard deviation of the torque of a half swing over mu", lower=0.0),
+        Field("tau_c", "1", "correlation time of the noise in half swings (to 1/e); 0: white", default=0.0, lower=0.0),
+        Field("half_swings", "1", "length of the run", lower=1.0, upper=HALF_SWING_LIMIT, integer=True),
+        Field("seed", "1", "names the noise; cells of equal seed share it", default=0.0, lower=0.0,
+              upper=philox.SEED_LIMIT, integer=True),
+        Field("averaging_time", "s", "averaging time of the scatter", SECONDS_PER_DAY, lower=0.0, open_lower=True),
+        Field("sigma_a", "1", "standard deviation of the friction of a half swing over a", default=0.0, lower=0.0),
+        Field("shared", "1", "correlation of the friction's noise with the torque's: 1 one noise, 0 independent ones",
+              default=1.0, lower=-1.0, upper=1.0),
+    ),
     outputs=(
         Field("rate_error_s_per_day", "s/day", "gain against the clock without noise; losses are negative"),
         Field("rate_scatter_s_per_day", "s/day", "Allan deviation of the rate at the averaging time"),
