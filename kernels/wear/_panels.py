@@ -106,10 +106,8 @@ def open_outline(count, scene, stops, room):
         found[0] = 0.0
         for j in range(2 + 2 * stops):
             if j < 2:
-                circle, start = (
-                    Circle(-ride.reach, 0.0, ride.w + r if j else magnitude(ride.w - r)),
-                    wide if j else near,
-                )
+                radius, start = (ride.w + r, wide) if j else (magnitude(ride.w - r), near)
+                circle = Circle(-ride.reach, 0.0, radius)
             else:
                 s, c = sincos(room.still[j // 2 - 1])
                 x, y = work_centre(scene, c, s)

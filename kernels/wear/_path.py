@@ -19,7 +19,7 @@ from kernels.polisher import linkage
 from kernels.wear._dwell import Arm
 from kernels.wear._pressure import Areas
 from kernels.wear._scene import Ride
-from kernels.wear._tool import Tool, excess, power, sincos
+from kernels.wear._tool import Tool, excess, power, range_of, sincos
 
 STEPS = 24
 """Steps of a turn of the crank or the work, whichever is faster."""
@@ -89,16 +89,6 @@ def position(step, s):
     )
 
 
-@jit
-def facing(course, place):
-    """Cosine and sine of the arm's angle from the direction of w, with the point at a place."""
-    x, y = course.x, course.y
-    w = sqrt(x * x + y * y)
-    if not w > 0.0:
-        return 1.0, 0.0
-    return (x * place.c + y * place.s) / w, (x * place.s - y * place.c) / w
-
-
 @jit_apart
 def bend(course):
     """(1), from samples of the arm's motion that are dense about the dead points, half as much again."""
@@ -116,17 +106,10 @@ def bend(course):
     return _MARGIN * (spin * spin * r + 2.0 * rate * magnitude(spin) * r + (acceleration + rate * rate) * far)
 
 
-@jit
-def _range(x, y, spread):
-    """Least and largest abs of what lies between x and y, or within `spread` of that."""
-    low, high = min(x, y) - spread, max(x, y) + spread
-    return (0.0 if low * high <= 0.0 else min(magnitude(low), magnitude(high))), max(magnitude(low), magnitude(high))
-
-
 @jit_apart
 def _rate_bounds(size, k, x1, x2, spread, v, turn):
     """Bounds on the rate of abs(x/size)^k over a box of x and rates within `turn` of v."""
-    least, most = _range(x1, x2, spread)
+    least, most = range_of(x1, x2, spread)
     if least == 0.0 and k < 1.0:
         return -math.inf, math.inf
     g1, g2 = k / size * power(min(least / size, 8.0), k - 1.0), k / size * power(min(most / size, 8.0), k - 1.0)
@@ -146,8 +129,8 @@ INSIDE, OUTSIDE, ONCE, UNKNOWN = range(4)
 def judged(tool, one, two, h, curve):
     """Whether a stretch of time h between two positions is INSIDE, OUTSIDE, crossed ONCE at most, or UNKNOWN."""
     spread = 0.125 * curve * h * h
-    x_low, x_high = _range(one.x, two.x, spread)
-    y_low, y_high = _range(one.y, two.y, spread)
+    x_low, x_high = range_of(one.x, two.x, spread)
+    y_low, y_high = range_of(one.y, two.y, spread)
     if excess(tool, x_high, y_high) < 0.0:
         return INSIDE
     if excess(tool, x_low, y_low) > 0.0:

@@ -162,11 +162,10 @@ def _end(piece, x, tool, circle, start):
 
 
 @jit
-def _least_square(x, y):
-    """Least square of a number between x and y."""
-    if x * y <= 0.0:
-        return 0.0
-    return min(x * x, y * y)
+def range_of(x, y, spread):
+    """Least and largest abs of what lies between x and y, or within `spread` of that."""
+    low, high = min(x, y) - spread, max(x, y) + spread
+    return (0.0 if low * high <= 0.0 else min(magnitude(low), magnitude(high))), max(magnitude(low), magnitude(high))
 
 
 @jit_apart
@@ -228,8 +227,8 @@ def crossings(piece, tool, circle, start, found, count, stack):
         if top == 0:
             return count
         right, x = read(stack, top - 1, left), math.nan
-        least = _least_square(left.u, right.u) + _least_square(left.v, right.v)
-        most = max(left.u * left.u, right.u * right.u) + max(left.v * left.v, right.v * right.v)
+        (near_u, far_u), (near_v, far_v) = range_of(left.u, right.u, 0.0), range_of(left.v, right.v, 0.0)
+        least, most = near_u * near_u + near_v * near_v, far_u * far_u + far_v * far_v
         slack = _ROUNDING * (square + most)
         if least <= square + slack and most >= square - slack:  # the circle meets the rectangle of both ends
             low, high = _slope_bounds(piece, tool, left, right)

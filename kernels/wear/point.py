@@ -49,7 +49,10 @@ def _speed(s, step):
     v = sqrt(there.vx * there.vx + there.vy * there.vy)
     if step.areas.panels == 0:
         return v, 4.0 * _EPS * v
-    cosine, sine = _path.facing(step.course, there)
+    x, y = step.course.x, step.course.y
+    w, cosine, sine = sqrt(x * x + y * y), 1.0, 0.0  # of the arm's angle from the direction of w
+    if w > 0.0:
+        cosine, sine = (x * there.c + y * there.s) / w, (x * there.s - y * there.c) / w
     weight, doubt, slope = _pressure.weight(step.areas, cosine, sine)
     return weight * v, weight * v * (4.0 * _EPS + doubt + 8.0 * _EPS * slope)
 
