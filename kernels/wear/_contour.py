@@ -16,6 +16,7 @@ Derived here.
 """
 
 import math
+from collections import namedtuple
 from typing import NamedTuple
 
 import numpy as np
@@ -51,11 +52,8 @@ class Scene(NamedTuple):
     spare: np.ndarray
 
 
-class Direction(NamedTuple):
-    """Cosine and sine of an angle."""
-
-    c: float
-    s: float
+Direction = namedtuple("Direction", "c s")
+"""Cosine and sine of an angle."""
 
 
 class Sight(NamedTuple):

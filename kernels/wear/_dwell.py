@@ -18,6 +18,7 @@ and near by the integral of v along an arc goes like x^2 log x of the distance x
 """
 
 import math
+from collections import namedtuple
 from typing import NamedTuple
 
 import numpy as np
@@ -51,25 +52,12 @@ class Arm(NamedTuple):
     whirls: bool
 
 
-class Pose(NamedTuple):
-    """The arm's angle eta and its cosine and sine, both gaps of (3) and their rounding, relative, and d eta/du."""
-
-    eta: float
-    c: float
-    s: float
-    top: float
-    bottom: float
-    noise: float
-    growth: float
+Pose = namedtuple("Pose", "eta c s top bottom noise growth")
+"""The arm's angle eta and its cosine and sine, both gaps of (3) and their rounding, relative, and d eta/du."""
 
 
-class Strokes(NamedTuple):
-    """alpha' of the stroke back, abs(dtheta/d alpha) there, both of the stroke forth; 0 for no such stroke."""
-
-    back: float
-    back_dwell: float
-    forth: float
-    forth_dwell: float
+Strokes = namedtuple("Strokes", "back back_dwell forth forth_dwell")
+"""alpha' of the stroke back, abs(dtheta/d alpha) there, both of the stroke forth; 0 for no such stroke."""
 
 
 @jit_apart

@@ -10,6 +10,7 @@ Time goes in steps of a share of the crank's turn; whole turns are taken off wit
 """
 
 import math
+from collections import namedtuple
 from typing import NamedTuple
 
 from kernels.lanes.jit import jit, jit_apart
@@ -56,15 +57,8 @@ class Step(NamedTuple):
     areas: Areas
 
 
-class Place(NamedTuple):
-    """X, Y and their rates, and cosine and sine of the direction of the tool's centre from the pivot."""
-
-    x: float
-    y: float
-    vx: float
-    vy: float
-    c: float
-    s: float
+Place = namedtuple("Place", "x y vx vy c s")
+"""X, Y and their rates, and cosine and sine of the direction of the tool's centre from the pivot."""
 
 
 @jit_apart

@@ -20,15 +20,8 @@ EXPONENT_LIMITS = 0.5, 100.0
 _SPAN = 2.0**-100  # of a length of the work over the longest of them
 
 
-class Ride(NamedTuple):
-    """Rates of the crank and of the work, L, w, cosine and sine of the direction of w from b + beta."""
-
-    speed: float
-    spin: float
-    reach: float
-    w: float
-    turn_c: float
-    turn_s: float
+Ride = namedtuple("Ride", "speed spin reach w turn_c turn_s")
+"""Rates of the crank and of the work, L, w, cosine and sine of the direction of w from b + beta."""
 
 
 class Setup(NamedTuple):

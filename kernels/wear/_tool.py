@@ -11,7 +11,7 @@ slope are monotone, hence so are bounds on the distance from a point and on its 
 """
 
 import math
-from typing import NamedTuple
+from collections import namedtuple
 
 import numpy as np
 
@@ -44,54 +44,24 @@ STACK = (6, _DEPTH)
 """Shape of a stack of `End`s."""
 
 
-class Tool(NamedTuple):
-    """Half widths, exponents, and 2^(-1/n), 2^(-1/m)."""
-
-    a: float
-    b: float
-    n: float
-    m: float
-    half_x: float
-    half_y: float
+Tool = namedtuple("Tool", "a b n m half_x half_y")
+"""Half widths, exponents, and 2^(-1/n), 2^(-1/m)."""
 
 
-class Circle(NamedTuple):
-    """Its centre in the frame of the tool, and its radius."""
-
-    x: float
-    y: float
-    radius: float
+Circle = namedtuple("Circle", "x y radius")
+"""Its centre in the frame of the tool, and its radius."""
 
 
-class Along(NamedTuple):
-    """(1) and what makes its slope: small, 1 - large, d small/dx, and two monotone factors of -d large/d small."""
-
-    small: float
-    missing: float
-    growth: float
-    steep: float
-    bent: float
+Along = namedtuple("Along", "small missing growth steep bent")
+"""(1) and what makes its slope: small, 1 - large, d small/dx, and two monotone factors of -d large/d small."""
 
 
-class Spot(NamedTuple):
-    """X, Y, dX/dx and dY/dx of an outline, and how far the larger of X and Y is below its vertex."""
-
-    x: float
-    y: float
-    dx: float
-    dy: float
-    missing: float
+Spot = namedtuple("Spot", "x y dx dy missing")
+"""X, Y, dX/dx and dY/dx of an outline, and how far the larger of X and Y is below its vertex."""
 
 
-class End(NamedTuple):
-    """Of an interval: x, X and Y from a circle's centre, two factors of the slope, squared distance less radius^2."""
-
-    x: float
-    u: float
-    v: float
-    steep: float
-    bent: float
-    excess: float
+End = namedtuple("End", "x u v steep bent excess")
+"""Of an interval: x, X and Y from a circle's centre, two factors of the slope, squared distance less radius^2."""
 
 
 @jit_apart
