@@ -174,8 +174,8 @@ def limit_cycle(step, stiffest, rippled, rtol):
     must agree to 0.3 rtol, or the tolerance is lowered further. A ripple makes s hang on v1 steeply, a thousandfold at
     times: how steeply the steps themselves tell, and what is left of v1's error is counted so.
 
-    `step` is one of `_half_swing`, `stiffest` EXPLICIT or IMPLICIT, and `rippled` a `_units.Scene` with (depth,
-    harmonic) of (2). It returns the half period, amplitude, speed before the switch, s and multiplier; and the verdict.
+    `step` is `dopri5_step` or `sdirk4_step`, `stiffest` EXPLICIT or IMPLICIT, and `rippled` a `_units.Scene` with
+    (depth, harmonic) of (2). It returns a `_units.Cycle` as a plain tuple, and the verdict.
     """
     problem = problem_of(*rippled, rtol)
     zero, one, stiff = 0.0 * problem.e, 0.0 * problem.e + 1.0, problem.stiffness * problem.pace
