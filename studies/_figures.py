@@ -190,7 +190,7 @@ def name_lines(axes: Any) -> None:
     marks = [axes.transData.transform(xy) for xy in known.values()]
     along = (np.linspace(at[:-1], at[1:], 100).reshape(-1, 2) for at in marks)
     covered = np.concatenate([np.empty((0, 2)), *marks, *along])
-    boxes = [shown.get_window_extent() for shown in (*axes.texts, *axes.patches)]
+    boxes = [shown.get_window_extent() for shown in axes.texts]
     ways = list(itertools.product((5.0, 8.0, 12.0, 18.0), ((0, 1), (1, 0), (-1, 0), (0, -1), (0.6, 1), (-0.6, 1))))
     for (line, xy), at in zip(known.items(), marks, strict=True):
         look = {"color": line.get_color(), "fontsize": 8, "ha": "center", "va": "center"}
