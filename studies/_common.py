@@ -74,8 +74,7 @@ OPTIONS = ("--all", "--force")
 NUMBER = re.compile(r"-?[\d.]+(?:e[-+]?\d+)?(?:/\d+)?")
 ORDER = {"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge}
 STUDIES = Path(__file__).parent
-DAY = 86400.0
-"""Seconds."""
+DAY = 86400.0  # seconds
 
 
 def digits(allowed: float) -> int:
@@ -301,11 +300,12 @@ class Script:
 
     def __call__(self, arguments: Sequence[str]) -> int:
         """Exit status: 1 if a statement does not hold, 2 if the results are not there or not of this study."""
-        paths = [argument for argument in arguments if argument not in OPTIONS]
-        if len(paths) != len(self.inputs):
+        paths, helped = [argument for argument in arguments if argument not in OPTIONS], "--help" in arguments
+        if helped or len(paths) != len(self.inputs):
             use = f"use: python {Path(self.file).name} {' '.join(self.inputs)} [{'] ['.join(OPTIONS)}]"
-            print(use, *(run_of(name) for name in self.inputs if name.endswith(".h5")), sep="\n", file=sys.stderr)
-            return 2
+            lines = [use, *(run_of(name) for name in self.inputs if name.endswith(".h5"))]
+            print(*[self.head] * helped, *lines, sep="\n", file=sys.stdout if helped else sys.stderr)
+            return 0 if helped else 2
         return self.report(arguments, lambda: self.conclude(*paths))
 
     def report(self, arguments: Sequence[str], conclude: Callable[[], Any]) -> int:
