@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from kernels.interface import Status, machine_code_folder
+from kernels.interface import machine_code_folder
 from sweep.cells.block import Guard, faults_reported
 from sweep.cells.grid import Grid, empty_cells
 from sweep.cells.reduce import strip_bytes
@@ -22,6 +22,7 @@ from sweep.cells.timing import work_clock
 from sweep.explore.scaling import scaling
 from sweep.file.frame import cuts_of, expected_size
 from sweep.file.open import memory
+from sweep.results.statuses import STATUS_NAMES
 from sweep.runs.loop import SILENT_SECONDS, Loop, Task
 from sweep.study.model import Study
 from sweep.study.read import Given
@@ -197,4 +198,4 @@ def _looked_at(study: Study, solver: Guard, seconds: float) -> tuple[dict[str, f
         return {names[code]: counts[code] / sampled for code in sorted(counts)}
 
     methods = {-1: "none", **dict(enumerate(method.name for method in study.kernel.methods))}
-    return shares(cells.used, methods), shares(cells.status, {int(s): s.name for s in Status}), sampled
+    return shares(cells.used, methods), shares(cells.status, STATUS_NAMES), sampled

@@ -16,7 +16,7 @@ from sweep.cells.schema import ERROR_BOUND, METHOD_USED, STATUS
 from sweep.cells.solve import GIVEN_UP, among, usable_methods
 from sweep.errors import SweepError
 from sweep.results.filter import cells_at
-from sweep.results.statuses import cell_values, flag_words, statuses_of
+from sweep.results.statuses import STATUS_NAMES, cell_text, cell_values, flag_words, statuses_of
 from sweep.study.model import SMALLEST_RTOL, Study, short
 from sweep.study.read import study as study_of
 from sweep.words import Table, page
@@ -24,7 +24,6 @@ from sweep.words import Table, page
 CLOSER = 100.0
 """A second opinion is asked for at rtol over this, or at the smallest rtol."""
 CONFIDENCE = 0.95
-WORDS = {int(status): status for status in Status}
 APART, TINY = 0.1, 1e-9
 """Share of itself and of the largest state, to leave out a state that is 0 but for rounding."""
 
@@ -58,14 +57,15 @@ class CellReport:
             self.place[name] = f"{text} {value.attrs.get('units', '1')}".removesuffix(" 1")
         self.values = {name: cell[name].item() for name in study.outputs if name in cell and not cell[name].dims}
         self.units = {name: cell[name].attrs.get("units", "") for name in self.values}
-        self.status, self.method = WORDS[cell[STATUS].item()], flag_words(cell[METHOD_USED])[cell[METHOD_USED].item()]
+        name, self.method = (flag_words(cell[words])[cell[words].item()] for words in (STATUS, METHOD_USED))
+        self.status = Status[name]
         self.error_bound = cell[ERROR_BOUND].item() if ERROR_BOUND in cell else np.nan
         self.methods, self.differs = dict[str, tuple[Status, float, dict[str, float]]](), dict[str, float]()
         part = zipped(study, {"rtol": [self.rtol]}, fixed=fixed, follows={})
         for method in (study.kernel.methods[k].name for k in usable_methods(part)):
             found = solved(replace(part, method=method))
             outputs = {name: float(found.outputs[name][0]) for name in self.values}
-            self.methods[method] = WORDS[int(found.status[0])], float(found.error[0]), outputs
+            self.methods[method] = Status[STATUS_NAMES[int(found.status[0])]], float(found.error[0]), outputs
             off = deviations(study, found.outputs, cells).values()
             self.differs[method] = max((float(one[0]) for one in off), default=np.nan)
 
@@ -85,8 +85,7 @@ class CellReport:
 class Checked:
     """What comes of solving some OK cells of a result again. Raises SweepError where nothing can be compared.
 
-    They are asked for at rtol over `CLOSER`. The second opinion is another method's wherever one gets to rtol; else
-    the same method's.
+    The second opinion is another method's wherever one gets to rtol; else the same method's.
 
     Attributes
     ----------
@@ -127,7 +126,7 @@ class Checked:
             none = (found.status >= FIRST_REFUSAL) & ~among(found.status, GIVEN_UP)
             right = np.where(found.status <= Status.INACCURATE, found.error, np.inf)
             error[some], another[some] = np.where(none, 0.0, right), others
-            source[some] = [asked[n].name if n >= 0 else WORDS[s].name for n, s in np.c_[found.used, found.status]]
+            source[some] = [asked[n].name if n >= 0 else STATUS_NAMES[s] for n, s in np.c_[found.used, found.status]]
             for name, column in found.outputs.items():
                 values.setdefault(name, np.full((len(used), *column.shape[1:]), np.nan))[some] = column
         off, judged = deviations(study, cells, values), error <= rtol
@@ -161,10 +160,9 @@ class Checked:
         ]
         rows += [("left out", f"{', '.join(self.left_out)}: 0 but for rounding")] if self.left_out else []
         if self.worst:
-            place = ", ".join(f"{name} = {value}" for name, value in self.worst["cell"].items())
             said = " against ".join(f"{value:.12g} ({who})" for who, value in self.worst["values"])
             by = f"{self.worst['output']} by {self.worst['off']:.2g} rtol"
-            rows += [("largest deviation", f"{by} at {place}: {said}")]
+            rows += [("largest deviation", f"{by} at {cell_text(self.worst['cell'])}: {said}")]
         return Table(rows).text()
 
 
@@ -177,11 +175,8 @@ def again(dataset: xr.Dataset, numbers: Any, allow_import: bool) -> tuple[Study,
         column = cells.coords.get(name)
         if column is None or column.attrs.get("units", field.unit) != field.unit:
             raise SweepError(f"{name}: is lost or in another unit; take cells of the result as it was read")
-        values: Any = column.values
-        if field.choices and values.dtype.kind not in "fiu":
-            values = np.vectorize(field.choices.get, otypes=[float])(values)
-        shape = values.shape if "cell" in column.dims else (len(numbers), *values.shape)
-        columns[field.name] = np.broadcast_to(values, shape)
+        values = np.vectorize(lambda value, field=field: field.choices.get(value, value), otypes=[float])(column)
+        columns[field.name] = values if "cell" in column.dims else np.repeat(values[None], len(numbers), axis=0)
     # beside other states it is seen that a state is 0 but for rounding
     more = (field.name for field in study.kernel.outputs if field.sized and field.name not in study.outputs)
     return replace(study, outputs=(*study.outputs, *more)), cells, columns

@@ -25,6 +25,7 @@ from sweep.cells.sample import relative_error, sampled, solved
 from sweep.cells.schema import STATUS
 from sweep.cells.solve import GIVEN_UP, Solver, among, usable_methods
 from sweep.errors import SweepError
+from sweep.results.statuses import STATUS_NAMES
 from sweep.runs.run import run
 from sweep.study.model import Study, frozen
 from sweep.study.read import Given
@@ -40,7 +41,6 @@ GIVEN, ROUNDING = "the truth given", 2.0**-53
 """The name of a reference that is given, and its own error."""
 UNSURE = (Status.INACCURATE, Status.GRAZING)
 """What says of itself that digits, or a count, may be wrong."""
-NAMES = {int(status): status.name for status in Status}
 EXTREMES = (1e-3, 1e-14)
 """Values of rtol at which isolated cells are tried."""
 WORK = ("rate_calls", "steps", "events")
@@ -288,7 +288,7 @@ def _measured(study: Study, name: str, rtol: float, against: Reference) -> dict[
     taken = ", ".join(f"{m} {100 * n / max((used >= 0).sum(), 1):.3g} %" for m, n in counts.items() if n)
     median = np.median(error[valued]) if valued.any() else math.nan
     largest = worst if sure.any() else math.nan
-    refusal = f"{NAMES[int(status[unsolved][0])]} at {first(unsolved)}" if unsolved.any() else ""
+    refusal = f"{STATUS_NAMES[int(status[unsolved][0])]} at {first(unsolved)}" if unsolved.any() else ""
     work = {key: outputs[key][valued].mean() if valued.any() else math.nan for key in WORK if key in outputs}
     return {
         "error_median": (median, "median relative error of a cell, over its outputs"),

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
     Cells: TypeAlias = xr.Dataset | StoredFile
 
+STATUS_NAMES = {int(status): status.name for status in Status}
 NUMBERS_AT_ONCE = 1 << 22
 
 
@@ -65,7 +66,7 @@ class Account:
 
 def account(dataset: Cells) -> Account:
     """What became of the cells of a result, of a summary too. Reads a few million of them at a time."""
-    found = _counts(dataset, BY_STATUS, STATUS, {int(status): status.name for status in Status})
+    found = _counts(dataset, BY_STATUS, STATUS, STATUS_NAMES)
     shown = () if is_summary(dataset) else (name for name in found if name != Status.OK.name)
     examples = {name: cell_values(dataset, found[name][1]) for name in shown}
     return Account({name: cells for name, (cells, _) in found.items()}, examples)
