@@ -46,7 +46,7 @@ class Listed:
             self.fault = str(fault).removeprefix(f"{path}: ")
         self.question = str(attrs.get("question") or attrs.get("title", ""))
         self.cells, self.statuses, self.account = found.total, found.statuses, found.by_kind
-        self.done = found.done
+        self.done = 0.0 if self.fault else found.done
         self.when = str(attrs.get("end", attrs.get("start", "")))
         self.version = str(attrs.get("versions", "")).partition(",")[0].removeprefix("foliot ")
 

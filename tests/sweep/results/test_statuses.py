@@ -58,3 +58,4 @@ def test_the_results_of_a_folder_are_listed_with_what_became_of_them(tmp_path):
     assert c.cells == 23
     assert 0 < c.done < 1
     assert "not the result of a sweep" in d.fault
+    assert (d.cells, d.done) == (0, 0.0)
