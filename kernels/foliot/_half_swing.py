@@ -323,10 +323,12 @@ def half_swing(step, start, problem, tolerance, active):
     for _ in range(HELP_LIMIT):
         if not any_lane(moving):
             break
+        # past the turning point
         forgotten = where(turning & not_(varied), state[6] + _FORGOTTEN, forgotten)
         turned, old = _turned(state, time, falling, slow), (state, jump, top, top_by_start, time)
         state, jump, top, top_by_start, time = choose(turning, turned, old)
 
+        # along a leg, to where it ends
         side, steady = where(rising, 1.0, falling.side), where(rising, problem.outwards, problem.inwards)
         stop = where(rising, smaller(slow, 0.5 * start), zero)
         leg = Leg(side, steady, floor, problem, stop, forgotten, slow, scales)
@@ -335,8 +337,9 @@ def half_swing(step, start, problem, tolerance, active):
         turning, inward = moving & rising, moving & not_(rising)
         rising = rising & not_(turning)
 
+        # uniformly to the switch, at speeds that friction wants: those of the integration waver about them
         uniform = inward & (state[6] > forgotten - 1e-3)
-        if any_lane(uniform):  # at speeds that friction wants: those of the integration waver about them
+        if any_lane(uniform):
             x, v, x_mu, v_mu, x_start, v_start, decay = state
             _, force, _, force_mu, _, force_start, slope = rates(state, falling)
             v, v_mu, v_start = v + force / slope, v_mu + force_mu / slope, v_start + force_start / slope
@@ -344,6 +347,8 @@ def half_swing(step, start, problem, tolerance, active):
             moved = (fma(coast, v_mu, x_mu), v_mu, fma(coast, v_start, x_start), v_start, fma(coast, slope, decay))
             at_switch = (zero - 1.0, v, *moved)
             state, time = choose(uniform, (at_switch, time + coast), (state, time))
+
+        # or from rest, helped, to where the drive wins again
         stopped = inward & (state[0] + 1.0 > _ARRIVED + _ROUNDED * top)
         if any_lane(stopped):
             free = _released(state[0], problem.inwards - _held_at(problem, floor), problem)
