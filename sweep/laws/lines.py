@@ -18,10 +18,10 @@ from scipy.special import gammaincc, ndtri
 
 from sweep.errors import SweepError
 from sweep.laws.curves import Window, fit_lines, stated_bound
-from sweep.laws.fits import Found, fitted, union
+from sweep.laws.fits import fitted, union
 from sweep.laws.loglog import EPSILON, FEWEST, Array, alike, slope_bounds, slopes, tends
 from sweep.laws.noise import BEYOND_DOUBT, RARE, inliers, regress, roughness, shaped
-from sweep.laws.shapes import CORRECTION, LOG_CORRECTION, ONE, Number
+from sweep.laws.shapes import FADING, LOG_CORRECTION, ONE, Number
 
 SMOOTH = 0.12
 """Share of the distances from a line that is noise, below which they are a bend and no noise."""
@@ -265,12 +265,14 @@ def _corrected(
     """Numbers of each line; at the low end by (1) of 1/x."""
     if low:
         t, z, sigma = -t[::-1], z[:, ::-1], None if sigma is None else sigma[:, ::-1]
-    every, sign, word = [], -1.0 if low else 1.0, noise if isinstance(noise, str) else "noise"
-    for row, tried in zip(z, fitted((ONE, CORRECTION, LOG_CORRECTION), t, z, sigma, CORRECTION), strict=True):
-        found, one, fits, ends = tried[CORRECTION.name], tried[ONE.name], True, [math.nan, math.nan]
-        exponent, fade, left = _outer(found, t)
+    every, sign, span = [], -1.0 if low else 1.0, float(t[-1] - t[0])
+    word = noise if isinstance(noise, str) else "noise"
+    for row, tried in zip(z, fitted((ONE, FADING, LOG_CORRECTION), t, z, sigma, FADING), strict=True):
+        found, one, fits, ends = tried[FADING.name], tried[ONE.name], True, [math.nan, math.nan]
+        strength, fade, _, exponent = found.numbers.tolist()
+        exponent, fade, left = exponent / span, fade / span, math.expm1(strength) * math.exp(-fade)
         if abs(left) >= 1 and one.aicc <= found.aicc + BEYOND_DOUBT:  # a correction that is none
-            exponent, fade, left = float(one.numbers[1] / (t[-1] - t[0])), math.nan, 0.0
+            exponent, fade, left = float(one.numbers[1] / span), math.nan, 0.0
         size = float(np.sqrt(np.mean(found.off**2)))
         scatters = bool(roughness(t, found.off)[0] > SCATTERS * size if noise is None else noise)
         if not (noisy := sigma is not None or (scatters and size > float(8 * rounding(t, row)))):
@@ -281,11 +283,11 @@ def _corrected(
             best, known = float(np.clip(abs(found.numbers[1]), least, most)), found.sigma
             doubt = 0.5 * np.ptp(found.interval(found.beside(t, word)[0], [1], confidence))
             far = np.clip(np.nan_to_num(doubt, posinf=most) / best, 0.02, 0.6)
-            strength, fades = CORRECTION.q[0], np.clip(best * steps**far, least, most).tolist()
-            laws = [CORRECTION._replace(name=str(d), q=(strength, Number(d, d, (d,)))) for d in fades]
+            fades = np.clip(best * steps**far, least, most).tolist()
+            laws = [FADING._replace(name=str(d), q=(FADING.q[0], Number(d, d, (d,)))) for d in fades]
             own, *others = fitted(laws, t, row[None], None if known is None else known[None])[0].values()
             others += [law for law in (one, tried[LOG_CORRECTION.name]) if law.aicc < found.aicc + HARDER]
-            ends = [*union(t, own, others, [-1], word, confidence, AS_WELL)[1][:, 0] / np.ptp(t), exponent]
+            ends = [*union(t, own, others, [-1], word, confidence, AS_WELL)[1][:, 0] / span, exponent]
         verdict = VERDICTS[1 if not fits else 0 if abs(left) < 1 else 2]
         of = {"exponent": sign * exponent, "correction_exponent": sign * fade, "correction": left, "verdict": verdict}
         of |= {"exponent_low": min(sign * end for end in ends), "exponent_high": max(sign * end for end in ends)}
@@ -293,24 +295,11 @@ def _corrected(
     return every
 
 
-def _outer(found: Found, t: Array) -> tuple[float, float, float]:
-    """p and D of the law that is left at the last point, and the correction there.
-
-    (1) is a sum of two powers; whichever is larger there is the law, and the other one the correction.
-    """
-    log_strength, fade, _, exponent = found.numbers
-    span = float(t[-1] - t[0])
-    last = math.expm1(log_strength) * math.exp(min(-fade, 0.0))
-    if fade > 0:
-        return exponent / span, fade / span, last
-    return (exponent - fade) / span, -fade / span, 1 / last if last else math.inf
-
-
 def _by_half(t: Array, z: Array, exponent: float) -> float:
     """Three times as far as the outer half of the window moves the exponent."""
     first = np.append(True, np.diff(t) > 0)
     t, z = t[first], z[first]
     half = t >= (t[0] + t[-1]) / 2
-    other = fitted((CORRECTION,), t[half], z[None, half])[0]
-    local = _outer(other[CORRECTION.name], t[half])[0] if other else slopes(t, z, 5)[-1]
+    other = fitted((FADING,), t[half], z[None, half])[0]
+    local = other[FADING.name].numbers[-1] / np.ptp(t[half]) if other else slopes(t, z, 5)[-1]
     return 3 * abs(float(local) - exponent) + float(slope_bounds(t, np.full(t.size, 8 * rounding(t, z)), 5)[-1])
