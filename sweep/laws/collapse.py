@@ -90,11 +90,11 @@ def fit_collapse(y: xr.DataArray, dim: str, over: str, *, sigma: Any = None, con
     left, moves, _ = np.linalg.svd(beside - basis @ (basis.T @ beside), full_matrices=False)
     beside = left[:, moves > 1e-6 * moves.max()][:, : max(0, off.size - k - 3)]
     every, places = np.column_stack([columns, beside]), np.arange(float(off.size))
-    line = regress(places, every, off[None], "correlated", k, found.sigma)
-    fits = not line.denied[0] or abs(off).max() <= exact
+    denied = regress(places, every, off[None], "correlated", k, found.sigma).denied[0]
+    fits, ends = not denied or abs(off).max() <= exact, found.beside(places, "correlated", confidence)[0]
     result = xr.Dataset({"scatter": np.sqrt(np.mean(off**2)), "points": off.size, "dropped": count - off.size})
     for number, name in enumerate(("x_exponent", "y_exponent")):
-        low, high = found.interval(line, [number], confidence)[:, 0] if fits else (math.nan, math.nan)
+        low, high = ends[:, number] if fits else (math.nan, math.nan)
         result = result.assign({name: found.numbers[number], f"{name}_low": low, f"{name}_high": high})
     result = result.assign(fits=int(fits), verdict="one curve" if fits else "not one curve")
     law = f"{title(y)} = {over}^b f({dim} / {over}^a)"

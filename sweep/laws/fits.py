@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sweep.laws.loglog import Array, alike
-from sweep.laws.noise import ROUNDING, Regression, corrected, inliers, regress, shaped
+from sweep.laws.noise import ROUNDING, corrected, inliers, regress, shaped
 from sweep.laws.shapes import ONE, Law
 
 DAMPINGS = np.array([1e-6, 0.03, 1.0, 30.0])
@@ -63,24 +63,19 @@ class Found(NamedTuple):
         """Largest relative distance of a point."""
         return math.expm1(min(float(abs(self.off).max()), 700.0))
 
-    def beside(self, t: Array, noise: str) -> tuple[Regression | None, float]:
-        """What noise of the word does to the numbers that the points determine, None where there are none; and `aicc`
-        with the noise that suits best, where it is not known."""
-        if not (known := np.isfinite(self.errors)).any():
-            return None, self.aicc
-        line = regress(t, self.jacobian[:, known], self.off[None], noise, sigma=self.sigma)
-        best = self if noise == "even" or self.sigma is not None else self._replace(deviance=line.deviance[0], more=2)
-        return line, best.aicc
-
-    def interval(self, line: Regression | None, which: list[int], confidence: float) -> Array:
-        """Ends of the intervals of some numbers (2, k), by `beside`; infinite where they are not determined."""
-        known, numbers = np.isfinite(self.errors), np.arange(self.numbers.size)[which]
-        ends = np.array([[-np.inf] * len(which), [np.inf] * len(which)])
-        if line is not None:
-            places = known[numbers]
-            ends[:, places] = line.interval((np.cumsum(known) - 1)[numbers[places]].tolist(), confidence)[:, :, 0]
-        found: Array = self.numbers[which] + np.clip(ends, [[-np.inf], [0.0]], [[0.0], [np.inf]])
-        return found
+    def beside(self, t: Array, noise: str, confidence: float = 0.95) -> tuple[Array, float]:
+        """Ends of the intervals of the numbers beside noise of the word (2, k), infinite where the points do not
+        determine them; and `aicc` with the noise that suits best, where it is not known."""
+        known, aicc = np.flatnonzero(np.isfinite(self.errors)), self.aicc
+        ends = np.array([[-np.inf], [np.inf]]) + np.zeros(self.numbers.size)
+        if known.size:
+            line = regress(t, self.jacobian[:, known], self.off[None], noise, sigma=self.sigma)
+            found = line.interval([*range(known.size)], confidence)[:, :, 0]
+            found = np.where(np.isnan(found), ends[:, known], found)
+            ends[:, known] = self.numbers[known] + np.clip(found, [[-np.inf], [0.0]], [[0.0], [np.inf]])
+            if noise != "even" and self.sigma is None:
+                aicc = self._replace(deviance=line.deviance[0], more=2).aicc
+        return ends, aicc
 
     def denied(self, t: Array, noise: str) -> bool:
         """Whether the points are not the law and noise; unless that is independent, by polynomials beside the law."""
@@ -104,12 +99,11 @@ def union(
 ) -> Array:
     """Ends of the intervals of some numbers of a law, and ends that hold those of each of the other laws, too, that the
     points do not rule out beside the best of all: whose AICc is not above it by more than `as_well` (2, 2, k)."""
-    every = [(one, *one.beside(t, noise)) for one in (own, *others)]
-    least = min(aicc for *_, aicc in every) + as_well
-    first, *rest = (one.interval(line, which, confidence) for one, line, aicc in every if one is own or aicc <= least)
+    every = [one.beside(t, noise, confidence) for one in (own, *others)]
+    least = min(aicc for _, aicc in every) + as_well
+    first, *rest = (ends[:, which] for k, (ends, aicc) in enumerate(every) if k == 0 or aicc <= least)
     low, high = zip(first, *rest, strict=True)
-    ends = np.array([first, (np.min(low, axis=0), np.max(high, axis=0))])
-    return np.where(np.isnan(ends), [[-np.inf], [np.inf]], ends)
+    return np.array([first, (np.min(low, axis=0), np.max(high, axis=0))])
 
 
 @np.errstate(all="ignore")  # what overflows is infinite, and no curve

@@ -281,7 +281,7 @@ def _corrected(
         elif fits := not found.denied(t, word):
             steps, least, most = FADES
             best, known = float(np.clip(abs(found.numbers[1]), least, most)), found.sigma
-            doubt = 0.5 * np.ptp(found.interval(found.beside(t, word)[0], [1], confidence))
+            doubt = 0.5 * np.ptp(found.beside(t, word, confidence)[0][:, 1])
             far = np.clip(np.nan_to_num(doubt, posinf=most) / best, 0.02, 0.6)
             fades = np.clip(best * steps**far, least, most).tolist()
             laws = [FADING._replace(name=str(d), q=(FADING.q[0], Number(d, d, (d,)))) for d in fades]
