@@ -34,7 +34,7 @@ from sweep.cells.timing import BLOCK_BYTES
 from sweep.file import disk
 from sweep.file.frame import cuts_of
 from sweep.file.reading import StoredFile
-from sweep.file.store import alone, found, unfinished_of
+from sweep.file.store import alone, earlier, unfinished_of
 from sweep.file.store import begun as made
 from sweep.study.model import Study
 
@@ -140,7 +140,7 @@ def many(folder: Path, count: int) -> None:
         framed, table = time.perf_counter() - begun, store.work
         table.write_digests(dict.fromkeys(range(table.blocks.count - 1), b"x" * table.row_bytes))
     begun = time.perf_counter()
-    with alone(path), found(path) as store:
+    with alone(path), earlier(path, mark) as store:
         store.resume(())
         left = store.missing()
         taken = time.perf_counter() - begun

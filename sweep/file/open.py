@@ -21,7 +21,7 @@ from sweep.errors import SweepError
 from sweep.file import disk
 from sweep.file.frame import cuts_of
 from sweep.file.reading import Damaged, StoredFile, Table
-from sweep.file.store import alone, begun, found, unfinished_of
+from sweep.file.store import alone, begun, earlier, unfinished_of
 from sweep.words import as_path
 
 if TYPE_CHECKING:
@@ -114,17 +114,15 @@ def store_cells(
     """
     if path is None:
         return in_memory(cell_schema(study, mark or {}), arrays).assign_attrs(attrs or {})
-    output, schema = Path(os.path.realpath(as_path(path))), cell_schema(study, mark or fingerprint(study))
+    output, mark = Path(os.path.realpath(as_path(path))), mark or fingerprint(study)
+    schema = cell_schema(study, mark)
     schema = replace(schema, attrs={**schema.attrs, **(attrs or {})})
     blocks = boxes(schema.shape, max(1, BLOCK_BYTES // sum(column.cell_bytes for column in schema.columns)))
     begin = time.monotonic()
     with alone(output), contextlib.ExitStack() as stack:
         disk.check_target(output, force=force)
-        if (left := found(output, force)) is not None:
-            left.close()
-            ours = left.attrs["fingerprint"] == schema.attrs["fingerprint"]
-            disk.check_target(left.path, force=force or ours)
-        disk.remove(unfinished_of(output))
+        if (store := earlier(output, mark, force)) is not None:
+            store.close()
         store = stack.enter_context(begun(output, schema, cuts_of(study, schema, blocks)))
         for block in range(blocks.count):
             rows = slice(*blocks.bounds(block))

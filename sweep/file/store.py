@@ -13,6 +13,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import shutil
 import time
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping
@@ -23,11 +24,13 @@ from typing import Any
 
 import numpy as np
 
+from sweep.cells.fingerprint import difference
 from sweep.cells.schema import Schema, ending, now
 from sweep.errors import Incomplete, SweepError
 from sweep.file import disk
-from sweep.file.frame import PAGE, Cut, create
+from sweep.file.frame import PAGE, Cut, create, expected_size
 from sweep.file.reading import BYTES, UNFINISHED, Damaged, StoredFile
+from sweep.words import quantity
 
 SYNC_SECONDS = 0.2
 """How often blocks are brought to the disk, and it is looked whether the file is still in its place."""
@@ -55,25 +58,45 @@ def alone(output: Path) -> Iterator[None]:
         yield
 
 
-def begun(output: Path, schema: Schema, cuts: Mapping[str, Cut], shared: bool = False) -> Store:
-    """A result of which nothing is computed yet, with room on the disk for all of it. Raises SweepError."""
-    with disk.replacing(unfinished_of(output), held=True) as part:
-        create(part, replace(schema, attrs={**schema.attrs, "start": now()}), cuts, shared)
-    return Store(output)
+def earlier(output: Path, mark: Mapping[str, str], give_up: bool = False) -> Store | None:
+    """What an earlier run with this fingerprint left; None where there is nothing, or to `give_up` what is not that.
 
-
-def found(output: Path, give_up: bool = False) -> Store | None:
-    """What an earlier run left; None where there is nothing, or to `give_up` what is damaged. Raises SweepError."""
+    Raises SweepError.
+    """
     path = unfinished_of(output)
     if not path.exists():
         return None
-    with contextlib.suppress(SweepError if give_up else Damaged):
-        if (store := Store(output)).is_as_made():
+    with contextlib.suppress(SweepError) if give_up else contextlib.nullcontext():
+        store = Store(output)
+        as_made, changes = store.is_as_made(), difference(store.fingerprint, mark)
+        if as_made and not changes:
             return store
         store.close()
-    if give_up:
-        return None
-    raise SweepError(f"{path}: damaged beside its numbers; remove it, or give it up with --force")
+        if not as_made:
+            raise Damaged(f"{path}: damaged beside its numbers; remove it, or give it up with --force")
+        raise SweepError(
+            f"{path}: the unfinished result of another study or version; finish that one first, choose another name, "
+            "or give it up with --force" + "".join(f"\n  {line}" for line in changes)
+        )
+    return None
+
+
+def begun(output: Path, schema: Schema, cuts: Mapping[str, Cut], shared: bool = False) -> Store:
+    """A result of which nothing is computed yet, with room on the disk for all of it. Raises SweepError.
+
+    What an earlier run left is removed first.
+    """
+    with disk.refusing(output):
+        disk.remove(unfinished_of(output))
+    needed, free = expected_size(schema, cuts), shutil.disk_usage(output.parent).free
+    if needed > free:
+        raise SweepError(
+            f"{output}: needs {quantity(needed)}, only {quantity(free)} are free here; free some space, choose another "
+            "folder with -o, fewer outputs, or keep a [summary] instead of every cell"
+        )
+    with disk.replacing(unfinished_of(output), held=True) as part:
+        create(part, replace(schema, attrs={**schema.attrs, "start": now()}), cuts, shared)
+    return Store(output)
 
 
 def reopened(output: Path) -> Store:

@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 import contextlib
-import shutil
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 from sweep.cells.block import Blocks
 from sweep.cells.fingerprint import difference
-from sweep.cells.partition import Partition
 from sweep.errors import SweepError
 from sweep.file import disk
-from sweep.file.frame import cuts_of, expected_size
+from sweep.file.frame import cuts_of
 from sweep.file.open import verdict
 from sweep.file.reading import StoredFile
-from sweep.file.store import Store, alone, begun, found, lock_of, reopened, unfinished_of
+from sweep.file.store import Store, alone, begun, earlier, lock_of, reopened, unfinished_of
 from sweep.runs.extend import Reused, has_failed, obstacle
 from sweep.runs.loop import Loop, Task
 from sweep.runs.pool import Terminated, TimeUp, signals_held
-from sweep.words import quantity
 
 Ending = Literal["done before", "complete", "unfinished", "not begun"]
 """What became of an output: the last two where the time was up before the end, or before the first block."""
@@ -27,36 +24,24 @@ Ending = Literal["done before", "complete", "unfinished", "not begun"]
 
 def run_to_file(task: Task) -> Ending:
     """Continues, begins or leaves alone what is there. Raises SweepError, KeyboardInterrupt, Terminated."""
-    left = any(map(disk.mark, (unfinished_of(task.output), lock_of(task.output))))
-    seen, (standing, damaged) = disk.mark(task.output), ("nothing", ()) if left else _standing(task)
+    at_work = any(map(disk.mark, (unfinished_of(task.output), lock_of(task.output))))
+    seen, (standing, damaged) = disk.mark(task.output), ("nothing", ()) if at_work else _standing(task)
     if standing == "complete":
         return "done before"
     with alone(task.output), contextlib.ExitStack() as stack:
-        if left or seen != disk.mark(task.output):  # another run may have ended before this one had the lock
+        if at_work or seen != disk.mark(task.output):  # another run may have ended before this one had the lock
             standing, damaged = _standing(task)
-        store = found(task.output, task.force)
-        is_ours = store is not None and store.fingerprint == dict(task.fingerprint)
+        store = earlier(task.output, task.fingerprint, task.force or standing == "complete")
         if standing == "complete":
             if store is not None:
                 store.close()
-            if is_ours:
-                disk.remove(unfinished_of(task.output))
+                disk.remove(store.path)
             return "done before"
-        if store is None and standing == "damaged":
+        if store is not None:
+            damaged = stack.enter_context(store).resume()
+        elif standing == "damaged":
             store = stack.enter_context(reopened(task.output))
             store.resume(damaged)
-        elif store is not None and is_ours:
-            damaged = stack.enter_context(store).resume()
-        else:
-            if store is not None:
-                store.close()  # or its room on the disk is not free
-            if store is not None and not task.force:
-                raise SweepError(
-                    f"{store.path}: the unfinished result of another study or version; finish that one first, "
-                    f"choose another name, or give it up with --force\n{_changes(store.fingerprint, task)}"
-                )
-            disk.remove(unfinished_of(task.output))
-            store = None
         if store is not None and not store.missing():  # its end alone is missing, or the columns made there are damaged
             with signals_held():
                 store.finish(0.0)
@@ -70,7 +55,8 @@ def run_to_file(task: Task) -> Ending:
                 # signals are held back from here on, wherever they would leave half a file behind
                 loop = Loop(task, running, None if store is None else store.work.blocks, known)
                 if store is None:
-                    store = stack.enter_context(_begun(task, loop.blocks.partition))
+                    cuts = cuts_of(task.study, task.schema, loop.blocks.partition)
+                    store = stack.enter_context(begun(task.output, task.schema, cuts, task.cluster is not None))
                 for block in damaged:
                     task.note(f"{loop.blocks.label(block)} were damaged on the disk and are computed again")
                 shared = None if task.cluster is None else store.shared()
@@ -90,18 +76,6 @@ def run_to_file(task: Task) -> Ending:
             if isinstance(reason, TimeUp):
                 return "not begun" if store is None else "unfinished"
             raise
-
-
-def _begun(task: Task, blocks: Partition) -> Store:
-    """A new file, if there is room for it. Raises SweepError."""
-    cuts = cuts_of(task.study, task.schema, blocks)
-    needed, free = expected_size(task.schema, cuts), shutil.disk_usage(task.output.parent).free
-    if needed > free:
-        raise SweepError(
-            f"{task.output}: needs {quantity(needed)}, only {quantity(free)} are free here; free some space, "
-            "choose another folder with -o, fewer outputs, or keep a [summary] instead of every cell"
-        )
-    return begun(task.output, task.schema, cuts, task.cluster is not None)
 
 
 def _standing(task: Task) -> tuple[Literal["nothing", "complete", "damaged", "reused"], Sequence[int]]:
@@ -124,11 +98,8 @@ def _standing(task: Task) -> tuple[Literal["nothing", "complete", "damaged", "re
     what = f"cannot be extended, for {hindrance}" if task.extend else "holds the result of another study or version"
     extendable = "; where its axes have only got more values, --extend computes the new cells alone"
     cure = f"choose another name, or overwrite it with --force{'' if hindrance else extendable}"
-    raise SweepError(f"{task.output}: {what}; {cure}\n{_changes(file.fingerprint, task)}")
-
-
-def _changes(stored: Mapping[str, str], task: Task) -> str:
-    return "\n".join(f"  {line}" for line in difference(dict(stored), dict(task.fingerprint)))
+    changes = "".join(f"\n  {line}" for line in difference(file.fingerprint, task.fingerprint))
+    raise SweepError(f"{task.output}: {what}; {cure}{changes}")
 
 
 class _Stored:
