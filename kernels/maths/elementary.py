@@ -111,7 +111,7 @@ def exp(x):
 
 @jit
 def cbrt(x):
-    """Cube root of a positive normal x, within 0.6 ulp."""
+    """Cube root of a positive normal x below 2^1023, within 0.6 ulp."""
     e = exponent(x)
     third = nearest((e - 1.0) * (1.0 / 3.0))
     j = e - 3.0 * third  # 0, 1, 2
@@ -149,9 +149,9 @@ def log_remainder3(x):
 
 @jit
 def _reduced(x):
-    """f in [sqrt(1/2) - 1, sqrt(2) - 1] and e with x = (1 + f) 2^e, for x normal and positive."""
+    """f in [sqrt(1/2) - 1, sqrt(2) - 1] and e with x = (1 + f) 2^e, for finite x from 2^-1021 on."""
     e = exponent(x)
-    m = x * pow2(-e)
+    m = (0.5 * x) * pow2(1.0 - e)  # from x = 2^1023 on 2^-e is no normal number
     high = m > _SQRT_2
     return where(high, 0.5 * m, m) - 1.0, where(high, e + 1.0, e)
 

@@ -1,5 +1,7 @@
 """Elementary functions against 50 digits, and lanes against one cell."""
 
+import sys
+
 import numpy as np
 import pytest
 from columns import relative_error
@@ -120,6 +122,10 @@ def test_elementary_functions_at_the_ends_of_their_ranges():
     assert sines[0] == 0.0
     assert angles[2:4].tolist() == [np.pi / 2, -np.pi / 2]
     assert powers[:2].tolist() == [1.0, 1e-310]  # 0^0 = 1
+    top = [2.0**1022, np.nextafter(2.0**1023, 0.0), 2.0**1023, 1e308, sys.float_info.max]
+    logs, logs1, *_ = evaluated(more, 9, top, top, np.ones(5))
+    for found in (logs, logs1):
+        assert relative_error(found, [log(mpf(x)) for x in top]).max() < 2e-16
 
 
 @jit
