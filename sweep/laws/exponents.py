@@ -15,7 +15,7 @@ import xarray as xr
 from sweep.errors import SweepError, missing
 from sweep.laws import curves
 from sweep.laws.curves import Window, log_of, positive_axis, title
-from sweep.laws.loglog import EPSILON, Array, brackets, is_logarithmic, root, slope_errors, slopes
+from sweep.laws.loglog import EPSILON, Array, brackets, by_runs, is_logarithmic, root, slope_errors, slopes
 
 BORDERS = (-1.0, -0.5, -1 / 3)
 """Exponents of a period in the drive: weak drive, losses that scale with it, strong drive."""
@@ -75,7 +75,7 @@ def local_exponent(y: xr.DataArray, dim: str, *, error: bool = False, bound: Any
     if not error:
         return found
     bounds = curves.stated_bound(y, bound).transpose(*logs.dims).values
-    errors = logs.copy(data=slope_errors(t, logs.values, bounds)).transpose(*y.dims)
+    errors = logs.copy(data=by_runs(t, slope_errors, logs.values, bounds)).transpose(*y.dims)
     errors.attrs = {"units": "1", "long_name": f"error of the local exponent of {title(y)} in {dim}"}
     return xr.Dataset({"exponent": found, "exponent_error": errors})
 
@@ -140,13 +140,8 @@ def where_exponent(
         noise = EPSILON * float(np.nanmax(abs(z))) / (1.0 if values else float(abs(np.diff(t)).min()))
         return found, apart + noise * step / rise + EPSILON * abs(float(t[at]))
 
-    place, error = xr.apply_ufunc(
-        *(one, curve.compute()),
-        input_core_dims=[[dimension]],
-        output_core_dims=[[], []],
-        vectorize=True,
-        keep_attrs=True,
-    )
+    keys: dict[str, Any] = {"input_core_dims": [[dimension]], "output_core_dims": [[], []], "keep_attrs": True}
+    place, error = xr.apply_ufunc(one, curve.compute(), vectorize=True, **keys)
     if not bool(place.notnull().any()):
         count = int(error.max())
         said = f"passes {value:g} {count} times" if count else f"does not pass {value:g}"

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sweep.laws.loglog import Array, alike
-from sweep.laws.noise import ROUNDING, corrected, inliers, regress, shaped
+from sweep.laws.noise import ROUNDING, inliers, regress, shaped
 from sweep.laws.shapes import ONE, Law
 
 DAMPINGS = np.array([1e-6, 0.03, 1.0, 30.0])
@@ -50,9 +50,10 @@ class Found(NamedTuple):
 
     @property
     def criteria(self) -> tuple[float, float]:
-        """Akaike's criterion, corrected for few points, and Bayes'."""
+        """Akaike's criterion, corrected for few points and inf where they are too few, and Bayes'."""
         numbers, points = self.law.numbers + self.more, self.off.size
-        return float(corrected(self.deviance, points, numbers)), self.deviance + numbers * math.log(points)
+        more = 2 * numbers * points / (points - numbers - 1) if points > numbers + 1 else math.inf
+        return self.deviance + more, self.deviance + numbers * math.log(points)
 
     @property
     def aicc(self) -> float:
@@ -236,7 +237,11 @@ class _Search:
         """Each law of each line."""
         off, b, by_q, columns, _ = self.derivatives(np.arange(len(self.q)))
         jacobian = np.concatenate([by_q.transpose(0, 2, 1), columns.transpose(1, 2, 0)], axis=2)
-        numbers, doubt, deviance = np.concatenate([self.q, b], axis=1), _doubts(jacobian), self.deviance()
+        numbers, deviance = np.concatenate([self.q, b], axis=1), self.deviance()
+        unit = jacobian / (size := np.sqrt((jacobian**2).sum(axis=1, keepdims=True)) + 1e-300)
+        inverse = np.linalg.pinv(unit, rcond=1e-8)
+        lost = 1 - np.einsum("rkn,rnk->rk", inverse, unit) > 1e-6
+        doubt = np.where(lost, np.inf, np.sqrt((inverse**2).sum(axis=2)) / size[:, 0])
         if self.errors is None:
             left = np.array([self.t.size - law.numbers for law in self.laws])[self.law]
             doubt *= np.sqrt(self.square / left)[:, None]
@@ -286,11 +291,3 @@ def _columns(every: Array) -> tuple[Array, Array, Array]:
     told = size > 1e-13 * size.max(axis=-1, keepdims=True)
     back = np.where(told[..., :, None] & told[..., None, :], back, np.eye(len(every) - 1))
     return every, np.where(told[..., None, :], basis, 0.0), back
-
-
-def _doubts(columns: Array) -> Array:
-    """Standard errors (r, k) of the numbers of columns (r, n, k) beside noise of 1; inf of what is not determined."""
-    unit = columns / (size := np.sqrt((columns**2).sum(axis=1, keepdims=True)) + 1e-300)
-    inverse = np.linalg.pinv(unit, rcond=1e-8)
-    lost = 1 - np.einsum("rkn,rnk->rk", inverse, unit) > 1e-6
-    return np.where(lost, np.inf, np.sqrt((inverse**2).sum(axis=2)) / size[:, 0])

@@ -126,12 +126,8 @@ def fit_line(
     bow = u * u - spread[:, None] / n - (share * u**3).sum(axis=1, keepdims=True) / spread[:, None] * u
     drift = 2 * (share * bow * off).sum(axis=1) / (share * bow * bow).sum(axis=1) * (t[-1] - t[0])
     fit: dict[str, Any] = {"exponent": slope, "exponent_error": size / np.sqrt(spread), "level": level}
-    fit |= {
-        "level_error": size / n**0.5,
-        "kind": np.full(len(z), "weighted", "U10"),
-        "fits": np.ones(len(z)),
-        "noisy": np.ones(len(z)),
-    }
+    fit |= {"level_error": size / n**0.5, "kind": np.full(len(z), "weighted", "U10")}
+    fit |= {name: np.ones(len(z)) for name in ("fits", "noisy")}
     fit |= {f"{name}_{end}": np.full(len(z), np.nan) for name in ("exponent", "limit") for end in ("low", "high")}
     if sigma is not None:
         error = 1 / np.sqrt((weight * u * u).sum(axis=1))

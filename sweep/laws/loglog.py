@@ -50,7 +50,7 @@ def slopes(t: Array, z: Array, points: int) -> Array:
         is differentiated with what it has.
     """
     # differences from one point: a constant has slope zero exactly
-    return _by_runs(t, lambda s, y: (y - y[:, :1]) @ _matrix(s, points).T, z)
+    return by_runs(t, lambda s, y: (y - y[:, :1]) @ _matrix(s, points).T, z)
 
 
 def slope_bounds(t: Array, bound: Array, points: int) -> Array:
@@ -59,7 +59,7 @@ def slope_bounds(t: Array, bound: Array, points: int) -> Array:
     return found
 
 
-def _by_runs(t: Array, function: Callable[..., Array], *lines: Array) -> Array:
+def by_runs(t: Array, function: Callable[..., Array], *lines: Array) -> Array:
     """`function` of each unbroken run of at least three neighbours; lines (..., n) with the same gaps at once."""
     rows = [np.broadcast_to(one, lines[0].shape).reshape(-1, t.size) for one in lines]
     if np.isfinite(rows[0]).all():
@@ -92,18 +92,14 @@ def runs(present: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
 
 
 def slope_errors(t: Array, z: Array, bound: Array) -> Array:
-    """Half the 95 % interval of the slope by five points, with noise; without, more than its error.
+    """Half the 95 % interval of the slope by five points, with noise; without, more than its error; of lines (m, n)
+    without gaps.
 
     What the polynomial through seven points says otherwise tells the error. Noise makes it alike at neighbours, over
     the weights of both: the median near a point gives its size. Where it is far larger, the curve bends: it counts
     itself there, and where a bend is within a step, so that more points do not tell more, the slopes of the steps
-    beside the point. What errors up to `bound` (..., n) in the values can do is added.
+    beside the point. What errors up to `bound` (m, n) in the values can do is added.
     """
-    return _by_runs(t, _errors, z, bound)
-
-
-def _errors(t: Array, z: Array, bound: Array) -> Array:
-    """`slope_errors` of lines (m, n) without gaps."""
     from scipy.sparse import diags_array
 
     orders = (7, 5, 3) if t.size > 5 else (t.size, max(2, t.size - 2), 2)  # beside few points lower orders

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import functools
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -243,9 +243,3 @@ def shaped(t: Array, off: Array) -> NDArray[np.bool_]:
     all but 0.1 % of it, by trial at 12 to 200 points."""
     found: NDArray[np.bool_] = roughness(t, off)[1] < 1 - 3.4 / math.sqrt(t.size)
     return found
-
-
-def corrected(deviance: Any, points: int, numbers: int) -> Any:
-    """AICc from minus twice the logarithm of the likelihood; inf where there are too few points for so many numbers."""
-    left = points - numbers - 1
-    return deviance + (2 * numbers + 2 * numbers * (numbers + 1) / left if left > 0 else math.inf)

@@ -130,8 +130,13 @@ def _each(t: Array, z: Array, sigma: Array | None, bound: None, **keys: Any) -> 
 def _one(t: Array, z: Array, tried: dict[str, Found], confidence: float, noise: bool | str | None) -> dict[str, Any]:
     """Numbers of one line."""
     two, span = tried[TWO.name], float(t[-1] - t[0])
-    size = math.sqrt(float(two.off @ two.off) / (t.size - 5))
-    noisy = two.sigma is not None or (_is_noise(t, z, two.off, size) if noise is None else bool(noise))
+    size, noisy = math.sqrt(float(two.off @ two.off) / (t.size - 5)), two.sigma is not None or bool(noise)
+    # a curve of five numbers swings about few points of a smooth truth in a way that looks like noise; then nothing is
+    # told, and the intervals are those of both
+    if noise is None and not noisy and t.size >= TELLING and size > 8 * rounding(t, z):
+        share = float(roughness(t, two.off)[0]) / size
+        noisy = share > (ROUGH if t.size >= TELLING_MEMORY else math.inf)
+        noisy |= bool(share > SCATTERED and size < 3 * roughness(t, z)[0])
     word = noise if isinstance(noise, str) else "noise" if noisy else "even"
     verdict, evidence = _verdict(t, tried)
     found = {"verdict": verdict, "regimes": VERDICTS.get(verdict, 0), "evidence": evidence}
@@ -156,19 +161,6 @@ def _one(t: Array, z: Array, tried: dict[str, Found], confidence: float, noise: 
     for name, of in (("", best), ("_low", low), ("_high", high)):
         found |= {f"exponent{name}": of[:2], f"crossover{name}": np.exp(of[2])}
     return found | {"width": width, "level": level}
-
-
-def _is_noise(t: Array, z: Array, off: Array, size: float) -> bool:
-    """Whether the distances are noise: neighbours do not tell the points themselves any better; or, of many points,
-    differ by more than a smooth truth would.
-
-    A curve of five numbers swings about few points of a smooth truth in a way that looks like noise; then nothing is
-    told, and the intervals are those of both.
-    """
-    if off.size < TELLING or size <= 8 * rounding(t, z):
-        return False
-    share = float(roughness(t, off)[0]) / size
-    return bool((share > SCATTERED and size < 3 * roughness(t, z)[0]) or (off.size >= TELLING_MEMORY and share > ROUGH))
 
 
 def _widened(t: Array, z: Array, best: Array, low: Array, high: Array) -> tuple[Array, Array]:
