@@ -1,6 +1,6 @@
 """How near is every kernel to what this machine can do: arithmetic, memory, and what keeps it from more?
 
-    python benchmarks/speed/roofline.py [KERNEL ...] [--cells 32] [--methods]
+    python benchmarks/speed/roofline.py [KERNEL ...] [--cells 16] [--methods]
 
 A row for each kernel's starter study, and the method that takes most of its cells by `auto` (`--methods`: for each
 that can solve it). Times are processor time of one core, best of several; others on the machine still take clock and
@@ -45,7 +45,7 @@ from sweep.cells.solve import Solver, usable_methods
 from sweep.show.kernels import starter
 from sweep.study.model import Study
 
-LANES = 32
+LANES = 16
 PASS = 0.2
 """Seconds of a timed pass, about: so many cells that what a call costs once is shared by thousands, as in a sweep."""
 PASS_BYTES = 1 << 27

@@ -26,7 +26,8 @@ POOL = (2 * PANEL_LIMIT, 8)
 _CAUTION = 3.0
 _JUMP = 0.125  # of a panel's change when it is halved: the least error of its halves, where theirs is small by chance
 _LEAST = 1.25  # of rtol
-ROOM = max(GROUP, COUNT)
+ROOM = -(-COUNT // GROUP) * GROUP
+"""Nodes of whole groups of lanes."""
 
 _NODES = np.array([
     0.995657163025808080735527280689003, 0.973906528517171720077964012084452, 0.930157491355708226001207180059508,
