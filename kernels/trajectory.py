@@ -12,8 +12,8 @@ from typing import Any, Unpack
 import numpy as np
 
 from kernels.codegen.return_map import at_times
-from kernels.codegen.to_tolerance import at_switches
-from kernels.interface import FIRST_REFUSAL, UNSOLVED, Field, Kernel, Status
+from kernels.codegen.to_tolerance import at_switches, on_the_way
+from kernels.interface import Field, Kernel, Status
 from kernels.scene import SceneParts, estimating_kernel, scene_of, states_of
 
 __all__ = ["motion_kernel", "section_kernel"]
@@ -40,7 +40,7 @@ def section_kernel(**parts: Unpack[SceneParts]) -> Kernel:
 
     def solved(method: str, columns: Any, rtol: Any, stops: Any, _: Any) -> Any:
         rows, error, status = at_switches(scene, method, columns, rtol, stops)
-        return np.delete(rows, 1, axis=0)[: len(outputs)], error, status
+        return rows[: len(outputs)], error, status
 
     return estimating_kernel(parts, parts["parameters"], outputs, [along], METHODS, solved)
 
@@ -62,14 +62,7 @@ def motion_kernel(**parts: Unpack[SceneParts]) -> Kernel:
         count, many = len(rtol), len(times)
         cells = [np.tile(c, many) for c in columns]
         found, status = at_times(scene, method, cells, np.repeat(times, count), np.tile(rtol, many))
-        status, rows = status.reshape(many, count), found.reshape(len(states), many, count)
-        missing = (status >= FIRST_REFUSAL) | np.isnan(rows).any(axis=0)
-        short = missing & ~missing.all(axis=0)
-        worst, rows = np.where(short, Status.TOO_SHORT, status).max(axis=0), np.where(missing, np.nan, rows)
-        # what this method gives up, as the last times of a stiff motion, another one may solve
-        given_up = np.isin(status, UNSOLVED).any(axis=0) & short.any(axis=0)
-        worst[given_up] = Status.INACCURATE
-        inaccurate = given_up | (status == Status.INACCURATE).any(axis=0)
-        return rows, np.where(inaccurate, math.inf, rtol), worst.astype(np.int8)
+        rows, status = found.reshape(len(states), many, count), status.reshape(many, count)
+        return on_the_way(rows, status, np.where((status == Status.INACCURATE).any(axis=0), math.inf, rtol))
 
     return estimating_kernel(parts, parts["parameters"], outputs, [along], METHODS, solved)

@@ -188,38 +188,60 @@ def told(one, columns, rtol, of_a_step, least=0.0):
 
 
 def at_switches(scene, method, columns, rtol, stops):
-    """Time, interval, states (n_rows, n_stops, n_cells), the error of each cell, relative, and its status.
+    """Time and states (n_rows, n_stops, n_cells) at those switches; of each cell the error and status (`on_the_way`).
 
-    Along the way the error is carried; by a method other than "taylor" three runs are compared. What a motion does not
-    come to is NaN; a cell's status is OK, or what was remarked, or why there is nothing at all. Where the method gives
-    later switches up, which another one may solve, it is INACCURATE, and the error infinite.
+    By "taylor" the error is carried along the way; by other methods, and where that comes to nothing, as behind what
+    grazes a surface, three runs are compared.
     """
-    n = len(scene.states)
-    found, error = _along(scene, method, columns, rtol, stops)
-    again = np.flatnonzero(~(error <= rtol))
-    if len(again):
-        better, less = _along(scene, method, [c[again] for c in columns], AT_SWITCHES * rtol[again], stops)
-        mended = ~(less >= error[again])
-        found[:, :, again[mended]], error[again[mended]] = better[:, :, mended], less[mended]
-    verdict = found[-1]
-    ended = (verdict >= FIRST_REFUSAL) | np.isnan(verdict)
-    rows = np.where(ended, np.nan, found[: 2 + n])
-    worst = np.fmax.reduce(np.where(ended, 0.0, verdict), axis=0)
-    why = np.fmax.reduce(verdict, axis=0)
-    given_up = np.isin(why, UNSOLVED) & ~ended.all(axis=0)
+    one, tells = runner(scene, "told" if method == "taylor" else method), method == "taylor"
+    found, error = _along(one, columns, rtol, stops, tells)
+    grazes = ((found[-1] == Status.GRAZING) & np.isnan(found[0])).any(axis=0)
+    again, known = ~(error <= rtol) | grazes, error < np.inf
+    for cells, carried in ((again & known, tells), (again & ~known, False)):
+        left = np.flatnonzero(cells)
+        if len(left):
+            better, less = _along(one, [c[left] for c in columns], AT_SWITCHES * rtol[left], stops, carried)
+            mended = ~(less >= error[left]) | grazes[left]
+            found[:, :, left[mended]], error[left[mended]] = better[:, :, mended], less[mended]
+    hangs = (found[-1] == Status.GRAZING).any(axis=0) & ~(error <= rtol)  # on what is not known: there may be no switch
+    error[hangs] = np.inf
+    return on_the_way(found[[0, *range(2, 2 + len(scene.states))]], found[-1], error)
+
+
+def on_the_way(rows, verdict, error):
+    """Rows (n_rows, n_stops, n_cells), NaN where a motion does not come to; the error of each cell, and its status.
+
+    That is OK, or what was remarked, or why there is nothing at all, or not all. Where the method gives later stops up,
+    which another one may solve, it is INACCURATE, and the error infinite.
+
+    Parameters
+    ----------
+    verdict : of each stop and cell; NaN where nothing is known
+    error : of what is given
+    """
+    ended = ~(verdict < FIRST_REFUSAL) | np.isnan(rows).any(axis=0)
+    why, worst = np.fmax.reduce(verdict, axis=0), np.fmax.reduce(np.where(ended, 0, verdict), axis=0)
+    given_up = np.isin(verdict, UNSOLVED).any(axis=0) & ~ended.all(axis=0)
     short = np.where(why == Status.STICKS, Status.COMES_TO_REST, Status.TOO_SHORT)
     short = np.where(given_up, Status.INACCURATE, short)
-    status = np.where(ended.all(axis=0), why, np.where(ended.any(axis=0), short, worst))
-    return rows, np.where(given_up, np.inf, error), status.astype(np.int8)
+    status = np.where(ended.all(axis=0), why, np.where(ended.any(axis=0), short, worst)).astype(np.int8)
+    return np.where(ended, np.nan, rows), np.where(given_up, np.inf, error), status
 
 
-def _along(scene, method, columns, rtol, stops):
-    """Results of one tolerance and their error."""
-    if method == "taylor":
-        found = passages(runner(scene, "told"), columns, OF_A_STEP * rtol, stops, told=True)
-        return found[:-1], STATED * np.fmax.reduce(found[-1], axis=0)
-    one, ends = runner(scene, method), [*columns, np.full(len(rtol), stops[-1])]
-    fine, _, doubt = three_runs(
-        lambda columns, finer, shake: passages(one, columns[:-1], rtol / finer, stops, shake=shake), ends, rtol
-    )
-    return fine, np.fmax.reduce(doubt.reshape(-1, doubt.shape[-1]), axis=0)
+def _along(one, columns, rtol, stops, carried):
+    """Results of one tolerance; of each cell the largest error of a switch that it comes to, infinite where unknown.
+
+    So it is where of three runs one comes to a switch, and another one does not. `carried` : by one run
+    """
+    if carried:
+        found = passages(one, columns, OF_A_STEP * rtol, stops, told=True)
+        found, doubt, comes = found[:-1], STATED * found[-1:], found[-2] < FIRST_REFUSAL
+    else:
+        found, rough, doubt = three_runs(
+            lambda columns, finer, shake: passages(one, columns[:-1], rtol / finer, stops, shake=shake),
+            [*columns, np.full(len(rtol), stops[-1])],
+            rtol,
+        )
+        comes = (found[-1] < FIRST_REFUSAL) | (rough[-1] < FIRST_REFUSAL)
+    doubt = np.where(comes, np.where(np.isnan(doubt), np.inf, doubt), 0.0)
+    return found, doubt.reshape(-1, len(rtol)).max(axis=0)
