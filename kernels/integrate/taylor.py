@@ -226,7 +226,7 @@ def foreseen(e, d, dd, ddd, h):
 
 
 @jit_apart
-def crossing(at, curve, event, facts, h, tolerance, searching):
+def crossing(at, curve, event, facts, extent, h, tolerance, searching):
     """Where an event falls through 0 in (0, h], given that it falls all along, and whether it only just does.
 
     Halley's steps within a bracket, with the bend by the first terms. What is left after a step is taken for that of
@@ -235,10 +235,11 @@ def crossing(at, curve, event, facts, h, tolerance, searching):
     Parameters
     ----------
     at, curve : u, u' and u''/2 at t are `at(t, curve)`
-    event : offset, factor and u(0) of the event offset + factor u
+    event : offset and factor of the event offset + factor u
     facts : coefficients 0 to 3 of the event
+    extent : what its value is made of, in size, which near 0 is more than the value: the series are right to a share
     """
-    offset, factor, start = event
+    offset, factor = event
     before, enough = 0.0 * h, 0.01 * tolerance + 1e-17
     low, high, t, left = 0.0 * h, h, foreseen(*facts, h), searching
     rate, bend = 0.0 * h, 0.0 * h
@@ -254,5 +255,5 @@ def crossing(at, curve, event, facts, h, tolerance, searching):
         if not any_lane(left):
             break
         before = change
-    blur = GRAZING * tolerance * (magnitude(offset) + magnitude(factor * start))
+    blur = GRAZING * tolerance * extent
     return t, searching & not_(magnitude(rate) > blur / magnitude(rate) * (2.0 * magnitude(bend)))

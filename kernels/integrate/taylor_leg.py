@@ -210,25 +210,25 @@ def agree(m, pieces, mode, unit, x, tolerance):
 
 
 @jit
-def first_root(found, number, way, curve, event, facts, passed, met, span, tolerance):
+def first_root(found, number, way, curve, event, facts, extent, passed, met, span, tolerance):
     """`found` is where the leg ends, by which event, whether only just; with this event, where it fires before."""
     end, which, hangs = found
-    offset, factor, u = event
+    offset, factor, _ = event
     first = met & passed
     if any_lane(first):
         first = first & ((which < 0.0) | (fma(factor, way.at(end, curve)[0], offset) <= 0.0))
-        at, only_just = crossing(way.at, curve, (offset, factor, u[0]), facts, span, tolerance, first)
+        at, only_just = crossing(way.at, curve, (offset, factor), facts, extent, span, tolerance, first)
         end, which, hangs = where(first, at, end), where(first, number, which), (hangs & not_(first)) | only_just
     return end, which, hangs
 
 
 @symbolic
-def ended(m, pieces, facts, passed, met, span, tolerance, state):
+def ended(m, pieces, facts, passed, met, span, tolerance, state, mode):
     """The end of a leg in its last step, by which event, whether only just; what fires, and others too; the states."""
-    numbers = tuple(map(float, range(len(passed))))
+    numbers, extents = tuple(map(float, range(len(passed)))), tuple(extent for extent, _ in m.scene.made(state, mode))
     end, which, hangs = fold(
         first_root, (span, -1.0 - 0.0 * span, met & not_(met)), (met, span, tolerance),
-        numbers, m.watched, pieces.of_events, pieces.events, facts, passed,
+        numbers, m.watched, pieces.of_events, pieces.events, facts, extents, passed,
     )  # fmt: skip
     own = tuple(met & (which > j - 0.5) & (which < j + 0.5) for j in numbers)
     near = fma(SAME, tolerance, ROUNDING)
@@ -277,15 +277,13 @@ def in_none(xs):
 
 
 @symbolic
-def begun(pieces, facts, state, on, tolerance, active):
+def begun(m, pieces, facts, state, mode, on, tolerance, active):
     """Of a leg's first step: the events behind already, the margins of all; broken and stuck lanes."""
     sound = finite(state)
     broken = active & not_(sound & finite(tuple(u[-1] for u in pieces.states)))
     now = tuple((o < 0.5) & (fact[0] <= 0.0) for o, fact in zip(on, facts, strict=True))
     pressed = tuple((o > 0.5) & not_(rises(fact[1], fact[2])) for o, fact in zip(on, facts, strict=True))
-    margins = tuple(
-        SLACK * tolerance * (magnitude(offset) + magnitude(factor * u[0])) for offset, factor, u in pieces.events
-    )
+    margins = tuple(SLACK * tolerance * extent for extent, _ in m.scene.made(state, mode))
     return now, margins, broken, active & any_of(pressed) & sound
 
 
@@ -330,7 +328,7 @@ def to_event(m, cell, mode, active):
         h, power_h, fine = length(m, pieces, state, unit, tolerance, h, power_h, moving, limits, longest, furthest)
         trial = h
         if step == 0:
-            now, margins, broken, stuck = begun(pieces, facts, state, on, tolerance, active)
+            now, margins, broken, stuck = begun(m, pieces, facts, state, mode, on, tolerance, active)
             margins = carried.wider(m, margins, state, mode, errors)
             trial, moving = where(any_of(now), 0.0, h), moving & not_(broken | stuck)
         tried = where(moving, tried + 1.0, tried)
@@ -369,7 +367,7 @@ def to_event(m, cell, mode, active):
             break
     lost = moving
     met = active & not_(lost | stuck | broken | grazing)
-    end, which, hangs, fired, others, ends = ended(m, pieces, facts, passed, met, span, tolerance, state)
+    end, which, hangs, fired, others, ends = ended(m, pieces, facts, passed, met, span, tolerance, state, mode)
     t = where(met, t + end, t)
     h = where(met & (t > 0.0) & (h > LONGEST * t), LONGEST * t, h)
     late = carried.at_event(

@@ -66,3 +66,18 @@ def test_the_end_of_a_stiff_motion_is_left_to_the_method_for_it(kernel, points):
     assert status[0] == Status.OK
     end = points[1] if kernel is motion_kernel else 4.0
     assert abs(found["x"][0, 1] - (np.cos(end) + 1e-6 * np.sin(end))) < 1e-6
+
+
+def test_a_surface_that_is_only_touched_is_not_said_to_be_passed():
+    """x'' = -x from 1, at -1 - d: met at arccos(-1 - d), nearly missed, nearly met, and never."""
+    touched = section_kernel(
+        name="touched", doc="oscillator that just meets a level", states=(Field("x", "1", ""), Field("v", "1", "")),
+        parameters=(Field("d", "1", "depth"),), rates=lambda x, v: (v, -x), surface=lambda x, d: x + 1.0 + d,
+        start=lambda: (1.0, 0.0),
+    )  # fmt: skip
+    d, passages = np.array([-0.1, -1e-3, -9.043732666554432e-14, 1.09856441320834e-15, 1e-6]), np.array([1.0, 2.0, 5.0])
+    found, status = solve(touched, "taylor", d, rtol=[1e-9, 1e-9, 2.1176513191615395e-07, 7e-4, 1e-9], along=[passages])
+    assert list(status[[0, 1, 4]]) == [Status.OK, Status.OK, Status.STEP_LIMIT]
+    assert np.isin(status[2:4], (Status.GRAZING, Status.INACCURATE)).all()
+    true = np.arccos(-1.0 - d[:2, None]) + 2.0 * np.pi * (passages - 1.0)
+    assert abs(found["time"][:2] / true - 1.0).max() < 1e-9
