@@ -28,6 +28,9 @@ ROUNDING, ROUNDINGS = 2.3e-16, 1e-15
 """Relative noise of a period that depends on no state; least noise of any other period and of states."""
 LINEAR = 0.25
 """Largest error of slopes, as a share of I - J, for which first order holds."""
+SHARP = 1e-3
+"""Largest noise of slopes: more is no noise but a corner, as where a motion touches the surface, and they tell nothing.
+"""
 ONE = 1e-8
 """To what a multiplier must be known where it cannot be told from 1: what is 1 leaves no cycle by itself; what is 1 in
 modulus alone lets disturbances neither grow nor fade."""
@@ -111,6 +114,7 @@ def differences(the_map, cycles, swept, h):
         even[:1, n:] = 0.0  # of how the period goes with a parameter these are most of what is left out
     shown = most(most(abs(even[:, :, 0] - 0.3125 * even[:, :, 1] + even[:, :, 2] / 64.0))) / (2.0 * h)
     bent = most(most(abs(even[:, :n, 0]))) / (h * h)
+    right = right & (shown <= SHARP)
     here = np.minimum(np.maximum(shown, ROUNDINGS / h), 1.5 * cycles.r / h) + cycles.r
     noise = here + bent * np.add.reduce(spread)
     of_time = np.where((slopes[0, :n] == 0.0).all(axis=(0, 1)), ROUNDING / h, noise)

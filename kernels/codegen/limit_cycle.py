@@ -118,6 +118,7 @@ def newton(the_map, cycles, swept=()):
         if not len(left):
             break
         some = best.some(left)._replace(z=z[:, left])
+        some.scale[:] = np.maximum(some.scale, abs(some.z))  # what is barely damped may grow far beyond its start
         r = np.where(before[left] > FAR, np.maximum(some.r, the_map.rough), some.r)
         some.rows[:], status = the_map.passed(some.parameters, some.z, some.flips, r)
         right, anew = status == Status.OK, np.flatnonzero(~steady[left])

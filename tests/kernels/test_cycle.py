@@ -50,6 +50,16 @@ def test_a_kicked_oscillator_has_the_cycle_of_the_closed_form():
         assert column[0] == found[name][5], name
 
 
+def test_a_cycle_far_larger_than_the_motion_that_it_is_searched_from_is_found():
+    """The speed grows to 1/(2 pi zeta) kicks."""
+    zeta = np.array([1e-4, 1e-6, 1e-8])
+    found, status, error = estimated(KICKED, "taylor", zeta=zeta, kick=1.0, asked=("period", "v"))
+    assert (status <= Status.INACCURATE).all()
+    true = np.array([kicked(one, 1.0, 1.0)[:2] for one in zeta]).T
+    for name, value in zip(("period", "v"), true, strict=True):
+        assert (abs(abs(found[name] / value) - 1.0) <= np.maximum(error, 1e-9)).all(), name
+
+
 def test_a_multiplier_close_to_1_is_as_accurate_as_its_cycle_is_known():
     """u = kick + 2 u (1 - u) has a double root at kick = -1/8, where the multiplier is 1."""
     near = 10.0 ** -np.arange(2.0, 9.0)
