@@ -131,15 +131,10 @@ def _switched(graph, scene, states, constants, met, declared):
 def _called(graph, scene, role, function, named, length):
     """What a function of some of the named scalars returns, as expressions."""
     try:
-        if not callable(function):
-            return (graph.of(function),)
-        wanted = inspect.signature(function).parameters
-        unknown = [name for name in wanted if name not in named]
+        unknown = [name for name in wanted(function, named) if name not in named]
         if unknown:
             raise SceneError(f"it asks for {unknown[0]!r}; there are {', '.join(named)}")
-        with math_recorded(function):
-            found = function(**{name: named[name] for name in wanted})
-        found = found if isinstance(found, tuple | list | np.ndarray) else (found,)
+        found = returned(function, named)
         if len(found) != length:
             raise SceneError(f"it returns {len(found)} values instead of {length}")
         return tuple(graph.of(value) for value in found)
@@ -148,6 +143,21 @@ def _called(graph, scene, role, function, named, length):
     except Exception as error:
         said = f"{type(error).__name__}: {error}".splitlines()[0][:200]
         raise SceneError(f"{role} of the scene {scene.name} cannot be recorded: {said}; {FUNCTIONS}") from error
+
+
+def wanted(function, values):
+    """The names that a scene's function asks for; all of the values for **keywords, none for a constant."""
+    asked = inspect.signature(function).parameters if callable(function) else {}
+    return values if any(one.kind == one.VAR_KEYWORD for one in asked.values()) else asked
+
+
+def returned(function, values):
+    """What it returns for those of the values that it asks for, as a tuple; a constant for itself."""
+    if not callable(function):
+        return (function,)
+    with math_recorded(function):
+        found = function(**{name: values[name] for name in wanted(function, values)})
+    return tuple(found) if isinstance(found, tuple | list | np.ndarray) else (found,)
 
 
 @contextlib.contextmanager

@@ -8,7 +8,6 @@ scene is made with a clock as its last state: its first surface is that the cloc
 """
 
 import functools
-import inspect
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -16,7 +15,7 @@ import numpy as np
 
 from kernels.codegen.compiled import runner, running, written_of
 from kernels.codegen.followed import followed
-from kernels.codegen.record import math_recorded, named_functions, record
+from kernels.codegen.record import named_functions, record, returned
 from kernels.codegen.to_tolerance import sliders, sliding, solver
 from kernels.expression.graph import ADD, INPUT, NUMBER, Expression, SceneError, needed
 from kernels.integrate.records import Mode
@@ -148,22 +147,6 @@ def at_times(scene, method, columns, times, rtol):
     return rows[2:], status
 
 
-def named(function, names):
-    """A function of keywords that asks for these names."""
-    kind = inspect.Parameter.POSITIONAL_OR_KEYWORD
-    function.__signature__ = inspect.Signature([inspect.Parameter(name, kind) for name in names])
-    return function
-
-
-def asked(function, values):
-    """What a scene's function returns for those of the values that it asks for, as a tuple; a constant for itself."""
-    if not callable(function):
-        return (function,)
-    with math_recorded(function):
-        found = function(**{name: values[name] for name in inspect.signature(function).parameters})
-    return tuple(found) if isinstance(found, tuple | list | np.ndarray) else (found,)
-
-
 @functools.cache
 def clocked(scene, drive=None):
     """The scene that ends where its clock has gone on by UNTIL; or which counts its drive's periods, and begins anew.
@@ -174,21 +157,21 @@ def clocked(scene, drive=None):
     clock, parameters = timed.states[-1], (*scene.parameters, *([UNTIL] if drive is None else []))
 
     def until(**given):
-        (begin,), (long,) = asked(timed.start_time, given), asked(given.get(UNTIL, drive), given)
+        (begin,), (long,) = returned(timed.start_time, given), returned(given.get(UNTIL, drive), given)
         return begin + long - given[clock]
 
     def again(**given):
-        return (*(given[name] for name in timed.states[:-1]), *asked(timed.start_time, given))
+        return (*(given[name] for name in timed.states[:-1]), *returned(timed.start_time, given))
 
     own, jumps = named_functions(scene.surface or {}), named_functions(scene.switch)
     everywhere = jumps.pop("", None)
     surfaces = {f"own {name}": function for name, function in own.items()}
     switches = dict.fromkeys(surfaces, everywhere) | {f"own {name}": function for name, function in jumps.items()}
     if drive is not None:
-        switches[f".{CLOCK}"] = named(again, (*timed.states, *parameters))
+        switches[f".{CLOCK}"] = again
     return replace(
         timed, name=f"{scene.name}_clocked", parameters=parameters, switch=switches, only_first=True,
-        surface={f".{CLOCK}": named(until, (*parameters, clock))} | surfaces, most_kinks=MOST_SWITCHES,
+        surface={f".{CLOCK}": until} | surfaces, most_kinks=MOST_SWITCHES,
     )  # fmt: skip
 
 
@@ -222,13 +205,12 @@ def returning(scene, drive):
         if drive is None:
             (offset, factor, number), graph = watched(scene), given[FRESH].graph
             before[states[number]] = -graph.again(offset, values) / graph.again(factor, values)
-        behind = before.values() if drive or jump is None else asked(jump, values | before)
-        graph, begun = given[FRESH].graph, asked(scene.start, given)
+        behind = before.values() if drive or jump is None else returned(jump, values | before)
+        graph, begun = given[FRESH].graph, returned(scene.start, given)
         return tuple(graph.chosen(given[FRESH], graph.of(x), graph.of(y)) for x, y in zip(begun, behind, strict=True))
 
-    parameters = (*own.parameters, *places, FRESH)
-    start = named(start, (*parameters, "side"))
-    return replace(own, name=f"{scene.name}_return", parameters=parameters, start=start, begins=FRESH)
+    name, parameters = f"{scene.name}_return", (*own.parameters, *places, FRESH)
+    return replace(own, name=name, parameters=parameters, start=start, begins=FRESH)
 
 
 @functools.cache
@@ -241,13 +223,12 @@ def turning(scene, everywhere):
     those = [everywhere or (r.varies and r.graph.parts(r)[1].kind == INPUT) for r in rates_of]
 
     def rates(**given):
-        found = asked(scene.rates, given)
+        found = returned(scene.rates, given)
         for rate, turns in zip(found, those, strict=False):  # the last state may be the time
             if turns and isinstance(rate, Expression) and rate.varies:
                 abs(rate)
         return found
 
-    rates = named(rates, inspect.signature(scene.rates).parameters)
     return replace(scene, name=f"{scene.name}_turning", rates=rates)
 
 
