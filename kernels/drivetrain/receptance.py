@@ -28,7 +28,7 @@ from kernels.lanes.records import read
 from kernels.lanes.vectors import where
 from kernels.lanes.wiring import kernel, tracing
 from kernels.maths import complex
-from kernels.maths.elementary import is_normal, log, scale
+from kernels.maths.elementary import arctan2, hypot, is_normal, log, scale
 
 _DB = 20.0 / math.log(10.0)
 
@@ -53,12 +53,12 @@ def _follow(i, columns, chain, rows):
         w = scale(rows[row_at(0)] * TURN, -0.5 * (e_k - e_J))
         re, im, e, error = receptance(chain, w, int(p.drive_mass), int(p.read_mass), row_at, rows)
         re, im = complex.scaled((re, im), e - e_k)
-        amplitude = complex.modulus(re, im)
+        amplitude = hypot(re, im)
         sound = is_normal(amplitude) & (error < math.inf)
         _write(i, j, lanes, sound, re, columns.receptance_re, rows)
         _write(i, j, lanes, sound, im, columns.receptance_im, rows)
         _write(i, j, lanes, sound, amplitude, columns.amplitude, rows)
-        _write(i, j, lanes, sound, complex.argument(re, im), columns.phase, rows)
+        _write(i, j, lanes, sound, 0.0 - arctan2(-im, re), columns.phase, rows)  # [-pi, pi)
         _write(i, j, lanes, sound, _DB * log(where(sound, amplitude, 1.0)), columns.amplitude_dB, rows)
         rows[row_at(0)] = where(sound, error, -1.0)
         for lane in range(lanes):

@@ -4,8 +4,8 @@ Products and quotients are right to 4 roundings of the modulus.
 """
 
 from kernels.lanes.jit import jit, jit_call
-from kernels.lanes.vectors import exponent, fma, magnitude, sqrt, where
-from kernels.maths.elementary import arctan2, is_normal, scale
+from kernels.lanes.vectors import fma, magnitude
+from kernels.maths.elementary import scale
 
 
 @jit
@@ -37,18 +37,3 @@ def scaled(z, n):
 def size(z):
     """Modulus, or up to sqrt 2 more."""
     return magnitude(z[0]) + magnitude(z[1])
-
-
-@jit_call
-def modulus(re, im):
-    """abs(re + i im), also where a square would leave the range."""
-    size = magnitude(re) + magnitude(im)
-    e = exponent(where(is_normal(size), size, 1.0))
-    x, y = scale(re, -e), scale(im, -e)
-    return scale(sqrt(fma(x, x, y * y)), e)
-
-
-@jit_call
-def argument(re, im):
-    """The angle of re + i im in [-pi, pi), for re + i im not 0."""
-    return 0.0 - arctan2(-im, re)

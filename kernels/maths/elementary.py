@@ -300,9 +300,9 @@ def arccos(x):
 def hypot(x, y):
     """sqrt(x^2 + y^2) within 2 ulp, without overflow on the way."""
     a, b = magnitude(x), magnitude(y)
-    most = where(a > b, a, b)
+    most = larger(a, b)
     _, e = mantissa_exponent(where(most > 0.0, most, 1.0))
-    a, b = in_unit(a, e), in_unit(b, e)
+    a, b = scale(a, -e), scale(b, -e)
     value = scale(sqrt(fma(a, a, b * b)), e)
     return where((magnitude(x) < math.inf) & (magnitude(y) < math.inf), value, magnitude(x) + magnitude(y))
 

@@ -63,19 +63,14 @@ def nodes():
     return Nodes(np.empty(ROOM), np.empty(ROOM), np.empty(ROOM), np.empty(ROOM))
 
 
-@jit
-def place(pool, k, y):
-    """x and dx/dy of a panel at y."""
-    return pool[k, START] + pool[k, LENGTH] * (y * y * (3.0 - 2.0 * y)), pool[k, LENGTH] * 6.0 * y * (1.0 - y)
-
-
 @jit_call
 def integrate(integrand, scene, pool, k, nodes):
     """Value, error and noise of panel k by 21 nodes; behind them the last is repeated."""
     middle, half = 0.5 * (pool[k, LOW] + pool[k, HIGH]), 0.5 * (pool[k, HIGH] - pool[k, LOW])
     for j in range(ROOM):
         y = middle - half * _NODES[j] if j < 11 else middle + half * _NODES[max(20 - j, 0)]
-        nodes.x[j], nodes.growth[j] = place(pool, k, y)
+        nodes.x[j] = pool[k, START] + pool[k, LENGTH] * (y * y * (3.0 - 2.0 * y))
+        nodes.growth[j] = pool[k, LENGTH] * 6.0 * y * (1.0 - y)
     integrand(pool[k, KIND], nodes, COUNT, scene)
     kronrod, gauss, noise, size = 0.0, 0.0, 0.0, 0.0
     for j in range(COUNT):
@@ -94,15 +89,6 @@ def integrate(integrand, scene, pool, k, nodes):
 def open_panel(pool, k, kind, start, length):
     """Makes panel k the whole of a stretch."""
     pool[k, KIND], pool[k, START], pool[k, LENGTH], pool[k, LOW], pool[k, HIGH] = kind, start, length, 0.0, 1.0
-
-
-@jit
-def halve(pool, k, new):
-    """Leaves panel k its first half; the second one becomes panel `new`."""
-    for j in range(5):
-        pool[new, j] = pool[k, j]
-    middle = 0.5 * (pool[k, LOW] + pool[k, HIGH])
-    pool[k, HIGH], pool[new, LOW] = middle, middle
 
 
 @jit_call
@@ -131,8 +117,10 @@ def adapt(integrand, scene, pool, nodes, count, rtol):
     for new in range(count, PANEL_LIMIT):
         if not (error > max(rtol * magnitude(value), noise) and excess > 0.0):
             break
-        whole = pool[worst, VALUE]
-        halve(pool, worst, new)
+        whole, middle = pool[worst, VALUE], 0.5 * (pool[worst, LOW] + pool[worst, HIGH])
+        for j in range(VALUE):  # the worst panel keeps its first half, the second one becomes the new panel
+            pool[new, j] = pool[worst, j]
+        pool[worst, HIGH], pool[new, LOW] = middle, middle
         integrate(integrand, scene, pool, worst, nodes)
         integrate(integrand, scene, pool, new, nodes)
         jump = _JUMP * magnitude(whole - (pool[worst, VALUE] + pool[new, VALUE]))
