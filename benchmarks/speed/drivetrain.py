@@ -25,11 +25,12 @@ from scipy.linalg import lapack
 from kernels.drivetrain._frequencies import frequencies as frequencies_of_group
 from kernels.drivetrain._frequencies import row_at
 from kernels.drivetrain.receptance import DRIVETRAIN_FRF
-from kernels.lanes.columns import GROUP, cells_at, entry, in_groups, room
+from kernels.lanes.columns import GROUP, cells_at, in_groups, room
 from kernels.lanes.jit import jit
 
 sys.path += [str(Path(__file__).parents[2] / "tests" / folder) for folder in ("oracles", "helpers")]
 import chain_oracles as oracles
+from loops import entry
 from mpmath import mp, mpc, mpf
 
 CELLS = {2: 65536, 4: 32768, 8: 16384, 16: 8192, 64: 512}
@@ -55,7 +56,7 @@ def _group(first, columns, rows):
             frequency[first + cell, j] = found[j * GROUP + cell]
 
 
-@entry()
+@entry
 def natural_frequencies_of_all(J, k, frequency, status):
     """Natural frequencies of every row of J and k, of shape (n_cells, n), a group of them at a time; and statuses."""
     in_groups(_group, (J, k, frequency, status), (room(6 * J.shape[1] + 2),))

@@ -21,6 +21,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -29,7 +30,7 @@ from kernels.foliot.noise import FOLIOT_NOISE
 from kernels.foliot.ripple import FOLIOT_RIPPLE
 from kernels.foliot.start import FOLIOT_START
 from kernels.interface import Status
-from kernels.lanes.columns import GROUP, cells_at, entry
+from kernels.lanes.columns import GROUP, cells_at, entry_of, in_groups
 from kernels.lanes.jit import jit
 from kernels.maths import philox
 
@@ -37,7 +38,6 @@ sys.path += [str(Path(__file__).parents[2] / "tests" / name) for name in ("oracl
 import foliot_oracles
 import ripple_oracles
 from columns import solve
-from loops import each_group
 from mpmath import mp, mpf
 
 try:
@@ -63,15 +63,16 @@ DAY = 86400.0
 
 
 @jit
-def _draw(first, seed, place, row, turns, ones, twos):
-    philox.fill(first, seed, place, 1, row, turns)
+def _draw(first, columns, place, row, turns):
+    seed, ones, twos = columns
+    philox.fill(first, seed, place, 1, 0, row, turns)
     ones[cells_at(first)], twos[cells_at(first)] = philox.gaussians(row[cells_at(0)], turns[cells_at(0)])
 
 
-@entry("place", "row", "turns")
+@partial(entry_of, per_cell=(True, False, False, False, True, True), kept=True)
 def draw(seed, place, row, turns, ones, twos):
     """A pair of the normal numbers of every seed."""
-    each_group(_draw, (seed, int(place[0]), row, turns, ones, twos))
+    in_groups(_draw, (seed, ones, twos), (int(place[0]), row, turns))
 
 
 def numbers(cells):

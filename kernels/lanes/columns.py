@@ -10,7 +10,6 @@ then come its cell's inputs. `advance(memory, i)` takes every lane on until one 
 events or steps, and returns whether one has; i is the index of all lanes.
 """
 
-import inspect
 import operator
 
 import numpy as np
@@ -30,24 +29,12 @@ _ROWS = np.minimum.outer(np.arange(WIDTH), np.arange(WIDTH))
 """Of so many cells and one more, the cell in each lane."""
 
 
-def entry(*shared):
-    """Makes a function of columns one that the engine can call; its machine code is kept on the disk.
-
-    Columns hold one cell a row; those named in `shared` belong to all cells. Fewer cells than lanes are filled up with
-    copies of the last one, so that no second version for one cell is compiled.
-    """
-
-    def decorate(function):
-        per_cell = [name not in shared for name in inspect.signature(function).parameters]
-        return entry_of(function, per_cell, kept=True)
-
-    return decorate
-
-
 def entry_of(function, per_cell, kept, read=0):
-    """An entry of columns. `per_cell` says which hold one cell a row (None: few cells need no filling up).
+    """Makes a function of columns one that the engine can call; `kept`: its machine code, on the disk.
 
-    The first `read` columns are only read.
+    `per_cell` says which columns hold one cell a row (None: few cells need no filling up); the first `read` are only
+    read. Fewer cells than lanes are filled up with copies of the last one, so that no second version for one cell is
+    compiled.
     """
     if not COMPILED:
         return function

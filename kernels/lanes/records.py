@@ -13,7 +13,6 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-from kernels.lanes.jit import jit
 from kernels.lanes.symbols import symbolic
 from kernels.lanes.vectors import not_, where
 
@@ -64,12 +63,6 @@ def _flat(values: Any) -> Iterator[tuple[str, Any]]:
 named.borrows = read.borrows = True  # type: ignore[attr-defined]  # arrays are their caller's: `kernels.lanes.inlining`
 
 
-@jit
-def _worse(worst: Any, wanted: Any, error: Any) -> Any:
-    """The larger of two errors where the second is wanted; inf for NaN."""
-    return where(wanted & not_(error <= worst), where(error > worst, error, math.inf), worst)
-
-
 @symbolic
 def largest(errors: Any, asked: Any, order: Any, given: Any) -> Any:
     """The largest of the errors that were asked for; a number stands for all.
@@ -85,5 +78,6 @@ def largest(errors: Any, asked: Any, order: Any, given: Any) -> Any:
         return errors
     worst = 0.0
     for name, error in _flat(named(given, errors)):
-        worst = _worse(worst, asked[order._fields.index(name)] > 0, error)
+        wanted = asked[order._fields.index(name)] > 0
+        worst = where(wanted & not_(error <= worst), where(error > worst, error, math.inf), worst)  # inf for NaN
     return worst

@@ -117,16 +117,6 @@ def _is_wide(*numba_types):
     return any(isinstance(t, LanesType | MaskType) for t in numba_types)
 
 
-_BINARY_OPERANDS = (
-    (LanesType, LanesType),
-    (LanesType, types.Number),
-    (types.Number, LanesType),
-    (MaskType, MaskType),
-    (MaskType, types.Boolean),
-    (types.Boolean, MaskType),
-)
-
-
 def _emit(build, operand=None):
     """Lowers a call: casts its arguments to `operand` (None: Lanes if one is wide, else float64), then builds."""
 
@@ -146,9 +136,9 @@ def _operator(python_operator, build, operand=_lanes, result=_lanes):
     def _(context):
         return lambda x, y: result if isinstance(x, type(operand)) or isinstance(y, type(operand)) else None
 
-    for operands in _BINARY_OPERANDS:
-        if type(operand) in operands:
-            lower_builtin(python_operator, *operands)(_emit(build, operand))
+    wide, one = type(operand), operand.one
+    for operands in ((wide, wide), (wide, one), (one, wide)):
+        lower_builtin(python_operator, *operands)(_emit(build, operand))
 
 
 def in_place(python_function, arity, result, lower):

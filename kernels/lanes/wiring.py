@@ -45,6 +45,16 @@ def nothing() -> tuple[()]:
     return ()
 
 
+@jit
+def _as_it_is(p: Any) -> Any:
+    return p, 0.0
+
+
+@jit
+def _with_none(units: Any, outputs: Any, status: Any) -> Any:
+    return outputs, status
+
+
 @dataclass(frozen=True)
 class method(Method):
     """A `Method` as its author writes it, of one cell; `kernel` makes functions of columns of it.
@@ -68,7 +78,7 @@ class method(Method):
     _: KW_ONLY
     buffers: Callable[..., tuple[Any, ...]] = nothing
     loop: Loop = loops.in_lanes
-    units: tuple[Callable[..., Any], Callable[..., Any]] | None = None
+    units: tuple[Callable[..., Any], Callable[..., Any]] = (_as_it_is, _with_none)
     fills: bool = False
     parts: Callable[[Any], Any] | None = None
 
@@ -221,9 +231,7 @@ class _Wiring:
         record, given, order = self.record, self._given(solver), namedtuple("Order", self.outputs)
         none = self._given(solver, False)(*(math.nan for _ in solver.lacks))
         inner: Any = solver.solve
-        take, put_back = solver.units or (_as_it_is, _with_none)
-
-        estimates = solver.estimates
+        (take, put_back), estimates = solver.units, solver.estimates
 
         @jit
         def body(i: Any, columns: Any, *buffers: Any) -> None:
@@ -245,7 +253,7 @@ class _Wiring:
         if isinstance(bound, float | tuple):
             return signed(lambda *columns: columns[-1].fill(np.max(columns[-2] * np.array(bound))), names)
         record, order, given = self.record, namedtuple("Order", self.outputs), self._given(solver)
-        take, _ = solver.units or (_as_it_is, _with_none)
+        take, _ = solver.units
 
         @jit
         def body(i: Any, columns: Any) -> None:
@@ -270,16 +278,6 @@ class _Wiring:
         made.__qualname__, made.__module__ = f"{self.name}.{name}", function.__module__
         per_cell = None if loop is loops.cell_by_cell else [n not in self.along and n != "asked" for n in names]
         return signed(loops.entry_of(made, per_cell, is_ours(function), len(self.parameters)), names)
-
-
-@jit
-def _as_it_is(p: Any) -> Any:
-    return p, 0.0
-
-
-@jit
-def _with_none(units: Any, outputs: Any, status: Any) -> Any:
-    return outputs, status
 
 
 def signed(function: Any, names: Sequence[str]) -> OnColumns:

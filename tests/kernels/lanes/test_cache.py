@@ -11,13 +11,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from loops import each_cell
+from loops import each_cell, entry
 from numba import float64
 from numba.core.errors import TypingError
 
 from kernels.catalogue import KERNELS
 from kernels.lanes.cache import FOLDER
-from kernels.lanes.columns import entry
 from kernels.lanes.jit import COMPILED, jit
 
 pytestmark = pytest.mark.skipif(not COMPILED, reason="plain Python has no machine code")
@@ -165,7 +164,7 @@ def test_a_kernel_of_the_users_own_is_not_cached():
     def body(i, x, y):
         y[i] = 2.0 * x[i]
 
-    @entry()
+    @entry
     def double(x, y):
         each_cell(body, (x, y))
 

@@ -5,10 +5,9 @@ import sys
 import numpy as np
 import pytest
 from columns import relative_error
-from loops import each_cell
+from loops import each_cell, entry
 from mpmath import acos, asin, atan, atanh, cbrt, cos, cosh, exp, expm1, hypot, log, log1p, mp, mpf, sin, sinh, tanh
 
-from kernels.lanes.columns import entry
 from kernels.lanes.jit import COMPILED, jit
 from kernels.lanes.vectors import magnitude
 from kernels.maths import elementary
@@ -24,7 +23,7 @@ def _functions(i, x, u, power, root, late, lost):
     lost[i] = elementary.log_remainder(u[i])
 
 
-@entry()
+@entry
 def functions(x, u, power, root, late, lost):
     each_cell(_functions, (x, u, power, root, late, lost))
 
@@ -76,7 +75,7 @@ def _more(i, x, u, y, logs, logs1, powers_less, sines, cosines, angles, powers, 
     thirds[i] = elementary.log_remainder3(0.5 * ratio)
 
 
-@entry()
+@entry
 def more(x, u, y, logs, logs1, powers_less, sines, cosines, angles, powers, artanhs, thirds):
     each_cell(_more, (x, u, y, logs, logs1, powers_less, sines, cosines, angles, powers, artanhs, thirds))
 
@@ -137,7 +136,7 @@ def _hyperbolic(i, x, y, u, tanhs, sinhs, coshs, arcsins, arccosines, roots, flo
     held[i] = elementary.floor_between(x[i], y[i])
 
 
-@entry()
+@entry
 def hyperbolic(x, y, u, tanhs, sinhs, coshs, arcsins, arccosines, roots, floors, held):
     each_cell(_hyperbolic, (x, y, u, tanhs, sinhs, coshs, arcsins, arccosines, roots, floors, held))
 
