@@ -57,7 +57,7 @@ def join(
     ------
     SweepError
         They are not two results, cannot be joined, are unfinished, or are larger than the memory; or `path` is there
-        already.
+        already, or what a run of another study left there unfinished.
 
     Examples
     --------
@@ -101,7 +101,7 @@ def join(
     versions = "\n".join(f"{k}: {d.attrs.get('versions', '')}" for k, d in zip(labels, results, strict=False))
     # no run continues it, nor is it of the program that joins
     mark = {**_said(study), "joined": "of two results"}
-    return store_cells(study, path, arrays, True, mark, {"taken_over": versions})
+    return store_cells(study, path, arrays, force, mark, {"taken_over": versions})
 
 
 def _said(study: Study) -> dict[str, str]:

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from running import same
+from running import interrupted, kept, same, tall
 from toy_studies import build
 
 import sweep
@@ -135,3 +135,14 @@ def test_a_file_that_is_there_is_replaced_by_force_alone(tmp_path):
     assert path.read_bytes() == whole
     with sweep.join(a, c, path, axis="version", force=True) as found:
         assert np.array_equal(found.fall_time[1], c.fall_time)
+
+
+def test_what_a_run_left_unfinished_is_given_up_by_force_alone(tmp_path):
+    path = tmp_path / "j.h5"
+    interrupted(tall(23), path)
+    before = kept(path)
+    with pytest.raises(sweep.SweepError, match="unfinished"):
+        sweep.join(of(), of(), path, axis="version")
+    assert kept(path) == before
+    with sweep.join(of(), of(), path, axis="version", force=True) as found:
+        assert found.version.size == 2
