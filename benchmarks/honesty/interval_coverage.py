@@ -8,7 +8,7 @@ Where the truth is none of the fit's laws, a set counts as held if the verdict s
 
 Of one line also: the same of ordinary least squares, weighted least squares (by the spread of neighbouring residuals),
 HAC errors, HAC errors over all lags (Kiefer, Vogelsang and Bunzel, `KVB`), least squares for AR(1) noise of 0.5
-(`GLS`), and, of RIVAL_SETS at most, Huber's M-estimate by statsmodels, lmfit with the true model, and a bootstrap of
+(`GLS`), and, of few lines, Huber's M-estimate by statsmodels, lmfit with the true model, and a bootstrap of
 points; and `single`, the median width of ours over that of the narrowest single rule. A single rule is one of these
 with its interval widened by one factor for each number of points, the least by which it holds 93.5 % in all rows; of
 the last three too few lines are fitted to tell that factor, and lmfit's interval is that of OLS, so they are left out.

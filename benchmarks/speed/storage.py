@@ -103,7 +103,7 @@ def dear(folder: Path, whole: float, rounds: int) -> None:
 
     In blocks of the same length, for in longer ones fewer lanes wait. A run takes some 0.13 s beside its cells: a third
     to open the result as a Dataset, a quarter to make the frame, the rest for the fingerprint of all sources; and three
-    calls of up to 32 cells for the timed sample. What is imported once, a second, is imported before.
+    calls of up to 16 cells for the timed sample. What is imported once, a second, is imported before.
     """
 
     def study(cells: int) -> Study:

@@ -96,7 +96,7 @@ def _leg(scene, a, b):
 
 @symbolic
 def _law(terms, s, p):
-    """The sum of terms of degree 0, 1 and n, where s^n is p."""
+    """constant + linear s + powered p, of three terms."""
     constant, linear, powered = terms
     return fma(linear, s, fma(powered, p, constant))
 

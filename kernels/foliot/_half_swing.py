@@ -15,8 +15,8 @@ there the estimated error is up to 70 times too low, and up to 8 times. So a ste
 rest, or since, and rest itself is passed without one: below slow speeds, w outwards and w' inwards, drag is held at
 what it is there, so that accelerations are constant,
     outwards w/t = tau + kappa x + rho + d w + gamma w^n,  inwards w'/t' = tau + kappa A - rho - gamma w'^n.      (4)
-As in that short time Y = ln(1 + gamma w^n/(tau + kappa A + rho)) outwards, and likewise inwards, (3) with f(0) + f(w)
-for f(0) is what J exp(-Y) is with the slope followed to rest:
+In that short time drag adds Y = ln(1 + gamma w^n/(tau + kappa A + rho)) outwards, and likewise inwards. The slope
+followed to rest is then J exp(-Y), where drag is added to the dry friction of (3):
     J = (tau + kappa A - rho - gamma w'^n)/(tau + kappa A + rho + gamma w^n).                        (5)
 """
 

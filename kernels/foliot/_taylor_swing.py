@@ -249,7 +249,8 @@ def cycles(cells, rtol, rippled, asked):
     When they give an output with a relative difference `apart`, its error is stated as
         told apart + 2 (rate apart + step) + (ROUNDING + tolerance (1 + waves))/(1 - dF/dv1),          (3)
     where `step` is the relative one that Newton's method would still go, and `rate` what it is of the way that v1 went
-    since the half swing before. The last term is more where the sensitivity cancels, and (1 + Y)-fold of exp(-Y).
+    since the half swing before. Where the torque varies, what the last two half swings differ by is added. The
+    last term is more where the sensitivity cancels, and (1 + Y)-fold of exp(-Y).
     """
     n, of_sensitivity = len(rtol), Outputs._fields.index("sensitivity")
     terms, v, possible = begun(cells, rtol)

@@ -30,7 +30,7 @@ from kernels.lanes.symbols import symbolic
 WIDTH = 16
 """Several registers hide the latency of a recurrence; more lanes than that wait for their slowest, and spill.
 
-With AVX2, 32 lanes take 0.9 to 1.15 of the time of 16 for formulas, 1.1 to 2.2 for integrators, and a third more time
+With AVX2, 32 lanes take 0.94 to 1.15 of the time of 16 for formulas, 1.05 to 2.2 for integrators, and a third more time
 to compile; 8 take 1 to 1.35 for formulas, 0.7 to 0.95 for integrators.
 """
 

@@ -72,7 +72,8 @@ def _settled(x, scene, piece):
     `_dwell` and (3) of `_contour` the gaps are functions of x, for each side and each half of psi, +-1:
         top = unit cos^2(eta/2) - high,  bottom = unit sin^2(eta/2) - low,  eta = turn + half (chi - side gamma),  (1)
         dtop/dx = -dbottom/dx = -unit sin(eta)/2 half (chi' - side gamma').                          (2)
-    Of these the least gap counts, where both g/unit and the step g/(dg/dx) are below _AT_TURN.
+    `turn` is the angle of w from the frame. Of those with sin(eta) > 0 the least gap counts, where both g/unit and the
+    step g/(dg/dx) are below _AT_TURN.
     """
     unit = scene.arm.unit
     sight = about_pivot(scene, piece, outline(piece, x, scene.tool))

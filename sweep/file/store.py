@@ -32,6 +32,7 @@ from sweep.file.frame import PAGE, Cut, create, expected_size
 from sweep.file.reading import BYTES, UNFINISHED, Damaged, StoredFile
 from sweep.words import quantity
 
+DAMAGED = "damaged beside its numbers; remove it, or give it up with --force (Python: force=True)"
 SYNC_SECONDS = 0.2
 """How often blocks are brought to the disk, and it is looked whether the file is still in its place."""
 
@@ -67,16 +68,19 @@ def earlier(output: Path, mark: Mapping[str, str], give_up: bool = False) -> Sto
     if not path.exists():
         return None
     with contextlib.suppress(SweepError) if give_up else contextlib.nullcontext():
-        store = Store(output)
+        try:
+            store = Store(output)
+        except Damaged:
+            raise Damaged(f"{path}: {DAMAGED}") from None
         as_made, changes = store.is_as_made(), difference(store.fingerprint, mark)
         if as_made and not changes:
             return store
         store.close()
         if not as_made:
-            raise Damaged(f"{path}: damaged beside its numbers; remove it, or give it up with --force")
+            raise Damaged(f"{path}: {DAMAGED}")
         raise SweepError(
             f"{path}: the unfinished result of another study or version; finish that one first, choose another name, "
-            "or give it up with --force" + "".join(f"\n  {line}" for line in changes)
+            "or give it up with --force (Python: force=True)" + "".join(f"\n  {line}" for line in changes)
         )
     return None
 
@@ -92,7 +96,7 @@ def begun(output: Path, schema: Schema, cuts: Mapping[str, Cut], shared: bool = 
     if needed > free:
         raise SweepError(
             f"{output}: needs {quantity(needed)}, only {quantity(free)} are free here; free some space, choose another "
-            "folder with -o, fewer outputs, or keep a [summary] instead of every cell"
+            "folder, fewer outputs, or keep a [summary] instead of every cell"
         )
     with disk.replacing(unfinished_of(output), held=True) as part:
         create(part, replace(schema, attrs={**schema.attrs, "start": now()}), cuts, shared)

@@ -116,8 +116,8 @@ def _bent(bend: Callable[[Any, Any], Any], over_x: bool = False) -> Curve:
 
 
 def _peak(q: Array, s: Array, span: float) -> Parts:
-    """q: where it is, and the logarithms of its widths below and above, over one another for the last."""
-    return 0.0, 1.0, np.exp(-0.5 * ((s - q[0]) / np.exp(q[1] + q[2] * (s > q[0]))) ** 2), s
+    """q: where it is, the logarithm of the mean of its two widths, and that of the upper over the lower one."""
+    return 0.0, 1.0, np.exp(-0.5 * ((s - q[0]) / np.exp(q[1] + q[2] * ((s > q[0]) - 0.5))) ** 2), s
 
 
 def _step(q: Array, s: Array, span: float) -> Parts:
@@ -160,7 +160,7 @@ LOGARITHM = Number(-2 + 1e-9, 2 - 1e-9, (-1.9, -1.5, -0.5, 0.5, 1.5, 1.9))
 BOTH = Number(0.5, 60.0, (1.0, 2.5, 6.0, 12.0))
 FLANK = Number(math.log(0.05), math.log(1 / 3), tuple(np.log((0.07, 0.14, 0.24))))
 NO_SHAPE, TWO_FLANKS = Number(0.0, 0.0, (0.0,)), Number(-1.5, 1.5, (-0.7, 0.7))
-STEP_Q = PLACE._replace(least=0.1, most=0.9), WIDTH._replace(most=math.log(0.15))
+STEP_Q = PLACE._replace(least=0.1, most=0.9), WIDTH._replace(most=math.log(0.15), starts=WIDTH.starts[:3])
 OTHER_FUNCTIONS = (
     Law("logarithm", "A x^p (1 + B ln x)", _logarithm, 2, (LOGARITHM,), P, power=False),
     Law("exponential", "A exp(-x/X)", lambda q, s, span: (0.0, 1.0, np.exp(span * (s - 1))), 2, power=False),

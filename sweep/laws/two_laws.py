@@ -76,9 +76,10 @@ def fit_two_laws(
     Dataset
         `exponent`, `exponent_low`, `exponent_high` along `law` ("low", "high"); `crossover` with its interval, in
         the unit of `dim`; `verdict`: "two laws" where they are beyond doubt, "one law" where one does as well and is
-        not denied as in `fit_exponent`, "three laws", "no power law" where AICc and BIC prefer another function to one
-        law by more than 10, and two laws to it by less, "no meeting in the window", "undecided"; and more, each with a
-        `long_name`. NaN where the verdict is "three laws" or "no power law", and of fewer than eight points.
+        not denied as in `fit_exponent`, "three laws", "no power law" where AICc and BIC prefer others to one law by
+        more than 10 and two laws are ruled out likewise, or a function that is no power law is not, "no meeting in the
+        window", "undecided"; and more, each with a `long_name`. NaN where the verdict is "three laws" or "no power
+        law", and of fewer than eight points.
 
         With `windows`, without noise, the interval of `crossover` is a bound: how far the place moves if a law is not
         the line through its window but goes through the outer end of it with the exponent to which the local one tends.
@@ -193,18 +194,23 @@ def _verdict(t: Array, tried: dict[str, Found]) -> tuple[str, float]:
 
     The noise of the line may be of any kind, that of all others is even.
     """
-    three, nearest = tried.pop(THREE.name, None), min(tried.values(), key=lambda found: found.aicc)
-    above, two = _above(tried.values()), np.array([found.law in BENDS for found in tried.values()])
+    few = {name: found for name, found in tried.items() if name != THREE.name}
+    three, nearest = tried.get(THREE.name), min(few.values(), key=lambda found: found.aicc)
+    above, two = _above(few.values()), np.array([found.law in BENDS for found in few.values()])
     evidence = float((above[~two].min(axis=0) - above[two].min(axis=0)).min())
+    ahead = nearest.aicc - three.aicc if three else 0.0
+    if three and three.criteria[1] > few[ONE.name].criteria[1] - BEYOND_DOUBT:  # of many points BIC asks for more
+        ahead = 0.0
     # three, if with a bend more even beside what noise of any kind leaves of fewer
-    if three and three.aicc < nearest.aicc - OTHER_SHAPES and three.aicc < nearest.beside(t, "noise")[1] - BEYOND_DOUBT:
+    if three and ahead > OTHER_SHAPES and three.aicc < nearest.beside(t, "noise")[1] - BEYOND_DOUBT:
         return "three laws", evidence
     if evidence > BEYOND_DOUBT:
         return "two laws" if 0 <= tried[TWO.name].numbers[0] <= 1 else "no meeting in the window", evidence
-    alive, power = above.min(axis=1) <= BEYOND_DOUBT, np.array([found.law.power for found in tried.values()])
-    if alive[[*tried].index(ONE.name)]:
+    alive, power = above.min(axis=1) <= BEYOND_DOUBT, np.array([found.law.power for found in few.values()])
+    if alive[[*few].index(ONE.name)]:
         return "one law", evidence
-    undecided = bool((alive & two).any()) and not (~power & (above.max(axis=1) <= BEYOND_DOUBT)).any()
+    bent = bool((alive & two).any()) or 0 < ahead <= OTHER_SHAPES
+    undecided = bent and not (~power & (above.max(axis=1) <= BEYOND_DOUBT)).any()
     return "undecided" if undecided else "no power law", evidence
 
 

@@ -212,9 +212,17 @@ def test_a_broad_peak_on_one_law_is_not_called_two(factor, noise):
     ],
 )
 def test_a_step_and_a_lopsided_peak_are_not_called_three_laws(law, z, noise):
-    y = line(z - 0.5 * T + noise * np.random.default_rng(4).standard_normal(X.size))
-    assert str(sweep.fit_two_laws(y, "x").verdict.values) == "no power law"
-    assert sweep.compare_laws(y, "x").attrs["chosen"] == law
+    """Nor is what they are called another in the direction of 1/x."""
+    z = z - 0.5 * T + noise * np.random.default_rng(4).standard_normal(X.size)
+    for y in (line(z), line(z[::-1])):
+        assert str(sweep.fit_two_laws(y, "x").verdict.values) == "no power law"
+        assert sweep.compare_laws(y, "x").attrs["chosen"] == law
+
+
+def test_three_laws_that_two_do_nearly_as_well_as_are_undecided():
+    z = np.interp(T, [T[0], T[20], T[40], T[60]], np.cumsum([0.0, *(np.diff(T[[0, 20, 40, 60]]) * [-0.5, -0.4, -0.5])]))
+    y = line(z + 0.01 * np.random.default_rng(3).standard_normal(X.size))
+    assert str(sweep.fit_two_laws(y, "x").verdict.values) in ("undecided", "three laws")
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.01])

@@ -40,7 +40,7 @@ COSTS = {
 
 
 class Run:
-    """Workers that take blocks in the forecast's order; probes of 32 cells at 64 places, each off by up to a half."""
+    """Workers that take blocks in the forecast's order; probes of 16 cells at 64 places, each off by up to a half."""
 
     def __init__(self, costs, blocks, workers, waste=0.0, seed=0, slow=1.0):
         partition = Partition(CELLS, CELLS // blocks)
@@ -48,7 +48,7 @@ class Run:
         self.costs = np.add.reduceat(costs, edges[:-1]) + waste
         places = (2 * np.arange(64) + 1) * CELLS // 128
         noise = np.random.default_rng(seed).uniform(0.5, 1.5, 64)
-        probed = noise * [costs[p : p + 32].mean() for p in places]
+        probed = noise * [costs[p : p + 16].mean() for p in places]
         self.weights = Sample(places, probed).weights(partition, lambda cells: cells)
         self.now, self.workers, self.slow = 0.0, workers, slow
         work = float(self.weights.sum())
