@@ -3,7 +3,8 @@
     y = L^b f(x / L^a)                                                                              (1)
 
 In logarithms the curves of all L are one, ln y = b ln L + g(ln x - a ln L). With g a polynomial, b and g are linear
-for given a: it is a law of one q, searched over all of its range, so there is no start to be stuck at.
+for given a, and (1) is a law with one number that is not (`shapes`), searched over all of its range, so there is no
+start to be stuck at.
 """
 
 from __future__ import annotations

@@ -24,12 +24,12 @@ Ending = Literal["done before", "complete", "unfinished", "not begun"]
 
 def run_to_file(task: Task) -> Ending:
     """Continues, begins or leaves alone what is there. Raises SweepError, KeyboardInterrupt, Terminated."""
-    at_work = any(map(disk.mark, (unfinished_of(task.output), lock_of(task.output))))
-    seen, (standing, damaged) = disk.mark(task.output), ("nothing", ()) if at_work else _standing(task)
+    traces = any(map(disk.mark, (unfinished_of(task.output), lock_of(task.output))))
+    seen, (standing, damaged) = disk.mark(task.output), ("nothing", ()) if traces else _standing(task)
     if standing == "complete":
         return "done before"
     with alone(task.output), contextlib.ExitStack() as stack:
-        if at_work or seen != disk.mark(task.output):  # another run may have ended before this one had the lock
+        if traces or seen != disk.mark(task.output):  # another run may have ended before this one had the lock
             standing, damaged = _standing(task)
         store = earlier(task.output, task.fingerprint, task.force or standing == "complete")
         if standing == "complete":
