@@ -25,7 +25,7 @@ from scipy.linalg import lapack
 from kernels.drivetrain._frequencies import frequencies as frequencies_of_group
 from kernels.drivetrain._frequencies import row_at
 from kernels.drivetrain.receptance import DRIVETRAIN_FRF
-from kernels.lanes.columns import GROUP, cells_at, in_groups, room
+from kernels.lanes.columns import FEW, few_at, room
 from kernels.lanes.jit import jit
 
 sys.path += [str(Path(__file__).parents[2] / "tests" / folder) for folder in ("oracles", "helpers")]
@@ -44,22 +44,24 @@ CHECKED = 6
 def _group(first, columns, rows):
     J, k, frequency, status = columns
     n = J.shape[1]
-    part = GROUP * n
+    part = FEW * n
     inertias, springs, found, entries = rows, rows[part:], rows[2 * part :], rows[3 * part :]
-    for cell in range(GROUP):
+    for cell in range(FEW):
         for j in range(n):
-            inertias[j * GROUP + cell] = J[first + cell, j]
-            springs[j * GROUP + cell] = k[first + cell, j]
-    status[cells_at(first)] = frequencies_of_group(n, row_at, GROUP, inertias, springs, found, entries)
-    for cell in range(GROUP):
+            inertias[j * FEW + cell] = J[first + cell, j]
+            springs[j * FEW + cell] = k[first + cell, j]
+    status[few_at(first)] = frequencies_of_group(n, row_at, FEW, inertias, springs, found, entries)
+    for cell in range(FEW):
         for j in range(n):
-            frequency[first + cell, j] = found[j * GROUP + cell]
+            frequency[first + cell, j] = found[j * FEW + cell]
 
 
 @entry
 def natural_frequencies_of_all(J, k, frequency, status):
     """Natural frequencies of every row of J and k, of shape (n_cells, n), a group of them at a time; and statuses."""
-    in_groups(_group, (J, k, frequency, status), (room(6 * J.shape[1] + 2),))
+    rows = room(6 * J.shape[1] + 2)
+    for first in range(0, len(J), FEW):  # the numbers of chains are whole groups
+        _group(first, (J, k, frequency, status), rows)
 
 
 def chains(n, decades, cells, seed=1):

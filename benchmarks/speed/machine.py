@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from kernels.lanes.jit import jit, jit_entry
-from kernels.lanes.vectors import WIDTH, fma, lanes_at, sqrt
+from kernels.lanes.vectors import FEW, few_at, fma, sqrt
 
 REPEATS = 7
 ROUNDS = 1 << 19
@@ -35,11 +35,11 @@ STEPS = {
 
 
 def _vectors(step: Any) -> Any:
-    """Four independent chains of WIDTH cells: enough to hide the latency, and in registers all the time."""
+    """Four independent chains of FEW cells: enough to hide the latency, and in registers all the time."""
 
     @jit_entry
     def run(x: Any) -> None:
-        i, j, k, m = lanes_at(0), lanes_at(WIDTH), lanes_at(2 * WIDTH), lanes_at(3 * WIDTH)
+        i, j, k, m = few_at(0), few_at(FEW), few_at(2 * FEW), few_at(3 * FEW)
         a, b, c, d, y = x[i], x[j], x[k], x[m], x[0]
         for _ in range(ROUNDS):
             a, b, c, d = step(a, y), step(b, y), step(c, y), step(d, y)
@@ -83,7 +83,7 @@ def seconds(action: Callable[[], object], repeats: int = REPEATS) -> float:
 
 
 def _nanoseconds(run: Any, operations: int) -> float:
-    x = np.linspace(0.9, 0.999, 4 * WIDTH)
+    x = np.linspace(0.9, 0.999, 4 * FEW)
     return seconds(lambda: run(x)) / ROUNDS / operations * 1e9
 
 
@@ -91,7 +91,7 @@ def measured() -> Machine:
     """The machine as it is now."""
     given, taken = np.ones(LARGE), np.ones(LARGE)
     return Machine(
-        vector={kind: _nanoseconds(_vectors(step), 4 * WIDTH) for kind, step in STEPS.items()},
+        vector={kind: _nanoseconds(_vectors(step), 4 * FEW) for kind, step in STEPS.items()},
         single={kind: _nanoseconds(_numbers(step), 8) for kind, step in STEPS.items()},
         link=_nanoseconds(_chain, 1),
         byte=seconds(lambda: np.copyto(taken, given)) / (16 * LARGE) * 1e9,

@@ -28,7 +28,7 @@ import math
 from kernels.drivetrain._chain import spread_is_normal
 from kernels.lanes.addresses import jit_by_address
 from kernels.lanes.codes import NOT_CONVERGED, OK, OUT_OF_RANGE
-from kernels.lanes.columns import GROUP, cells_at
+from kernels.lanes.columns import FEW, few_at
 from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.vectors import any_lane, choose, fma, magnitude, nearest, not_, sqrt, where
 
@@ -48,7 +48,7 @@ _BLANK = 2.0**360
 @jit
 def row_at(j):
     """Where the j-th row of a buffer of a group begins."""
-    return cells_at(j * GROUP)
+    return few_at(j * FEW)
 
 
 @jit

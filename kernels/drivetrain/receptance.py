@@ -22,7 +22,7 @@ from kernels.drivetrain._frequencies import row_at
 from kernels.drivetrain._receptance import receptance
 from kernels.interface import Field
 from kernels.lanes.codes import BAD_INPUT, INACCURATE, OK, OUT_OF_RANGE, PARTLY_OUT_OF_RANGE
-from kernels.lanes.columns import GROUP, cell_by_cell
+from kernels.lanes.columns import FEW, cell_by_cell
 from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.records import read
 from kernels.lanes.vectors import where
@@ -43,12 +43,12 @@ def _write(i, j, lanes, sound, values, output, rows):
 
 @jit_apart
 def _follow(i, columns, chain, rows):
-    """Both ends followed to the inertia that is turned, GROUP frequencies at a time: they share their chain."""
+    """Both ends followed to the inertia that is turned, FEW frequencies at a time: they share their chain."""
     p, count, worst, given = read(Drive, columns, i), columns.frequency.size, 0.0, 0
     e_J, e_k = take_units(p.J, p.k, p.h, chain)
-    for j in range(0, count, GROUP):
-        lanes = min(GROUP, count - j)
-        for lane in range(GROUP):  # the last one again beyond the end
+    for j in range(0, count, FEW):
+        lanes = min(FEW, count - j)
+        for lane in range(FEW):  # the last one again beyond the end
             rows[lane] = columns.frequency[min(j + lane, count - 1)]
         w = scale(rows[row_at(0)] * TURN, -0.5 * (e_k - e_J))
         re, im, e, error = receptance(chain, w, int(p.drive_mass), int(p.read_mass), row_at, rows)
@@ -72,7 +72,7 @@ def _follow(i, columns, chain, rows):
 def _buffers(columns):
     n = columns.J.shape[1]
     rows, none = np.empty((4, n)), np.empty(0, np.complex128)
-    return Chain(rows[0], rows[1], rows[2], rows[3], none), np.empty(3 * n * GROUP)
+    return Chain(rows[0], rows[1], rows[2], rows[3], none), np.empty(3 * n * FEW)
 
 
 @jit

@@ -17,6 +17,7 @@ from kernels.foliot._half_swing import force_on, half_swing, problem_of, pull, r
 from kernels.foliot._units import given, without_dimensions
 from kernels.integrate.tableaux import DOPRI5, DOPRI5_ERROR, SDIRK4, SDIRK4_ERROR
 from kernels.lanes.codes import INACCURATE, NOT_CONVERGED, OK, STEP_LIMIT, STICKS
+from kernels.lanes.columns import in_few_lanes
 from kernels.lanes.jit import jit, jit_call, jit_inline
 from kernels.lanes.symbols import symbolic
 from kernels.lanes.tuples import after, joined, times
@@ -270,6 +271,6 @@ def by_steps(sooner=None):
     explicit = "adaptive Runge-Kutta of order 5, Newton on the half-swing map"
     implicit = "implicit Runge-Kutta of order 4, L-stable, for stiff cells"
     return (
-        method("dopri5", explicit, dopri5, units=(_taken, given), sooner=sooner),
-        method("sdirk4", implicit, sdirk4, units=(_taken, given)),
+        method("dopri5", explicit, dopri5, units=(_taken, given), loop=in_few_lanes, sooner=sooner),
+        method("sdirk4", implicit, sdirk4, units=(_taken, given), loop=in_few_lanes),
     )

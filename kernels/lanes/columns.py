@@ -4,28 +4,31 @@ A *group* is of cells that share buffers, for traces and noise, which no column 
 `in_groups` gets the number of its first cell; `cells_at(first)` is the index of the group's cells in a column, and
 `cells_at(j * GROUP)` of the j-th row of a buffer. Compiled, a group is WIDTH lanes; in plain Python it is one cell.
 
-Cells of very different length are *refilled*: a lane that has finished its cell is given the next one. A *memory* has a
-row for each number that a lane knows between two events, and a column for each lane. The first row is the lane's stage;
-then come its cell's inputs. `advance(memory, i)` takes every lane on until one has finished, or for a limited number of
-events or steps, and returns whether one has; i is the index of all lanes.
+Cells of very different length are *refilled*: a lane that has finished its cell is given the next one. There are FEW
+lanes. A *memory* has a row for each number that a lane knows between two events, and a column for each lane. The first
+row is the lane's stage; then come its cell's inputs. `advance(memory, i)` takes every lane on until one has finished,
+or for a limited number of events or steps, and returns whether one has; i is the index of all lanes.
 """
 
 import operator
 
 import numpy as np
 
+from kernels.lanes import vectors
 from kernels.lanes.inlining import LINE
 from kernels.lanes.jit import COMPILED, cached, jit, jit_entry
-from kernels.lanes.vectors import WIDTH, lanes_at
 
-GROUP = WIDTH if COMPILED else 1
-"""Cells of a group, and lanes that are refilled."""
+GROUP = vectors.WIDTH if COMPILED else 1
+"""Cells of a group."""
+FEW = vectors.FEW if COMPILED else 1
+"""Lanes that are refilled, and cells side by side of what else steps or recurs for long."""
 IDLE, FRESH, MOVING, DONE = 0.0, 1.0, 2.0, 3.0
 """Stages of a lane that is refilled; `advance` begins a fresh one and says when it is done."""
 
-cells_at = lanes_at if COMPILED else operator.index
+cells_at = vectors.lanes_at if COMPILED else operator.index
+few_at = vectors.few_at if COMPILED else operator.index
 
-_ROWS = np.minimum.outer(np.arange(WIDTH), np.arange(WIDTH))
+_ROWS = np.minimum.outer(np.arange(GROUP), np.arange(GROUP))
 """Of so many cells and one more, the cell in each lane."""
 
 
@@ -44,7 +47,7 @@ def entry_of(function, per_cell, kept, read=0):
         n = len(columns[0])
         if per_cell is None:
             compiled(*(c if c.flags.writeable else c.copy() for c in columns))
-        elif n >= WIDTH:
+        elif n >= GROUP:
             compiled(*columns)
         elif n:
             full = [c[_ROWS[n - 1]] if cells else c for c, cells in zip(columns, per_cell, strict=True)]
@@ -75,9 +78,10 @@ def _plain(body, columns, buffers):
             body(i, columns, *buffers)
 
 
-in_lanes = _looped(lanes_at, WIDTH) if COMPILED else _plain
+in_lanes = _looped(cells_at, GROUP) if COMPILED else _plain
+in_few_lanes = _looped(few_at, FEW) if COMPILED else _plain
 cell_by_cell = _looped(np.int64, 1) if COMPILED else _plain
-in_groups = _looped(np.int64, WIDTH) if COMPILED else _plain
+in_groups = _looped(np.int64, GROUP) if COMPILED else _plain
 
 
 @jit
@@ -114,7 +118,7 @@ def fresh(numbers, inputs):
 def to_the_end(run, cells):
     """Runs every cell, (n_cells, numbers that a lane knows), by a compiled `each_refilled`."""
     with np.errstate(all="ignore"):  # of plain Python
-        run(cells, np.zeros((cells.shape[1], GROUP)), np.zeros(GROUP, np.int64))
+        run(cells, np.zeros((cells.shape[1], FEW)), np.zeros(FEW, np.int64))
 
 
 @jit
@@ -127,15 +131,15 @@ def each_refilled(advance, cells, memory, held):
     memory, held : zeros, a row for each number, and the lanes' cells; numba takes long to compile what makes arrays
     """
     n = cells.shape[0]
-    for lane in range(GROUP):
+    for lane in range(FEW):
         held[lane] = lane if lane < n else n - 1
         _give(memory, lane, cells, held[lane])
         memory[0, lane] = memory[0, lane] if lane < n else IDLE
-    handed, left = GROUP, n
+    handed, left = FEW, n
     while left > 0:  # every lane ends: cells have a limit of events and each event one of steps
-        if not advance(memory, cells_at(0)):
+        if not advance(memory, few_at(0)):
             continue
-        for lane in range(GROUP):
+        for lane in range(FEW):
             if memory[0, lane] == DONE:
                 for row in range(cells.shape[1]):
                     cells[held[lane], row] = memory[row, lane]

@@ -1,10 +1,10 @@
-"""A numba type of WIDTH cells in vector registers, so that physics is written once for one cell and for many.
+"""numba types of cells side by side in vector registers, so that physics is written once for one cell and for many.
 
 A function of plain arithmetic compiles for float64 and for `Lanes` alike and gives the same bits in both, because
 multiply-adds are explicit (`fma`) and nothing else may be contracted. A column loop is written for one index `i`:
-an integer means one cell, `lanes_at(i)` means cells i .. i + WIDTH - 1:
+an integer means one cell, `lanes_at(i)` means cells i .. i + WIDTH - 1, `few_at(i)` means i .. i + FEW - 1:
 
-    def body(i, x, y):          # y[i] = x[i]^2 for one cell or WIDTH of them
+    def body(i, x, y):          # y[i] = x[i]^2 for one cell or as many as the index means
         y[i] = x[i] * x[i]
 
 Branches become `where(condition, x, y)`; `any_lane(condition)` ends a masked loop. In such a loop a finished lane is
@@ -21,17 +21,20 @@ import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
+from numba.core.registry import cpu_target
 from numba.core.typeconv import Conversion
 from numba.extending import lower_builtin, lower_cast, models, register_model, type_callable
 
 from kernels.lanes.jit import jit
 from kernels.lanes.symbols import symbolic
 
-WIDTH = 16
-"""Several registers hide the latency of a recurrence; more lanes than that wait for their slowest, and spill.
+REGISTER = 8 if "+avx512f" in cpu_target.target_context.codegen().magic_tuple()[2] else 4
+"""Numbers in a vector register of the processor that code is compiled for."""
+WIDTH, FEW = 4 * REGISTER, 2 * REGISTER
+"""Lanes for formulas, and for what steps: several registers hide the latency of a recurrence; more lanes than that wait
+for their slowest, and spill.
 
-With AVX2, 32 lanes take 0.94 to 1.15 of the time of 16 for formulas, 1.05 to 2.2 for integrators, and a third more time
-to compile; 8 take 1 to 1.35 for formulas, 0.7 to 0.95 for integrators.
+With half as many lanes formulas take 1 to 1.35 of the time, with twice as many what steps takes 1 to 2.2.
 """
 
 _I64, _F64 = ir.IntType(64), ir.DoubleType()
@@ -39,18 +42,19 @@ _MAGIC = 6755399441055744.0  # 1.5 * 2^52: adding it leaves the nearest integer 
 
 
 class _Primitive(types.Type):
-    """A type with a model of its own; one of another type, `one`, beside it is repeated in every lane."""
+    """A type of so many lanes, with a model of its own; a number of type `one` beside it is repeated in every lane."""
 
-    one, llvm = None, None
+    one: type[types.Type] | None = None
 
-    def __init__(self):
-        super().__init__(type(self).__name__)
+    def __init__(self, width):
+        super().__init__(f"{type(self).__name__}({width})")
+        self.width, self.llvm = width, self.of_width(width)
 
     def __init_subclass__(cls):
         @register_model(cls)
         class Model(models.PrimitiveModel):
             def __init__(self, manager, fe_type):
-                super().__init__(manager, fe_type, cls.llvm)
+                super().__init__(manager, fe_type, fe_type.llvm)
 
     def can_convert_from(self, typing_context, other):
         return Conversion.promote if self.one and isinstance(other, self.one) else None
@@ -60,24 +64,28 @@ class _Primitive(types.Type):
 
 
 class LanesType(_Primitive):
-    """WIDTH float64 cells."""
+    """A float64 of each cell."""
 
-    one, llvm = types.Number, ir.VectorType(_F64, WIDTH)
+    one = types.Number
+
+    def of_width(self, width):
+        return ir.VectorType(_F64, width)
 
 
 class MaskType(_Primitive):
     """One bit a lane."""
 
-    one, llvm = types.Boolean, ir.VectorType(ir.IntType(1), WIDTH)
+    one = types.Boolean
+
+    def of_width(self, width):
+        return ir.VectorType(ir.IntType(1), width)
 
 
 class LaneIndexType(_Primitive):
-    """Cells i .. i + WIDTH - 1 of a column."""
+    """As many cells of a column, from i on."""
 
-    llvm = _I64
-
-
-_lanes, _mask, _lane_index = LanesType(), MaskType(), LaneIndexType()
+    def of_width(self, width):
+        return _I64
 
 
 class _Written(ir.Constant):
@@ -97,31 +105,38 @@ def _repeat(builder, value, like):
     """A scalar LLVM value in every lane of a vector type."""
     if isinstance(value, ir.Constant):
         return _Written(like, f"splat ({value})")
-    undefined, lanes = _Written(like, "undef"), _Written(ir.VectorType(ir.IntType(32), WIDTH), "zeroinitializer")
+    undefined, lanes = _Written(like, "undef"), _Written(ir.VectorType(ir.IntType(32), like.count), "zeroinitializer")
     return builder.shuffle_vector(builder.insert_element(undefined, value, ir.IntType(32)(0)), undefined, lanes)
 
 
 @lower_cast(types.Number, LanesType)
 def _number_to_lanes(context, builder, source, target, value):
-    return _repeat(builder, context.cast(builder, value, source, types.float64), LanesType.llvm)
+    return _repeat(builder, context.cast(builder, value, source, types.float64), target.llvm)
 
 
 @lower_cast(types.Boolean, MaskType)
 def _boolean_to_mask(context, builder, source, target, value):
     bit = context.cast(builder, value, source, types.boolean)
     bit = builder.icmp_unsigned("!=", bit, ir.Constant(bit.type, 0))
-    return _repeat(builder, bit, MaskType.llvm)
+    return _repeat(builder, bit, target.llvm)
 
 
-def _is_wide(*numba_types):
-    return any(isinstance(t, LanesType | MaskType) for t in numba_types)
+def _width(*numba_types):
+    """How many lanes the wide ones of some types have; 0 where none is wide."""
+    return max((t.width for t in numba_types if isinstance(t, LanesType | MaskType)), default=0)
 
 
-def _emit(build, operand=None):
-    """Lowers a call: casts its arguments to `operand` (None: Lanes if one is wide, else float64), then builds."""
+def _number(*numba_types):
+    """The type of a number that is computed from these."""
+    width = _width(*numba_types)
+    return LanesType(width) if width else types.float64
+
+
+def _emit(build, operand=_number):
+    """Lowers a call: casts its arguments to the type `operand(*types)`, then builds."""
 
     def lower(context, builder, signature, values):
-        target = operand or (_lanes if _is_wide(*signature.args) else types.float64)
+        target = operand(*signature.args)
         return build(
             builder, *(context.cast(builder, v, t, target) for v, t in zip(values, signature.args, strict=True))
         )
@@ -129,16 +144,15 @@ def _emit(build, operand=None):
     return lower
 
 
-def _operator(python_operator, build, operand=_lanes, result=_lanes):
-    """Gives a Python operator a meaning for Lanes or Mask; plain numbers keep numba's own."""
+def _operator(python_operator, build, wide=LanesType, result=LanesType):
+    """Gives a Python operator a meaning for lanes of the type `wide`; plain numbers keep numba's own."""
 
     @type_callable(python_operator)
     def _(context):
-        return lambda x, y: result if isinstance(x, type(operand)) or isinstance(y, type(operand)) else None
+        return lambda x, y: result(_width(x, y)) if isinstance(x, wide) or isinstance(y, wide) else None
 
-    wide, one = type(operand), operand.one
-    for operands in ((wide, wide), (wide, one), (one, wide)):
-        lower_builtin(python_operator, *operands)(_emit(build, operand))
+    for operands in ((wide, wide), (wide, wide.one), (wide.one, wide)):
+        lower_builtin(python_operator, *operands)(_emit(build, lambda x, y: wide(_width(x, y))))
 
 
 def in_place(python_function, arity, result, lower):
@@ -153,16 +167,12 @@ def in_place(python_function, arity, result, lower):
     lower_builtin(python_function, *[types.Any] * arity)(lower)
 
 
-def _number(*numba_types):
-    return _lanes if _is_wide(*numba_types) else types.float64
-
-
 def _called(name):
     """An LLVM floating-point intrinsic of the operands' own type."""
 
     def build(builder, *values):
         ty = values[0].type
-        suffix = f"v{WIDTH}f64" if isinstance(ty, ir.VectorType) else "f64"
+        suffix = f"v{ty.count}f64" if isinstance(ty, ir.VectorType) else "f64"
         function = cgutils.get_or_insert_function(
             builder.module, ir.FunctionType(ty, [ty] * len(values)), f"llvm.{name}.{suffix}"
         )
@@ -175,13 +185,13 @@ _operator(operator.add, lambda b, x, y: b.fadd(x, y))
 _operator(operator.sub, lambda b, x, y: b.fsub(x, y))
 _operator(operator.mul, lambda b, x, y: b.fmul(x, y))
 _operator(operator.truediv, lambda b, x, y: b.fdiv(x, y))
-_operator(operator.lt, lambda b, x, y: b.fcmp_ordered("<", x, y), result=_mask)
-_operator(operator.le, lambda b, x, y: b.fcmp_ordered("<=", x, y), result=_mask)
-_operator(operator.gt, lambda b, x, y: b.fcmp_ordered(">", x, y), result=_mask)
-_operator(operator.ge, lambda b, x, y: b.fcmp_ordered(">=", x, y), result=_mask)
-_operator(operator.and_, lambda b, x, y: b.and_(x, y), operand=_mask, result=_mask)
-_operator(operator.or_, lambda b, x, y: b.or_(x, y), operand=_mask, result=_mask)
-type_callable(operator.neg)(lambda context: lambda x: _lanes if _is_wide(x) else None)
+_operator(operator.lt, lambda b, x, y: b.fcmp_ordered("<", x, y), result=MaskType)
+_operator(operator.le, lambda b, x, y: b.fcmp_ordered("<=", x, y), result=MaskType)
+_operator(operator.gt, lambda b, x, y: b.fcmp_ordered(">", x, y), result=MaskType)
+_operator(operator.ge, lambda b, x, y: b.fcmp_ordered(">=", x, y), result=MaskType)
+_operator(operator.and_, lambda b, x, y: b.and_(x, y), wide=MaskType, result=MaskType)
+_operator(operator.or_, lambda b, x, y: b.or_(x, y), wide=MaskType, result=MaskType)
+type_callable(operator.neg)(lambda context: lambda x: x if isinstance(x, LanesType) else None)
 lower_builtin(operator.neg, LanesType)(_emit(lambda b, x: b.fneg(x)))
 
 
@@ -246,7 +256,7 @@ def _constant(ty, value):
 
 
 def _as_integers(ty):
-    return ir.VectorType(_I64, WIDTH) if isinstance(ty, ir.VectorType) else _I64
+    return ir.VectorType(_I64, ty.count) if isinstance(ty, ir.VectorType) else _I64
 
 
 def _build_pow2(builder, n):
@@ -289,7 +299,7 @@ def choose(condition, xs, ys):
 
 def _lower_where(context, builder, signature, values):
     wide = isinstance(signature.return_type, LanesType)
-    mask = _mask if wide and isinstance(signature.args[0], MaskType) else types.boolean
+    mask = signature.args[0] if wide and isinstance(signature.args[0], MaskType) else types.boolean
     condition = context.cast(builder, values[0], signature.args[0], mask)
     if mask is types.boolean:
         condition = builder.icmp_unsigned("!=", condition, ir.Constant(condition.type, 0))
@@ -307,7 +317,7 @@ def any_lane(condition):
 def _lower_any_lane(context, builder, signature, values):
     if not isinstance(signature.args[0], MaskType):
         return context.cast(builder, values[0], signature.args[0], types.boolean)
-    bits = builder.bitcast(values[0], ir.IntType(WIDTH))
+    bits = builder.bitcast(values[0], ir.IntType(signature.args[0].width))
     return builder.icmp_unsigned("!=", bits, ir.Constant(bits.type, 0))
 
 
@@ -326,57 +336,70 @@ def lanes_at(i):
     raise NotImplementedError
 
 
-in_place(lanes_at, 1, lambda i: _lane_index, lambda context, builder, signature, values: values[0])
+def few_at(i):
+    """The index of cells i .. i + FEW - 1; compiled code only."""
+    raise NotImplementedError
 
 
-def _is_column(array, i):
-    """Whether lanes can be loaded at i: cells side by side, in one dimension, or a row of a memory of lanes.
+for _at, _wide in ((lanes_at, WIDTH), (few_at, FEW)):
+    in_place(_at, 1, lambda i, n=_wide: LaneIndexType(n), lambda context, builder, signature, values: values[0])
+
+
+def _lanes_of(array, i):
+    """The type of the lanes at i, if any can be there: cells in one dimension, or a row of a memory of so many lanes.
 
     Anything else is a TypingError.
     """
     if not isinstance(array, types.Array) or array.layout != "C" or array.dtype not in (types.float64, types.int8):
-        return False
+        return None
     if array.ndim == 2 and isinstance(i, types.BaseTuple) and len(i) == 2:
-        return isinstance(i[1], LaneIndexType)
-    return array.ndim == 1 and isinstance(i, LaneIndexType)
+        i = i[1]
+    elif array.ndim != 1:
+        return None
+    return LanesType(i.width) if isinstance(i, LaneIndexType) else None
 
 
-def _cells_pointer(context, builder, array_type, array, i):
+def _cells_pointer(context, builder, array_type, index_type, array, i):
     """Where lanes are, their type, and the bytes of one: a column's cells need not lie on a register's border."""
     element = context.get_data_type(array_type.dtype)
+    width = _lanes_of(array_type, index_type).width
     if array_type.ndim == 2:
         row, first = cgutils.unpack_tuple(builder, i)
-        i = builder.add(builder.mul(row, _I64(WIDTH)), first)
+        i = builder.add(builder.mul(row, _I64(width)), first)
     first = builder.gep(context.make_array(array_type)(context, builder, array).data, [i])
     align = element.width // 8 if isinstance(element, ir.IntType) else 8
-    return builder.bitcast(first, ir.VectorType(element, WIDTH).as_pointer()), element, align
+    return builder.bitcast(first, ir.VectorType(element, width).as_pointer()), element, align
 
 
 @type_callable(operator.getitem)
 def _type_load(context):
-    return lambda column, i: _lanes if _is_column(column, i) else None
+    return _lanes_of
 
 
 def _lower_load(context, builder, signature, values):
-    pointer, element, align = _cells_pointer(context, builder, signature.args[0], *values)
+    pointer, element, align = _cells_pointer(context, builder, *signature.args, *values)
     cells = builder.load(pointer, align=align)
-    return builder.sitofp(cells, ir.VectorType(_F64, WIDTH)) if isinstance(element, ir.IntType) else cells
+    return builder.sitofp(cells, signature.return_type.llvm) if isinstance(element, ir.IntType) else cells
 
 
 @type_callable(operator.setitem)
 def _type_store(context):
-    return lambda column, i, value: types.void(column, i, _lanes) if _is_column(column, i) else None
+    def typer(column, i, value):
+        lanes = _lanes_of(column, i)
+        return lanes and types.void(column, i, lanes)
+
+    return typer
 
 
 def _lower_store(context, builder, signature, values):
-    pointer, element, align = _cells_pointer(context, builder, signature.args[0], *values[:2])
+    pointer, element, align = _cells_pointer(context, builder, *signature.args[:2], *values[:2])
     cells = values[2]
     if isinstance(element, ir.IntType):
-        cells = builder.fptosi(cells, ir.VectorType(element, WIDTH))
+        cells = builder.fptosi(cells, ir.VectorType(element, cells.type.count))
     builder.store(cells, pointer, align=align)
     return context.get_dummy_value()
 
 
-for _index in (LaneIndexType, types.Tuple((types.int64, _lane_index))):
+for _index in (LaneIndexType, *(types.Tuple((types.int64, LaneIndexType(n))) for n in (WIDTH, FEW))):
     lower_builtin(operator.getitem, types.Array, _index)(_lower_load)
     lower_builtin(operator.setitem, types.Array, _index, LanesType)(_lower_store)
