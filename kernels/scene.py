@@ -249,8 +249,8 @@ def _methods(scene: Scene, parameters: list[str], outputs: list[str]) -> tuple[M
         def solve(*columns: Any) -> None:
             if len(columns[0]):
                 with compiling(scene.name, name):
-                    rows, columns[-1][:] = how(columns[:n], columns[n])
-                for column, row in zip(columns[n + 1 : -1], rows, strict=True):
+                    results, columns[-1][:], *_ = how(columns[:n], columns[n])
+                for column, row in zip(columns[n + 1 : -1], results, strict=False):
                     column[:] = row
 
         bound = signed(no_bound, [*parameters, "rtol", "asked", "out"]) if single else None

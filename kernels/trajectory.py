@@ -12,8 +12,8 @@ from typing import Any, Unpack
 import numpy as np
 
 from kernels.codegen.return_map import at_times
-from kernels.codegen.to_tolerance import at_switches, on_the_way
-from kernels.interface import Field, Kernel, Status
+from kernels.codegen.to_tolerance import solver
+from kernels.interface import FIRST_REFUSAL, UNSOLVED, Field, Kernel, Status
 from kernels.scene import SceneParts, estimating_kernel, scene_of, states_of
 
 __all__ = ["motion_kernel", "section_kernel"]
@@ -39,8 +39,11 @@ def section_kernel(**parts: Unpack[SceneParts]) -> Kernel:
     outputs = [replace(f, dims=("passage",), gaps=True) for f in (Field("time", "s", "time of the switch"), *states)]
 
     def solved(method: str, columns: Any, rtol: Any, stops: Any, _: Any) -> Any:
-        rows, error, status = at_switches(scene, method, columns, rtol, stops)
-        return rows[: len(outputs)], error, status
+        columns = [*columns, np.full(len(rtol), stops[-1])]
+        results, status, error = solver(scene, method)(columns, rtol, stops)
+        hangs = (status == Status.GRAZING) & ~(error <= rtol)  # on what is not known: there may be no switch
+        rows = results[[0, *range(2, 1 + len(outputs))]]
+        return on_the_way(rows, status, np.where(hangs | np.isnan(error), math.inf, error))
 
     return estimating_kernel(parts, parts["parameters"], outputs, [along], METHODS, solved)
 
@@ -62,7 +65,23 @@ def motion_kernel(**parts: Unpack[SceneParts]) -> Kernel:
         count, many = len(rtol), len(times)
         cells = [np.tile(c, many) for c in columns]
         found, status = at_times(scene, method, cells, np.repeat(times, count), np.tile(rtol, many))
-        rows, status = found.reshape(len(states), many, count), status.reshape(many, count)
-        return on_the_way(rows, status, np.where((status == Status.INACCURATE).any(axis=0), math.inf, rtol))
+        rows, status = found[: len(states)].reshape(len(states), many, count), status.reshape(many, count)
+        return on_the_way(rows, status, np.where(status == Status.INACCURATE, math.inf, rtol))
 
     return estimating_kernel(parts, parts["parameters"], outputs, [along], METHODS, solved)
+
+
+def on_the_way(rows: Any, status: Any, error: Any) -> tuple[Any, Any, Any]:
+    """Rows (n_rows, n_stops, n_cells), NaN where a motion does not come to; the error of each cell, and its status.
+
+    That is OK, or what was remarked, or why there is nothing at all, or not all. Where the method gives later stops up,
+    which another one may solve, it is INACCURATE, and the error infinite. `status`, `error` : of each stop and cell
+    """
+    refused, given_up = status >= FIRST_REFUSAL, np.isin(status, UNSOLVED).any(axis=0)
+    ended = refused | np.isnan(rows).any(axis=0)
+    why, worst = np.maximum.reduce(status), np.maximum.reduce(np.where(ended, 0, status))
+    short = np.where(why == Status.STICKS, Status.COMES_TO_REST, Status.TOO_SHORT)
+    short = np.where(given_up, Status.INACCURATE, short)
+    error = np.where(given_up, math.inf, np.maximum.reduce(np.where(refused, 0.0, error)))
+    status = np.where(ended.all(axis=0), why, np.where(ended.any(axis=0), short, worst)).astype(np.int8)
+    return np.where(ended, math.nan, rows), error, status

@@ -157,7 +157,7 @@ def theirs(follow):
 
 def ours(subject, columns, tolerance, follow):
     begin = time.thread_time()
-    outputs, status = follow(subject, columns, np.full(CELLS, tolerance))
+    outputs, status, *_ = follow(subject, columns, np.full(CELLS, tolerance))
     rate = CELLS / (time.thread_time() - begin)
     assert not status[:JUDGED].any()
     return rate, np.stack([outputs[0], abs(outputs[3])], axis=1)
@@ -200,7 +200,7 @@ def compare(title, follow, scene, columns, tolerance, truth):
     runs = {
         "heyoka.py": lambda: theirs(follow),
         "taylor_once": lambda: ours(plain, columns, tolerance, once),
-        "taylor": lambda: ours(scene, columns, rtol, by_error),
+        "taylor": lambda: ours(runner(scene, "told"), columns, rtol, by_error),
     }
     runs["taylor_once, run"] = lambda: by_run(scene, columns, tolerance, "taylor_once")
     runs["taylor, run"] = lambda: by_run(scene, columns, rtol, "taylor")

@@ -10,8 +10,6 @@ move by as much over LEFT/(1 - q) switches, as it does where intervals shrink by
 
 import numpy as np
 
-from kernels.codegen.compiled import runner
-from kernels.codegen.followed import followed
 from kernels.interface import Status
 
 ENDED = Status.STICKS, Status.OUT_OF_RANGE, Status.STEP_LIMIT
@@ -37,45 +35,37 @@ LEFT = 4.0
 """Enough where intervals shrink as n^-p, p > 4/3, where (1) misses D n/(2 p (p - 1)) and moves by D/(2 p) a switch."""
 
 
-def to_rest(how, scene, by):
-    """The function of columns `how`, followed by (1) where the scene does not reach the wanted number of switches.
+def to_rest(how, columns, rtol, results, status):
+    """Puts (1) into the results, where a motion does not reach the wanted number of switches.
 
-    `by` : what `how` runs the scene by (`runner`), which is compiled by then
+    `how` : (columns, rtol) -> results, status, error; what has followed them
     """
+    flips, outputs = columns[-1], (len(results) + 1) // 2
+    time, interval = results[:2]
+    faint = (np.isin(status, FAINT) & ~(interval * flips > SHORT * time)) | (interval <= STILL * time)
+    cells = np.flatnonzero((flips >= LEAST) & (np.isin(status, ENDED) | faint))
+    if not len(cells):
+        return
+    tolerance = np.minimum(0.5 * rtol[cells], FINE)
 
-    def solve(columns, rtol):
-        outputs, status = how(columns, rtol)
-        flips, (time, interval, *_) = columns[-1], outputs
-        faint = (np.isin(status, FAINT) & ~(interval * flips > SHORT * time)) | (interval <= STILL * time)
-        cells = np.flatnonzero((flips >= LEAST) & (np.isin(status, ENDED) | faint))
-        if not len(cells):
-            return outputs, status
+    def solved(those, flips):
+        """Rows of results, and which cells are right to half of the tolerance."""
+        rows, verdict, _ = how([*(c[cells[those]] for c in columns[:-1]), flips.astype(float)], tolerance[those])
+        return rows, verdict == Status.OK
 
-        tolerance = np.minimum(0.5 * rtol[cells], FINE)
-
-        def solved(those, flips):
-            """Rows of outputs, and which cells are right to half of the tolerance."""
-            rows, verdict = how([*(c[cells[those]] for c in columns[:-1]), flips.astype(float)], tolerance[those])
-            return rows, verdict == Status.OK
-
-        last = _last_right(solved, columns[-1][cells])
-        those = np.flatnonzero(last >= LEAST)
-        early = [*(c[cells[those]] for c in columns[:-1]), np.full(len(those), 2.0)]
-        sizes = followed(runner(scene, by), early, tolerance[those])[2 + len(scene.states) : -1]
-        for _ in range(TRIES):
-            if not len(those):
-                break
-            last[those] = np.maximum(np.floor(AWAY * last[those]), LEAST)
-            flips = columns[-1][cells[those]]
-            rests, values, error, left = _limits(solved, those, last[those], flips, sizes[: len(outputs) - 2])
-            rests &= left <= 0.5 * rtol[cells[those]]
-            good = cells[those[rests]]
-            outputs[:, good] = values[:, rests]
-            status[good] = np.where(error[rests] <= 0.5 * rtol[good], Status.COMES_TO_REST, Status.INACCURATE)
-            those, sizes = those[~rests], sizes[:, ~rests]
-        return outputs, status
-
-    return solve
+    last = _last_right(solved, flips[cells])
+    those = np.flatnonzero(last >= LEAST)
+    sizes = solved(those, np.full(len(those), 2.0))[0][outputs:-1]
+    for _ in range(TRIES):
+        if not len(those):
+            break
+        last[those] = np.maximum(np.floor(AWAY * last[those]), LEAST)
+        rests, values, error, left = _limits(solved, those, last[those], flips[cells[those]], sizes)
+        rests &= left <= 0.5 * rtol[cells[those]]
+        good = cells[those[rests]]
+        results[:outputs, good] = values[:, rests]
+        status[good] = np.where(error[rests] <= 0.5 * rtol[good], Status.COMES_TO_REST, Status.INACCURATE)
+        those, sizes = those[~rests], sizes[:, ~rests]
 
 
 def _last_right(solved, flips):
@@ -99,7 +89,8 @@ def _limits(solved, those, last, flips, sizes):
     And what is left of the way to rest after the wanted number of switches, as the error is.
     """
     runs = [solved(those, last - k) for k in (0, 1, 2, 3, 4)]
-    rows, good = (np.array(part) for part in zip(*runs, strict=True))  # (5, outputs, cells), (5, cells)
+    rows, good = (np.array(part) for part in zip(*runs, strict=True))  # (5, results, cells), (5, cells)
+    rows = rows[:, : 2 + len(sizes)]
     with np.errstate(all="ignore"):
         (values, q), (before, q_before) = (_limit(rows[k:]) for k in (0, 1))
         scale = abs(rows).max(axis=0)

@@ -104,7 +104,8 @@ def closed(the_map, cycles):
 def differences(the_map, cycles, swept, h):
     """The same by differences at h, and multipliers and sensitivities; and what is `judged` by them."""
     n, at, runs = len(the_map.directions), the_map.directions, (cycles.parameters, cycles.z, cycles.flips, cycles.r)
-    (rows, status), (slopes, sums, right) = the_map.passed(*runs), jacobian(the_map, cycles, h, (1.0, 2.0, 4.0), swept)
+    (rows, status, _), levels = the_map.passed(*runs), (1.0, 2.0, 4.0)
+    slopes, sums, right = jacobian(the_map, cycles, h, levels, swept)
     low, lower = ((4.0 * slopes[:, :, k] - slopes[:, :, k + 1]) / 3.0 for k in (0, 1))
     high, right = (16.0 * low - lower) / 15.0, right & (status == Status.OK)
     found, spread, W, late = closed(the_map, cycles._replace(rows=rows, slopes=high))

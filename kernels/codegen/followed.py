@@ -1,7 +1,7 @@
 """Columns of cells followed by what runs a scene (`compiled.Runner`), each step right to a tolerance.
 
-Results are a row each: time of the last switch, interval, states, the states' sizes on the way, the status; and where
-it is told, the error that is carried along, relative to the worst of the results.
+Results are a row each: time of the last switch, or of each stop, interval, states, the states' sizes on the way, the
+status; and where it is told, the error that is carried along, relative to the worst of the results.
 """
 
 import math
@@ -28,8 +28,10 @@ FAINT = 16.0 * TINY
 """The largest size on the way of a state below which steps do not hold its relative error."""
 
 
-def followed(runner, columns, rtol, of_a_step=None, shake=0.0, told=False):
-    """The results of a cell a column.
+def followed(runner, columns, rtol, of_a_step=None, shake=0.0, told=False, stops=None):
+    """The results of a cell a column, (n_rows, n_cells); at several stops (n_rows, n_stops, n_cells).
+
+    Cells that take as many steps are side by side, for so lanes wait less for each other.
 
     Parameters
     ----------
@@ -38,60 +40,37 @@ def followed(runner, columns, rtol, of_a_step=None, shake=0.0, told=False):
     of_a_step : tolerance of each step, a column; None: rtol
     shake : 1 or -1 where each event is missed by some roundings, and each state at the start (`driver.missed_by`)
     told : whether the error is
+    stops : None, or numbers of switches, of which the last ends the motion: all are by the higher order. Where a motion
+        has ended before, there is what it ended with
     """
-    steps = rtol if of_a_step is None else of_a_step
-    results, high = np.empty((3 + 2 * len(runner.scene.states) + told, len(rtol))), rtol < HIGH_BELOW
-    for run, chosen in ((runner.low, ~high), (runner.high, high)):
-        cells = np.flatnonzero(chosen)
-        those = [column[cells] for column in columns]
-        for _, places, found in _at_stops(runner, run, those, steps[cells], STOPS, shake, told):
-            results[:, cells[places]] = found
-    return results
-
-
-def passages(runner, columns, of_a_step, stops, shake=0.0, told=False):
-    """The results of each cell at each of those switches, (n_rows, n_stops, n_cells); NaN where it gets there not.
-
-    All are by the method of the higher order.
-    """
-    results = np.full((3 + 2 * len(runner.scene.states) + told, len(stops), len(of_a_step)), np.nan)
-    inputs = [*columns, np.full(len(of_a_step), stops[-1])]
-    for k, places, found in _at_stops(runner, runner.high, inputs, of_a_step, stops, shake, told):
-        results[:, k, places] = found
-    return results
-
-
-def _at_stops(runner, run, columns, of_a_step, stops, shake, told):
-    """Number of a stop, a number of switches, places and results of cells that go on from there, or are at their last.
-
-    Those that take as many steps are side by side, for so lanes wait less for each other.
-    """
-    cell, flips = runner.m.cell, columns[-1]
+    steps, high = rtol if of_a_step is None else of_a_step, (rtol < HIGH_BELOW) | (stops is not None)
+    cell, tolerance = runner.m.cell, np.maximum(steps, FINEST)
+    inputs = np.array([*columns, tolerance, np.full(len(rtol), shake)])
     row, rows = first_rows(cell), len(flat(cell))
     shown = [*range(row["time"], row["verdict"] + 1), *([row["own"] + 1] if told else [])]
-    tolerance = np.maximum(of_a_step, FINEST)
-    inputs = [*columns, tolerance, np.full(len(flips), shake)]
-    for begin in range(0, len(flips), AT_ONCE):
-        part = slice(begin, begin + AT_ONCE)
-        cells = fresh(rows, [column[part] for column in inputs])
-        places = begin + np.arange(len(cells))
-        whole = np.where(flips[part] < math.inf, flips[part], math.nan)  # NaN is refused, without end not followed
-        cells[:, row["interval"] : row["size"]] = np.nan
-        # two runs by a pair that began alike would share the steps that grow by the most allowed, and their errors
-        cells[:, row["h"]] = 1.0 if runner.order is None else tolerance[part] ** (1.0 / runner.order)
-        if cell.own:
-            cells[:, row["own"]] = float(told)
-        for k, stop in enumerate(stops):
-            cells[:, row["flips"]] = np.minimum(whole, stop)
-            to_the_end(run, cells)
-            yield k, places, cells[:, shown].T
-            count, verdict, steps, before = (cells[:, row[name]] for name in ("count", "verdict", "steps", "before"))
-            going = np.flatnonzero((count >= stop) & (count < whole) & (verdict < FIRST_REFUSAL))
-            going = going[np.lexsort([key[going].astype(np.int16) for key in (steps, before)])]
-            if not len(going):
-                break
-            cells, places, whole = cells[going], places[going], whole[going]
-            cells[:, 0] = MOVING
+    results = np.empty((len(shown), 1 if stops is None else len(stops), len(rtol)))
+    for run, chosen in ((runner.low, np.flatnonzero(~high)), (runner.high, np.flatnonzero(high))):
+        for begin in range(0, len(chosen), AT_ONCE):
+            places = chosen[begin : begin + AT_ONCE]
+            cells, whole = fresh(rows, inputs[:, places]), inputs[-3, places]
+            whole = np.where(whole < math.inf, whole, math.nan)  # NaN is refused, without end not followed
+            cells[:, row["interval"] : row["size"]] = np.nan
+            # two runs by a pair that began alike would share the steps that grow by the most allowed, and their errors
+            cells[:, row["h"]] = 1.0 if runner.order is None else tolerance[places] ** (1.0 / runner.order)
+            if cell.own:
+                cells[:, row["own"]] = float(told)
+            for k, stop in enumerate(STOPS if stops is None else stops):
+                cells[:, row["flips"]] = np.minimum(whole, stop)
+                to_the_end(run, cells)
+                results[:, 0 if stops is None else k :, places] = cells[:, shown].T[:, None]
+                count, verdict, *keys = (cells[:, row[name]] for name in ("count", "verdict", "steps", "before"))
+                going = np.flatnonzero((count >= stop) & (count < whole) & (verdict < FIRST_REFUSAL))
+                going = going[np.lexsort([key[going].astype(np.int16) for key in keys])]
+                if not len(going):
+                    break
+                cells, places, whole = cells[going], places[going], whole[going]
+                cells[:, 0] = MOVING
+    return results[:, 0] if stops is None else results
 
 
 def off_by_roundings(columns, many=1.0):
@@ -110,10 +89,16 @@ def off_by_roundings(columns, many=1.0):
     return [*changed, flips]
 
 
-def status_of(results, verdict, outputs):
+def status_of(results, outputs):
     """The verdict; OUT_OF_RANGE where one of so many outputs is no normal number, or a state is never above FAINT."""
-    values, sizes, status = abs(results[:outputs]), results[outputs:-1], verdict.astype(np.int8)
+    values, sizes, status = abs(results[:outputs]), results[outputs:-1], results[-1].astype(np.int8)
     normal = (values == 0) | ((values >= NORMAL_LOW) & (values <= NORMAL_HIGH))
     in_range = normal.all(axis=0) & ((sizes == 0) | (sizes >= FAINT)).all(axis=0)
     status[~in_range & (status == Status.OK)] = Status.OUT_OF_RANGE
     return status
+
+
+def put(wholes, cells, parts, which=slice(None)):
+    """Puts what has been found for these cells, or for some of them, into columns, whose last axis is of all cells."""
+    for whole, part in zip(wholes, parts, strict=True):
+        whole[..., cells[which]] = part[..., which]

@@ -86,9 +86,9 @@ def jacobian(the_map, cycles, h, levels, swept=()):
     places = np.tile(origin[:, None, None, None], (len(moves), len(levels), 2, 1))
     for k, move in enumerate(moves):
         places[move, k] += np.multiply.outer(np.multiply.outer(levels, signs), h * by[move])
-    many = len(moves) * len(levels) * 2
-    places = places.reshape(len(origin), -1)
-    found, status = the_map.passed(places[:first], places[first:], np.tile(cycles.flips, many), np.tile(cycles.r, many))
+    places, many = places.reshape(len(origin), -1), len(moves) * len(levels) * 2
+    flips, r = np.tile(cycles.flips, many), np.tile(cycles.r, many)
+    found, status, _ = the_map.passed(places[:first], places[first:], flips, r)
     pairs = found[[0, *(1 + j for j in at)]].reshape(1 + len(at), len(moves), len(levels), 2, count)
     pairs[1:] = pairs[1:] / cycles.scale[at][:, None, None, None]
     slopes = (pairs[:, :, :, 0] - pairs[:, :, :, 1]) / (2.0 * h * np.array(levels)[:, None])
@@ -120,7 +120,7 @@ def newton(the_map, cycles, swept=()):
         some = best.some(left)._replace(z=z[:, left])
         some.scale[:] = np.maximum(some.scale, abs(some.z))  # what is barely damped may grow far beyond its start
         r = np.where(before[left] > FAR, np.maximum(some.r, the_map.rough), some.r)
-        some.rows[:], status = the_map.passed(some.parameters, some.z, some.flips, r)
+        some.rows[:], status, _ = the_map.passed(some.parameters, some.z, some.flips, r)
         right, anew = status == Status.OK, np.flatnonzero(~steady[left])
         slopes, _, well = jacobian(the_map, some._replace(r=r).some(anew), STEP, (1.0,), swept)
         some.slopes[:, :, anew], right[anew] = slopes[:, :, 0], right[anew] & well
@@ -209,13 +209,14 @@ class Search:
         """States so many cycles after the start, and statuses."""
         some = self.cycles.some(left)
         rough = np.full(len(left), self.map.rough)
-        rows, status = self.map.passed(some.parameters, None, some.flips * cycles, rough)
+        rows, status, _ = self.map.passed(some.parameters, None, some.flips * cycles, rough)
         return rows[1:], status
 
     def _newton(self, some):
         """From the states of these cells: cycles; how far they are from rest, of their sizes, NaN where there is none;
         and how far from their halves."""
-        (T, *P), sizes = self.map.once(some.parameters, some.z, some.flips)
+        rough = np.full(len(some.r), self.map.rough)
+        (T, *P), _, sizes = self.map.passed(some.parameters, some.z, some.flips, rough)
         P = np.array(P)
         some.scale[:] = np.where(sizes > 0.0, sizes, np.where(abs(P) > 0.0, abs(P), 1.0))
         some.shift[:] = 0.0
@@ -225,7 +226,7 @@ class Search:
             some.scale[j] = np.minimum(some.scale[j], turn)
         some = newton(self.map, some, self.swept)
         half = np.maximum(np.floor(0.5 * some.flips), 1.0)
-        (time, *middle), _ = self.map.once(some.parameters, some.z, half)
+        (time, *middle), *_ = self.map.passed(some.parameters, some.z, half, rough)
         apart, by_half = (most(abs(middle - some.z - share * some.shift) / some.scale) for share in (0.0, 0.5))
         alike = (half == some.flips) | self.map.driven | (not self.map.directions)
         moved = np.where(alike, np.where(time > NEAR * T, 1.0, 0.0), np.minimum(apart, 1.0))

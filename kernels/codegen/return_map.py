@@ -13,13 +13,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from kernels.codegen.compiled import runner, running, written_of
-from kernels.codegen.followed import followed
+from kernels.codegen.compiled import running, written_of
 from kernels.codegen.record import named_functions, record, returned
-from kernels.codegen.to_tolerance import sliders, sliding, solver
+from kernels.codegen.to_tolerance import solver
 from kernels.expression.graph import ADD, INPUT, NUMBER, Expression, SceneError, needed
 from kernels.integrate.records import Mode
-from kernels.interface import Status
+from kernels.interface import FIRST_REFUSAL
 from kernels.lanes.columns import DONE, fresh, to_the_end
 from kernels.lanes.jit import jit_call
 from kernels.lanes.tuples import flat, read, write
@@ -73,20 +72,26 @@ class ReturnMap:
         self.modes = [j for j, rate in enumerate(recorded.rates) if rate.kind == NUMBER and not rate.args[0]]
         """The states whose rate is 0."""
         self.fine, self.rough, self.step = TOLERANCES[method]
-        self._how = solver(self.scene, method)
         self._sized = (turning(self.scene, True), (1.0,)), (turning(self.scene, False), OTHERS), (self.scene, OTHERS)
         for one in (*(scene for scene, _ in self._sized), *([] if self.driven else [clocked(scene)])):
             record(one)
 
-    def passed(self, parameters, before, flips, rtol):
-        """Rows of time and states, and statuses: `flips` switches after the one before which the states are given.
+    def passed(self, parameters, before, flips, rtol, scene=None):
+        """Rows of time and states, `flips` switches after the one before which the states are given; and statuses.
 
-        `before` : None where the scene's start is meant instead
+        And the largest sizes of the states on the way, at the ends of steps. All are NaN where the motion ends before.
+
+        Parameters
+        ----------
+        before : None where the scene's start is meant instead
+        scene : the map's own one, or as `turning` makes of it
         """
-        begin = np.zeros((len(self.states), len(flips))) if before is None else before
-        columns = [*parameters, *begin, np.full(len(flips), float(before is None)), flips]
-        found, status = self._how(columns, rtol)
-        return found[[0, *range(2, 2 + len(begin))]], status
+        n, start = len(self.states), np.full(len(flips), float(before is None))
+        begin = np.zeros((n, len(flips))) if before is None else before
+        solve = solver(scene or self.scene, self.method, again=False)
+        found, status, _ = solve([*parameters, *begin, start, flips], rtol)
+        found, sizes = np.where(status < FIRST_REFUSAL, found, np.nan), 2 + len(self.scene.states)
+        return found[[0, *range(2, 2 + n)]], status, found[sizes : sizes + n]
 
     def rates(self, parameters, states, side):
         """The rates of each state, columns."""
@@ -99,18 +104,6 @@ class ReturnMap:
         """The states, and statuses, of the motion from the start at a time each."""
         return at_times(self.own, self.method, list(parameters), times, np.full(len(times), TIGHT * self.fine))
 
-    def once(self, parameters, before, flips):
-        """Rows of time and states after so many switches, and the states' largest sizes on the way, to some digits.
-
-        The sizes are NaN where a single run does not get there.
-        """
-        rows, sizes = self._once(self.scene, parameters, before, flips, self.rough)
-        left = np.flatnonzero(np.isnan(rows[0]))
-        if len(left):
-            rough = np.full(len(left), self.rough)
-            rows[:, left], _ = self.passed(parameters[:, left], before[:, left], flips[left], rough)
-        return rows, sizes
-
     def turned(self, parameters, before, flips):
         """The largest sizes on the way, tightly, where states turn round; and by how much they may be off besides.
 
@@ -120,31 +113,17 @@ class ReturnMap:
         for scene, tolerances in self._sized:
             left = np.flatnonzero(np.isnan(sizes).any(axis=0))
             if len(left):
-                some = parameters[:, left], before[:, left], flips[left]
-                found = [self._once(scene, *some, many * TIGHT * self.fine)[1] for many in tolerances]
+                some, rtol = (parameters[:, left], before[:, left], flips[left]), np.full(len(left), TIGHT * self.fine)
+                found = [self.passed(*some, many * rtol, scene)[2] for many in tolerances]
                 sizes[:, left] = np.maximum.reduce(found)
                 off[:, left] = APART * (sizes[:, left] - np.minimum.reduce(found))
         return sizes, np.where(np.isnan(off), np.inf, off)
 
-    def _once(self, scene, parameters, before, flips, rtol):
-        """By one run: rows of time and states, and the largest size of each state at the ends of steps."""
-        # a scene that is followed with its error is compiled so already; without, it has the same bits
-        by = "told" if self.method == "taylor" and scene is self.scene else self.method
-        columns, r, many = [*parameters, *before, 0.0 * flips, flips], np.full(len(flips), rtol), len(before)
-        found = followed(runner(scene, by), columns, r)
-        for slider in sliders(self.scene, self.method) and sliders(scene, self.method):
-            cells = np.flatnonzero(found[-1] == Status.STICKS)
-            if len(cells):
-                along = runner(sliding(scene), slider)
-                found[:, cells] = followed(along, [c[cells] for c in columns], r[cells])
-        found, sizes = np.where(found[-1] <= Status.INACCURATE, found, np.nan), 2 + len(scene.states)
-        return found[[0, *range(2, 2 + many)]], found[sizes : sizes + many]
-
 
 def at_times(scene, method, columns, times, rtol):
     """The states (n_states, n_cells) at a time after the start each; and the status."""
-    rows, status = solver(clocked(scene), method)([*columns, times, np.ones(len(rtol))], rtol)
-    return rows[2:], status
+    results, status, _ = solver(clocked(scene), method)([*columns, times, np.ones(len(rtol))], rtol)
+    return results[2 : 2 + len(scene.states)], status
 
 
 @functools.cache

@@ -1,5 +1,6 @@
 """Motion along a kink onto which both sides press it: when it begins and ends, against closed forms to 50 digits."""
 
+import belt_scene
 import numpy as np
 import pytest
 from columns import relative_error, solve
@@ -9,6 +10,7 @@ from sliding_scene import SLIDING
 from kernels.interface import Status
 from kernels.lanes.jit import COMPILED
 from kernels.scene import Field, maximum, scene_kernel, sign
+from kernels.trajectory import section_kernel
 
 METHODS = ["taylor", "dop853", "rodas5p"] if COMPILED else ["dop853"]
 """What keeps a step on the kink is the same for dopri5 as for dop853."""
@@ -57,6 +59,18 @@ def test_a_slow_belt_lets_go_of_a_mass_that_short_steps_follow(method):
         truths = [1 / mpf(b) + cycles * belt_cycle(1, mpf(b), mpf(drag)) for b in belt]
     assert (status == Status.OK).all()
     assert (relative_error(outputs["time"], truths) < 1e-9).all()
+
+
+@many
+@pytest.mark.parametrize("method", METHODS)
+def test_a_section_goes_on_behind_what_the_belt_carries(method):
+    belt, switches = np.array([0.05, 0.2, 0.4]), np.array([1.0, 3.0, 11.0])
+    found, status = solve(section_kernel(**belt_scene.SCENE), method, belt=belt, along=[switches])
+    with mp.workdps(50):
+        truths = [[1 / mpf(b) + (k - 1) / 2 * belt_cycle(1, mpf(b), mpf(-0.1)) for k in switches] for b in belt]
+    assert (status == Status.OK).all()
+    assert abs(found["time"] / np.array(truths, float) - 1.0).max() < 1e-9
+    assert abs(found["speed"] / belt[:, None] - 1.0).max() < 1e-9
 
 
 def relay_time(m, mid):
