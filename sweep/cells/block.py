@@ -11,7 +11,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -23,9 +23,7 @@ from sweep.cells.schema import cells_of, columns
 from sweep.cells.solve import NONE, Solver
 from sweep.cells.timing import LANES, Sample, block_cells, take_sample, work_clock
 from sweep.errors import SweepError
-
-if TYPE_CHECKING:
-    from sweep.study.model import Study
+from sweep.study.model import Study
 
 
 class Blocks:

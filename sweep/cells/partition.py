@@ -11,12 +11,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from sweep.study.model import Study
+from sweep.study.model import Study
 
 FINENESS = 1024
 """Row blocks a study is cut into, about: enough for many workers, and few to merge in the end."""

@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 import timeit
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,9 +23,7 @@ from sweep.cells import schema
 from sweep.cells.grid import Cells, SolveCells, empty_cells
 from sweep.cells.partition import row_blocks
 from sweep.cells.schema import Column, Coordinate, Schema
-
-if TYPE_CHECKING:
-    from sweep.study.model import Study
+from sweep.study.model import Study
 
 STRIP = 65536
 """Cells reduced at a time, where outputs are numbers."""

@@ -8,17 +8,14 @@ import platform
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from kernels.interface import Field, Status
 from sweep.cells.fingerprint import version
 from sweep.cells.grid import Cells
-from sweep.study.model import setting
-
-if TYPE_CHECKING:
-    from sweep.study.model import Study
+from sweep.study.model import Study, setting
 
 CONVENTIONS = "CF-1.11"
 STATUS, METHOD_USED, ERROR_BOUND = "status", "method_used", "error_bound"

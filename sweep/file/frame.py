@@ -15,7 +15,7 @@ import math
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -25,10 +25,7 @@ from sweep.cells.reduce import part_columns
 from sweep.cells.schema import STATUS, Column, Schema
 from sweep.file import disk
 from sweep.file.reading import BYTES, FORMAT, checksum, key_of
-from sweep.study.model import ARRAY
-
-if TYPE_CHECKING:
-    from sweep.study.model import Study
+from sweep.study.model import ARRAY, Study
 
 PAGE = 4096
 WORTH_A_PAGE = 10 * PAGE

@@ -22,12 +22,11 @@ from sweep.file import disk
 from sweep.file.frame import cuts_of
 from sweep.file.reading import Damaged, StoredFile, Table
 from sweep.file.store import alone, begun, earlier, unfinished_of
+from sweep.study.model import Study
 from sweep.words import as_path
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from sweep.study.model import Study
 
 MEMORY_SHARE = 0.25
 """Results larger than this share of the memory are opened in pieces (dask)."""

@@ -19,14 +19,13 @@ from sweep.file.store import unfinished_of
 from sweep.runs.loop import Loop, Task
 from sweep.runs.to_file import Ending, run_to_file
 from sweep.study.keys import KEYS
+from sweep.study.model import Study
 from sweep.study.read import Given
 from sweep.study.read import study as as_study
 from sweep.words import did_you_mean, listed
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from sweep.study.model import Study
 
 
 def run(
