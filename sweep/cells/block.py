@@ -11,7 +11,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -24,47 +24,6 @@ from sweep.cells.solve import NONE, Solver
 from sweep.cells.timing import LANES, Sample, block_cells, take_sample, work_clock
 from sweep.errors import SweepError
 from sweep.study.model import Study
-
-
-class Blocks:
-    """The rows of a study, cut into blocks: their `partition`, the `columns` they fill, the cells of each of `rows`."""
-
-    def __init__(self, study: Study, partition: Partition) -> None:
-        self.partition, self.columns, self.rows = partition, part_columns(study), row_blocks(study)
-        self._here = threading.local()
-
-    @property
-    def count(self) -> int:
-        """Number of blocks."""
-        return self.partition.count
-
-    @property
-    def row_bytes(self) -> int:
-        """Bytes of one row over all columns."""
-        return sum(column.cell_bytes for column in self.columns)
-
-    def bounds(self, block: int) -> tuple[int, int]:
-        """The rows of a block."""
-        return self.partition.bounds(block)
-
-    def cells(self, block: int) -> tuple[int, int]:
-        """The cells of a block."""
-        return self.rows.bounds(*self.bounds(block))
-
-    def label(self, block: int) -> str:
-        """How a block is called in messages."""
-        return "cells {} to {}".format(*self.cells(block))
-
-    def empty(self, rows: int) -> dict[str, Any]:
-        """Columns of so many rows."""
-        return {column.name: column.empty(rows) for column in self.columns}
-
-    def own(self, block: int) -> dict[str, Any]:
-        """Columns of a block, made once in each thread, for new ones cost more than a cheap kernel."""
-        if not hasattr(self._here, "columns"):
-            self._here.columns = self.empty(min(self.partition.cells, self.partition.size))
-        start, stop = self.bounds(block)
-        return {name: column[: stop - start] for name, column in self._here.columns.items()}
 
 
 def cut(study: Study, workers: int, sample: Sample, wanted: int | None = None, least: float = 0.0) -> Partition:
@@ -170,14 +129,7 @@ class Guard:
 
 
 Found = bytes | Mapping[str, Any] | None
-"""A block that is not in the sink of the run yet: digests of what a worker has written to the file, or its numbers."""
-
-
-class Sink(Protocol):
-    """Where blocks go: `room` gives the columns to fill, `put` takes a block and gives what is still to be put."""
-
-    def room(self, job: int) -> Mapping[str, Any]: ...
-    def put(self, job: int, arrays: Any) -> Found: ...
+"""A block that is still to be put where those of the run go: digests of what a worker has written, or its numbers."""
 
 
 @dataclass(frozen=True)
@@ -191,29 +143,56 @@ class Done:
 
 
 class Bench:
-    """Computes blocks into a sink, in any thread, each by a solver of its own where `apart` does not solve for all."""
+    """A study cut into blocks of rows, which are computed here, in any thread, or `apart`.
 
-    def __init__(self, study: Study, blocks: Blocks, sink: Sink, apart: SolveCells | None = None) -> None:
-        self._study, self._blocks, self._sink, self._apart = study, blocks, sink, apart
-        self._here = threading.local()
+    `partition` is how the rows are cut, `columns` are what they fill, `rows` the cells of each.
+    """
 
-    def block(self, job: int, wanted: Any = None) -> Done:
-        """Computes a block; of its cells only those wanted, by default all. Raises SweepError."""
-        here, (start, stop) = self._here, self._blocks.bounds(job)
-        with faults_reported(f"{self._blocks.label(job)} cannot be computed or kept"):
+    def __init__(self, study: Study, partition: Partition, apart: SolveCells | None = None) -> None:
+        self.study, self.partition, self._apart = study, partition, apart
+        self.columns, self.rows, self._here = part_columns(study), row_blocks(study), threading.local()
+
+    @property
+    def row_bytes(self) -> int:
+        """Bytes of one row over all columns."""
+        return sum(column.cell_bytes for column in self.columns)
+
+    def cells(self, block: int) -> tuple[int, int]:
+        """The cells of a block."""
+        return self.rows.bounds(*self.partition.bounds(block))
+
+    def label(self, block: int) -> str:
+        """How a block is called in messages."""
+        return "cells {} to {}".format(*self.cells(block))
+
+    def empty(self, rows: int) -> dict[str, Any]:
+        """Columns of so many rows."""
+        return {column.name: column.empty(rows) for column in self.columns}
+
+    def compute(
+        self, block: int, put: Callable[[int, Any], Found], wanted: Any = None, room: Mapping[str, Any] | None = None
+    ) -> Done:
+        """Computes a block; of its cells only those wanted, by default all. Raises SweepError.
+
+        `put` takes its columns, and gives what is still to be put. They are in `room`, or in this thread's own.
+        """
+        here, (start, stop) = self._here, self.partition.bounds(block)
+        with faults_reported(f"{self.label(block)} cannot be computed or kept"):
             if not hasattr(here, "guard"):
-                here.bad = []
-                here.guard = Guard(self._apart or Solver(self._study), here.bad.append)
-                here.reducer = None if self._study.summary is None else Reducer(self._study, here.guard)
+                here.bad, here.columns = [], {}
+                here.guard = Guard(self._apart or Solver(self.study), here.bad.append)
+                here.reducer = None if self.study.summary is None else Reducer(self.study, here.guard)
             here.bad.clear()
             begun = time.perf_counter()
-            arrays = self._sink.room(job)
+            if room is None:  # new columns cost more than a cheap kernel
+                here.columns = here.columns or self.empty(min(self.partition.cells, self.partition.size))
+                room = {name: column[: stop - start] for name, column in here.columns.items()}
             if here.reducer is None:
-                here.guard.solve(start, cells_of(arrays), wanted)
+                here.guard.solve(start, cells_of(room), wanted)
             else:
-                here.reducer.solve(start, stop, arrays)
-            found = self._sink.put(job, arrays)
-            return Done(job, time.perf_counter() - begun, [*here.bad], found)
+                here.reducer.solve(start, stop, room)
+            found = put(block, room)
+            return Done(block, time.perf_counter() - begun, [*here.bad], found)
 
 
 def told(fault: BaseException) -> str:

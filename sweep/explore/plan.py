@@ -72,10 +72,10 @@ class Plan:
         self.shape, self.workers = study.grid_shape, task.cores
         with ExitStack() as stack:
             loop = Loop(task, stack, hold=False)
-            sample, blocks, apart = loop.sample, loop.blocks, loop.processes
+            sample, bench, apart = loop.sample, loop.bench, loop.processes
             starting = 0.0 if apart is None else time.monotonic() - begun - apart.seconds
-            self.cells, self.cell_seconds = blocks.rows.size, sample.cost
-            self.seconds = RUN_SECONDS + sample.cost * self.cells / min(self.workers, blocks.count)
+            self.cells, self.cell_seconds = bench.rows.size, sample.cost
+            self.seconds = RUN_SECONDS + sample.cost * self.cells / min(self.workers, bench.partition.count)
             solver = Guard(apart or Solver(study), lambda cell: None)
             looked_at = _looked_at(study, solver, min(LOOK_SECONDS, SHARE * self.seconds))
         self.methods, self.statuses, self.sampled = looked_at
@@ -87,9 +87,9 @@ class Plan:
         compiling = starting if apart else work_clock.compiled - before
         self.compile_seconds = compiling if compiling > SILENT_SECONDS else 0.0
         self.seconds += starting if apart else 0.0 if self._is_kept else self.compile_seconds
-        self.blocks, self.cells_per_block = blocks.count, blocks.cells(0)[1]
-        self.output_bytes = expected_size(task.schema, cuts_of(study, task.schema, blocks.partition))
-        self.memory_bytes = 2 * self.workers * (blocks.partition.cells * blocks.row_bytes + strip_bytes(study))
+        self.blocks, self.cells_per_block = bench.partition.count, bench.cells(0)[1]
+        self.output_bytes = expected_size(task.schema, cuts_of(study, task.schema, bench.partition))
+        self.memory_bytes = 2 * self.workers * (bench.partition.cells * bench.row_bytes + strip_bytes(study))
         self.folder = str(Path.cwd() if task.path is None else task.output.parent)
         self.free_bytes = shutil.disk_usage(self.folder).free
 

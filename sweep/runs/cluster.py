@@ -26,7 +26,7 @@ from typing import Any
 
 import distributed
 
-from sweep.cells.block import Bench, Blocks, Done, Found, faults_reported
+from sweep.cells.block import Bench, Done, Found, faults_reported
 from sweep.cells.fingerprint import difference, fingerprint
 from sweep.errors import Incomplete, SweepError, reason
 from sweep.file import disk
@@ -177,7 +177,7 @@ class Remote:
         where = f"worker on {socket.gethostname()}"
         with self._turn, faults_reported(where):
             self._bench = self._bench or self._begun(where)
-        return self._bench.block(job, wanted)
+        return self._bench.compute(job, self._put, wanted)
 
     def _begun(self, where: str) -> Bench:
         """Loads the kernel. Raises SweepError where what computes here is not what was asked for."""
@@ -201,11 +201,9 @@ class Remote:
             path, key = shared
             with contextlib.suppress(OSError, SweepError):  # it is not seen here, or may not be written
                 self._file = StoredFile(path, os.O_RDWR, key)
-        blocks = Blocks(study, partition)
-        self.room = blocks.own
-        return Bench(study, blocks, weakref.proxy(self), processes)  # so that all ends when dask lets go of this
+        return Bench(study, partition, processes)
 
-    def put(self, job: int, arrays: Mapping[str, Any]) -> Found:
+    def _put(self, job: int, arrays: Mapping[str, Any]) -> Found:
         """The digests of what is written, and on the disk; or the numbers, which lie where nothing else will."""
         file = self._file
         if file is None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import reduce
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -52,24 +52,29 @@ class Reused:
         self._numbers: Mapping[str, Any] = self._stored.tables["cells"].columns
         self._positions = [_positions(old.axes[name], axis) for name, axis in study.axes.items()]
 
-    def close(self) -> None:
-        """Gives the file back."""
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *fault: object) -> None:
         self._stored.close()
 
     def missing(self, start: int, stop: int) -> Any:
         """Of the cells `start` to `stop`, which have to be computed."""
         return ~self._known(start, stop)[1]
 
-    def fill(self, start: int, stop: int, arrays: Mapping[str, Any]) -> None:
-        """Writes the known ones among the cells `start` to `stop`. Raises SweepError where the file fails."""
+    def filled(self, start: int, stop: int, arrays: Mapping[str, Any]) -> Mapping[str, Any]:
+        """The cells `start` to `stop`, with the known ones among them. Raises SweepError where the file fails."""
         shared, known = self._known(start, stop)
         if not known.any():
-            return
+            return arrays
+        # what came from elsewhere may be read only
+        arrays = {name: column if column.flags.writeable else column.copy() for name, column in arrays.items()}
         # values of the result that are neighbours there have none of its values between them here
         parts = [p[s] for p, s in zip(self._positions, box_slices(self._shape, start, stop), strict=True)]
         old = tuple(slice(int(part[part >= 0].min()), int(part.max()) + 1) for part in parts)
         for column in columns(self._study):
             arrays[column.name][known] = self._numbers[column.name][old].reshape(-1, *column.shape)[known[shared]]
+        return arrays
 
     def _known(self, start: int, stop: int) -> tuple[Any, Any]:
         """Which of some cells the result has; and which of these did not FAIL, where those are computed again."""

@@ -1,7 +1,7 @@
 """The loop of a run: numbers of blocks go to an executor, threads here or the workers of a cluster, and come back.
 
-Wherever a block is computed, it is on a `Bench`, which puts it into a sink: the arrays of a run in memory, the file,
-or, of a worker that does not see the file, what sends its numbers. Those the loop puts into the sink of the run.
+Wherever a block is computed, it is on a `Bench`, which puts it into the arrays of a run in memory, or into the file.
+What a worker that sees no file has computed, the loop puts there.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import contextlib
 import os
 import platform
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from datetime import datetime
@@ -18,7 +18,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
-from sweep.cells.block import Bench, Blocks, Done, Sink, cut, sampled_study
+from sweep.cells.block import Bench, Done, Found, cut, sampled_study
 from sweep.cells.fingerprint import fingerprint
 from sweep.cells.partition import Partition
 from sweep.cells.reduce import output_schema
@@ -142,8 +142,9 @@ class Loop:
         self.sample = self._sample()
         # a block of a cluster takes so long that the scheduler's millisecond is nothing
         least = 0.0 if self._cluster is None else 0.5
-        self.blocks = Blocks(study, partition or cut(study, self._crew, self.sample, task.block_cells, least))
-        self._weights = self.sample.weights(self.blocks.partition, self.blocks.rows.first)
+        cells = partition or cut(study, self._crew, self.sample, task.block_cells, least)
+        self.bench = Bench(study, cells, self.processes)
+        self._weights = self.sample.weights(self.bench.partition, self.bench.rows.first)
 
     def _sample(self) -> Sample:
         """The sample, taken in a thread, so that Ctrl-C and the time to stop are seen while a kernel is compiled.
@@ -172,37 +173,42 @@ class Loop:
 
     def _cells(self, job: int) -> int:
         """How many cells a block has."""
-        start, stop = self.blocks.cells(job)
+        start, stop = self.bench.cells(job)
         return stop - start
 
     def compute(
         self,
         jobs: Sequence[int],
-        sink: Sink,
+        put: Callable[[int, Any], Found],
+        room: Callable[[int], Mapping[str, Any] | None] = lambda job: None,
         shared: tuple[Path, bytes] | None = None,
         tick: Callable[[], None] = lambda: None,
     ) -> None:
-        """Computes blocks into a sink, and tells of the progress; `tick` is called often.
+        """Computes blocks, and tells of the progress.
 
-        Workers that see the file `shared` write them there.
-        After a fault, Ctrl-C or SIGTERM no block is begun, and those at work are put into the sink if they end.
+        `put` and `room` are as of `Bench.compute`; workers that see the file `shared` write there; `tick` is called
+        often.
+        After a fault, Ctrl-C or SIGTERM no block is begun, and those at work are kept if they end.
         Raises SweepError, TimeUp, KeyboardInterrupt, Terminated.
         """
-        task, cluster, known, study = self.task, self._cluster, self._reused, self.task.study
-        total, machine, versions = self.blocks.rows.size, platform.uname(), task.schema.attrs["versions"]
+        task, cluster, known, bench = self.task, self._cluster, self._reused, self.bench
+        total, machine, versions = bench.rows.size, platform.uname(), task.schema.attrs["versions"]
         done = total - sum(map(self._cells, jobs))
         self.progress = Progress(total, task.progress, task.name, done, float(self._weights[list(jobs)].sum()))
         log(
-            f"begins: {task.name}, kernel {study.kernel_name}, {done:,} of {total:,} cells done before, "
-            f"{self.blocks.count:,} blocks, {task.cores} cores, process {os.getpid()} on {machine.node} "
+            f"begins: {task.name}, kernel {bench.study.kernel_name}, {done:,} of {total:,} cells done before, "
+            f"{bench.partition.count:,} blocks, {task.cores} cores, process {os.getpid()} on {machine.node} "
             f"({machine.system} {machine.machine}), {versions}",
-            "begin", kernel=study.kernel_name, cells=done, of=total, cores=task.cores, process=os.getpid(),
+            "begin", kernel=bench.study.kernel_name, cells=done, of=total, cores=task.cores, process=os.getpid(),
             machine=machine.node, versions=versions,
         )  # fmt: skip
-        bench = Bench(study, self.blocks, sink, self.processes)
+
+        def keep(job: int, found: Any) -> Found:
+            return put(job, found if known is None else known.filled(*bench.partition.bounds(job), found))
+
         if cluster is not None:
             isolated = None if self.processes is None else (self.processes.limit, self.processes.cost)
-            words = study.to_json(), dict(task.fingerprint), self.blocks.partition
+            words = bench.study.to_json(), dict(task.fingerprint), bench.partition
             cluster.begin(*words, shared if known is None else None, isolated)
         queue, under_way = deque(from_everywhere(jobs)), set[Future[Done]]()
         try:
@@ -210,15 +216,15 @@ class Loop:
                 self._check()
                 while queue and len(under_way) < 2 + 3 * self._crew:
                     job = queue.popleft()
-                    wanted = None if known is None else known.missing(*self.blocks.bounds(job))
+                    wanted = None if known is None else known.missing(*bench.partition.bounds(job))
                     # a block of which all cells are known is put together here
                     if cluster is None or (wanted is not None and not wanted.any()):
-                        under_way.add(self._threads.submit(bench.block, job, wanted))
+                        under_way.add(self._threads.submit(bench.compute, job, keep, wanted, room(job)))
                     else:
-                        under_way.add(cluster.submit(job, wanted, self.blocks.label(job)))
+                        under_way.add(cluster.submit(job, wanted, bench.label(job)))
                 for future in wait(under_way, TICK, FIRST_COMPLETED).done:
                     under_way.remove(future)
-                    self._take(future.result(), sink)
+                    self._take(future.result(), keep)
                 if cluster is not None:
                     cluster.look()
                 self.progress.crew = self._crew
@@ -228,13 +234,13 @@ class Loop:
             self._stop(under_way)
             for future in under_way:
                 with contextlib.suppress(Exception, CancelledError):
-                    self._take(future.result(0.0), sink)
+                    self._take(future.result(0.0), keep)
             raise
 
-    def _take(self, done: Done, sink: Sink) -> None:
-        """Has what a worker sent put into the sink, and tells of cells that FAILED; of too many only how many."""
+    def _take(self, done: Done, keep: Callable[[int, Any], Found]) -> None:
+        """Keeps what a worker sent, and tells of cells that FAILED; of too many only how many."""
         if done.found is not None:
-            sink.put(done.block, done.found)
+            keep(done.block, done.found)
         for cell in done.bad:
             self._failed += 1
             if self._failed <= MOST_TOLD:

@@ -1,23 +1,30 @@
-"""Runs a study: what is asked for is checked, and computed into memory or into a file."""
+"""Runs a study: what is asked for is checked, and computed into memory, or into a file.
+
+What stands at the place of a file is looked at, and continued; blocks go to a store that survives a kill.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from datetime import datetime
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, Any, Literal, TextIO
 
 import numpy as np
 
-from sweep.cells.block import Blocks
+from sweep.cells.fingerprint import difference
 from sweep.cells.reduce import gathered
 from sweep.cells.schema import ending, now
 from sweep.errors import SweepError
-from sweep.file.open import in_memory, memory, open_result
-from sweep.file.store import unfinished_of
+from sweep.file import disk
+from sweep.file.frame import cuts_of
+from sweep.file.open import in_memory, memory, open_result, verdict
+from sweep.file.reading import StoredFile
+from sweep.file.store import alone, begun, earlier, lock_of, reopened, unfinished_of
+from sweep.runs.extend import Reused, has_failed, obstacle
 from sweep.runs.loop import Loop, Task
-from sweep.runs.to_file import Ending, run_to_file
+from sweep.runs.pool import Terminated, TimeUp, signals_held
 from sweep.study.keys import KEYS
 from sweep.study.model import Study
 from sweep.study.read import Given
@@ -26,6 +33,9 @@ from sweep.words import did_you_mean, listed
 
 if TYPE_CHECKING:
     import xarray as xr
+
+Ending = Literal["done before", "complete", "unfinished", "not begun"]
+"""What became of an output: the last two where the time was up before the end, or before the first block."""
 
 
 def run(
@@ -106,42 +116,118 @@ def run(
             hint = did_you_mean(key, [*options, *KEYS]) or f"; a study has {listed(KEYS, word='and')}"
             raise SweepError(f"sweep.run: no such keyword {key}{hint}")
     task = Task(as_study(study, **keys), path, **options)
-    if path is not None:
-        outcome = run_to_file(task)
-        if outcome == "not begun":
-            raise SweepError("until: the time was up before the first cell could be computed")
-        return open_result(unfinished_of(task.output) if outcome == "unfinished" else task.output)
-    start = now()
-    with contextlib.ExitStack() as stack:
-        loop = Loop(task, stack)
-        sink = _Memory(loop.blocks)
-        loop.compute(range(loop.blocks.count), sink)
-        loop.progress.end()
-    found = sink.arrays if task.study.summary is None else gathered(task.study, sink.arrays)
-    return in_memory(task.schema, found).assign_attrs(start=start, **ending(loop.progress.rate))
+    if path is None:
+        return _in_memory(task)
+    outcome = _to_file(task)
+    if outcome == "not begun":
+        raise SweepError("until: the time was up before the first cell could be computed")
+    return open_result(unfinished_of(task.output) if outcome == "unfinished" else task.output)
 
 
 def complete(study: Study, path: str | os.PathLike[str], **options: Any) -> Ending:
     """Runs as `run` does, and opens nothing."""
-    return run_to_file(Task(study, path, **options))
+    return _to_file(Task(study, path, **options))
 
 
-class _Memory:
-    """Where blocks of a run in memory go: all columns. Raises SweepError where the memory is too small."""
-
-    def __init__(self, blocks: Blocks) -> None:
-        self._blocks, rows = blocks, blocks.rows.count
-        if rows * blocks.row_bytes > memory():
-            needed = f"{rows * blocks.row_bytes / 1e9:.1f} GB"
+def _in_memory(task: Task) -> xr.Dataset:
+    """Raises SweepError also where the memory is too small."""
+    start = now()
+    with contextlib.ExitStack() as stack:
+        loop = Loop(task, stack)
+        bench, rows = loop.bench, loop.bench.rows.count
+        if rows * bench.row_bytes > memory():
+            needed = f"{rows * bench.row_bytes / 1e9:.1f} GB"
             raise SweepError(f"the result takes {needed}, more than the memory; give a path to store it")
-        self.arrays = blocks.empty(rows)
+        arrays = bench.empty(rows)
 
-    def room(self, job: int) -> Mapping[str, Any]:
-        """Where a block lies."""
-        return {name: array[slice(*self._blocks.bounds(job))] for name, array in self.arrays.items()}
+        def room(job: int) -> dict[str, Any]:
+            return {name: array[slice(*bench.partition.bounds(job))] for name, array in arrays.items()}
 
-    def put(self, job: int, arrays: Mapping[str, Any]) -> None:
-        """Takes a block, which lies there already if it was computed here."""
-        for name, place in self.room(job).items():
-            if not np.may_share_memory(place, arrays[name]):
-                place[...] = arrays[name]
+        def put(job: int, found: Mapping[str, Any]) -> None:
+            for name, place in room(job).items():
+                if not np.may_share_memory(place, found[name]):  # what was computed here lies there already
+                    place[...] = found[name]
+
+        loop.compute(range(bench.partition.count), put, room)
+        loop.progress.end()
+    found = arrays if task.study.summary is None else gathered(task.study, arrays)
+    return in_memory(task.schema, found).assign_attrs(start=start, **ending(loop.progress.rate))
+
+
+def _to_file(task: Task) -> Ending:
+    """Continues, begins or leaves alone what is there. Raises SweepError, KeyboardInterrupt, Terminated."""
+    traces = any(map(disk.mark, (unfinished_of(task.output), lock_of(task.output))))
+    seen, (standing, damaged) = disk.mark(task.output), ("nothing", ()) if traces else _standing(task)
+    if standing == "complete":
+        return "done before"
+    with alone(task.output), contextlib.ExitStack() as stack:
+        if traces or seen != disk.mark(task.output):  # another run may have ended before this one had the lock
+            standing, damaged = _standing(task)
+        store = earlier(task.output, task.fingerprint, task.force or standing == "complete")
+        if standing == "complete":
+            if store is not None:
+                store.close()
+                disk.remove(store.path)
+            return "done before"
+        if store is not None:
+            damaged = stack.enter_context(store).resume()
+        elif standing == "damaged":
+            store = stack.enter_context(reopened(task.output))
+            store.resume(damaged)
+        if store is not None and not store.missing():  # its end alone is missing, or the columns made there are damaged
+            with signals_held():
+                store.finish(0.0)
+            return "complete"
+        try:
+            with contextlib.ExitStack() as running:
+                known = None
+                if standing == "reused":
+                    known = running.enter_context(Reused(task.output, task.study, task.retry_failed))
+                # signals are held back from here on, wherever they would leave half a file behind
+                loop = Loop(task, running, None if store is None else store.work.blocks, known)
+                if store is None:
+                    cuts = cuts_of(task.study, task.schema, loop.bench.partition)
+                    store = stack.enter_context(begun(task.output, task.schema, cuts, task.cluster is not None))
+                for block in damaged:
+                    task.note(f"{loop.bench.label(block)} were damaged on the disk and are computed again")
+                shared = None if task.cluster is None else store.shared()
+                loop.compute(store.missing(), store.put, shared=shared, tick=store.tick)
+                store.finish(loop.progress.rate)
+                loop.progress.end()
+            return "complete"
+        except (KeyboardInterrupt, Terminated, TimeUp) as reason:
+            if store is not None and store.finished:  # the signal came while the result was put in its place
+                raise
+            kept = "before the first block"
+            if store is not None:
+                store.commit()
+                kept = f"{int(store.work.done.sum())} of {store.work.blocks.count} blocks are kept"
+            why = f", for {reason}" if isinstance(reason, TimeUp) else ""
+            task.note(f"stopped{why}; {kept}, run the same command again to continue")
+            if isinstance(reason, TimeUp):
+                return "not begun" if store is None else "unfinished"
+            raise
+
+
+def _standing(task: Task) -> tuple[Literal["nothing", "complete", "damaged", "reused"], Sequence[int]]:
+    """What the output is to this study, whose cells may be "reused"; blocks that are damaged and can be repaired.
+
+    All of it is read. Raises SweepError where it is something else.
+    """
+    if not disk.mark(task.output):
+        return "nothing", ()
+    with StoredFile(task.output) as file:
+        if task.force:
+            return "nothing", ()
+        hindrance, ours = obstacle(file.fingerprint, task.fingerprint), file.fingerprint == dict(task.fingerprint)
+        if ours or (task.extend and not hindrance):
+            checked = verdict(task.output, file)
+            if ours and task.repair and checked.blocks is not None:
+                return "damaged", checked.blocks
+            checked.require_whole()
+            return "complete" if ours and not (task.retry_failed and has_failed(file)) else "reused", ()
+    what = f"cannot be extended, for {hindrance}" if task.extend else "holds the result of another study or version"
+    extendable = "; where its axes have only got more values, --extend computes the new cells alone"
+    cure = f"choose another name, or overwrite it with --force{'' if hindrance else extendable}"
+    changes = "".join(f"\n  {line}" for line in difference(file.fingerprint, task.fingerprint))
+    raise SweepError(f"{task.output}: {what}; {cure}{changes}")
