@@ -82,9 +82,9 @@ def solve(case, columns, rtol, outputs):
     study = sweep.study(
         kernel=case.kernel, design="zip", method="auto", axes=axes, fixed=dict(case.fixed), along=along, outputs=outputs
     )
-    values, status, used, _ = solved(study)
-    names = [study.kernel.methods[i].name if i >= 0 else "" for i in used]
-    return values, status, names
+    cells = solved(study)
+    names = [study.kernel.methods[i].name if i >= 0 else "" for i in cells["method_used"]]
+    return {name: cells[name] for name in study.outputs}, cells["status"], names
 
 
 class Tally:

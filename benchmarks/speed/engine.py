@@ -18,9 +18,9 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 import sweep
-from sweep.cells.block import warm
-from sweep.cells.schema import cells_of, columns
+from sweep.cells.schema import columns, empty, part
 from sweep.cells.solve import Solver
+from sweep.cells.timing import sampled_study
 from sweep.study.model import Study
 
 PIECE = 32 << 20
@@ -52,11 +52,9 @@ def kernel_seconds(study: Study, workers: int, block: int = 1 << 16) -> float:
 
     def pull() -> None:
         solver = Solver(study)
-        arrays = {c.name: c.empty(block) for c in columns(study)}
+        arrays = empty(columns(study), block)
         for start in starts:
-            stop = min(start + block, size)
-            views = {name: array[: stop - start] for name, array in arrays.items()}
-            solver.solve(start, cells_of(views))
+            solver.solve(start, part(arrays, slice(size - start)))
 
     with ThreadPoolExecutor(workers) as pool:
         return seconds(lambda: [future.result() for future in [pool.submit(pull) for _ in range(workers)]])
@@ -88,7 +86,7 @@ def disk_seconds(folder: Path, size: int) -> float:
 def overhead(folder: Path, cells: int) -> None:
     """A kernel of more than a microsecond a cell: what the engine adds beyond 0.2 s, in memory and stored."""
     study = foliot("map", cells)
-    warm(Solver(study), study)
+    sampled_study(study)
     workers = os.cpu_count() or 1
     path = folder / "overhead.h5"
     rows = [
@@ -128,7 +126,7 @@ def speedup(study: Study, rounds: int) -> tuple[int, float]:
 def small(folder: Path) -> None:
     """A study of a hundred cells: nearly all of it is the engine."""
     study = foliot("closed", 200)
-    warm(Solver(study), study)
+    sampled_study(study)
     for turn in range(ROUNDS):
         path = folder / f"small{turn}.h5"
         memory = seconds(lambda: sweep.run(study, progress=False))

@@ -27,7 +27,7 @@ import numpy as np
 import psutil
 
 import sweep
-from sweep.cells.block import sampled_study
+from sweep.cells.timing import sampled_study
 from sweep.explore.plan import plan
 from sweep.runs.pool import cores
 from sweep.runs.progress import Progress

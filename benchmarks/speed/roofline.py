@@ -40,7 +40,8 @@ from numpy.typing import NDArray
 import sweep
 from kernels import catalogue
 from kernels.interface import FIRST_REFUSAL, Method
-from sweep.cells.grid import Grid, empty_cells
+from sweep.cells.grid import Grid
+from sweep.cells.schema import empty_cells
 from sweep.cells.solve import Solver, usable_methods
 from sweep.show.kernels import starter
 from sweep.study.model import Study
@@ -121,8 +122,9 @@ def chosen(study: Study) -> tuple[str, list[int]]:
     """The method to which `auto` gives most cells, and which they are."""
     cells = empty_cells(study, Grid(study).size)
     Solver(study).solve(0, cells)
-    number = int(np.bincount(cells.used[cells.used >= 0]).argmax())
-    return study.kernel.methods[number].name, [int(cell) for cell in np.flatnonzero(cells.used == number)]
+    used = cells["method_used"]
+    number = int(np.bincount(used[used >= 0]).argmax())
+    return study.kernel.methods[number].name, [int(cell) for cell in np.flatnonzero(used == number)]
 
 
 def digest(outputs: Columns) -> str:

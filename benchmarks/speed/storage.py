@@ -22,15 +22,14 @@ from typing import Any
 
 import h5py
 import numpy as np
-from engine import disk_seconds, foliot, kernel_seconds, run_seconds, seconds, warm
+from engine import disk_seconds, foliot, kernel_seconds, run_seconds, seconds
 
 import sweep
 from sweep.cells.fingerprint import fingerprint
 from sweep.cells.partition import boxes
 from sweep.cells.reduce import output_schema
 from sweep.cells.schema import columns
-from sweep.cells.solve import Solver
-from sweep.cells.timing import BLOCK_BYTES
+from sweep.cells.timing import BLOCK_BYTES, sampled_study
 from sweep.file import disk
 from sweep.file.frame import cuts_of
 from sweep.file.reading import StoredFile
@@ -51,7 +50,7 @@ def cheap(folder: Path, cells: int, rounds: int) -> None:
     In blocks of as many cells as a run has of so cheap a kernel on an idle machine, whatever else this one does.
     """
     study = foliot("closed", cells)
-    warm(Solver(study), study)
+    sampled_study(study)
     each, path = sum(c.cell_bytes for c in columns(study)), folder / "cheap.h5"
     size, block = cells * each, BLOCK_BYTES // each
     for workers in (1, 2):

@@ -22,8 +22,7 @@ import numpy as np
 from engine import kernel_seconds
 
 import sweep
-from sweep.cells.block import warm
-from sweep.cells.solve import Solver
+from sweep.cells.timing import sampled_study
 from sweep.results.statuses import account
 from sweep.study.model import Study
 
@@ -77,7 +76,7 @@ def size(folder: Path, cells: int, kind: str) -> None:
     small, large = measured(folder, 10**6, kind), measured(folder, cells, kind)
     sample = min(cells, 2 * 10**7)
     cells = foliot(sample, "cells")
-    warm(Solver(cells), cells)
+    sampled_study(cells)
     begun = time.process_time()
     kernel_seconds(foliot(sample, "cells"), 1)
     kernel = (time.process_time() - begun) * cells / sample

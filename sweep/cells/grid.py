@@ -6,12 +6,13 @@ Cells are numbered in C order: the last axis runs fastest.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple, Protocol
+from collections.abc import Sequence
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sweep.cells.schema import Columns
 from sweep.study.condition import cells_where
 from sweep.study.model import AUTO, SETTINGS, Study
 
@@ -90,49 +91,10 @@ class Grid:
         return {name: axis.label(index // self._runs[name] % len(axis)) for name, axis in self.study.axes.items()}
 
 
-class Cells(NamedTuple):
-    """The columns of some cells, to be filled or filled.
-
-    Attributes
-    ----------
-    outputs : mapping of output name to ndarray, shape (cells, ...)
-    status, used : ndarray of int8, shape (cells,)
-        A `Status`; the position in `kernel.methods`, or -1 where the cell is refused.
-    error : ndarray of float32, shape (cells,), optional
-        What values are right to, infinite where nobody knows; NaN where there are none.
-    """
-
-    outputs: Mapping[str, Any]
-    status: Any
-    used: Any
-    error: Any = None
-
-    @property
-    def number(self) -> int:
-        """How many cells."""
-        return len(self.status)
-
-    @property
-    def columns(self) -> list[Any]:
-        """All of them: outputs, status, used, and errors where there are any."""
-        return [*self.outputs.values(), self.status, self.used, *([] if self.error is None else [self.error])]
-
-    def rows(self, some: slice) -> Cells:
-        """Views of some of them."""
-        outputs = {name: column[some] for name, column in self.outputs.items()}
-        return Cells(outputs, self.status[some], self.used[some], None if self.error is None else self.error[some])
-
-
 class SolveCells(Protocol):
     """What `Solver` does, here or in a process of its own."""
 
     grid: Grid
 
-    def solve(self, start: int, cells: Cells, wanted: Any = None) -> None:
+    def solve(self, start: int, cells: Columns, wanted: Any = None) -> None:
         """Fills the columns of the cells from number `start` on. Raises what the kernel does."""
-
-
-def empty_cells(study: Study, cells: int) -> Cells:
-    """Uninitialised arrays for so many cells."""
-    outputs = {name: np.empty((cells, *shape)) for name, shape in study.shapes.items()}
-    return Cells(outputs, np.empty(cells, np.int8), np.empty(cells, np.int8))

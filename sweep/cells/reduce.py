@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 
 from kernels.interface import Field, Status
 from sweep.cells import schema
-from sweep.cells.grid import Cells, SolveCells, empty_cells
+from sweep.cells.grid import SolveCells
 from sweep.cells.partition import row_blocks
-from sweep.cells.schema import Column, Coordinate, Schema
+from sweep.cells.schema import METHOD_USED, STATUS, Column, Columns, Coordinate, Schema, empty, empty_cells, part
 from sweep.study.model import Study
 
 STRIP = 65536
@@ -56,7 +56,7 @@ def part_columns(study: Study) -> tuple[Column, ...]:
 
 def nothing(study: Study, rows: int) -> Rows:
     """Rows of no cell at all."""
-    found = {column.name: column.empty(rows) for column in part_columns(study)}
+    found = empty(part_columns(study), rows)
     _clear(found)
     return found
 
@@ -102,22 +102,22 @@ class Reducer:
         """Fill `rows` with the rows `start` to `stop`."""
         _clear(rows)
         for row, count, cell, each in self.row_blocks.strips(start, stop, self.strip):
-            cells = self._cells.rows(slice(count * each))
+            cells = part(self._cells, slice(count * each))
             self.solver.solve(cell, cells)
             place = slice(row - start, row - start + count)
             found = reduced(self.study, cell, count, cells)
-            merge({name: column[place] for name, column in rows.items()}, found)
+            merge(part(rows, place), found)
 
 
-def reduced(study: Study, cell: int, rows: int, cells: Cells) -> Rows:
+def reduced(study: Study, cell: int, rows: int, cells: Columns) -> Rows:
     """Rows of equally many cells, which lie one behind the other from cell number `cell` on."""
     assert study.summary is not None
     found: Rows = {
-        BY_STATUS: _counted(cells.status, rows, _OF_STATUS, len(STATUSES)),
-        BY_METHOD: _counted(cells.used, rows, _OF_METHOD, len(study.kernel.methods) + 1),
+        BY_STATUS: _counted(cells[STATUS], rows, _OF_STATUS, len(STATUSES)),
+        BY_METHOD: _counted(cells[METHOD_USED], rows, _OF_METHOD, len(study.kernel.methods) + 1),
     }
     for name, reductions in study.summary.outputs.items():
-        values = cells.outputs[name].reshape(rows, -1, *cells.outputs[name].shape[1:])
+        values = cells[name].reshape(rows, -1, *cells[name].shape[1:])
         missing = np.isnan(values)
         gaps = missing.any()
         count = np.full((rows, *values.shape[2:]), values.shape[1])
@@ -134,7 +134,7 @@ def reduced(study: Study, cell: int, rows: int, cells: Cells) -> Rows:
                     place = np.where(void, missing.argmin(axis=1), place)
                 none = own["count"] == 0
                 own[f"{end} at"] = np.where(none, NO_CELL, place + offset + cell)
-                own[f"{end} status"] = np.where(none, 0, cells.status[place + offset])
+                own[f"{end} status"] = np.where(none, 0, cells[STATUS][place + offset])
         if "mean" in reductions:
             own["sum"], own["rest"] = tree_sum(np.where(missing, 0.0, values) if gaps else values)
         if "histogram" in reductions:
@@ -149,7 +149,7 @@ def seconds_a_cell(study: Study) -> float:
     length = min(blocks.cells, _strip_cells(study))
     rows = min(_strip_cells(study), blocks.size) // length
     cells = _zeros(study, rows * length)
-    return min(timeit.repeat(lambda: reduced(study, 0, rows, cells), number=1, repeat=3)) / cells.number
+    return min(timeit.repeat(lambda: reduced(study, 0, rows, cells), number=1, repeat=3)) / (rows * length)
 
 
 def strip_bytes(study: Study) -> int:
@@ -224,11 +224,8 @@ def _cell_bytes(study: Study) -> int:
     return sum(8 * math.prod(shape) for shape in study.shapes.values())
 
 
-def _zeros(study: Study, cells: int) -> Cells:
-    found = empty_cells(study, cells)
-    for column in (*found.outputs.values(), found.status, found.used):
-        column.fill(0)
-    return found
+def _zeros(study: Study, cells: int) -> dict[str, Any]:
+    return {name: np.zeros_like(column) for name, column in empty_cells(study, cells).items()}
 
 
 def output_schema(study: Study, fingerprint: Mapping[str, str]) -> Schema:

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from sweep.cells.block import Guard
-from sweep.cells.grid import Cells, Grid, empty_cells
+from sweep.cells.grid import Grid
+from sweep.cells.schema import columns, empty
 from sweep.cells.solve import Solver
 from sweep.errors import SweepError
 from sweep.study.condition import names_in
@@ -87,11 +88,10 @@ def require_asked(study: Study) -> None:
         raise SweepError(f'where = "{study.where}": holds for none of the {size} cells; nothing is left to run')
 
 
-def solved(study: Study) -> Cells:
+def solved(study: Study) -> dict[str, Any]:
     """All cells of a study with their errors, in memory; those at which the kernel raises FAILED."""
-    size = Grid(study).size
-    cells = empty_cells(study, size)._replace(error=np.empty(size, np.float32))
-    Guard(Solver(study), lambda cell: None).solve(0, cells)
+    cells = empty(columns(study), Grid(study).size)
+    Guard(Solver(study)).solve(0, cells)
     return cells
 
 

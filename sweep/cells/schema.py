@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import platform
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any
@@ -14,13 +14,16 @@ import numpy as np
 
 from kernels.interface import Field, Status
 from sweep.cells.fingerprint import version
-from sweep.cells.grid import Cells
 from sweep.study.model import Study, setting
 
 CONVENTIONS = "CF-1.11"
 STATUS, METHOD_USED, ERROR_BOUND = "status", "method_used", "error_bound"
 ANCILLARY = (STATUS, METHOD_USED, ERROR_BOUND)
 """What a result says of every cell besides its outputs."""
+Columns = Mapping[str, Any]
+"""Some cells, filled or to be filled: arrays of shape (cells, ...) by name. Of outputs; `STATUS`, int8; `METHOD_USED`,
+int8, the position in `kernel.methods`, or -1 where the cell is refused; and, where that is wanted, `ERROR_BOUND`,
+float32, what values are right to, infinite where nobody knows, NaN where there are none."""
 
 
 @dataclass(frozen=True)
@@ -40,10 +43,6 @@ class Column:
     def cell_bytes(self) -> int:
         """Bytes of one cell."""
         return np.dtype(self.dtype).itemsize * math.prod(self.shape)
-
-    def empty(self, cells: int) -> Any:
-        """An uninitialised array of shape `(cells, *shape)`."""
-        return np.empty((cells, *self.shape), self.dtype)
 
 
 @dataclass(frozen=True)
@@ -109,10 +108,20 @@ def columns(study: Study) -> tuple[Column, ...]:
     return (*outputs, *(Column(name, dtype, (), (), attrs) for name, dtype, attrs in kinds))
 
 
-def cells_of(arrays: Mapping[str, Any]) -> Cells:
-    """The cells whose columns are given by name."""
-    outputs = {name: array for name, array in arrays.items() if name not in ANCILLARY}
-    return Cells(outputs, arrays[STATUS], arrays[METHOD_USED], arrays.get(ERROR_BOUND))
+def empty(columns: Iterable[Column], cells: int) -> dict[str, Any]:
+    """Uninitialised columns of so many cells."""
+    return {column.name: np.empty((cells, *column.shape), column.dtype) for column in columns}
+
+
+def empty_cells(study: Study, cells: int) -> dict[str, Any]:
+    """Uninitialised columns of so many cells, without errors."""
+    outputs = {name: np.empty((cells, *shape)) for name, shape in study.shapes.items()}
+    return {**outputs, STATUS: np.empty(cells, np.int8), METHOD_USED: np.empty(cells, np.int8)}
+
+
+def part(cells: Columns, rows: slice) -> dict[str, Any]:
+    """Views of some of the cells."""
+    return {name: column[rows] for name, column in cells.items()}
 
 
 def coordinates(study: Study) -> tuple[Coordinate, ...]:

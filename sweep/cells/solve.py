@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 
 from kernels import catalogue
 from kernels.interface import FIRST_REFUSAL, UNSOLVED, Status
-from sweep.cells.grid import Cells, Grid
+from sweep.cells.grid import Grid
+from sweep.cells.schema import ERROR_BOUND, METHOD_USED, STATUS, Columns, part
 from sweep.study.model import AUTO, Study
 
 STRIP = 16384
@@ -118,7 +119,7 @@ class Solver:
     A foliot that is driven forwards or backwards, without and with dry friction R, at two tolerances: eight cells.
 
     >>> import sweep
-    >>> from sweep.cells.grid import empty_cells
+    >>> from sweep.cells.schema import empty_cells
     >>> axes = {"mu": [1.0, -1.0], "R": [0.0, 0.1], "rtol": [1e-6, 1e-15]}
     >>> study = sweep.study(kernel="foliot", outputs=["period"], axes=axes, fixed={"phi0": 1.0, "a": 0.5})
     >>> cells = empty_cells(study, 8)
@@ -129,9 +130,9 @@ class Solver:
     `coulomb` is the next that can do cells 2 and 3. Its bound, 4e-15, meets the rtol of cell 2, which it solves. Cell 3
     goes on to `segments` and others, all of which estimate more, so that it gets the values of the smallest bound.
 
-    >>> [Status(status).name for status in cells.status[:5]]
+    >>> [Status(status).name for status in cells["status"][:5]]
     ['OK', 'OK', 'OK', 'INACCURATE', 'BAD_INPUT']
-    >>> [study.kernel.methods[number].name for number in cells.used[:4]]
+    >>> [study.kernel.methods[number].name for number in cells["method_used"][:4]]
     ['closed', 'closed', 'coulomb', 'coulomb']
     """
 
@@ -160,15 +161,15 @@ class Solver:
         own = study.kernel_name not in catalogue.KERNELS
         self._promised = [k for k, f in enumerate(kernel.outputs) if self._asked[k] and not f.gaps] if own else None
 
-    def solve(self, start: int, cells: Cells, wanted: NDArray[np.bool_] | None = None) -> None:
+    def solve(self, start: int, cells: Columns, wanted: NDArray[np.bool_] | None = None) -> None:
         """Fill the columns of cells.
 
         Parameters
         ----------
         start : int
             Flat number of the first of them in the grid.
-        cells : Cells
-            Columns of every output asked for, of statuses, of method numbers, and maybe of errors.
+        cells : Columns
+            Of every output asked for, of statuses, of method numbers, and maybe of errors.
         wanted : ndarray of bool, optional
             Cells to solve; what comes out for the others means nothing. Default: all.
 
@@ -178,24 +179,24 @@ class Solver:
             What the kernel raises; a RuntimeError where it ends Python.
         """
         try:
-            for begin in range(0, cells.number, self._strip):
-                rows = slice(begin, min(begin + self._strip, cells.number))
+            for begin in range(0, len(cells[STATUS]), self._strip):
+                rows = slice(begin, begin + self._strip)
                 if wanted is None or wanted[rows].any():
-                    self._solve_strip(start + begin, cells.rows(rows), None if wanted is None else wanted[rows])
+                    self._solve_strip(start + begin, part(cells, rows), None if wanted is None else wanted[rows])
         except (SystemExit, KeyboardInterrupt) as fault:
             # only in the main thread may it be Ctrl-C, or what a program does at a signal
             if threading.current_thread() is threading.main_thread():
                 raise
             raise RuntimeError(f"it raised {type(fault).__name__}, which would have ended Python") from fault
 
-    def _solve_strip(self, start: int, cells: Cells, wanted: NDArray[np.bool_] | None) -> None:
+    def _solve_strip(self, start: int, cells: Columns, wanted: NDArray[np.bool_] | None) -> None:
         """Check the cells, give each to its method, and take back what stands in those that are refused."""
-        n = cells.number
+        n = len(cells[STATUS])
         *parameters, rtol = self.inputs = [column[:n] for column in self._buffers]
         self._cached: tuple[Places | None, list[Floats]] = None, []
-        self.status, self.used = cells.status, cells.used
+        self.status, self.used = cells[STATUS], cells[METHOD_USED]
         spare = zip(self.study.kernel.outputs, self._spare, strict=False)
-        self.targets = [*(cells.outputs.get(field.name, column) for field, column in spare), self.status]
+        self.targets = [*(cells.get(field.name, column) for field, column in spare), self.status]
         self.grid.columns(start, start + n, parameters)
         self.study.kernel.check(*parameters, self.status)
         if self._promised is not None:
@@ -218,7 +219,7 @@ class Solver:
             self.used[refused] = NONE
             for column in self.targets[:-1]:
                 column[:n][refused] = np.nan
-        if (error := cells.error) is not None:
+        if (error := cells.get(ERROR_BOUND)) is not None:
             with np.errstate(over="ignore", invalid="ignore"):
                 np.multiply(self._error[:n], ROUNDED_UP, out=error, casting="unsafe")
             # what meets rtol meets it in single precision, too

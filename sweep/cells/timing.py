@@ -11,16 +11,20 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
-from sweep.cells.grid import SolveCells
-from sweep.cells.partition import Partition
-from sweep.cells.schema import Column, cells_of
+from sweep.cells.block import Guard, faults_reported
+from sweep.cells.grid import Grid, SolveCells
+from sweep.cells.partition import Partition, boxes, row_blocks
+from sweep.cells.reduce import part_columns, seconds_a_cell
+from sweep.cells.schema import Column, columns, empty, empty_cells
+from sweep.cells.solve import Solver
 from sweep.errors import SweepError
+from sweep.study.model import Study
 
 LANES = 16
 """Cells that a lane kernel solves at once: it takes as long for one of them."""
@@ -70,35 +74,48 @@ class Sample:
         return np.interp((edges[:-1] + edges[1:]) / 2, self.positions, self.costs) * np.diff(edges)
 
 
+def sampled_study(study: Study, apart: SolveCells | None = None, clock: Callable[[], float] | None = None) -> Sample:
+    """Compiles the kernel and times a sample of the grid, here or `apart`, by a clock of its own.
+
+    Raises SweepError where the kernel always fails.
+    """
+    solver, clock, last = apart or Solver(study), clock or work_clock, Grid(study).size - 1
+    clock()  # it counts what is compiled from now on
+    with faults_reported(f"{study.kernel_name}: the kernel failed"):
+        # what several methods need is compiled before threads start; corners come last, where cells are bad most often
+        several = study.method == "auto" or "method" in study.axes
+        for index in dict.fromkeys((last // 2, 0, last) if several else (last // 2,)):
+            Guard(solver).solve(index, empty_cells(study, 1))
+        sample = take_sample(solver, columns(study), last + 1, clock)
+        return sample if study.summary is None else replace(sample, costs=sample.costs + seconds_a_cell(study))
+
+
 def take_sample(solver: SolveCells, columns: Sequence[Column], size: int, clock: Callable[[], float]) -> Sample:
     """Times a few cells at up to 64 places of the grid, in a few hundredths of a second or a hundredth of the run.
 
     A probe has few enough cells for 64 of them in the budget, and enough to see past the cost of a call. Probes that
     fail are left out. Raises what the kernel does where single cells fail all over the grid.
     """
-    faults: list[Exception] = []
-    dear: dict[int, dict[int, float]] = {}  # probes of so many cells that are not made twice, by their first cells
+    faults, made = list[Exception](), dict[tuple[int, int], float]()
 
     def probe(start: int, cells: int) -> float:
-        """Seconds of so many cells; infinity where the kernel fails."""
-        arrays = {column.name: column.empty(cells) for column in columns}
-        begun = clock()
-        try:
-            solver.solve(start, cells_of(arrays))
-        except (SweepError, MemoryError):
-            raise
-        except Exception as fault:
-            faults.append(fault)
-            return math.inf
-        return clock() - begun
+        """Seconds of so many cells; infinity where the kernel fails. What is dear is not done twice."""
+        if made.get((start, cells), 0.0) < DEAR:
+            arrays, begun = empty(columns, cells), clock()
+            try:
+                solver.solve(start, arrays)
+                made[start, cells] = clock() - begun
+            except (SweepError, MemoryError):
+                raise
+            except Exception as fault:
+                faults.append(fault)
+                made[start, cells] = math.inf
+        return made[start, cells]
 
     def anywhere(cells: int) -> float:
         """Seconds that some cells in the middle of the grid take, or elsewhere where these fail."""
-        for start in _places(size, PLACES, cells):
-            if (seconds := probe(start, cells)) < math.inf:
-                dear[cells] = {start: seconds} if seconds >= DEAR else {}
-                return seconds
-        return math.inf
+        found = (probe(start, cells) for start in _places(size, PLACES, cells))
+        return next((seconds for seconds in found if seconds < math.inf), math.inf)
 
     alone = anywhere(1)
     if alone == math.inf:
@@ -114,12 +131,12 @@ def take_sample(solver: SolveCells, columns: Sequence[Column], size: int, clock:
         taken, more = alone, LANES
         while (cells == 1 or taken <= PROBE_SECONDS) and size >= (4 if cells == 1 else POSITIONS) * more:
             cells, taken, more = more, anywhere(more), 4 * more
-    probes = dear.get(cells, {})
+    probes = {start: seconds for (start, n), seconds in made.items() if n == cells and DEAR <= seconds < math.inf}
     spent = sum(probes.values())
     for start in _places(size, max(1, min(POSITIONS, size // (4 * cells))), cells):
         run = spent / (len(probes) * cells) * size if probes else math.inf
-        if probes and spent > max(BUDGET[0], min(BUDGET[1], run / 100), SHARE * run):
-            break
+        if start in probes or (probes and spent > max(BUDGET[0], min(BUDGET[1], run / 100), SHARE * run)):
+            continue
         seconds = probe(start, cells)
         spent += DEAR if seconds == math.inf else seconds
         probes |= {start: seconds} if seconds < math.inf else {}
@@ -147,6 +164,17 @@ def block_cells(sample: Sample, size: int, cell_bytes: float, workers: int, leas
         cells = max(cells, min(LANES, math.ceil(size / workers)))
     cells = max(1, math.floor(cells), -(-size // MOST_BLOCKS))
     return min(cells if cells < LANES else -(-cells // LANES) * LANES, size)
+
+
+def cut(study: Study, workers: int, sample: Sample, wanted: int | None = None, least: float = 0.0) -> Partition:
+    """Blocks of about so many cells; by default of what a timed sample tells for so many workers, `least` seconds."""
+    rows, lanes = row_blocks(study), 1
+    shape = Grid(study).shape if study.summary is None else (rows.count,)
+    if wanted is None:
+        row_bytes = sum(column.cell_bytes for column in part_columns(study))
+        wanted = block_cells(sample, rows.size, row_bytes / rows.mean, workers, least)
+        lanes = LANES if rows.mean == 1 else 1
+    return boxes(shape, math.ceil(wanted / rows.mean), lanes)
 
 
 class WorkClock:

@@ -15,8 +15,9 @@ import numpy as np
 
 from kernels.interface import machine_code_folder
 from sweep.cells.block import Guard, faults_reported
-from sweep.cells.grid import Grid, empty_cells
+from sweep.cells.grid import Grid
 from sweep.cells.reduce import strip_bytes
+from sweep.cells.schema import METHOD_USED, STATUS, empty_cells, part
 from sweep.cells.solve import Solver
 from sweep.cells.timing import work_clock
 from sweep.explore.scaling import scaling
@@ -76,7 +77,7 @@ class Plan:
             starting = 0.0 if apart is None else time.monotonic() - begun - apart.seconds
             self.cells, self.cell_seconds = bench.rows.size, sample.cost
             self.seconds = RUN_SECONDS + sample.cost * self.cells / min(self.workers, bench.partition.count)
-            solver = Guard(apart or Solver(study), lambda cell: None)
+            solver = Guard(apart or Solver(study))
             looked_at = _looked_at(study, solver, min(LOOK_SECONDS, SHARE * self.seconds))
         self.methods, self.statuses, self.sampled = looked_at
         self.scaling, allowed = NO_ADVICE, max(SHARE * self.seconds, ADVICE_SECONDS)
@@ -190,7 +191,7 @@ def _looked_at(study: Study, solver: Guard, seconds: float) -> tuple[dict[str, f
         if number not in ends and time.perf_counter() > until:
             numbers = numbers[:taken]
             break
-        solver.solve(number, cells.rows(slice(taken, taken + 1)))
+        solver.solve(number, part(cells, slice(taken, taken + 1)))
     sampled = len(numbers)
 
     def shares(column: Any, names: dict[int, str]) -> dict[str, float]:
@@ -198,4 +199,4 @@ def _looked_at(study: Study, solver: Guard, seconds: float) -> tuple[dict[str, f
         return {names[code]: counts[code] / sampled for code in sorted(counts)}
 
     methods = {-1: "none", **dict(enumerate(method.name for method in study.kernel.methods))}
-    return shares(cells.used, methods), shares(cells.status, STATUS_NAMES), sampled
+    return shares(cells[METHOD_USED], methods), shares(cells[STATUS], STATUS_NAMES), sampled

@@ -64,9 +64,9 @@ class CellReport:
         part = zipped(study, {"rtol": [self.rtol]}, fixed=fixed, follows={})
         for method in (study.kernel.methods[k].name for k in usable_methods(part)):
             found = solved(replace(part, method=method))
-            outputs = {name: float(found.outputs[name][0]) for name in self.values}
-            self.methods[method] = Status[STATUS_NAMES[int(found.status[0])]], float(found.error[0]), outputs
-            off = deviations(study, found.outputs, cells).values()
+            outputs = {name: float(found[name][0]) for name in self.values}
+            self.methods[method] = Status[STATUS_NAMES[int(found[STATUS][0])]], float(found[ERROR_BOUND][0]), outputs
+            off = deviations(study, found, cells).values()
             self.differs[method] = max((float(one[0]) for one in off), default=np.nan)
 
     def __repr__(self) -> str:
@@ -123,12 +123,13 @@ class Checked:
             asked = tuple(method for method in order if (method is not methods[k]) == others)
             found = solved(replace(part, kernel=replace(study.kernel, methods=asked), method="auto"))
             # that there is no such answer is an answer, which differs from any value
-            none = (found.status >= FIRST_REFUSAL) & ~among(found.status, GIVEN_UP)
-            right = np.where(found.status <= Status.INACCURATE, found.error, np.inf)
+            status = found[STATUS]
+            none = (status >= FIRST_REFUSAL) & ~among(status, GIVEN_UP)
+            right = np.where(status <= Status.INACCURATE, found[ERROR_BOUND], np.inf)
             error[some], another[some] = np.where(none, 0.0, right), others
-            source[some] = [asked[n].name if n >= 0 else STATUS_NAMES[s] for n, s in np.c_[found.used, found.status]]
-            for name, column in found.outputs.items():
-                values.setdefault(name, np.full((len(used), *column.shape[1:]), np.nan))[some] = column
+            source[some] = [asked[n].name if n >= 0 else STATUS_NAMES[s] for n, s in np.c_[found[METHOD_USED], status]]
+            for name, shape in study.shapes.items():
+                values.setdefault(name, np.full((len(used), *shape), np.nan))[some] = found[name]
         off, judged = deviations(study, cells, values), error <= rtol
         if not off:
             raise SweepError("no output can be compared: all say how a cell was solved, or are 0 but for rounding")

@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kernels.interface import FIRST_REFUSAL, Field, Status
-from sweep.cells.grid import Cells
 from sweep.cells.sample import drawn, multiplied, solved
+from sweep.cells.schema import STATUS, Columns
 from sweep.study.model import Study, differs
 from sweep.study.read import Given
 from sweep.study.read import study as as_study
@@ -195,7 +195,7 @@ def _held(study: Study) -> tuple[dict[str, Weights], int]:
     fields.sort(key=lambda f: (f in along, bool(f.dims), not units[f.name], sum(map(abs, units[f.name].values()))))
     few, cells = (drawn(study, number, np.random.default_rng(2)) for number in (FEW, CELLS))
     old_few, old = solved(few), solved(cells)
-    valued = old.status < FIRST_REFUSAL
+    valued = old[STATUS] < FIRST_REFUSAL
     # a coordinate may be a share of something, whatever its unit
     changes: list[Weights] = [{}, *({field.name: 0 * ONE} for field in along)]
     changes += [{field.name: power} for field in fields if not units[field.name] for power in POWERS]
@@ -230,16 +230,16 @@ def _is_scalable(study: Study, field: Field) -> bool:
     return bool(np.any(study.fixed[field.name]))
 
 
-def _tried(study: Study, old: Cells, weights: Weights) -> Weights | None:
+def _tried(study: Study, old: Columns, weights: Weights) -> Weights | None:
     """Weights of fields, and of outputs as they come out, if these scale; statuses may change as rounding decides."""
-    fine, found = old.status < FIRST_REFUSAL, dict.fromkeys(old.outputs, 0 * ONE)
+    fine, found = old[STATUS] < FIRST_REFUSAL, dict.fromkeys(study.outputs, 0 * ONE)
     for factor in FACTORS:
         new = solved(multiplied(study, {name: factor ** float(weight) for name, weight in weights.items() if weight}))
-        was, now = (np.where(c.status == Status.INACCURATE, Status.OK, c.status) for c in (old, new))
+        was, now = (np.where(c[STATUS] == Status.INACCURATE, Status.OK, c[STATUS]) for c in (old, new))
         if (was != now).any():
             return None
-        for name, values in old.outputs.items():
-            before, after = values[fine], new.outputs[name][fine]
+        for name in study.outputs:
+            before, after = old[name][fine], new[name][fine]
             usable = np.isfinite(before) & (before * after > 0)
             if factor == FACTORS[0] and usable.any():
                 weight = math.log(np.median(after[usable] / before[usable])) / math.log(factor)

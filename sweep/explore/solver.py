@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from sweep.cells.block import BadCell, Guard
-from sweep.cells.grid import Grid, empty_cells
+from sweep.cells.grid import Grid
+from sweep.cells.schema import empty_cells
 from sweep.cells.solve import Solver
 from sweep.errors import SweepError
 from sweep.study.model import SETTINGS, Axis, Study
@@ -80,7 +81,7 @@ class PointSolver:
             self._study.axes[name] = Axis(name, column, "values")
         cells = empty_cells(self._study, columns.shape[1])
         self._solver.solve(0, cells)
-        found = (column.reshape(shape + column.shape[1:]) for column in (*cells.outputs.values(), cells.status))
+        found = (cells[name].reshape(shape + cells[name].shape[1:]) for name in self.fields)
         return self._solved(*(column if column.ndim else column.item() for column in found))
 
 

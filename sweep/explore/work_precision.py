@@ -20,9 +20,9 @@ import numpy as np
 import xarray as xr
 
 from kernels.interface import FIRST_REFUSAL, Status
-from sweep.cells.grid import Grid, empty_cells
+from sweep.cells.grid import Grid
 from sweep.cells.sample import relative_error, sampled, solved
-from sweep.cells.schema import STATUS
+from sweep.cells.schema import METHOD_USED, STATUS, empty_cells
 from sweep.cells.solve import GIVEN_UP, Solver, among, usable_methods
 from sweep.errors import SweepError
 from sweep.results.statuses import STATUS_NAMES
@@ -241,11 +241,12 @@ def _best(study: Study, names: Sequence[str]) -> Reference:
             break  # those that state a bound suffice
         values, floor = dict[str, Any](), np.full(Grid(study).size, np.inf)
         for rtol in FINE:
-            outputs, status, *_ = solved(replace(study, method=name, rtol=rtol))
+            cells = solved(replace(study, method=name, rtol=rtol))
+            status = cells[STATUS]
             refused = status >= FIRST_REFUSAL
             now = np.isinf(floor) & ~refused & (status != Status.INACCURATE)
-            for output, column in outputs.items():
-                values.setdefault(output, column)[now] = column[now]
+            for output in study.outputs:
+                values.setdefault(output, cells[output])[now] = cells[output][now]
             floor[np.isinf(floor) & refused & ~among(status, GIVEN_UP)] = np.nan
             floor[now] = rtol
             if not np.isinf(floor).any():
@@ -263,8 +264,9 @@ def _measured(study: Study, name: str, rtol: float, against: Reference) -> dict[
     """What is measured of a method at a tolerance, but for its time, and what each of it is."""
     source, truth, floor = against
     sound, void, judged = np.isfinite(floor), np.isnan(floor), (~np.isinf(floor)).sum()
-    outputs, status, used, _ = solved(replace(study, method=name, rtol=rtol))
-    error = np.max([relative_error(outputs[name], true) for name, true in truth.items()], axis=0)
+    cells = solved(replace(study, method=name, rtol=rtol))
+    status, used = cells[STATUS], cells[METHOD_USED]
+    error = np.max([relative_error(cells[name], true) for name, true in truth.items()], axis=0)
     methods = [method.name for method in study.kernel.methods]
     # against itself the reference has no error; what can be said is what it is right to, also where auto took it
     itself = source in methods and used == methods.index(source)
@@ -289,11 +291,11 @@ def _measured(study: Study, name: str, rtol: float, against: Reference) -> dict[
     median = np.median(error[valued]) if valued.any() else math.nan
     largest = worst if sure.any() else math.nan
     refusal = f"{STATUS_NAMES[int(status[unsolved][0])]} at {first(unsolved)}" if unsolved.any() else ""
-    work = {key: outputs[key][valued].mean() if valued.any() else math.nan for key in WORK if key in outputs}
+    work = {key: cells[key][valued].mean() if valued.any() else math.nan for key in WORK if key in cells}
     return {
         "error_median": (median, "median relative error of a cell, over its outputs"),
         "error_worst": (largest, "largest relative error of a cell that the method calls right"),
-        **{key: (cells.sum() / judged, f"share of cells {text}") for key, (cells, text) in shares.items()},
+        **{key: (some.sum() / judged, f"share of cells {text}") for key, (some, text) in shares.items()},
         **{key: (mean, f"{key.replace('_', ' ')} per cell, mean") for key, mean in work.items()},
         "worst_cell": (first(sure & (error == worst)), "where the largest error is"),
         "unsolved_as": (refusal, "the status of the first of these cells, and where it is"),
@@ -310,12 +312,13 @@ def _seconds(study: Study, names: Sequence[str], tolerances: Sequence[float]) ->
     best = np.full((len(names), len(tolerances)), math.inf)
     for _, (i, name), (j, rtol) in itertools.product(range(ROUNDS), enumerate(names), enumerate(tolerances)):
         trial = replace(study, method=name, rtol=rtol)
-        cells, solver = empty_cells(trial, Grid(trial).size), Solver(trial)
+        size, solver = Grid(trial).size, Solver(trial)
+        cells = empty_cells(trial, size)
         count, begin = 0, time.thread_time()
         while (spent := time.thread_time() - begin) < LEAST_SECONDS or not count:
             solver.solve(0, cells)
             count += 1
-        best[i, j] = min(best[i, j], spent / count / cells.number)
+        best[i, j] = min(best[i, j], spent / count / size)
     return best
 
 

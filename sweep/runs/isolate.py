@@ -21,11 +21,11 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from sweep.cells.block import Unsolved, sampled_study, told
-from sweep.cells.grid import Cells, Grid
-from sweep.cells.schema import cells_of, columns
+from sweep.cells.block import Unsolved, told
+from sweep.cells.grid import Grid
+from sweep.cells.schema import STATUS, Columns, columns, empty
 from sweep.cells.solve import Solver
-from sweep.cells.timing import Sample, work_clock
+from sweep.cells.timing import Sample, sampled_study, work_clock
 from sweep.errors import SweepError
 from sweep.study.model import Study
 
@@ -39,10 +39,6 @@ TRIALS = 3
 """Times that a cell is tried alone of which a process dies."""
 LOOK_SECONDS = 0.2
 """How often it is looked whether time goes by, or the machine slept."""
-
-
-class Died(Unsolved):
-    """The process died, or has no memory left; another one may not."""
 
 
 class Processes:
@@ -68,26 +64,44 @@ class Processes:
         """Whether one of them compiles now."""
         return any(process.compiling.value for process in list(self._all))
 
-    def solve(self, start: int, cells: Cells, wanted: Any = None) -> None:
+    def solve(self, start: int, cells: Columns, wanted: Any = None) -> None:
         """As `Solver.solve`. Raises Unsolved where the kernel raises, dies or takes too long; SweepError at the end.
 
-        One cell alone is tried again, for a process may die of what it did before, or with others; and then no other
-        cell is tried so meanwhile, lest each be blamed for the other.
+        One cell alone is tried again where its process dies, or has no memory left, for that may come of what it did
+        before, or of others; and then no other cell is tried so meanwhile, lest each be blamed for the other.
         """
+        number, limit = len(cells[STATUS]), self.limit or max(CELL_SECONDS, DEARER * self.cost)
+        if number > 1 or (self._sampling and self.cost):  # one of a sample is left out where it is late, but not FAILED
+            limit = min(limit, SEVERAL_SECONDS) + SLACK * self.cost * number
         for trial in range(1, TRIALS + 1):
-            try:
-                with self._alone if trial > 1 else contextlib.nullcontext():
-                    columns, seconds = self._solved(start, cells.number, wanted)
+            with self._alone if trial > 1 else contextlib.nullcontext():
+                process = self._lent()
+                try:
+                    found, reason = _answer(process, limit, start, number, wanted)
+                    died = reason.startswith(MemoryError.__name__)
+                except (OSError, EOFError) as fault:
+                    late, code, died = isinstance(fault, TimeoutError), self._killed(process), True
+                    # one that died by itself, as late as that, is not late
+                    if late and code in (None, -signal.SIGKILL):
+                        raise Unsolved(f"took longer than {limit:.3g} s") from None
+                    reason = "its process died" if code is None else f"its process ended with {code}"
+                    if code is not None and code < 0:
+                        reason = f"its process died of {signal.Signals(-code).name}"
+            if not died:
+                self._idle.append(process)
                 break
-            except Died:
-                if self._over:  # it was killed with the run, so the cell is not to blame, and stays PENDING
-                    raise SweepError("the run is being stopped") from None
-                if cells.number > 1 or trial == TRIALS:
-                    raise
+            self._killed(process)
+            if self._over:  # it was killed with the run, so the cell is not to blame, and stays PENDING
+                raise SweepError("the run is being stopped")
+            if number > 1:
+                break
+        if reason:
+            raise Unsolved(reason)
+        arrays, seconds = found
         self.seconds += seconds
-        self.cost = max(self.cost, seconds / cells.number)
-        for column, values in zip(cells.columns, columns, strict=False):  # errors come last, and may not be wanted
-            column[...] = values
+        self.cost = max(self.cost, seconds / number)
+        for name, column in cells.items():
+            column[...] = arrays[name]
 
     def end(self) -> None:
         """Kills all; what they are at raises SweepError."""
@@ -96,35 +110,10 @@ class Processes:
         for process in list(self._all):
             process.kill()
 
-    def _solved(self, start: int, count: int, wanted: Any) -> tuple[list[Any], float]:
-        """Columns of cells, and the seconds that they took. Raises Unsolved, Died, SweepError."""
-        limit = self.limit or max(CELL_SECONDS, DEARER * self.cost)
-        if count > 1 or (self._sampling and self.cost):  # one of a sample is left out where it is late, but not FAILED
-            limit = min(limit, SEVERAL_SECONDS) + SLACK * self.cost * count
-        try:
-            process = self._idle.pop()
-        except IndexError:
-            process = self._begun()
-        try:
-            found, reason = _answer(process, limit, start, count, wanted)
-        except (OSError, EOFError) as fault:
-            late, code = isinstance(fault, TimeoutError), self._killed(process)
-            # one that died by itself, as late as that, is not late
-            if late and code in (None, -signal.SIGKILL):
-                raise Unsolved(f"took longer than {limit:.3g} s") from None
-            if code is not None and code < 0:
-                raise Died(f"its process died of {signal.Signals(-code).name}") from None
-            raise Died("its process died" if code is None else f"its process ended with {code}") from None
-        if reason.startswith(MemoryError.__name__):
-            self._killed(process)
-            raise Died(reason)
-        self._idle.append(process)
-        if reason:
-            raise Unsolved(reason)
-        return found  # type: ignore[no-any-return]
-
-    def _begun(self) -> Any:
-        """A process that has loaded the kernel. Raises SweepError."""
+    def _lent(self) -> Any:
+        """A process that has loaded the kernel: one that is idle, or a new one. Raises SweepError."""
+        with contextlib.suppress(IndexError):
+            return self._idle.pop()
         for _ in range(10):
             process = None
             try:
@@ -223,10 +212,10 @@ def _serve(pipe: Any, flag: Any, text: str) -> None:
             start, count, wanted = pipe.recv()
             try:
                 solver = solver or Solver(Study.from_json(text, allow_import=True))
-                cells = cells_of({column.name: column.empty(count) for column in columns(solver.study)})
+                cells = empty(columns(solver.study), count)
                 begun = work_clock()
                 solver.solve(start, cells, wanted)
-                found, reason = (cells.columns, work_clock() - begun), ""
+                found, reason = (cells, work_clock() - begun), ""
             except BaseException as fault:
                 found, reason = None, told(fault)
             pipe.send((found, reason))

@@ -18,13 +18,13 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
-from sweep.cells.block import Bench, Done, Found, cut, sampled_study
+from sweep.cells.block import Bench, Done, Found
 from sweep.cells.fingerprint import fingerprint
 from sweep.cells.partition import Partition
 from sweep.cells.reduce import output_schema
 from sweep.cells.sample import require_asked
 from sweep.cells.schema import Schema
-from sweep.cells.timing import Sample, work_clock
+from sweep.cells.timing import Sample, cut, sampled_study, work_clock
 from sweep.errors import SweepError, missing
 from sweep.runs.extend import Reused
 from sweep.runs.isolate import Processes

@@ -15,7 +15,7 @@ import numpy as np
 
 from sweep.cells.fingerprint import difference
 from sweep.cells.reduce import gathered
-from sweep.cells.schema import ending, now
+from sweep.cells.schema import empty, ending, now, part
 from sweep.errors import SweepError
 from sweep.file import disk
 from sweep.file.frame import cuts_of
@@ -138,10 +138,10 @@ def _in_memory(task: Task) -> xr.Dataset:
         if rows * bench.row_bytes > memory():
             needed = f"{rows * bench.row_bytes / 1e9:.1f} GB"
             raise SweepError(f"the result takes {needed}, more than the memory; give a path to store it")
-        arrays = bench.empty(rows)
+        arrays = empty(bench.columns, rows)
 
         def room(job: int) -> dict[str, Any]:
-            return {name: array[slice(*bench.partition.bounds(job))] for name, array in arrays.items()}
+            return part(arrays, slice(*bench.partition.bounds(job)))
 
         def put(job: int, found: Mapping[str, Any]) -> None:
             for name, place in room(job).items():

@@ -55,9 +55,9 @@ class Uneven:
         self.seconds, self.ranges, self.now = seconds, [], 0.0
 
     def solve(self, start, cells):
-        stop = start + cells.number
+        stop = start + len(cells["status"])
         self.ranges.append((start, stop))  # to be looked at later: a sample tolerates what is raised here
-        cells.status[:], cells.used[:] = 0, 1
+        cells["status"][:], cells["method_used"][:] = 0, 1
         self.now += max(self.seconds(k) for k in range(start, stop))
 
 

@@ -16,7 +16,7 @@ from running import environment, quiet, tall, wait_for
 import sweep
 from kernels.interface import Status
 from sweep.cells.block import Guard
-from sweep.cells.grid import Cells
+from sweep.cells.schema import empty_cells
 from sweep.errors import CELLS_FAILED, MISTAKE, SweepError
 from sweep.file.store import unfinished_of
 from sweep.results.statuses import account
@@ -76,8 +76,7 @@ def test_a_process_that_died_by_itself_was_not_late(monkeypatch):
 
     monkeypatch.setattr(isolate, "wait", blind)
     processes, seen = Processes(tall(40, "bad:DYING"), 1.5), []
-    arrays = {"fall_time": np.empty(40)}, np.empty(40, np.int8), np.empty(40, np.int8)
-    Guard(processes, seen.append).solve(0, Cells(*arrays))
+    Guard(processes, seen.append).solve(0, empty_cells(processes.study, 40))
     processes.end()
     assert [cell.reason for cell in seen] == [
         "ZeroDivisionError: eleven",
@@ -90,7 +89,7 @@ def test_a_cell_that_is_stopped_in_its_last_trial_is_not_blamed(monkeypatch):
     monkeypatch.setattr(isolate, "TRIALS", 1)
     processes, seen = Processes(tall(50, "bad:STUCK"), None), []
     solver = Guard(processes, seen.append)
-    cell = Cells({"fall_time": np.empty(1)}, np.empty(1, np.int8), np.empty(1, np.int8))
+    cell = empty_cells(processes.study, 1)
     solver.solve(0, cell)  # its process is there from now on
     with ThreadPoolExecutor(1) as thread:
         stuck = thread.submit(solver.solve, int(bad.HANGS) - 1, cell)
