@@ -163,12 +163,6 @@ class Verdict:
     def __str__(self) -> str:
         return "\n  ".join([f"{self.path}: {self.state}; {self.checked}", *self.findings])
 
-    def require_whole(self) -> None:
-        """Raises SweepError where anything is wrong."""
-        if not self.whole:
-            cure = "\n  sweep run --repair computes damaged cells again, and nothing else"
-            raise SweepError(f"{self}{'' if self.blocks is None else cure}")
-
 
 def verify(path: str | os.PathLike[str]) -> Verdict:
     """Check all checksums of a result, finished or not.

@@ -72,15 +72,12 @@ class StoredFile:
         try:
             self.fd = disk.open_file(path, flags)
             os.lseek(self.fd, 0, os.SEEK_SET)  # in a pipe one cannot
-            raw = os.fdopen(os.dup(self.fd), "rb", 0)  # whatever has the file's name by now
-        except (FileNotFoundError, NotADirectoryError):
-            raise
-        except OSError as fault:
-            raise SweepError(f"{path}: cannot be read ({reason(fault)})") from fault
-        try:
-            with raw, h5py.File(raw, "r") as h5:
+            # whatever has the file's name by now
+            with os.fdopen(os.dup(self.fd), "rb", 0) as raw, h5py.File(raw, "r") as h5:
                 self._read(h5, key)
         except DAMAGE as fault:
+            if self.fd < 0 and isinstance(fault, FileNotFoundError | NotADirectoryError):
+                raise
             self.close()
             if isinstance(fault, OSError) and fault.errno and fault.errno not in OF_DAMAGE:
                 raise SweepError(f"{path}: cannot be read ({reason(fault)})") from fault

@@ -224,7 +224,9 @@ def _standing(task: Task) -> tuple[Literal["nothing", "complete", "damaged", "re
             checked = verdict(task.output, file)
             if ours and task.repair and checked.blocks is not None:
                 return "damaged", checked.blocks
-            checked.require_whole()
+            if not checked.whole:
+                cure = "\n  sweep run --repair computes damaged cells again, and nothing else"
+                raise SweepError(f"{checked}{'' if checked.blocks is None else cure}")
             return "complete" if ours and not (task.retry_failed and has_failed(file)) else "reused", ()
     what = f"cannot be extended, for {hindrance}" if task.extend else "holds the result of another study or version"
     extendable = "; where its axes have only got more values, --extend computes the new cells alone"
