@@ -133,7 +133,14 @@ def coordinates(study: Study) -> tuple[Coordinate, ...]:
             axis, field = study.axes[name], fields.get(name) or setting(name, study.kernel)
             values = axis.values if axis.words is None else np.array(axis.words)
             found.append(Coordinate(name, (dim, *field.dims), values, _attrs(field)))
-    found += [Coordinate(k, fields[k].dims, np.float64(v), _attrs(fields[k])) for k, v in study.fixed.items()]
+    for name, value in study.fixed.items():
+        field, attrs = fields[name], _attrs(fields[name])
+        if field.choices:  # the number of a word
+            attrs |= {
+                "flag_values": np.array([*field.choices.values()], "f8"),
+                "flag_meanings": " ".join(field.choices),
+            }
+        found.append(Coordinate(name, field.dims, np.float64(value), attrs))
     used = {d for f in (*study.kernel.parameters, *study.asked) for d in f.dims}
     found += [Coordinate(k, (k,), v, _attrs(fields[k])) for k, v in study.along.items() if k in used]
     for dim, length in study.lengths.items():

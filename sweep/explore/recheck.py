@@ -53,7 +53,8 @@ class CellReport:
         required = (field.name for field in study.kernel.parameters if field.default is None)
         shown, self.place = {*study.terms, *study.axes, *required}, dict[str, str]()
         for name, value in ((str(name), cell[name]) for name in cell.coords if name in shown):
-            text = short(value.values) if value.dtype.kind in "fiu" else str(value.item())
+            words, number = flag_words(value), value.dtype.kind in "fiu"
+            text = words[value.item()] if words else short(value.values) if number else str(value.item())
             self.place[name] = f"{text} {value.attrs.get('units', '1')}".removesuffix(" 1")
         self.values = {name: cell[name].item() for name in study.outputs if name in cell and not cell[name].dims}
         self.units = {name: cell[name].attrs.get("units", "") for name in self.values}

@@ -191,7 +191,8 @@ def _check_methods(
     lacking = {m.name: [name for name in m.lacks if name in outputs] for m in kernel.methods}
     if "auto" in words and excluded and all(excluded.values()):
         hard = [term for term in terms if any(term in found for found in excluded.values())]
-        mistakes.add(where, f"no method of {kernel.name} can do {listed(hard, word='and')} together")
+        together = " together" * (len(hard) > 1)
+        mistakes.add(where, f"no method of {kernel.name} can do {listed(hard, word='and')}{together}")
     for wanting, verb, too, cure in (
         (excluded, "cannot do", "", "leave it out"),
         (lacking, "does not give", ", or name the outputs you want", "name other outputs"),

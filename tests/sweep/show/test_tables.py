@@ -102,3 +102,17 @@ def test_an_output_of_one_value_is_told_as_one_number(heights):
     text = result_text("x.h5", sweep.run(build(axes={"height": heights}), progress=False))
     assert "  0.63866  " in text.partition("outputs")[2]
     assert "0.63866 to" not in text
+
+
+def test_a_fixed_word_is_told_as_the_word(tmp_path):
+    """By `sweep show` and `sweep cell`, in conditions and in tables; for other programs its number has a meaning."""
+    fixed = {"J": [1.0, 2.0], "k": 3.0, "n_keep": 1, "reduction": "rivin"}
+    found = sweep.run(kernel="drivetrain", outputs=["n_kept"], axes={"f_max": [1.0]}, fixed=fixed)
+    assert "reduction [1] rivin" in " ".join(result_text("x.h5", found).split())
+    assert "reduction = rivin" in str(found.sweep.cell(f_max=1.0))
+    assert sweep.where(found, "reduction == 'rivin'").sizes["cell"] == 1
+    lines = sweep.export(found, tmp_path / "x.csv").read_text().splitlines()
+    row, *_ = csv.DictReader(line for line in lines if not line.startswith("#"))
+    assert row["reduction"] == "rivin"
+    numbers, words = found.reduction.attrs["flag_values"], found.reduction.attrs["flag_meanings"].split()
+    assert words[list(numbers).index(found.reduction.item())] == "rivin"
