@@ -218,9 +218,9 @@ def _folder_of_rounds(path: str | os.PathLike[str] | None, dataset: xr.Dataset, 
     if path is None:
         return None
     target, source = as_path(path), dataset.encoding.get("source")
+    check_target(target, force=force, read=[Path(source)] if source else [])
     rounds = target.with_name(f"{target.name}.rounds")
     with disk.refusing(target):
-        check_target(target, force=force, read=[Path(source)] if source else [])
         if force:
             shutil.rmtree(rounds, ignore_errors=True)
         rounds.mkdir(exist_ok=True)

@@ -109,6 +109,8 @@ def replacing(target: Path, held: bool = False) -> Iterator[Path]:
         stack.callback(remove, part)
         part.touch()  # says in plain words that there is no such folder, or no permission
         yield part
+        if target.is_dir() and not part.is_dir():
+            raise SweepError(f"{target} is a folder; name a file in it")
         for inner in (*part.rglob("*"), part):
             sync_folder(inner)
         if target.is_dir() or (part.is_dir() and target.exists()):
@@ -156,8 +158,13 @@ def mark(path: Path) -> tuple[int, ...]:
 
 
 def check_target(target: Path, *, force: bool = False, read: Sequence[Path] = ()) -> None:
-    """Raise SweepError where something is at `target`, unless by `force`, or where it is what is `read`."""
+    """Raise SweepError where something is at `target`, unless by `force`, or where it is what is `read`.
+
+    Of folders, which hold what nobody meant to overwrite, only those of zarr are given up.
+    """
     there = bool(mark(target))
+    if target.is_dir() and not (target / "zarr.json").is_file():
+        raise SweepError(f"{target} is a folder; name a file in it")
     if there and any(one.exists() and target.samefile(one) for one in read):
         raise SweepError(f"{target} is what is read; name another file")
     if there and not force:

@@ -70,8 +70,6 @@ def export(
     if kind not in WRITERS:
         found = f'"{target.suffix}"' if target.suffix else "no suffix"
         raise SweepError(f"{target}: found {found}; export writes {listed(WRITERS, word='and')}, as the suffix says")
-    if target.is_dir() and kind != ".zarr":
-        raise SweepError(f"{target} is a folder; name a file in it")
     if compress and kind not in PACKED:
         raise SweepError(f"{target}: compress is for {listed(PACKED, word='and')}")
     source = dataset.encoding.get("source")

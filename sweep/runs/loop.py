@@ -81,6 +81,8 @@ class Task:
         self.output = Path(os.path.realpath(as_path("." if self.path is None else self.path)))
         if not self.output.parent.is_dir():
             raise SweepError(f"{self.path}: there is no folder {self.output.parent}")
+        if self.path is not None and self.output.is_dir():
+            raise SweepError(f"{self.path} is a folder; name a file in it")
         self.cores = cores() if self.workers is None else whole_number("workers", self.workers)
         if self.block_cells is not None:
             whole_number("block_cells", self.block_cells)

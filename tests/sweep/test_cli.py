@@ -230,6 +230,35 @@ def test_a_mistake_ends_in_one_message_and_status_2(here, call, argv, message):
 
 
 @pytest.mark.parametrize(
+    "argv",
+    [
+        ("run", "stones.toml", *OWN),
+        ("report", "stones.h5"),
+        ("fit", "stones.h5", "--x", "height", "--y", "fall_time"),
+        ("plot", "stones.h5"),
+        ("export", "stones.h5"),
+        ("refine", "stones.h5", *OWN, "--y", "fall_time", "--tolerance", "1e-2"),
+        ("join", "stones.h5", "stones.h5", "--axis", "version", "--labels", "a", "b"),
+    ],
+)
+@pytest.mark.parametrize("target", [".", "/", "mine.csv", "mine.html", "mine.h5", "mine.png", "mine.zarr"])
+def test_no_folder_gives_way_to_what_a_command_writes(done, call, argv, target):
+    """With --force either, and with no name in the path at all."""
+    if target.startswith("mine"):
+        Path(target).mkdir()
+        Path(target, "letter").touch()
+    code, _, err = call(*argv, "--force", "-o", target)
+    assert (code, "is a folder" in err) == (2, True)
+    assert not target.startswith("mine") or Path(target, "letter").exists()
+
+
+def test_a_run_in_python_refuses_a_folder_as_its_output(tmp_path):
+    for path in ("/", tmp_path):
+        with pytest.raises(SweepError, match="is a folder"):
+            sweep.run(kernel="foliot", axes={"mu": [1.0]}, fixed={"phi0": 1.0, "a": 1.0}, path=path, force=True)
+
+
+@pytest.mark.parametrize(
     ("error", "code", "word"),
     [
         (SweepError("so"), 2, "so"),
