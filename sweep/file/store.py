@@ -39,7 +39,7 @@ SYNC_SECONDS = 0.2
 
 def unfinished_of(output: Path) -> Path:
     """Where a result is while its sweep runs."""
-    return output.with_name(output.name + UNFINISHED)
+    return Path(f"{output}{UNFINISHED}")  # of "." and "/", which have no name, too
 
 
 def lock_of(output: Path) -> Path:

@@ -211,6 +211,8 @@ def test_two_results_are_joined(done, call):
         (("run", "study.py"), "python study.py"),
         (("run", "stones.h5"), "sweep show stones.h5"),
         (("show", "no.h5"), "no.h5"),
+        (("show", "."), "directory"),
+        (("verify", "/"), "directory"),
         (("run", "pipe.toml"), "pipe.toml"),
         (("run", "stones.toml", "--allow-import", "--workers", "0"), "workers"),
         (("run", "stones.toml", "--allow-import", "--cell-timeout", "soon"), "cell_timeout"),
