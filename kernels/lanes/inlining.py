@@ -135,23 +135,26 @@ def _only_borrows(state):
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class _BorrowingLowering(NativeLowering):
-    """numba's lowering; arrays that a function only borrows are not counted: that is half of its lines."""
+    """numba's lowering; arrays that a function only borrows are not counted: that is half of its lines.
+
+    What Python calls has a wrapper, which counts.
+    """
 
     _name = "borrowing_lowering"
 
     def run_pass(self, state):
-        if _only_borrows(state):
+        if state.flags.no_cpython_wrapper and _only_borrows(state):
             state.targetctx = state.targetctx.subtarget(enable_nrt=False)
         return super().run_pass(state)
 
 
 _NEEDLESS = NopythonRewrites, WithLifting
-"""Passes for what no inlined function has, a twentieth of the time: sums of whole arrays as one loop, and `with`; the
+"""Passes for what none of our functions has, a twentieth of the time: sums of whole arrays as one loop, and `with`; the
 one for functions within a function is left out where there are none."""
 
 
-class _PartCompiler(Compiler):
-    """numba's compiler, into a `_PartLibrary` and without what Python would need to call it."""
+class _Compiler(Compiler):
+    """numba's compiler, without what our functions do not need."""
 
     def define_pipelines(self):
         nested = any(isinstance(x, CodeType) for x in self.state.func_id.code.co_consts)
@@ -165,6 +168,10 @@ class _PartCompiler(Compiler):
                 if kind not in needless
             ]
         return pipelines
+
+
+class _PartCompiler(_Compiler):
+    """Into a `_PartLibrary` and without what Python would need to call it."""
 
     def __init__(self, typing_context, target_context, library, *rest):
         library = library or _PartLibrary(target_context.codegen(), "part")
@@ -223,8 +230,8 @@ class _Entry(CPUDispatcher):
                 gc.enable()
 
 
-class _EntryCompiler(Compiler):
-    """numba's compiler, into an `_AlignedLibrary` that can be kept on the disk."""
+class _EntryCompiler(_Compiler):
+    """Into an `_EntryLibrary` that can be kept on the disk."""
 
     def __init__(self, typing_context, target_context, library, *rest):
         if library is None:
