@@ -10,18 +10,16 @@ start to be stuck at.
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import xarray as xr
 from numpy.polynomial import chebyshev
-from numpy.typing import NDArray
 
 from sweep.errors import SweepError
 from sweep.laws.curves import check_options, check_output, described, log_of, positive_axis, relative_sigma, title
 from sweep.laws.fits import Found, fitted
 from sweep.laws.loglog import Array
-from sweep.laws.noise import regress
 from sweep.laws.shapes import Law, Number, Parts
 
 FEWEST_POINTS, MOST_DEGREE = 10, 18
@@ -67,76 +65,6 @@ def fit_collapse(y: xr.DataArray, dim: str, over: str, *, sigma: Any = None, con
     1.500
     """
     check_options(confidence)
-    points, count = _points(y, dim, over, sigma)
-    # exponents that leave neighbours in L with something in common, and no more than 8
-    most = min(8.0, 0.9 * float(np.ptp(points.t)) / float(np.diff(np.unique(points.size)).min()))
-    start = points.fit(*np.linspace(-most, most, 81)).numbers[0]
-    inside, far = points.shared(start), 0.3 * (1 + abs(start))
-    if (among := int(inside.sum())) < FEWEST_POINTS:
-        raise SweepError(
-            f"of {count} points {among} lie among those of another curve; at least {FEWEST_POINTS} are needed"
-        )
-    points = Points(*(column[inside] for column in points))
-    found = points.fit(*np.linspace(start - far, start + far, 41))
-    off, columns, exact = found.off, found.jacobian, 1e-6 * (1 + np.ptp(points.z)) if sigma is None else 0.0
-    moved = [points.fit(found.numbers[0] + by) for by in (-0.25, 0.25)]
-    if any(one.deviance < found.deviance + 12 or abs(one.off).max() < 1e-4 * exact for one in moved):
-        raise SweepError(
-            "the curves collapse for any exponents of x: f is a power law, so a and b are not determined apart"
-        )
-    # whether a level, a slope and a bow of each curve describe the points far better than the common one
-    u, k = points.t - points.t.mean(), columns.shape[1]
-    own = [here * u**power for here in points.size == np.unique(points.size)[1:, None] for power in range(3)]
-    basis, beside = np.linalg.qr(columns)[0], np.column_stack(own)
-    left, moves, _ = np.linalg.svd(beside - basis @ (basis.T @ beside), full_matrices=False)
-    beside = left[:, moves > 1e-6 * moves.max()][:, : max(0, off.size - k - 3)]
-    every, places = np.column_stack([columns, beside]), np.arange(float(off.size))
-    denied = regress(places, every, off[None], "correlated", k, found.sigma).denied[0]
-    fits, ends = not denied or abs(off).max() <= exact, found.beside(places, "correlated", confidence)[0]
-    result = xr.Dataset({"scatter": np.sqrt(np.mean(off**2)), "points": off.size, "dropped": count - off.size})
-    for number, name in enumerate(("x_exponent", "y_exponent")):
-        low, high = ends[:, number] if fits else (math.nan, math.nan)
-        result = result.assign({name: found.numbers[number], f"{name}_low": low, f"{name}_high": high})
-    result = result.assign(fits=int(fits), verdict="one curve" if fits else "not one curve")
-    law = f"{title(y)} = {over}^b f({dim} / {over}^a)"
-    return described(result.assign_attrs(law=law, y=title(y), x=dim, over=over, confidence=confidence), y[dim], y)
-
-
-class Points(NamedTuple):
-    """Logarithms of all points, one curve behind the other."""
-
-    t: Array
-    z: Array
-    size: Array
-    """ln L."""
-    errors: Array
-    """Standard errors of z; NaN where they are not known."""
-
-    def fit(self, *a: float) -> Found:
-        """The common curve, a polynomial in ln(x / L^a), for the best a between the first and last of tries."""
-        degree, size = min(MOST_DEGREE, max(3, self.z.size // 7)), self.size - self.size.mean()
-
-        def curve(q: Array, s: Array, span: float) -> Parts:
-            u = self.t - q[0] * self.size
-            v = u - u.min(axis=1, keepdims=True)
-            v /= np.maximum(v.max(axis=1, keepdims=True) / 2, 1e-300)
-            return 0.0, size, *np.moveaxis(chebyshev.chebvander(v - 1, degree), -1, 0)
-
-        law = Law("collapse", "", curve, 2 + degree, (Number(a[0], a[-1], a),))
-        errors = self.errors[None] if np.isfinite(self.errors).all() else None
-        return fitted((law,), np.arange(float(self.z.size)), self.z[None], errors, law)[0][law.name]
-
-    def shared(self, a: float) -> NDArray[np.bool_]:
-        """Which points lie, in x / L^a, between the first and the last of another curve."""
-        u, found = self.t - a * self.size, np.zeros(self.t.size, dtype=bool)
-        for size in np.unique(self.size):
-            here = self.size == size
-            found |= ~here & (u >= u[here].min()) & (u <= u[here].max())
-        return found
-
-
-def _points(y: xr.DataArray, dim: str, over: str, sigma: Any) -> tuple[Points, int]:
-    """Points that are there, and how many could be."""
     check_output(y)
     if y.ndim != 2 or {dim, over} != {str(d) for d in y.dims}:
         raise SweepError(f"a collapse takes one output along {dim} and {over}, and nothing else; choose with .sel")
@@ -145,9 +73,60 @@ def _points(y: xr.DataArray, dim: str, over: str, sigma: Any) -> tuple[Points, i
         raise SweepError(f"{over}: a collapse needs at least two values, all positive")
     order = np.argsort(t)
     z, errors = (part.transpose(over, dim).values[:, order] for part in (log_of(y), relative_sigma(y, sigma)))
-    fine = np.isfinite(z) & (np.isfinite(errors) | (sigma is None))
-    curve, place = np.nonzero(fine)
+    curve, place = np.nonzero(np.isfinite(z) & (np.isfinite(errors) | (sigma is None)))
     if place.size < FEWEST_POINTS:
         few = f"a collapse needs at least {FEWEST_POINTS} positive points of {title(y)}, found {place.size}"
         raise SweepError(few)
-    return Points(t[order][place], z[fine], np.log(sizes)[curve], errors[fine]), z.size
+    points = np.stack([t[order][place], np.log(sizes)[curve], z[curve, place], errors[curve, place]])
+    # exponents that leave neighbours in L with something in common, and no more than 8
+    most = min(8.0, 0.9 * float(np.ptp(points[0])) / float(np.diff(np.unique(points[1])).min()))
+    start = _common(points, *np.linspace(-most, most, 81)).numbers[0]
+    # the points that lie, in x / L^a, between the first and the last of another curve
+    u, inside = points[0] - start * points[1], np.zeros(place.size, dtype=bool)
+    for own in (points[1] == size for size in np.unique(points[1])):
+        inside |= ~own & (u >= u[own].min()) & (u <= u[own].max())
+    if (among := int(inside.sum())) < FEWEST_POINTS:
+        raise SweepError(
+            f"of {z.size} points {among} lie among those of another curve; at least {FEWEST_POINTS} are needed"
+        )
+    points, far = points[:, inside], 0.3 * (1 + abs(start))
+    found = _common(points, *np.linspace(start - far, start + far, 41))
+    off, exact = found.off, 1e-6 * (1 + np.ptp(points[2])) if sigma is None else 0.0
+    moved = [_common(points, found.numbers[0] + by) for by in (-0.25, 0.25)]
+    if any(one.deviance < found.deviance + 12 or abs(one.off).max() < 1e-4 * exact for one in moved):
+        raise SweepError(
+            "the curves collapse for any exponents of x: f is a power law, so a and b are not determined apart"
+        )
+    # whether a level, a slope and a bow of each curve describe the points far better than the common one
+    u, sizes = points[0] - points[0].mean(), np.unique(points[1])[1:, None]
+    own = np.concatenate([(points[1] == sizes) * u**power for power in range(3)]).T
+    basis = np.linalg.qr(found.jacobian)[0]
+    left, moves, _ = np.linalg.svd(own - basis @ (basis.T @ own), full_matrices=False)
+    own = left[:, moves > 1e-6 * moves.max()][:, : max(0, off.size - basis.shape[1] - 3)]
+    ends, _, denied = found.beside(np.arange(float(off.size)), "correlated", confidence, own)
+    fits = not denied or abs(off).max() <= exact
+    result = xr.Dataset({"scatter": np.sqrt(np.mean(off**2)), "points": off.size, "dropped": z.size - off.size})
+    for number, name in enumerate(("x_exponent", "y_exponent")):
+        low, high = ends[:, number] if fits else (math.nan, math.nan)
+        result = result.assign({name: found.numbers[number], f"{name}_low": low, f"{name}_high": high})
+    result = result.assign(fits=int(fits), verdict="one curve" if fits else "not one curve")
+    law = f"{title(y)} = {over}^b f({dim} / {over}^a)"
+    return described(result.assign_attrs(law=law, y=title(y), x=dim, over=over, confidence=confidence), y[dim], y)
+
+
+def _common(points: Array, *a: float) -> Found:
+    """The common curve, a polynomial in ln(x / L^a), for the best a between the first and last of tries; of points
+    ln x, ln L, ln y and its standard error, NaN where that is not known (4, n), one curve behind the other."""
+    t, size, z, errors = points
+    degree, about = min(MOST_DEGREE, max(3, z.size // 7)), size - size.mean()
+
+    def curve(q: Array, s: Array, span: float) -> Parts:
+        here = np.rint(s * span).astype(int)  # which of the points
+        u = t[here] - q[0] * size[here]
+        u -= u.min(axis=1, keepdims=True)
+        u /= np.maximum(u.max(axis=1, keepdims=True) / 2, 1e-300)
+        return 0.0, about[here], *np.moveaxis(chebyshev.chebvander(u - 1, degree), -1, 0)
+
+    law = Law("collapse", "", curve, 2 + degree, (Number(a[0], a[-1], a),))
+    known = errors[None] if np.isfinite(errors).all() else None
+    return fitted((law,), np.arange(float(z.size)), z[None], known)[0][law.name]

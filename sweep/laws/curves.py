@@ -11,7 +11,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from sweep.errors import SweepError
-from sweep.laws.loglog import EPSILON, FEWEST, Array, alike
+from sweep.laws.loglog import EPSILON, FEWEST, LINES, VALUES, Array, alike
 from sweep.laws.noise import NOISES
 from sweep.words import did_you_mean, kind
 
@@ -21,8 +21,6 @@ FEWEST_OF_LAW, PLACES_OF_LAW = 8, 6
 """Points, and different places among them, from which on laws with more numbers than a line are fitted."""
 MOST_SIGMA = 1e6
 """Relative standard error beyond which a logarithm says nothing."""
-MOST_ROWS = 20
-"""Lines of a summary."""
 FIELDS = {
     "exponent": "exponent of the power law",
     "x_exponent": "a of x / L^a",
@@ -106,9 +104,10 @@ def positive_axis(y: xr.DataArray, dim: str, repeated: bool = False) -> tuple[st
     known = [str(name) for name, coordinate in y.coords.items() if coordinate.ndim == 1]
     if dim not in known:
         there = f"; {title(y)} runs along {', '.join(known) or 'no axis with values'}"
-        if dim in y.coords:
-            raise SweepError(f"{dim} has one value here, so nothing can be fitted along it{there}")
-        raise SweepError(f"{title(y)} has no axis {dim!r}" + (did_you_mean(dim, known) or there))
+        none = f"{title(y)} has no axis {dim!r}" + (did_you_mean(dim, known) or there)
+        raise SweepError(
+            f"{dim} has one value here, so nothing can be fitted along it{there}" if dim in y.coords else none
+        )
     values = y.coords[dim].values
     if values.dtype.kind in "mM":
         since = f" since a moment before the first, ({dim} - MOMENT)" if values.dtype.kind == "M" else f", {dim}"
@@ -151,8 +150,7 @@ def log_of(y: xr.DataArray, values: bool = False) -> xr.DataArray:
     check_output(y)
     numbers = y.astype(np.float64)
     numbers = numbers.where(np.isfinite(numbers) & (values | (numbers > 0)))
-    found: xr.DataArray = numbers if values else xr.ufuncs.log(numbers)
-    return found
+    return numbers if values else numbers.copy(data=np.log(numbers.data))
 
 
 def fit_lines(
@@ -175,8 +173,9 @@ def fit_lines(
     """
     check_options(sigma=sigma, **options)
     dimension, x = positive_axis(y, dim, repeated=True)
-    here = {dimension: np.flatnonzero(inside_window(x, window, dim))}
-    part, t = y.isel(here).transpose(..., dimension).compute(), np.log(x[here[dimension]])
+    here = np.flatnonzero(inside_window(x, window, dim))
+    here = here[np.argsort(x[here], kind="stable")]
+    part, t = y.isel({dimension: here}).transpose(..., dimension).compute(), np.log(x[here])
     values = part.values.astype(np.float64).reshape(math.prod(part.shape[:-1]), t.size)
     values[~np.isfinite(values)] = np.nan
     bad = np.asarray((values <= 0).any(axis=1))
@@ -188,20 +187,18 @@ def fit_lines(
         )
     with np.errstate(all="ignore"):
         z = np.where(bad[:, None], np.nan, np.log(values))
-    given = [
-        None if one is None else one.isel(here).transpose(..., dimension).values.astype(np.float64).reshape(z.shape)
-        for one in (None if sigma is None else relative_sigma(y, sigma), bounds)
-    ]
-    present = np.isfinite(z) if given[0] is None else np.isfinite(z) & np.isfinite(given[0])
+    errors, bound = (
+        None if one is None else one.isel({dimension: here}).transpose(..., dimension).values.reshape(z.shape)
+        for one in (None if sigma is None else relative_sigma(y, sigma).astype(np.float64), bounds)
+    )
+    present = np.isfinite(z) if errors is None else np.isfinite(z) & np.isfinite(errors)
     columns, places = dict[str, Any](), PLACES_OF_LAW if fewest == FEWEST_OF_LAW else 2
-    for pattern, which in alike(present, plain=True):
-        at = np.flatnonzero(pattern)
-        at = at[np.argsort(t[at], kind="stable")]
-        if at.size < fewest or np.unique(t[at]).size < places:
+    for pattern, which in alike(present, max(LINES, VALUES // max(1, t.size))):
+        if pattern.sum() < fewest or np.unique(t[pattern]).size < places:
             continue
-        grid = np.ix_(which, at)
+        lines = (None if one is None else one[which][:, pattern] for one in (z, errors, bound))
         with np.errstate(all="ignore"):  # what overflows is infinite
-            found = function(t[at], z[grid], *(None if one is None else one[grid] for one in given), **options)
+            found = function(t[pattern], *lines, **options)
         if isinstance(found, xr.Dataset):
             return described(found.assign_attrs(y=title(y), x=dim), y.coords[dim], y)
         if not isinstance(found, dict):
@@ -300,5 +297,5 @@ def described(found: xr.Dataset, x: xr.DataArray, y: xr.DataArray) -> xr.Dataset
         columns += [name for name in ends if found[name].dtype.kind == "U"]
         table = found[columns] if found[columns].sizes else found[columns].expand_dims("line")
         rows = table.to_dataframe().reset_index()[[*table.sizes, *columns]]
-        found.attrs["summary"] = rows.to_string(index=False, max_rows=MOST_ROWS, float_format="{:.6g}".format)
+        found.attrs["summary"] = rows.to_string(index=False, max_rows=20, float_format="{:.6g}".format)
     return found

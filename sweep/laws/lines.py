@@ -19,16 +19,10 @@ from scipy.special import gammaincc, ndtri
 from sweep.errors import SweepError
 from sweep.laws.curves import Window, fit_lines, stated_bound
 from sweep.laws.fits import fitted, union
-from sweep.laws.loglog import EPSILON, FEWEST, Array, alike, slope_bounds, slopes, tends
-from sweep.laws.noise import BEYOND_DOUBT, RARE, inliers, regress, roughness, shaped
+from sweep.laws.loglog import FEWEST, LINES, Array, alike, once, slope_bounds, slopes, tends
+from sweep.laws.noise import BEYOND_DOUBT, RARE, inliers, regress, rounding, scatters, shaped
 from sweep.laws.shapes import FADING, LOG_CORRECTION, ONE, Number
 
-SMOOTH = 0.12
-"""Share of the distances from a line that is noise, below which they are a bend and no noise."""
-FEWEST_FOR_BEND = 8
-"""Points from which on a bend is looked for among noise."""
-SCATTERS = 0.3
-"""Share of the distances from a corrected law that is noise between neighbours, from which on they are noise."""
 AS_WELL, HARDER = 13.0, 5.0
 """Difference of AICc up to which another D is not ruled out, and up to which one law and a logarithmic correction are
 not, whose exponent is far harder to tell."""
@@ -103,73 +97,61 @@ def fit_exponent(
     return fit_lines(fit_line, law, y, dim, window, *more, confidence=confidence, noise=noise)
 
 
-def rounding(t: Array, z: Array) -> Array:
-    """What rounding of both coordinates leaves of lines (..., n)."""
-    slope = abs(z[..., -1] - z[..., 0]) / abs(t[-1] - t[0])
-    found: Array = EPSILON * (1.0 + abs(z).max(axis=-1) + slope * abs(t).max())
-    return found
-
-
 def fit_line(
     t: Array, z: Array, sigma: Array | None, bound: Array, *, confidence: float = 0.95, noise: bool | str | None = None
 ) -> dict[str, Any]:
     """Of lines z (m, n) without gaps, t rising: least squares, and then by what the distances are."""
     weight = np.ones_like(z) if sigma is None else sigma**-2.0
-    share, n, least = weight / weight.mean(axis=1, keepdims=True), t.size, 8 * rounding(t, z)
+    share, n, sums = weight / weight.mean(axis=1, keepdims=True), t.size, weight.sum(axis=1)
     centre, level = (share * t).mean(axis=1), (share * z).mean(axis=1)
     u = t - centre[:, None]
     spread = (share * u * u).sum(axis=1)
     slope = (share * u * (z - level[:, None])).sum(axis=1) / spread
     off = z - level[:, None] - slope[:, None] * u
-    size = np.sqrt((share * off * off).sum(axis=1) / max(n - 2, 1))
     # the parabola that fits best, beside the line
     bow = u * u - spread[:, None] / n - (share * u**3).sum(axis=1, keepdims=True) / spread[:, None] * u
     drift = 2 * (share * bow * off).sum(axis=1) / (share * bow * bow).sum(axis=1) * (t[-1] - t[0])
-    fit: dict[str, Any] = {"exponent": slope, "exponent_error": size / np.sqrt(spread), "level": level}
-    fit |= {"level_error": size / n**0.5, "kind": np.full(len(z), "weighted", "U10")}
-    fit |= {name: np.ones(len(z)) for name in ("fits", "noisy")}
-    fit |= {f"{name}_{end}": np.full(len(z), np.nan) for name in ("exponent", "limit") for end in ("low", "high")}
+    size = np.sqrt((share * off * off).sum(axis=1) / max(n - 2, 1)) if sigma is None else np.sqrt(n / sums)
+    error, unknown = size / np.sqrt(spread), np.full((4, len(z)), np.nan)
+    fit: dict[str, Any] = {"exponent": slope, "exponent_error": error, "level": level, "level_error": size / n**0.5}
+    fit |= dict(zip(("exponent_low", "exponent_high", "limit_low", "limit_high"), unknown, strict=True))
+    fit |= {"kind": np.full(len(z), "weighted", "U10"), "fits": np.ones(len(z)), "noisy": np.ones(len(z))}
     if sigma is not None:
-        error = 1 / np.sqrt((weight * u * u).sum(axis=1))
         reach = ndtri((1 + confidence) / 2) * error
-        chance = gammaincc((n - 2) / 2, (weight * off**2).sum(axis=1) / 2) if n > 2 else np.ones(len(z))
-        fit |= {"exponent_error": error, "level_error": weight.sum(axis=1) ** -0.5}
+        chance = gammaincc(max(n - 2, 1) / 2, (weight * off**2).sum(axis=1) / 2)
         fit |= {"exponent_low": slope - reach, "exponent_high": slope + reach}
         fit["fits"] = (chance > RARE) & ~shaped(t, off)
     else:
-        noisy = (abs(off).max(axis=1) > least) & (n > FEWEST) & (noise is None or bool(noise))
+        noisy = scatters(t, z, off, 2, noise) & (n > FEWEST)
         if noise is None:
-            within = bound.any(axis=1) & (abs(off) <= 2 * bound).all(axis=1)
-            noisy &= (size > least) & ~within & (roughness(t, off)[1] > SMOOTH)
-        if (which := np.flatnonzero(noisy)).size:
-            word = noise if isinstance(noise, str) else "noise"
-            for name, values in _noisy(t, z[which], centre[which], word, confidence).items():
-                fit[name][which] = values
-        if (which := np.flatnonzero(~noisy)).size:
-            for name, values in _exact(t, *(part[which] for part in (z, off, bound, slope))).items():
-                fit[name][which] = values
+            noisy &= ~(bound.any(axis=1) & (abs(off) <= 2 * bound).all(axis=1))
+        word = noise if isinstance(noise, str) else "noise"
+        for which, of in ((noisy, functools.partial(_noisy, word=word, confidence=confidence)), (~noisy, _exact)):
+            if which.any():
+                for name, values in of(t, *(part[which] for part in (z, off, bound, slope))).items():
+                    fit[name][which] = values
     slope, level = fit["exponent"], fit["level"]
     fit |= {"exponent_low": np.fmin(fit["exponent_low"], slope), "exponent_high": np.fmax(fit["exponent_high"], slope)}
     prefactor = np.exp(level - slope * centre)
     fit |= {"prefactor_error": prefactor * np.hypot(fit["level_error"], centre * fit["exponent_error"])}
     residual = np.expm1(np.minimum(abs(z - level[:, None] - slope[:, None] * u).max(axis=1), 700))
     fit |= {"drift": drift, "residual": residual, "prefactor": prefactor, "level": np.exp(level)}
-    fit |= {"low": np.exp(t[0]), "high": np.exp(t[-1]), "centre": np.exp(centre)}
-    fit |= {"start": np.exp(z[:, 0]), "stop": np.exp(z[:, -1])}
+    fit |= {"low": np.exp(t[0]), "high": np.exp(t[-1]), "start": np.exp(z[:, 0]), "stop": np.exp(z[:, -1])}
+    fit |= {"centre": np.exp(centre)}
     return fit | {"verdict": np.where(fit["fits"] == 1, "one power law", "no power law")}
 
 
-def _noisy(t: Array, z: Array, centre: Array, word: str, confidence: float) -> dict[str, Any]:
+def _noisy(t: Array, z: Array, *_: Array, word: str, confidence: float) -> dict[str, Any]:
     """Lines beside noise: their numbers, or the range of the slope where they bend."""
     u, half = 2 * (t - t[0]) / (t[-1] - t[0]) - 1, (t[-1] - t[0]) / 2
-    columns = np.stack([np.ones_like(t), t - centre[0], u**2, u**3], axis=1)
+    columns = np.stack([np.ones_like(t), t - t.mean(), u**2, u**3], axis=1)
     # the numbers of a cubic that are its slopes at the middle and at the ends
     ends = half * np.stack([u - u**3 / 3, u**3 / 6 - u**2 / 4, u**3 / 6 + u**2 / 4], axis=1)
-    bends = word == "noise" and t.size >= FEWEST_FOR_BEND
+    bends = word == "noise" and t.size >= 8  # fewer do not tell bends from noise
     columns = columns if bends else columns[:, :2]
     inside = inliers(t, columns[:, :2], z) if word in ("noise", "outliers") else np.ones(z.shape, bool)
     kind, fits, numbers = np.full(len(z), word, "U10"), np.ones(len(z)), np.empty((6, len(z)))
-    for pattern, rows in alike(inside, plain=word == "even"):
+    for pattern, rows in alike(inside, len(z) if word == "even" else LINES):
         line = regress(t[pattern], columns[pattern], z[rows][:, pattern], word, 2)
         # a point that is left out counts as one that is not known
         wider = t.size / pattern.sum()
@@ -179,28 +161,25 @@ def _noisy(t: Array, z: Array, centre: Array, word: str, confidence: float) -> d
         if bends and (bent := rows[line.denied]).size:
             cubic = regress(t[pattern], np.column_stack([columns[:, 0], ends])[pattern], z[bent][:, pattern], word)
             low, high = cubic.interval([1, 2, 3], confidence)
-            kind[bent], numbers[4, bent], numbers[5, bent] = "bent", low.min(axis=0), high.max(axis=0)
+            kind[bent], numbers[4:, bent] = "bent", (low.min(axis=0), high.max(axis=0))
     names = ("level", "exponent", "level_error", "exponent_error", "exponent_low", "exponent_high", "fits", "kind")
     return dict(zip(names, (*numbers, fits, kind), strict=True))
 
 
 def _exact(t: Array, z: Array, off: Array, bound: Array, slope: Array) -> dict[str, Any]:
     """Where there is no noise: bounds for what rounding and stated errors do, or the range of the local exponent."""
-    first = np.append(True, np.diff(t) > 0)  # repetitions are alike
-    t, z, off, bound = t[first], z[:, first], off[:, first], bound[:, first]
+    t, z, off, bound = once(t, z, off, bound)
     u, least = t - t.mean(), rounding(t, z)
     error = bound + least[:, None]
     reach = (abs(u) * error).sum(axis=1) / (u @ u) + least / np.ptp(t)
     straight = (abs(off) <= 2 * bound + 8 * least[:, None]).all(axis=1)
     kind = np.where(straight, np.where(bound.any(axis=1), "bounded", "exact"), "curved")
     low, high, *limits = slope - reach, slope + reach, slope.copy(), slope.copy()
-    if t.size >= FEWEST:
-        bent = np.flatnonzero(~straight)
-        local, rough, by_error = slopes(t, z[bent], 5), slopes(t, z[bent], 7), slope_bounds(t, error[bent], 5)
-        doubt = (abs(local - rough) + by_error).max(axis=1)
-        low[bent], high[bent] = local.min(axis=1) - doubt, local.max(axis=1) + doubt
-        for i, row in enumerate(bent):
-            (_, limits[0][row]), (_, limits[1][row]) = tends(t, local[i], by_error[i, [0, -1]])
+    for i in np.flatnonzero(~straight & (t.size >= FEWEST)):
+        local, by_error = slopes(t, z[i], 5), slope_bounds(t, error[i], 5)
+        doubt = (abs(local - slopes(t, z[i], 7)) + by_error).max()
+        low[i], high[i] = local.min() - doubt, local.max() + doubt
+        limits[0][i], limits[1][i] = (limit for _, limit in tends(t, local, by_error[[0, -1]]))
     names = ("exponent_low", "exponent_high", "limit_low", "limit_high", "fits", "kind", "noisy")
     return dict(zip(names, (low, high, *limits, straight, kind, 0.0), strict=True))
 
@@ -256,34 +235,36 @@ def fit_correction(
 
 
 def _corrected(
-    t: Array, z: Array, sigma: Array | None, bound: None, low: bool, confidence: float, noise: bool | str | None
+    t: Array, z: Array, sigma: Array | None, bound: None, *, low: bool, confidence: float, noise: bool | str | None
 ) -> list[dict[str, Any]]:
     """Numbers of each line; at the low end by (1) of 1/x."""
     if low:
         t, z, sigma = -t[::-1], z[:, ::-1], None if sigma is None else sigma[:, ::-1]
     every, sign, span = [], -1.0 if low else 1.0, float(t[-1] - t[0])
     word = noise if isinstance(noise, str) else "noise"
-    for row, tried in zip(z, fitted((ONE, FADING, LOG_CORRECTION), t, z, sigma, FADING), strict=True):
+    bows = np.polynomial.chebyshev.chebvander(2 * (t - t[0]) / span - 1, 4)[:, 2:]
+    known = word == "even" or sigma is not None
+    for row, tried in zip(z, fitted((ONE, FADING, LOG_CORRECTION), t, z, sigma), strict=True):
         found, one, fits, ends = tried[FADING.name], tried[ONE.name], True, [math.nan, math.nan]
         strength, fade, _, exponent = found.numbers.tolist()
         exponent, fade, left = exponent / span, fade / span, math.expm1(strength) * math.exp(-fade)
         if abs(left) >= 1 and one.aicc <= found.aicc + BEYOND_DOUBT:  # a correction that is none
             exponent, fade, left = float(one.numbers[1] / span), math.nan, 0.0
-        size = float(np.sqrt(np.mean(found.off**2)))
-        scatters = bool(roughness(t, found.off)[0] > SCATTERS * size if noise is None else noise)
-        if not (noisy := sigma is not None or (scatters and size > float(8 * rounding(t, row)))):
+        if noisy := sigma is not None or bool(scatters(t, row[None], found.off[None], 4, noise)[0]):
+            about, _, denied = found.beside(t, word, confidence, None if known else bows)
+            if fits := not denied:
+                steps, least, most = FADES
+                best = float(np.clip(abs(found.numbers[1]), least, most))
+                far = np.clip(np.nan_to_num(0.5 * np.ptp(about[:, 1]), posinf=most) / best, 0.02, 0.6)
+                fades = np.clip(best * steps**far, least, most).tolist()
+                laws = [FADING._replace(name=str(d), q=(FADING.q[0], Number(d, d, (d,)))) for d in fades]
+                errors = None if found.sigma is None else found.sigma[None]
+                own, *others = fitted(laws, t, row[None], errors)[0].values()
+                others += [law for law in (one, tried[LOG_CORRECTION.name]) if law.aicc < found.aicc + HARDER]
+                ends = [*union(t, own, others, [-1], word, confidence, AS_WELL)[1][:, 0] / span, exponent]
+        else:
             reach = _by_half(t, row, exponent)
             ends = [exponent - reach, exponent + reach]
-        elif fits := not found.denied(t, word):
-            steps, least, most = FADES
-            best, known = float(np.clip(abs(found.numbers[1]), least, most)), found.sigma
-            doubt = 0.5 * np.ptp(found.beside(t, word, confidence)[0][:, 1])
-            far = np.clip(np.nan_to_num(doubt, posinf=most) / best, 0.02, 0.6)
-            fades = np.clip(best * steps**far, least, most).tolist()
-            laws = [FADING._replace(name=str(d), q=(FADING.q[0], Number(d, d, (d,)))) for d in fades]
-            own, *others = fitted(laws, t, row[None], None if known is None else known[None])[0].values()
-            others += [law for law in (one, tried[LOG_CORRECTION.name]) if law.aicc < found.aicc + HARDER]
-            ends = [*union(t, own, others, [-1], word, confidence, AS_WELL)[1][:, 0] / span, exponent]
         verdict = VERDICTS[1 if not fits else 0 if abs(left) < 1 else 2]
         of = {"exponent": sign * exponent, "correction_exponent": sign * fade, "correction": left, "verdict": verdict}
         of |= {"exponent_low": min(sign * end for end in ends), "exponent_high": max(sign * end for end in ends)}
@@ -292,10 +273,8 @@ def _corrected(
 
 
 def _by_half(t: Array, z: Array, exponent: float) -> float:
-    """Three times as far as the outer half of the window moves the exponent."""
-    first = np.append(True, np.diff(t) > 0)
-    t, z = t[first], z[first]
-    half = t >= (t[0] + t[-1]) / 2
-    other = fitted((FADING,), t[half], z[None, half])[0]
-    local = other[FADING.name].numbers[-1] / np.ptp(t[half]) if other else slopes(t, z, 5)[-1]
-    return 3 * abs(float(local) - exponent) + float(slope_bounds(t, np.full(t.size, 8 * rounding(t, z)), 5)[-1])
+    """Three times as far as the outer half of the points, and six at least, moves the exponent."""
+    t, z = once(t, z)
+    outer = slice(-max(6, t.size // 2), None)
+    other = fitted((FADING,), t[outer], z[None, outer])[0][FADING.name].numbers[-1] / np.ptp(t[outer])
+    return 3 * abs(float(other) - exponent) + float(slope_bounds(t, np.full(t.size, 8 * rounding(t, z)), 5)[-1])

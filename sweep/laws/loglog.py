@@ -16,39 +16,15 @@ Array = NDArray[np.float64]
 
 FEWEST = 3
 """Points that a slope needs: through two it says nothing about its own error."""
-
-BEYOND_NOISE = 4.0
-"""Standard errors that noise does not reach."""
-
-MEMORY = 0.9
-"""Autocorrelation of the noise that error bars of slopes are for; of independent noise they are wider, by half."""
-NEAR, WIDEST = 6, 6
-"""Points to each side that tell the size of the noise, and between the ends of a stencil of seven points."""
-
-SLOWER = 1e-6
-"""Share by which a change must be less than the one before to be told from an equal one, beside rounding."""
-
-FEW = 20
-"""Points below which noise is not told from a bend."""
-
 LINES, VALUES = 250, 100_000
-"""Lines, or values of lines of which no more than one noise is tried, that are taken at once, so that what is held
-stays below some 50 MB."""
-
+"""Lines, and values of lines, that are taken at once, so that what is held stays below some 50 MB."""
 EPSILON = float(np.finfo(np.float64).eps)
 
 
 def slopes(t: Array, z: Array, points: int) -> Array:
-    """dz/dt at every point, by the polynomial through `points` neighbours: order points - 1.
-
-    Parameters
-    ----------
-    t : (n,) array
-        Strictly monotone.
-    z : (..., n) array
-        NaN where missing; the result is NaN there, and in runs shorter than three. A run shorter than `points`
-        is differentiated with what it has.
-    """
+    """dz/dt at every point of lines (..., n), t strictly monotone, by the polynomial through `points` neighbours: order
+    points - 1. NaN where a point is missing, and in runs shorter than three; shorter ones than `points` take what there
+    is."""
     # differences from one point: a constant has slope zero exactly
     return by_runs(t, lambda s, y: (y - y[:, :1]) @ _matrix(s, points).T, z)
 
@@ -62,8 +38,6 @@ def slope_bounds(t: Array, bound: Array, points: int) -> Array:
 def by_runs(t: Array, function: Callable[..., Array], *lines: Array) -> Array:
     """`function` of each unbroken run of at least three neighbours; lines (..., n) with the same gaps at once."""
     rows = [np.broadcast_to(one, lines[0].shape).reshape(-1, t.size) for one in lines]
-    if np.isfinite(rows[0]).all():
-        return function(t, *rows).reshape(lines[0].shape)
     found = np.full(rows[0].shape, np.nan)
     for pattern, which in alike(np.isfinite(rows[0])):
         for start, stop in runs(pattern):
@@ -72,17 +46,19 @@ def by_runs(t: Array, function: Callable[..., Array], *lines: Array) -> Array:
     return found.reshape(lines[0].shape)
 
 
-def alike(present: NDArray[np.bool_], plain: bool = False) -> list[tuple[NDArray[np.bool_], NDArray[np.intp]]]:
-    """Patterns among rows (m, n), and which rows have each, at most LINES at once, or `plain` rows of VALUES."""
-    if not len(present):
-        return []
-    if present.all():
-        patterns, which = present[:1], np.zeros(len(present), dtype=np.intp)
-    else:
+def alike(present: NDArray[np.bool_], most: int = LINES) -> list[tuple[NDArray[np.bool_], NDArray[np.intp]]]:
+    """Patterns among rows (m, n), and which rows have each, so many at most at once."""
+    patterns, which = present[:1], np.zeros(len(present), dtype=np.intp)
+    if not present.all():
         patterns, which = np.unique(present, axis=0, return_inverse=True)
     parts = [(p, np.flatnonzero(which.reshape(-1) == number)) for number, p in enumerate(patterns)]
-    most = max(LINES, VALUES // max(1, present.shape[1])) if plain else LINES
     return [(p, rows[i : i + most]) for p, rows in parts for i in range(0, rows.size, most)]
+
+
+def once(t: Array, *lines: Array) -> tuple[Array, ...]:
+    """Abscissae, and lines (..., n), without repetitions, which are alike where there is no noise."""
+    first = np.append(True, np.diff(t) > 0)
+    return t[first], *(one[..., first] for one in lines)
 
 
 def runs(present: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
@@ -100,6 +76,7 @@ def slope_errors(t: Array, z: Array, bound: Array) -> Array:
     itself there, and where a bend is within a step, so that more points do not tell more, the slopes of the steps
     beside the point. What errors up to `bound` (m, n) in the values can do is added.
     """
+    from scipy.ndimage import maximum_filter1d, median_filter
     from scipy.sparse import diags_array
 
     orders = (7, 5, 3) if t.size > 5 else (t.size, max(2, t.size - 2), 2)  # beside few points lower orders
@@ -112,19 +89,19 @@ def slope_errors(t: Array, z: Array, bound: Array) -> Array:
     sharp = 4.0 * apart > coarse + 8.0 * rounding
     steps = np.diff(z, axis=-1) / np.diff(t)
     both = [abs(steps[..., np.clip(np.arange(t.size) - k, 0, t.size - 2)] - slope) for k in (0, 1)]
-    # standard errors for values with autocorrelated errors of size 1
-    reach = min(WIDEST, t.size - 1)
-    memory = [MEMORY ** abs(k) for k in range(-reach, reach + 1)]
-    noises = diags_array(memory, offsets=range(-reach, reach + 1), shape=(t.size, t.size))
+    # standard errors for values with errors of size 1 and autocorrelation 0.9; of independent noise they are wider, by
+    # half. A stencil of seven points reaches over six steps
+    steps_apart = np.arange(-min(6, t.size - 1), min(7, t.size))
+    noises = diags_array(0.9 ** abs(steps_apart), offsets=steps_apart, shape=(t.size, t.size))
     size, size_apart = (np.sqrt(((one @ noises) * one).sum(axis=1)) for one in (middle, fine - middle))
     apart_by_noise = apart / size_apart
-    # the median near a point, which a bend or a spike does not change
-    noise = 1.4826 * np.median(_near(apart_by_noise, min(NEAR, (t.size - 1) // 2), "reflect"), axis=-1)
+    # the median over six points to each side, which a bend or a spike does not change
+    noise = 1.4826 * median_filter(apart_by_noise, (1, 1 + 2 * min(6, (t.size - 1) // 2)), mode="mirror")
     least = np.minimum(noise, 1.4826 * np.median(apart_by_noise, axis=-1, keepdims=True))
-    few, rises = t.size < FEW, _near(apart_by_noise, 2, "edge").max(axis=-1) > BEYOND_NOISE * least
-    by_bend = np.where(sharp, np.maximum(apart, np.maximum(*both)), np.maximum(apart, coarse) if few else apart)
-    error = noise * size
-    error = np.where(few | rises, np.maximum(error, _near(by_bend, 2, "edge").max(axis=-1)), error)
+    # a bend beyond four standard errors, which noise does not reach; few points do not tell it from noise
+    few, rises = t.size < 20, maximum_filter1d(apart_by_noise, 5, mode="nearest") > 4.0 * least
+    by_bend = np.maximum(apart, np.where(sharp, np.maximum(*both), coarse if few else 0.0))
+    error = np.maximum(noise * size, np.where(few | rises, maximum_filter1d(by_bend, 5, mode="nearest"), 0.0))
     found: Array = 2.3 * error + rounding  # 1.96 and what the median, of few points, is too small
     return np.where(_beside_pole(steps) & rises, np.inf, found) + slope_bounds(t, bound, 5)
 
@@ -137,18 +114,11 @@ def _beside_pole(steps: Array) -> NDArray[np.bool_]:
     found = np.zeros((*steps.shape[:-1], steps.shape[-1] + 1), dtype=bool)
     for between in range(min(2, max(0, steps.shape[-1] - 5))):  # steps over the pole
         window = sliding_window_view(steps, 6 + between, axis=-1)
-        towards = np.stack([window[..., :3], window[..., :-4:-1]])
-        grow = (np.diff(abs(towards), axis=-1) > 0).all(axis=-1) & (abs(np.sign(towards).sum(axis=-1)) == 3)
-        pole = grow.all(axis=0) & (np.sign(towards[..., 2]).sum(axis=0) == 0)
+        towards = np.stack([window[..., :3], -window[..., :-4:-1]]) * np.sign(window[..., 2])[..., None]
+        pole = ((np.diff(towards, axis=-1) > 0).all(axis=-1) & (towards[..., 0] > 0)).all(axis=0)
         for k in range(3, 4 + between):
             found[..., k : k + pole.shape[-1]] |= pole
     return found
-
-
-def _near(values: Array, reach: int, mode: Any) -> Array:
-    """Each value and its neighbours on both sides (..., n, 2 reach + 1)."""
-    padded = np.pad(values, [(0, 0)] * (values.ndim - 1) + [(reach, reach)], mode=mode)
-    return sliding_window_view(padded, 2 * reach + 1, axis=-1)
 
 
 def _matrix(t: Array, points: int) -> Any:
@@ -183,7 +153,7 @@ def tends(t: Array, local: Array, doubts: Any) -> list[tuple[float, float]]:
     for end, inwards, doubt in zip(t[[0, -1]], (step, -step), doubts, strict=True):
         first, second, third = np.interp(end + inwards * np.arange(3), t, local).tolist()
         last, before = first - second, second - third
-        slows = last * before > 0 and abs(last) < (1 - SLOWER) * abs(before)
+        slows = last * before > 0 and abs(last) < (1 - 1e-6) * abs(before)  # by more than rounding
         left = last * last / (before - last) if slows else 10 * last
         found.append((first, first + 3 * left if abs(last) > doubt else first))
     return found

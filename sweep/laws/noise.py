@@ -10,6 +10,7 @@ give each (phi, a, c) of a grid its weight, by restricted likelihood. Points far
 from __future__ import annotations
 
 import functools
+import itertools
 import math
 from typing import NamedTuple
 
@@ -20,16 +21,16 @@ from scipy.special import fdtrc, gammaincc, stdtrit
 from sweep.laws.loglog import EPSILON, Array, alike, differences
 
 CORRELATIONS = np.array([-0.2, 0.0, 0.2, 0.4, 0.6, 0.7, 0.8, 0.85, 0.9, 0.93, 0.96])
-TRENDS, ENDS = np.linspace(-1.6, 1.6, 5), np.array([0.0, 1.6, 3.2])
-"""phi, a and c of (1) that are tried; exp(2 * 1.6) is a ratio of 25 between the sizes at both ends."""
-EVEN = np.zeros(1)
+SHAPES = np.array([*itertools.product(np.linspace(-1.6, 1.6, 5), (0.0, 1.6, 3.2))])
+"""phi, and a with c of (1), that are tried; exp(2 * 1.6) is a ratio of 25 between the sizes at both ends."""
+ALONE, EVEN = np.zeros(1), np.zeros((1, 2))
 
 NOISES = {
-    "noise": (CORRELATIONS, TRENDS, ENDS),
-    "even": (EVEN, EVEN, EVEN),
-    "uneven": (EVEN, TRENDS, ENDS),
-    "correlated": (CORRELATIONS, EVEN, EVEN),
-    "outliers": (EVEN, EVEN, EVEN),
+    "noise": (CORRELATIONS, SHAPES),
+    "even": (ALONE, EVEN),
+    "uneven": (ALONE, SHAPES),
+    "correlated": (CORRELATIONS, EVEN),
+    "outliers": (ALONE, EVEN),
 }
 """What noise may be, by the word that a user says; "noise" is any."""
 
@@ -41,10 +42,8 @@ UNLIKELY = 0.01
 """and where it may be of any kind."""
 ROUNDING = 16 * EPSILON
 """Relative distance of a point from a curve that is none."""
-FAR = 3.5
-"""Sizes of the noise beyond which a point is left out."""
-MANY = 10**7
-"""Degrees of freedom of a normal distribution."""
+SMOOTH = 0.12
+"""Share of the distances from a line that is noise, below which they are a bend and no noise."""
 
 
 class Regression(NamedTuple):
@@ -80,19 +79,18 @@ class Regression(NamedTuple):
         best = np.take_along_axis(value, height.argmax(axis=0)[None], axis=0)[0]
 
         def dense(reached: Array) -> NDArray[np.bool_]:
-            """Whether values so far below and above the densest noise's own (..., 2, k, m) are above the level."""
-            off = ((best + sides * reached)[..., None, :, :] - value) / error
-            return np.asarray((height * (1 + off**2 / self.left) ** power).sum(axis=-3) > level)
+            """Whether values so far below and above the densest noise's own (2, k, m) are above the level."""
+            off = ((best + sides * reached)[:, None] - value) / error
+            return np.asarray((height * (1 + off**2 / self.left) ** power).sum(axis=1) > level)
 
         inside = np.zeros((2, *best.shape))
         outside = inside + np.ptp(value, axis=0) + error.max(axis=0)
         while (further := dense(outside)).any():
             outside = np.where(further, 2 * outside, outside)
-        for _ in range(13):  # a quarter of what is left, each time
-            quarter = (outside - inside) / 4
-            further = dense(inside + quarter * np.arange(1.0, 4.0)[:, None, None, None])
-            inside = inside + quarter * np.cumprod(further, axis=0).sum(axis=0)
-            outside = inside + quarter
+        for _ in range(26):
+            middle = (inside + outside) / 2
+            further = dense(middle)
+            inside, outside = np.where(further, middle, inside), np.where(further, outside, middle)
         ends: Array = best + sides * inside
         return ends
 
@@ -107,8 +105,8 @@ def regress(
     """
     if sigma is not None:
         noise, columns, z = "even", columns / sigma[:, None], z / sigma
-    phi, trend, ends = NOISES[noise]
-    (n, k), one = columns.shape, phi[:, None, None]
+    phi, shapes = NOISES[noise]
+    (n, k), own = columns.shape, -np.log1p(-(phi[:, None, None] ** 2))
     used = k if used is None else used
     left = n - used
     basis, back = np.linalg.qr(columns)
@@ -116,24 +114,22 @@ def regress(
     off = z.T - basis[:, :used] @ start[:used]
     scale = abs(off).max(axis=0) + 1e-300
     u = 2 * (t - t[0]) / (t[-1] - t[0]) - 1
-    steep, round_ = (grid.reshape(-1, 1) for grid in np.meshgrid(trend, ends, indexing="ij"))
-    log_size = steep * u + round_ * abs(u)
+    log_size = shapes @ np.stack([u, abs(u)])
     log_size -= log_size.mean(axis=1, keepdims=True)
     factor, solved, squares = _sums(phi, *(np.exp(-log_size)[:, :, None] * part for part in (basis, off / scale)))
-    own, (flat, cautious) = -np.log1p(-(one**2)), _priors(noise, n)
+    of_shape, (flat, cautious) = 0.5 * (own + (shapes**2).sum(axis=1)[:, None] / 1.6**2), _priors(noise, n)
 
-    def likelihoods(count: int, prior: Array) -> Array:
-        """Logarithms of restricted likelihoods on so many columns, with the prior."""
+    def weights(count: int, prior: Array) -> Array:
+        """Of each noise, by a prior of phi and the restricted likelihood on so many columns."""
         determinant = np.log(np.einsum("pskk->psk", factor[:, :, :count, :count])).sum(axis=2)[:, :, None]
-        before = prior[:, None, None] - 0.5 * own - 0.5 * (steep**2 + round_**2) / 1.6**2
-        found: Array = before - determinant - 0.5 * (n - count) * np.log(squares[:, :, count - 1])
-        return found
+        log = prior[:, None, None] - of_shape - determinant - 0.5 * (n - count) * np.log(squares[:, :, count - 1])
+        likely = np.exp(log - log.max(axis=(0, 1)))
+        return np.asarray(likely / likely.sum(axis=(0, 1)))
 
     if k > used:
-        log, ratio = likelihoods(k, flat), squares[:, :, used - 1] / squares[:, :, k - 1] - 1
-        weight = np.exp(log - log.max(axis=(0, 1)))
+        ratio = squares[:, :, used - 1] / squares[:, :, k - 1] - 1
         beyond = fdtrc(k - used, n - k, ratio * (n - k) / (k - used))
-        denied = (weight * beyond).sum(axis=(0, 1)) / weight.sum(axis=(0, 1)) < UNLIKELY
+        denied = (weights(k, flat) * beyond).sum(axis=(0, 1)) < UNLIKELY
     else:
         denied = shaped(t, off.T) if noise == "even" else np.zeros(len(z), bool)
     # the numbers of each noise, and their mixture over sizes a, c
@@ -142,9 +138,7 @@ def regress(
     value = inside @ solved[:, :, :used] * scale + turn @ start[:used]
     of_point = square / max(left, 1) if sigma is None else np.ones_like(square)
     variance = (inside**2).sum(axis=3)[..., None] * of_point[:, :, None]
-    log = likelihoods(used, cautious)
-    weight = np.exp(log - log.max(axis=(0, 1)))
-    weight /= weight.sum(axis=(0, 1))
+    weight = weights(used, cautious)
     of_phi = weight.sum(axis=1)
     part = weight / np.maximum(of_phi, 1e-300)[:, None]
     middle = np.einsum("psm,pskm->pkm", part, value)
@@ -155,7 +149,7 @@ def regress(
     if sigma is not None:
         deviance = square[0, 0]
         denied |= gammaincc(left / 2, deviance / 2) < RARE
-        left = MANY
+        left = 10**7  # of a normal distribution
     return Regression(of_phi, middle, error, size, left, deviance, denied)
 
 
@@ -188,29 +182,26 @@ def _priors(noise: str, points: int) -> tuple[Array, Array]:
     that intervals hold 93.5 % beside AR(1) of 0.9 and are at most 1.3 times as wide as the narrowest single rule's."""
     if (phi := NOISES[noise][0]).size == 1:
         return np.zeros(1), np.zeros(1)
-    flat = np.gradient(phi)
+    flat, alone = np.gradient(phi), min(0.15, 1.1 / points)
     cautious = flat * (1 - phi) ** -(1.7 + 4.5 / points)
-    alone = min(0.15, 1.1 / points)
     return np.log(flat), np.log(cautious / cautious.sum() * (1 - alone) + alone * (phi == 0))
 
 
 def inliers(t: Array, columns: Array, z: Array) -> NDArray[np.bool_]:
-    """Points of lines z (m, n) within FAR times the size of the noise about what is fitted to the others."""
-    inside = np.ones(z.shape, dtype=bool)
-    todo = np.arange(len(z))
+    """Points of lines z (m, n) within 3.5 times the size of the noise about what is fitted to the others."""
+    inside, todo = np.ones(z.shape, dtype=bool), np.arange(len(z))
     for _ in range(3):
-        again = []
+        changed = np.zeros(len(z), dtype=bool)
         for pattern, which in alike(inside[todo]):
             rows = todo[which]
             found = regress(t[pattern], columns[pattern], z[rows][:, pattern])
             off = abs(z[rows] - found.mean()[0] @ columns.T)
             off /= np.stack([np.interp(t, t[pattern], size) for size in found.size])
             size = np.quantile(off[:, pattern], 0.8, axis=1, keepdims=True) / 1.2816  # a fifth may be anything
-            near = off <= FAR * size
-            changed = (near != inside[rows]).any(axis=1) & (near.sum(axis=1) >= max(4, 0.7 * t.size))
-            inside[rows[changed]] = near[changed]
-            again.append(rows[changed])
-        todo = np.concatenate(again) if again else todo[:0]
+            near = off <= 3.5 * size
+            other = (near != inside[rows]).any(axis=1) & (near.sum(axis=1) >= max(4, 0.7 * t.size))
+            inside[rows[other]], changed[rows[other]] = near[other], True
+        todo = np.flatnonzero(changed)
     return inside
 
 
@@ -242,4 +233,21 @@ def shaped(t: Array, off: Array) -> NDArray[np.bool_]:
     """Whether distances (..., n), t rising, are no independent noise: neighbours say more of each other than they do in
     all but 0.1 % of it, by trial at 12 to 200 points."""
     found: NDArray[np.bool_] = roughness(t, off)[1] < 1 - 3.4 / math.sqrt(t.size)
+    return found
+
+
+def scatters(t: Array, z: Array, off: Array, numbers: int, noise: bool | str | None) -> NDArray[np.bool_]:
+    """Whether the distances of lines z (m, n) from a law of so many numbers are noise: above rounding; and as is said,
+    else as neighbours say less of each other than they do of a smooth curve. About few points of such a curve a law of
+    many numbers swings as noise does."""
+    found = np.sqrt(np.mean(off**2, axis=1)) > 8 * rounding(t, z)
+    if noise is not None:
+        return np.asarray(found & bool(noise))
+    return np.asarray(found & (roughness(t, off)[1] > SMOOTH + (5 * (numbers - 2) ** 2 / (3 * t.size)) ** 4))
+
+
+def rounding(t: Array, z: Array) -> Array:
+    """What rounding of both coordinates leaves of lines (..., n)."""
+    slope = abs(z[..., -1] - z[..., 0]) / abs(t[-1] - t[0])
+    found: Array = EPSILON * (1.0 + abs(z).max(axis=-1) + slope * abs(t).max())
     return found

@@ -60,16 +60,6 @@ def _correction(q: Array, s: Array, span: float) -> Parts:
     return np.log1p(np.expm1(q[0]) * np.exp(-q[1] * (s - (q[1] < 0)))), 1.0, s
 
 
-def _log_correction(q: Array, s: Array, span: float) -> Parts:
-    """q: logarithm of B per window."""
-    return 0.0, 1.0, np.log1p(np.exp(q[0]) * s), s
-
-
-def _logarithm(q: Array, s: Array, span: float) -> Parts:
-    """q: B per window, over what the brackets are at its middle."""
-    return np.log(1 + q[0] * (s - 0.5)), 1.0, s
-
-
 def _between(q: Array, s: Array, span: float) -> Parts:
     """q: b per window; both exponents are of size 1 at their own end."""
     return 0.0, 1.0, np.exp(q[0] * (s - 1)), np.exp(-q[0] * s), s
@@ -80,13 +70,9 @@ def _stretched(q: Array, s: Array, span: float) -> Parts:
     return 0.0, 1.0, np.exp(q[0] * (s - (q[0] > 0)))
 
 
-def _ramp(v: Any, width: Any) -> Any:
+def _ramp(v: Any, width: Any = 1.0) -> Any:
     """max(0, v) with a bend that fades exponentially."""
     return width * np.logaddexp(0, v / width)
-
-
-def _one_width(v: Any, k: Any) -> Any:
-    return _ramp(v, 1.0)
 
 
 def _two_widths(v: Any, k: Any) -> Any:
@@ -98,7 +84,7 @@ def _two_widths(v: Any, k: Any) -> Any:
 
 def _three_scales(v: Any, k: Any) -> Any:
     """A third of it of each width exp(k), 1, exp(-k), so that it begins sharply and fades slowly."""
-    return (_ramp(v, np.exp(k)) + _ramp(v, 1.0) + _ramp(v, np.exp(-k))) / 3
+    return (_ramp(v, np.exp(k)) + _ramp(v) + _ramp(v, np.exp(-k))) / 3
 
 
 def _bent(bend: Callable[[Any, Any], Any], over_x: bool = False) -> Curve:
@@ -137,13 +123,12 @@ SKEWED, SCALES = (PLACE, WIDTH, Number(-2.0, 2.0, (0.0,))), (PLACE, WIDTH, Numbe
 POWER = Number(-60.0, 60.0, (-12.0, -6.0, -2.5, -1.0, 1.0, 2.5, 6.0, 12.0))
 P, P_TWO = (("p", -1),), (("p low", -2), ("p high", -1))
 ONE = Law("one law", "A x^p", lambda q, s, span: (0.0, 1.0, s), 2, exponents=P)
-TWO = Law("two laws", "bend fading exponentially", _bent(_one_width), 3, (PLACE, WIDTH), P_TWO)
+ONE_WIDTH, HYPERBOLA = (lambda v, k: _ramp(v)), (lambda v, k: 0.5 * (v + np.hypot(v, 1)))
+TWO = Law("two laws", "bend fading exponentially", _bent(ONE_WIDTH), 3, (PLACE, WIDTH), P_TWO)
 BENDS = (
     TWO,
     Law("two laws, two widths", "one width below, one above", _bent(_two_widths), 3, SKEWED, P_TWO, case="two laws"),
-    Law(
-        "two laws, hyperbola", "bend fading as 1/ln x", _bent(lambda v, k: 0.5 * (v + np.hypot(v, 1))), 3, TWO.q, P_TWO
-    ),
+    Law("two laws, hyperbola", "bend fading as 1/ln x", _bent(HYPERBOLA), 3, TWO.q, P_TWO),
     Law("two laws, three scales", "bend of three widths", _bent(_three_scales), 3, SCALES, P_TWO, case="two laws"),
 )
 SECOND = Number(0.02, 0.9, (0.15, 0.3, 0.45, 0.6)), Number(-2.5, 0.0, tuple(np.log((0.2, 0.35, 0.5))))
@@ -154,23 +139,24 @@ OFFSET = Law("offset", "A x^p + C", _offset, 1, (POWER, Number(-1.57, 1.57, (-1.
 CORRECTION_Q = Number(-30.0, 60.0, (-2.5, -0.7, -0.1, 0.1, 0.7, 2.5, 6.0, 14.0)), POWER._replace(least=-80.0, most=80.0)
 CORRECTION = Law("correction to scaling", "A x^p (1 + B x^-D)", _correction, 2, CORRECTION_Q, (*P, ("D", 1)))
 FADING = CORRECTION._replace(q=(CORRECTION_Q[0], Number(0.0, 80.0, POWER.starts[4:])))
-LOG_Q = (Number(-3.0, 8.0, (-1.0, 1.0, 3.0, 5.0)),)
-LOG_CORRECTION = Law("logarithmic correction", "A x^p (1 + B ln(x/x0))^c", _log_correction, 3, LOG_Q, P)
-LOGARITHM = Number(-2 + 1e-9, 2 - 1e-9, (-1.9, -1.5, -0.5, 0.5, 1.5, 1.9))
+LOG_Q = (Number(-3.0, 8.0, (-1.0, 1.0, 3.0, 5.0)),)  # the logarithm of B per window
+LOG_NAMES = "logarithmic correction", "A x^p (1 + B ln(x/x0))^c"
+LOG_CORRECTION = Law(*LOG_NAMES, lambda q, s, _: (0.0, 1.0, np.log1p(np.exp(q[0]) * s), s), 3, LOG_Q, P)
+LOG_B = (Number(-2 + 1e-9, 2 - 1e-9, (-1.9, -1.5, -0.5, 0.5, 1.5, 1.9)),)  # B over (1 + B ln x) at the middle
 BOTH = Number(0.5, 60.0, (1.0, 2.5, 6.0, 12.0))
 FLANK = Number(math.log(0.05), math.log(1 / 3), tuple(np.log((0.07, 0.14, 0.24))))
 NO_SHAPE, TWO_FLANKS = Number(0.0, 0.0, (0.0,)), Number(-1.5, 1.5, (-0.7, 0.7))
 STEP_Q = PLACE._replace(least=0.1, most=0.9), WIDTH._replace(most=math.log(0.15), starts=WIDTH.starts[:3])
 OTHER_FUNCTIONS = (
-    Law("logarithm", "A x^p (1 + B ln x)", _logarithm, 2, (LOGARITHM,), P, power=False),
-    Law("exponential", "A exp(-x/X)", lambda q, s, span: (0.0, 1.0, np.exp(span * (s - 1))), 2, power=False),
+    Law("logarithm", "A x^p (1 + B ln x)", lambda q, s, _: (np.log(1 + q[0] * (s - 0.5)), 1.0, s), 2, LOG_B, P, False),
+    Law("exponential", "A exp(-x/X)", lambda _, s, span: (0.0, 1.0, np.exp(span * (s - 1))), 2, power=False),
     Law("stretched exponential", "A exp(-(x/X)^b)", _stretched, 2, (POWER,), power=False),
-    Law("cut-off", "A exp(-x/X) x^p", lambda q, s, span: (0.0, 1.0, np.exp(span * (s - 1)), s), 3, (), P, False),
+    Law("cut-off", "A exp(-x/X) x^p", lambda _, s, span: (0.0, 1.0, np.exp(span * (s - 1)), s), 3, (), P, False),
     Law("cut-off at both ends", "A exp(-(x/X)^b - (Y/x)^b) x^p", _between, 4, (BOTH,), P, power=False),
     Law("peak", "A x^p exp(B exp(-ln(x/X)^2 / C))", _peak, 3, (PLACE, FLANK, NO_SHAPE), P),
     Law("lopsided peak", "a peak of two widths", _peak, 3, (PLACE, FLANK, TWO_FLANKS), P, case="peak"),
     Law("step", "A x^p exp(B tanh(ln(x/X) / C))", _step, 3, STEP_Q, P),
     Law("lognormal", "A exp(-B ln(x/X)^2)", lambda q, s, span: (0.0, 1.0, s, s**2), 3, power=False),
-    Law("two exponentials", "A exp(-x/X), with a bend to exp(-x/Y)", _bent(_one_width, True), 3, TWO.q, power=False),
+    Law("two exponentials", "A exp(-x/X), with a bend to exp(-x/Y)", _bent(ONE_WIDTH, True), 3, TWO.q, power=False),
 )
 LAWS = (ONE, *OTHER_FUNCTIONS, OFFSET, CORRECTION, *BENDS, THREE)

@@ -19,18 +19,11 @@ from scipy.special import gammaincc
 from sweep.errors import SweepError
 from sweep.laws.curves import Window, check_names, check_output, described, fit_lines, title
 from sweep.laws.fits import Found, fitted, union
-from sweep.laws.lines import fit_exponent, fit_line, rounding
-from sweep.laws.loglog import Array, slopes, tends
-from sweep.laws.noise import BEYOND_DOUBT, roughness
+from sweep.laws.lines import fit_exponent, fit_line
+from sweep.laws.loglog import Array, once, slopes, tends
+from sweep.laws.noise import BEYOND_DOUBT, roughness, rounding, scatters
 from sweep.laws.shapes import BENDS, LAWS, ONE, OTHER_FUNCTIONS, THREE, TWO
 
-TELLING = 16
-"""Points from which noise is told from the misfit of a smooth truth,"""
-TELLING_MEMORY, ROUGH = 40, 0.15
-"""and points and share of the distances that neighbours do not tell, from which on autocorrelated noise is: smooth
-bends have 0.08 at most, correlations of 0.95 at least 0.19."""
-SCATTERED = 0.5
-"""Share that independent noise leaves at least."""
 OTHER_SHAPES = 20.0
 """Difference of AICc from which on a bend of another shape is ruled out; more than for a second law, since the truth
 may be between the shapes that are tried."""
@@ -65,8 +58,8 @@ def fit_two_laws(
     y, dim, window, confidence, sigma
         As of `fit_exponent`.
     noise : bool or "even", "uneven", "correlated", "outliers", optional
-        Whether there is noise, or of which kind. Default: as the points show; fewer than 16 show nothing, and intervals
-        are then wide enough for both.
+        Whether there is noise, or of which kind. Default: as the points show; fewer than some 16 show nothing, and
+        intervals are then wide enough for both.
     windows : pair of (low, high), optional
         Fit a straight line in each of two windows, which share at most an end point, and say where the two lines
         meet; nothing is fitted between them.
@@ -112,63 +105,50 @@ def fit_two_laws(
         low, high = windows
     except (TypeError, ValueError):
         raise SweepError(f"windows: expected two, ((low, high), (low, high)); found {windows!r}") from None
-    fits = [fit_exponent(y, dim, one, sigma=sigma, **keys) for one in (low, high)]
-    both = [fit[["exponent", "exponent_low", "exponent_high"]] for fit in fits]
-    exponents = xr.concat(both, xr.Variable("law", ["low", "high"]), combine_attrs="override")
-    return described(crossover(*fits).assign(exponents.data_vars), y.coords[dim], y)
+    return crossover(*(fit_exponent(y, dim, one, sigma=sigma, **keys) for one in (low, high)))
 
 
-def _each(t: Array, z: Array, sigma: Array | None, bound: None, **keys: Any) -> list[dict[str, Any]]:
-    tried = fitted((ONE, *BENDS, *OTHER_FUNCTIONS, THREE), t, z, sigma, TWO)
-    every = [_one(t, row, laws, **keys) for row, laws in zip(z, tried, strict=True)]
-    if one := [k for k, found in enumerate(every) if found["verdict"] == "one law"]:
-        straight = fit_line(t, z[one], None if sigma is None else sigma[one], np.zeros((len(one), t.size)))["fits"]
-        for k in np.array(one)[straight == 0]:
-            every[k] |= {"verdict": "undecided", "regimes": 0}
-    return every
-
-
-def _one(t: Array, z: Array, tried: dict[str, Found], confidence: float, noise: bool | str | None) -> dict[str, Any]:
-    """Numbers of one line."""
-    two, span = tried[TWO.name], float(t[-1] - t[0])
-    size, noisy = math.sqrt(float(two.off @ two.off) / (t.size - 5)), two.sigma is not None or bool(noise)
-    # a curve of five numbers swings about few points of a smooth truth in a way that looks like noise; then nothing is
-    # told, and the intervals are those of both
-    if noise is None and not noisy and t.size >= TELLING and size > 8 * rounding(t, z):
-        share = float(roughness(t, two.off)[0]) / size
-        noisy = share > (ROUGH if t.size >= TELLING_MEMORY else math.inf)
-        noisy |= bool(share > SCATTERED and size < 3 * roughness(t, z)[0])
-    word = noise if isinstance(noise, str) else "noise" if noisy else "even"
-    verdict, evidence = _verdict(t, tried)
-    found = {"verdict": verdict, "regimes": VERDICTS.get(verdict, 0), "evidence": evidence}
-    found |= {"residual": two.residual, "noisy": noisy}
+def _each(
+    t: Array, z: Array, sigma: Array | None, bound: None, *, confidence: float, noise: bool | str | None
+) -> list[dict[str, Any]]:
+    """Numbers of each line."""
+    every, span = [], float(t[-1] - t[0])
     # both exponents, and where the laws meet
     which, units, zero = [-2, -1, 0], np.array([1 / span, 1 / span, span]), np.array([0.0, 0.0, t[0]])
-    best = two.numbers[which] * units + zero
-    width, level = math.exp(two.numbers[1]) * span / math.log(10), np.exp(two.numbers[2])
-    if verdict in ("three laws", "no power law"):
-        best, low, high, width, level = *np.full((3, 3), math.nan), math.nan, math.nan
-    else:
-        others = [tried[law.name] for law in BENDS[1:] if law.name in tried]
-        own, (low, high) = union(t, two, others, which, word, confidence, OTHER_SHAPES) * units + zero
-        further = BEYOND_SHAPES * np.nan_to_num(max(own[0, 2] - low[2], high[2] - own[1, 2]))
-        low[2], high[2] = low[2] - further, high[2] + further
-        if not noisy:
-            low, high = _widened(t, z, best, low, high)
-        if evidence <= 0 and not noisy:  # straight to rounding: nothing meets anywhere
-            best[2], low[2], high[2], width, level = math.nan, -np.inf, np.inf, math.nan, math.nan
-    if verdict == "no meeting in the window":
-        best[2] = math.nan
-    for name, of in (("", best), ("_low", low), ("_high", high)):
-        found |= {f"exponent{name}": of[:2], f"crossover{name}": np.exp(of[2])}
-    return found | {"width": width, "level": level}
+    tried, straight = fitted((ONE, *BENDS, *OTHER_FUNCTIONS, THREE), t, z, sigma), fit_line(t, z, sigma, 0 * z)["fits"]
+    for row, laws, line in zip(z, tried, straight, strict=True):
+        two, (verdict, evidence) = laws[TWO.name], _verdict(t, laws)
+        if verdict == "one law" and not line:
+            verdict = "undecided"
+        noisy = sigma is not None or bool(scatters(t, row[None], two.off[None], 5, noise)[0])
+        word = noise if isinstance(noise, str) else "noise" if noisy else "even"
+        best = two.numbers[which] * units + zero
+        width, level = math.exp(two.numbers[1]) * span / math.log(10), np.exp(two.numbers[2])
+        if verdict in ("three laws", "no power law"):
+            best, low, high, width, level = *np.full((3, 3), math.nan), math.nan, math.nan
+        else:
+            others = [laws[law.name] for law in BENDS[1:] if law.name in laws]
+            own, (low, high) = union(t, two, others, which, word, confidence, OTHER_SHAPES) * units + zero
+            further = BEYOND_SHAPES * np.nan_to_num(max(own[0, 2] - low[2], high[2] - own[1, 2]))
+            low[2], high[2] = low[2] - further, high[2] + further
+            if not noisy:
+                low, high = _widened(t, row, best, low, high)
+            if evidence <= 0 and not noisy:  # straight to rounding: nothing meets anywhere
+                best[2], low[2], high[2], width, level = math.nan, -np.inf, np.inf, math.nan, math.nan
+        if verdict == "no meeting in the window":
+            best[2] = math.nan
+        found = {"verdict": verdict, "regimes": VERDICTS.get(verdict, 0), "evidence": evidence, "width": width}
+        found |= {"residual": two.residual, "noisy": noisy, "level": level}
+        for name, of in (("", best), ("_low", low), ("_high", high)):
+            found |= {f"exponent{name}": of[:2], f"crossover{name}": np.exp(of[2])}
+        every.append(found)
+    return every
 
 
 def _widened(t: Array, z: Array, best: Array, low: Array, high: Array) -> tuple[Array, Array]:
     """Intervals that reach to where the local exponents tend; of the crossover, to where they are half-way between the
     laws and to where the tangents at the ends of the window meet."""
-    first = np.append(True, np.diff(t) > 0)
-    t, z = t[first], z[first]
+    t, z = once(t, z)
     local = slopes(t, z, 5)
     half = np.flatnonzero(np.diff(np.sign(local - (best[0] + best[1]) / 2)))
     places = [t[half[np.argmin(abs(t[half] - best[2]))]] if half.size else best[2]]
@@ -190,75 +170,69 @@ def _above(tried: Iterable[Found]) -> Array:
 
 
 def _verdict(t: Array, tried: dict[str, Found]) -> tuple[str, float]:
-    """One of VERDICTS, if no straight line denies one law, and by how much two are better than one and than functions.
+    """What the points say of the law, and by how much two are better than one and than functions.
 
     The noise of the line may be of any kind, that of all others is even.
     """
-    few = {name: found for name, found in tried.items() if name != THREE.name}
-    three, nearest = tried.get(THREE.name), min(few.values(), key=lambda found: found.aicc)
-    above, two = _above(few.values()), np.array([found.law in BENDS for found in few.values()])
+    few = [found for found in tried.values() if found.law is not THREE]
+    three, one, nearest = tried.get(THREE.name), tried[ONE.name], min(few, key=lambda found: found.aicc)
+    above, two = _above(few), np.array([found.law in BENDS for found in few])
     evidence = float((above[~two].min(axis=0) - above[two].min(axis=0)).min())
-    ahead = nearest.aicc - three.aicc if three else 0.0
-    if three and three.criteria[1] > few[ONE.name].criteria[1] - BEYOND_DOUBT:  # of many points BIC asks for more
-        ahead = 0.0
-    # three, if with a bend more even beside what noise of any kind leaves of fewer
+    # three, if BIC, which of many points asks for more, prefers them to one; and if with a bend more even beside what
+    # noise of any kind leaves of fewer
+    ahead = nearest.aicc - three.aicc if three and three.criteria[1] < one.criteria[1] - BEYOND_DOUBT else 0.0
     if three and ahead > OTHER_SHAPES and three.aicc < nearest.beside(t, "noise")[1] - BEYOND_DOUBT:
         return "three laws", evidence
     if evidence > BEYOND_DOUBT:
         return "two laws" if 0 <= tried[TWO.name].numbers[0] <= 1 else "no meeting in the window", evidence
-    alive, power = above.min(axis=1) <= BEYOND_DOUBT, np.array([found.law.power for found in few.values()])
-    if alive[[*few].index(ONE.name)]:
+    alive, function = above <= BEYOND_DOUBT, np.array([not found.law.power for found in few])
+    if alive[few.index(one)].any():
         return "one law", evidence
-    bent = bool((alive & two).any()) or 0 < ahead <= OTHER_SHAPES
-    undecided = bent and not (~power & (above.max(axis=1) <= BEYOND_DOUBT)).any()
-    return "undecided" if undecided else "no power law", evidence
+    bent = alive[two].any() or 0 < ahead <= OTHER_SHAPES
+    return "undecided" if bent and not alive[function].all(axis=1).any() else "no power law", evidence
 
 
 def crossover(low_fit: xr.Dataset, high_fit: xr.Dataset) -> xr.Dataset:
     """Where two power laws, from `fit_exponent` over two windows, meet: `crossover` with its interval,
-    `crossover_error`, half of that, and `level`.
+    `crossover_error`, half of that, and `level`; and both exponents.
 
-    The interval holds all places where the two lines differ by less than their intervals at that place, taken as
-    independent (Fieller), and, without noise, where lines through the outer ends of the windows meet, with the
-    exponents to which the local ones tend there. Raises SweepError where the windows share more than an end, or the
+    Where there is noise, the place is where the laws are equal within their errors. Where there is none, the bound is
+    how far the place moves as either law is not the line through its window but through the outer end of it, with the
+    exponent to which the local ones tend there. Raises SweepError where the windows share more than an end, or the
     lines are parallel within their errors.
     """
     if bool(((low_fit.low < high_fit.high) & (high_fit.low < low_fit.high)).any()):
         raise SweepError("the windows of the two fits overlap, so their errors are not independent; take them apart")
+    exponents = ["exponent", "exponent_low", "exponent_high"]
+    result = xr.concat([low_fit[exponents], high_fit[exponents]], xr.Variable("law", ["low", "high"]))
     if bool((low_fit.centre > high_fit.centre).all()):
         low_fit, high_fit = high_fit, low_fit
-    middle = (np.log(low_fit.centre) + np.log(high_fit.centre)) / 2  # logarithms counted from here keep their digits
-    lines, outer, wide = [], [], []  # outer: through the outer ends, towards where the exponents tend
+    both = xr.concat([low_fit, high_fit], "law", combine_attrs="override")
+    middle = np.log(both.centre).mean("law")  # logarithms counted from here keep their digits
+    lines = []  # slope and level at the middle: through the window's centre; through its outer end, as the laws tend
     for fit, side, end in ((low_fit, "low", "start"), (high_fit, "high", "stop")):
-        centre = np.log(fit.centre) - middle
-        lines.append((fit.exponent, np.log(fit.level), centre))
-        outer.append((fit[f"limit_{side}"], np.log(fit[end]), np.log(fit[side]) - middle))
-        reach = ((fit.exponent_high - fit.exponent_low) / 2).where(fit.noisy == 1, fit.exponent_error)
-        factor = (reach / fit.exponent_error).where(fit.exponent_error > 0, 1.0)
-        wide.append((reach, fit.level_error * factor, centre))
-    slope = (lines[1][0] - lines[0][0]).where(abs(lines[1][0] - lines[0][0]) > np.hypot(wide[0][0], wide[1][0]))
-    if not slope.notnull().any():
+        through = (fit.exponent, fit.level, fit.centre), (fit[f"limit_{side}"], fit[end], fit[side])
+        lines.append([(slope, np.log(level) - slope * (np.log(place) - middle)) for slope, level, place in through])
+    meeting, *others = ((low[1] - high[1]) / (high[0] - low[0]) for low, high in itertools.product(*lines))
+    moved = xr.concat([abs(other - meeting).fillna(0.0) for other in others], "which").max("which")
+    # (slope (x - meeting))^2 = sum of (level error)^2 + (slope error (x - centre))^2, a quadratic in x - meeting
+    reach = ((both.exponent_high - both.exponent_low) / 2).where(both.noisy == 1, both.exponent_error)
+    level_reach = both.level_error * (reach / both.exponent_error).where(both.exponent_error > 0, 1.0)
+    square = (high_fit.exponent - low_fit.exponent) ** 2 - (reach**2).sum("law")
+    square = square.where(square > 0)
+    if not square.notnull().any():
         raise SweepError("the two laws have the same exponent within their errors, so they meet nowhere")
-
-    def meeting(low: Any, high: Any) -> xr.DataArray:
-        """Where two lines (slope, level, place of that level) meet."""
-        gap: xr.DataArray = low[1] - low[0] * low[2] - high[1] + high[0] * high[2]
-        return gap / (high[0] - low[0])  # type: ignore[no-any-return]
-
-    there = meeting(*lines)
-    pairs = [(a, b) for a in (lines[0], outer[0]) for b in (lines[1], outer[1])]
-    moved = xr.concat([abs(meeting(*pair) - there).fillna(0.0) for pair in pairs], "which").max("which")
-    # (slope (x - there))^2 = sum of (level error)^2 + (slope error (x - centre))^2, a quadratic in x - there
-    square = slope**2 - wide[0][0] ** 2 - wide[1][0] ** 2
-    linear = sum(p**2 * (there - c) for p, _, c in wide)
-    root = np.sqrt(linear**2 + square * sum(level**2 + (p * (there - c)) ** 2 for p, level, c in wide))
-    place = (middle + there).where(slope.notnull())
-    below, above = (place + (linear + sign * root) / square + sign * moved for sign in (-1, 1))
-    found = xr.Dataset({"crossover": np.exp(place), "crossover_low": np.exp(below), "crossover_high": np.exp(above)})
-    found["crossover_error"] = (found.crossover_high - found.crossover_low) / 2
-    found["level"] = np.exp(lines[0][1] + low_fit.exponent * (place - middle - lines[0][2]))
-    found.attrs = {name: low_fit.attrs[name] for name in ("law", "y", "x", "confidence")}
-    return described(found, low_fit.centre, low_fit.level)
+    off = reach * (meeting + middle - np.log(both.centre))
+    linear = (reach * off).sum("law")
+    root = np.sqrt(linear**2 + square * (level_reach**2 + off**2).sum("law"))
+    place = (middle + meeting).where(square.notnull())
+    below, above = ((linear + sign * root) / square + sign * moved for sign in (-1, 1))
+    for name, ln in (("", place), ("_low", place + below), ("_high", place + above)):
+        result[f"crossover{name}"] = np.exp(ln)
+    result["crossover_error"] = (result.crossover_high - result.crossover_low) / 2
+    result["level"] = np.exp(lines[0][0][1] + low_fit.exponent * (place - middle))
+    result.attrs = {name: low_fit.attrs[name] for name in ("law", "y", "x", "confidence")}
+    return described(result, low_fit.centre, low_fit.level)
 
 
 def compare_laws(y: xr.DataArray, dim: str, window: Window | None = None, *, sigma: Any = None) -> xr.Dataset:
@@ -304,26 +278,23 @@ def compare_laws(y: xr.DataArray, dim: str, window: Window | None = None, *, sig
         raise SweepError(
             f"{title(y)} runs along {', '.join(map(str, y.dims))}; compare laws of one line, choose with .sel"
         )
-
-    def compared(t: Array, z: Array, sigma: Array | None, bounds: None) -> xr.Dataset:
-        return _table(t, z[0], sorted(fitted(LAWS, t, z, sigma)[0].values(), key=lambda fit: fit.aicc))
-
-    return fit_lines(compared, "", y, dim, window, sigma)
+    return fit_lines(_table, "", y, dim, window, sigma)
 
 
-def _table(t: Array, z: Array, tried: list[Found]) -> xr.Dataset:
+def _table(t: Array, z: Array, sigma: Array | None, bound: None) -> xr.Dataset:
     """All that `compare_laws` says of laws, the best first."""
+    tried = sorted(fitted(LAWS, t, z, sigma)[0].values(), key=lambda fit: fit.aicc)
     off, worse, span = np.stack([f.off for f in tried]), _above(tried).min(axis=1), t[-1] - t[0]
-    columns: dict[str, Any] = dict(zip(("aicc", "bic"), np.transpose([f.criteria for f in tried]), strict=True))
-    columns |= {"worse": worse, "scatter": np.sqrt((off**2).mean(axis=1))}
-    columns |= {"numbers": [f.law.numbers for f in tried], "residual": [f.residual for f in tried]}
-    chances = [float(gammaincc((t.size - f.law.numbers) / 2, f.deviance / 2)) for f in tried if f.sigma is not None]
-    columns |= {"chi_squared": chances or [math.nan] * len(tried), "formula": [f.law.formula for f in tried]}
-    columns["exponents"] = [
-        ", ".join(f"{name} = {f.numbers[k] / span:.4g} +- {f.errors[k] / span:.1g}" for name, k in f.law.exponents)
-        or "none"
+    chances = [float(gammaincc((t.size - f.law.numbers) / 2, f.deviance / 2)) for f in tried if sigma is not None]
+    exponents = (
+        (f"{name} = {f.numbers[k] / span:.4g} +- {f.errors[k] / span:.1g}" for name, k in f.law.exponents)
         for f in tried
-    ]
+    )
+    columns: dict[str, Any] = dict(zip(("aicc", "bic"), np.transpose([f.criteria for f in tried]), strict=True))
+    columns |= {"worse": worse, "scatter": np.sqrt((off**2).mean(axis=1)), "residual": [f.residual for f in tried]}
+    columns |= {"numbers": [f.law.numbers for f in tried], "formula": [f.law.formula for f in tried]}
+    columns |= {"chi_squared": chances or [math.nan] * len(tried)}
+    columns |= {"exponents": [", ".join(texts) or "none" for texts in exponents]}
     alive = [f for f, by in zip(tried, worse, strict=True) if by <= BEYOND_DOUBT]
     chosen = min(alive, key=lambda f: (f.law.numbers, not f.law.power, f.aicc))
     margin = min((f.aicc for f in tried if f is not chosen), default=math.inf) - chosen.aicc
@@ -332,9 +303,13 @@ def _table(t: Array, z: Array, tried: list[Found]) -> xr.Dataset:
         text += f"not ruled out beside it: {', '.join(rivals)}"
     else:
         text += f"all others are ruled out, the next by {margin:.3g} in AICc"
-    if chosen.residual > 8 * rounding(t, z) and chosen.denied(t, "even"):
+    if chosen.residual > 8 * rounding(t, z[0]) and chosen.beside(t, "even")[2]:
         text += "; but what it leaves has a shape, so that none of them is the law"
     variables: dict[str, Any] = {name: ("law", column) for name, column in columns.items()}
-    variables |= {"fitted": (("law", "point"), np.exp(z - off)), "x": ("point", np.exp(t)), "y": ("point", np.exp(z))}
+    variables |= {
+        "fitted": (("law", "point"), np.exp(z - off)),
+        "x": ("point", np.exp(t)),
+        "y": ("point", np.exp(z[0])),
+    }
     attrs = {"chosen": chosen.law.name, "margin": margin, "verdict": text}
     return xr.Dataset(variables, {"law": [f.law.name for f in tried]}, attrs)

@@ -116,7 +116,7 @@ def laws(
     bound = stated_error(dataset, y)
     fits = tuple(fit_exponent(column, x, window, bound=bound, **keys) for window in limits)  # type: ignore[arg-type]
     if len(fits) == 2:
-        meeting = crossover(*fits)
+        meeting = crossover(*fits).drop_dims("law")
     elif column.sizes[str(column[x].dims[0])] >= FEWEST_OF_LAW:
         with contextlib.suppress(SweepError):  # the window leaves too few points
             found = fit_two_laws(column, x, limits[0], **keys)  # type: ignore[arg-type]

@@ -1,5 +1,7 @@
 """Two laws, corrections, collapses and the comparison of laws: what data were made of is found, with its numbers."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -270,6 +272,22 @@ def test_a_correction_that_the_points_deny_has_no_interval():
     assert (int(known.fits), bool(known.exponent_high.isnull())) == (0, True)
 
 
+@pytest.mark.parametrize("z", [lambda t: -0.5 * t - np.exp(-t), lambda t: -0.5 * t - np.log1p(2 * np.exp(-t))])
+def test_without_noise_the_interval_of_a_correction_holds_what_curves_of_no_such_law_tend_to(z):
+    t = np.log(np.geomspace(0.8, 1e4, 41))
+    found = sweep.fit_correction(line(z(t), np.exp(t)), "x")
+    assert (int(found.noisy), bool(found.exponent_low <= -0.5 <= found.exponent_high)) == (0, True)
+    assert float(found.exponent_high - found.exponent_low) < 0.5
+
+
+@pytest.mark.parametrize("fit", [sweep.fit_exponent, sweep.fit_correction, sweep.fit_two_laws])
+def test_values_without_noise_that_are_given_twice_tell_what_they_tell_once(fit):
+    t = np.log(np.geomspace(0.8, 1e4, 41))
+    once, twice = (fit(line(two(at, 0.4, -1.0, -0.5, 4.0, 0.0), np.exp(at)), "x") for at in (t, np.repeat(t, 2)))
+    for name in ("exponent_low", "exponent_high"):
+        np.testing.assert_allclose(twice[name], once[name], atol=0.02)
+
+
 def test_a_collapse_of_a_constant_is_refused_and_known_errors_are_taken():
     with pytest.raises(sweep.SweepError, match="not determined"):
         sweep.fit_collapse(xr.ones_like(curves(1.5, 0.7)), "x", "L")
@@ -278,6 +296,20 @@ def test_a_collapse_of_a_constant_is_refused_and_known_errors_are_taken():
     assert (int(found.fits), int(small.fits)) == (1, 0)
     assert float(found.x_exponent_low) < 1.5 < float(found.x_exponent_high)
     assert np.isnan(small.x_exponent_low)
+
+
+def test_many_points_take_no_more_memory_than_they_need_and_overflow_nowhere():
+    """Starts were once laid out over all 20,000 points: 650 MB."""
+    x, size = np.geomspace(0.01, 100, 2000), 2.0 ** np.arange(10)
+    u = x / size[:, None] ** 0.5
+    noise = 0.02 * np.random.default_rng(1).standard_normal(u.shape)
+    y = xr.DataArray(size[:, None] ** 0.7 / (u + u**0.2) * np.exp(noise), {"L": size, "x": x}, ("L", "x"), name="y")
+    tracemalloc.start()
+    found = sweep.fit_collapse(y, "x", "L")
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 2e8
+    assert float(found.x_exponent_low) < 0.5 < float(found.x_exponent_high) < 0.502
 
 
 @pytest.mark.parametrize("kind", ["even", "correlated", "outliers", "uneven"])
