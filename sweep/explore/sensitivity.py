@@ -9,7 +9,7 @@ import xarray as xr
 
 from sweep.errors import SweepError
 from sweep.study.designs import LEVELS, problem, require_salib
-from sweep.study.model import Study
+from sweep.study.model import Study, study_together
 
 SEED = 1
 """Of the resampling that tells the errors; SALib takes 0 for none."""
@@ -58,7 +58,7 @@ def sensitivity(dataset: xr.Dataset, y: str | xr.DataArray) -> xr.Dataset:
     'a'
     """
     text = dataset.attrs.get("study_json")
-    study = None if text is None else Study.from_json(str(text), declared=True)
+    study = None if text is None else Study.from_json(study_together(str(text), dataset.coords), declared=True)
     if study is None or study.design not in ("saltelli", "morris"):
         raise SweepError('the design of the result is neither "saltelli" nor "morris"; sensitivity needs one of these')
     found = dataset[y] if isinstance(y, str) and y in dataset else y

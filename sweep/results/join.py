@@ -19,7 +19,7 @@ from sweep.errors import SweepError
 from sweep.file.disk import check_target
 from sweep.file.open import memory, store_cells
 from sweep.results.diff import diff
-from sweep.study.model import SETTINGS, Axis, Block, Study, frozen, setting
+from sweep.study.model import SETTINGS, Axis, Block, Study, frozen, setting, study_together
 from sweep.words import as_path, listed, require_dataset
 
 PAIR = ("first", "second")
@@ -78,7 +78,8 @@ def join(
             raise SweepError("an unfinished result cannot be joined; run its sweep to the end first")
     if 2 * sum(dataset.nbytes for dataset in results) > memory():
         raise SweepError("the two results together do not fit into the memory")
-    studies = [Study.from_json(str(dataset.attrs["study_json"]), declared=True) for dataset in results]
+    texts = (study_together(str(dataset.attrs["study_json"]), dataset.coords) for dataset in results)
+    studies = [Study.from_json(text, declared=True) for text in texts]
     # what they differ in: "axes.mu", "fixed.a", "rtol"; of axes that run together "points"
     old, new = map(_said, studies)
     apart = sorted(name for name in {*old, *new} - {"study"} if old.get(name) != new.get(name))
