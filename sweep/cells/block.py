@@ -136,19 +136,16 @@ class Bench:
         """
         here, (start, stop) = self._here, self.partition.bounds(block)
         with faults_reported(f"{self.label(block)} cannot be computed or kept"):
-            if not hasattr(here, "guard"):
+            if not hasattr(here, "solver"):
                 here.bad, here.columns = [], {}
-                here.guard = Guard(self._apart or Solver(self.study), here.bad.append)
-                here.reducer = None if self.study.summary is None else Reducer(self.study, here.guard)
+                guard = Guard(self._apart or Solver(self.study), here.bad.append)
+                here.solver = guard if self.study.summary is None else Reducer(self.study, guard)
             here.bad.clear()
             begun = time.perf_counter()
             if room is None:  # new columns cost more than a cheap kernel
                 here.columns = here.columns or empty(self.columns, min(self.partition.cells, self.partition.size))
                 room = part(here.columns, slice(stop - start))
-            if here.reducer is None:
-                here.guard.solve(start, room, wanted)
-            else:
-                here.reducer.solve(start, stop, room)
+            here.solver.solve(start, room, wanted)
             found = put(block, room)
             return Done(block, time.perf_counter() - begun, [*here.bad], found)
 

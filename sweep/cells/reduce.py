@@ -94,19 +94,18 @@ class Reducer:
     """Solves row blocks of a study with a summary and reduces each to a row, for one thread at a time."""
 
     def __init__(self, study: Study, solver: SolveCells) -> None:
-        self.study, self.row_blocks, self.solver = study, row_blocks(study), solver
-        self.strip = _strip_cells(study)
-        self._cells = empty_cells(study, min(self.strip, self.row_blocks.size))
+        self.study, self.row_blocks, self.solver, self.grid = study, row_blocks(study), solver, solver.grid
+        self._cells = empty_cells(study, min(_strip_cells(study), self.row_blocks.size))
 
-    def solve(self, start: int, stop: int, rows: Mapping[str, Any]) -> None:
-        """Fill `rows` with the rows `start` to `stop`."""
-        _clear(rows)
-        for row, count, cell, each in self.row_blocks.strips(start, stop, self.strip):
-            cells = part(self._cells, slice(count * each))
-            self.solver.solve(cell, cells)
+    def solve(self, start: int, cells: Columns, wanted: Any = None) -> None:
+        """Fills rows, from number `start` on; all are wanted."""
+        _clear(cells)
+        stop, strip = start + len(cells[BY_STATUS]), _strip_cells(self.study)
+        for row, count, cell, each in self.row_blocks.strips(start, stop, strip):
+            solved = part(self._cells, slice(count * each))
+            self.solver.solve(cell, solved)
             place = slice(row - start, row - start + count)
-            found = reduced(self.study, cell, count, cells)
-            merge(part(rows, place), found)
+            merge(part(cells, place), reduced(self.study, cell, count, solved))
 
 
 def reduced(study: Study, cell: int, rows: int, cells: Columns) -> Rows:

@@ -25,7 +25,7 @@ from sweep.cells.sample import relative_error, sampled, solved
 from sweep.cells.schema import METHOD_USED, STATUS, empty_cells
 from sweep.cells.solve import GIVEN_UP, Solver, among, usable_methods
 from sweep.errors import SweepError
-from sweep.results.statuses import STATUS_NAMES
+from sweep.results.statuses import STATUS_NAMES, cell_text
 from sweep.runs.run import run
 from sweep.study.model import Study, frozen
 from sweep.study.read import Given
@@ -157,7 +157,8 @@ def _without_failing(
         good &= found[STATUS].values.ravel() != Status.FAILED
     if good.all():
         return study
-    text = f"the kernel fails at {(~good).sum()} of {good.size} cells, e.g. {_cell(study, int(good.argmin()))}"
+    example = cell_text(Grid(study).cell(int(good.argmin())))
+    text = f"the kernel fails at {(~good).sum()} of {good.size} cells, e.g. {example}"
     if not good.any():
         raise SweepError(text)
     note(f"{text}; they are left out")
@@ -284,7 +285,7 @@ def _measured(study: Study, name: str, rtol: float, against: Reference) -> dict[
     }
 
     def first(some: Any) -> str:
-        return _cell(study, int(some.argmax())) if some.any() else ""
+        return cell_text(Grid(study).cell(int(some.argmax()))) if some.any() else ""
 
     counts = {method: int((used == i).sum()) for i, method in enumerate(methods)}
     taken = ", ".join(f"{m} {100 * n / max((used >= 0).sum(), 1):.3g} %" for m, n in counts.items() if n)
@@ -320,7 +321,3 @@ def _seconds(study: Study, names: Sequence[str], tolerances: Sequence[float]) ->
             count += 1
         best[i, j] = min(best[i, j], spent / count / size)
     return best
-
-
-def _cell(study: Study, index: int) -> str:
-    return " ".join(f"{name}={axis.label(index)}" for name, axis in study.axes.items())
