@@ -48,10 +48,9 @@ class Grid:
         first, last = start // run, max(stop - 1, start) // run
         begin, count = first % len(values), last + 1 - first
         found: Floats = values[begin : begin + count]
-        if len(found) < count:
-            turns, rest = divmod(count - len(found), len(values))
-            whole = np.repeat(values[None], turns, axis=0).reshape(-1, *values.shape[1:])
-            found = np.concatenate([found, whole, values[:rest]])
+        if (more := count - len(found)) > 0:
+            turns = (-(-more // len(values)), *[1] * (values.ndim - 1))
+            found = np.concatenate([found, np.tile(values, turns)[:more]])
         if run == 1:
             return found
         lengths = np.full(count, run)

@@ -72,15 +72,11 @@ class Partition:
         place = start
         while place < stop:
             cell, end = self.bounds(place)
-            if end - cell > capacity:
-                for first in range(cell, end, capacity):
-                    yield place, 1, first, min(capacity, end - first)
-                place += 1
-                continue
             # as many as are of equal length and follow each other
-            whole = (self.row or self.size) // self.cells - place % self.per_row
-            rows = min(stop - place, capacity // (end - cell), max(1, whole if self.per_row > 1 else self.count))
-            yield place, rows, cell, end - cell
+            whole = (self.row or self.size) // self.cells - place % self.per_row if self.per_row > 1 else self.count
+            rows = max(1, min(stop - place, capacity // (end - cell), whole))
+            for first in range(cell, end, capacity):
+                yield place, rows, first, min(capacity, end - first)
             place += rows
 
 
