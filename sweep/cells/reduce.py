@@ -54,16 +54,10 @@ def part_columns(study: Study) -> tuple[Column, ...]:
     return tuple(Column(name, c.dtype.str[1:], (), c.shape[1:], {}) for name, c in found.items())
 
 
-def nothing(study: Study, rows: int) -> Rows:
-    """Rows of no cell at all."""
-    found = empty(part_columns(study), rows)
-    _clear(found)
-    return found
-
-
 def pending(study: Study, start: int, stop: int) -> Rows:
     """Some of the rows, not computed yet."""
-    rows = nothing(study, stop - start)
+    rows = empty(part_columns(study), stop - start)
+    _clear(rows)
     first = row_blocks(study).first(np.arange(start, stop + 1, dtype=np.int64))
     rows[BY_STATUS][:, STATUSES.index(Status.PENDING.name)] = np.diff(first)
     return rows
@@ -233,7 +227,7 @@ def output_schema(study: Study, fingerprint: Mapping[str, str]) -> Schema:
         return schema.cell_schema(study, fingerprint)
     over = study.summary.over
     kept = {dim: study.grid_shape[dim] for dim, names in study.dims.items() if names[0] not in over}
-    none = _variables(study, nothing(study, 0))
+    none = _variables(study, pending(study, 0, 0))
     columns = tuple(Column(name, v.dtype.str[1:], dims, v.shape[1:], attrs) for name, v, dims, attrs in none)
     words = {"status_name": STATUSES, "method_name": ("none", *(m.name for m in study.kernel.methods))}
     said = {"status_name": "what became of a cell", "method_name": "method that solved a cell"}
