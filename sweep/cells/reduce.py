@@ -291,8 +291,10 @@ def _reductions(study: Study, field: Field, own: Rows) -> Iterator[Variable]:
             for name in over:
                 yield from _place(study, reduction, name, at, about)
             attrs = {**next(c.attrs for c in schema.columns(study) if c.name == schema.STATUS)}
-            attrs["long_name"] = f"status of the cell at the {about}"
-            yield f"{reduction}_status", np.where(none, np.int8(Status.PENDING), status), (), attrs
+            attrs["flag_values"] = np.append(np.int8(-1), attrs["flag_values"])
+            attrs["flag_meanings"] = f"none {attrs['flag_meanings']}"
+            attrs["long_name"] = f"status of the cell at the {about}; none where no cell has a value"
+            yield f"{reduction}_status", np.where(none, np.int8(-1), status), (), attrs
 
 
 def _place(study: Study, reduction: str, name: str, at: Any, about: str) -> Iterator[Variable]:

@@ -151,7 +151,7 @@ def reduced(name, cells, numbers, here, columns, summary, field):
         return {"below": below, name: np.histogram(numbers, edges)[0], "above": above}
     if name in ("argmin", "argmax"):
         best = cells[getattr(np, name)(numbers)] if len(cells) else None
-        found = {f"{name}_status": Status.PENDING if best is None else columns["status"][1][best]}
+        found = {f"{name}_status": -1 if best is None else columns["status"][1][best]}
         for axis in summary["over"]:
             none = "none" if isinstance(here[0][axis], str) else nan
             found[f"{name}_{axis}"] = none if best is None else here[best][axis]

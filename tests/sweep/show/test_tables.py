@@ -116,3 +116,11 @@ def test_a_fixed_word_is_told_as_the_word(tmp_path):
     assert row["reduction"] == "rivin"
     numbers, words = found.reduction.attrs["flag_values"], found.reduction.attrs["flag_meanings"].split()
     assert words[list(numbers).index(found.reduction.item())] == "rivin"
+
+
+def test_a_summary_that_is_complete_holds_nothing_that_is_pending():
+    """Where no cell has a value, there is no cell at the extreme, and so no status."""
+    summary = {"over": ["height"], "outputs": {"fall_time": ["argmin"]}}
+    found = sweep.run(build(axes={"v0": [0.0, 1.0], "height": [-1.0, -2.0]}, summary=summary), progress=False)
+    assert "fall_time_argmin_status none" in " ".join(result_text("x.h5", found).split())
+    assert "PENDING" not in result_text("x.h5", found)
