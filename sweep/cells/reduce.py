@@ -290,11 +290,11 @@ def _reductions(study: Study, field: Field, own: Rows) -> Iterator[Variable]:
             at, status = own[f"{reduction[3:]} at"], own[f"{reduction[3:]} status"]
             for name in over:
                 yield from _place(study, reduction, name, at, about)
-            attrs = {**next(c.attrs for c in schema.columns(study) if c.name == schema.STATUS)}
-            attrs["flag_values"] = np.append(np.int8(-1), attrs["flag_values"])
-            attrs["flag_meanings"] = f"none {attrs['flag_meanings']}"
-            attrs["long_name"] = f"status of the cell at the {about}; none where no cell has a value"
-            yield f"{reduction}_status", np.where(none, np.int8(-1), status), (), attrs
+            flags = dict(next(c.attrs for c in schema.columns(study) if c.name == schema.STATUS))
+            flags["flag_values"] = np.append(np.int8(-1), flags["flag_values"])
+            flags["flag_meanings"] = f"none {flags['flag_meanings']}"
+            flags["long_name"] = f"status of the cell at the {about}; none where no cell has a value"
+            yield f"{reduction}_status", np.where(none, np.int8(-1), status), (), flags
 
 
 def _place(study: Study, reduction: str, name: str, at: Any, about: str) -> Iterator[Variable]:

@@ -107,6 +107,8 @@ class Checked:
     def __init__(self, dataset: xr.Dataset, sample: int, seed: int, allow_import: bool) -> None:
         if sample < 1:
             raise SweepError(f"sample: expected 1 or more, found {sample}")
+        if seed < 0:
+            raise SweepError(f"seed: expected 0 or more, found {seed}")
         ok = np.flatnonzero(statuses_of(dataset).values == Status.OK)
         if not len(ok):
             raise SweepError("no cell is OK, so there is nothing to check")
