@@ -207,7 +207,7 @@ def _require(dataset: xr.Dataset, study: Study, names: Sequence[str], tolerance:
     if study.design == "product" and any(len(axis) < 2 or (np.diff(axis.values) <= 0).any() for axis in axes):
         raise SweepError("an axis to be refined needs at least two values, in rising order")
     for name in names:
-        if name not in dataset or dataset[name].dims != dataset[STATUS].dims:
+        if name not in study.outputs or name not in dataset or dataset[name].dims != dataset[STATUS].dims:
             raise SweepError(f"{name}: is no output of one value a cell")
     if bool((dataset[STATUS] == Status.PENDING).any()):
         raise SweepError("the sweep is not finished; run it to its end first")

@@ -135,6 +135,8 @@ def diff(a: xr.Dataset, b: xr.Dataset, rtol: float = 0.0) -> Difference:
     """
     require_dataset("diff", a)
     require_dataset("diff", b)
+    if not rtol >= 0.0:
+        raise SweepError(f"rtol: expected 0 or more, found {rtol:g}")
     kernels = [str(d.attrs.get("kernel", "")) for d in (a, b)]
     if kernels[0] != kernels[1]:
         raise SweepError(f"the results are of different kernels, {kernels[0]} and {kernels[1]}")

@@ -104,6 +104,8 @@ def test_what_is_no_cell_is_refused(clocks):
         clocks.assign_coords(phi0=clocks.phi0.assign_attrs(units="degree")).sweep.check()
     with pytest.raises(sweep.SweepError, match="phi0"):
         clocks.drop_vars("phi0").sweep.check()
+    with pytest.raises(sweep.SweepError, match="seed"):
+        clocks.sweep.check(seed=-1)
     with pytest.raises(sweep.SweepError, match="OK"):
         clocks.where(False, drop=False).assign(status=clocks.status * 0 + 64).sweep.check()
     summary = sweep.run(

@@ -211,6 +211,8 @@ def test_traces_are_kept_for_every_cell():
     ("axes", "keys", "options", "word"),
     [
         ({}, {}, {"y": "periods"}, "periods"),
+        ({}, {}, {"y": "status"}, "no output"),
+        ({}, {}, {"y": ["period", "mu"]}, "no output"),
         ({}, {}, {"tolerance": 0.0}, "between 0 and 1"),
         ({"method": ["auto"]}, {}, {}, "number axes"),
         ({"mu": [2.0, 1.0]}, {}, {}, "rising"),

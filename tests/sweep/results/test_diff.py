@@ -103,3 +103,10 @@ def test_cells_of_large_results_are_found_wherever_they_are():
     assert found.outputs["time"].example == "e.g. x=1.0 y=5.0"
     assert account(other).statuses == {"OK": 5_999_999, "BAD_INPUT": 1}
     assert account(other).examples == {"BAD_INPUT": {"x": "3.0", "y": "7.0"}}
+
+
+@pytest.mark.parametrize("rtol", [-1.0, np.nan])
+def test_a_tolerance_that_is_none_is_refused(result, rtol):
+    """By NaN any two results would be the same, by -1 a result would differ from itself."""
+    with pytest.raises(sweep.SweepError, match="rtol"):
+        sweep.diff(result, 2.0 * result, rtol=rtol)
