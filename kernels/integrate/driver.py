@@ -138,7 +138,7 @@ def started(m, cell):
     So is the first one, but where the start is just behind a switch there, whose jump takes the motion on through it.
     """
     side = 0.0 * cell.flips + 1.0
-    one, parameters, off = 0.0 * side + 1.0, cell.parameters, missed_by(m, cell.shake)
+    one, parameters, off = 0.0 * side + 1.0, cell.parameters, -m.roundings * cell.shake
     state = tuple(u + 0.0 * side for u in m.started(parameters, side))
     signs, on = settled(m, state, side, parameters, one, tuple(0.0 * side for sign in cell.signs[:-1]))
     mode = Mode(side, signs, parameters, False)

@@ -15,6 +15,7 @@ from kernels.lanes.jit import COMPILED
 sys.path.append(str(Path(__file__).parents[3] / "benchmarks" / "honesty"))
 from columns import solve
 from families import FAMILIES, judged
+from family import scene
 
 CELLS = 40
 WIDE, TIGHT, BOTH = (-9, -3), (-11, -9.5), (-11, -3)
@@ -105,3 +106,19 @@ def test_runs_that_meet_again_behind_chaos_are_not_believed():
     cell = {"g": np.array([0.48296410607714096]), "T": np.array([182.57927549973576]), "flips": np.ones(1)}
     outputs, status = solve(FAMILIES["chaos"].kernel, "dopri5", rtol=np.array([4.5711548553949307e-4]), **cell)
     assert status[0] == Status.INACCURATE or abs(outputs["x"][0] - 1.13833503) < 1e-3
+
+
+@pytest.mark.skipif(not COMPILED, reason="thousands of steps")
+@pytest.mark.parametrize("method", ["dop853", "rodas5p"])
+def test_a_difference_that_no_step_moves_any_more_is_not_believed(method):
+    """x' = k (a - x), where x - a is a few roundings of x, so that no step changes x; y' = x - a shows it."""
+    kernel = scene("stopped", "x y t", "a d k T", lambda x, a, k: (k * (a - x), x - a, 1.0), lambda t, T: T - t,
+                   lambda a, d: (a + d, 0.0, 0.0))  # fmt: skip
+    random, count = np.random.default_rng(3), 400
+    a, d, k, T = 10.0 ** random.uniform([[6], [-6], [-1], [-0.3]], [[10], [2], [1], [0.7]], (4, count))
+    rtol, d = 10.0 ** random.uniform(-13, -3, count), (a + d) - a
+    outputs, status = solve(kernel, method, a=a, d=d, k=k, T=T, flips=1.0, rtol=rtol)
+    y = -d * np.expm1(-k * T) / k
+    good = status == Status.OK
+    assert good.sum() > 10
+    assert (abs(outputs["y"] - y) <= rtol * abs(y))[good].all()
