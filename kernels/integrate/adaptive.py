@@ -133,7 +133,7 @@ def to_event(pair, cell, mode, active):
             shorter = where(other, part * h, shorter)
             shorter = where(loose, h * where(part < 0.9, 1.05 * part, 0.5), shorter)
             bend = magnitude(length * last_rate - length * rate) / length
-            turns = slope * slope * length <= 2.0 * of_event(margins, which) * bend
+            turns = not_(magnitude(slope) * length > 2.0 * of_event(margins, which) * (bend / magnitude(slope)))
             hangs = hangs | (curved & not_(other | loose) & turns)
             new, taken = choose(seeking, found, new), where(seeking, part * h, taken)
             again = again | other | loose

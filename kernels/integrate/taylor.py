@@ -239,7 +239,9 @@ def crossing(at, curve, event, facts, extent, h, tolerance, searching):
     facts : coefficients 0 to 3 of the event
     extent : what its value is made of, in size, which near 0 is more than the value: the series are right to a share
     """
-    offset, factor = event
+    whole = fma(h, fma(h, magnitude(facts[2]), magnitude(facts[1])), extent)
+    scale = pow2(-exponent(where((whole > TINY) & (whole < 1.0 / TINY), whole, 1.0)))  # or its squares would underflow
+    offset, factor, extent = event[0] * scale, event[1] * scale, extent * scale
     before, enough = 0.0 * h, 0.01 * tolerance + 1e-17
     low, high, t, left = 0.0 * h, h, foreseen(*facts, h), searching
     rate, bend = 0.0 * h, 0.0 * h

@@ -122,3 +122,18 @@ def test_a_difference_that_no_step_moves_any_more_is_not_believed(method):
     good = status == Status.OK
     assert good.sum() > 10
     assert (abs(outputs["y"] - y) <= rtol * abs(y))[good].all()
+
+
+@pytest.mark.skipif(not COMPILED, reason="thousands of steps")
+@pytest.mark.parametrize("method", ["taylor", "dop853"])
+def test_a_linear_oscillator_is_right_at_any_size(method):
+    kernel = scene("sized", "x v", "size w", lambda x, v, w: (v, -w * w * x), lambda x, side: side * x,
+                   lambda size: (size, 0.0))  # fmt: skip
+    random, count = np.random.default_rng(3), 400
+    size, w = 10.0 ** random.uniform([[-270], [-1]], [[270], [1]], (2, count))
+    rtol, flips = 10.0 ** random.uniform(-11, -3, count), random.integers(1, 6, count).astype(float)
+    outputs, status = solve(kernel, method, size=size, w=w, flips=flips, rtol=rtol)
+    good, time = status == Status.OK, (flips - 0.5) * np.pi / w
+    assert good.mean() > 0.95
+    assert (abs(outputs["time"] / time - 1.0) <= rtol)[good].all()
+    assert (abs(abs(outputs["v"] / (size * w)) - 1.0) <= rtol)[good].all()
