@@ -25,7 +25,7 @@ from dataclasses import replace
 import numpy as np
 
 from kernels.codegen.accumulated import to_rest
-from kernels.codegen.compiled import runner
+from kernels.codegen.compiled import runner, written_of
 from kernels.codegen.followed import followed, off_by_roundings, put, status_of
 from kernels.codegen.record import record
 from kernels.expression.graph import SceneError
@@ -56,6 +56,9 @@ OF_A_STEP = 0.25
 """Tolerance of a step over the one of the whole motion: errors of some steps may add up."""
 SMALLER, SMALLEST = 4.0, 1e-5
 """By how much less than what would do a second tolerance is, and the least share of the first one that is tried."""
+NEAR_POWERS = 0.125
+"""The tolerance of three runs by series, over rtol, where there are powers: on the way to the kink of one, and from it,
+steps are many, and err to one side."""
 SLIDERS = {"taylor": ("dop853", "rodas5p")}
 """Methods by which a method follows what slides along a kink, where that is not itself."""
 
@@ -125,7 +128,9 @@ def by_runs(one, columns, rtol, tightest=0.0, stops=None):
     `tightest`; where that breaks off too, as of what is stiff, with one between. Runs that were LOST, and then differ
     by much less than their tolerances say, may have met again only where motions of all sorts end: INACCURATE.
     """
-    found = _, status, error = three_runs(one, columns, rtol, rtol, stops)
+    by_series_of_powers = one.order is None and written_of(one.scene)[0].graph.powers
+    steps = NEAR_POWERS * rtol if by_series_of_powers else rtol
+    found = _, status, error = three_runs(one, columns, steps, rtol, stops)
     left, last = np.flatnonzero(some_stop(np.isin(status, TRIED_AGAIN) & (rtol >= ROUNDING))), 0.0 * rtol
     for tighter in (np.minimum(TIGHT, TIGHTER * rtol), BETWEEN * rtol):
         steps = np.maximum(tighter, tightest)

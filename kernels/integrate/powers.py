@@ -14,7 +14,6 @@ are right, and what hangs on u is off by less than u times that time. Generic in
 
 from collections import namedtuple
 
-from kernels.integrate.taylor import SLACK
 from kernels.lanes.jit import jit_call
 from kernels.lanes.symbols import symbolic
 from kernels.lanes.tuples import all_of, joined, times
@@ -24,6 +23,8 @@ from kernels.maths.elementary import power
 UNEVEN = 0.25
 """d of (1), at most."""
 FAR = 1e300
+REST = 0.1
+"""Of the margin of u, that below which it does not matter where u is on its way to rest: the motion may end before."""
 SHORT = 0.9
 """Of the way to rest, that a step may take: at the end of it the series may turn round instead."""
 
@@ -61,7 +62,7 @@ def core(p, state, mode, unit, tolerance, on, t, margins):
     core, longest, coarse = nothing - 1.0, nothing + FAR, times(nothing, state)
     nears = p.of_kink(joined((0.0,), mode.signs)) * p.of_base(full) < 0.0
     if any_lane(nears):
-        core, longest, coarse = towards(p, state, mode, unit, tolerance, t, n, base, value, full, margin, nears)
+        core, longest, coarse = towards(p, state, mode, unit, tolerance, n, base, value, full, margin, nears)
     if any_lane(leaves):
         behind = away(p, state, mode, unit, tolerance, n)
         core, longest, coarse = choose(leaves, behind, (core, longest, coarse))
@@ -69,7 +70,7 @@ def core(p, state, mode, unit, tolerance, on, t, margins):
 
 
 @symbolic
-def towards(p, state, mode, unit, tolerance, t, n, base, value, full, margin, nears):
+def towards(p, state, mode, unit, tolerance, n, base, value, full, margin, nears):
     """`core`, how far a step may go, and what is left out, where u comes to 0."""
     nothing = 0.0 * mode.side
     bare = p.rates(state, mode, unit, nothing)
@@ -82,8 +83,7 @@ def towards(p, state, mode, unit, tolerance, t, n, base, value, full, margin, ne
     at_kink = p.of_base(p.rates(p.without(state, mode), mode, unit, nothing))
     settles = nears & (at_kink <= 0.0) & (at_kink >= 0.0) & (n < 1.0)
     left = t_base / (1.0 - n)
-    # so little is left of u that its way to rest does not matter
-    rests = settles & ((SLACK * base * left <= margin * (t + left)) | (base <= SLACK * margin))
+    rests = settles & (base <= REST * margin)
     core = where(rests, value * (1.0 - n), where(inside, mean_power(value, n), -1.0))
     longest = where(settles & not_(rests), SHORT * left, FAR)
     return core, longest, tuple(where(inside, x, 0.0) for x in left_out)

@@ -100,3 +100,30 @@ def test_what_a_tighter_tolerance_can_do_a_wider_one_does_not_refuse():
         outputs, status = solve(RICH, "dop853", [1e5], 1.0, a=1e5, flips=1.0, rtol=rtol)
         assert status[0] == Status.OK
         assert relative_error(outputs["time"], [1 + mpf(10) ** -5])[0] < max(rtol, 1e-13)
+
+
+def test_on_its_way_to_rest_a_speed_is_right_up_to_the_end():
+    """v' = -abs(v)^n sign v rests after v0^(1 - n)/(1 - n)."""
+    kernel = scene_kernel(
+        name="halting", doc="what drag alone brings to rest", states=fields("v"), parameters=fields("n", "end"),
+        rates=lambda v, n: -power(abs(v), n) * sign(v), surface=lambda t, end: end - t, start=lambda: 2.0,
+    )  # fmt: skip
+    n, rtol, left = map(np.ravel, np.meshgrid([0.3, 0.5, 0.7], [1e-5, 1e-6, 1e-7], 10.0 ** -np.linspace(1.0, 8.0, 30)))
+    end = 2.0 ** (1.0 - n) / (1.0 - n) * (1.0 - left)
+    outputs, status = solve(kernel, "taylor", n, end, flips=1.0, rtol=rtol)
+    power_left = [mpf(2) ** (1 - mpf(m)) - (1 - mpf(m)) * mpf(t) for m, t in zip(n, end, strict=True)]
+    truth = np.array([p ** (1 / (1 - mpf(m))) for p, m in zip(power_left, n, strict=True)], float)
+    good = status == Status.OK
+    assert good.mean() > 0.9
+    assert (abs(outputs["v"] - truth) / 2.0 < rtol)[good].all()
+
+
+@pytest.mark.skipif(not COMPILED, reason="a thousand cells")
+def test_at_wide_tolerances_errors_near_the_kinks_of_a_power_do_not_add_up_unseen(swing):
+    random = np.random.default_rng(5)
+    n, flips = random.uniform(0.5, 2.0, 1500), np.floor(random.uniform(5.0, 9.0, 1500))
+    rtol = 10.0 ** random.uniform(-4.6, -3.0, 1500)
+    outputs, status = solve(swing, "taylor", n, 1.0, 0.0, flips, rtol=rtol)
+    assert (status == Status.OK).mean() > 0.99
+    speed = np.sqrt(2.0 / (n + 1.0))
+    assert (abs(abs(outputs["v"]) / speed - 1.0) < rtol)[status == Status.OK].all()
