@@ -104,10 +104,9 @@ def positive_axis(y: xr.DataArray, dim: str, repeated: bool = False) -> tuple[st
     known = [str(name) for name, coordinate in y.coords.items() if coordinate.ndim == 1]
     if dim not in known:
         there = f"; {title(y)} runs along {', '.join(known) or 'no axis with values'}"
-        none = f"{title(y)} has no axis {dim!r}" + (did_you_mean(dim, known) or there)
-        raise SweepError(
-            f"{dim} has one value here, so nothing can be fitted along it{there}" if dim in y.coords else none
-        )
+        if dim in y.coords:
+            raise SweepError(f"{dim} has one value here, so nothing can be fitted along it{there}")
+        raise SweepError(f"{title(y)} has no axis {dim!r}" + (did_you_mean(dim, known) or there))
     values = y.coords[dim].values
     if values.dtype.kind in "mM":
         since = f" since a moment before the first, ({dim} - MOMENT)" if values.dtype.kind == "M" else f", {dim}"

@@ -31,8 +31,7 @@ def slopes(t: Array, z: Array, points: int) -> Array:
 
 def slope_bounds(t: Array, bound: Array, points: int) -> Array:
     """How far errors up to `bound` (..., n) in the values can move each slope of `slopes`; lines without gaps."""
-    found: Array = bound @ abs(_matrix(t, points)).T
-    return found
+    return np.asarray(bound @ abs(_matrix(t, points)).T)
 
 
 def by_runs(t: Array, function: Callable[..., Array], *lines: Array) -> Array:

@@ -91,8 +91,7 @@ class Regression(NamedTuple):
             middle = (inside + outside) / 2
             further = dense(middle)
             inside, outside = np.where(further, middle, inside), np.where(further, outside, middle)
-        ends: Array = best + sides * inside
-        return ends
+        return np.asarray(best + sides * inside)
 
 
 def regress(
@@ -164,8 +163,7 @@ def _sums(phi: Array, x: Array, y: Array) -> tuple[Array, Array, Array]:
     def products(a: Array, b: Array) -> Array:
         over, both, by_phi = a.transpose(0, 2, 1), [0, -1], phi[:, None, None, None]
         pairs, whole = over[:, :, 1:] @ b[:, :-1] + over[:, :, :-1] @ b[:, 1:], over @ b
-        found: Array = whole + by_phi**2 * (whole - over[:, :, both] @ b[:, both]) - by_phi * pairs
-        return found
+        return np.asarray(whole + by_phi**2 * (whole - over[:, :, both] @ b[:, both]) - by_phi * pairs)
 
     factor = np.linalg.cholesky(products(x, x))
     solved = np.linalg.solve(factor, products(x, y))
@@ -232,8 +230,7 @@ def roughness(t: Array, z: Array) -> tuple[Array, Array]:
 def shaped(t: Array, off: Array) -> NDArray[np.bool_]:
     """Whether distances (..., n), t rising, are no independent noise: neighbours say more of each other than they do in
     all but 0.1 % of it, by trial at 12 to 200 points."""
-    found: NDArray[np.bool_] = roughness(t, off)[1] < 1 - 3.4 / math.sqrt(t.size)
-    return found
+    return np.asarray(roughness(t, off)[1] < 1 - 3.4 / math.sqrt(t.size))
 
 
 def scatters(t: Array, z: Array, off: Array, numbers: int, noise: bool | str | None) -> NDArray[np.bool_]:
@@ -249,5 +246,4 @@ def scatters(t: Array, z: Array, off: Array, numbers: int, noise: bool | str | N
 def rounding(t: Array, z: Array) -> Array:
     """What rounding of both coordinates leaves of lines (..., n)."""
     slope = abs(z[..., -1] - z[..., 0]) / abs(t[-1] - t[0])
-    found: Array = EPSILON * (1.0 + abs(z).max(axis=-1) + slope * abs(t).max())
-    return found
+    return np.asarray(EPSILON * (1.0 + abs(z).max(axis=-1) + slope * abs(t).max()))

@@ -165,8 +165,7 @@ def _widened(t: Array, z: Array, best: Array, low: Array, high: Array) -> tuple[
 def _above(tried: Iterable[Found]) -> Array:
     """AICc and BIC of laws above the least (laws, 2). A law is ruled out if both are beyond BEYOND_DOUBT."""
     criteria = np.array([law.criteria for law in tried])
-    above: Array = criteria - criteria.min(axis=0)
-    return above
+    return np.asarray(criteria - criteria.min(axis=0))
 
 
 def _verdict(t: Array, tried: dict[str, Found]) -> tuple[str, float]:
