@@ -65,6 +65,48 @@ def fit_collapse(y: xr.DataArray, dim: str, over: str, *, sigma: Any = None, con
     1.500
     """
     check_options(confidence)
+    points, count = _points(y, dim, over, sigma)
+    t, size, _, _ = points
+    # exponents that leave neighbours in L with something in common, and no more than 8
+    most = min(8.0, 0.9 * float(np.ptp(t)) / float(np.diff(np.unique(size)).min()))
+    start = _common(points, *np.linspace(-most, most, 81)).numbers[0]
+    # the points that lie, in x / L^a, between the first and the last of another curve
+    u, inside = t - start * size, np.zeros(t.size, dtype=bool)
+    for own in (size == one for one in np.unique(size)):
+        inside |= ~own & (u >= u[own].min()) & (u <= u[own].max())
+    if (among := int(inside.sum())) < FEWEST_POINTS:
+        raise SweepError(
+            f"of {count} points {among} lie among those of another curve; at least {FEWEST_POINTS} are needed"
+        )
+    t, size, z, _ = points = points[:, inside]
+    far = 0.3 * (1 + abs(start))
+    found = _common(points, *np.linspace(start - far, start + far, 41))
+    off, exact = found.off, 1e-6 * (1 + np.ptp(z)) if sigma is None else 0.0
+    moved = [_common(points, found.numbers[0] + by) for by in (-0.25, 0.25)]
+    if any(one.deviance < found.deviance + 12 or abs(one.off).max() < 1e-4 * exact for one in moved):
+        raise SweepError(
+            "the curves collapse for any exponents of x: f is a power law, so a and b are not determined apart"
+        )
+    # whether a level, a slope and a bow of each curve describe the points far better than the common one
+    u, sizes = t - t.mean(), np.unique(size)[1:, None]
+    own = np.concatenate([(size == sizes) * u**power for power in range(3)]).T
+    basis = np.linalg.qr(found.jacobian)[0]
+    left, moves, _ = np.linalg.svd(own - basis @ (basis.T @ own), full_matrices=False)
+    own = left[:, moves > 1e-6 * moves.max()][:, : max(0, off.size - basis.shape[1] - 3)]
+    ends, _, denied = found.beside(np.arange(float(off.size)), "correlated", confidence, own)
+    fits = not denied or abs(off).max() <= exact
+    result = xr.Dataset({"scatter": np.sqrt(np.mean(off**2)), "points": off.size, "dropped": count - off.size})
+    for number, name in enumerate(("x_exponent", "y_exponent")):
+        low, high = ends[:, number] if fits else (math.nan, math.nan)
+        result = result.assign({name: found.numbers[number], f"{name}_low": low, f"{name}_high": high})
+    result = result.assign(fits=int(fits), verdict="one curve" if fits else "not one curve")
+    law = f"{title(y)} = {over}^b f({dim} / {over}^a)"
+    return described(result.assign_attrs(law=law, y=title(y), x=dim, over=over, confidence=confidence), y[dim], y)
+
+
+def _points(y: xr.DataArray, dim: str, over: str, sigma: Any) -> tuple[Array, int]:
+    """Of the points that are there, one curve behind the other, ln x, ln L, ln y and its standard error, NaN where that
+    is not known (4, n); and how many could be."""
     check_output(y)
     if y.ndim != 2 or {dim, over} != {str(d) for d in y.dims}:
         raise SweepError(f"a collapse takes one output along {dim} and {over}, and nothing else; choose with .sel")
@@ -75,48 +117,12 @@ def fit_collapse(y: xr.DataArray, dim: str, over: str, *, sigma: Any = None, con
     z, errors = (part.transpose(over, dim).values[:, order] for part in (log_of(y), relative_sigma(y, sigma)))
     curve, place = np.nonzero(np.isfinite(z) & (np.isfinite(errors) | (sigma is None)))
     if place.size < FEWEST_POINTS:
-        few = f"a collapse needs at least {FEWEST_POINTS} positive points of {title(y)}, found {place.size}"
-        raise SweepError(few)
-    points = np.stack([t[order][place], np.log(sizes)[curve], z[curve, place], errors[curve, place]])
-    # exponents that leave neighbours in L with something in common, and no more than 8
-    most = min(8.0, 0.9 * float(np.ptp(points[0])) / float(np.diff(np.unique(points[1])).min()))
-    start = _common(points, *np.linspace(-most, most, 81)).numbers[0]
-    # the points that lie, in x / L^a, between the first and the last of another curve
-    u, inside = points[0] - start * points[1], np.zeros(place.size, dtype=bool)
-    for own in (points[1] == size for size in np.unique(points[1])):
-        inside |= ~own & (u >= u[own].min()) & (u <= u[own].max())
-    if (among := int(inside.sum())) < FEWEST_POINTS:
-        raise SweepError(
-            f"of {z.size} points {among} lie among those of another curve; at least {FEWEST_POINTS} are needed"
-        )
-    points, far = points[:, inside], 0.3 * (1 + abs(start))
-    found = _common(points, *np.linspace(start - far, start + far, 41))
-    off, exact = found.off, 1e-6 * (1 + np.ptp(points[2])) if sigma is None else 0.0
-    moved = [_common(points, found.numbers[0] + by) for by in (-0.25, 0.25)]
-    if any(one.deviance < found.deviance + 12 or abs(one.off).max() < 1e-4 * exact for one in moved):
-        raise SweepError(
-            "the curves collapse for any exponents of x: f is a power law, so a and b are not determined apart"
-        )
-    # whether a level, a slope and a bow of each curve describe the points far better than the common one
-    u, sizes = points[0] - points[0].mean(), np.unique(points[1])[1:, None]
-    own = np.concatenate([(points[1] == sizes) * u**power for power in range(3)]).T
-    basis = np.linalg.qr(found.jacobian)[0]
-    left, moves, _ = np.linalg.svd(own - basis @ (basis.T @ own), full_matrices=False)
-    own = left[:, moves > 1e-6 * moves.max()][:, : max(0, off.size - basis.shape[1] - 3)]
-    ends, _, denied = found.beside(np.arange(float(off.size)), "correlated", confidence, own)
-    fits = not denied or abs(off).max() <= exact
-    result = xr.Dataset({"scatter": np.sqrt(np.mean(off**2)), "points": off.size, "dropped": z.size - off.size})
-    for number, name in enumerate(("x_exponent", "y_exponent")):
-        low, high = ends[:, number] if fits else (math.nan, math.nan)
-        result = result.assign({name: found.numbers[number], f"{name}_low": low, f"{name}_high": high})
-    result = result.assign(fits=int(fits), verdict="one curve" if fits else "not one curve")
-    law = f"{title(y)} = {over}^b f({dim} / {over}^a)"
-    return described(result.assign_attrs(law=law, y=title(y), x=dim, over=over, confidence=confidence), y[dim], y)
+        raise SweepError(f"a collapse needs at least {FEWEST_POINTS} positive points of {title(y)}, found {place.size}")
+    return np.stack([t[order][place], np.log(sizes)[curve], z[curve, place], errors[curve, place]]), z.size
 
 
 def _common(points: Array, *a: float) -> Found:
-    """The common curve, a polynomial in ln(x / L^a), for the best a between the first and last of tries; of points
-    ln x, ln L, ln y and its standard error, NaN where that is not known (4, n), one curve behind the other."""
+    """The common curve, a polynomial in ln(x / L^a), for the best a between the first and last of tries."""
     t, size, z, errors = points
     degree, about = min(MOST_DEGREE, max(3, z.size // 7)), size - size.mean()
 
