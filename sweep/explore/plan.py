@@ -17,6 +17,7 @@ from kernels.interface import machine_code_folder
 from sweep.cells.block import Guard, faults_reported
 from sweep.cells.grid import Grid
 from sweep.cells.reduce import strip_bytes
+from sweep.cells.sample import require_asked
 from sweep.cells.schema import METHOD_USED, STATUS, empty_cells, part
 from sweep.cells.solve import Solver
 from sweep.cells.timing import work_clock
@@ -171,7 +172,9 @@ def plan(
     2
     """
     keys: dict[str, Any] = {"isolate": isolate, "cell_timeout": cell_timeout, "note": note}
-    return Plan(Task(as_study(study), path, workers, progress=False, **keys))
+    task = Task(as_study(study), path, workers, progress=False, **keys)
+    require_asked(task.study)
+    return Plan(task)
 
 
 def _looked_at(study: Study, solver: Guard, seconds: float) -> tuple[dict[str, float], dict[str, float], int]:

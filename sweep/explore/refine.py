@@ -35,7 +35,8 @@ from sweep.file.disk import check_target
 from sweep.file.open import store_cells
 from sweep.results.filter import cells_at
 from sweep.results.statuses import statuses_of
-from sweep.runs.run import run
+from sweep.runs.loop import Task
+from sweep.runs.run import computed
 from sweep.study.model import Axis, Study, frozen
 from sweep.study.read import study as as_study
 from sweep.words import as_path, require_dataset
@@ -176,7 +177,7 @@ def refine(
     def solve(values: Mapping[str, Array]) -> xr.Dataset:
         """A round of cells; of one that an earlier call has computed, the file is there."""
         file = None if rounds is None else rounds / f"{next(numbers)}.h5"
-        with run(study_of(values), file, progress=file is not None, **options) as found:
+        with computed(Task(study_of(values), file, progress=file is not None, **options)) as found:
             return found.load()
 
     cells = Refiner(dataset, study, names, tolerance, most_cells, solve)
@@ -204,8 +205,10 @@ def _require(dataset: xr.Dataset, study: Study, names: Sequence[str], tolerance:
         raise SweepError("only a product of axes can be refined, or what was refined before")
     if len(axes) > MOST_AXES:
         raise SweepError(f"at most {MOST_AXES} axes can be refined, found {len(axes)}; fix the others")
-    if study.design == "product" and any(len(axis) < 2 or (np.diff(axis.values) <= 0).any() for axis in axes):
+    if study.design == "product" and any(len(axis) < 2 or not (np.diff(axis.values) > 0).all() for axis in axes):
         raise SweepError("an axis to be refined needs at least two values, in rising order")
+    if not all(np.isfinite(axis.values).all() for axis in axes):
+        raise SweepError("an axis to be refined needs finite values")
     for name in names:
         if name not in study.outputs or name not in dataset or dataset[name].dims != dataset[STATUS].dims:
             raise SweepError(f"{name}: is no output of one value a cell")

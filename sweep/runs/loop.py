@@ -22,7 +22,6 @@ from sweep.cells.block import Bench, Done, Found
 from sweep.cells.fingerprint import fingerprint
 from sweep.cells.partition import Partition
 from sweep.cells.reduce import output_schema
-from sweep.cells.sample import require_asked
 from sweep.cells.schema import Schema
 from sweep.cells.timing import Sample, cut, sampled_study, work_clock
 from sweep.errors import SweepError, missing
@@ -91,7 +90,6 @@ class Task:
         self.isolate = self.isolate or self.limit is not None
         if self.cluster is not None and self.workers is not None:
             raise SweepError("workers, cluster: a cluster brings its own workers; give one of the two")
-        require_asked(self.study)
         if self.path is None and self.until is not None:
             raise SweepError("until: give a path as well, or what is computed by then would be lost")
         if self.extend and self.retry_failed:

@@ -15,6 +15,7 @@ import numpy as np
 
 from sweep.cells.fingerprint import difference
 from sweep.cells.reduce import gathered
+from sweep.cells.sample import require_asked
 from sweep.cells.schema import empty, ending, now, part
 from sweep.errors import SweepError
 from sweep.file import disk
@@ -116,7 +117,13 @@ def run(
             hint = did_you_mean(key, [*options, *KEYS]) or f"; a study has {listed(KEYS, word='and')}"
             raise SweepError(f"sweep.run: no such keyword {key}{hint}")
     task = Task(as_study(study, **keys), path, **options)
-    if path is None:
+    require_asked(task.study)
+    return computed(task)
+
+
+def computed(task: Task) -> xr.Dataset:
+    """What `run` gives; its study may ask for none of its cells, as one round of a refinement does."""
+    if task.path is None:
         return _in_memory(task)
     outcome = _to_file(task)
     if outcome == "not begun":
@@ -126,7 +133,9 @@ def run(
 
 def complete(study: Study, path: str | os.PathLike[str], **options: Any) -> Ending:
     """Runs as `run` does, and opens nothing."""
-    return _to_file(Task(study, path, **options))
+    task = Task(study, path, **options)
+    require_asked(study)
+    return _to_file(task)
 
 
 def _in_memory(task: Task) -> xr.Dataset:

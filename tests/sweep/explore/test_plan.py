@@ -28,10 +28,10 @@ def test_a_plan_forecasts_bytes_that_a_run_then_takes(tmp_path, keys):
 
 def test_a_plan_forecasts_the_time_of_a_run(monkeypatch):
     """By a clock on which a cell takes two milliseconds, and nothing else takes any."""
-    now = [0.0]
+    plan, now = sweep.plan, [0.0]  # imported before the clock is another
     monkeypatch.setattr("slow.time", SimpleNamespace(sleep=lambda seconds: now.append(now[-1] + seconds)))
     monkeypatch.setattr("sweep.cells.timing.work_clock", lambda: now[-1])
-    found = sweep.plan(build(kernel="slow:SLOW", axes={"height": np.arange(1.0, 1001)}), workers=2)
+    found = plan(build(kernel="slow:SLOW", axes={"height": np.arange(1.0, 1001)}), workers=2)
     assert found.cell_seconds == pytest.approx(2e-3)
     assert found.seconds == pytest.approx(1.0, abs=0.2)
 

@@ -5,6 +5,7 @@ import signal
 
 import numpy as np
 import pytest
+import xarray as xr
 from scipy.interpolate import LinearNDInterpolator
 from toy import KERNEL as TOY
 from toy import exact
@@ -217,6 +218,8 @@ def test_traces_are_kept_for_every_cell():
         ({"method": ["auto"]}, {}, {}, "number axes"),
         ({"mu": [2.0, 1.0]}, {}, {}, "rising"),
         ({"mu": [1.0]}, {}, {}, "two values"),
+        ({"mu": [1.0, np.nan]}, {}, {}, "rising"),
+        ({"mu": [1.0, np.inf]}, {}, {}, "finite"),
         ({}, {"design": "zip"}, {}, "product"),
         ({}, {"summary": {}}, {}, "no cells"),
         ({name: [0.1, 0.2] for name in ("R", "c", "k", "a", "n")}, {}, {}, "at most 5 axes"),
@@ -228,6 +231,16 @@ def test_what_cannot_be_refined_is_told(axes, keys, options, word):
     ds = sweep.run(kernel="foliot", axes=axes, fixed=fixed, outputs=["period"], **keys)
     with pytest.raises(sweep.SweepError, match=word):
         sweep.refine(ds, **{"y": "period", "tolerance": 0.1, **options})
+
+
+def test_where_a_condition_does_not_hold_no_cell_is_solved():
+    """A round of cuts may lie beyond its border as a whole."""
+    ds = sweep.run(kernel="foliot", outputs=["period"], axes={"mu": [1.0, 2.0, 3.0]}, fixed=FIXED, where="mu > 1.5")
+    found = sweep.refine(ds, "period", 1e-3)
+    asked = found.dataset.mu > 1.5
+    assert (found.dataset.status == xr.where(asked, Status.OK, Status.NOT_ASKED)).all()
+    assert asked.sum() > 3
+    assert found.error < 1e-3
 
 
 def test_the_bits_do_not_depend_on_workers_or_on_a_file(tmp_path):
