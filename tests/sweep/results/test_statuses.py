@@ -41,6 +41,8 @@ def test_a_status_that_is_none_is_failed_with_the_exit_status_of_that(number, tm
         with sweep.open_result("s.h5") as found:
             assert found.status.values.tolist() == [Status.FAILED if h == number else h for h in heights]
             assert np.isnan(found.fall_time).values.tolist() == [h >= 64 or h == number for h in heights]
+    assert main(["show", "s.h5"]) == 0
+    assert "gave no number or status" in " ".join(capsys.readouterr().out.split())
 
 
 def test_the_results_of_a_folder_are_listed_with_what_became_of_them(tmp_path):
