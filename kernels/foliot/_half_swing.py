@@ -45,7 +45,8 @@ _FORGOTTEN = 40.0
 """Y after which a motion that no force varies along the way is uniform, to exp(-40)."""
 _SCAN, _BISECTIONS = 32, 40
 _ARRIVED, _ROUNDED = 1e-12, 4e-15
-"""How far x may be from the switch for having reached it: so much, and so much of the largest x."""
+"""How far x may be from the switch for having reached it: so much, so much of the largest x, and what is left open of
+the time that the last step takes."""
 _CLEARLY = 0.01
 """Of the hairspring, what is missing at the switch so that no rounding and no tolerance brings the motion there."""
 _NEARER, _FARTHER = 0.8, 3.0
@@ -349,7 +350,8 @@ def half_swing(step, start, problem, tolerance, active):
             state, time = choose(uniform, (at_switch, time + coast), (state, time))
 
         # or from rest, helped, to where the drive wins again
-        stopped = inward & (state[0] + 1.0 > _ARRIVED + _ROUNDED * top)
+        near = fma(_ROUNDED, top, _ARRIVED) + _SETTLED * magnitude(h * state[1])
+        stopped = inward & (state[0] + 1.0 > near)
         if any_lane(stopped):
             free = _released(state[0], problem.inwards - _held_at(problem, floor), problem)
             state = choose(stopped, (free, zero, zero, zero, zero, zero, zero), state)
