@@ -34,9 +34,6 @@ HELP_LIMIT, STEP_LIMIT, _ROOT_LIMIT = 1000, 10_000, 60
 _SETTLED = 1e-9
 """Newton's step for the end of a leg, over the whole one, after which the next is the last."""
 _SAFETY, _SHRINK, _GROW = 0.9, 0.2, 5.0
-_SHARE, _ROUGH_SHARE, _SHARP_SHARE = 0.3, 0.1, 0.03
-"""Of rtol that a single step may take; the same for friction whose slope is not smooth at rest, where estimates of the
-error are too low; and where its degree is below 2 or torque varies: errors of v count more there."""
 _SMOOTHER = 4.0
 """Degree of drag from which a step that begins or ends at rest has an error below its estimate."""
 _FLOOR = 1e-4
@@ -55,14 +52,12 @@ estimate, in quadrature of a power of the time with exponents from -0.9 to 3."""
 _SLOW = 0.01
 """Of the tolerance, what is left out below the slow speed."""
 
-Problem = namedtuple(
-    "Problem", "e rho_s outwards inwards d gamma n kappa depth wave rtol floor share rough stiffness pace"
-)
+Problem = namedtuple("Problem", "e rho_s outwards inwards d gamma n kappa depth wave floor rough stiffness pace")
 """A cell by the terms of (1) and (2).
 
 outwards, inwards : 1 + rho, with which dry friction helps, and 1 - rho; wave = harmonic pi/2
 floor : speed below which power-law friction is constant
-share : of rtol that a single step may take; rough: whether friction's slope is not smooth at rest
+rough : whether friction's slope is not smooth at rest
 stiffness, pace : f'(V) and 1/V for the speed V at which friction balances the drive, within a factor of 2
 """
 
@@ -97,9 +92,8 @@ def problem_of(scene, ripple, rtol):
     whole = not_(nearest(n) > n) & not_(nearest(n) < n)
     rough = (gamma > 0.0) & (n < _SMOOTHER) & not_(whole)
     return Problem(
-        e, rho_s, 1.0 + rho, slack, d, gamma, n, kappa, depth, harmonic * (0.5 * math.pi), rtol,
+        e, rho_s, 1.0 + rho, slack, d, gamma, n, kappa, depth, harmonic * (0.5 * math.pi),
         floor=where(n < 1.0, _FLOOR * rtol / (1.0 + pace), 0.0),
-        share=where((depth > 0.0) | ((gamma > 0.0) & (n < 2.0)), _SHARP_SHARE, where(rough, _ROUGH_SHARE, _SHARE)),
         rough=rough, stiffness=d + n * slack * by_power, pace=pace,
     )  # fmt: skip
 

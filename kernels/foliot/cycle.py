@@ -10,9 +10,11 @@ stable; where the foliot does not come to it from rest at phi = 0, `segments` re
 spring; `taylor` and `dopri5`, which do what `segments` cannot, follow the cycle only and do not say so).
 """
 
-from kernels.foliot import _coulomb, _friction_quadrature, _taylor_swing, _viscous
-from kernels.foliot._integrated_swing import by_steps
+from kernels.foliot import _coulomb, _friction_quadrature, _viscous
+from kernels.foliot._integrated_swing import BY_DOPRI5, BY_SDIRK4
+from kernels.foliot._limit_cycle import method_by
 from kernels.foliot._linear_swing import segments
+from kernels.foliot._taylor_swing import BY_TAYLOR
 from kernels.foliot._units import UNITS, Foliot, drag_of, errors, spare_torque
 from kernels.interface import Field
 from kernels.lanes.codes import BAD_INPUT, NEVER_STARTS, NO_LIMIT_CYCLE, OK
@@ -81,9 +83,11 @@ FOLIOT = kernel(
                _friction_quadrature.quadrature, _friction_quadrature.bound, units=UNITS, excludes=("k",)),
         method("map", "exact map from switch to switch, iterated from rest",
                _viscous.event_map, _viscous.event_map_bound, **_VISCOUS),
-        _taylor_swing.by_taylor(Foliot._fields),
+        method_by(BY_TAYLOR, Foliot._fields),
         # `dopri5` sooner where `taylor` takes 1.04 to 5 times as long, in columns of 10,000 cells
-        *by_steps(lambda p, rtol: (rtol >= 1e-4) & (rtol <= 1e-2) & (p.n >= 1.0) & (p.n <= 6.0)),
+        method_by(BY_DOPRI5, Foliot._fields,
+                  lambda p, rtol: (rtol >= 1e-4) & (rtol <= 1e-2) & (p.n >= 1.0) & (p.n <= 6.0)),
+        method_by(BY_SDIRK4, Foliot._fields),
     ),
     example={"mu": 1.0, "phi0": 1.0, "a": 1.0},
 )  # fmt: skip

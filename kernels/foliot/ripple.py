@@ -12,9 +12,9 @@ Leaves out: the geometry of the pallets that makes the ripple. Source: as `folio
 
 import math
 
-from kernels.foliot._integrated_swing import by_steps
-from kernels.foliot._taylor_swing import by_taylor
-from kernels.foliot._units import Foliot
+from kernels.foliot._integrated_swing import BY_DOPRI5, BY_SDIRK4
+from kernels.foliot._limit_cycle import Cell, method_by
+from kernels.foliot._taylor_swing import BY_TAYLOR
 from kernels.foliot.cycle import FOLIOT, check
 from kernels.interface import Field
 from kernels.lanes.wiring import kernel
@@ -35,6 +35,6 @@ FOLIOT_RIPPLE = kernel(
     ),
     outputs=FOLIOT.outputs,
     check=check,
-    methods=(by_taylor((*Foliot._fields, "depth", "harmonic")), *by_steps()),
+    methods=tuple(method_by(manner, Cell._fields) for manner in (BY_TAYLOR, BY_DOPRI5, BY_SDIRK4)),
     example={"mu": 1.0, "phi0": 1.0, "a": 1.0, "depth": 0.3, "harmonic": 2.0},
 )  # fmt: skip
