@@ -15,6 +15,7 @@ import math
 import numpy as np
 
 from kernels.codegen.columns_algebra import eigenvalues, identity, largest, most, times
+from kernels.codegen.followed import put
 from kernels.codegen.limit_cycle import CLOSED, FOUND, jacobian, newton, settling
 from kernels.codegen.return_map import TIGHT
 from kernels.interface import Status
@@ -79,7 +80,7 @@ def described(search, swept, modes, asked, rtol, tight):
     for r in (cycles.r, tight):
         left = there & (unclear | ~(error <= rtol)) & ((r is not tight) | (cycles.r > tight))
         cells = np.flatnonzero(left & (cycles.r > r))
-        cycles.put(cells, newton(the_map, cycles.some(cells)._replace(r=r[cells]), search.swept))
+        put(cycles, cells, newton(the_map, cycles.some(cells)._replace(r=r[cells]), search.swept))
         error = by_differences(the_map.step, left)
         rough = ~(error <= np.maximum(rtol, ROUGHER / the_map.step * cycles.r))
         error = by_differences(SHORTER * the_map.step, left & rough)

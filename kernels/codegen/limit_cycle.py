@@ -16,6 +16,8 @@ from collections import namedtuple
 import numpy as np
 
 from kernels.codegen.columns_algebra import eigenvalues, identity, largest, most, solved
+from kernels.codegen.followed import put
+from kernels.codegen.return_map import rating
 from kernels.interface import FIRST_REFUSAL, Status
 
 LOOSE, WIDER = 1e-7, 4.0
@@ -66,12 +68,6 @@ class Cycles(namedtuple("Cycles", "parameters flips r z scale shift off rows slo
     def some(self, cells):
         """A copy of those cells."""
         return Cycles(*(column.take(cells, axis=-1) for column in self))
-
-    def put(self, cells, part, keep=slice(None)):
-        """Takes what has been found for these cells, or for some of them."""
-        kept = np.arange(len(cells))[keep]
-        for column, values in zip(self, part, strict=True):
-            column[..., cells[kept]] = values.take(kept, axis=-1)
 
 
 def jacobian(the_map, cycles, h, levels, swept=()):
@@ -128,7 +124,7 @@ def newton(the_map, cycles, swept=()):
         some.off[:] = np.where(right, np.maximum(most(abs(rho)), CLOSED * r), math.inf)
         step = settling(some.slopes, rho[:, None])[:, 0]
         far = most(abs(step))
-        best.put(left, some, some.off < best.off[left])
+        put(best, left, some, some.off < best.off[left])
         lost = ~((some.off < math.inf) & (far < math.inf))
         best.r[left[lost]] = np.minimum(WIDER * some.r[lost], LOOSE)
         onward = some.z[at] + some.scale[at] * step / np.maximum(1.0, far)
@@ -138,25 +134,6 @@ def newton(the_map, cycles, swept=()):
         before[left], left = some.off, left[~settled]
     best.z[held] = np.where(best.off < math.inf, best.rows[[1 + j for j in held]], best.z[held])
     return best._replace(multiplier=largest(*eigenvalues(best.slopes[1:, : len(at)])[:2]))
-
-
-def equilibrium(the_map, parameters, z, side, size):
-    """From states z: where the rates are 0, by Newton's method; how far off that is; whether motions come to it.
-
-    `size` : of the motion, not of what is left of it, to which the differences are in proportion
-    """
-    n, h = len(z), STEP * np.maximum(size, 1e-150)
-    for _ in range(ROUNDS):
-        J = np.empty((n, n, z.shape[1]))
-        for j in range(n):
-            up, down = z.copy(), z.copy()
-            up[j], down[j] = z[j] + h, z[j] - h
-            J[:, j] = (the_map.rates(parameters, up, side) - the_map.rates(parameters, down, side)) / (2.0 * h)
-        rates = the_map.rates(parameters, z, side)
-        J[range(n), range(n)] -= (J == 0.0).all(axis=1) & (rates == 0.0)  # what no rate changes stays
-        step = solved(J, rates[:, None])[:, 0]
-        z = z - step
-    return z, most(abs(step)), (eigenvalues(J)[0] < 0.0).all(axis=0)
 
 
 class Search:
@@ -245,7 +222,7 @@ class Search:
         else:
             some.status[:] = np.where(stable, Status.OK, Status.UNSTABLE)
             good &= stable | ~np.isin(before, FOUND)
-        self.cycles.put(left, some, good)
+        put(self.cycles, left, some, good)
         self.fades[left] = (moved <= NEAR) & (some.off <= NEAR) & (size < 1.0)
 
     def _doubled(self, left):
@@ -255,15 +232,27 @@ class Search:
         self.cycles.flips[left[self.cycles.status[left] != Status.PERIOD_2]] *= 0.5
 
     def _at_equilibrium(self, left):
-        """COMES_TO_REST where a motion ended closer to an equilibrium, at which it stays, than it was after a cycle."""
+        """COMES_TO_REST where a motion ended closer to an equilibrium, at which it stays, than it was after a cycle.
+
+        There the rates are 0, by Newton's method, with differences in proportion to the motion, not to what is left.
+        """
         if not len(left):
             return
         first, last = self._from_start(left, 1.0)[0], self.last[:, left]
-        parameters, size = self.cycles.parameters[:, left], most(np.fmax(abs(first), abs(last)))
+        parameters, rates = self.cycles.parameters[:, left], rating(self.map.own)
+        h = STEP * np.maximum(most(np.fmax(abs(first), abs(last))), 1e-150)
+        n, moves = len(last), np.multiply.outer(np.eye(len(last)), h)
         for side in (1.0, -1.0):
-            z, off, stays = equilibrium(self.map, parameters, last, side, size)
+            z = last
+            for _ in range(ROUNDS):
+                sides = ([rates(parameters, z + s * by, side) for by in moves] for s in (1.0, -1.0))
+                J, found = np.subtract(*sides).swapaxes(0, 1) / (2.0 * h), rates(parameters, z, side)
+                J[range(n), range(n)] -= (J == 0.0).all(axis=1) & (found == 0.0)  # what no rate changes stays
+                step = solved(J, found[:, None])[:, 0]
+                z = z - step
             far, near = (most(abs(x - z)) for x in (first, last))
-            known = (stays | self.fades[left]) & (off <= RESTS * (far + most(abs(z))))
+            known = self.fades[left] | (eigenvalues(J)[0] < 0.0).all(axis=0)
+            known &= most(abs(step)) <= RESTS * (far + most(abs(z)))
             self._rest(left, z, known & (near <= 0.5 * far))
 
     def _rest(self, left, z, rests):
@@ -317,7 +306,7 @@ class Search:
             near = (most(abs(off)) <= STRAIGHT) & (bent <= np.maximum(BENT * most(abs(chord[at])), FLAT))
             near &= (moved > NEAR) & (new.off <= NEAR * moved)
             new.status[:] = np.where(abs(new.multiplier) <= 1.0, stable[left], Status.UNSTABLE)
-            cycles.put(left, new, near)
+            put(cycles, left, new, near)
             reached[left[near]] += by[near]
             step[left] = np.where(near, 2.0 * step[left], 0.25 * by)
             lost = left[~near & (by <= LEAST_STEP)]

@@ -90,15 +90,8 @@ class ReturnMap:
         begin = np.zeros((n, len(flips))) if before is None else before
         solve = solver(scene or self.scene, self.method, again=False)
         found, status, _ = solve([*parameters, *begin, start, flips], rtol)
-        found, sizes = np.where(status < FIRST_REFUSAL, found, np.nan), 2 + len(self.scene.states)
+        found[:, status >= FIRST_REFUSAL], sizes = np.nan, 2 + len(self.scene.states)
         return found[[0, *range(2, 2 + n)]], status, found[sizes : sizes + n]
-
-    def rates(self, parameters, states, side):
-        """The rates of each state, columns."""
-        run, like = rating(self.own)
-        cells = fresh(len(flat(like)), [*parameters, np.full(states.shape[1], side), *states])
-        to_the_end(run, cells)
-        return cells[:, -len(states) :].T
 
     def at(self, parameters, times):
         """The states, and statuses, of the motion from the start at a time each."""
@@ -213,7 +206,7 @@ def turning(scene, everywhere):
 
 @functools.cache
 def rating(scene):
-    """What runs cells of parameters, a side and states, in whose place it puts the rates; and a cell of zeros."""
+    """The function of columns of parameters and states, and of a side, that gives the rates of each state."""
     functions, m = written_of(scene)
     like = 0.0, (0.0,) * len(scene.parameters), 0.0, (0.0,) * len(scene.states)
 
@@ -225,4 +218,11 @@ def rating(scene):
         write(memory, i, (where(stage > 0.5, DONE, stage), parameters, side, rates))
         return True
 
-    return running(functions, of_lanes, "rates"), like
+    run = running(functions, of_lanes, "rates")
+
+    def rates(parameters, states, side):
+        cells = fresh(len(flat(like)), [*parameters, np.full(states.shape[1], side), *states])
+        to_the_end(run, cells)
+        return cells[:, -len(states) :].T
+
+    return rates

@@ -71,46 +71,30 @@ def solved(runner, method, columns, step, location):
     threefold = [np.concatenate([c, off, off]) for c, off in zip(columns, off_by_roundings(columns), strict=True)]
     runs = followed(runner, method, threefold, (lengths * step).ravel(), np.tile(location, 3), substeps.ravel())
     first, finest, between = np.split(runs, 3, axis=1)
-    error, unsure, grows = _compared(first, finest, between, len(runner.scene.states))
+    states = len(runner.scene.states)
+    scale = np.concatenate([abs(finest[:2]), finest[2 + states : 2 + 2 * states]])
     with np.errstate(all="ignore"):
+        # what each two runs differ by: time, interval and states at the switch, and the states' reach
+        pairs = (first, finest), (first, between), (between, finest)
+        apart = [abs(one - other)[: 2 + 2 * states] / np.concatenate([scale, scale[2:]]) for one, other in pairs]
+        of_switch = np.max([x[: 2 + states].max(axis=0) for x in apart], axis=0)
+        ends, near, far = (x.max(axis=0) for x in apart)
+        of_all, rounding = np.max((ends, near, far), axis=0), ROUNDING * np.sqrt(first[-3])
+        grows = (near < GROWS * ends) & (of_all > ROUNDINGS * rounding)
+        error = SAFETY * of_all + rounding
         error = np.where(blind, np.maximum(error, step / first[1]), error)
-    status = _status(first, finest, between)
+        fallen = np.maximum(first[-4], between[-4]) - finest[-4]
+        unsure = finest[-4] <= np.maximum((UNSURE * of_switch) ** 2, FALLEN * fallen)
+    # what the finest run does not hide, the others' differences from it tell
+    status, near = (np.where(run[-1] == Status.INACCURATE, 0.0, run[-1]).astype(np.int8) for run in (first, between))
+    for other in (finest[-1], near):
+        status = np.where(status == Status.OK, other * (other < FIRST_REFUSAL), status)
+    sizes = abs(first[:-4])
+    normal = ((sizes == 0) | ((sizes >= NORMAL_LOW) & (sizes <= NORMAL_HIGH))).all(axis=0)
+    status = np.where((status < FIRST_REFUSAL) & ~normal, Status.OUT_OF_RANGE, status)
     reliable = (finest[-1] < FIRST_REFUSAL) & (between[-1] < FIRST_REFUSAL)
     status = np.where((status < Status.GRAZING) & unsure & reliable, Status.GRAZING, status)
     status = np.where((status == Status.OK) & grows & reliable, Status.INACCURATE, status)
     error = np.where(status < FIRST_REFUSAL, np.where(reliable & (error < np.inf), error, np.inf), np.nan)
     status = np.where((status == Status.OK) & np.isinf(error), Status.INACCURATE, status)
     return np.delete(first, (-4, -1), axis=0), error, status
-
-
-def _compared(first, finest, between, states):
-    """The error, whether the last switch may not be there, and whether differences grow as the step shrinks."""
-    with np.errstate(all="ignore"):
-        ends, near, far = (
-            _apart(one, other, finest, states) for one, other in ((first, finest), (first, between), (between, finest))
-        )
-        of_switch, of_all = np.max((ends, near, far), axis=0)
-        fallen = np.maximum(first[-4], between[-4]) - finest[-4]
-        unsure = finest[-4] <= np.maximum((UNSURE * of_switch) ** 2, FALLEN * fallen)
-        rounding = ROUNDING * np.sqrt(first[-3])
-        grows = (near[1] < GROWS * ends[1]) & (of_all > ROUNDINGS * rounding)
-        return SAFETY * of_all + rounding, unsure, grows
-
-
-def _apart(one, other, finest, states):
-    """The largest relative difference of time, interval and states at the switch; the same with the states' reach."""
-    scale = np.concatenate([abs(finest[:2]), finest[2 + states : 2 + 2 * states]])
-    switch = (abs(one - other)[: len(scale)] / scale).max(axis=0)
-    reach = (abs(one - other)[2 + states : 2 + 2 * states] / scale[2:]).max(axis=0)
-    return switch, np.maximum(switch, reach)
-
-
-def _status(first, finest, between):
-    """What the finest run does not hide, the others' differences from it tell."""
-    status, near = (np.where(run[-1] == Status.INACCURATE, 0.0, run[-1]).astype(np.int8) for run in (first, between))
-    for other in (finest[-1], near):
-        remark = other * (other < FIRST_REFUSAL)
-        status = np.where(status == Status.OK, remark, status)
-    sizes = abs(first[:-4])
-    normal = ((sizes == 0) | ((sizes >= NORMAL_LOW) & (sizes <= NORMAL_HIGH))).all(axis=0)
-    return np.where((status < FIRST_REFUSAL) & ~normal, Status.OUT_OF_RANGE, status)
