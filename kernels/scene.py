@@ -94,6 +94,8 @@ class Scene:
     start_time : a number, or (parameters) -> one: then the last state is the time `t`, of which the functions know
         nothing but that they may ask for it
     only_first : whether switches at the first surface alone count; others may lie between, as many as kinks
+    peaks : "all": a kink is wherever a state turns round, so that steps end where its size is largest; "some": of
+        states alone whose rate is another one, for a rate may come close to 0 and stay there
 
     At a switch `side` turns from 1 to -1 or back. Where abs(u) or sign(u) occurs, u = 0 is a *kink*: the motion is
     followed up to it and begun anew behind it.
@@ -112,6 +114,7 @@ class Scene:
     begins: str | None = None
     start_time: Function | float | None = None
     only_first: bool = False
+    peaks: str | None = None
 
     def __post_init__(self) -> None:
         names = [*self.states, *self.parameters]

@@ -90,18 +90,14 @@ def _roots(A):
                 x, y = _product(*value, real[j], imaginary[j])
                 value = x + c, y
             for i in range(n):
-                if i != j:
-                    value = _quotient(*value, real[j] - real[i], imaginary[j] - imaginary[i])
+                if i != j:  # 0 where both are 0, as at two roots that have met
+                    (a, b), (c, d) = value, (real[j] - real[i], imaginary[j] - imaginary[i])
+                    square = c * c + d * d
+                    over, apart = np.where(square > 0.0, square, 1.0), square > 0.0
+                    value = np.where(apart, (a * c + b * d) / over, 0.0), np.where(apart, (b * c - a * d) / over, 0.0)
             real[j], imaginary[j] = real[j] - value[0], imaginary[j] - value[1]
     return real, imaginary
 
 
 def _product(a, b, c, d):
     return a * c - b * d, a * d + b * c
-
-
-def _quotient(a, b, c, d):
-    """a + ib over c + id; 0 where both are 0, as at two roots that have met."""
-    square = c * c + d * d
-    over = np.where(square > 0.0, square, 1.0)
-    return np.where(square > 0.0, (a * c + b * d) / over, 0.0), np.where(square > 0.0, (b * c - a * d) / over, 0.0)

@@ -17,7 +17,7 @@ import numpy as np
 
 from kernels.codegen.columns_algebra import eigenvalues, identity, largest, most, solved
 from kernels.codegen.followed import put
-from kernels.codegen.return_map import rating
+from kernels.codegen.return_map import TIGHT, at_times, rating
 from kernels.interface import FIRST_REFUSAL, Status
 
 LOOSE, WIDER = 1e-7, 4.0
@@ -158,7 +158,11 @@ class Search:
         if branch:
             ends, parameters[branch[0]] = parameters[branch[0]].copy(), branch[1]
         self._from_later_and_later(settle)
-        self._doubled(np.flatnonzero((status == Status.UNSTABLE) & (self.cycles.multiplier < -1.0) & (settle > 0)))
+        # where iterates alternate about a cycle, that of twice as many switches
+        twice = np.flatnonzero((status == Status.UNSTABLE) & (self.cycles.multiplier < -1.0) & (settle > 0))
+        self.cycles.flips[twice] *= 2.0
+        self._settled(twice, doubled=True)
+        self.cycles.flips[twice[status[twice] != Status.PERIOD_2]] *= 0.5
         if not the_map.driven:
             self._at_equilibrium(np.flatnonzero(~np.isin(status, (*FOUND, Status.COMES_TO_REST))))
             self._at_rest(np.flatnonzero((status >= FIRST_REFUSAL) & (status != Status.NOT_CONVERGED)))
@@ -225,12 +229,6 @@ class Search:
         put(self.cycles, left, some, good)
         self.fades[left] = (moved <= NEAR) & (some.off <= NEAR) & (size < 1.0)
 
-    def _doubled(self, left):
-        """Where iterates alternate about a cycle, that of twice as many switches."""
-        self.cycles.flips[left] *= 2.0
-        self._settled(left, doubled=True)
-        self.cycles.flips[left[self.cycles.status[left] != Status.PERIOD_2]] *= 0.5
-
     def _at_equilibrium(self, left):
         """COMES_TO_REST where a motion ended closer to an equilibrium, at which it stays, than it was after a cycle.
 
@@ -268,7 +266,8 @@ class Search:
         for _ in range(TIMES):
             if not len(left):
                 break
-            z, status = self.map.at(self.cycles.parameters[:, left], np.full(len(left), seconds))
+            times, tight = np.full(len(left), seconds), np.full(len(left), TIGHT * self.map.fine)
+            z, status = at_times(self.map.own, self.map.method, self.cycles.parameters[:, left], times, tight)
             ended, size = status > Status.INACCURATE, np.fmax(size, abs(z))
             still = (abs(z - before) <= STILL * size).all(axis=0)
             moved = moved | ~(still | ended | np.isnan(before).any(axis=0))

@@ -13,7 +13,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from kernels.codegen.sliding import slid
-from kernels.expression.graph import ADD, FUNCTIONS, NAMED, NUMBER, SCALED, Expression, Graph, SceneError, power
+from kernels.expression.graph import ADD, FUNCTIONS, INPUT, NAMED, NUMBER, SCALED, Expression, Graph, SceneError, power
 
 RESERVED = ("side", "flips", "time", "interval", "rtol", "status")
 """Names that a scene's states and parameters cannot have."""
@@ -27,11 +27,11 @@ class Recorded:
     """The expressions of a scene, in one graph.
 
     `events` are (offset, factor, u): each fires where offset + factor u falls through 0; the first is the switch, the
-    others are the kinks. The switch's has the factor ".way": -1 while the motion is behind the surface, where its event
-    is that it comes up. `timed` are the rates per unit of time, an input ".unit" in seconds. `surfaces` are the numbers
-    of the kinks that are further surfaces: of these ".sign_j", and of the first ".way", are 1 in `switched` where they
-    are met, else -1. `shared`: whether one of them is a kink of the rates too. `onto` and `speeds` are those of
-    `sliding.slid`.
+    others are the kinks, of which one may be `nested`: its u is, but for a constant factor, the rate of the surface's.
+    The switch's has the factor ".way": -1 while the motion is behind the surface, where its event is that it comes up.
+    `timed` are the rates per unit of time, an input ".unit" in seconds. `surfaces` are the numbers of the kinks that
+    are further surfaces: of these ".sign_j", and of the first ".way", are 1 in `switched` where they are met, else -1.
+    `shared`: whether one of them is a kink of the rates too. `onto` and `speeds` are those of `sliding.slid`.
     """
 
     graph: Graph
@@ -65,6 +65,9 @@ def _once(scene):
     has_clock = scene.start_time is not None
     declared, clock = len(states) - has_clock, (graph.of(1.0),) * has_clock
     rates = _called(graph, scene, "rates", scene.rates, states | constants, declared) + clock
+    for _, u in map(graph.parts, rates):
+        if u.varies and (scene.peaks == "all" or (scene.peaks and u.kind == INPUT)):
+            graph.side_of(u)
     surfaces = named_functions(scene.surface)
     found = []
     for name, function in surfaces.items():
@@ -88,22 +91,19 @@ def _once(scene):
     offset, factor, u = _affine(graph, surface)
     wayward = offset if offset.kind == NUMBER and not offset.args[0] else way * offset
     events = ((wayward, way * factor, u), *kinks)
-    nested = _nested(events, dict(zip(states.values(), rates, strict=True)))
+    rate = dict(zip(states.values(), rates, strict=True)).get(u)
+    nested = 0 if rate is None else 1 + graph.kinks.get(graph.parts(rate)[1], -1)
     recorded = Recorded(graph, rates, timed, surface, switched, started, events, nested, numbers, shared)
     return slid(recorded, scene.states) if scene.slides else recorded
 
 
 def asks_for_time(functions, names):
     """Whether one of them asks for `t`, where no state and no parameter is called so."""
-    return "t" not in names and any("t" in _asked(function) for function in functions if function)
-
-
-def _asked(function):
-    """The names that it asks for; none where Python does not know them, which is said when it is recorded."""
-    try:
-        return inspect.signature(function).parameters
-    except (TypeError, ValueError):
-        return ()
+    asked = set()
+    for function in filter(callable, functions):  # where Python does not know what it asks for, its recording says so
+        with contextlib.suppress(TypeError, ValueError):
+            asked.update(inspect.signature(function).parameters)
+    return "t" in asked.difference(names)
 
 
 def named_functions(functions):
@@ -182,12 +182,3 @@ def _affine(graph, surface):
         offset, rest = sorted(surface.args, key=lambda term: term.varies)
     factor, u = rest.args if rest.kind == SCALED else (graph.of(1.0), rest)
     return offset, factor, u
-
-
-def _nested(events, rates):
-    """The number of the kink whose u is, but for a constant factor, the rate of the surface; 0 where there is none."""
-    surface = events[0][2]
-    if surface not in rates:
-        return 0
-    _, rate = surface.graph.parts(rates[surface])
-    return 1 + surface.graph.kinks.get(rate, -1)

@@ -16,7 +16,7 @@ import numpy as np
 from kernels.codegen.compiled import running, written_of
 from kernels.codegen.record import named_functions, record, returned
 from kernels.codegen.to_tolerance import solver
-from kernels.expression.graph import ADD, INPUT, NUMBER, Expression, SceneError, needed
+from kernels.expression.graph import ADD, INPUT, NUMBER, SceneError, needed
 from kernels.integrate.records import Mode
 from kernels.interface import FIRST_REFUSAL
 from kernels.lanes.columns import DONE, fresh, to_the_end
@@ -72,8 +72,9 @@ class ReturnMap:
         self.modes = [j for j, rate in enumerate(recorded.rates) if rate.kind == NUMBER and not rate.args[0]]
         """The states whose rate is 0."""
         self.fine, self.rough, self.step = TOLERANCES[method]
-        self._sized = (turning(self.scene, True), (1.0,)), (turning(self.scene, False), OTHERS), (self.scene, OTHERS)
-        for one in (*(scene for scene, _ in self._sized), *([] if self.driven else [clocked(scene)])):
+        turning = [replace(self.scene, peaks=peaks) for peaks in ("all", "some")]
+        self._sized = list(zip((*turning, self.scene), ((1.0,), OTHERS, OTHERS), strict=True))
+        for one in (*turning, *([] if self.driven else [clocked(scene)])):
             record(one)
 
     def passed(self, parameters, before, flips, rtol, scene=None):
@@ -84,7 +85,7 @@ class ReturnMap:
         Parameters
         ----------
         before : None where the scene's start is meant instead
-        scene : the map's own one, or as `turning` makes of it
+        scene : the map's own one, or with `peaks`
         """
         n, start = len(self.states), np.full(len(flips), float(before is None))
         begin = np.zeros((n, len(flips))) if before is None else before
@@ -92,10 +93,6 @@ class ReturnMap:
         found, status, _ = solve([*parameters, *begin, start, flips], rtol)
         found[:, status >= FIRST_REFUSAL], sizes = np.nan, 2 + len(self.scene.states)
         return found[[0, *range(2, 2 + n)]], status, found[sizes : sizes + n]
-
-    def at(self, parameters, times):
-        """The states, and statuses, of the motion from the start at a time each."""
-        return at_times(self.own, self.method, list(parameters), times, np.full(len(times), TIGHT * self.fine))
 
     def turned(self, parameters, before, flips):
         """The largest sizes on the way, tightly, where states turn round; and by how much they may be off besides.
@@ -183,25 +180,6 @@ def returning(scene, drive):
 
     name, parameters = f"{scene.name}_return", (*own.parameters, *places, FRESH)
     return replace(own, name=name, parameters=parameters, start=start, begins=FRESH)
-
-
-@functools.cache
-def turning(scene, everywhere):
-    """The scene with a kink wherever a state turns round, so that steps end where its size is largest.
-
-    If not `everywhere`, of states alone whose rate is another one: a rate may come close to 0 and stay there.
-    """
-    rates_of = record(scene).rates
-    those = [everywhere or (r.varies and r.graph.parts(r)[1].kind == INPUT) for r in rates_of]
-
-    def rates(**given):
-        found = returned(scene.rates, given)
-        for rate, turns in zip(found, those, strict=False):  # the last state may be the time
-            if turns and isinstance(rate, Expression) and rate.varies:
-                abs(rate)
-        return found
-
-    return replace(scene, name=f"{scene.name}_turning", rates=rates)
 
 
 @functools.cache

@@ -69,11 +69,8 @@ def slid(recorded, states):
         events=(recorded.events[0], *events),
         nested=0,
         onto=tuple(k * (s + off * jump) for k, s, jump in zip(stays, at, jumps, strict=True)),
-        speeds=tuple(_speeds(graph, recorded.rates, g, j) for j, g in enumerate(gradients)),
+        speeds=tuple(
+            tuple(along(graph, g, list(map(_side(graph, {j: graph.of(sign)}), recorded.rates))) for sign in (1.0, -1.0))
+            for j, g in enumerate(gradients)
+        ),
     )
-
-
-def _speeds(graph, rates, gradient, j):
-    """u'(f+) and u'(f-) of a kink."""
-    sides = (_side(graph, {j: graph.of(sign)}) for sign in (1.0, -1.0))
-    return tuple(along(graph, gradient, [side(rate) for rate in rates]) for side in sides)

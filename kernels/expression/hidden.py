@@ -87,14 +87,11 @@ class Enclosures:
             own = OF.hidden_by_hypot(self.values.value(x), self._once(x, self._plain))
             return added(own, *map(self.excess, x.args))
         if x.kind == DIV:
-            return self._excess_of_quotient(x, *x.args)
+            divisor, plain = self.interval(*others), self._once(x, self._plain)
+            moved = added(self.excess(u), self._passed_on(*others, OF.largest(plain)))
+            own = OF.hidden_by_over(self.values.value(*others), divisor, plain)
+            return added(own, moved if moved is None else OF.times(moved, 1.0 / OF.smallest(divisor)))
         return self._excess_of_function(x, u, self.values.value(u), self.interval(u), *others)
-
-    def _excess_of_quotient(self, x, u, w):
-        divisor, plain = self.interval(w), self._once(x, self._plain)
-        moved = added(self.excess(u), self._passed_on(w, OF.largest(plain)))
-        own = OF.hidden_by_over(self.values.value(w), divisor, plain)
-        return added(own, moved if moved is None else OF.times(moved, 1.0 / OF.smallest(divisor)))
 
     def _excess_of_function(self, x, u, value, inside, n=None):
         """Its own, and what its argument's comes to by the slope where that is largest."""

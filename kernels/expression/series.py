@@ -190,34 +190,23 @@ class Values:
 
     def _power_by_parts(self, x, u, k, over):
         """b_k of (1): what u_k and b_{k-1} bring is added last, so that the recurrence waits for two sums a step."""
-        per_base = self._once((x.index, "per base"), lambda: self.value(x.args[1]) * self.value(x) * over)
-        parts = [(per_base, self.coefficient(u, k))]
-        if k > 1:
-            parts.append((self._of_one_before(x, u, k, over), self.coefficient(x, k - 1)))
-        total = product(self._power_between(x, u, k), over)
-        for factor, term in reversed([(f, t) for f, t in parts if f is not None and t is not None]):
-            total = factor * term if total is None else V.fma(factor, term, total)
-        return total
+        first, between = self.coefficient(u, 1), _oldest_first(2, k - 1, k)
 
-    def _of_one_before(self, x, u, k, over):
-        """The factor ((n + 1)/k - 1) u_1/u_0 of b_{k-1}; None where u_1 is 0."""
-        first = self.coefficient(u, 1)
-        if first is None:
-            return None
-        slope = self._once((x.index, "slope"), lambda: first * over)
-        steep = self._once((x.index, "steep"), lambda: self._one_more(x) * slope)
-        return V.fma(steep, 1.0 / k, -slope)
+        def one_more():
+            return self._once((x.args[1].index, "and one"), lambda: self.value(x.args[1]) + 1.0)
 
-    def _power_between(self, x, u, k):
-        """The terms 1 < j < k of u_0 b_k."""
-        between = _oldest_first(2, k - 1, k)
         rates = self._sum((self._rate(u, j), self.coefficient(x, k - j)) for j in between)
         plain = self._sum((self.coefficient(u, j), self.coefficient(x, k - j)) for j in between)
-        return None if rates is None else V.fma(self._one_more(x) * (1.0 / k), rates, -plain)
-
-    def _one_more(self, x):
-        """n + 1."""
-        return self._once((x.args[1].index, "and one"), lambda: self.value(x.args[1]) + 1.0)
+        total = None if rates is None else V.fma(one_more() * (1.0 / k), rates, -plain) * over
+        if k > 1 and first is not None and (before := self.coefficient(x, k - 1)) is not None:
+            slope = self._once((x.index, "slope"), lambda: first * over)
+            steep = self._once((x.index, "steep"), lambda: one_more() * slope)
+            factor = V.fma(steep, 1.0 / k, -slope)  # ((n + 1)/k - 1) u_1/u_0
+            total = factor * before if total is None else V.fma(factor, before, total)
+        per_base = self._once((x.index, "per base"), lambda: self.value(x.args[1]) * self.value(x) * over)
+        if (newest := self.coefficient(u, k)) is not None:
+            total = per_base * newest if total is None else V.fma(per_base, newest, total)
+        return total
 
     def _abs(self, x, k):
         return V.magnitude(self.value(x.args[0]))
