@@ -63,8 +63,6 @@ class Cycles(namedtuple("Cycles", "parameters flips r z scale shift off rows slo
     status : what has been found
     """
 
-    __slots__ = ()
-
     def some(self, cells):
         """A copy of those cells."""
         return Cycles(*(column.take(cells, axis=-1) for column in self))

@@ -271,18 +271,15 @@ class Graph:
         `done` : a dict of what has been replaced already, by the node's number
         """
         done = {} if done is None else done
+        made = {ADD: self.add, MUL: self.multiply, SCALED: self.multiply, DIV: self.divide, "power": self.power}
+        made |= {"abs": self.magnitude, "sign": self.sign, HALF_SQUARE: lambda u: 0.5 * u * u}
         if x.index not in done:
             if x.kind in (NUMBER, INPUT):
                 done[x.index] = self.of(inputs.get(x.args[0], x) if x.kind == INPUT else x.args[0])
             else:
-                done[x.index] = self.operation(x.kind, [self.again(a, inputs, done) for a in x.args])
+                args = [self.again(a, inputs, done) for a in x.args]
+                done[x.index] = made[x.kind](*args) if x.kind in made else self.function(x.kind, *args)
         return done[x.index]
-
-    def operation(self, kind, args):
-        """The expression of that kind."""
-        made = {ADD: self.add, MUL: self.multiply, SCALED: self.multiply, DIV: self.divide, "power": self.power}
-        made |= {"abs": self.magnitude, "sign": self.sign, HALF_SQUARE: lambda u: 0.5 * u * u}
-        return made[kind](*args) if kind in made else self.function(kind, *args)
 
     def timed(self, x, unit):
         """x times a constant, which in a sum of series goes into their constants and costs nothing there."""

@@ -70,13 +70,11 @@ class Values:
     def _computed(self, x, k):
         if x.kind == NUMBER:
             return x.args[0]
-        if x.kind == INPUT:
-            return self._state(x, k) if k else self.inputs[x.args[0]]
-        return getattr(self, f"_{x.kind}")(x, k)
-
-    def _state(self, x, k):
-        """1/k goes into the constants of the rate, which are multiplied once for many steps."""
-        rate = self._rates[x.args[0]]
+        if x.kind != INPUT:
+            return getattr(self, f"_{x.kind}")(x, k)
+        if k == 0:
+            return self.inputs[x.args[0]]
+        rate = self._rates[x.args[0]]  # 1/k goes into its constants, which are multiplied once for many steps
         return None if rate is None else self.coefficient(x.graph.timed(rate, x.graph.of(1.0 / k)), k - 1)
 
     def _add(self, x, k):
