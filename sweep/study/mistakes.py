@@ -49,13 +49,15 @@ class Mistakes(list[Mistake]):
 class Entry:
     """What a study says at one place, such as "axes.mu.values[2]", or as a whole; None where it says nothing.
 
-    What is wrong goes to `mistakes`; names of files are relative to the `folder`.
+    What is wrong goes to `mistakes`; names of files are relative to the `folder`. `unit` is one that the value itself
+    has, a DataArray of a result or a quantity of pint.
     """
 
     value: Any
     where: str
     mistakes: Mistakes
     folder: Path = Path()
+    unit: str = ""
 
     def __contains__(self, key: str) -> bool:
         return key in self.value
@@ -63,11 +65,13 @@ class Entry:
     def __getitem__(self, key: str | int) -> Entry:
         """What stands under a key of a table, or at a place of a list; arrays as lists, but for lines of float64."""
         found = self.value[key] if isinstance(key, int) else self.value.get(key)
+        unit = ""
         if hasattr(found, "__array__"):
-            found = np.asarray(found)
+            unit = str(getattr(found, "units", getattr(found, "unit", "")))
+            found = np.asarray(getattr(found, "magnitude", found))
             found = found if found.ndim == 1 and found.dtype == np.float64 else found.tolist()
         at = f"{self.where}[{key}]" if isinstance(key, int) else f"{self.where}.{key}".removeprefix(".")
-        return replace(self, value=found, where=at)
+        return replace(self, value=found, where=at, unit=unit)
 
     def good(self) -> bool:
         """Whether nothing is wrong here or below."""

@@ -36,7 +36,7 @@ def study(given: Given | None = None, /, *, allow_import: bool = False, **keys: 
         Allow a kernel named "module:NAME", whose module is imported.
     **keys
         title, question, kernel, method, rtol, outputs, design, axes, fixed, along, summary. Axes and coordinates may
-        also be arrays or lists of numbers in SI units.
+        also be arrays or lists of numbers in SI units, or have a unit themselves: a DataArray of a result, pint's.
 
     Raises
     ------

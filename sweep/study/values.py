@@ -46,10 +46,11 @@ def quantity(entry: Entry, field: Field) -> float | Floats:
 
     Of an array parameter also a list, or a table { file, unit }; one number stands for all its values.
     """
-    array, given, factor = bool(field.dims), entry, None
+    array, given, factor = bool(field.dims), entry, _own_factor(entry, field)
     if isinstance(entry.value, Mapping):
         entry = entry.keys("value", "unit", *["file"] * array)
-        given, factor = entry["value"], _factor(entry, field)
+        given = entry["value"]
+        factor = _factor(entry, field, given)
         if array and "file" in entry:
             if "value" in entry:
                 entry.wrong("value and file exclude each other; keep one")
@@ -76,7 +77,7 @@ def axis(entry: Entry, field: Field, shares: Floats | None = None) -> Axis:
     else:
         entry, forms = replace(entry, value={}), ["values"]
     unclear = not forms and len(entry.mistakes) == before
-    form, factor, values = forms[0] if len(forms) == 1 else "", _factor(entry, field), NONE
+    form, factor, values = forms[0] if len(forms) == 1 else "", _factor(entry, field, listing), NONE
     if len(forms) > 1:
         entry.wrong(f"{listed(forms, word='and')} exclude each other; keep one")
     elif unclear:
@@ -102,8 +103,17 @@ def axis(entry: Entry, field: Field, shares: Floats | None = None) -> Axis:
     return Axis(field.name, frozen(values), form, tuple(words[v] for v in values.tolist()) if words else None)
 
 
-def _factor(entry: Entry, field: Field) -> Decimal | None:
-    """What the numbers of an entry are multiplied by, to be in the field's unit; None: they are in it."""
+def _own_factor(given: Entry, field: Field) -> Decimal | None:
+    """What numbers that have a unit themselves are multiplied by, to be in the field's; None: they are in it."""
+    return replace(given, value=given.unit).read(None, scale, field.unit, field.name) if given.unit else None
+
+
+def _factor(entry: Entry, field: Field, given: Entry) -> Decimal | None:
+    """What the numbers `given` in an entry are multiplied by, to be in the field's unit; None: they are in it."""
+    if given.unit and not field.choices:
+        if "unit" in entry:
+            entry["unit"].wrong(f'the numbers have the unit "{given.unit}" themselves; leave it out')
+        return _own_factor(given, field)
 
     def factor(value: Any) -> Decimal | None:
         unit = text(value)

@@ -8,6 +8,7 @@ from fractions import Fraction
 
 import mpmath
 import numpy as np
+import pint
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -105,6 +106,25 @@ def test_the_unit_of_the_field_needs_no_pint_and_malformed_ones_are_refused():
 
 
 # sampled designs
+
+
+def test_numbers_that_have_a_unit_themselves_are_converted():
+    """Quantities of pint, and what `in_units` gives: 180 degree are pi rad."""
+    keys, of_pint = {"kernel": "foliot", "axes": {"mu": [1.0]}}, pint.UnitRegistry().Quantity
+    half = of_pint(180, "degree")
+    assert sweep.study(**keys, fixed={"phi0": half, "a": of_pint(60.0, "1/min")}).fixed["phi0"] == math.pi
+    keys["fixed"] = {"phi0": 1.0, "a": 1.0}
+    study = sweep.study(**keys | {"axes": {"mu": of_pint([1.0, 180.0], "degree/s^2")}})
+    assert study.axes["mu"].values.tolist() == pytest.approx([math.pi / 180, math.pi], abs=0.0, rel=1e-15)
+    in_degrees = sweep.in_units(sweep.run(study), {"mu": "degree/s^2"}).mu
+    for entry in (in_degrees, {"values": in_degrees}):
+        again = sweep.study(**keys | {"axes": {"mu": entry}})
+        np.testing.assert_allclose(again.axes["mu"].values, study.axes["mu"].values, rtol=1e-15)
+    for entry, where in (
+        (of_pint([1.0], "kg"), "axes.mu"),
+        ({"values": in_degrees, "unit": "rad/s^2"}, "axes.mu.unit"),
+    ):
+        assert message_of(lambda entry=entry: sweep.study(**keys | {"axes": {"mu": entry}}), where)
 
 
 @pytest.mark.parametrize(
