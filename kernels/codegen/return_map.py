@@ -18,7 +18,7 @@ from kernels.codegen.record import named_functions, record, returned
 from kernels.codegen.to_tolerance import solver
 from kernels.expression.graph import ADD, INPUT, NUMBER, SceneError, needed
 from kernels.integrate.records import Mode
-from kernels.interface import FIRST_REFUSAL
+from kernels.interface import FIRST_REFUSAL, Status
 from kernels.lanes.columns import DONE, fresh, to_the_end
 from kernels.lanes.jit import jit_call
 from kernels.lanes.tuples import flat, read, write
@@ -104,7 +104,8 @@ class ReturnMap:
             left = np.flatnonzero(np.isnan(sizes).any(axis=0))
             if len(left):
                 some, rtol = (parameters[:, left], before[:, left], flips[left]), np.full(len(left), TIGHT * self.fine)
-                found = [self.passed(*some, many * rtol, scene)[2] for many in tolerances]
+                runs = [self.passed(*some, many * rtol, scene)[1:] for many in tolerances]
+                found = [np.where(status <= Status.INACCURATE, on_the_way, np.nan) for status, on_the_way in runs]
                 sizes[:, left] = np.maximum.reduce(found)
                 off[:, left] = APART * (sizes[:, left] - np.minimum.reduce(found))
         return sizes, np.where(np.isnan(off), np.inf, off)
