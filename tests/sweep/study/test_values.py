@@ -108,6 +108,12 @@ def test_the_unit_of_the_field_needs_no_pint_and_malformed_ones_are_refused():
 # sampled designs
 
 
+def test_what_is_masked_is_no_number():
+    masked = np.ma.array([1.0, 2.0], mask=[False, True])
+    found = sweep.study(kernel="foliot", axes={"mu": masked}, fixed={"phi0": 1.0, "a": 1.0}).axes["mu"].values
+    assert (found[0], np.isnan(found[1])) == (1.0, True)
+
+
 def test_numbers_that_have_a_unit_themselves_are_converted():
     """Quantities of pint, and what `in_units` gives: 180 degree are pi rad."""
     keys, of_pint = {"kernel": "foliot", "axes": {"mu": [1.0]}}, pint.UnitRegistry().Quantity
