@@ -100,12 +100,9 @@ def test_the_unit_of_the_field_needs_no_pint_and_malformed_ones_are_refused():
     for text in ("m/", "(((", "m*", "rad s-2", "3 m", "m**m", "m^", "\n", "m;m", "__import__('os')", "💥"):
         with pytest.raises(UnitMistake):
             scale(text, "m", "x")
-    for text, wanted, what in (("degC", "K", "offset"), ("m Hz", "m/s", "Hz inside")):
+    for text, wanted, what in (("degC", "K", "offset"), ("m Hz", "m/s", "Hz inside"), ("dB", "1", "multiple")):
         with pytest.raises(UnitMistake, match=what):
             scale(text, wanted, "x")
-
-
-# sampled designs
 
 
 def test_what_is_masked_is_no_number():
@@ -131,6 +128,9 @@ def test_numbers_that_have_a_unit_themselves_are_converted():
         ({"values": in_degrees, "unit": "rad/s^2"}, "axes.mu.unit"),
     ):
         assert message_of(lambda entry=entry: sweep.study(**keys | {"axes": {"mu": entry}}), where)
+
+
+# sampled designs
 
 
 @pytest.mark.parametrize(
