@@ -27,7 +27,7 @@ from kernels.interface import FIRST_REFUSAL, Field, Method, Status
 from kernels.lanes.codes import OK, STICKS
 from kernels.lanes.columns import in_lanes
 from kernels.lanes.jit import jit
-from kernels.lanes.vectors import fma, magnitude, not_, sqrt, where
+from kernels.lanes.vectors import fma, magnitude, not_, where
 from kernels.lanes.wiring import kernel, method, signed
 
 LIMIT, STUCK, AGAIN = 60, 6, 5
@@ -46,9 +46,8 @@ _ROUNDING = 2e-14
 
 Cell = namedtuple("Cell", (*Foliot._fields, "depth", "harmonic"))
 """Columns of cells."""
-Terms = namedtuple("Terms", "drag outwards inwards gamma degree kappa rough first slow stiff")
-"""Of a cell: terms of `Problem`; whether friction soon balances the drive, and the speed that Newton's method begins
-with; and the stiffness f'(V)/V."""
+Terms = namedtuple("Terms", "drag outwards inwards gamma degree kappa rough pace stiff")
+"""Of a cell: terms of `Problem`, and the stiffness f'(V)/V."""
 Found = namedtuple("Found", "end change slope cancels Y A helped outputs")
 """By a half swing: F, Newton's step from the speed before it, dF/dv1; how many times larger than s the terms are that
 it is the sum of; Y, the turning point A, and whether it was helped; the outputs of the cycle by it."""
@@ -91,10 +90,8 @@ def terms_of(p, rtol):
     """The `Terms` of a cell."""
     scene, _ = without_dimensions(p)
     q = problem_of(scene, (p.depth, p.harmonic), rtol)
-    slow = q.pace > 3.0
-    first = where(slow, 1.0 / q.pace, 2.0 / sqrt(1.0 + 4.0 * q.pace * q.pace))
-    rough, slow = where(q.rough, 1.0, 0.0), where(slow, 1.0, 0.0)
-    return Terms(q.d, q.outwards, q.inwards, q.gamma, q.n, q.kappa, rough, first, slow, q.stiffness * q.pace), OK
+    rough, stiff = where(q.rough, 1.0, 0.0), q.stiffness * q.pace
+    return Terms(q.d, q.outwards, q.inwards, q.gamma, q.n, q.kappa, rough, q.pace, stiff), OK
 
 
 @jit
@@ -159,7 +156,9 @@ def cycles(manner, cells, rtol, asked):
         wanted = share[i] * rtol[i] * gap / (1.0 + steady) / (1.0 + waves)
         return np.fmin(np.fmax(wanted, manner.least), manner.orderly)
 
-    i, v, slow = np.flatnonzero(status == Status.OK), terms.first.copy(), (terms.slow > 0.5) & manner.skips
+    i, slow = np.flatnonzero(status == Status.OK), terms.pace > 3.0
+    v = np.where(slow, 1.0 / terms.pace, 2.0 / np.sqrt(1.0 + 4.0 * terms.pace * terms.pace))
+    slow &= manner.skips
     stage = np.where(slow, ROUGH, SEARCH)
     tolerance = np.where(slow, finer * wanted_of(slice(None), 1.0, 2.0 * terms.stiff, 0.0), manner.coarse)
     status[i] = Status.NOT_CONVERGED
