@@ -128,7 +128,7 @@ def _manner(name, doc, solve, stiffest):
         return np.where(terms.inwards > 0.0, np.where(mild, Status.OK, Status.STEP_LIMIT), Status.STICKS)
 
     return Manner(
-        name, doc, follow, begins, bare=False, skips=True, coarse=1e-3, orderly=3e-5, least=3e-15,
+        name, doc, follow, begins, bare=False, steps=True, coarse=1e-3, orderly=3e-5, least=3e-15,
         finer=4.0, shares=(0.3, 0.1, 0.03), told=(4.0, 4.0, 10.0), steep=10.0, tighter=0.1,
     )  # fmt: skip
 

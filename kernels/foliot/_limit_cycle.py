@@ -51,7 +51,7 @@ Terms = namedtuple("Terms", "drag outwards inwards gamma degree kappa rough pace
 Found = namedtuple("Found", "end change slope cancels Y A helped outputs")
 """By a half swing: F, Newton's step from the speed before it, dF/dv1; how many times larger than s the terms are that
 it is the sum of; Y, the turning point A, and whether it was helped; the outputs of the cycle by it."""
-Manner = namedtuple("Manner", "name doc follow begins bare skips coarse orderly least finer shares told steep tighter")
+Manner = namedtuple("Manner", "name doc follow begins bare steps coarse orderly least finer shares told steep tighter")
 """A way to follow half swings.
 
 name, doc : of the method
@@ -59,7 +59,8 @@ follow : (cells, terms, v1, tolerance, rtol, rough, bare) -> rows of `Found` and
     be followed with parameters some roundings off; `bare`: those whose tangents are not needed
 begins : (cells, terms) -> statuses: OK where the method is worth while, else why it is not
 bare : whether less is followed where torque varies and neither drag nor the sensitivity need tangents
-skips : whether the search is left out where friction soon balances the drive: steps are short there in any case
+steps : whether it goes by steps of one order. Cells that take about as many go side by side then, and the search is
+    left out where friction soon balances the drive: steps are short there in any case
 coarse, orderly, least : tolerance of the search; the one below which an error falls as it does; the finest
 finer : how many times the fine tolerance the rough one is
 shares : of rtol that a half swing may be off by: where friction is smooth at rest, where it is not, and where its
@@ -158,7 +159,7 @@ def cycles(manner, cells, rtol, asked):
 
     i, slow = np.flatnonzero(status == Status.OK), terms.pace > 3.0
     v = np.where(slow, 1.0 / terms.pace, 2.0 / np.sqrt(1.0 + 4.0 * terms.pace * terms.pace))
-    slow &= manner.skips
+    slow &= manner.steps
     stage = np.where(slow, ROUGH, SEARCH)
     tolerance = np.where(slow, finer * wanted_of(slice(None), 1.0, 2.0 * terms.stiff, 0.0), manner.coarse)
     status[i] = Status.NOT_CONVERGED
@@ -166,8 +167,8 @@ def cycles(manner, cells, rtol, asked):
         if not len(i):
             break
 
-        # beside each other those that take about as many steps
-        i = i[np.argsort((tolerance[i] ** -0.2 + terms.stiff[i]) * (1.0 + np.sqrt(terms.kappa[i])))]
+        if manner.steps:
+            i = i[np.argsort((tolerance[i] ** -0.2 + terms.stiff[i]) * (1.0 + np.sqrt(terms.kappa[i])))]
 
         # the half swings; Newton's step of each, and the cycle by it
         bare, now, used = linear[i] & ((stage[i] < ROUGH) | (not tangents)), v[i], tolerance[i]
