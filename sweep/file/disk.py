@@ -163,10 +163,11 @@ def check_target(target: Path, *, force: bool = False, read: Sequence[Path] = ()
     Of folders, which hold what nobody meant to overwrite, only those of zarr are given up.
     """
     there = bool(mark(target))
-    if target.is_dir() and not (target / "zarr.json").is_file():
-        raise SweepError(f"{target} is a folder; name a file in it")
-    if there and any(one.exists() and target.samefile(one) for one in read):
-        raise SweepError(f"{target} is what is read; name another file")
+    with refusing(target):
+        if target.is_dir() and not (target / "zarr.json").is_file():
+            raise SweepError(f"{target} is a folder; name a file in it")
+        if there and any(one.exists() and target.samefile(one) for one in read):
+            raise SweepError(f"{target} is what is read; name another file")
     if there and not force:
         raise SweepError(
             f"{target} is there already; name another file, or overwrite it with --force (Python: force=True)"

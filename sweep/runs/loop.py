@@ -25,6 +25,7 @@ from sweep.cells.reduce import output_schema
 from sweep.cells.schema import Schema
 from sweep.cells.timing import Sample, cut, sampled_study, work_clock
 from sweep.errors import SweepError, missing
+from sweep.file import disk
 from sweep.runs.extend import Reused
 from sweep.runs.isolate import Processes
 from sweep.runs.log import log
@@ -78,10 +79,11 @@ class Task:
     def __post_init__(self) -> None:
         self.fingerprint = fingerprint(self.study)
         self.output = Path(os.path.realpath(as_path("." if self.path is None else self.path)))
-        if not self.output.parent.is_dir():
-            raise SweepError(f"{self.path}: there is no folder {self.output.parent}")
-        if self.path is not None and self.output.is_dir():
-            raise SweepError(f"{self.path} is a folder; name a file in it")
+        with disk.refusing(self.output):
+            if not self.output.parent.is_dir():
+                raise SweepError(f"{self.path}: there is no folder {self.output.parent}")
+            if self.path is not None and self.output.is_dir():
+                raise SweepError(f"{self.path} is a folder; name a file in it")
         self.cores = cores() if self.workers is None else whole_number("workers", self.workers)
         if self.block_cells is not None:
             whole_number("block_cells", self.block_cells)

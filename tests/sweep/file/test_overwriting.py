@@ -103,12 +103,21 @@ def test_a_folder_that_is_no_zarr_is_left_alone(here):
     Path("a.zarr").mkdir()
     Path("a.zarr/thesis.txt").write_text("all of it")
     with sweep.open_result("r.h5") as ds:
+        for force in (False, True):
+            with pytest.raises(SweepError, match="is a folder"):
+                sweep.export(ds, "a.zarr", force=force)
+    assert Path("a.zarr/thesis.txt").read_text() == "all of it"
+
+
+def test_a_folder_of_zarr_gives_way_when_forced_and_to_what_is_complete_alone(here):
+    with sweep.open_result("r.h5") as ds:
+        sweep.export(ds, "a.zarr")
+        Path("a.zarr/thesis.txt").write_text("all of it")
         with pytest.raises(SweepError, match="is there already"):
             sweep.export(ds, "a.zarr")
-        assert Path("a.zarr/thesis.txt").read_text() == "all of it"
         with pytest.MonkeyPatch.context() as patched:
             patched.setattr(disk, "rename", full_once(disk.rename))
-            with pytest.raises(sweep.SweepError, match="cannot be written"):
+            with pytest.raises(SweepError, match="cannot be written"):
                 sweep.export(ds, "a.zarr", force=True)
         assert Path("a.zarr/thesis.txt").read_text() == "all of it"
         sweep.export(ds, "a.zarr", force=True)

@@ -142,3 +142,8 @@ def test_all_mistakes_are_told_at_once():
     assert "did you mean fall_time?" in text
     assert '"kg" is a mass; height is a length' in text
     assert "words or counts" in text
+
+
+def test_a_name_that_the_system_refuses_is_told_in_one_line(tmp_path):
+    with pytest.raises(SweepError, match=r"^[^\n]*cannot be written[^\n]*$"):
+        sweep.export(result(), tmp_path / f"{'a' * 300}.csv")

@@ -67,6 +67,7 @@ def test_cells_that_are_cheap_beside_a_call_are_solved_by_few_calls():
         ({"worker": 2}, "workers"),
         ({"path": "nowhere/out.h5"}, "nowhere"),
         ({"path": 3}, "path"),
+        ({"path": "a" * 300}, "cannot be written"),
     ],
 )
 def test_what_cannot_be_meant_is_refused_in_one_line(keys, word):
