@@ -25,8 +25,8 @@ STEPS, ENOUGH = 30, 0.01
 """Steps at most; and what a step must take away of a deviance for another one: so much of what it is above the best,
 and the square."""
 MOST_LINES, MOST_Q, MOST_POINTS = 16, 3, 300
-"""Lines that are fitted at once, so that what is held stays below some 50 MB; q of a law at most; and of some more
-points than these, starts are for every second, third and so on."""
+"""Lines that are fitted at once, so that what is held stays below some 50 MB; q of a law at most; and from so many
+points on the starts are chosen by every second point alone, from twice as many on by every third, and so on."""
 
 
 class Found(NamedTuple):

@@ -62,7 +62,7 @@ def fit_two_laws(
         intervals are then wide enough for both.
     windows : pair of (low, high), optional
         Fit a straight line in each of two windows, which share at most an end point, and say where the two lines
-        meet; nothing is fitted between them.
+        meet; nothing is fitted between them. The results are in the order of the windows.
 
     Returns
     -------
@@ -202,9 +202,10 @@ def crossover(low_fit: xr.Dataset, high_fit: xr.Dataset) -> xr.Dataset:
     """
     if bool(((low_fit.low < high_fit.high) & (high_fit.low < low_fit.high)).any()):
         raise SweepError("the windows of the two fits overlap, so their errors are not independent; take them apart")
-    exponents = ["exponent", "exponent_low", "exponent_high"]
-    result = xr.concat([low_fit[exponents], high_fit[exponents]], xr.Variable("law", ["low", "high"]))
-    if bool((low_fit.centre > high_fit.centre).all()):
+    turned, exponents = bool((low_fit.centre > high_fit.centre).all()), ["exponent", "exponent_low", "exponent_high"]
+    names = ["high", "low"] if turned else ["low", "high"]
+    result = xr.concat([low_fit[exponents], high_fit[exponents]], xr.Variable("law", names))
+    if turned:
         low_fit, high_fit = high_fit, low_fit
     both = xr.concat([low_fit, high_fit], "law", combine_attrs="override")
     middle = np.log(both.centre).mean("law")  # logarithms counted from here keep their digits

@@ -263,6 +263,7 @@ def test_two_power_laws_meet_where_they_are_equal_in_either_order():
         assert float(met.crossover_error) < 1e-10
         slopes = [-1, -1 / 3] if windows[0][0] is None else [-1 / 3, -1]
         np.testing.assert_allclose(met.exponent, slopes, rtol=1e-12)
+        np.testing.assert_allclose(met.exponent.sel(law=["low", "high"]), [-1, -1 / 3], rtol=1e-12)
 
 
 @pytest.mark.parametrize(
