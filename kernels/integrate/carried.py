@@ -40,8 +40,6 @@ DOUBT = 4.0
 """By how much an event's margin grows per unit of its error at the start of a leg."""
 ORDERLY = 8.0
 """How late, of the time since the event before, one may come: else which comes first is not sure."""
-PART = 0.05
-"""Of what a state's last rate comes to since the last switch: its size where it is small at the switch."""
 FADES = 0.8
 """Of an error at a switch, what counts at the next one at least: where it changes its sign it is small by chance."""
 VAGUE = 0.05

@@ -1,6 +1,6 @@
 """The statuses as numbers that lanes can hold: `where(condition, OK, BAD_INPUT)`; their one home in `kernels/`.
 
-A verdict is a float64 of a cell or WIDTH of them until `write` puts it into the int8 column. The names are those of
+A verdict is a float64 of a cell, or lanes of them, until `write` puts it into the int8 column. The names are those of
 `kernels.interface.Status`, where it stands what each means, in its order: OK, remarks, refusals.
 """
 

@@ -1,6 +1,6 @@
 """Records of columns and of cells: a cell's numbers are read from columns, and written to them, by name.
 
-A *record* is a NamedTuple. Of arrays, it holds columns; of numbers (or lanes), one cell (or WIDTH of them). With
+A *record* is a NamedTuple. Of arrays, it holds columns; of numbers, one cell; of lanes, the cells side by side. With
 
     Columns(a=array, b=array, total=array, status=array)
     p = read(Pair, columns, i)                            # Pair(a=columns.a[i], b=columns.b[i])

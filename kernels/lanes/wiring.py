@@ -66,7 +66,7 @@ class method(Method):
     sooner : `sooner(p, rtol)` of columns, uncompiled
     name, doc, excludes, lacks, estimates : as in `kernels.interface.Method`
     buffers : makes a tuple of arrays that a thread's cells use one after the other: `buffers()`, or `buffers(columns)`
-    loop : `in_lanes`; `cell_by_cell`, where every search goes its own way
+    loop : `in_lanes`; `in_few_lanes`, of what takes many steps; `cell_by_cell`, where every search goes its own way
     units : (take, put_back) of a method whose scene has no units. `scene, units = take(p)` is what `solve` and `bound`
         get in place of p, and `put_back(units, outputs, status)` makes outputs and status of what is solved.
     fills : whether it writes the rows of its cells itself
@@ -227,7 +227,7 @@ class _Wiring:
         return namedtuple("Given", [name for name in self.outputs if (name in solver.lacks) != gives])
 
     def _body(self, solver: method) -> FillCells:
-        """The work of a method on cell i, or on WIDTH of them."""
+        """The work of a method on cell i, or on the cells that i means."""
         record, given, order = self.record, self._given(solver), namedtuple("Order", self.outputs)
         none = self._given(solver, False)(*(math.nan for _ in solver.lacks))
         inner: Any = solver.solve

@@ -27,7 +27,7 @@ from sweep.errors import SweepError
 from sweep.study.model import Study
 
 LANES = 16
-"""Cells that a lane kernel solves at once: it takes as long for one of them."""
+"""Cells that a lane kernel solves at once, within a factor of 2: it takes as long for one of them."""
 POSITIONS, PLACES = 64, 16
 """Places of the grid where probes are made; and how many are tried in turn where one in the middle fails."""
 BUDGET = 0.003, 0.03
@@ -53,7 +53,7 @@ GOLDEN = 0.6180339887498949
 class Sample:
     """Timed probes: cell each starts at (ascending), and its seconds per cell.
 
-    `lanes`: whether one cell takes as long as 16, where cells are so dear that it matters. `call`: what a call costs
+    `lanes`: whether one cell takes as long as LANES, where cells are so dear that it matters. `call`: what a call costs
     beside the share of its cells, in seconds: what one cell alone takes beyond it. Where cells are solved in lanes,
     that is also about what the last ones of a call wait for each other.
     """
@@ -124,7 +124,7 @@ def take_sample(solver: SolveCells, columns: Sequence[Column], size: int, clock:
         alone = min(alone, anywhere(1))
     cells, lanes = 1, False
     if size > 1 and alone > PROBE_SECONDS:
-        # where two cells take as long as one, 16 will
+        # where two cells take as long as one, as many as lanes will
         lanes = anywhere(2) < 1.5 * alone
         cells = max(1, min(LANES, size // 4)) if lanes else 1
     else:
