@@ -16,7 +16,7 @@ from kernels.expression.rounding import Losses, Sizes
 from kernels.expression.series import V, Values
 from kernels.expression.tangent import SHORT, Tangents, along, short
 from kernels.integrate.carried import Changes
-from kernels.integrate.driver import KINK_LIMIT
+from kernels.integrate.driver import KINK_LIMIT, STILL
 from kernels.integrate.pairs import ROUNDINGS
 from kernels.integrate.powers import Power, core
 from kernels.integrate.records import Cell, Errors, Mode, Pieces, Written
@@ -87,7 +87,7 @@ class Functions:
         """Whether the rate of a state hangs on another one whose own rate, or that of a further one, hangs on it."""
         mode, boxes = Mode(ANY, (ANY,) * (kinks + 1), (ANY,) * m, False), ((ANY, ANY),) * n
         self.any = {"state": (ANY,) * n, "changes": (ANY,) * n, "mode": mode, "boxes": boxes}
-        self.any |= {"parameters": mode.parameters, "cores": (ANY,) * len(self.graph.powers)}
+        self.any |= {"parameters": mode.parameters, "cores": (ANY,) * len(self.graph.powers), "on": mode.signs}
 
     def written(self):
         """The scene's `Written`, for a method that misses events by no more than an explicit one.
@@ -119,6 +119,7 @@ class Functions:
             surfaces=tuple(mark * (j in further) for j in range(len(self.kinks))) if further else None,
             passable=tuple(float(not any(x.kind == INPUT and x.args[0] == "side" for x in parts)) for parts in sided),
             deciding=deciding if any(deciding) else None,
+            jumped=left_a_call(self.rehearsed(self._jumped)) if any(self._jumps()) else None,
             cell=cell_of(*self.size), roundings=ROUNDINGS, biased=0.0,
         )  # fmt: skip
 
@@ -193,6 +194,37 @@ class Functions:
             signs.append(V.where(values.value(u) < 0.0, -1.0, 1.0))
             values.inputs[f".sign_{j}"] = signs[j]
         return (*signs, 0.0 * mode.side + 1.0)
+
+    def _jumps(self):
+        """Whether the surface, and each kink's u, may jump at a kink."""
+        parts = (needed(u) for u in (self.recorded.surface, *self.kinks))
+        return [any(x.kind == INPUT and x.args[0].startswith(".sign_") for x in part) for part in parts]
+
+    def _jumped(self, state, mode, on, blur):
+        """Where kinks have just been met: marks and signs of what jumps over 0 there; whether it comes next to 0.
+
+        A surface that jumps below 0 is met; what else jumps over 0 has the other sign, as if it had been met too.
+        `blur` : of what a value is made of, that within which it is next to 0
+        """
+        old, new = Values(self.inputs(state, mode)), Values(self.inputs(state, mode))
+        sizes, jumps, never = Sizes(self.inputs(state, mode)), self._jumps(), on[0] < 0.0
+
+        def over(u, sign, met):
+            before, after, size = sign * old.value(u), sign * new.value(u), sizes.of(u)
+            jump = (met < 0.5) & (V.magnitude(after - before) > STILL * size)
+            return jump & (before > 0.0) & (after < 0.0), jump & (V.magnitude(after) <= blur * size)
+
+        marks, signs, faint = [], [], never
+        for j, (u, sign, met) in enumerate(zip(self.kinks, mode.signs[:-1], on[1:], strict=True)):
+            jumps_over, close = over(u, sign, met) if jumps[1 + j] else (never, never)
+            passed = jumps_over & (sign > 0.0) if j in self.recorded.surfaces else never
+            marks.append(V.where(passed, 1.0, met))
+            signs.append(V.where(jumps_over & V.not_(passed), -sign, sign))
+            new.inputs[f".sign_{j}"], faint = V.where(met > 0.5, -sign, signs[j]), faint | close
+        way = mode.signs[-1]
+        jumps_over, close = over(self.recorded.surface, way, on[0]) if jumps[0] else (never, never)
+        first = V.where(jumps_over & (way > 0.0), 1.0, on[0])
+        return (first, *marks), (*signs, V.where(jumps_over, 1.0, way)), faint | close
 
     def _underflows(self, state, mode, unit):
         value, lost = Values(self.inputs(state, mode, unit)).value, unit < 0.0

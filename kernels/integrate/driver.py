@@ -27,6 +27,8 @@ BACK = 1e-9
 """Of an event's rate before a switch, that of one which rounding may be all of behind it."""
 STILL = 1e-12
 """Of what a surface's value is made of, that within which a motion is on it."""
+MET = 1e-2
+"""The same behind an event, of what has been met by moving there and not by a jump."""
 ONE_ULP = 2.0**-52
 CLOCK_OFF = 8.0
 """Roundings that a clock is off by from one event to the next in a shaken run: what is near an event in time hangs on
@@ -227,6 +229,10 @@ def turned(m, cell, moving):
     And the lanes that switch; whose switch counts; those at the first surface, at each further one (() for none).
     """
     on, signs, left, met = cell.on, cell.signs, (), ()
+    if m.jumped is not None:
+        *jumped, faint = m.jumped(cell.state, mode_of(cell), on, BLUR * cell.tolerance)
+        on, signs = choose(moving, tuple(jumped), (on, signs))
+        cell = cell._replace(verdict=raised(cell.verdict, moving & faint, GRAZING))
     switches = counts = first = moving & first_of(signs[-1], on[0])
     if m.surfaces is not None:
         parts = zip(on[1:], m.surfaces, signs[:-1], strict=True)
@@ -265,6 +271,9 @@ def switched(m, cell, rates, switches, counts, first, met):
     old_mode = Mode(cell.side, which, parameters, False)
     own, rates = ERRORS.behind(m, own, old, old_mode, rates, switches)
     before, gaps, verdict = m.surface(old, old_mode), m.kinks(old, old_mode), cell.verdict
+    if m.jumped is not None:  # what has jumped over 0 is not on it
+        parts = zip((before, *gaps), m.made(old, old_mode), strict=True)
+        before, *gaps = (where(magnitude(gap) <= MET * size, gap, 0.0) for gap, (size, _) in parts)
     if m.deciding is not None:  # a kink whose side decides what the switch does may be too close to tell its side
         parts = zip(m.deciding, gaps, m.made(old, old_mode)[1:], strict=True)
         close = tuple(

@@ -23,7 +23,7 @@ class Mode(NamedTuple):
 Written = namedtuple(
     "Written",
     "rates surface kinks switched started natural_signs underflows jet lost hidden bounds made most_kinks cell "
-    "roundings biased speeds onto surfaces hiding passable deciding on_clock states_off factored solved error",
+    "roundings biased speeds onto surfaces hiding passable deciding jumped on_clock states_off factored solved error",
     defaults=(None, None, None),
 )
 """What is written of a scene: functions of (state, mode) unless said otherwise, and its numbers.
@@ -47,6 +47,8 @@ surfaces : 1 for each kink that is a further surface, at which the motion switch
 hiding : 1 for each rate, and for each event, that can hide something; None where none can
 passable : 1 for the surface, and for each kink, that does not depend on the side: a motion may pass through it
 deciding : 1 for each kink whose side decides what a switch does; None where there is none
+jumped : (state, mode, on, blur) -> marks and signs where kinks are met, of what jumps over 0 there; whether that comes
+    next to 0; None where nothing does
 on_clock : (state, unit, h) -> the step next to h > 0 by which each *clock*, a state whose rate is 1, is not rounded
 states_off : (state, by) -> the state, its clocks off by so many parts of themselves, others by fewer
 factored, solved : None, or of a scene that may be stiff (`expression.stiff`)

@@ -9,7 +9,7 @@ from mpmath import mp, mpf
 
 from kernels.interface import Status
 from kernels.lanes.jit import COMPILED
-from kernels.scene import Field, SceneError, maximum, minimum, scene_kernel, sign, where
+from kernels.scene import Field, SceneError, maximum, minimum, mod, scene_kernel, sign, where
 from kernels.stepping import stepped_kernel
 
 METHODS = ["taylor", "taylor_once", "dop853", "dopri5"]
@@ -173,3 +173,26 @@ def test_what_a_function_keeps_of_an_earlier_call_is_refused():
 def test_names_that_are_taken_or_none_are_refused(changed):
     with pytest.raises(SceneError):
         scene(**changed)
+
+
+@pytest.mark.skipif(not COMPILED, reason="thousands of steps")
+@pytest.mark.parametrize("method", ["taylor", "dop853"])
+def test_what_jumps_over_a_threshold_and_comes_back_soon_is_not_missed(method):
+    """A pulse at the beginning of each second; and a surface above which a motion is but for that time."""
+    width, seconds = np.tile(10.0 ** -np.linspace(0.05, 4.0, 40), 2), np.repeat([4.0, 9.0], 40)
+    common = {"doc": "", "states": fields("on"), "start": lambda: 0.0, "start_time": 0.5}
+    pulsed = scene_kernel(
+        **common, name="pulsed", parameters=fields("width", "end"), surface=lambda t, end: end - t,
+        rates=lambda t, width: where(mod(t, 1.0) < width, 1.0, 0.0),
+    )  # fmt: skip
+    outputs, status = solve(pulsed, method, width, seconds + 0.95, flips=1.0, rtol=1e-9)
+    assert (status == Status.OK).all()
+    on = seconds * width + np.maximum(width - 0.5, 0.0)
+    assert np.allclose(outputs["on"], on, rtol=1e-9, atol=0.0)
+    ticks = scene_kernel(
+        **common, name="ticks", parameters=fields("width"), surface=lambda t, width: mod(t, 1.0) - width,
+        rates=lambda: 1.0,
+    )  # fmt: skip
+    outputs, status = solve(ticks, method, width, flips=seconds, rtol=1e-9)
+    assert (status == Status.OK).all()
+    assert np.allclose(outputs["time"], seconds - 0.5, rtol=1e-9, atol=0.0)
