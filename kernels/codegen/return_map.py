@@ -78,9 +78,8 @@ class ReturnMap:
             record(one)
 
     def passed(self, parameters, before, flips, rtol, scene=None):
-        """Rows of time and states, `flips` switches after the one before which the states are given; and statuses.
-
-        And the largest sizes of the states on the way, at the ends of steps. All are NaN where the motion ends before.
+        """Rows of time and states, `flips` switches after the one before which the states are given; statuses; and the
+        largest sizes of the states on the way, at the ends of steps. Numbers are NaN where the motion ends before.
 
         Parameters
         ----------
@@ -91,7 +90,8 @@ class ReturnMap:
         begin = np.zeros((n, len(flips))) if before is None else before
         solve = solver(scene or self.scene, self.method, again=False)
         found, status, _ = solve([*parameters, *begin, start, flips], rtol)
-        found[:, status >= FIRST_REFUSAL], sizes = np.nan, 2 + len(self.scene.states)
+        found[:, status >= FIRST_REFUSAL] = np.nan
+        sizes = 2 + len(self.scene.states)
         return found[[0, *range(2, 2 + n)]], status, found[sizes : sizes + n]
 
     def turned(self, parameters, before, flips):

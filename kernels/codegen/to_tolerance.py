@@ -66,7 +66,8 @@ SLIDERS = {"taylor": ("dop853", "rodas5p")}
 def solver(scene, method, again=True):
     """The function of columns, rtol and, maybe, stops that solves cells by a method: results, statuses and errors.
 
-    They are as those of `followed`, at all stops; the errors are what the results are right to, as far as is known.
+    Results are rows as those of `followed`; an error is what the results of a cell, at a stop, are right to, infinite
+    or NaN where that is not known.
     `again` : whether what three runs leave unsure is followed with tighter tolerances
     """
 
@@ -111,7 +112,7 @@ def sliding(scene):
 
 
 def some_stop(condition):
-    """Whether it holds at a stop of each cell, or of those that have but one end."""
+    """For each cell, whether the condition (n_stops, n_cells) or (n_cells,) holds at any of its stops."""
     return np.atleast_2d(condition).any(axis=0)
 
 
