@@ -43,6 +43,7 @@ _CALM = 1e-6
 """Tolerance at which a half swing is right enough for Newton's method to converge, whatever is wanted."""
 _ROUNDING = 2e-14
 """Of a half swing's speed and time."""
+_SENSITIVITY, _MULTIPLIER = map(Outputs._fields.index, ("sensitivity", "multiplier"))
 
 Cell = namedtuple("Cell", (*Foliot._fields, "depth", "harmonic"))
 """Columns of cells."""
@@ -123,6 +124,64 @@ def begun(manner, cells, rtol):
         return terms, manner.begins(cells, terms).astype(np.int8)
 
 
+def _counted(decay):
+    """Y where errors of it count; beyond, the multiplier exp(-Y) is 0 for good."""
+    return np.where(decay < 750.0, decay, 0.0)
+
+
+def _wanted(manner, share, gap, decay, waves):
+    """The tolerance of the last half swings; `share` times rtol is given.
+
+    An error of F counts 1/(1 - dF/dv1)-fold in v1, and Y-fold in exp(-Y); without tangents errors of steps add up over
+    the waves of the torque. So it is
+        share rtol (1 - dF/dv1)/((1 + Y) (1 + waves)).                                               (5)
+    """
+    wanted = share * gap / (1.0 + _counted(decay)) / (1.0 + waves)
+    return np.fmin(np.fmax(wanted, manner.least), manner.orderly)
+
+
+def _stated(by, former, last, earlier, told, step, moved, tolerance, gap):
+    """Relative errors of what half swings give, a row for each output, and their first term.
+
+    Where those before gave outputs with a relative difference `apart`, they are
+        told apart + 2 (rate apart + step) + (ROUNDING + tolerance (1 + waves))/(1 - dF/dv1),          (6)
+    where `step` is the relative one that Newton's method would still go, and `rate` what it is of the way `moved` that
+    v1 went since. The last term is more where the sensitivity cancels, and (1 + Y)-fold of exp(-Y).
+
+    Parameters
+    ----------
+    by, former : what is found, and the outputs before
+    last, earlier : the cells at LAST, whose first term before gets `apart` more
+    tolerance, gap : that of the half swings times (1 + waves); 1 - dF/dv1
+    """
+    ratio = by.outputs / former
+    apart = np.where(by.outputs == former, 0.0, np.abs(ratio - 1.0))  # a multiplier may be 0 for good
+    first = np.where(last, earlier + apart, told * apart)
+    rate = np.where(moved > 0.0, step / moved, 0.0)
+    floor = np.tile((_ROUNDING + tolerance) / gap, (len(former), 1))
+    floor[_SENSITIVITY] *= 1.0 + by.cancels
+    floor[_MULTIPLIER] *= 1.0 + _counted(by.Y)
+    return first + 2.0 * (rate * apart + step) + floor, first
+
+
+def _next(manner, stage, final, checked, inside, step, gap, used, wanted, rtol, linear):
+    """The next stage of cells, and its tolerance, at last (5).
+
+    Where the search is cheap (`linear`), it goes on until what Newton's method leaves of its relative `step` is below
+    what is wanted. `checked` are those whose rough half swing has a twin; `inside`, whose step stays in the bracket.
+    """
+    near = np.clip(0.01 * np.sqrt(rtol * gap), manner.finer * wanted, manner.coarse)
+    left, converged = step * step, step < np.sqrt(near)
+    near = np.where(linear, np.clip(0.01 * left, np.minimum(4.0 * wanted, _CALM), manner.coarse), near)
+    converged = np.where(linear, (left < wanted) & (used <= manner.finer * wanted), converged)
+    close = inside & np.where(stage == SEARCH, step < _CLOSE, converged)
+    onward = checked | (close & (stage < ROUGH))
+    stage = np.where(onward, stage + 1, np.minimum(stage, ROUGH))
+    rough = manner.finer * wanted
+    coarse = np.clip(0.03 * np.where(gap > 0.0, gap, 1.0), np.fmin(rough, manner.coarse), manner.coarse)
+    return stage, np.choose(stage, [coarse, near, rough, wanted, wanted])
+
+
 @np.errstate(all="ignore")
 def cycles(manner, cells, rtol, asked):
     """Limit cycles of many cells by Newton's method on v1, each cell at its own stage.
@@ -130,44 +189,29 @@ def cycles(manner, cells, rtol, asked):
     `asked` says which of the outputs must be right. The result is outputs and relative errors, a row for each output,
     and statuses: NOT_CONVERGED where half swings come to rest or the bracket closes on nothing.
 
-    An error of F counts 1/(1 - dF/dv1)-fold in v1, and Y-fold in exp(-Y); without tangents errors of steps add up over
-    the waves of the torque. So the tolerance wanted of the last half swings is
-        share rtol (1 - dF/dv1)/((1 + Y) (1 + waves)).                                               (5)
-    When they give an output with a relative difference `apart`, its error is stated as
-        told apart + 2 (rate apart + step) + (ROUNDING + tolerance (1 + waves))/(1 - dF/dv1),          (6)
-    where `step` is the relative one that Newton's method would still go, and `rate` what it is of the way that v1 went
-    since the half swing before. Where the torque varies, what the last two half swings differ by is added. The
-    last term is more where the sensitivity cancels, and (1 + Y)-fold of exp(-Y).
     """
-    n, of_sensitivity = len(rtol), Outputs._fields.index("sensitivity")
+    n = len(rtol)
     terms, status = begun(manner, cells, rtol)
-    dragged, varies, tangents = terms.gamma > 0.0, cells.depth > 0.0, asked[of_sensitivity]
+    dragged, varies, tangents = terms.gamma > 0.0, cells.depth > 0.0, asked[_SENSITIVITY]
     linear = ~dragged & varies & manner.bare
     kind = np.where((dragged & (terms.degree < 2.0)) | varies, 2, np.where(terms.rough > 0.5, 1, 0))
     share, told = np.array(manner.shares)[kind], np.tile(np.array(manner.told)[kind], (len(Outputs._fields), 1))
-    told[of_sensitivity, varies] = manner.steep
-    final, finer = np.where(varies, LAST, FINE), manner.finer
+    told[_SENSITIVITY, varies] = manner.steep
+    final = np.where(varies, LAST, FINE)
     low, high, stuck, again = np.zeros(n), np.full(n, np.inf), np.zeros(n, int), np.zeros(n, int)
     before, outputs = np.full(n, np.nan), np.full((len(Outputs._fields), n), np.nan)
     errors, by_tolerance = np.full_like(outputs, np.inf), np.full_like(outputs, np.inf)
-
-    def wanted_of(i, gap, decay, waves):
-        """The tolerance (5) of cells i."""
-        steady = np.where(decay < 750.0, decay, 0.0)  # beyond, the multiplier is 0 for good
-        wanted = share[i] * rtol[i] * gap / (1.0 + steady) / (1.0 + waves)
-        return np.fmin(np.fmax(wanted, manner.least), manner.orderly)
 
     i, slow = np.flatnonzero(status == Status.OK), terms.pace > 3.0
     v = np.where(slow, 1.0 / terms.pace, 2.0 / np.sqrt(1.0 + 4.0 * terms.pace * terms.pace))
     slow &= manner.steps
     stage = np.where(slow, ROUGH, SEARCH)
-    tolerance = np.where(slow, finer * wanted_of(slice(None), 1.0, 2.0 * terms.stiff, 0.0), manner.coarse)
+    tolerance = np.where(slow, manner.finer * _wanted(manner, share * rtol, 1.0, 2.0 * terms.stiff, 0.0), manner.coarse)
     status[i] = Status.NOT_CONVERGED
     for _ in range(LIMIT):
         if not len(i):
             break
-
-        if manner.steps:
+        if manner.steps:  # lanes wait for their slowest
             i = i[np.argsort((tolerance[i] ** -0.2 + terms.stiff[i]) * (1.0 + np.sqrt(terms.kappa[i])))]
 
         # the half swings; Newton's step of each, and the cycle by it
@@ -181,15 +225,12 @@ def cycles(manner, cells, rtol, asked):
         lost = (stuck[i] > STUCK) | ((stage[i] == SEARCH) & (high[i] - low[i] <= manner.coarse * now))
 
         # the error (6), where the last two are done; the end where that will do or nothing helps
-        moved, ratio = np.abs(now / before[i] - 1.0), by.outputs / outputs[:, i]
-        apart = np.where(by.outputs == outputs[:, i], 0.0, np.abs(ratio - 1.0))  # a multiplier may be 0 for good
-        rate = np.where(moved > 0.0, relative / moved, 0.0)
-        by_tolerance[:, i] = np.where(stage[i] == LAST, by_tolerance[:, i] + apart, told[:, i] * apart)
         waves = np.where(linear[i] & (not tangents), cells.harmonic[i] * 0.5 * (1.0 + by.A), 0.0)
-        floor = np.tile((_ROUNDING + used * (1.0 + waves)) / gap, (len(Outputs._fields), 1))
-        floor[of_sensitivity] *= 1.0 + by.cancels
-        floor[4] *= 1.0 + np.where(by.Y < 750.0, by.Y, 0.0)
-        stated, done = by_tolerance[:, i] + 2.0 * (rate * apart + relative) + floor, free & (stage[i] == final[i])
+        loose, moved, twin = used * (1.0 + waves), np.abs(now / before[i] - 1.0), stage[i] == LAST
+        stated, by_tolerance[:, i] = _stated(
+            by, outputs[:, i], twin, by_tolerance[:, i], told[:, i], relative, moved, loose, gap
+        )
+        done = free & (stage[i] == final[i])
         outputs[:, i[free]], errors[:, i[done]] = by.outputs[:, free], stated[:, done]
         status[i[done]] = verdict[done]
         over = stated[asked].max(axis=0) / rtol[i]
@@ -215,18 +256,10 @@ def cycles(manner, cells, rtol, asked):
         checked = inside & (stage[i] >= ROUGH) & (stage[i] < final[i]) & (relative < _CHECKED)
         before[i], v[i] = now, np.where(inside, new, between)
 
-        # the next stage and its tolerance, at last (5). Where the search is cheap, it goes on until what Newton's
-        # method leaves is below what is wanted
-        wanted = wanted_of(i, gap, by.Y, waves)
-        near = np.clip(0.01 * np.sqrt(rtol[i] * gap), finer * wanted, manner.coarse)
-        left, converged = relative * relative, relative < np.sqrt(near)
-        near = np.where(linear[i], np.clip(0.01 * left, np.minimum(4.0 * wanted, _CALM), manner.coarse), near)
-        converged = np.where(linear[i], (left < wanted) & (used <= finer * wanted), converged)
-        close = inside & np.where(stage[i] == SEARCH, relative < _CLOSE, converged)
-        onward = checked | (close & (stage[i] < ROUGH))
-        stage[i] = np.where(onward, stage[i] + 1, np.minimum(stage[i], ROUGH))
-        coarse = np.clip(0.03 * np.where(gap > 0.0, gap, 1.0), np.fmin(finer * wanted, manner.coarse), manner.coarse)
-        tolerance[i] = np.choose(stage[i], [coarse, near, finer * wanted, wanted, wanted])
+        wanted = _wanted(manner, share[i] * rtol[i], gap, by.Y, waves)
+        stage[i], tolerance[i] = _next(
+            manner, stage[i], final[i], checked, inside, relative, gap, used, wanted, rtol[i], linear[i]
+        )
         i = i[~(last | lost | helped | many)]
     return outputs, errors, status
 
