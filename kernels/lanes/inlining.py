@@ -210,10 +210,18 @@ def _set_linkage(module, old, new):
             function.linkage = new
 
 
+@functools.cache
+def _is_frozen():
+    """Whether the program keeps objects from the collector itself; asked once, for all of them are counted."""
+    return gc.get_freeze_count() > 0
+
+
 class _Entry(CPUDispatcher):
     """A function that Python calls, compiled without collecting garbage: that takes a twelfth of the time."""
 
     def compile(self, sig):
+        if sig in self.overloads:  # a part called from Python asks each time
+            return self.overloads[sig].entry_point
         collecting = gc.isenabled()
         gc.disable()
         if "resolve_function_type" not in vars(self.typingctx):
@@ -224,7 +232,7 @@ class _Entry(CPUDispatcher):
                 return super().compile(sig)
         finally:
             if collecting:
-                if not gc.get_freeze_count():  # all that is new counts as old: or it would be looked through at once
+                if not _is_frozen():  # all that is new counts as old: or it would be looked through at once
                     gc.freeze()
                     gc.unfreeze()
                 gc.enable()
