@@ -188,7 +188,6 @@ def cycles(manner, cells, rtol, asked):
 
     `asked` says which of the outputs must be right. The result is outputs and relative errors, a row for each output,
     and statuses: NOT_CONVERGED where half swings come to rest or the bracket closes on nothing.
-
     """
     n = len(rtol)
     terms, status = begun(manner, cells, rtol)

@@ -10,8 +10,6 @@ row is the lane's stage; then come its cell's inputs. `advance(memory, i)` takes
 or for a limited number of events or steps, and returns whether one has; i is the index of all lanes.
 """
 
-import operator
-
 import numpy as np
 
 from kernels.lanes import vectors
@@ -25,8 +23,7 @@ FEW = vectors.FEW if COMPILED else 1
 IDLE, FRESH, MOVING, DONE = 0.0, 1.0, 2.0, 3.0
 """Stages of a lane that is refilled; `advance` begins a fresh one and says when it is done."""
 
-cells_at = vectors.lanes_at if COMPILED else operator.index
-few_at = vectors.few_at if COMPILED else operator.index
+cells_at, few_at = vectors.lanes_at, vectors.few_at
 
 _ROWS = np.minimum.outer(np.arange(GROUP), np.arange(GROUP))
 """Of so many cells and one more, the cell in each lane."""

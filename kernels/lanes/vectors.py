@@ -44,11 +44,11 @@ _MAGIC = 6755399441055744.0  # 1.5 * 2^52: adding it leaves the nearest integer 
 class _Primitive(types.Type):
     """A type of so many lanes, with a model of its own; a number of type `one` beside it is repeated in every lane."""
 
-    one: type[types.Type] | None = None
+    one, element = None, None
 
     def __init__(self, width):
         super().__init__(f"{type(self).__name__}({width})")
-        self.width, self.llvm = width, self.of_width(width)
+        self.width, self.llvm = width, ir.VectorType(self.element, width) if self.element else _I64
 
     def __init_subclass__(cls):
         @register_model(cls)
@@ -66,26 +66,17 @@ class _Primitive(types.Type):
 class LanesType(_Primitive):
     """A float64 of each cell."""
 
-    one = types.Number
-
-    def of_width(self, width):
-        return ir.VectorType(_F64, width)
+    one, element = types.Number, _F64
 
 
 class MaskType(_Primitive):
     """One bit a lane."""
 
-    one = types.Boolean
-
-    def of_width(self, width):
-        return ir.VectorType(ir.IntType(1), width)
+    one, element = types.Boolean, ir.IntType(1)
 
 
 class LaneIndexType(_Primitive):
     """As many cells of a column, from i on."""
-
-    def of_width(self, width):
-        return _I64
 
 
 class _Written(ir.Constant):
@@ -332,13 +323,13 @@ in_place(not_, 1, lambda condition: condition, lambda context, builder, signatur
 
 
 def lanes_at(i):
-    """The index of cells i .. i + WIDTH - 1; compiled code only."""
-    raise NotImplementedError
+    """The index of cells i .. i + WIDTH - 1; in plain Python of cell i alone."""
+    return operator.index(i)
 
 
 def few_at(i):
-    """The index of cells i .. i + FEW - 1; compiled code only."""
-    raise NotImplementedError
+    """The index of cells i .. i + FEW - 1; in plain Python of cell i alone."""
+    return operator.index(i)
 
 
 for _at, _wide in ((lanes_at, WIDTH), (few_at, FEW)):

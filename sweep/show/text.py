@@ -34,7 +34,7 @@ LARGEST_SCAN = 1 << 28
 """Bytes of an output up to which its smallest and largest value are looked up."""
 MOST_FAILED = 20
 """Cells that FAILED which are reported one by one."""
-UNTOLD = "not in the log: the kernel gave no number or status, or the log is not complete"
+NOT_LOGGED = "not in the log: the kernel gave no number or status, or the log is not complete"
 _FAILED, _REASON = " FAILED (", "): "
 
 
@@ -50,7 +50,7 @@ def result_text(path: Path, dataset: xr.Dataset) -> str:
     failed = []
     for number in numbers[:MOST_FAILED]:
         place = "" if summed else cell_text(cell_values(dataset, number))
-        failed.append((f"cell {number}", place, known.get(number, UNTOLD)))
+        failed.append((f"cell {number}", place, known.get(number, NOT_LOGGED)))
     return page(
         paragraph("\n".join(head(path, dataset))),
         settings(dataset).text(),
