@@ -212,14 +212,6 @@ def expm1(x):
 
 
 @jit
-def artanh(x):
-    """Inverse hyperbolic tangent within 3 ulp, for -1 < x < 1."""
-    a = magnitude(x)
-    value = 0.5 * log1p(2.0 * a / (1.0 - a))
-    return where(x < 0.0, -value, value)
-
-
-@jit
 def sincos(x):
     """Sine and cosine, within 1 ulp of the larger for abs(x) < 1e7."""
     n = nearest(x * _TWO_OVER_PI)

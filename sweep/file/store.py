@@ -33,6 +33,8 @@ from sweep.file.reading import BYTES, UNFINISHED, Damaged, StoredFile
 from sweep.words import quantity
 
 DAMAGED = "damaged beside its numbers; remove it, or give it up with --force (Python: force=True)"
+OTHERS = (".csv", ".parquet", ".zarr", ".toml")
+"""Endings of other kinds of file, which no result is given."""
 SYNC_SECONDS = 0.2
 """How often blocks are brought to the disk, and it is looked whether the file is still in its place."""
 
@@ -50,6 +52,8 @@ def lock_of(output: Path) -> Path:
 @contextlib.contextmanager
 def alone(output: Path) -> Iterator[None]:
     """No other run writes this output meanwhile. Raises SweepError."""
+    if output.suffix in OTHERS:
+        raise SweepError(f"{output}: a result is an HDF5 file; name it *.h5, of which `sweep export` makes other kinds")
     if output.suffix == UNFINISHED:
         raise SweepError(f"{output}: a result that is not finished is called *{UNFINISHED}; choose another name")
     with disk.refusing(output), disk.locked(lock_of(output)) as ours:

@@ -139,10 +139,12 @@ class Entry:
 
 
 def text(value: Any) -> str:
-    """A text."""
-    if isinstance(value, str):
-        return value
-    raise ValueError(f"expected text in quotes, found {show(value)}")
+    """A text of characters that a file can hold."""
+    if not isinstance(value, str):
+        raise ValueError(f"expected text in quotes, found {show(value)}")
+    if bad := re.search("[\0\ud800-\udfff]", value):
+        raise ValueError(f"no file holds the character {bad[0]!r}; leave it out")
+    return value
 
 
 def one_of(value: Any, words: Iterable[str]) -> str:

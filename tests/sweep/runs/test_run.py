@@ -126,6 +126,12 @@ def test_a_pipe_or_a_folder_where_a_result_should_be_is_told_at_once(output, nam
         quiet(tall(3), output.parent)
 
 
+def test_a_result_is_not_named_as_another_kind_of_file(output):
+    with pytest.raises(SweepError, match="export"):
+        quiet(tall(3), output.with_suffix(".csv"))
+    assert not list(output.parent.iterdir())
+
+
 def test_the_output_may_be_a_link_to_another_folder(tmp_path):
     (tmp_path / "far").mkdir()
     link = tmp_path / "out.h5"

@@ -15,7 +15,7 @@ import sweep
 from sweep.study.model import Study
 
 NUMBERS = st.floats(allow_nan=False, allow_infinity=False, min_value=1e-300, max_value=1e300)
-TEXTS = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)
+TEXTS = st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\0"), max_size=20)
 
 
 @st.composite

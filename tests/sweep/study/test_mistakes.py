@@ -36,6 +36,7 @@ import sweep
         ("axes.height = [1]\nfixed.rtol = 1", "fixed.rtol", "at the top"),
         ("axes.height = [1]\nalong.phase = [0, 2]", "along.phase", ">= 0, <= 1"),
         ("axes.height = [1]\nalong.r.num = 5", "along.r", "it has phase"),
+        ('title = "a\\u0000b"\naxes.height = [1]', "title", "leave it out"),
         ('design = "zip"\naxes.height = [1, 2]\naxes.v0 = [1, 2, 3]', "axes", "equal length"),
         ("axes.height.file = '../b.csv'", "axes.height.file", "outside"),
     ],
