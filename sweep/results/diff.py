@@ -68,7 +68,7 @@ class Difference:
                 here, there = one.values, y[name].transpose(*one.dims).values
                 # 0 of equal values and of two NaN, infinite where one alone is NaN
                 with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-                    apart = np.abs(here - there) / np.maximum(np.abs(here), np.abs(there))
+                    apart = np.asarray(np.abs(here - there) / np.maximum(np.abs(here), np.abs(there)))
                 apart[(here == there) | (np.isnan(here) & np.isnan(there))] = 0.0
                 apart[np.isnan(apart)] = np.inf
                 apart = apart.max(axis=tuple(range(len(cells), one.ndim)), initial=0.0)
@@ -143,7 +143,11 @@ def diff(a: xr.Dataset, b: xr.Dataset, rtol: float = 0.0) -> Difference:
     if set(statuses_of(a).dims) != set(statuses_of(b).dims):
         dims = [listed(map(str, d[STATUS].dims), word="and") for d in (a, b)]
         raise SweepError(f"the cells run along {dims[0]} in one result and along {dims[1]} in the other")
-    for dim in (dim for dim in a[STATUS].dims if dim not in a.coords):
+    for dim in a[STATUS].dims:
+        if dim in a.coords and dim in b.coords:
+            if not (a.indexes[dim].is_unique and b.indexes[dim].is_unique):
+                raise SweepError(f"{dim} has a value twice; take one of each, e.g. ds.drop_duplicates({str(dim)!r})")
+            continue
         # cells without a value of their own are told apart by their number, so they must be the same ones
         along = [name for name, c in a.coords.items() if c.dims[:1] == (dim,)]
         if a.sizes[dim] != b.sizes[dim] or not all(name in b.coords and a[name].equals(b[name]) for name in along):

@@ -23,6 +23,7 @@ def test_a_result_is_the_same_as_itself(result):
     assert "bit for bit" in repr(found)
     assert all((distance.cells, distance.largest) == (0, 0.0) for distance in found.outputs.values())
     assert sweep.diff(result, result.transpose("v0", "phase", "height")).same
+    assert sweep.diff(*[result.fall_time.to_dataset().assign(status=result.status).isel(height=1, v0=1)] * 2).same
 
 
 def test_the_cell_and_the_distance_are_told(result):
@@ -87,6 +88,8 @@ def test_what_cannot_be_compared_is_refused(result):
         sweep.diff(result, result.assign_attrs(kernel="foliot"))
     with pytest.raises(sweep.SweepError, match="height and v0"):
         sweep.diff(result, sweep.run(build(axes={"height": [1.0]})))
+    with pytest.raises(sweep.SweepError, match="height has a value twice"):
+        sweep.diff(result, xr.concat([result, result], "height"))
 
 
 def test_cells_of_large_results_are_found_wherever_they_are():
