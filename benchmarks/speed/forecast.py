@@ -29,7 +29,7 @@ import psutil
 import sweep
 from sweep.cells.timing import sampled_study
 from sweep.explore.plan import plan
-from sweep.runs.pool import cores
+from sweep.runs.loop import cores
 from sweep.runs.progress import Progress
 from sweep.runs.run import complete
 from sweep.study.model import Study

@@ -66,16 +66,11 @@ def read_all(fd: int, buffers: Sequence[Any], offset: int) -> None:
 
 
 def _through(call: Callable[..., int], fd: int, pieces: Sequence[Any], offset: int) -> None:
-    left = [view for piece in pieces if (view := as_bytes(piece))]
-    while left:
-        count = call(fd, [*left], offset)
-        if not count:
-            raise EOFError("the file ends early")
-        offset += count
-        while left and count >= len(left[0]):
-            count -= len(left.pop(0))
-        if count:
-            left[0] = left[0][count:]
+    for view in map(as_bytes, pieces):
+        while view:
+            if not (count := call(fd, [view], offset)):
+                raise EOFError("the file ends early")
+            offset, view = offset + count, view[count:]
 
 
 def as_bytes(piece: Any) -> memoryview:

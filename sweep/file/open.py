@@ -144,7 +144,7 @@ class Verdict:
     findings : tuple of str
         What is wrong or missing, a line each; none where it is whole.
     blocks : tuple of int or None
-        Damaged blocks of a finished result that can be computed again; None where that would not mend it.
+        Damaged blocks that can be computed again; None where nothing is damaged, or that would not mend it.
     state : str
         What it is called: "undamaged", "damaged", or "not complete" where nothing is wrong with what there is.
     """
@@ -204,14 +204,14 @@ def verdict(output: Path, file: StoredFile) -> Verdict:
             lost.update(bad if table is work else ())
             findings += _lines(f"{name}: damaged between its cells {{:,}} and {{:,}}", table, bad)
     state = "damaged" if findings else "undamaged" if file.finished else "not complete"
+    blocks = tuple(sorted(lost)) if findings and mendable else None
     if file.finished:
-        blocks = tuple(sorted(lost)) if findings and mendable else None
         return Verdict(output, state, f"{file.path.stat().st_size:,} bytes checked", tuple(findings), blocks)
     missing = np.flatnonzero(~work.done).tolist()
     checked = f"unfinished, {work.blocks.count - len(missing):,} of {work.blocks.count:,} blocks there and checked"
     findings += _lines(f"missing: {work.name} {{:,}} to {{:,}}", work, missing)
     findings = findings or ["all blocks are there, but it has not ended; run the sweep again to finish"]
-    return Verdict(output, state, checked, tuple(findings))
+    return Verdict(output, state, checked, tuple(findings), blocks)
 
 
 def _lines(text: str, table: Table, blocks: list[int]) -> Iterator[str]:

@@ -32,7 +32,6 @@ from sweep.file.frame import PAGE, Cut, create, expected_size
 from sweep.file.reading import BYTES, UNFINISHED, Damaged, StoredFile
 from sweep.words import quantity
 
-DAMAGED = "damaged beside its numbers; remove it, or give it up with --force (Python: force=True)"
 OTHERS = (".csv", ".parquet", ".zarr", ".toml")
 """Endings of other kinds of file, which no result is given."""
 SYNC_SECONDS = 0.2
@@ -72,16 +71,10 @@ def earlier(output: Path, mark: Mapping[str, str], give_up: bool = False) -> Sto
     if not path.exists():
         return None
     with contextlib.suppress(SweepError) if give_up else contextlib.nullcontext():
-        try:
-            store = Store(output)
-        except Damaged:
-            raise Damaged(f"{path}: {DAMAGED}") from None
-        as_made, changes = store.is_as_made(), difference(store.fingerprint, mark)
-        if as_made and not changes:
+        store = Store(output)
+        if not (changes := difference(store.fingerprint, mark)):
             return store
         store.close()
-        if not as_made:
-            raise Damaged(f"{path}: {DAMAGED}")
         raise SweepError(
             f"{path}: the unfinished result of another study or version; finish that one first, choose another name, "
             "or give it up with --force (Python: force=True)" + "".join(f"\n  {line}" for line in changes)
@@ -118,11 +111,19 @@ def reopened(output: Path) -> Store:
 class Store(StoredFile):
     """The result of one sweep while it is written, held by this process alone. To be used with `with`.
 
-    It is at `path`, and will be at `output`, where it is when `finished`.
+    It is at `path`, and will be at `output`, where it is when `finished`. Raises Damaged where its structure is not as
+    it was made.
     """
 
     def __init__(self, output: Path) -> None:
-        super().__init__(unfinished_of(output), os.O_RDWR)
+        try:
+            super().__init__(unfinished_of(output), os.O_RDWR)
+            if not self.is_as_made():
+                raise Damaged
+        except Damaged:
+            self.close()
+            cure = "remove it, or give it up with --force (Python: force=True)"
+            raise Damaged(f"{self.path}: damaged beside its numbers; {cure}") from None
         status = os.fstat(self.fd)
         self.output, self._mark = output, (status.st_ino, status.st_size)  # of the file: still the one, and as long
         self._waiting: deque[tuple[int, bytes]] = deque()
@@ -138,17 +139,10 @@ class Store(StoredFile):
         self.close()
         self._syncing.shutdown()
 
-    def resume(self, damaged: Iterable[int] | None = None) -> list[int]:
-        """Takes up what an earlier run left; its damaged blocks count as missing, and are returned.
-
-        `damaged` names them where that is known; None: all blocks that are done are read and compared with their
-        digests. Raises SweepError.
-        """
-        if damaged is None:
-            damaged = set[int]().union(*self.work.damaged(np.flatnonzero(self.work.done).tolist()).values())
+    def resume(self, damaged: Iterable[int]) -> None:
+        """Takes up what an earlier run left; blocks that are damaged count as missing. Raises SweepError."""
         with disk.refusing(self.path):
             self.work.write_digests(dict.fromkeys(damaged, bytes(self.work.row_bytes)))
-        return sorted(damaged)
 
     def missing(self) -> list[int]:
         """Numbers of the blocks that are not done, ascending."""

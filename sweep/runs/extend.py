@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import reduce
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
 from kernels.interface import Status
 from sweep.cells.grid import Grid
 from sweep.cells.partition import box_slices
-from sweep.cells.schema import STATUS, columns
+from sweep.cells.schema import STATUS
 from sweep.errors import SweepError
 from sweep.file.reading import StoredFile
 from sweep.results.statuses import flat_pieces
@@ -38,7 +38,7 @@ def has_failed(file: StoredFile) -> bool:
     return any((piece == Status.FAILED).any() for piece in flat_pieces(columns[STATUS]))
 
 
-class Reused:
+class Reused(StoredFile):
     """The cells of a finished result, in the grid of a study whose axes have all its values, in order, and more.
 
     To `retry`, it is the same study, and cells that FAILED are not known. Raises SweepError where the result cannot be
@@ -46,17 +46,9 @@ class Reused:
     """
 
     def __init__(self, output: Path, study: Study, retry: bool = False) -> None:
-        self._study, self._shape, self._retry = study, Grid(study).shape, retry
-        self._stored = StoredFile(output)
-        old = Study.from_json(self._stored.attrs["study_json"], declared=True)
-        self._numbers: Mapping[str, Any] = self._stored.tables["cells"].columns
+        super().__init__(output)
+        self._shape, self._retry, old = Grid(study).shape, retry, self.study
         self._positions = [_positions(old.axes[name], axis) for name, axis in study.axes.items()]
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *fault: object) -> None:
-        self._stored.close()
 
     def missing(self, start: int, stop: int) -> Any:
         """Of the cells `start` to `stop`, which have to be computed."""
@@ -72,8 +64,8 @@ class Reused:
         # values of the result that are neighbours there have none of its values between them here
         parts = [p[s] for p, s in zip(self._positions, box_slices(self._shape, start, stop), strict=True)]
         old = tuple(slice(int(part[part >= 0].min()), int(part.max()) + 1) for part in parts)
-        for column in columns(self._study):
-            arrays[column.name][known] = self._numbers[column.name][old].reshape(-1, *column.shape)[known[shared]]
+        for name, column in self.tables["cells"].columns.items():
+            arrays[name][known] = column[old].reshape(-1, *column.own)[known[shared]]
         return arrays
 
     def _known(self, start: int, stop: int) -> tuple[Any, Any]:
@@ -81,7 +73,7 @@ class Reused:
         box = box_slices(self._shape, start, stop)
         axes = [positions[s] >= 0 for positions, s in zip(self._positions, box, strict=True)]
         shared = reduce(np.logical_and.outer, axes).ravel()
-        return shared, shared & np.ravel(self._numbers[STATUS][box] != Status.FAILED) if self._retry else shared
+        return shared, shared & np.ravel(self[STATUS][box] != Status.FAILED) if self._retry else shared
 
 
 def _positions(old: Axis, new: Axis) -> Any:

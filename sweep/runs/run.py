@@ -179,9 +179,10 @@ def _to_file(task: Task) -> Ending:
                 disk.remove(store.path)
             return "done before"
         if store is not None:
-            damaged = stack.enter_context(store).resume()
+            damaged = verdict(task.output, stack.enter_context(store)).blocks or ()
         elif standing == "damaged":
             store = stack.enter_context(reopened(task.output))
+        if store is not None:
             store.resume(damaged)
         if store is not None and not store.missing():  # its end alone is missing, or the columns made there are damaged
             with signals_held():
