@@ -48,8 +48,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             stream.flush()
         except OSError:  # Python would try again, and end with a status of its own
             os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
-    pool = sys.modules.get("sweep.runs.pool")
-    if argv is None and pool is not None and pool.endless.is_set():
+    loop = sys.modules.get("sweep.runs.loop")
+    if argv is None and loop is not None and loop.endless.is_set():
         # a kernel that never ends would keep Python from ending; a program that calls this is not ours to end
         os._exit(ended.code)
     return ended.code

@@ -34,7 +34,7 @@ import toy_studies  # noqa: E402
 import sweep  # noqa: E402
 from kernels.interface import Status  # noqa: E402
 from sweep.results.statuses import account  # noqa: E402
-from sweep.runs.log import log_path  # noqa: E402
+from sweep.runs.progress import log_path  # noqa: E402
 
 STUDY = """
 kernel = "night_kernel:NIGHT"

@@ -58,7 +58,7 @@ def plan(arguments: argparse.Namespace) -> None:
 def run(arguments: argparse.Namespace) -> Outcome:
     """Compute a study, or continue where it stopped."""
     study, target = study_from(arguments), arguments.output
-    from sweep.runs.log import log, log_path, logging_to
+    from sweep.runs.progress import log, log_path, logging_to
 
     path = log_path(target) if target.parent.is_dir() else None
     with contextlib.ExitStack() as stack:

@@ -32,7 +32,7 @@ from sweep.errors import Incomplete, SweepError, reason
 from sweep.file import disk
 from sweep.file.reading import StoredFile
 from sweep.runs.isolate import Processes
-from sweep.runs.log import log
+from sweep.runs.progress import log
 from sweep.study.model import Study
 
 CONNECT_SECONDS = 10

@@ -1,55 +1,100 @@
-"""How far a run has come and how long it will take: a bar on a terminal or in a notebook, plain lines in a log.
+"""What a run tells: a bar on a terminal or in a notebook, lines elsewhere, and the log beside its output, OUT.h5.log.
 
-The time left comes from the blocks that are done. They are taken from all over the grid at any time, so they stand for
-those to come; the timed sample of the grid tells by how much these are dearer or cheaper.
+The log is written by Python's logging, a line for people or a line of JSON each. All that is logged goes to the logger
+"sweep", so a program of one's own may send it elsewhere.
 """
 
 from __future__ import annotations
 
+import contextlib
+import json
+import logging
 import sys
 import time
 import warnings
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
 from typing import Any, TextIO
 
 import numpy as np
 
-from sweep.cells.timing import GOLDEN
-from sweep.runs.log import log
+from sweep.errors import SweepError
 from sweep.words import SHORTEST, duration, one_digit, paragraph, printable, speed
 
+LOG = logging.getLogger("sweep")
+LOG.addHandler(logging.NullHandler())
 QUIET_SECONDS = 1.0
 """A run that ends sooner says nothing."""
 LINE_SECONDS = 30.0
 """How often a line is logged, and told where there is no bar; the first ones sooner if cells were done."""
 
 
-def from_everywhere(jobs: Iterable[int]) -> list[int]:
-    """Numbers of blocks in an order in which those of any beginning come from all over the grid."""
-    found = np.array(list(jobs), int)
-    return list(map(int, found[np.argsort(np.arange(found.size) * GOLDEN % 1.0)]))
+def log_path(output: Path) -> Path:
+    """The log of a run with this output."""
+    return output.with_name(output.name + ".log")
+
+
+def log(text: str, event: str = "note", **fields: Any) -> None:
+    """Writes a line; the event is "begin", "progress", "failed", "note" or "end". JSON has it and the fields, too."""
+    LOG.info("%s", text, extra={"fields": {"event": event, **fields}})
+
+
+class _Handler(logging.FileHandler):
+    """Writes to the end of a file; a disk that is full does not end the run, neither now nor when it is closed."""
+
+    as_json = False
+
+    def format(self, record: logging.LogRecord) -> str:
+        text, at = record.getMessage(), time.localtime(record.created)
+        if self.as_json:
+            fields = getattr(record, "fields", {})
+            return json.dumps({"time": time.strftime("%Y-%m-%dT%H:%M:%S%z", at), "text": text, **fields})
+        return f"{time.strftime('%Y-%m-%d %H:%M:%S', at)}  {printable(' '.join(text.splitlines()))}"
+
+    def handleError(self, record: logging.LogRecord) -> None:
+        pass
+
+    def close(self) -> None:
+        with contextlib.suppress(OSError):
+            super().close()
+
+
+@contextlib.contextmanager
+def logging_to(path: Path | None, as_json: bool = False) -> Iterator[None]:
+    """All that is logged within goes to the end of a file, too; None: to none. Raises OSError, SweepError."""
+    if path is None:
+        yield
+        return
+    if path.is_fifo():  # to open it would wait for a reader
+        raise SweepError(f"{path} is a pipe, where the log of the run is to be written; remove it")
+    handler, level = _Handler(path, encoding="utf-8"), LOG.level
+    handler.as_json = as_json
+    LOG.setLevel(logging.INFO)
+    LOG.addHandler(handler)
+    try:
+        yield
+    finally:
+        LOG.removeHandler(handler)
+        LOG.setLevel(level)
+        handler.close()
+
+
+def read_lines(text: str) -> Iterator[Mapping[str, Any]]:
+    """What the lines of a log say, of either kind: "time", "text", and of JSON its fields."""
+    for line in text.splitlines():
+        if not line.startswith("{"):
+            yield {"time": line[:19], "text": line[21:]}
+            continue
+        with contextlib.suppress(ValueError):
+            yield json.loads(line)
 
 
 class Progress:
-    """Tells how many cells are done, how fast, and how long it will take.
+    """Tells how many of the `total` cells are done, how fast, and how long it will take.
 
-    Parameters
-    ----------
-    total, done : int
-        Cells of the grid, and those that were there before.
-    stream : text stream, bool or None
-        None and True: stderr; False: say nothing.
-    name : str
-        Begins every line.
-    work : float
-        Seconds that the blocks to come should take altogether, or any measure of them.
-    clock : callable
-        Seconds.
-
-    Attributes
-    ----------
-    crew : int
-        Blocks that are computed at a time.
+    So many were `done` before. The blocks to come should take so much `work`, in seconds or in any measure; they come
+    from all over the grid, so those that are done tell what a measure takes, where a `crew` of them is computed at a
+    time. A `stream` of None or True is stderr; False: nothing is said. Every line begins with the `name`.
     """
 
     def __init__(

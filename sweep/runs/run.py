@@ -24,8 +24,7 @@ from sweep.file.open import in_memory, memory, open_result, verdict
 from sweep.file.reading import StoredFile
 from sweep.file.store import alone, begun, earlier, lock_of, reopened, unfinished_of
 from sweep.runs.extend import Reused, has_failed, obstacle
-from sweep.runs.loop import Loop, Task
-from sweep.runs.pool import Terminated, TimeUp, signals_held
+from sweep.runs.loop import Loop, Task, Terminated, TimeUp, signals_held
 from sweep.study.keys import KEYS
 from sweep.study.model import Study
 from sweep.study.read import Given

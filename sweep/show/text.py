@@ -23,7 +23,7 @@ from sweep.results.statuses import (
     is_summary,
     kind_of,
 )
-from sweep.runs.log import log_path, read_lines
+from sweep.runs.progress import log_path, read_lines
 from sweep.study.model import short
 from sweep.words import Table, page, paragraph, percent
 

@@ -7,7 +7,8 @@ import pytest
 
 from sweep.cells.partition import Partition
 from sweep.cells.timing import Sample
-from sweep.runs.progress import Progress, from_everywhere
+from sweep.runs.loop import from_everywhere
+from sweep.runs.progress import Progress
 
 CELLS = 2**18
 

@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from sweep.runs.pool import signals_held
+from sweep.runs.loop import signals_held
 
 
 def press():

@@ -19,8 +19,8 @@ from sweep.cli import main, parser
 from sweep.errors import EXIT_CODES, SweepError
 from sweep.file.store import unfinished_of
 from sweep.results.statuses import account
-from sweep.runs.log import LOG, log, log_path, logging_to, read_lines
-from sweep.runs.pool import deadline, passed
+from sweep.runs.loop import deadline, passed
+from sweep.runs.progress import LOG, log, log_path, logging_to, read_lines
 from sweep.show.text import reasons
 
 SECONDS = 10.0
@@ -126,7 +126,7 @@ def test_until_goes_by_the_clock_on_the_wall_however_it_jumps(monkeypatch):
     until = datetime(2027, 1, 31, 7, 0).astimezone()
     for at, over in (((6, 30), False), ((7, 30), True), ((6, 45), False), ((7, 0), True)):
         clock = SimpleNamespace(now=lambda at=at: datetime(2027, 1, 31, *at))
-        monkeypatch.setattr("sweep.runs.pool.datetime", clock)
+        monkeypatch.setattr("sweep.runs.loop.datetime", clock)
         assert passed(until) is over
 
 
