@@ -104,12 +104,10 @@ def replacing(target: Path, held: bool = False) -> Iterator[Path]:
         stack.callback(remove, part)
         part.touch()  # says in plain words that there is no such folder, or no permission
         yield part
-        if target.is_dir() and not part.is_dir():
-            raise SweepError(f"{target} is a folder; name a file in it")
         for inner in (*part.rglob("*"), part):
             sync_folder(inner)
-        if target.is_dir() or (part.is_dir() and target.exists()):
-            # a folder cannot be replaced in one step, and stands aside meanwhile
+        if part.is_dir() and target.exists():
+            # what is there cannot be replaced by a folder in one step, and stands aside meanwhile
             remove(old)
             stack.callback(lambda: remove(old) if target.exists() else rename(old, target))
             rename(target, old)

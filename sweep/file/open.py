@@ -68,8 +68,7 @@ def open_result(path: str | os.PathLike[str], strict: bool = False, *, chunks: A
 
     file: Any = stored(as_path(path))
     if strict and not file.finished:
-        done = file.work.done
-        left = f"{int((~done).sum())} of {done.size} blocks are missing"
+        left = f"{len(file.missing())} of {file.work.blocks.count} blocks are missing"
         file.close()
         raise SweepError(f"{file.path}: unfinished, {left}; run its sweep again to continue")
     if chunks is None and os.fstat(file.fd).st_size > MEMORY_SHARE * memory():
@@ -207,7 +206,7 @@ def verdict(output: Path, file: StoredFile) -> Verdict:
     blocks = tuple(sorted(lost)) if findings and mendable else None
     if file.finished:
         return Verdict(output, state, f"{file.path.stat().st_size:,} bytes checked", tuple(findings), blocks)
-    missing = np.flatnonzero(~work.done).tolist()
+    missing = file.missing()
     checked = f"unfinished, {work.blocks.count - len(missing):,} of {work.blocks.count:,} blocks there and checked"
     findings += _lines(f"missing: {work.name} {{:,}} to {{:,}}", work, missing)
     findings = findings or ["all blocks are there, but it has not ended; run the sweep again to finish"]

@@ -141,6 +141,10 @@ class StoredFile:
         except (OSError, EOFError):
             return False
 
+    def missing(self) -> list[int]:
+        """Numbers of the blocks that are not done, ascending."""
+        return np.flatnonzero(~self.work.done).tolist()
+
     def __contains__(self, name: str) -> bool:
         return name in self.dims
 

@@ -144,10 +144,6 @@ class Store(StoredFile):
         with disk.refusing(self.path):
             self.work.write_digests(dict.fromkeys(damaged, bytes(self.work.row_bytes)))
 
-    def missing(self) -> list[int]:
-        """Numbers of the blocks that are not done, ascending."""
-        return np.flatnonzero(~self.work.done).tolist()
-
     def put(self, index: int, found: bytes | Mapping[str, Any]) -> None:
         """Writes a block, or takes the digests of one that another process has written and synced. Raises SweepError.
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import functools
 import gc
 import logging
 import math
@@ -88,13 +89,11 @@ class Cluster:
         dask blames a worker's death on every block that waited there, so those given up are tried again one by one.
         """
 
-        def ask() -> Any:
-            return self._client.submit(Remote.compute, self._remote, job, wanted, pure=False)
-
-        async def settled(asked: Any) -> Done:
+        async def settled() -> Done:
+            ask = functools.partial(self._client.submit, Remote.compute, self._remote, job, wanted, pure=False)
             try:
                 try:
-                    return await answer(asked)
+                    return await answer(ask())
                 except distributed.KilledWorker:
                     async with self._suspects:
                         return await answer(ask())
@@ -106,10 +105,7 @@ class Cluster:
                 what = f"{label} cannot be computed ({type(fault).__name__}: {fault}); what is finished is kept"
                 raise SweepError(f"cluster: {what}; isolated, a cell of which its process dies is FAILED") from fault
 
-        try:
-            return asyncio.run_coroutine_threadsafe(settled(ask()), self._client.loop.asyncio_loop)
-        except Exception as fault:
-            raise _lost(fault) from fault
+        return asyncio.run_coroutine_threadsafe(settled(), self._client.loop.asyncio_loop)
 
 
 async def answer(asked: Any) -> Done:

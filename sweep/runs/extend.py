@@ -50,7 +50,7 @@ class Reused(StoredFile):
         self._shape, self._retry, old = Grid(study).shape, retry, self.study
         self._positions = [_positions(old.axes[name], axis) for name, axis in study.axes.items()]
 
-    def missing(self, start: int, stop: int) -> Any:
+    def wanted(self, start: int, stop: int) -> Any:
         """Of the cells `start` to `stop`, which have to be computed."""
         return ~self._known(start, stop)[1]
 

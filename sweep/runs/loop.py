@@ -230,6 +230,7 @@ class Loop:
         cells = partition or cut(study, self._crew, self.sample, task.block_cells, least)
         self.bench = Bench(study, cells, self.processes)
         self._weights = self.sample.weights(self.bench.partition, self.bench.rows.first)
+        self._cells = [stop - start for start, stop in map(self.bench.cells, range(self.bench.partition.count))]
 
     def _sample(self) -> Sample:
         """The sample, taken in a thread, so that Ctrl-C and the time to stop are seen while a kernel is compiled.
@@ -256,11 +257,6 @@ class Loop:
         """How many blocks are computed at a time."""
         return self.task.cores if self._cluster is None else max(1, self._cluster.threads)
 
-    def _cells(self, job: int) -> int:
-        """How many cells a block has."""
-        start, stop = self.bench.cells(job)
-        return stop - start
-
     def compute(
         self,
         jobs: Sequence[int],
@@ -278,7 +274,7 @@ class Loop:
         """
         task, cluster, known, bench = self.task, self._cluster, self._reused, self.bench
         total, machine, versions = bench.rows.size, platform.uname(), task.schema.attrs["versions"]
-        done = total - sum(map(self._cells, jobs))
+        done = total - sum(self._cells[job] for job in jobs)
         self.progress = Progress(total, task.progress, task.name, done, float(self._weights[list(jobs)].sum()))
         log(
             f"begins: {task.name}, kernel {bench.study.kernel_name}, {done:,} of {total:,} cells done before, "
@@ -301,7 +297,7 @@ class Loop:
                 self._check()
                 while queue and len(under_way) < 2 + 3 * self._crew:
                     job = queue.popleft()
-                    wanted = None if known is None else known.missing(*bench.partition.bounds(job))
+                    wanted = None if known is None else known.wanted(*bench.partition.bounds(job))
                     # a block of which all cells are known is put together here
                     if cluster is None or (wanted is not None and not wanted.any()):
                         under_way.add(self._threads.submit(bench.compute, job, keep, wanted, room(job)))
@@ -333,7 +329,7 @@ class Loop:
                 self.progress.note(str(cell), "failed", **fields)
             elif self._failed == MOST_TOLD + 1:
                 self.progress.note("more cells FAILED; from here on they are counted only")
-        self.progress.add(self._cells(done.block), self._weights[done.block], done.seconds)
+        self.progress.add(self._cells[done.block], self._weights[done.block], done.seconds)
 
     def _stop(self, futures: Iterable[Future[Any]]) -> None:
         """Lets what is computed here end within a second or so; then its process is killed, or its thread given up."""
