@@ -5,7 +5,6 @@ Others may use
     `lines`      straight lines in log-log, corrections to scaling
     `two_laws`   two power laws with a bend, fitted at once; where two straight lines meet; which law of the table
     `collapse`   exponents of a collapse
-    `curves`     stated_error: what a result says its values are right to
     `loglog`     is_logarithmic, spans_decades: what an axis is drawn and interpolated by
 
 Behind these: `loglog` (slopes and roots of plain arrays), `noise` (the one regression, whatever the noise), `shapes`

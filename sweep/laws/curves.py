@@ -258,26 +258,15 @@ def stated_bound(y: xr.DataArray, bound: Any = None) -> xr.DataArray:
     rounding to fewer digits than double precision adds."""
     check_output(y)
     if isinstance(bound, xr.Dataset):
-        bound = stated_error(bound, title(y))
+        if title(y) not in bound:
+            raise SweepError(f"bound: this Dataset has no {title(y)}")
+        rtol = bound["rtol"] if "rtol" in bound.coords else float(bound.attrs.get("rtol", 0.0))
+        wanted, stated = like(rtol, bound[title(y)], "rtol"), bound.get("error_bound", rtol)
+        bound = xr.where(stated > wanted, stated, wanted)  # more where a cell is INACCURATE
     found = like(y.attrs.get("rtol", 0.0) if bound is None else bound, y, "bound")
     few_digits = y.dtype.kind == "f" and y.dtype.itemsize < 8
     rounded = float(np.finfo(y.dtype).eps) / 2 if few_digits else 0.0
     return found.where(np.isfinite(found), 1.0) + rounded  # of an error that is not known a value is worth nothing
-
-
-def stated_error(dataset: xr.Dataset, name: str) -> xr.DataArray:
-    """Relative error that a result states for each value of an output: `rtol`, or `error_bound` where it is INACCURATE.
-
-    Of the output's shape; 0 where nothing is stated, inf where no error is known.
-    """
-    if name not in dataset:
-        raise SweepError(f"bound: this Dataset has no {name}")
-    rtol = dataset["rtol"] if "rtol" in dataset.coords else float(dataset.attrs.get("rtol", 0.0))
-    found = like(rtol, dataset[name], "rtol")
-    if "error_bound" in dataset:
-        stated = dataset["error_bound"].astype(np.float64)
-        found = found.where(~(stated > found), stated)
-    return found.transpose(*dataset[name].dims)
 
 
 def described(found: xr.Dataset, x: xr.DataArray, y: xr.DataArray) -> xr.Dataset:

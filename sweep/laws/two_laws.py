@@ -202,35 +202,36 @@ def crossover(low_fit: xr.Dataset, high_fit: xr.Dataset) -> xr.Dataset:
     """
     if bool(((low_fit.low < high_fit.high) & (high_fit.low < low_fit.high)).any()):
         raise SweepError("the windows of the two fits overlap, so their errors are not independent; take them apart")
-    turned, exponents = bool((low_fit.centre > high_fit.centre).all()), ["exponent", "exponent_low", "exponent_high"]
-    names = ["high", "low"] if turned else ["low", "high"]
-    result = xr.concat([low_fit[exponents], high_fit[exponents]], xr.Variable("law", names))
-    if turned:
-        low_fit, high_fit = high_fit, low_fit
-    both = xr.concat([low_fit, high_fit], "law", combine_attrs="override")
+    names = ["high", "low"] if bool((low_fit.centre > high_fit.centre).all()) else ["low", "high"]
+    both = xr.concat([low_fit, high_fit], xr.Variable("law", names), combine_attrs="override")
     middle = np.log(both.centre).mean("law")  # logarithms counted from here keep their digits
     lines = []  # slope and level at the middle: through the window's centre; through its outer end, as the laws tend
-    for fit, side, end in ((low_fit, "low", "start"), (high_fit, "high", "stop")):
+    for side, end in (("low", "start"), ("high", "stop")):
+        fit = both.sel(law=side, drop=True)
         through = (fit.exponent, fit.level, fit.centre), (fit[f"limit_{side}"], fit[end], fit[side])
         lines.append([(slope, np.log(level) - slope * (np.log(place) - middle)) for slope, level, place in through])
+    (slope, level), steeper = lines[0][0], lines[1][0][0] - lines[0][0][0]
     meeting, *others = ((low[1] - high[1]) / (high[0] - low[0]) for low, high in itertools.product(*lines))
     moved = xr.concat([abs(other - meeting).fillna(0.0) for other in others], "which").max("which")
     # (slope (x - meeting))^2 = sum of (level error)^2 + (slope error (x - centre))^2, a quadratic in x - meeting
     reach = ((both.exponent_high - both.exponent_low) / 2).where(both.noisy == 1, both.exponent_error)
     level_reach = both.level_error * (reach / both.exponent_error).where(both.exponent_error > 0, 1.0)
-    square = (high_fit.exponent - low_fit.exponent) ** 2 - (reach**2).sum("law")
+    square = steeper**2 - (reach**2).sum("law")
     square = square.where(square > 0)
     if not square.notnull().any():
         raise SweepError("the two laws have the same exponent within their errors, so they meet nowhere")
     off = reach * (meeting + middle - np.log(both.centre))
     linear = (reach * off).sum("law")
     root = np.sqrt(linear**2 + square * (level_reach**2 + off**2).sum("law"))
-    place = (middle + meeting).where(square.notnull())
-    below, above = ((linear + sign * root) / square + sign * moved for sign in (-1, 1))
-    for name, ln in (("", place), ("_low", place + below), ("_high", place + above)):
-        result[f"crossover{name}"] = np.exp(ln)
+    place = meeting.where(square.notnull())
+    result = both[["exponent", "exponent_low", "exponent_high"]].assign(level=np.exp(level + slope * place))
+    for name, by in (
+        ("", 0.0),
+        ("_low", (linear - root) / square - moved),
+        ("_high", (linear + root) / square + moved),
+    ):
+        result[f"crossover{name}"] = np.exp(middle + place + by)
     result["crossover_error"] = (result.crossover_high - result.crossover_low) / 2
-    result["level"] = np.exp(lines[0][0][1] + low_fit.exponent * (place - middle))
     result.attrs = {name: low_fit.attrs[name] for name in ("law", "y", "x", "confidence")}
     return described(result, low_fit.centre, low_fit.level)
 

@@ -104,7 +104,7 @@ def laws(
     noise: bool | str | None = None,
 ) -> Laws:
     """What `sweep fit` finds; `y` and `noise` as of `output_of` and `fit_exponent`. Raises SweepError."""
-    from sweep.laws.curves import FEWEST_OF_LAW, stated_error
+    from sweep.laws.curves import FEWEST_OF_LAW
     from sweep.laws.lines import fit_exponent
     from sweep.laws.two_laws import crossover, fit_two_laws
 
@@ -113,8 +113,7 @@ def laws(
         raise SweepError(f"--window: expected one or two, found {len(windows)}")
     limits: list[Any] = sorted((low, high) for low, high in windows) or [None]
     column, keys, bend, meeting = dataset[y], {"confidence": confidence, "noise": noise}, None, None
-    bound = stated_error(dataset, y)
-    fits = tuple(fit_exponent(column, x, window, bound=bound, **keys) for window in limits)  # type: ignore[arg-type]
+    fits = tuple(fit_exponent(column, x, window, bound=dataset, **keys) for window in limits)  # type: ignore[arg-type]
     if len(fits) == 2:
         meeting = crossover(*fits).drop_dims("law")
     elif column.sizes[str(column[x].dims[0])] >= FEWEST_OF_LAW:
