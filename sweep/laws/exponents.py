@@ -90,10 +90,8 @@ def where_exponent(
 
     Parameters
     ----------
-    y : DataArray
-        Any shape; points that are missing or not positive are left out.
-    dim : str
-        Dimension of `y`, or 1-D coordinate along one; positive and strictly monotone.
+    y, dim
+        As of `local_exponent`.
     value : float
         The exponent looked for, with its sign: -0.5 for y ~ dim^(-1/2).
     window : (low, high), optional

@@ -162,7 +162,7 @@ def brackets(c: Array, value: float) -> list[int]:
     """Indices i such that a curve passes `value` in [c[i], c[i + 1]), or meets it at either end of a run."""
     present, above, on = np.isfinite(c), c >= value, c == value
     alone = np.concatenate([[True], ~present, [True]])  # whether the point before is missing; shifted by 2: after
-    starts, ends = alone[:-2][:-1] & on[:-1] & above[1:], alone[2:][1:] & on[1:] & above[:-1]
+    starts, ends = alone[:-2][:-1] & on[:-1] & (c > value)[1:], alone[2:][1:] & on[1:] & (c > value)[:-1]
     passes = (above[:-1] != above[1:]) | starts | ends
     found: list[int] = np.flatnonzero(present[:-1] & present[1:] & passes).tolist()
     return found

@@ -179,6 +179,11 @@ def test_the_place_is_that_of_the_polynomial_through_six_neighbours_of_its_run(b
         ([2, 1, 2], []),  # touched from above
         ([2, 3, 4], []),
         ([0, 0, 0], []),
+        ([1, 1, 0], [1]),  # level where it is met: no place at the end that it stays at
+        ([0.5, 1, 1], [1]),
+        ([1, 1, 2], []),
+        ([1, 1, np.nan, 2], []),
+        ([1, 1, np.nan, 0, 2], [3.5]),
         ([np.nan, 1, 2], [1]),
         ([0, np.nan, 2], []),  # a passage inside a gap is not made up
         ([0, 2, 0, 2], [0, 1, 2]),
