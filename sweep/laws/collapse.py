@@ -65,8 +65,7 @@ def fit_collapse(y: xr.DataArray, dim: str, over: str, *, sigma: Any = None, con
     1.500
     """
     check_options(confidence)
-    points, count = _points(y, dim, over, sigma)
-    t, size, _, _ = points
+    t, size, _, _ = points = _points(y, dim, over, sigma)
     # exponents that leave neighbours in L with something in common, and no more than 8
     most = min(8.0, 0.9 * float(np.ptp(t)) / float(np.diff(np.unique(size)).min()))
     start = _common(points, *np.linspace(-most, most, 81)).numbers[0]
@@ -76,7 +75,7 @@ def fit_collapse(y: xr.DataArray, dim: str, over: str, *, sigma: Any = None, con
         inside |= ~own & (u >= u[own].min()) & (u <= u[own].max())
     if (among := int(inside.sum())) < FEWEST_POINTS:
         raise SweepError(
-            f"of {count} points {among} lie among those of another curve; at least {FEWEST_POINTS} are needed"
+            f"of {y.size} points {among} lie among those of another curve; at least {FEWEST_POINTS} are needed"
         )
     t, size, z, _ = points = points[:, inside]
     far = 0.3 * (1 + abs(start))
@@ -95,18 +94,18 @@ def fit_collapse(y: xr.DataArray, dim: str, over: str, *, sigma: Any = None, con
     own = left[:, moves > 1e-6 * moves.max()][:, : max(0, off.size - basis.shape[1] - 3)]
     ends, _, denied = found.beside(np.arange(float(off.size)), "correlated", confidence, own)
     fits = not denied or abs(off).max() <= exact
-    result = xr.Dataset({"scatter": np.sqrt(np.mean(off**2)), "points": off.size, "dropped": count - off.size})
+    result: dict[str, Any] = {"scatter": np.sqrt(np.mean(off**2)), "points": off.size, "dropped": y.size - off.size}
+    result |= {"fits": int(fits), "verdict": "one curve" if fits else "not one curve"}
     for number, name in enumerate(("x_exponent", "y_exponent")):
         low, high = ends[:, number] if fits else (math.nan, math.nan)
-        result = result.assign({name: found.numbers[number], f"{name}_low": low, f"{name}_high": high})
-    result = result.assign(fits=int(fits), verdict="one curve" if fits else "not one curve")
-    law = f"{title(y)} = {over}^b f({dim} / {over}^a)"
-    return described(result.assign_attrs(law=law, y=title(y), x=dim, over=over, confidence=confidence), y[dim], y)
+        result |= {name: found.numbers[number], f"{name}_low": low, f"{name}_high": high}
+    attrs = {"law": f"{title(y)} = {over}^b f({dim} / {over}^a)", "y": title(y), "x": dim, "over": over}
+    return described(xr.Dataset(result, attrs=attrs | {"confidence": confidence}), y[dim], y)
 
 
-def _points(y: xr.DataArray, dim: str, over: str, sigma: Any) -> tuple[Array, int]:
+def _points(y: xr.DataArray, dim: str, over: str, sigma: Any) -> Array:
     """Of the points that are there, one curve behind the other, ln x, ln L, ln y and its standard error, NaN where that
-    is not known (4, n); and how many could be."""
+    is not known (4, n)."""
     check_output(y)
     if y.ndim != 2 or {dim, over} != {str(d) for d in y.dims}:
         raise SweepError(f"a collapse takes one output along {dim} and {over}, and nothing else; choose with .sel")
@@ -118,7 +117,7 @@ def _points(y: xr.DataArray, dim: str, over: str, sigma: Any) -> tuple[Array, in
     curve, place = np.nonzero(np.isfinite(z) & (np.isfinite(errors) | (sigma is None)))
     if place.size < FEWEST_POINTS:
         raise SweepError(f"a collapse needs at least {FEWEST_POINTS} positive points of {title(y)}, found {place.size}")
-    return np.stack([t[order][place], np.log(sizes)[curve], z[curve, place], errors[curve, place]]), z.size
+    return np.stack([t[order][place], np.log(sizes)[curve], z[curve, place], errors[curve, place]])
 
 
 def _common(points: Array, *a: float) -> Found:

@@ -153,23 +153,18 @@ def log_of(y: xr.DataArray, values: bool = False) -> xr.DataArray:
 
 
 def fit_lines(
-    function: Callable[..., Any],
-    law: str,
-    y: xr.DataArray,
-    dim: str,
-    window: Window | None,
-    sigma: Any,
-    bounds: xr.DataArray | None = None,
-    fewest: int = FEWEST_OF_LAW,
-    **options: Any,
+    function: Callable[..., Any], law: str, y: Any, dim: str, window: Window | None, sigma: Any, **options: Any
 ) -> xr.Dataset:
     """What a function finds of each line of y in a window, described, with `points`, how many of its values are there.
 
-    `function` of ln x (n,), rising, and ln y, relative standard errors (None where `sigma` is) and bounds (m, n) of m
-    lines without gaps, and of the options, gives numbers and words (m,) by name, or those of each line; of two laws (m,
-    2); or, of one line alone, what becomes the result. Of lines that are not positive, or have too few points, the
-    numbers are NaN and the words say so; raises SweepError where that is so of all lines.
+    `function` of ln x (n,), rising, of ln y of m lines without gaps (m, n), of their `sigma`, relative standard errors,
+    and `bound` likewise, if given, and of the options gives numbers and words (m,) by name, or those of each line; of
+    two laws (m, 2); or, of one line alone, what becomes the result. With `bound` two places are enough. Of lines that
+    are not positive, or have too few points, the numbers are NaN and the words say so; raises SweepError where that is
+    so of all lines.
     """
+    bound = options.pop("bound", None)
+    fewest, places = (FEWEST_OF_LAW, PLACES_OF_LAW) if bound is None else (FEWEST, 2)
     check_options(sigma=sigma, **options)
     dimension, x = positive_axis(y, dim, repeated=True)
     here = np.flatnonzero(inside_window(x, window, dim))
@@ -186,18 +181,19 @@ def fit_lines(
         )
     with np.errstate(all="ignore"):
         z = np.where(bad[:, None], np.nan, np.log(values))
-    errors, bound = (
-        None if one is None else one.isel({dimension: here}).transpose(..., dimension).values.reshape(z.shape)
-        for one in (None if sigma is None else relative_sigma(y, sigma).astype(np.float64), bounds)
-    )
-    present = np.isfinite(z) if errors is None else np.isfinite(z) & np.isfinite(errors)
-    columns, places = dict[str, Any](), PLACES_OF_LAW if fewest == FEWEST_OF_LAW else 2
+    columns, rows = dict[str, Any](), dict[str, Array]()
+    for name, one in (("bound", bound), ("sigma", None if sigma is None else relative_sigma(y, sigma))):
+        if one is not None:
+            rows[name] = (
+                one.isel({dimension: here}).transpose(..., dimension).values.reshape(z.shape).astype(np.float64)
+            )
+    present = np.isfinite(z) & np.isfinite(rows.get("sigma", 0.0))
     for pattern, which in alike(present, max(LINES, VALUES // max(1, t.size))):
         if pattern.sum() < fewest or np.unique(t[pattern]).size < places:
             continue
-        lines = (None if one is None else one[which][:, pattern] for one in (z, errors, bound))
+        lines = {name: one[which][:, pattern] for name, one in rows.items()}
         with np.errstate(all="ignore"):  # what overflows is infinite
-            found = function(t[pattern], *lines, **options)
+            found = function(t[pattern], z[which][:, pattern], **lines, **options)
         if isinstance(found, xr.Dataset):
             return described(found.assign_attrs(y=title(y), x=dim), y.coords[dim], y)
         if not isinstance(found, dict):
@@ -262,7 +258,7 @@ def stated_bound(y: xr.DataArray, bound: Any = None) -> xr.DataArray:
             raise SweepError(f"bound: this Dataset has no {title(y)}")
         rtol = bound["rtol"] if "rtol" in bound.coords else float(bound.attrs.get("rtol", 0.0))
         wanted, stated = like(rtol, bound[title(y)], "rtol"), bound.get("error_bound", rtol)
-        bound = xr.where(stated > wanted, stated, wanted)  # more where a cell is INACCURATE
+        bound = wanted.where(~(stated > wanted), stated)  # more where a cell is INACCURATE
     found = like(y.attrs.get("rtol", 0.0) if bound is None else bound, y, "bound")
     few_digits = y.dtype.kind == "f" and y.dtype.itemsize < 8
     rounded = float(np.finfo(y.dtype).eps) / 2 if few_digits else 0.0

@@ -20,7 +20,7 @@ from sweep.errors import SweepError
 from sweep.laws.curves import Window, fit_lines, stated_bound
 from sweep.laws.fits import fitted, union
 from sweep.laws.loglog import FEWEST, LINES, Array, alike, once, slope_bounds, slopes, tends
-from sweep.laws.noise import BEYOND_DOUBT, RARE, inliers, regress, rounding, scatters, shaped
+from sweep.laws.noise import BEYOND_DOUBT, RARE, Noise, inliers, regress, rounding, scatters, shaped
 from sweep.laws.shapes import FADING, LOG_CORRECTION, ONE, Number
 
 AS_WELL, HARDER = 13.0, 5.0
@@ -93,12 +93,12 @@ def fit_exponent(
     >>> print(f"{float(sweep.fit_exponent(ds.period, 'mu').exponent):.4f}")
     -0.3334
     """
-    law, more = "{y} = prefactor {x}^exponent", (sigma, stated_bound(y, bound), FEWEST)
-    return fit_lines(fit_line, law, y, dim, window, *more, confidence=confidence, noise=noise)
+    law, keys = "{y} = prefactor {x}^exponent", {"confidence": confidence, "noise": noise}
+    return fit_lines(fit_line, law, y, dim, window, sigma, bound=stated_bound(y, bound), **keys)
 
 
 def fit_line(
-    t: Array, z: Array, sigma: Array | None, bound: Array, *, confidence: float = 0.95, noise: bool | str | None = None
+    t: Array, z: Array, bound: Array, sigma: Array | None = None, confidence: float = 0.95, noise: Noise = None
 ) -> dict[str, Any]:
     """Of lines z (m, n) without gaps, t rising: least squares, and then by what the distances are."""
     weight = np.ones_like(z) if sigma is None else sigma**-2.0
@@ -112,9 +112,9 @@ def fit_line(
     bow = u * u - spread[:, None] / n - (share * u**3).sum(axis=1, keepdims=True) / spread[:, None] * u
     drift = 2 * (share * bow * off).sum(axis=1) / (share * bow * bow).sum(axis=1) * (t[-1] - t[0])
     size = np.sqrt((share * off * off).sum(axis=1) / max(n - 2, 1)) if sigma is None else np.sqrt(n / sums)
-    error, unknown = size / np.sqrt(spread), np.full((4, len(z)), np.nan)
+    error, unknown = size / np.sqrt(spread), ("exponent_low", "exponent_high", "limit_low", "limit_high")
     fit: dict[str, Any] = {"exponent": slope, "exponent_error": error, "level": level, "level_error": size / n**0.5}
-    fit |= dict(zip(("exponent_low", "exponent_high", "limit_low", "limit_high"), unknown, strict=True))
+    fit |= {name: np.full(len(z), np.nan) for name in unknown}
     fit |= {"kind": np.full(len(z), "weighted", "U10"), "fits": np.ones(len(z)), "noisy": np.ones(len(z))}
     if sigma is not None:
         reach = ndtri((1 + confidence) / 2) * error
@@ -235,7 +235,7 @@ def fit_correction(
 
 
 def _corrected(
-    t: Array, z: Array, sigma: Array | None, bound: None, *, low: bool, confidence: float, noise: bool | str | None
+    t: Array, z: Array, sigma: Array | None = None, *, low: bool, confidence: float, noise: Noise
 ) -> list[dict[str, Any]]:
     """Numbers of each line; at the low end by (1) of 1/x."""
     if low:
@@ -263,18 +263,14 @@ def _corrected(
                 others += [law for law in (one, tried[LOG_CORRECTION.name]) if law.aicc < found.aicc + HARDER]
                 ends = [*union(t, own, others, [-1], word, confidence, AS_WELL)[1][:, 0] / span, exponent]
         else:
-            reach = _by_half(t, row, exponent)
+            # three times as far as the outer half of the points, and six at least, moves the exponent
+            s, line = once(t, row)
+            outer, rounded = slice(-max(6, s.size // 2), None), np.full(s.size, 8 * rounding(s, line))
+            half = fitted((FADING,), s[outer], line[None, outer])[0][FADING.name].numbers[-1] / np.ptp(s[outer])
+            reach = 3 * abs(float(half) - exponent) + float(slope_bounds(s, rounded, 5)[-1])
             ends = [exponent - reach, exponent + reach]
         verdict = VERDICTS[1 if not fits else 0 if abs(left) < 1 else 2]
         of = {"exponent": sign * exponent, "correction_exponent": sign * fade, "correction": left, "verdict": verdict}
         of |= {"exponent_low": min(sign * end for end in ends), "exponent_high": max(sign * end for end in ends)}
         every.append(of | {"residual": found.residual, "noisy": noisy, "fits": verdict == VERDICTS[0]})
     return every
-
-
-def _by_half(t: Array, z: Array, exponent: float) -> float:
-    """Three times as far as the outer half of the points, and six at least, moves the exponent."""
-    t, z = once(t, z)
-    outer = slice(-max(6, t.size // 2), None)
-    other = fitted((FADING,), t[outer], z[None, outer])[0][FADING.name].numbers[-1] / np.ptp(t[outer])
-    return 3 * abs(float(other) - exponent) + float(slope_bounds(t, np.full(t.size, 8 * rounding(t, z)), 5)[-1])

@@ -33,6 +33,8 @@ NOISES = {
     "outliers": (ALONE, EVEN),
 }
 """What noise may be, by the word that a user says; "noise" is any."""
+Noise = bool | str | None
+"""What a user says of noise: whether there is any, its word, or nothing."""
 
 BEYOND_DOUBT = 10.0
 """Difference of AICc from which on a law is taken instead of a simpler one."""
@@ -233,7 +235,7 @@ def shaped(t: Array, off: Array) -> NDArray[np.bool_]:
     return np.asarray(roughness(t, off)[1] < 1 - 3.4 / math.sqrt(t.size))
 
 
-def scatters(t: Array, z: Array, off: Array, numbers: int, noise: bool | str | None) -> NDArray[np.bool_]:
+def scatters(t: Array, z: Array, off: Array, numbers: int, noise: Noise) -> NDArray[np.bool_]:
     """Whether the distances of lines z (m, n) from a law of so many numbers are noise: above rounding; and as is said,
     else as neighbours say less of each other than they do of a smooth curve. About few points of such a curve a law of
     many numbers swings as noise does."""

@@ -21,7 +21,7 @@ from sweep.laws.curves import Window, check_names, check_output, described, fit_
 from sweep.laws.fits import Found, fitted, union
 from sweep.laws.lines import fit_exponent, fit_line
 from sweep.laws.loglog import Array, once, slopes, tends
-from sweep.laws.noise import BEYOND_DOUBT, roughness, rounding, scatters
+from sweep.laws.noise import BEYOND_DOUBT, Noise, roughness, rounding, scatters
 from sweep.laws.shapes import BENDS, LAWS, ONE, OTHER_FUNCTIONS, THREE, TWO
 
 OTHER_SHAPES = 20.0
@@ -108,14 +108,12 @@ def fit_two_laws(
     return crossover(*(fit_exponent(y, dim, one, sigma=sigma, **keys) for one in (low, high)))
 
 
-def _each(
-    t: Array, z: Array, sigma: Array | None, bound: None, *, confidence: float, noise: bool | str | None
-) -> list[dict[str, Any]]:
+def _each(t: Array, z: Array, sigma: Array | None = None, *, confidence: float, noise: Noise) -> list[dict[str, Any]]:
     """Numbers of each line."""
     every, span = [], float(t[-1] - t[0])
     # both exponents, and where the laws meet
     which, units, zero = [-2, -1, 0], np.array([1 / span, 1 / span, span]), np.array([0.0, 0.0, t[0]])
-    tried, straight = fitted((ONE, *BENDS, *OTHER_FUNCTIONS, THREE), t, z, sigma), fit_line(t, z, sigma, 0 * z)["fits"]
+    tried, straight = fitted((ONE, *BENDS, *OTHER_FUNCTIONS, THREE), t, z, sigma), fit_line(t, z, 0 * z, sigma)["fits"]
     for row, laws, line in zip(z, tried, straight, strict=True):
         two, (verdict, evidence) = laws[TWO.name], _verdict(t, laws)
         if verdict == "one law" and not line:
@@ -282,20 +280,16 @@ def compare_laws(y: xr.DataArray, dim: str, window: Window | None = None, *, sig
     return fit_lines(_table, "", y, dim, window, sigma)
 
 
-def _table(t: Array, z: Array, sigma: Array | None, bound: None) -> xr.Dataset:
+def _table(t: Array, z: Array, sigma: Array | None = None) -> xr.Dataset:
     """All that `compare_laws` says of laws, the best first."""
     tried = sorted(fitted(LAWS, t, z, sigma)[0].values(), key=lambda fit: fit.aicc)
-    off, worse, span = np.stack([f.off for f in tried]), _above(tried).min(axis=1), t[-1] - t[0]
-    chances = [float(gammaincc((t.size - f.law.numbers) / 2, f.deviance / 2)) for f in tried if sigma is not None]
-    exponents = (
-        (f"{name} = {f.numbers[k] / span:.4g} +- {f.errors[k] / span:.1g}" for name, k in f.law.exponents)
-        for f in tried
-    )
-    columns: dict[str, Any] = dict(zip(("aicc", "bic"), np.transpose([f.criteria for f in tried]), strict=True))
-    columns |= {"worse": worse, "scatter": np.sqrt((off**2).mean(axis=1)), "residual": [f.residual for f in tried]}
-    columns |= {"numbers": [f.law.numbers for f in tried], "formula": [f.law.formula for f in tried]}
-    columns |= {"chi_squared": chances or [math.nan] * len(tried)}
-    columns |= {"exponents": [", ".join(texts) or "none" for texts in exponents]}
+    off, worse, span, rows = np.stack([f.off for f in tried]), _above(tried).min(axis=1), t[-1] - t[0], []
+    for f, by in zip(tried, worse, strict=True):
+        texts = [f"{name} = {f.numbers[k] / span:.4g} +- {f.errors[k] / span:.1g}" for name, k in f.law.exponents]
+        chance = math.nan if sigma is None else gammaincc((t.size - f.law.numbers) / 2, f.deviance / 2)
+        row = {"aicc": f.aicc, "bic": f.criteria[1], "worse": by, "numbers": f.law.numbers, "formula": f.law.formula}
+        row |= {"residual": f.residual, "chi_squared": chance, "exponents": ", ".join(texts) or "none"}
+        rows.append(row | {"scatter": np.sqrt(np.mean(f.off**2))})
     alive = [f for f, by in zip(tried, worse, strict=True) if by <= BEYOND_DOUBT]
     chosen = min(alive, key=lambda f: (f.law.numbers, not f.law.power, f.aicc))
     margin = min((f.aicc for f in tried if f is not chosen), default=math.inf) - chosen.aicc
@@ -306,11 +300,11 @@ def _table(t: Array, z: Array, sigma: Array | None, bound: None) -> xr.Dataset:
         text += f"all others are ruled out, the next by {margin:.3g} in AICc"
     if chosen.residual > 8 * rounding(t, z[0]) and chosen.beside(t, "even")[2]:
         text += "; but what it leaves has a shape, so that none of them is the law"
-    variables: dict[str, Any] = {name: ("law", column) for name, column in columns.items()}
+    variables: dict[str, Any] = {name: ("law", [row[name] for row in rows]) for name in rows[0]}
     variables |= {
-        "fitted": (("law", "point"), np.exp(z - off)),
         "x": ("point", np.exp(t)),
         "y": ("point", np.exp(z[0])),
+        "fitted": (("law", "point"), np.exp(z - off)),
     }
     attrs = {"chosen": chosen.law.name, "margin": margin, "verdict": text}
     return xr.Dataset(variables, {"law": [f.law.name for f in tried]}, attrs)
