@@ -5,10 +5,15 @@ import functools
 import numpy as np
 from mpmath import mp, mpf
 
-from kernels.interface import FIRST_REFUSAL, Kernel, Status
+from kernels.interface import FIRST_REFUSAL, Field, Kernel, Status
 
 JUNK = -7.5
 """What stands in an output before a method writes it."""
+
+
+def fields(*names):
+    """Declarations of numbers without a unit."""
+    return tuple(Field(name, "1", name) for name in names)
 
 
 def columns_of(kernel: Kernel, parameters, named):
@@ -23,6 +28,12 @@ def columns_of(kernel: Kernel, parameters, named):
     cells = np.broadcast_shapes(*(v.shape[:-1] if array else v.shape for v, array in given))
     length = max((v.shape[-1] for v, array in given if array and v.ndim), default=0)
     return [np.array(np.broadcast_to(v, (*cells, length) if array else cells)) for v, array in given]
+
+
+def named(kernel: Kernel, cells):
+    """{parameter: column} of cells that are dicts; what a cell leaves out is at its default."""
+    names = [p for p in kernel.parameters if any(p.name in cell for cell in cells)]
+    return {p.name: np.array([cell.get(p.name, p.default) for cell in cells], float) for p in names}
 
 
 def solve(kernel: Kernel, method: str, *parameters, rtol=1e-9, along=(), asked=None, **named):

@@ -3,7 +3,7 @@
 import foliot_scene
 import numpy as np
 import pytest
-from columns import checked, estimated, solve
+from columns import estimated, solve
 from junction_scene import KERNEL as JUNCTION
 from kicked_scene import KICKED
 from mpmath import mp, mpf
@@ -14,7 +14,6 @@ from kernels.cycle import cycle_kernel
 from kernels.foliot.cycle import FOLIOT
 from kernels.interface import Status
 from kernels.lanes.jit import COMPILED
-from kernels.scene import Field, SceneError
 
 pytestmark = pytest.mark.skipif(not COMPILED, reason="a cycle takes minutes as plain Python")
 
@@ -137,17 +136,6 @@ def test_the_foliot_as_a_scene_has_the_cycle_of_its_own_kernel():
             assert abs(abs(found[name][those]) / own[other] - 1.0).max() < 1e-9, name
         assert abs(found["multiplier"][those] - own["multiplier"] ** 2).max() < 1e-9
         assert abs(found["period_by_mu"][those] + own["sensitivity"]).max() < 1e-9
-
-
-def test_a_cycle_of_half_the_sides_and_a_surface_of_two_states_are_refused():
-    assert checked(KICKED, zeta=[0.1], flips=[3.0])[0] == Status.BAD_INPUT
-    states = Field("x", "1", "x"), Field("v", "1", "v")
-    own = {"name": "two", "doc": "", "states": states, "parameters": (), "start": lambda: (1.0, 0.0)}
-    with pytest.raises(SceneError, match="surface"):
-        cycle_kernel(**own, rates=lambda x, v: (v, -x), surface=lambda x, v, side: side * (x + v))
-    for turns, said in (({"x": 1.0}, "turn"), ({"y": 1.0}, "turns .* 'y'; there are x, v"), ({"v": 0.0}, "above 0")):
-        with pytest.raises(SceneError, match=said):
-            cycle_kernel(**own, rates=lambda x, v: (v, -x), surface=lambda x, side: side * x, turns=turns)
 
 
 def test_a_phase_that_is_locked_to_its_drive_goes_on_by_whole_turns():

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from columns import estimated, solve
+from columns import checked, estimated, solve
 from forced_scene import FORCED, MOVING, POPULATION, PUSHED, RESTING, TABLE, THROWN, WALLS
-from kicked_scene import BRANCHED
+from kicked_scene import BRANCHED, KICKED
 from mpmath import mp, mpc, mpf
 
 from kernels.cycle import cycle_kernel
@@ -141,17 +141,8 @@ def test_a_round_cycle_begins_where_the_surface_is_met_without_curvature():
 
 def test_a_mode_of_three_values_and_three_surfaces():
     kick, e, length, left = np.array([1.0, 2.0]), np.array([0.5, 0.8]), 2.0, np.array([0.0, -0.7])
-    found, status = solve(
-        WALLS,
-        "taylor",
-        along=RANKS,
-        kick=kick,
-        e=e,
-        length=length,
-        left=left,
-        flips=1.0,
-        asked=(*NO_SIZES, "period_by_kick"),
-    )
+    cells = {"kick": kick, "e": e, "length": length, "left": left, "flips": 1.0}
+    found, status = solve(WALLS, "taylor", along=RANKS, **cells, asked=(*NO_SIZES, "period_by_kick"))
     assert (status == Status.OK).all()
     assert abs(found["x"] - left).max() < 1e-12
     slow = e * kick / (1.0 - e * e)
@@ -228,16 +219,24 @@ def test_a_cycle_ends_where_the_motion_passes_through_a_surface_with_a_jump_and_
         assert abs(found["x"][2] - 0.0625) < 1e-11
 
 
-def test_what_cannot_be_a_cycle_is_refused():
-    own = {"name": "wrong", "doc": "", "states": MOVING, "parameters": (), "start": lambda: (1.0, 0.0)}
-    with pytest.raises(SceneError, match="drive"):
-        cycle_kernel(**own, rates=lambda x, v, t: (v, -x * t), surface=lambda x, side: side * x)
-    with pytest.raises(SceneError, match="side"):
-        cycle_kernel(**own, rates=lambda x, v, t, side: (v, side - x * t), drive=1.0)
-    with pytest.raises(SceneError, match="surface"):
-        cycle_kernel(**own, rates=lambda x, v: (v, -x))
-    with pytest.raises(SceneError, match="gain"):
-        cycle_kernel(**own, rates=lambda x, v: (v, -x), surface=lambda x, side: side * x, branch="gain")
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"rates": lambda x, v, t: (v, -x * t)}, "drive"),
+        ({"rates": lambda x, v, t, side: (v, side - x * t), "surface": None, "drive": 1.0}, "side"),
+        ({"surface": None}, "surface"), ({"surface": lambda x, v, side: side * (x + v)}, "surface"),
+        ({"branch": "gain"}, "gain"), ({"turns": {"x": 1.0}}, "turn"),
+        ({"turns": {"y": 1.0}}, "turns .* 'y'; there are x, v"), ({"turns": {"v": 0.0}}, "above 0"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_a_cycle_is_refused(changed, said):
+    scene = {
+        "name": "wrong", "doc": "", "states": MOVING, "parameters": (), "start": lambda: (1.0, 0.0),
+        "rates": lambda x, v: (v, -x), "surface": lambda x, side: side * x,
+    }  # fmt: skip
+    with pytest.raises(SceneError, match=said):
+        cycle_kernel(**scene | changed)
+    assert checked(KICKED, zeta=[0.1], flips=[3.0])[0] == Status.BAD_INPUT  # half of the sides
 
 
 def test_a_branch_ends_where_it_meets_another_one_and_is_followed_where_others_fork_off():

@@ -7,7 +7,7 @@ import own_scene
 import pytest
 import rich_scene
 import sliding_scene
-from columns import counted, solve
+from columns import counted, fields, solve
 from mpmath import mp, mpf
 from rich_scene import RICH
 from sliding_scene import SLIDING
@@ -20,22 +20,14 @@ from kernels.stepping import stepped_kernel
 from kernels.trajectory import motion_kernel, section_kernel
 
 
-def own_rates(known, rates, surface, start, switch=None):
+@pytest.mark.parametrize(("scene", "known"), [(rich_scene, RICH), (sliding_scene, SLIDING)])
+def test_a_scenes_functions_are_not_asked_again_at_every_call(scene, known):
     """The scene of another kernel once more, with rates of its own."""
-    return scene_kernel(
+    rates = counted(scene.rates)
+    kernel = scene_kernel(
         name=known.name, doc=known.doc, states=known.outputs[2:], parameters=known.parameters[:-1],
-        rates=rates, surface=surface, start=start, switch=switch,
+        rates=rates, surface=scene.surface, start=scene.start, switch=getattr(scene, "switch", None),
     )  # fmt: skip
-
-
-@pytest.mark.parametrize("known", [RICH, SLIDING])
-def test_a_scenes_functions_are_not_asked_again_at_every_call(known):
-    if known is RICH:
-        rates = counted(rich_scene.rates)
-        kernel = own_rates(RICH, rates, rich_scene.surface, rich_scene.start, rich_scene.switch)
-    else:
-        rates = counted(sliding_scene.rates)
-        kernel = own_rates(SLIDING, rates, sliding_scene.surface, sliding_scene.start)
     for method in golden.OF_SCENE.get(known.name, [method.name for method in kernel.methods]):
         asked = []
         for _ in range(2):
@@ -59,8 +51,7 @@ def test_names_of_a_scene_may_be_those_of_the_text_that_is_written():
     """x' = 1, y' = h + exp + t: from 0 to x = unit."""
     names = ("h", "exp", "e_0", "verdict", "n12", "abs", "t", "unit")
     kernel = scene_kernel(
-        name="odd", doc="", states=[Field(name, "1", name) for name in ("series", "end_speed")],
-        parameters=[Field(name, "1", name) for name in names],
+        name="odd", doc="", states=fields("series", "end_speed"), parameters=fields(*names),
         rates=lambda series, h, exp, t: (1.0, h + exp + t + 0.0 * series), surface=lambda series, unit: unit - series,
         start=lambda: (0.0, 0.0),
     )  # fmt: skip

@@ -17,46 +17,37 @@ from kernels.interface import Field, Method
 from kernels.lanes.jit import jit
 from kernels.lanes.wiring import kernel, method, tracing
 
-
 @jit
 def check(p):
     return 0.0
-
 
 @jit
 def solve(p, rtol):
     return (p.a,), 0.0
 
-
 @jit
 def buffered(p, rtol, rows, sums):
     return (p.a,), 0.0
-
 
 @jit
 def bound(p):
     return 1e-9
 
-
 @jit
 def fill(i, columns, row):
     row[0] = columns.a[i]
-
 
 @jit
 def without_rtol(p):
     return (p.a,), 0.0
 
-
 @jit
 def without_status(p: Any, rtol: Any) -> float:
     return 0.0
 
-
 @jit
 def in_a_loop(n):
     return 0.0
-
 
 A = (Field("a", "m", "length"),)
 """

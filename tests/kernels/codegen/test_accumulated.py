@@ -11,7 +11,7 @@ from kernels.interface import Status
 from kernels.lanes.jit import COMPILED
 
 MANY, SOME = 1e5, 20
-many = pytest.mark.skipif(not COMPILED, reason="many bounces")
+pytestmark = pytest.mark.skipif(not COMPILED, reason="many bounces")
 
 
 def rest(g, e, above):
@@ -21,7 +21,6 @@ def rest(g, e, above):
         return mp.sqrt(2 * above / g) * (1 + e) / (1 - e)
 
 
-@many
 @pytest.mark.parametrize(("kernel", "rtol"), [(BALL, 1e-4), (BALL, 1e-9), (RAISED, 1e-9)])
 def test_a_ball_is_at_rest_when_its_bounces_accumulate(kernel, rtol):
     random = np.random.default_rng(3)
@@ -38,7 +37,6 @@ def test_a_ball_is_at_rest_when_its_bounces_accumulate(kernel, rtol):
     assert (abs(outputs["height"] - (kernel is RAISED))[rests] <= rtol * above[rests]).all()
 
 
-@many
 def test_a_method_of_steps_carries_it_there():
     """All of them by the same code; benchmarks/honesty/families.py tries them."""
     outputs, status = solve(BALL, "dop853", [9.81], 0.3, flips=2000.0, rtol=1e-8)
@@ -60,7 +58,6 @@ def braked_ball(g, e, above, d):
     return time
 
 
-@many
 @pytest.mark.parametrize("kernel", [BALL, RAISED])
 def test_where_bounces_shrink_by_a_share_that_differs_it_is_right_too(kernel):
     e = np.array([0.4, 0.6, 0.8, 0.9])
@@ -72,7 +69,6 @@ def test_where_bounces_shrink_by_a_share_that_differs_it_is_right_too(kernel):
     assert (relative_error(outputs["time"], truths)[status == Status.COMES_TO_REST] < 1e-9).all()
 
 
-@many
 def test_what_does_not_slow_down_by_a_factor_is_not_carried_to_rest():
     """A ball that loses nothing bounces for ever; one thrown back faster is never at rest."""
     _, status = solve(BALL, "taylor", [9.81], [1.0, 1.2, 1e4], flips=500.0)

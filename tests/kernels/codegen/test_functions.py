@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from columns import solve
+from columns import fields, solve
 from mpmath import mp, mpf
 
 from kernels.interface import Status
@@ -33,8 +33,8 @@ def rates(u, b, c, d):
 FUNCTIONS = scene_kernel(
     name="functions",
     doc="integrals of functions over a ramp",
-    states=tuple(Field(name, "1", name) for name in ("u", *NAMES)),
-    parameters=tuple(Field(name, "1", name) for name in "abcd"),
+    states=fields("u", *NAMES),
+    parameters=fields(*"abcd"),
     rates=rates,
     surface=lambda u, a, b: a + b - u,
     start=lambda a: (a, *[0.0] * len(NAMES)),
@@ -45,8 +45,8 @@ FUNCTIONS = scene_kernel(
 SMOOTH = scene_kernel(
     name="steps_in_time",
     doc="a smooth step, a root and a sawtooth of the time, which jumps once between",
-    states=(Field("x", "1", "x"), Field("y", "1", "y")),
-    parameters=(Field("w", "1", "width"),),
+    states=fields("x", "y"),
+    parameters=fields("w"),
     rates=lambda t, w: (np.tanh((t - 1.0) / w) + math.hypot(t, w), t % 0.7),
     surface={"end": lambda t: 4.0 - t, "half": lambda t: -t},
     switch={"half": lambda x, y: (x, y + 1.0)},
@@ -141,10 +141,6 @@ def test_lanes_a_cell_alone_and_plain_python_have_the_same_bits_and_narrow_steps
     environment = os.environ | {"NUMBA_DISABLE_JIT": "1"}
     done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True)
     assert done.stdout.split() == here, done.stderr
-
-
-def fields(*names):
-    return tuple(Field(name, "1", name) for name in names)
 
 
 FORCED = {

@@ -3,19 +3,15 @@
 import numpy as np
 import pytest
 import scene_oracles as oracles
-from columns import relative_error, solve
+from columns import fields, relative_error, solve
 from mpmath import mp, mpf
 from rich_scene import RICH
 
 from kernels.interface import Status
 from kernels.lanes.jit import COMPILED
-from kernels.scene import Field, power, scene_kernel, sign
+from kernels.scene import power, scene_kernel, sign
 
-TOLERANCES = [1e-10, 1e-12] if COMPILED else [1e-10]
-
-
-def fields(*names):
-    return tuple(Field(name, "1", name) for name in names)
+pytestmark = pytest.mark.skipif(not COMPILED, reason="thousands of steps")
 
 
 GENERAL = scene_kernel(
@@ -35,8 +31,6 @@ def followed(*cells, flips=2.0, rtol=1e-9):
 @pytest.mark.parametrize("rtol", [1e-5, 1e-9])
 def test_any_power_is_right_to_the_tolerance(rtol):
     cells = [2.0, 0.7, 4.5], [1.0, 2.0, 0.4], [0.3, 0.05, 0.0], [0.4, 0.2, 0.1], [1.5, 0.5, 2.7]
-    if not COMPILED:
-        cells = [c[:1] for c in cells]
     outputs, status = followed(*cells, rtol=rtol)
     assert (status == Status.OK).all()
     truths = [oracles.power_foliot(*cell, 2) for cell in zip(*cells, strict=True)]
@@ -55,10 +49,10 @@ def test_the_power_0_is_dry_friction_and_the_power_2_is_quadratic_drag():
     assert relative_error(outputs["time"], [dry, drag]).max() < 1e-9
 
 
-@pytest.mark.parametrize("rtol", [1e-6, 1e-13] if COMPILED else [1e-10])
+@pytest.mark.parametrize("rtol", [1e-6, 1e-13])
 @pytest.mark.parametrize("a", [0.0, 1.0])
 def test_what_a_power_below_1_brings_to_rest_sticks(rtol, a):
-    n = np.array([0.5, 0.3, 0.05, 0.8] if COMPILED else [0.5, 0.3])
+    n = np.array([0.5, 0.3, 0.05, 0.8])
     _, status = solve(GENERAL, "taylor", 0.0, 5.0, a, 1.0, n, 1.0, flips=1.0, rtol=rtol)
     assert (status == Status.STICKS).all()
 
@@ -79,10 +73,10 @@ def quarter(n, x0, v0):
     return far ** (1 - p / 2) * mp.sqrt(p / 2) * mp.beta(1 / p, mpf(1) / 2) / p
 
 
-@pytest.mark.parametrize("rtol", TOLERANCES)
+@pytest.mark.parametrize("rtol", [1e-10, 1e-12])
 @pytest.mark.parametrize(("x0", "v0"), [(1.0, 0.0), (0.0, 1.0)])
 def test_an_oscillator_switched_at_its_own_kink_keeps_its_period(swing, rtol, x0, v0):
-    n, flips = np.meshgrid(*(([-0.3, 0.1, 0.5, 1.5, 2.2], [1.0, 2.0, 21.0, 60.0]) if COMPILED else ([0.5], [2.0])))
+    n, flips = np.meshgrid([-0.3, 0.1, 0.5, 1.5, 2.2], [1.0, 2.0, 21.0, 60.0])
     n, flips = n.ravel(), flips.ravel()
     outputs, status = solve(swing, "taylor", n, np.full(len(n), x0), np.full(len(n), v0), flips, rtol=rtol)
     quarters = 2 * flips - (1 if x0 else 0)
@@ -93,7 +87,6 @@ def test_an_oscillator_switched_at_its_own_kink_keeps_its_period(swing, rtol, x0
     assert (outputs["x"] == 0.0).all()
 
 
-@pytest.mark.skipif(not COMPILED, reason="thousands of steps")
 def test_what_a_tighter_tolerance_can_do_a_wider_one_does_not_refuse():
     """v' = (1 - v)/eps: v comes to 1 in the last digit alone, where the steps are free of eps."""
     for rtol in (1e-6, 1e-10, 1e-13):
@@ -118,7 +111,6 @@ def test_on_its_way_to_rest_a_speed_is_right_up_to_the_end():
     assert (abs(outputs["v"] - truth) / 2.0 < rtol)[good].all()
 
 
-@pytest.mark.skipif(not COMPILED, reason="a thousand cells")
 def test_at_wide_tolerances_errors_near_the_kinks_of_a_power_do_not_add_up_unseen(swing):
     random = np.random.default_rng(5)
     n, flips = random.uniform(0.5, 2.0, 1500), np.floor(random.uniform(5.0, 9.0, 1500))

@@ -4,19 +4,15 @@ import math
 
 import numpy as np
 import pytest
-from columns import relative_error, solve
+from columns import fields, relative_error, solve
 from mpmath import mp, mpf
 
 from kernels.interface import Status
 from kernels.lanes.jit import COMPILED
-from kernels.scene import Field, SceneError, maximum, minimum, mod, scene_kernel, sign, where
+from kernels.scene import SceneError, maximum, minimum, mod, scene_kernel, sign, where
 from kernels.stepping import stepped_kernel
 
 METHODS = ["taylor", "taylor_once", "dop853", "dopri5"]
-
-
-def fields(*names):
-    return tuple(Field(name, "1", name) for name in names)
 
 
 PULSE = {

@@ -12,10 +12,10 @@ from kernels.lanes.jit import COMPILED
 from kernels.scene import Field, maximum, scene_kernel, sign
 from kernels.trajectory import section_kernel
 
-METHODS = ["taylor", "dop853", "rodas5p"] if COMPILED else ["dop853"]
+METHODS = ["taylor", "dop853", "rodas5p"]
 """What keeps a step on the kink is the same for dopri5 as for dop853."""
 MANY = 24
-many = pytest.mark.skipif(not COMPILED, reason="many steps")
+pytestmark = pytest.mark.skipif(not COMPILED, reason="many steps")
 
 
 def belt_cycle(mu, belt, c):
@@ -30,7 +30,6 @@ def belt_cycle(mu, belt, c):
     return t + (-c - away)
 
 
-@many
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("rtol", [1e-5, 1e-9, 1e-12])
 def test_stick_and_slip_on_a_belt_keep_their_period_for_many_cycles(method, rtol):
@@ -49,19 +48,6 @@ def test_stick_and_slip_on_a_belt_keep_their_period_for_many_cycles(method, rtol
     assert (abs(outputs["speed"] - belt)[right] <= rtol * belt[right]).all()  # it slides where it is switched
 
 
-@many
-@pytest.mark.parametrize("method", METHODS)
-def test_a_slow_belt_lets_go_of_a_mass_that_short_steps_follow(method):
-    belt, drag, cycles = np.geomspace(1e-4, 0.02, 24), -0.1, 8
-    cells = {"press": 1.0, "belt": belt, "drag": drag, "speed0": belt, "stiffness": 1.0, "mid": 1.0, "wall": -1e9}
-    outputs, status = solve(SLIDING, method, **cells, flips=2.0 * cycles + 1, rtol=1e-9)
-    with mp.workdps(50):
-        truths = [1 / mpf(b) + cycles * belt_cycle(1, mpf(b), mpf(drag)) for b in belt]
-    assert (status == Status.OK).all()
-    assert (relative_error(outputs["time"], truths) < 1e-9).all()
-
-
-@many
 @pytest.mark.parametrize("method", METHODS)
 def test_a_section_goes_on_behind_what_the_belt_carries(method):
     belt, switches = np.array([0.05, 0.2, 0.4]), np.array([1.0, 3.0, 11.0])
@@ -87,19 +73,6 @@ def relay_time(m, mid):
     return t
 
 
-@many
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("rtol", [1e-4, 1e-10])
-def test_a_relay_is_held_until_its_drive_is_stronger(method, rtol):
-    m = np.array([0.9, 0.85, 0.8])
-    cells = {"press": m, "drive": 1.0, "belt": 1.0, "speed0": 1.0, "mid": 5.0, "wall": -1e9}
-    outputs, status = solve(SLIDING, method, **cells, flips=1.0, rtol=rtol)
-    with mp.workdps(50):
-        truths = [relay_time(mpf(float(one)), mpf(5)) for one in m]
-    assert (status == Status.OK).all()
-    assert (relative_error(outputs["time"], truths) < rtol).all()
-
-
 def swaying(mu, belt, sway, wave):
     """A mass on a belt of the speed belt + sway sin(wave t): when it slips off, and when it is at mu + 0.25 then."""
 
@@ -115,17 +88,54 @@ def swaying(mu, belt, sway, wave):
     return t + mp.findroot(lambda s: x * mp.cos(s) + v * mp.sin(s) - mpf(0.25), (0, mp.pi / 2), solver="anderson")
 
 
-@many
+def decayed(press, slope):
+    """When a place drawn to 0 from -1 along its kink, which it meets first, has come to -0.01."""
+    met = (mp.sqrt(1 + 2 * slope**2 / press) - 1) / slope
+    return met + mp.log((1 - press * met**2 / 2) / mpf(0.01)) / slope
+
+
+SLOW, SHORT = np.geomspace(1e-4, 0.02, 24), np.linspace(0.3, 0.5, 40)
+MU, BELT, SWAY, WAVE = np.array([[2.0, 1.0, 0.3, 0.7], [1.0, 0.5, 0.1, 1.3], [3.0, 1.5, 0.5, 0.4]]).T
+CASES = {
+    "a slow belt lets go of a mass that short steps follow": (
+        {"press": 1.0, "belt": SLOW, "drag": -0.1, "speed0": SLOW, "stiffness": 1.0, "mid": 1.0, "flips": 17.0},
+        ["belt"], lambda belt: 1 / belt + 8 * belt_cycle(1, belt, mpf(-0.1)), [1e-9],
+    ),
+    "a relay is held until its drive is stronger": (
+        {"press": np.array([0.9, 0.85, 0.8]), "drive": 1.0, "belt": 1.0, "speed0": 1.0, "mid": 5.0},
+        ["press"], lambda press: relay_time(press, mpf(5)), [1e-4, 1e-10],
+    ),
+    "a belt whose speed varies takes the mass along": (
+        {"press": MU, "belt": BELT, "sway": SWAY, "wave": WAVE, "stiffness": 1.0, "speed0": BELT, "mid": MU,
+         "level": 0.25}, ["press", "belt", "sway", "wave"], swaying, [1e-4, 1e-7, 1e-11],
+    ),
+    "a sliding mode decays by its surface": (
+        {"press": np.array([1.0, 3.0, 0.7]), "slope": np.array([0.5, 1.2, 0.4]), "place0": -1.0, "mid": -0.01},
+        ["press", "slope"], decayed, [1e-4, 1e-8, 1e-12],
+    ),
+    "a slide goes on across another kink": (
+        {"press": 2.0, "belt": 1.0, "speed0": 1.0, "hold": [0.25], "wall": 0.5, "mid": 1.0, "stiffness": 1.0},
+        ["hold"], lambda hold: 1 / (2 * (1 + hold)) + 1 / (2 * (1 - hold)), [1e-12],
+    ),
+    "a slide shorter than a first step behind the kink is seen": (
+        {"press": 1.0, "belt": SHORT, "stiffness": 1.0, "place0": 0.99, "speed0": SHORT, "mid": 1.1},
+        ["belt"], lambda belt: (1 - mpf(0.99)) / belt + mp.asin(mpf(1.1 - 1.0) / belt), [1e-4],
+    ),
+}  # fmt: skip
+"""Cells, the parameters that their truth is a function of, that time, and tolerances."""
+
+
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("rtol", [1e-4, 1e-7, 1e-11])
-def test_a_belt_whose_speed_varies_takes_the_mass_along(method, rtol):
-    mu, belt, sway, wave = np.array([[2.0, 1.0, 0.3, 0.7], [1.0, 0.5, 0.1, 1.3], [3.0, 1.5, 0.5, 0.4]]).T
-    cells = {"press": mu, "belt": belt, "sway": sway, "wave": wave, "stiffness": 1.0, "speed0": belt}
-    outputs, status = solve(SLIDING, method, **cells, mid=mu, level=0.25, wall=-1e9, flips=1.0, rtol=rtol)
+@pytest.mark.parametrize(("name", "rtol"), [(name, rtol) for name, case in CASES.items() for rtol in case[3]])
+def test_what_slides_comes_where_the_closed_form_says(name, rtol, method):
+    cells, names, time, _ = CASES[name]
+    outputs, status = solve(SLIDING, method, **{"wall": -1e9, "flips": 1.0} | cells, rtol=rtol)
     with mp.workdps(50):
-        truths = [swaying(*(mpf(float(x)) for x in cell)) for cell in zip(mu, belt, sway, wave, strict=True)]
+        truths = [time(*map(mpf, map(float, cell))) for cell in zip(*(cells[n] for n in names), strict=True)]
     assert (status == Status.OK).all()
     assert (relative_error(outputs["time"], truths) < rtol).all()
+    if "slope" in cells:
+        assert (relative_error(outputs["speed"], 0.01 * cells["slope"]) < rtol + 1e-15).all()
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -140,24 +150,6 @@ def test_what_slides_stays_on_its_kink_to_rounding_at_a_wide_tolerance(method):
     assert (abs(outputs["speed"] - 1.0 - 0.5 * np.sin(3.0 * outputs["clock"])) < 1e-14).all()
 
 
-@many
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("rtol", [1e-4, 1e-8, 1e-12])
-def test_a_sliding_mode_decays_by_its_surface(method, rtol):
-    m, slope = np.array([1.0, 3.0, 0.7]), np.array([0.5, 1.2, 0.4])
-    cells = {"press": m, "slope": slope, "place0": -1.0, "mid": -0.01, "wall": -1e9}
-    outputs, status = solve(SLIDING, method, **cells, flips=1.0, rtol=rtol)
-    truths = []
-    with mp.workdps(50):
-        for k, c in zip(map(mpf, m), map(mpf, slope), strict=True):
-            met = (mp.sqrt(1 + 2 * c**2 / k) - 1) / c
-            truths.append(met + mp.log((1 - k * met**2 / 2) / mpf(0.01)) / c)
-    assert (status == Status.OK).all()
-    assert (relative_error(outputs["time"], truths) < rtol).all()
-    assert (relative_error(outputs["speed"], 0.01 * slope) < rtol + 1e-15).all()
-
-
-@many
 @pytest.mark.parametrize("method", METHODS)
 def test_what_rests_for_ever_or_is_held_by_two_kinks_sticks(method):
     rests = {"press": 1.0, "stiffness": 1.0, "place0": 0.5, "mid": 2.0}
@@ -168,28 +160,6 @@ def test_what_rests_for_ever_or_is_held_by_two_kinks_sticks(method):
         assert status[0] == Status.STICKS, cell
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_a_slide_goes_on_across_another_kink(method):
-    cells = {"press": 2.0, "belt": 1.0, "speed0": 1.0, "hold": 0.25, "wall": [0.5], "mid": 1.0, "stiffness": 1.0}
-    outputs, status = solve(SLIDING, method, **cells, flips=1.0)
-    assert status[0] == Status.OK
-    assert relative_error(outputs["time"], [mpf(1) / 2 / mpf(1.25) + mpf(1) / 2 / mpf(0.75)])[0] < 1e-12
-
-
-@many
-@pytest.mark.parametrize("method", ["dop853", "rodas5p"])
-def test_a_slide_shorter_than_a_step_is_seen(method):
-    """The belt holds the mass for a hundredth of the time, less than the first step behind the kink."""
-    belt = np.linspace(0.3, 0.5, 40)
-    cells = {"press": 1.0, "belt": belt, "stiffness": 1.0, "place0": 0.99, "speed0": belt, "mid": 1.1, "wall": -1e9}
-    outputs, status = solve(SLIDING, method, **cells, flips=1.0, rtol=1e-4)
-    with mp.workdps(50):
-        truths = [(1 - mpf(0.99)) / b + mp.asin(mpf(1.1 - 1.0) / b) for b in map(mpf, map(float, belt))]
-    assert (status == Status.OK).all()
-    assert (relative_error(outputs["time"], truths) < 1e-4).all()
-
-
-@many
 def test_taylor_hands_what_slides_to_dop853_and_what_that_cannot_end_to_rodas5p():
     """The same bits as by the method that does it: a relay, and a place drawn in a microsecond to where its kink is."""
     slope, wave = 1e6, 1.0
@@ -207,7 +177,6 @@ def test_taylor_hands_what_slides_to_dop853_and_what_that_cannot_end_to_rodas5p(
     assert relative_error(found[0]["time"], [t])[0] < 1e-6
 
 
-@many
 @pytest.mark.parametrize("method", ["taylor", "dop853"])
 def test_stick_and_slip_that_never_comes_to_its_surface_meets_the_limit(method):
     cell = {"press": 1.0, "belt": 0.2, "speed0": 0.2, "drag": -0.1, "stiffness": 1.0, "mid": 9.0, "wall": [-1e9]}

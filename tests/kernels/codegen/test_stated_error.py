@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from columns import relative_error, solve
+from columns import fields, relative_error, solve
 from mpmath import mp, mpf
 from rich_scene import RICH
 
 from kernels.interface import Status
 from kernels.lanes.jit import COMPILED
-from kernels.scene import Field, scene_kernel
+from kernels.scene import scene_kernel
 
 many = pytest.mark.skipif(not COMPILED, reason="many cells")
 
@@ -47,8 +47,8 @@ def test_next_to_a_turning_point_a_switch_is_not_called_ok():
 def test_what_an_impact_leaves_at_rest_sticks_however_large_its_error_was_before():
     """A ball whose third impact returns nothing; beside it what errors leave of two numbers that are equal."""
     kernel = scene_kernel(
-        name="thud", doc="three impacts", states=[Field(name, "1", name) for name in "xvew"],
-        parameters=[Field("g", "1", "g")], rates=lambda x, v, g: (v, -g * (1 + x * x), 0.0, 0.0), surface=lambda x: x,
+        name="thud", doc="three impacts", states=fields(*"xvew"),
+        parameters=fields("g"), rates=lambda x, v, g: (v, -g * (1 + x * x), 0.0, 0.0), surface=lambda x: x,
         start=lambda: (1.0, 0.0, 1.0, 0.0),
         switch=lambda v, e, w, g: (0.0, -e * v, e - 0.5, w + 2 * e * (e - 0.5) * (v * v - g * 8 / 3)),
     )  # fmt: skip

@@ -139,13 +139,12 @@ def test_where_a_partial_system_stands_still_in_a_mode_twelve_digits_are_left_or
     chain = {"J": np.ones(n), "k": np.append(np.ones(n - 1), 0.0), "h": np.zeros(n)}
     truth = frequencies(chain["J"], chain["k"], 60)
     for n_keep in range(1, n) if COMPILED else (1,):
-        outputs, status = reduced("exact", chain, n_keep=n_keep)
-        assert status[0] == Status.OK
-        error = relative_error(outputs["frequency"][0, 1:], truth[1:]).max()
-        assert error < 1e-11
-        for rtol in (1e-11, 1e-12, 1e-13) if COMPILED else (1e-12,):
-            assert error <= rtol or reduced("exact", chain, rtol, n_keep=n_keep)[1][0] == Status.INACCURATE
-    assert reduced("exact", chain, 1e-16, n_keep=1)[1][0] == Status.INACCURATE
+        for rtol in (1e-9, 1e-11, 1e-12, 1e-13, 1e-16):
+            outputs, status = reduced("exact", chain, rtol, n_keep=n_keep)
+            error = relative_error(outputs["frequency"][0, 1:], truth[1:]).max()
+            assert error < 1e-11
+            assert status[0] == Status.OK if rtol == 1e-9 else error <= rtol or status[0] == Status.INACCURATE
+    assert status[0] == Status.INACCURATE
 
 
 def test_a_chain_of_its_full_size_is_itself():
@@ -176,7 +175,7 @@ def test_merging_the_motor_spring_holds_to_one_and_a_half_hertz():
     assert reduced("guyan", n_keep=2, f_max=1e3)[1][0] == Status.DAMPERS_OUT_OF_RANGE
 
 
-@pytest.mark.parametrize("tol", [0.01] if not COMPILED else [1e-1, 1e-2, 1e-4])
+@pytest.mark.parametrize("tol", [1e-1, 1e-2, 1e-4] if COMPILED else [0.01])
 @pytest.mark.parametrize("reduction", REDUCING if COMPILED else ("rivin", "modal"))
 def test_the_fewest_masses_hold_the_tolerance_and_one_less_does_not(reduction, tol):
     f_max = 150.0

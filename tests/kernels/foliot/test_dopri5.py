@@ -3,7 +3,7 @@
 import foliot_oracles
 import numpy as np
 import pytest
-from columns import relative_error, solve
+from columns import named, relative_error, solve
 
 from kernels.foliot.cycle import FOLIOT
 from kernels.interface import Status
@@ -42,10 +42,7 @@ NEAR_REST = [
 
 
 def as_columns(cells):
-    """One column of each term, at its default where a cell has none."""
-    defaults = {"R": 0.0, "a": 0.0, "c": 0.0, "n": 2.0, "k": 0.0, "e": 1.0}
-    full = [UNIT | defaults | cell for cell in cells]
-    return {name: np.array([cell[name] for cell in full]) for name in full[0]}
+    return named(FOLIOT, [UNIT | {"n": 2.0} | cell for cell in cells])
 
 
 def compare(cells, truths, rtol):

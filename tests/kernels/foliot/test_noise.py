@@ -180,19 +180,20 @@ def test_noise_never_stops_the_clock(terms, sigma):
 
 
 @pytest.mark.skipif(not COMPILED, reason="thousands of half swings in plain Python")
-def test_a_run_of_less_than_two_averaging_times_is_too_short():
-    found, status = run(a=[1.0] * 3, sigma=0.01, half_swings=50, averaging_time=[80.0, 120.0, 500.0])
-    assert status.tolist() == [Status.OK, Status.TOO_SHORT, Status.TOO_SHORT]
-    assert np.isfinite(found["rate_scatter_s_per_day"]).tolist() == [True, False, False]
-    assert np.isfinite(found["rate_error_s_per_day"]).all()
-
-
-def test_what_has_no_cycle_has_no_rate():
-    _, status = run(a=[1.0, 0.1, 0.0], k=[2.0, 0.1, 0.3], R=[0.0, 0.0, 0.1], R_s=[0.0, 0.0, 1.5], sigma=0.1)
-    assert status.tolist() == [Status.STICKS, Status.TOO_SHORT, Status.STICKS]
-
-
-@pytest.mark.skipif(not COMPILED, reason="thousands of half swings in plain Python")
-def test_a_tolerance_below_rounding_is_remarked():
-    _, status = run(a=[1.0, 1.0], sigma=0.1, averaging_time=10.0, rtol=[1e-16, 1e-12])
-    assert status.tolist() == [Status.INACCURATE, Status.OK]
+@pytest.mark.parametrize(
+    ("named", "statuses"),
+    [
+        # of less than two averaging times; of what has no cycle; at a tolerance below rounding
+        (
+            {"a": 1.0, "sigma": 0.01, "half_swings": 50, "averaging_time": [80.0, 120.0, 500.0]},
+            "OK TOO_SHORT TOO_SHORT",
+        ),
+        ({"a": [1.0, 0.1, 0.0], "k": [2.0, 0.1, 0.3], "R": [0, 0, 0.1], "R_s": [0, 0, 1.5]}, "STICKS TOO_SHORT STICKS"),
+        ({"a": [1.0] * 2, "sigma": 0.1, "averaging_time": 10.0, "rtol": [1e-16, 1e-12]}, "INACCURATE OK"),
+    ],
+)
+def test_what_a_run_comes_to_is_named_and_has_the_numbers_that_there_are(named, statuses):
+    found, status = run(**named)
+    assert [Status(s).name for s in status] == statuses.split()
+    assert np.isfinite(found["rate_error_s_per_day"]).tolist() == (status != Status.STICKS).tolist()
+    assert np.isfinite(found["rate_scatter_s_per_day"]).tolist() == (status < Status.TOO_SHORT).tolist()

@@ -39,13 +39,8 @@ def test_exp_is_right_to_an_ulp_from_underflow_to_overflow():
     x = np.concatenate([np.random.default_rng(1).uniform(-700, 700, 300), np.linspace(-1, 1, 101)])
     power = evaluated(functions, 4, x, np.ones_like(x))[0]
     assert relative_error(power, [exp(mpf(v)) for v in x]).max() < 2.3e-16
-    assert evaluated(functions, 4, [-1e300, -800.0, 0.0, 800.0, 1e300], np.ones(5))[0].tolist() == [
-        0.0,
-        0.0,
-        1.0,
-        np.inf,
-        np.inf,
-    ]
+    ends = evaluated(functions, 4, [-1e300, -800.0, 0.0, 800.0, 1e300, np.nan], np.ones(6))[0]
+    np.testing.assert_array_equal(ends, [0.0, 0.0, 1.0, np.inf, np.inf, np.nan])
 
 
 def test_cube_root_is_right_to_an_ulp_over_all_exponents():
@@ -98,17 +93,8 @@ def test_elementary_functions_are_right_to_a_few_ulp(top):
     assert relative_error(thirds, [log1p(r / 2) - r / 2 + r * r / 8 for r in ratios]).max() < 7e-16
 
 
-def test_logarithms_and_powers_hold_over_all_exponents():
-    x = 10.0 ** np.random.default_rng(8).uniform(-300, 300, 300 if COMPILED else 30)
-    logs, logs1, _, _, _, angles, powers, _ = evaluated(more, 8, x, x, np.full_like(x, 0.37))
-    exact = [mpf(float(v)) for v in x]
-    assert relative_error(logs, [log(v) for v in exact]).max() < 2e-16
-    assert relative_error(logs1, [log1p(v) for v in exact]).max() < 2e-16
-    assert relative_error(angles, [atan(v) for v in exact]).max() < 3e-16
-    assert relative_error(powers, [v ** mpf(0.37) for v in exact]).max() < 6e-16
-
-
 def test_elementary_functions_at_the_ends_of_their_ranges():
+    """And over all exponents."""
     outputs = evaluated(
         more, 8, [0.0, 1e-310, np.inf, -np.inf, np.nan], [-1.0, 0.0, np.inf, -2.0, np.nan], [0, 1, 0, 0, 0]
     )
@@ -120,9 +106,13 @@ def test_elementary_functions_at_the_ends_of_their_ranges():
     assert angles[2:4].tolist() == [np.pi / 2, -np.pi / 2]
     assert powers[:2].tolist() == [1.0, 1e-310]  # 0^0 = 1
     top = [2.0**1022, np.nextafter(2.0**1023, 0.0), 2.0**1023, 1e308, sys.float_info.max]
-    logs, logs1, *_ = evaluated(more, 8, top, top, np.ones(5))
-    for found in (logs, logs1):
-        assert relative_error(found, [log(mpf(x)) for x in top]).max() < 2e-16
+    x = np.append(10.0 ** np.random.default_rng(8).uniform(-300, 300, 300 if COMPILED else 30), top)
+    logs, logs1, _, _, _, angles, powers, _ = evaluated(more, 8, x, x, np.full_like(x, 0.37))
+    exact = [mpf(float(v)) for v in x]
+    assert relative_error(logs, [log(v) for v in exact]).max() < 2e-16
+    assert relative_error(logs1, [log1p(v) for v in exact]).max() < 2e-16
+    assert relative_error(angles, [atan(v) for v in exact]).max() < 3e-16
+    assert relative_error(powers, [v ** mpf(0.37) for v in exact]).max() < 6e-16
 
 
 @jit
@@ -154,10 +144,8 @@ def test_hyperbolic_and_inverse_functions_are_right_to_a_few_ulp_wherever_they_a
     x = np.append(x, [1.7e308, 0.0, 3e-320])
     y = np.append(np.where(y > 1.0, x[:-3] * random.uniform(0.1, 10, 2 * n), y), [-1e307, 0.0, 4e-320])
     roots = evaluated(hyperbolic, 8, x, y, np.zeros_like(x))[5]
-    assert (
-        relative_error(roots[:-2], [hypot(mpf(float(a)), mpf(float(b))) for a, b in zip(x, y, strict=True)][:-2]).max()
-        < 3e-16
-    )
+    exact = [hypot(mpf(float(a)), mpf(float(b))) for a, b in zip(x[:-2], y[:-2], strict=True)]
+    assert relative_error(roots[:-2], exact).max() < 3e-16
     assert roots[-2] == 0.0
     assert roots[-1] == pytest.approx(5e-320, rel=1e-3)
 
@@ -171,7 +159,6 @@ def test_hyperbolic_and_inverse_functions_at_the_ends_of_their_ranges():
     np.testing.assert_array_equal(arcsins, [np.pi / 2, -np.pi / 2, np.nan, np.nan, 0.0])
     np.testing.assert_array_equal(arccosines[:4], [0.0, np.pi, np.nan, np.nan])
     np.testing.assert_array_equal(roots, [np.inf, np.inf, np.nan, np.sqrt(640001.0), 1.0])
-    assert np.isnan(evaluated(functions, 4, [np.nan], [1.0])[0][0])  # exp
 
 
 def test_a_floor_is_that_of_all_numbers_and_goes_on_as_it_is_half_a_unit_beyond():
