@@ -41,6 +41,7 @@ def same(left, right):
     for name in left.data_vars:
         assert left[name].dims == right[name].dims
         assert left[name].values.tobytes() == right[name].values.tobytes(), name
+        assert left[name].attrs.get("units") == right[name].attrs.get("units")
     for name in left.coords:
         xr.testing.assert_identical(left[name].drop_attrs(), right[name].drop_attrs())
 

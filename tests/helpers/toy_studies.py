@@ -6,6 +6,17 @@ import sweep
 
 HEAD = 'kernel = "toy:KERNEL"\noutputs = ["fall_time"]\n'
 """Beginning of a study file."""
+STONES = """
+title = "Stones"
+kernel = "{kernel}"
+outputs = ["fall_time"]
+[axes.height]
+spacing = "linear"
+start = 1
+stop = {count}
+num = {count}
+"""
+"""A study file of stones of 1, 2, 3 ... m."""
 
 
 def build(**keys):

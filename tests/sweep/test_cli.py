@@ -16,7 +16,6 @@ import pytest
 import xarray as xr
 
 import sweep
-from sweep import cli
 from sweep.command.reading import explained
 from sweep.errors import SweepError
 
@@ -59,18 +58,6 @@ def done(here, result):
     """The same folder with the study computed."""
     shutil.copy(result, "stones.h5")
     return here
-
-
-@pytest.fixture
-def call(capsys):
-    """Runs a command: exit status, what it printed, what it complained of."""
-
-    def call(*argv):
-        code = cli.main([str(word) for word in argv])
-        printed = capsys.readouterr()
-        return code, printed.out, printed.err
-
-    return call
 
 
 def in_a_process(*argv, **options):
@@ -208,13 +195,9 @@ def test_two_results_are_joined(done, call):
     ("argv", "message"),
     [
         (("run", "."), "folder"),
-        (("run", "study.py"), "python study.py"),
-        (("run", "stones.h5"), "sweep show stones.h5"),
         (("show", "no.h5"), "no.h5"),
         (("show", "."), "directory"),
-        (("verify", "/"), "directory"),
         (("run", "pipe.toml"), "pipe.toml"),
-        (("run", "stones.toml", "--allow-import", "--workers", "0"), "workers"),
         (("run", "stones.toml", "--allow-import", "--cell-timeout", "soon"), "cell_timeout"),
         (("run", "stones.toml", "--allow-import", "-o", "nowhere/a.h5"), "nowhere"),
         (("run", "stones.toml", "--allow-import", "-o", "stones.toml"), "stones.toml"),
@@ -252,12 +235,6 @@ def test_no_folder_gives_way_to_what_a_command_writes(done, call, argv, target):
     code, _, err = call(*argv, "--force", "-o", target)
     assert (code, "is a folder" in err) == (2, True)
     assert not target.startswith("mine") or Path(target, "letter").exists()
-
-
-def test_a_run_in_python_refuses_a_folder_as_its_output(tmp_path):
-    for path in ("/", tmp_path):
-        with pytest.raises(SweepError, match="is a folder"):
-            sweep.run(kernel="foliot", axes={"mu": [1.0]}, fixed={"phi0": 1.0, "a": 1.0}, path=path, force=True)
 
 
 @pytest.mark.parametrize(

@@ -116,9 +116,11 @@ def test_what_is_no_cell_is_refused(clocks):
             look(allow_import=True)
 
 
-def test_traces_differ_relative_to_their_amplitude():
+def test_traces_are_judged_and_differ_relative_to_their_amplitude():
     keys = {"kernel": "foliot_motion", "outputs": ["angle"], "along": {"phase": [0.1, 0.4]}}
     ds = sweep.run(keys | {"axes": {"mu": [0.5]}, "fixed": {"phi0": 1.0, "a": 0.3}})
+    found = ds.sweep.check()
+    assert (found.judged, found.sample, found.beyond) == (1, 1, 0)
     assert "segments" in str(ds.sweep.cell())
     differs = ds.assign(angle=ds.angle * 0.8).sweep.cell().differs
     assert differs == pytest.approx(dict.fromkeys(differs, 0.25), rel=1e-3)
@@ -148,14 +150,6 @@ def test_a_dataset_without_statuses_says_what_can_be_done_with_it():
     assert "in_units" in repr(xr.Dataset({"y": ("x", [1.0])}).sweep)
     summary = sweep.run(build(axes={"height": [1.0, 2.0]}, summary={}))
     assert re.search(r"^  2 +OK ", repr(summary.sweep), re.MULTILINE)
-
-
-def test_words_traces_and_arrays_are_given_back_as_the_kernel_had_them():
-    keys = {"kernel": "foliot_motion", "axes": {"mu": [0.5, 1.0]}, "fixed": {"phi0": 1.0, "a": 0.3}}
-    keys["along"] = {"phase": [0.1, 0.4]}
-    found = sweep.run(keys).sweep.check()
-    assert found.judged == found.sample == 2
-    assert found.beyond == 0
 
 
 def test_outputs_that_are_infinite_by_both_methods_agree():

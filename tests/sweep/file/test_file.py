@@ -33,7 +33,7 @@ def run(path, cells=None, **keys):
     return sweep.run(study, path, progress=False, workers=1, block_cells=cells)
 
 
-@pytest.mark.parametrize("cells", [1, 4, None])
+@pytest.mark.parametrize("cells", [1, 4])
 @pytest.mark.parametrize("name", STUDIES)
 def test_plain_readers_find_the_numbers_and_all_that_is_said_of_them(tmp_path, name, cells):
     path = tmp_path / "out.h5"

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
-from running import interrupted, kept, same, tall
+from running import interrupted, same, tall
 from toy_studies import build
 
 import sweep
@@ -137,27 +137,20 @@ def test_results_beyond_the_memory_are_refused(monkeypatch):
         sweep.join(a, b)
 
 
-def test_a_file_that_is_there_is_replaced_by_force_alone(tmp_path):
-    """The studies of all three are the same: some source has changed."""
+@pytest.mark.parametrize("left", ["a join of other results", "an unfinished run"])
+def test_what_is_there_is_replaced_by_force_alone(tmp_path, left):
+    """The studies of all three results are the same: some source has changed."""
     a, b, c = of(), of(), of()
     b.fall_time[0] += 1.0
     c.fall_time[0] += 2.0
     path = tmp_path / "j.h5"
-    sweep.join(a, b, path, axis="version").close()
-    whole = path.read_bytes()
+    if left == "an unfinished run":
+        interrupted(tall(23), path)
+    else:
+        sweep.join(a, b, path, axis="version").close()
+    before = {file: file.read_bytes() for file in tmp_path.iterdir()}
     with pytest.raises(sweep.SweepError, match="--force"):
         sweep.join(a, c, path, axis="version")
-    assert path.read_bytes() == whole
+    assert {file: file.read_bytes() for file in tmp_path.iterdir()} == before
     with sweep.join(a, c, path, axis="version", force=True) as found:
         assert np.array_equal(found.fall_time[1], c.fall_time)
-
-
-def test_what_a_run_left_unfinished_is_given_up_by_force_alone(tmp_path):
-    path = tmp_path / "j.h5"
-    interrupted(tall(23), path)
-    before = kept(path)
-    with pytest.raises(sweep.SweepError, match="unfinished"):
-        sweep.join(of(), of(), path, axis="version")
-    assert kept(path) == before
-    with sweep.join(of(), of(), path, axis="version", force=True) as found:
-        assert found.version.size == 2

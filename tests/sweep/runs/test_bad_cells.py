@@ -2,16 +2,13 @@
 
 import io
 import resource
-import subprocess
-import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 
 import bad
 import numpy as np
 import pytest
-from clusters import served
-from running import environment, quiet, tall, wait_for
+from running import quiet, tall, wait_for
 
 import sweep
 from kernels.interface import Status
@@ -25,15 +22,6 @@ from sweep.runs.isolate import Processes
 
 SOUND = 100
 BAD = {"bad:RAISING": [11.0], "bad:DYING": [11.0, 22.0, 33.0], "bad:WORST": [11.0, 22.0, 33.0, 44.0, 55.0, 66.0]}
-DEADLY = """
-kernel = "bad:DEADLY"
-outputs = ["fall_time"]
-[axes.height]
-spacing = "linear"
-start = 1
-stop = 600
-num = 600
-"""
 KEYS = {"bad:RAISING": {"block_cells": 10}, "bad:DYING": {"isolate": True}, "bad:WORST": {"cell_timeout": 10.0}}
 
 
@@ -101,7 +89,7 @@ def test_a_cell_that_is_stopped_in_its_last_trial_is_not_blamed(monkeypatch):
 
 
 def test_a_kernel_that_kills_its_parent_costs_the_cell_and_none_of_those_that_other_processes_are_at():
-    found = quiet(tall(120, "bad:ORPHANED"), isolate=True, block_cells=30)
+    found = quiet(tall(96, "bad:ORPHANED"), isolate=True, block_cells=12)
     assert heights_of(found, Status.FAILED) == [bad.ORPHANS]
 
 
@@ -113,37 +101,20 @@ def test_a_kernel_that_ends_python_or_raises_what_cannot_be_told_costs_those_cel
     assert all(word in log.getvalue() for word in ("SystemExit", "Mumbling"))
 
 
-@pytest.fixture
-def run_of_deadly(tmp_path):
-    """Begins a run by the command whose kernel needs new processes again and again; its process and its output."""
-    (tmp_path / "stones.toml").write_text(DEADLY)
-    words = [sys.executable, "-m", "sweep", "run", "stones.toml", "--allow-import", "--workers", "2"]
-    begun = []
-
-    def begin(**environ):
-        keys = {"env": {**environment(), **environ}, "cwd": tmp_path, "stderr": subprocess.PIPE, "text": True}
-        begun.append(subprocess.Popen(words, **keys))
-        return begun[-1], tmp_path / "stones.h5"
-
-    yield begin
-    for process in begun:
-        process.kill()
-        process.communicate()
-
-
 @pytest.mark.skipif(not hasattr(resource, "prlimit"), reason="the limit of another process is set on Linux only")
-def test_where_no_process_can_be_started_the_run_ends_and_no_cell_is_blamed(run_of_deadly, tmp_path):
-    process, output = run_of_deadly(TMPDIR=str(tmp_path))
+def test_where_no_process_can_be_started_the_run_ends_and_no_cell_is_blamed(begun, tmp_path):
+    deadly = ("bad:DEADLY", 600, "--workers", "2")
+    process, output = begun(*deadly, TMPDIR=str(tmp_path))
     wait_for(unfinished_of(output).exists, process)
     resource.prlimit(process.pid, resource.RLIMIT_NOFILE, (6, resource.getrlimit(resource.RLIMIT_NOFILE)[1]))
     assert process.wait(60) == MISTAKE
     assert "process" in process.stderr.read()
     long = tmp_path / ("x" * 100)
     long.mkdir()
-    process, output = run_of_deadly(TMPDIR=str(long))  # sockets have names of at most 108 characters
+    process, output = begun(*deadly, TMPDIR=str(long))  # sockets have names of at most 108 characters
     assert process.wait(60) == MISTAKE
     assert "TMPDIR" in process.stderr.read()
-    process, output = run_of_deadly()
+    process, output = begun(*deadly)
     assert process.wait(60) == CELLS_FAILED
     with sweep.open_result(output) as found:
         assert heights_of(found, Status.FAILED) == [bad.CRASHES, bad.EXITS]
@@ -154,16 +125,6 @@ def test_a_kernel_of_which_every_cell_is_bad_is_told_at_once():
         quiet(tall(50, "bad:HOPELESS"))
     with pytest.raises(SweepError, match=r"bad:HOPELESS: .*ZeroDivisionError"):
         quiet(tall(50, "bad:HOPELESS"), isolate=True)
-
-
-def test_a_kernel_that_fails_on_a_cluster_costs_a_cell_too(tmp_path):
-    pytest.importorskip("distributed")
-    with served(workers=2) as (address, _):
-        for name in ("bad:RAISING", "bad:WORST"):
-            keys = {**KEYS[name], "workers": None, "cluster": address}
-            with quiet(tall(SOUND, name), tmp_path / f"{name[4:]}.h5", **keys) as found:
-                assert heights_of(found, Status.FAILED) == BAD[name]
-                assert account(found).by_kind["ok"] == SOUND - len(BAD[name])
 
 
 def test_what_compiling_takes_is_not_taken_for_what_a_cell_takes():

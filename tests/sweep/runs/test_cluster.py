@@ -14,6 +14,7 @@ from clusters import served
 from running import kept, quiet, same, tall
 
 import sweep
+from kernels.interface import Status
 from sweep.cli import main
 from sweep.command.reading import explained
 from sweep.errors import INCOMPLETE, SweepError
@@ -144,6 +145,17 @@ def test_a_worker_with_another_version_refuses(client, output, monkeypatch):
     monkeypatch.setattr("sweep.runs.loop.fingerprint", lambda study: {**real(study), "source toy": "other"})
     with pytest.raises(SweepError, match=r"worker.*versions(.|\n)*source toy"):
         elsewhere(tall(3), output, cluster=client)
+
+
+@pytest.mark.parametrize(
+    ("kernel", "options", "bad"), [("bad:RAISING", {"block_cells": 10}, 1), ("bad:WORST", {"cell_timeout": 10.0}, 6)]
+)
+def test_a_kernel_that_fails_on_a_cluster_costs_its_cells_alone(client, output, kernel, options, bad):
+    with elsewhere(tall(100, kernel), output, cluster=client, **options) as found:
+        assert found.height.values[found.status.values == Status.FAILED].tolist() == [
+            11.0 * k for k in range(1, bad + 1)
+        ]
+        assert account(found).by_kind["ok"] == 100 - bad
 
 
 def test_workers_killed_in_the_middle_cost_nothing_but_time(client, output, monkeypatch):

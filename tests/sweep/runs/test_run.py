@@ -68,6 +68,8 @@ def test_cells_that_are_cheap_beside_a_call_are_solved_by_few_calls():
         ({"path": "nowhere/out.h5"}, "nowhere"),
         ({"path": 3}, "path"),
         ({"path": "a" * 300}, "cannot be written"),
+        ({"path": "/", "force": True}, "is a folder"),
+        ({"path": Path(__file__).parent, "force": True}, "is a folder"),
     ],
 )
 def test_what_cannot_be_meant_is_refused_in_one_line(keys, word):
@@ -79,12 +81,16 @@ def test_what_cannot_be_meant_is_refused_in_one_line(keys, word):
 # what stands there
 
 
-def test_the_output_of_another_study_is_kept_unless_forced(output):
-    quiet(tall(3), output).close()
-    with pytest.raises(SweepError, match=r"another study(.|\n)*axes\.height"):
-        quiet(tall(4), output)
-    assert sweep.open_result(output).sizes["height"] == 3
-    assert quiet(tall(4), output, force=True).sizes["height"] == 4
+@pytest.mark.parametrize("finished", [True, False])
+def test_the_output_of_another_study_is_kept_unless_forced(unfinished, finished):
+    if finished:
+        quiet(tall(23), unfinished).close()
+    path = unfinished if finished else unfinished_of(unfinished)
+    before = path.read_bytes()
+    with pytest.raises(SweepError, match=r"(another study|unfinished)(.|\n)*axes\.height"):
+        quiet(tall(24), unfinished)
+    assert path.read_bytes() == before
+    same(quiet(tall(24), unfinished, force=True), quiet(tall(24)))
 
 
 @pytest.mark.parametrize("content", [b"", b"words", b"\x89HDF\r\n\x1a\n" + bytes(100), None])
@@ -117,13 +123,11 @@ def test_a_result_whose_fingerprint_was_changed_is_told_and_kept(output, change,
 
 
 @pytest.mark.parametrize("name", ["out.h5", "out.h5.unfinished"])
-def test_a_pipe_or_a_folder_where_a_result_should_be_is_told_at_once(output, name):
+def test_a_pipe_where_a_result_should_be_is_told_at_once(output, name):
     os.mkfifo(output.with_name(name))
     for action in (lambda path: quiet(tall(3), path), sweep.verify, sweep.open_result):
         with pytest.raises(SweepError, match=r"^[^\n]*$"):
             action(output)
-    with pytest.raises(SweepError, match=r"^[^\n]*$"):
-        quiet(tall(3), output.parent)
 
 
 def test_a_result_is_not_named_as_another_kind_of_file(output):
@@ -163,14 +167,6 @@ def test_what_a_run_left_that_was_killed_at_its_beginning_is_removed(output):
         output.with_name(name).write_bytes(b"half of it")
     quiet(tall(3), output).close()
     assert list(output.parent.iterdir()) == [output]
-
-
-def test_the_unfinished_result_of_another_study_is_kept_unless_forced(unfinished):
-    before = unfinished_of(unfinished).read_bytes()
-    with pytest.raises(SweepError, match=r"unfinished(.|\n)*axes\.height"):
-        quiet(tall(24), unfinished)
-    assert unfinished_of(unfinished).read_bytes() == before
-    same(quiet(tall(24), unfinished, force=True), quiet(tall(24)))
 
 
 @pytest.mark.skipif(not Path("/proc/self/fd").is_dir(), reason="what is open is looked up in /proc")
@@ -303,13 +299,6 @@ def test_a_summary_a_zip_and_a_damaged_result_are_not_extended(tmp_path):
 
 
 # the disk
-
-
-def test_writes_that_take_only_a_part_are_carried_on(output, monkeypatch):
-    real = disk.write
-    monkeypatch.setattr(disk, "write", lambda fd, pieces, at: real(fd, [pieces[0][:97]], at))
-    same(quiet(tall(50), output, block_cells=20), quiet(tall(50)))
-    assert sweep.verify(output).whole
 
 
 def test_numbers_that_do_not_reach_the_disk_are_never_acknowledged(output, monkeypatch):

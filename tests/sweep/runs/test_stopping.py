@@ -4,18 +4,17 @@ import json
 import os
 import re
 import signal
-import subprocess
-import sys
 import time
 from datetime import datetime, timedelta
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from running import environment, quiet, tall, wait_for
+from running import quiet, tall, wait_for
+from toy_studies import STONES
 
 import sweep
-from sweep.cli import main, parser
+from sweep.cli import parser
 from sweep.errors import EXIT_CODES, SweepError
 from sweep.file.store import unfinished_of
 from sweep.results.statuses import account
@@ -25,35 +24,6 @@ from sweep.show.text import reasons
 
 SECONDS = 10.0
 """What a run may take to end: two seconds, and eight for a machine with much to do to notice."""
-
-STUDY = """
-title = "Stones"
-kernel = "{kernel}"
-outputs = ["fall_time"]
-[axes.height]
-spacing = "linear"
-start = 1
-stop = {count}
-num = {count}
-"""
-
-
-@pytest.fixture
-def begun(tmp_path):
-    """Begins a run by the command: the process, and its output."""
-    processes = []
-
-    def begin(kernel, count, *options):
-        (tmp_path / "stones.toml").write_text(STUDY.format(kernel=kernel, count=count))
-        words = [sys.executable, "-m", "sweep", "run", "stones.toml", "--allow-import", *options]
-        keys = {"env": environment(), "cwd": tmp_path, "stderr": subprocess.PIPE, "text": True}
-        processes.append(subprocess.Popen(words, start_new_session=True, **keys))
-        return processes[-1], tmp_path / "stones.h5"
-
-    yield begin
-    for process in processes:
-        process.kill()
-        process.communicate()
 
 
 def solved(output):
@@ -177,18 +147,17 @@ def test_an_output_that_is_moved_or_spoilt_ends_the_run_within_seconds_and_keeps
 
 
 @pytest.fixture
-def command(tmp_path, monkeypatch, capsys):
-    """Runs a command in an empty folder: its exit status, and what it printed."""
+def command(tmp_path, monkeypatch, call):
+    """Runs a command in a folder with two studies: its exit status, and what it said."""
     monkeypatch.chdir(tmp_path)
+    (tmp_path / "good.toml").write_text(STONES.format(kernel="toy:KERNEL", count=5))
+    (tmp_path / "bad.toml").write_text(STONES.format(kernel="bad:RAISING", count=20))
 
-    def call(*words):
-        code = main(list(words))
-        printed = capsys.readouterr()
-        return code, printed.out + printed.err
+    def command(*words):
+        code, printed, complained = call(*words)
+        return code, printed + complained
 
-    (tmp_path / "good.toml").write_text(STUDY.format(kernel="toy:KERNEL", count=5))
-    (tmp_path / "bad.toml").write_text(STUDY.format(kernel="bad:RAISING", count=20))
-    return call
+    return command
 
 
 OWN = ("--allow-import", "--no-isolate")

@@ -114,9 +114,6 @@ def test_a_result_without_one_value_is_drawn_all_the_same(tmp_path, axes):
     ds["period"] = ds.period * np.nan
     ds["status"][:] = 64
     figure = plot(ds, tmp_path / "out.png")
-    with pytest.raises(SweepError, match="there already"):
-        plot(ds, tmp_path / "out.png")
-    plot(ds, tmp_path / "out.png", force=True)
     assert "BAD_INPUT" in [*words(figure), *(text.get_text() for text in figure.axes[0].texts)]
 
 

@@ -1,6 +1,7 @@
 """The page of a result: all of it in one file, nothing from elsewhere, nothing of the result's text run."""
 
 from html.parser import HTMLParser
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -32,29 +33,30 @@ def foliot(**keys):
 
 
 @pytest.fixture(scope="module")
-def ds():
-    return sweep.run(foliot(title="Period & drive", question="How does <b>it</b> fall?", fixed={"a": 1.0, "phi0": 1.0}))
+def text():
+    """A page of a result whose texts are no friends of markup."""
+    ds = sweep.run(foliot(question="How does <b>it</b> fall?"))
+    evil = ds.assign_attrs(title='<script>alert("x")</script>', study="</pre><img src=x onerror=y>")
+    return page(evil, Path("a<b>.h5"))
 
 
-def test_the_page_tells_question_axes_exponents_statuses_and_provenance(ds, tmp_path):
-    text = Tree(page(ds, tmp_path / "foliot.h5")).text
+def test_the_page_tells_question_axes_exponents_statuses_and_provenance(text):
     for words in (
         "How does <b>it</b> fall?",
         "drive torque per moment of inertia",
         "two laws with a smooth bend",
         "Fingerprint",
     ):
-        assert words in text, words
+        assert words in Tree(text).text, words
 
 
-def test_nothing_comes_from_elsewhere_and_no_text_of_the_result_becomes_markup(ds, tmp_path):
-    evil = ds.assign_attrs(title='<script>alert("x")</script>', study="</pre><img src=x onerror=y>")
-    tree = Tree(page(evil, tmp_path / "a<b>.h5"))
+def test_nothing_comes_from_elsewhere_and_no_text_of_the_result_becomes_markup(text):
+    tree = Tree(text)
     assert not {"script", "link", "iframe", "b"} & set(tree.tags)
     sources = [value for name, value in tree.attributes if name in ("src", "href")]
     assert sources
     assert all(value.startswith("data:image/png;base64,") for value in sources)
-    assert "url(" not in page(ds, tmp_path / "x.h5")
+    assert "url(" not in text
 
 
 @pytest.mark.parametrize(

@@ -12,8 +12,8 @@ import sweep
     [
         ("fixed.height = 1", "axes", "missing"), ("[axes]\n[fixed]\nheight = 1", "axes", ""),
         ("axes.v0 = [1.0]", "fixed.height", "has no default"), ("axes.height = []", "axes.height", "no values"),
-        ("axes.height = [1, 2, 1.0]", "axes.height", "1 stands"), ("axes.height = ['1e3']", "axes.height[0]", "drop"),
-        ("axes.height = [1, nan, 2, nan]", "axes.height", "nan"), ("axes.height = [1, [2]]", "axes.height[1]", ""),
+        ("axes.height = [1, 2, 1.0]", "axes.height", "1 stands"),
+        ("axes.height = [1, nan, 2, nan]", "axes.height", "nan"),
         ("axes.method = ['auto', 'auto']\nfixed.height = 1", "axes.method", "auto stands"),
         ("axes.height = {}", "axes.height", "neither"),
         ("axes.height = { values = [1], file = 'x' }", "axes.height", "exclude each other"),
@@ -25,7 +25,6 @@ import sweep
         ("axes.height = { spacing = 'log', start = 1e-320, stop = 1, num = 3, unit = 'nm' }", "axes.height", "range"),
         ("axes.height = [9007199254740993]", "axes.height[0]", "not exact"),
         (f"axes.height = [1{'0' * 400}]", "axes.height[0]", "larger than any"),
-        ("axes.rtol = [1e-3, 1]\nfixed.height = 1", "axes.rtol", "< 1"),
         ("axes.height = [1]\naxes.rtol = [1e-3]\nrtol = 1e-3", "rtol", "an axis as well"),
         ("axes.height = [1]\naxes.method = ['auto']\nmethod = 'auto'", "method", "an axis as well"),
         ("axes.height = { spacing = 'log', start = 1, stop = 2 }\ndesign = 'sobol'", "design", "how many"),
@@ -38,11 +37,9 @@ import sweep
         ("axes.height = [1]\nalong.r.num = 5", "along.r", "it has phase"),
         ('title = "a\\u0000b"\naxes.height = [1]', "title", "leave it out"),
         ('design = "zip"\naxes.height = [1, 2]\naxes.v0 = [1, 2, 3]', "axes", "equal length"),
-        ("axes.height.file = '../b.csv'", "axes.height.file", "outside"),
     ],
 )  # fmt: skip
-def test_what_does_not_fit_together_is_told_where_it_stands(mistakes, tmp_path, text, where, word):
-    (tmp_path.parent / "b.csv").write_text("height\n1\n")
+def test_what_does_not_fit_together_is_told_where_it_stands(mistakes, text, where, word):
     found = mistakes(text)
     assert list(found) == [where]
     assert word in found[where]
