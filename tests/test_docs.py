@@ -29,14 +29,10 @@ def test_every_public_name_has_its_place_in_the_reference():
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda path: path.stem)
-def test_links_lead_to_files_that_are_there(page):
+def test_links_of_a_page_lead_to_files_that_are_there_and_its_python_parses(page):
     made = {"gallery.md", "commands.md", "index.md"}
     for target in re.findall(r"\]\((?!http)([^)#]+)\)", page.read_text(encoding="utf-8")):
         assert (page.parent / target).exists() or ("_made" in target and Path(target).name in made), target
-
-
-@pytest.mark.parametrize("page", PAGES, ids=lambda path: path.stem)
-def test_its_python_parses(page):
     for code in re.findall(r"```(?:\{code-cell\} )?python\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL):
         if not code.startswith(">>>"):  # a doctest is run by a test of its own
             ast.parse("\n".join(line for line in code.splitlines() if not line.startswith(("%", ":"))))

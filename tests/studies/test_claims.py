@@ -388,23 +388,17 @@ def test_a_script_is_used_as_its_head_and_its_study_say(name, other, tmp_path, c
 
 
 @pytest.mark.parametrize("path", sorted(STUDIES.glob("*.toml")), ids=lambda path: path.stem)
-def test_a_study_file_opens_with_its_question_and_holds_no_mistake(path):
+def test_a_study_file_holds_no_mistake_opens_with_its_question_and_closes_with_its_answer(path):
+    """And with how that was checked; its picture has a caption of two to four sentences."""
     study = sweep.study(path, allow_import=True)
     assert path.read_text(encoding="utf-8").startswith("# ")
     assert study.question.endswith("?")
     assert study.title
-
-
-@pytest.mark.parametrize("name", sorted(p.stem for p in STUDIES.glob("*.png")))
-def test_a_study_closes_with_its_answer_and_how_that_was_checked(name):
-    told = " ".join(what_came_out(name))
-    assert "? " in told
-    assert " How it was checked, and its limits: " in told
-
-
-def test_a_picture_has_a_caption_of_two_to_four_sentences():
-    captions = {p.stem: p.with_suffix(".md").read_text(encoding="utf-8") for p in STUDIES.glob("*.png")}
-    assert [n for n, text in captions.items() if not 2 <= len(re.findall(r"\.(?=\s|$)", text)) <= 4] == []
+    if path.with_suffix(".png").exists():
+        told, caption = " ".join(what_came_out(path.stem)), path.with_suffix(".md").read_text(encoding="utf-8")
+        assert "? " in told
+        assert " How it was checked, and its limits: " in told
+        assert 2 <= len(re.findall(r"\.(?=\s|$)", caption)) <= 4
 
 
 def test_the_masses_that_a_model_needs_and_false_counts_and_errors_are_noticed(tmp_path):
