@@ -109,15 +109,15 @@ def _points(y: xr.DataArray, dim: str, over: str, sigma: Any) -> Array:
     check_output(y)
     if y.ndim != 2 or {dim, over} != {str(d) for d in y.dims}:
         raise SweepError(f"a collapse takes one output along {dim} and {over}, and nothing else; choose with .sel")
-    t, sizes = np.log(positive_axis(y, dim)[1]), y[over].values.astype(np.float64)
-    if sizes.size < 2 or not (np.isfinite(sizes) & (sizes > 0)).all():
-        raise SweepError(f"{over}: a collapse needs at least two values, all positive")
+    t, sizes = np.log(positive_axis(y, dim)[1]), y[over].values
+    if sizes.dtype.kind not in "fiu" or sizes.size < 2 or not (np.isfinite(sizes) & (sizes > 0)).all():
+        raise SweepError(f"{over}: a collapse needs at least two values, all positive numbers")
     order = np.argsort(t)
     z, errors = (part.transpose(over, dim).values[:, order] for part in (log_of(y), relative_sigma(y, sigma)))
     curve, place = np.nonzero(np.isfinite(z) & (np.isfinite(errors) | (sigma is None)))
     if place.size < FEWEST_POINTS:
         raise SweepError(f"a collapse needs at least {FEWEST_POINTS} positive points of {title(y)}, found {place.size}")
-    return np.stack([t[order][place], np.log(sizes)[curve], z[curve, place], errors[curve, place]])
+    return np.stack([t[order][place], np.log(sizes.astype(np.float64))[curve], z[curve, place], errors[curve, place]])
 
 
 def _common(points: Array, *a: float) -> Found:

@@ -280,6 +280,6 @@ def described(found: xr.Dataset, x: xr.DataArray, y: xr.DataArray) -> xr.Dataset
         columns = [one for name in ends if ends[name] for one in (name, *ends[name])]
         columns += [name for name in ends if found[name].dtype.kind == "U"]
         table = found[columns] if found[columns].sizes else found[columns].expand_dims("line")
-        rows = table.to_dataframe().reset_index()[[*table.sizes, *columns]]
+        rows = table.to_dataframe()[columns].reset_index()
         found.attrs["summary"] = rows.to_string(index=False, max_rows=20, float_format="{:.6g}".format)
     return found

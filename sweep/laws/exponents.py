@@ -14,7 +14,7 @@ import xarray as xr
 
 from sweep.errors import SweepError, missing
 from sweep.laws import curves
-from sweep.laws.curves import Window, log_of, positive_axis, title
+from sweep.laws.curves import Window, check_names, log_of, positive_axis, title
 from sweep.laws.loglog import EPSILON, Array, brackets, by_runs, is_logarithmic, root, slope_errors, slopes
 
 BORDERS = (-1.0, -0.5, -1 / 3)
@@ -74,6 +74,7 @@ def local_exponent(y: xr.DataArray, dim: str, *, error: bool = False, bound: Any
     found.attrs = {"units": "1", "long_name": f"local exponent of {title(y)} in {dim}"}
     if not error:
         return found
+    check_names(y, {*y.coords, *y.dims} & {"exponent", "exponent_error"})
     bounds = curves.stated_bound(y, bound).transpose(*logs.dims).values
     errors = logs.copy(data=by_runs(t, slope_errors, logs.values, bounds)).transpose(*y.dims)
     errors.attrs = {"units": "1", "long_name": f"error of the local exponent of {title(y)} in {dim}"}
@@ -119,6 +120,7 @@ def where_exponent(
     """
     curve = log_of(y, values)
     dimension, x = positive_axis(curve, dim)
+    check_names(y, {*y.coords, *y.dims} & {"abscissa", "abscissa_error"})
     if not curve.size:
         raise SweepError(f"{title(curve)} has no line along {dim}; an axis of it is empty: {dict(curve.sizes)}")
     inside, t = curves.inside_window(x, window, dim), np.log(x)
@@ -185,6 +187,7 @@ def exponent_map(y: xr.DataArray, dim: str, levels: Sequence[float] = BORDERS) -
     ('mu', 'R')
     """
     local = local_exponent(y, dim, error=True)
+    check_names(y, {*y.dims} & {"point", "level", "line"})
     if y.ndim != 2:
         raise SweepError(f"{title(y)} has {y.ndim} dimensions; a map needs two, choose with .sel")
     for name in y.dims:

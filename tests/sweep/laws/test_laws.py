@@ -378,6 +378,10 @@ def test_eight_points_are_enough_and_may_fall_or_have_gaps():
         (lambda y: sweep.fit_collapse(curves(1.5, 0.7, lambda u: u**-0.5), "x", "L"), "is a power law"),
         (lambda y: sweep.fit_collapse(y, "x", "L"), "L"),
         (lambda y: sweep.fit_collapse(curves(1.5, 0.7)[:1], "x", "L"), "two values"),
+        (lambda y: sweep.fit_collapse(curves(1.5, 0.7).assign_coords(L=list("abcde")), "x", "L"), "positive numbers"),
+        (lambda y: sweep.where_exponent(y.expand_dims(abscissa=[1.0]), "x", -0.5), "rename"),
+        (lambda y: sweep.local_exponent(y.expand_dims(exponent=[1.0]), "x", error=True), "rename"),
+        (lambda y: sweep.exponent_map(curves(1.5, 0.7).rename(L="point"), "x"), "rename"),
         (lambda y: sweep.fit_collapse(curves(1.5, 0.7).where(PLACES < 0.012), "x", "L"), "at least 10"),
     ],
 )

@@ -188,6 +188,14 @@ def test_a_line_that_is_not_positive_or_too_short_is_left_out_and_named():
     assert found.attrs["summary"].splitlines()[1].split()[1].startswith(f"{float(found.exponent[0]):.6g}"[:6])
 
 
+def test_stacked_axes_are_fitted_as_those_that_they_are_of():
+    y = curve((1.0 - 0.5 * T + 0.02 * WAVE) * np.ones((2, 3, 1)).reshape(6, 1))
+    y = y.assign_coords(set=np.arange(6)).assign_coords(a=("set", [1, 1, 1, 2, 2, 2]), b=("set", [1, 2, 3] * 2))
+    stacked = sweep.fit_exponent(y.set_index(set=["a", "b"]), "x")
+    np.testing.assert_array_equal(stacked.exponent, sweep.fit_exponent(y, "x").exponent)
+    assert stacked.attrs["summary"].split()[:2] == ["a", "b"]
+
+
 # windows
 
 
