@@ -18,7 +18,7 @@ from numpy.polynomial import chebyshev
 
 from sweep.errors import SweepError
 from sweep.laws.curves import check_options, check_output, described, log_of, positive_axis, relative_sigma, title
-from sweep.laws.fits import Found, fitted
+from sweep.laws.fits import Fit, fitted
 from sweep.laws.loglog import Array
 from sweep.laws.shapes import Law, Number, Parts
 
@@ -79,26 +79,26 @@ def fit_collapse(y: xr.DataArray, dim: str, over: str, *, sigma: Any = None, con
         )
     t, size, z, _ = points = points[:, inside]
     far = 0.3 * (1 + abs(start))
-    found = _common(points, *np.linspace(start - far, start + far, 41))
-    off, exact = found.off, 1e-6 * (1 + np.ptp(z)) if sigma is None else 0.0
-    moved = [_common(points, found.numbers[0] + by) for by in (-0.25, 0.25)]
-    if any(one.deviance < found.deviance + 12 or abs(one.off).max() < 1e-4 * exact for one in moved):
+    fit = _common(points, *np.linspace(start - far, start + far, 41))
+    off, exact = fit.off, 1e-6 * (1 + np.ptp(z)) if sigma is None else 0.0
+    moved = [_common(points, fit.numbers[0] + by) for by in (-0.25, 0.25)]
+    if any(one.deviance < fit.deviance + 12 or abs(one.off).max() < 1e-4 * exact for one in moved):
         raise SweepError(
             "the curves collapse for any exponents of x: f is a power law, so a and b are not determined apart"
         )
     # whether a level, a slope and a bow of each curve describe the points far better than the common one
     u, sizes = t - t.mean(), np.unique(size)[1:, None]
     own = np.concatenate([(size == sizes) * u**power for power in range(3)]).T
-    basis = np.linalg.qr(found.jacobian)[0]
+    basis = np.linalg.qr(fit.jacobian)[0]
     left, moves, _ = np.linalg.svd(own - basis @ (basis.T @ own), full_matrices=False)
     own = left[:, moves > 1e-6 * moves.max()][:, : max(0, off.size - basis.shape[1] - 3)]
-    ends, _, denied = found.beside(np.arange(float(off.size)), "correlated", confidence, own)
+    ends, _, denied = fit.beside(np.arange(float(off.size)), "correlated", confidence, own)
     fits = not denied or abs(off).max() <= exact
     result: dict[str, Any] = {"scatter": np.sqrt(np.mean(off**2)), "points": off.size, "dropped": y.size - off.size}
     result |= {"fits": int(fits), "verdict": "one curve" if fits else "not one curve"}
     for number, name in enumerate(("x_exponent", "y_exponent")):
         low, high = ends[:, number] if fits else (math.nan, math.nan)
-        result |= {name: found.numbers[number], f"{name}_low": low, f"{name}_high": high}
+        result |= {name: fit.numbers[number], f"{name}_low": low, f"{name}_high": high}
     attrs = {"law": f"{title(y)} = {over}^b f({dim} / {over}^a)", "y": title(y), "x": dim, "over": over}
     return described(xr.Dataset(result, attrs=attrs | {"confidence": confidence}), y[dim], y)
 
@@ -120,17 +120,17 @@ def _points(y: xr.DataArray, dim: str, over: str, sigma: Any) -> Array:
     return np.stack([t[order][place], np.log(sizes.astype(np.float64))[curve], z[curve, place], errors[curve, place]])
 
 
-def _common(points: Array, *a: float) -> Found:
+def _common(points: Array, *a: float) -> Fit:
     """The common curve, a polynomial in ln(x / L^a), for the best a between the first and last of tries."""
     t, size, z, errors = points
     degree, about = min(MOST_DEGREE, max(3, z.size // 7)), size - size.mean()
 
     def curve(q: Array, s: Array, span: float) -> Parts:
-        here = np.rint(s * span).astype(int)  # which of the points
-        u = t[here] - q[0] * size[here]
+        place = np.rint(s * span).astype(int)  # which of the points
+        u = t[place] - q[0] * size[place]
         u -= u.min(axis=1, keepdims=True)
         u /= np.maximum(u.max(axis=1, keepdims=True) / 2, 1e-300)
-        return 0.0, about[here], *np.moveaxis(chebyshev.chebvander(u - 1, degree), -1, 0)
+        return 0.0, about[place], *np.moveaxis(chebyshev.chebvander(u - 1, degree), -1, 0)
 
     law = Law("collapse", "", curve, 2 + degree, (Number(a[0], a[-1], a),))
     known = errors[None] if np.isfinite(errors).all() else None

@@ -101,12 +101,12 @@ def check_names(y: xr.DataArray, taken: Iterable[Hashable]) -> None:
 def positive_axis(y: xr.DataArray, dim: str, repeated: bool = False) -> tuple[str, Array]:
     """Dimension that `dim` runs along, and its values, fit to take logarithms of; some may be `repeated`."""
     check_output(y)
-    known = [str(name) for name, coordinate in y.coords.items() if coordinate.ndim == 1]
-    if dim not in known:
-        there = f"; {title(y)} runs along {', '.join(known) or 'no axis with values'}"
+    axes = [str(name) for name, coordinate in y.coords.items() if coordinate.ndim == 1]
+    if dim not in axes:
+        others = f"; {title(y)} runs along {', '.join(axes) or 'no axis with values'}"
         if dim in y.coords:
-            raise SweepError(f"{dim} has one value here, so nothing can be fitted along it{there}")
-        raise SweepError(f"{title(y)} has no axis {dim!r}" + (did_you_mean(dim, known) or there))
+            raise SweepError(f"{dim} has one value here, so nothing can be fitted along it{others}")
+        raise SweepError(f"{title(y)} has no axis {dim!r}" + (did_you_mean(dim, axes) or others))
     values = y.coords[dim].values
     if values.dtype.kind in "mM":
         since = f" since a moment before the first, ({dim} - MOMENT)" if values.dtype.kind == "M" else f", {dim}"
@@ -164,12 +164,12 @@ def fit_lines(
     so of all lines.
     """
     bound = options.pop("bound", None)
-    fewest, places = (FEWEST_OF_LAW, PLACES_OF_LAW) if bound is None else (FEWEST, 2)
+    fewest, fewest_places = (FEWEST_OF_LAW, PLACES_OF_LAW) if bound is None else (FEWEST, 2)
     check_options(sigma=sigma, **options)
     dimension, x = positive_axis(y, dim, repeated=True)
-    here = np.flatnonzero(inside_window(x, window, dim))
-    here = here[np.argsort(x[here], kind="stable")]
-    part, t = y.isel({dimension: here}).transpose(..., dimension).compute(), np.log(x[here])
+    places = np.flatnonzero(inside_window(x, window, dim))
+    places = places[np.argsort(x[places], kind="stable")]
+    part, t = y.isel({dimension: places}).transpose(..., dimension).compute(), np.log(x[places])
     values = part.values.astype(np.float64).reshape(math.prod(part.shape[:-1]), t.size)
     values[~np.isfinite(values)] = np.nan
     bad = np.asarray((values <= 0).any(axis=1))
@@ -185,20 +185,20 @@ def fit_lines(
     for name, one in (("bound", bound), ("sigma", None if sigma is None else relative_sigma(y, sigma))):
         if one is not None:
             rows[name] = (
-                one.isel({dimension: here}).transpose(..., dimension).values.reshape(z.shape).astype(np.float64)
+                one.isel({dimension: places}).transpose(..., dimension).values.reshape(z.shape).astype(np.float64)
             )
     present = np.isfinite(z) & np.isfinite(rows.get("sigma", 0.0))
     for pattern, which in alike(present, max(LINES, VALUES // max(1, t.size))):
-        if pattern.sum() < fewest or np.unique(t[pattern]).size < places:
+        if pattern.sum() < fewest or np.unique(t[pattern]).size < fewest_places:
             continue
         lines = {name: one[which][:, pattern] for name, one in rows.items()}
         with np.errstate(all="ignore"):  # what overflows is infinite
-            found = function(t[pattern], z[which][:, pattern], **lines, **options)
-        if isinstance(found, xr.Dataset):
-            return described(found.assign_attrs(y=title(y), x=dim), y.coords[dim], y)
-        if not isinstance(found, dict):
-            found = {name: np.array([one[name] for one in found]) for name in found[0]}
-        for name, column in found.items():
+            result = function(t[pattern], z[which][:, pattern], **lines, **options)
+        if isinstance(result, xr.Dataset):
+            return described(result.assign_attrs(y=title(y), x=dim), y.coords[dim], y)
+        if not isinstance(result, dict):
+            result = {name: np.array([one[name] for one in result]) for name in result[0]}
+        for name, column in result.items():
             empty: Any = ("", object) if column.dtype.kind == "U" else (np.nan, np.float64)
             columns.setdefault(name, np.full((len(z), *column.shape[1:]), *empty))[which] = column
     columns["points"] = present.sum(axis=1)
@@ -209,7 +209,7 @@ def fit_lines(
             where, way = f"in the window {' to '.join(ends)} of {dim}", "choose a wider one"
         raise SweepError(
             f"a fit needs at least {fewest} points, found {columns['points'].max(initial=0)} of {title(y)} {where}, "
-            f"at {np.unique(t[present.any(axis=0)]).size} places ({places} are needed); {way}"
+            f"at {np.unique(t[present.any(axis=0)]).size} places ({fewest_places} are needed); {way}"
         )
     coords: dict[Any, Any] = {name: one for name, one in part.coords.items() if dimension not in one.dims}
     check_names(y, {*coords, *part.dims[:-1]} & {*columns})
@@ -226,27 +226,27 @@ def fit_lines(
 def like(given: Any, y: xr.DataArray, what: str) -> xr.DataArray:
     """A number or DataArray as one of the shape of y. Raises SweepError where it is negative or does not fit."""
     try:
-        found: xr.DataArray = xr.zeros_like(y, dtype=np.float64) + given
+        array: xr.DataArray = xr.zeros_like(y, dtype=np.float64) + given
     except (TypeError, ValueError):
-        found = xr.DataArray(math.nan)
-    if found.dims != y.dims or found.shape != y.shape:
+        array = xr.DataArray(math.nan)
+    if array.dims != y.dims or array.shape != y.shape:
         raise SweepError(f"{what}: expected a number, or an array along axes of {title(y)}; found {kind(given)}")
-    if bool((found < 0).any()):
-        raise SweepError(f"{what}: errors are not negative; found {float(found.min()):g}")
-    return found
+    if bool((array < 0).any()):
+        raise SweepError(f"{what}: errors are not negative; found {float(array.min()):g}")
+    return array
 
 
 def relative_sigma(y: xr.DataArray, sigma: Any) -> xr.DataArray:
     """Standard errors over y; NaN where none are given. Raises SweepError where they are not above rounding."""
-    found: xr.DataArray = like(np.nan if sigma is None else sigma, y, "sigma") / abs(y)
-    beyond = found.where((found < EPSILON) | (found > MOST_SIGMA))
+    errors: xr.DataArray = like(np.nan if sigma is None else sigma, y, "sigma") / abs(y)
+    beyond = errors.where((errors < EPSILON) | (errors > MOST_SIGMA))
     if bool(beyond.notnull().any()):
         worst = float(beyond.min())
         raise SweepError(
             f"sigma: expected standard errors of {EPSILON:.2g} to {MOST_SIGMA:.2g} times {title(y)}, found {worst:.3g} "
             "times; leave sigma out where values do not scatter"
         )
-    return found
+    return errors
 
 
 def stated_bound(y: xr.DataArray, bound: Any = None) -> xr.DataArray:
@@ -259,27 +259,27 @@ def stated_bound(y: xr.DataArray, bound: Any = None) -> xr.DataArray:
         rtol = bound["rtol"] if "rtol" in bound.coords else float(bound.attrs.get("rtol", 0.0))
         wanted, stated = like(rtol, bound[title(y)], "rtol"), bound.get("error_bound", rtol)
         bound = wanted.where(~(stated > wanted), stated)  # more where a cell is INACCURATE
-    found = like(y.attrs.get("rtol", 0.0) if bound is None else bound, y, "bound")
+    error = like(y.attrs.get("rtol", 0.0) if bound is None else bound, y, "bound")
     few_digits = y.dtype.kind == "f" and y.dtype.itemsize < 8
     rounded = float(np.finfo(y.dtype).eps) / 2 if few_digits else 0.0
-    return found.where(np.isfinite(found), 1.0) + rounded  # of an error that is not known a value is worth nothing
+    return error.where(np.isfinite(error), 1.0) + rounded  # of an error that is not known a value is worth nothing
 
 
-def described(found: xr.Dataset, x: xr.DataArray, y: xr.DataArray) -> xr.Dataset:
+def described(result: xr.Dataset, x: xr.DataArray, y: xr.DataArray) -> xr.Dataset:
     """A result with its variables in the order of FIELDS, each followed by the ends of its interval where there is one,
     with units and long names; and a summary: a table of intervals and words, a row for each line."""
-    there = [name for name in FIELDS if name in found]
-    ends = {name: [f"{name}_low", f"{name}_high"] if f"{name}_low" in found else [] for name in there}
-    found = found[[one for name in ends for one in (name, *ends[name])]]
+    names = [name for name in FIELDS if name in result]
+    ends = {name: [f"{name}_low", f"{name}_high"] if f"{name}_low" in result else [] for name in names}
+    result = result[[one for name in ends for one in (name, *ends[name])]]
     for name in ends:
         unit = (x if name in IN_X else y).attrs.get("units", "1") if name in IN_X + IN_Y else "1"
         words = FIELDS[name], *(f"{end} end of the interval of {name}" for end in ("low", "high"))
         for one, text in zip((name, *ends[name]), words, strict=False):
-            found.variables[one].attrs = {"units": str(unit), "long_name": text}
+            result.variables[one].attrs = {"units": str(unit), "long_name": text}
     if any(ends.values()):
         columns = [one for name in ends if ends[name] for one in (name, *ends[name])]
-        columns += [name for name in ends if found[name].dtype.kind == "U"]
-        table = found[columns] if found[columns].sizes else found[columns].expand_dims("line")
+        columns += [name for name in ends if result[name].dtype.kind == "U"]
+        table = result[columns] if result[columns].sizes else result[columns].expand_dims("line")
         rows = table.to_dataframe()[columns].reset_index()
-        found.attrs["summary"] = rows.to_string(index=False, max_rows=20, float_format="{:.6g}".format)
-    return found
+        result.attrs["summary"] = rows.to_string(index=False, max_rows=20, float_format="{:.6g}".format)
+    return result

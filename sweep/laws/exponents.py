@@ -70,15 +70,15 @@ def local_exponent(y: xr.DataArray, dim: str, *, error: bool = False, bound: Any
     """
     dimension, x = positive_axis(y, dim)
     t, logs, name = np.log(x), log_of(y).transpose(..., dimension).compute(), "" if y.name is None else f"{y.name}_"
-    found = logs.copy(data=slopes(t, logs.values, 5)).transpose(*y.dims).rename(f"{name}exponent")
-    found.attrs = {"units": "1", "long_name": f"local exponent of {title(y)} in {dim}"}
+    exponent = logs.copy(data=slopes(t, logs.values, 5)).transpose(*y.dims).rename(f"{name}exponent")
+    exponent.attrs = {"units": "1", "long_name": f"local exponent of {title(y)} in {dim}"}
     if not error:
-        return found
+        return exponent
     check_names(y, {*y.coords, *y.dims} & {"exponent", "exponent_error"})
     bounds = curves.stated_bound(y, bound).transpose(*logs.dims).values
     errors = logs.copy(data=by_runs(t, slope_errors, logs.values, bounds)).transpose(*y.dims)
     errors.attrs = {"units": "1", "long_name": f"error of the local exponent of {title(y)} in {dim}"}
-    return xr.Dataset({"exponent": found, "exponent_error": errors})
+    return xr.Dataset({"exponent": exponent, "exponent_error": errors})
 
 
 def where_exponent(
@@ -134,11 +134,11 @@ def where_exponent(
             return np.nan, float(len(places))
         at = places[0]
         step, rise = float(abs(t[at + 1] - t[at])), float(abs(fine[1][at + 1] - fine[1][at]))
-        found = root(t, fine[1], at, value, fine[0])
+        passage = root(t, fine[1], at, value, fine[0])
         near = [i for i in brackets(coarse[1], value) if abs(i - at) <= 1]
-        apart = min((abs(found - root(t, coarse[1], i, value, coarse[0])) for i in near), default=step)
+        apart = min((abs(passage - root(t, coarse[1], i, value, coarse[0])) for i in near), default=step)
         noise = EPSILON * float(np.nanmax(abs(z))) / (1.0 if values else float(abs(np.diff(t)).min()))
-        return found, apart + noise * step / rise + EPSILON * abs(float(t[at]))
+        return passage, apart + noise * step / rise + EPSILON * abs(float(t[at]))
 
     keys: dict[str, Any] = {"input_core_dims": [[dimension]], "output_core_dims": [[], []], "keep_attrs": True}
     place, error = xr.apply_ufunc(one, curve.compute(), vectorize=True, **keys)
@@ -146,11 +146,11 @@ def where_exponent(
         count = int(error.max())
         said = f"passes {value:g} {count} times" if count else f"does not pass {value:g}"
         raise SweepError(f"{title(curve)} {said} along {dim} in the window; choose another window")
-    found = xr.Dataset({"abscissa": np.exp(place), "abscissa_error": (np.exp(place) * error).where(place.notnull())})
+    result = xr.Dataset({"abscissa": np.exp(place), "abscissa_error": (np.exp(place) * error).where(place.notnull())})
     units, what = str(y.coords[dim].attrs.get("units", "1")), title(y) if values else f"the exponent of {title(y)}"
-    found.abscissa.attrs = {"units": units, "long_name": f"where {what} is {value:g}"}
-    found.abscissa_error.attrs = {"units": units, "long_name": "estimated error of the place"}
-    return found
+    result.abscissa.attrs = {"units": units, "long_name": f"where {what} is {value:g}"}
+    result.abscissa_error.attrs = {"units": units, "long_name": "estimated error of the place"}
+    return result
 
 
 def exponent_map(y: xr.DataArray, dim: str, levels: Sequence[float] = BORDERS) -> xr.Dataset:

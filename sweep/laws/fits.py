@@ -29,7 +29,7 @@ MOST_LINES, MOST_Q, MOST_POINTS = 16, 3, 300
 points on the starts are chosen by every second point alone, from twice as many on by every third, and so on."""
 
 
-class Found(NamedTuple):
+class Fit(NamedTuple):
     """A law fitted to points; `numbers` are q and then b, `jacobian` the derivatives of the curve by them."""
 
     law: Law
@@ -67,19 +67,21 @@ class Found(NamedTuple):
         """Beside noise of the word: ends of the intervals of the numbers (2, k), infinite where the points do not
         determine them; `aicc` with the noise that suits best, where it is not known; and whether the points deny the
         law, as columns `more` (n, j) tell too much, or as `regress` says."""
-        known, ends = np.isfinite(self.errors), np.array([[-np.inf], [np.inf]]) + np.zeros(self.numbers.size)
-        if not (k := int(known.sum())):
+        determined, ends = np.isfinite(self.errors), np.array([[-np.inf], [np.inf]]) + np.zeros(self.numbers.size)
+        if not (k := int(determined.sum())):
             return ends, self.aicc, False
-        columns = self.jacobian[:, known] if more is None else np.column_stack([self.jacobian[:, known], more])
+        columns = (
+            self.jacobian[:, determined] if more is None else np.column_stack([self.jacobian[:, determined], more])
+        )
         line = regress(t, columns, self.off[None], noise, k, self.sigma)
-        found = np.clip(line.interval([*range(k)], confidence)[:, :, 0], [[-np.inf], [0.0]], [[0.0], [np.inf]])
-        ends[:, known] = np.where(np.isnan(found), ends[:, known], self.numbers[known] + found)
+        reach = np.clip(line.interval([*range(k)], confidence)[:, :, 0], [[-np.inf], [0.0]], [[0.0], [np.inf]])
+        ends[:, determined] = np.where(np.isnan(reach), ends[:, determined], self.numbers[determined] + reach)
         best = self if noise == "even" or self.sigma is not None else self._replace(deviance=line.deviance[0], more=2)
         return ends, best.aicc, bool(line.denied[0])
 
 
 def union(
-    t: Array, own: Found, others: Iterable[Found], which: list[int], noise: str, confidence: float, as_well: float
+    t: Array, own: Fit, others: Iterable[Fit], which: list[int], noise: str, confidence: float, as_well: float
 ) -> Array:
     """Ends of the intervals of some numbers of a law, and ends that hold those of each of the other laws, too, that the
     points do not rule out beside the best of all: whose AICc is not above it by more than `as_well` (2, 2, k)."""
@@ -89,7 +91,7 @@ def union(
 
 
 @np.errstate(all="ignore")  # what overflows is infinite, and no curve
-def fitted(laws: Sequence[Law], t: Array, z: Array, errors: Array | None = None) -> list[dict[str, Found]]:
+def fitted(laws: Sequence[Law], t: Array, z: Array, errors: Array | None = None) -> list[dict[str, Fit]]:
     """For each line of z (m, n) the laws, by name, that are nearest to it, t rising; not those that have not two more
     points than numbers, at more places than numbers. `errors` (m, n) are standard errors, where they are known.
 
@@ -98,20 +100,20 @@ def fitted(laws: Sequence[Law], t: Array, z: Array, errors: Array | None = None)
     """
     places, most = np.unique(t).size, MOST_LINES if errors is None else 1
     laws = [law for law in laws if t.size >= law.numbers + 2 and places > law.numbers]
-    found: list[dict[str, Found]] = [{} for _ in z]
+    fits: list[dict[str, Fit]] = [{} for _ in z]
     for first in range(0, len(z) if laws else 0, most):
         search = _Search(laws, t, z[first : first + most], None if errors is None else errors[first])
-        for k, one in enumerate(search.found()):
-            found[first + k % search.lines][one.law.name] = one
+        for k, one in enumerate(search.fits()):
+            fits[first + k % search.lines][one.law.name] = one
     if ONE in laws and errors is None:
         columns = np.stack([np.ones_like(t), t - t.mean()], axis=1)
         for pattern, rows in alike(inliers(t, columns, z)):
             share, line = pattern.mean(), regress(t[pattern], columns[pattern], z[rows][:, pattern])
             for row, deviance in zip(rows, line.deviance / share + t.size * math.log(share), strict=True):
-                one = found[row][ONE.name]
+                one = fits[row][ONE.name]
                 other = one._replace(deviance=float(deviance), more=2 + int((~pattern).sum()))
-                found[row][ONE.name] = min(one, other, key=lambda fit: fit.aicc)
-    return found
+                fits[row][ONE.name] = min(one, other, key=lambda fit: fit.aicc)
+    return fits
 
 
 class _Search:
@@ -186,7 +188,7 @@ class _Search:
         above = after.reshape(-1, self.lines) - after.reshape(-1, self.lines).min(axis=0)
         return np.asarray(rows[(before - after >= ENOUGH**2 + ENOUGH * above.reshape(-1))[rows]])
 
-    def found(self) -> list[Found]:
+    def fits(self) -> list[Fit]:
         """Each law of each line, at the end of all steps."""
         moving = np.flatnonzero(self.high[:, 0] > self.low[:, 0])
         for _ in range(STEPS):
@@ -211,7 +213,7 @@ class _Search:
             size = 1.0 if self.errors is not None else math.sqrt(self.square[row] / (self.t.size - law.numbers))
             of_points = jacobian[row][:, which] / self.root[:, None], off[row] / self.root, self.errors
             of_law = size * doubt[row, which], deviance[row], int(self.errors is None)
-            every.append(Found(law, numbers[row, which], *of_points, *of_law))
+            every.append(Fit(law, numbers[row, which], *of_points, *of_law))
         return every
 
 
@@ -249,6 +251,6 @@ def _columns(every: Array) -> tuple[Array, Array, Array]:
     every[:, none], every[0, none] = 0.0, np.nan
     basis, back = np.linalg.qr(np.moveaxis(every[1:], 0, -1))
     size = abs(np.diagonal(back, axis1=-2, axis2=-1))
-    told = size > 1e-13 * size.max(axis=-1, keepdims=True)
-    back = np.where(told[..., :, None] & told[..., None, :], back, np.eye(len(every) - 1))
-    return every, np.where(told[..., None, :], basis, 0.0), back
+    independent = size > 1e-13 * size.max(axis=-1, keepdims=True)
+    back = np.where(independent[..., :, None] & independent[..., None, :], back, np.eye(len(every) - 1))
+    return every, np.where(independent[..., None, :], basis, 0.0), back

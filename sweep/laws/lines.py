@@ -243,24 +243,24 @@ def _corrected(
     every, sign, span = [], -1.0 if low else 1.0, float(t[-1] - t[0])
     word = noise if isinstance(noise, str) else "noise"
     bows = np.polynomial.chebyshev.chebvander(2 * (t - t[0]) / span - 1, 4)[:, 2:]
-    known = word == "even" or sigma is not None
+    independent = word == "even" or sigma is not None
     for row, tried in zip(z, fitted((ONE, FADING, LOG_CORRECTION), t, z, sigma), strict=True):
-        found, one, fits, ends = tried[FADING.name], tried[ONE.name], True, [math.nan, math.nan]
-        strength, fade, _, exponent = found.numbers.tolist()
+        fit, one, fits, ends = tried[FADING.name], tried[ONE.name], True, [math.nan, math.nan]
+        strength, fade, _, exponent = fit.numbers.tolist()
         exponent, fade, left = exponent / span, fade / span, math.expm1(strength) * math.exp(-fade)
-        if abs(left) >= 1 and one.aicc <= found.aicc + BEYOND_DOUBT:  # a correction that is none
+        if abs(left) >= 1 and one.aicc <= fit.aicc + BEYOND_DOUBT:  # a correction that is none
             exponent, fade, left = float(one.numbers[1] / span), math.nan, 0.0
-        if noisy := sigma is not None or bool(scatters(t, row[None], found.off[None], 4, noise)[0]):
-            about, _, denied = found.beside(t, word, confidence, None if known else bows)
+        if noisy := sigma is not None or bool(scatters(t, row[None], fit.off[None], 4, noise)[0]):
+            about, _, denied = fit.beside(t, word, confidence, None if independent else bows)
             if fits := not denied:
                 steps, least, most = FADES
-                best = float(np.clip(abs(found.numbers[1]), least, most))
+                best = float(np.clip(abs(fit.numbers[1]), least, most))
                 far = np.clip(np.nan_to_num(0.5 * np.ptp(about[:, 1]), posinf=most) / best, 0.02, 0.6)
                 fades = np.clip(best * steps**far, least, most).tolist()
                 laws = [FADING._replace(name=str(d), q=(FADING.q[0], Number(d, d, (d,)))) for d in fades]
-                errors = None if found.sigma is None else found.sigma[None]
+                errors = None if fit.sigma is None else fit.sigma[None]
                 own, *others = fitted(laws, t, row[None], errors)[0].values()
-                others += [law for law in (one, tried[LOG_CORRECTION.name]) if law.aicc < found.aicc + HARDER]
+                others += [law for law in (one, tried[LOG_CORRECTION.name]) if law.aicc < fit.aicc + HARDER]
                 ends = [*union(t, own, others, [-1], word, confidence, AS_WELL)[1][:, 0] / span, exponent]
         else:
             # three times as far as the outer half of the points, and six at least, moves the exponent
@@ -272,5 +272,5 @@ def _corrected(
         verdict = VERDICTS[1 if not fits else 0 if abs(left) < 1 else 2]
         of = {"exponent": sign * exponent, "correction_exponent": sign * fade, "correction": left, "verdict": verdict}
         of |= {"exponent_low": min(sign * end for end in ends), "exponent_high": max(sign * end for end in ends)}
-        every.append(of | {"residual": found.residual, "noisy": noisy, "fits": verdict == VERDICTS[0]})
+        every.append(of | {"residual": fit.residual, "noisy": noisy, "fits": verdict == VERDICTS[0]})
     return every

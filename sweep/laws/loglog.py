@@ -37,12 +37,12 @@ def slope_bounds(t: Array, bound: Array, points: int) -> Array:
 def by_runs(t: Array, function: Callable[..., Array], *lines: Array) -> Array:
     """`function` of each unbroken run of at least three neighbours; lines (..., n) with the same gaps at once."""
     rows = [np.broadcast_to(one, lines[0].shape).reshape(-1, t.size) for one in lines]
-    found = np.full(rows[0].shape, np.nan)
+    result = np.full(rows[0].shape, np.nan)
     for pattern, which in alike(np.isfinite(rows[0])):
         for start, stop in runs(pattern):
             if stop - start >= FEWEST:
-                found[which, start:stop] = function(t[start:stop], *(one[which, start:stop] for one in rows))
-    return found.reshape(lines[0].shape)
+                result[which, start:stop] = function(t[start:stop], *(one[which, start:stop] for one in rows))
+    return result.reshape(lines[0].shape)
 
 
 def alike(present: NDArray[np.bool_], most: int = LINES) -> list[tuple[NDArray[np.bool_], NDArray[np.intp]]]:
@@ -101,8 +101,8 @@ def slope_errors(t: Array, z: Array, bound: Array) -> Array:
     few, rises = t.size < 20, maximum_filter1d(apart_by_noise, 5, mode="nearest") > 4.0 * least
     by_bend = np.maximum(apart, np.where(sharp, np.maximum(*both), coarse if few else 0.0))
     error = np.maximum(noise * size, np.where(few | rises, maximum_filter1d(by_bend, 5, mode="nearest"), 0.0))
-    found: Array = 2.3 * error + rounding  # 1.96 and what the median, of few points, is too small
-    return np.where(_beside_pole(steps) & rises, np.inf, found) + slope_bounds(t, bound, 5)
+    bar: Array = 2.3 * error + rounding  # 1.96 and what the median, of few points, is too small
+    return np.where(_beside_pole(steps) & rises, np.inf, bar) + slope_bounds(t, bound, 5)
 
 
 def _beside_pole(steps: Array) -> NDArray[np.bool_]:
@@ -110,14 +110,14 @@ def _beside_pole(steps: Array) -> NDArray[np.bool_]:
 
     Nothing at the points says how near the pole is.
     """
-    found = np.zeros((*steps.shape[:-1], steps.shape[-1] + 1), dtype=bool)
+    beside = np.zeros((*steps.shape[:-1], steps.shape[-1] + 1), dtype=bool)
     for between in range(min(2, max(0, steps.shape[-1] - 5))):  # steps over the pole
         window = sliding_window_view(steps, 6 + between, axis=-1)
         towards = np.stack([window[..., :3], -window[..., :-4:-1]]) * np.sign(window[..., 2])[..., None]
         pole = ((np.diff(towards, axis=-1) > 0).all(axis=-1) & (towards[..., 0] > 0)).all(axis=0)
         for k in range(3, 4 + between):
-            found[..., k : k + pole.shape[-1]] |= pole
-    return found
+            beside[..., k : k + pole.shape[-1]] |= pole
+    return beside
 
 
 def _matrix(t: Array, points: int) -> Any:
@@ -148,14 +148,14 @@ def tends(t: Array, local: Array, doubts: Any) -> list[tuple[float, float]]:
     way for a bend that fades as 1/ln^2; where it does not slow down towards the end, ten times the last change stands
     for an unknown limit. What is within the doubt of that end is no change.
     """
-    step, found = min(np.log(10), (t[-1] - t[0]) / 8), []
+    step, limits = min(np.log(10), (t[-1] - t[0]) / 8), []
     for end, inwards, doubt in zip(t[[0, -1]], (step, -step), doubts, strict=True):
         first, second, third = np.interp(end + inwards * np.arange(3), t, local).tolist()
         last, before = first - second, second - third
         slows = last * before > 0 and abs(last) < (1 - 1e-6) * abs(before)  # by more than rounding
         left = last * last / (before - last) if slows else 10 * last
-        found.append((first, first + 3 * left if abs(last) > doubt else first))
-    return found
+        limits.append((first, first + 3 * left if abs(last) > doubt else first))
+    return limits
 
 
 def brackets(c: Array, value: float) -> list[int]:
@@ -164,8 +164,8 @@ def brackets(c: Array, value: float) -> list[int]:
     alone = np.concatenate([[True], ~present, [True]])  # whether the point before is missing; shifted by 2: after
     starts, ends = alone[:-2][:-1] & on[:-1] & (c > value)[1:], alone[2:][1:] & on[1:] & (c > value)[:-1]
     passes = (above[:-1] != above[1:]) | starts | ends
-    found: list[int] = np.flatnonzero(present[:-1] & present[1:] & passes).tolist()
-    return found
+    result: list[int] = np.flatnonzero(present[:-1] & present[1:] & passes).tolist()
+    return result
 
 
 def root(t: Array, c: Array, bracket: int, value: float, points: int) -> float:

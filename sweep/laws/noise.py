@@ -194,9 +194,9 @@ def inliers(t: Array, columns: Array, z: Array) -> NDArray[np.bool_]:
         changed = np.zeros(len(z), dtype=bool)
         for pattern, which in alike(inside[todo]):
             rows = todo[which]
-            found = regress(t[pattern], columns[pattern], z[rows][:, pattern])
-            off = abs(z[rows] - found.mean()[0] @ columns.T)
-            off /= np.stack([np.interp(t, t[pattern], size) for size in found.size])
+            line = regress(t[pattern], columns[pattern], z[rows][:, pattern])
+            off = abs(z[rows] - line.mean()[0] @ columns.T)
+            off /= np.stack([np.interp(t, t[pattern], size) for size in line.size])
             size = np.quantile(off[:, pattern], 0.8, axis=1, keepdims=True) / 1.2816  # a fifth may be anything
             near = off <= 3.5 * size
             other = (near != inside[rows]).any(axis=1) & (near.sum(axis=1) >= max(4, 0.7 * t.size))
@@ -239,10 +239,10 @@ def scatters(t: Array, z: Array, off: Array, numbers: int, noise: Noise) -> NDAr
     """Whether the distances of lines z (m, n) from a law of so many numbers are noise: above rounding; and as is said,
     else as neighbours say less of each other than they do of a smooth curve. About few points of such a curve a law of
     many numbers swings as noise does."""
-    found = np.sqrt(np.mean(off**2, axis=1)) > 8 * rounding(t, z)
+    scattered = np.sqrt(np.mean(off**2, axis=1)) > 8 * rounding(t, z)
     if noise is not None:
-        return np.asarray(found & bool(noise))
-    return np.asarray(found & (roughness(t, off)[1] > SMOOTH + (5 * (numbers - 2) ** 2 / (3 * t.size)) ** 4))
+        return np.asarray(scattered & bool(noise))
+    return np.asarray(scattered & (roughness(t, off)[1] > SMOOTH + (5 * (numbers - 2) ** 2 / (3 * t.size)) ** 4))
 
 
 def rounding(t: Array, z: Array) -> Array:

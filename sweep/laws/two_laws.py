@@ -18,7 +18,7 @@ from scipy.special import gammaincc
 
 from sweep.errors import SweepError
 from sweep.laws.curves import Window, check_names, check_output, described, fit_lines, title
-from sweep.laws.fits import Found, fitted, union
+from sweep.laws.fits import Fit, fitted, union
 from sweep.laws.lines import fit_exponent, fit_line
 from sweep.laws.loglog import Array, once, slopes, tends
 from sweep.laws.noise import BEYOND_DOUBT, Noise, roughness, rounding, scatters
@@ -135,11 +135,11 @@ def _each(t: Array, z: Array, sigma: Array | None = None, *, confidence: float, 
                 best[2], low[2], high[2], width, level = math.nan, -np.inf, np.inf, math.nan, math.nan
         if verdict == "no meeting in the window":
             best[2] = math.nan
-        found = {"verdict": verdict, "regimes": VERDICTS.get(verdict, 0), "evidence": evidence, "width": width}
-        found |= {"residual": two.residual, "noisy": noisy, "level": level}
+        numbers = {"verdict": verdict, "regimes": VERDICTS.get(verdict, 0), "evidence": evidence, "width": width}
+        numbers |= {"residual": two.residual, "noisy": noisy, "level": level}
         for name, of in (("", best), ("_low", low), ("_high", high)):
-            found |= {f"exponent{name}": of[:2], f"crossover{name}": np.exp(of[2])}
-        every.append(found)
+            numbers |= {f"exponent{name}": of[:2], f"crossover{name}": np.exp(of[2])}
+        every.append(numbers)
     return every
 
 
@@ -160,20 +160,20 @@ def _widened(t: Array, z: Array, best: Array, low: Array, high: Array) -> tuple[
     return np.minimum(low, reach[0]), np.maximum(high, reach[1])
 
 
-def _above(tried: Iterable[Found]) -> Array:
+def _above(tried: Iterable[Fit]) -> Array:
     """AICc and BIC of laws above the least (laws, 2). A law is ruled out if both are beyond BEYOND_DOUBT."""
     criteria = np.array([law.criteria for law in tried])
     return np.asarray(criteria - criteria.min(axis=0))
 
 
-def _verdict(t: Array, tried: dict[str, Found]) -> tuple[str, float]:
+def _verdict(t: Array, tried: dict[str, Fit]) -> tuple[str, float]:
     """What the points say of the law, and by how much two are better than one and than functions.
 
     The noise of the line may be of any kind, that of all others is even.
     """
-    few = [found for found in tried.values() if found.law is not THREE]
-    three, one, nearest = tried.get(THREE.name), tried[ONE.name], min(few, key=lambda found: found.aicc)
-    above, two = _above(few), np.array([found.law in BENDS for found in few])
+    few = [fit for fit in tried.values() if fit.law is not THREE]
+    three, one, nearest = tried.get(THREE.name), tried[ONE.name], min(few, key=lambda fit: fit.aicc)
+    above, two = _above(few), np.array([fit.law in BENDS for fit in few])
     evidence = float((above[~two].min(axis=0) - above[two].min(axis=0)).min())
     # three, if BIC, which of many points asks for more, prefers them to one; and if with a bend more even beside what
     # noise of any kind leaves of fewer
@@ -182,7 +182,7 @@ def _verdict(t: Array, tried: dict[str, Found]) -> tuple[str, float]:
         return "three laws", evidence
     if evidence > BEYOND_DOUBT:
         return "two laws" if 0 <= tried[TWO.name].numbers[0] <= 1 else "no meeting in the window", evidence
-    alive, function = above <= BEYOND_DOUBT, np.array([not found.law.power for found in few])
+    alive, function = above <= BEYOND_DOUBT, np.array([not fit.law.power for fit in few])
     if alive[few.index(one)].any():
         return "one law", evidence
     bent = alive[two].any() or 0 < ahead <= OTHER_SHAPES
