@@ -104,7 +104,6 @@ def laws(
     noise: bool | str | None = None,
 ) -> Laws:
     """What `sweep fit` finds; `y` and `noise` as of `output_of` and `fit_exponent`. Raises SweepError."""
-    from sweep.laws.curves import FEWEST_OF_LAW
     from sweep.laws.lines import fit_exponent
     from sweep.laws.two_laws import crossover, fit_two_laws
 
@@ -116,8 +115,8 @@ def laws(
     fits = tuple(fit_exponent(column, x, window, bound=dataset, **keys) for window in limits)  # type: ignore[arg-type]
     if len(fits) == 2:
         meeting = crossover(*fits).drop_dims("law")
-    elif column.sizes[str(column[x].dims[0])] >= FEWEST_OF_LAW:
-        with contextlib.suppress(SweepError):  # the window leaves too few points
+    else:
+        with contextlib.suppress(SweepError):  # of too few points
             found = fit_two_laws(column, x, limits[0], **keys)  # type: ignore[arg-type]
             bend = found if bool((found.regimes == 2).any()) else None
     remarks, parts = [str(dataset.attrs.get("lines", ""))], []
