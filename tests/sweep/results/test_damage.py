@@ -237,6 +237,15 @@ def test_an_unfinished_result_by_either_name_is_not_called_damaged_and_what_is_m
         assert f"{len(kept(tmp_path / 'out.h5'))} of 5 blocks" in found.checked
 
 
+def test_damaged_blocks_of_an_unfinished_result_are_named(tmp_path):
+    output = tmp_path / "out.h5"
+    interrupted(study(), output)
+    harm(unfinished_of(output), "fall_time", 6)
+    found = sweep.verify(output)
+    assert found.findings[0] == "fall_time: damaged between its cells 4 and 8"
+    assert found.blocks == (1,)
+
+
 def test_an_unfinished_result_that_is_damaged_beside_its_numbers_is_not_continued(tmp_path):
     output = tmp_path / "out.h5"
     interrupted(study(), output)
