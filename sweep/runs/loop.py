@@ -230,7 +230,8 @@ class Loop:
         cells = partition or cut(study, self._crew, self.sample, task.block_cells, least)
         self.bench = Bench(study, cells, self.processes)
         self._weights = self.sample.weights(self.bench.partition, self.bench.rows.first)
-        self._cells = [stop - start for start, stop in map(self.bench.cells, range(self.bench.partition.count))]
+        ends = self.bench.rows.first(cells.first(np.arange(cells.count + 1)))
+        self._cells = np.diff(ends).tolist()
 
     def _sample(self) -> Sample:
         """The sample, taken in a thread, so that Ctrl-C and the time to stop are seen while a kernel is compiled.
