@@ -159,9 +159,9 @@ def fit_lines(
 
     `function` of ln x (n,), rising, of ln y of m lines without gaps (m, n), of their `sigma`, relative standard errors,
     and `bound` likewise, if given, and of the options gives numbers and words (m,) by name, or those of each line; of
-    two laws (m, 2); or, of one line alone, what becomes the result. With `bound` two places are enough. Of lines that
-    are not positive, or have too few points, the numbers are NaN and the words say so; raises SweepError where that is
-    so of all lines.
+    two laws (m, 2); or, of one line alone, what becomes the result. With `bound`, for a straight line, three points at
+    two places are enough. Of lines that are not positive, or have too few points, the numbers are NaN and the words
+    say so; raises SweepError where that is so of all lines.
     """
     bound = options.pop("bound", None)
     fewest, fewest_places = (FEWEST_OF_LAW, PLACES_OF_LAW) if bound is None else (FEWEST, 2)
@@ -184,9 +184,7 @@ def fit_lines(
     columns, rows = dict[str, Any](), dict[str, Array]()
     for name, one in (("bound", bound), ("sigma", None if sigma is None else relative_sigma(y, sigma))):
         if one is not None:
-            rows[name] = (
-                one.isel({dimension: places}).transpose(..., dimension).values.reshape(z.shape).astype(np.float64)
-            )
+            rows[name] = one.isel({dimension: places}).transpose(..., dimension).values.reshape(z.shape).astype(float)
     present = np.isfinite(z) & np.isfinite(rows.get("sigma", 0.0))
     for pattern, which in alike(present, max(LINES, VALUES // max(1, t.size))):
         if pattern.sum() < fewest or np.unique(t[pattern]).size < fewest_places:

@@ -123,7 +123,7 @@ def where_exponent(
     check_names(y, {*y.coords, *y.dims} & {"abscissa", "abscissa_error"})
     if not curve.size:
         raise SweepError(f"{title(curve)} has no line along {dim}; an axis of it is empty: {dict(curve.sizes)}")
-    inside, t = curves.inside_window(x, window, dim), np.log(x)
+    inside, t, value = curves.inside_window(x, window, dim), np.log(x), float(value)
     orders = ((6, 0), (4, 0)) if values else ((6, 7), (4, 5))  # points of the interpolation and of the slopes
 
     def one(z: Array) -> tuple[float, float]:

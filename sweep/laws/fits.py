@@ -70,9 +70,7 @@ class Fit(NamedTuple):
         determined, ends = np.isfinite(self.errors), np.array([[-np.inf], [np.inf]]) + np.zeros(self.numbers.size)
         if not (k := int(determined.sum())):
             return ends, self.aicc, False
-        columns = (
-            self.jacobian[:, determined] if more is None else np.column_stack([self.jacobian[:, determined], more])
-        )
+        columns = np.column_stack([part for part in (self.jacobian[:, determined], more) if part is not None])
         line = regress(t, columns, self.off[None], noise, k, self.sigma)
         reach = np.clip(line.interval([*range(k)], confidence)[:, :, 0], [[-np.inf], [0.0]], [[0.0], [np.inf]])
         ends[:, determined] = np.where(np.isnan(reach), ends[:, determined], self.numbers[determined] + reach)

@@ -216,4 +216,5 @@ def test_each_line_has_its_own_place_and_those_without_one_are_nan():
     found = sweep.where_exponent(c, "mu", 0.5, values=True)
     np.testing.assert_allclose(found.abscissa, [0.5, 0.25, np.nan, np.nan], rtol=1e-8)
     assert np.isnan(found.abscissa_error).values.tolist() == [False, False, True, True]
+    xr.testing.assert_identical(found, sweep.where_exponent(c, "mu", xr.DataArray(0.5), values=True))
     assert float(passing(x, x, float(x[7])).abscissa) == pytest.approx(x[7], rel=1e-14, abs=0.0)
