@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -44,6 +45,8 @@ class Difference:
         Cells that one of them alone has.
     missing : tuple of str
         Outputs that one of them alone has.
+    fixed : dict of str to (a, b)
+        Parameters with one value for all cells, which is another in each result.
     outputs : dict of str to Distance
         Of every output that both have.
     statuses : dict of (str, str) to int
@@ -61,6 +64,9 @@ class Difference:
         self.missing, self.rtol = tuple(sorted(names[0] ^ names[1])), rtol
         self.outputs = {str(name): Distance() for name in a.data_vars if str(name) in names[0] & names[1]}
         self.statuses, self.examples = dict[tuple[str, str], int](), dict[tuple[str, str], str]()
+        single = [str(name) for name, c in a.coords.items() if not c.dims and name in b.coords]
+        apart = [name for name in single if not a[name].variable.equals(b[name].variable)]
+        self.fixed = {name: (_single(a[name]), _single(b[name])) for name in apart}
         words, compared = [flag_words(d[STATUS]) for d in (first, second)], [*self.outputs, STATUS]
         for x, y in zip(*(pieces(d[compared], cells) for d in (first, second)), strict=True):
             for name, distance in self.outputs.items():
@@ -87,7 +93,7 @@ class Difference:
     def same(self) -> bool:
         """Whether nothing differs by more than the tolerance."""
         apart = any(distance.cells for distance in self.outputs.values())
-        return not (self.only_a or self.only_b or self.missing or self.statuses or apart)
+        return not (self.only_a or self.only_b or self.missing or self.fixed or self.statuses or apart)
 
     def __repr__(self) -> str:
         lines = [
@@ -95,6 +101,7 @@ class Difference:
         ]
         if self.missing:
             lines.append(f"outputs of one alone: {listed(self.missing, word='and')}")
+        lines += [f"fixed: {name} is {x} in the first and {y} in the second" for name, (x, y) in self.fixed.items()]
         rows = [
             (name, f"{found.cells:,} cells differ", f"by up to {found.largest:.2g}", found.example)
             for name, found in self.outputs.items()
@@ -153,6 +160,11 @@ def diff(a: xr.Dataset, b: xr.Dataset, rtol: float = 0.0) -> Difference:
         if a.sizes[dim] != b.sizes[dim] or not all(name in b.coords and a[name].equals(b[name]) for name in along):
             raise SweepError(f"the points along {dim} are not the same in both; compare results of one design")
     return Difference(a, b, rtol)
+
+
+def _single(parameter: xr.DataArray) -> Any:
+    """A number or word that all cells share."""
+    return flag_words(parameter).get(parameter.item(), parameter.item())
 
 
 def _example(piece: xr.Dataset, place: int) -> str:

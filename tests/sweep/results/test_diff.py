@@ -63,6 +63,14 @@ def test_statuses_are_compared(result):
     assert not found.same
 
 
+def test_another_fixed_parameter_is_a_difference_though_no_cell_differs(result):
+    other = result.assign_coords(g=result.g + 1.0)
+    found = sweep.diff(result, other)
+    assert list(found.fixed) == ["g"]
+    assert not found.same
+    assert f"fixed: g is {result.g.item()} in the first and {other.g.item()} in the second" in str(found)
+
+
 def test_cells_of_equal_parameters_are_compared(result):
     more = sweep.run(build(axes={"height": [0.5, 1.0, 2.0, 4.0], "v0": [1.0, 3.0]}))
     found = sweep.diff(result.drop_vars("drop"), more)
