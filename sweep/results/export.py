@@ -6,7 +6,7 @@ import contextlib
 import csv
 import math
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -98,8 +98,14 @@ def _write_csv(dataset: xr.Dataset, path: Path) -> None:
         writer = csv.writer(file, lineterminator="\n")  # faster than that of pandas
         writer.writerow(map(cell, (*dataset.coords, *dataset.data_vars)))
         for table in _tables(dataset):
-            columns = [c.tolist() if c.dtype.kind in "fiu" else map(cell, c) for _, c in table.items()]
-            writer.writerows(zip(*columns, strict=True))
+            writer.writerows(zip(*(_texts(column) for _, column in table.items()), strict=True))
+
+
+def _texts(column: Any) -> Iterable[Any]:
+    """A column of a table, for csv."""
+    if column.dtype == "float32":  # as a float it would have the digits of another number
+        return map(str, column.to_numpy())
+    return column.tolist() if column.dtype.kind in "fiu" else map(cell, column)
 
 
 def _write_parquet(dataset: xr.Dataset, path: Path) -> None:

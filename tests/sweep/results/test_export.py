@@ -42,6 +42,11 @@ def test_csv_columns_do_not_depend_on_the_order_of_an_outputs_dimensions(tmp_pat
     assert plain.read_text() == other.read_text()
 
 
+def test_csv_has_the_digits_of_single_precision_where_a_number_has_no_more(tmp_path):
+    heading, rows = read(sweep.export(result().assign(error_bound=np.float32(0.1)), tmp_path / "out.csv"))
+    assert {row[heading.index("error_bound")] for row in rows} == {"0.1"}
+
+
 def test_netcdf_keeps_full_precision_however_the_source_was_packed(tmp_path):
     ds = result()
     ds.fall_time.encoding = {"dtype": "float32", "scale_factor": 2.0}
