@@ -66,6 +66,8 @@ class Account:
 
 def account(dataset: Cells) -> Account:
     """What became of the cells of a result, of a summary too. Reads a few million of them at a time."""
+    if not is_summary(dataset):
+        statuses_of(dataset)
     found = _counts(dataset, BY_STATUS, STATUS, STATUS_NAMES)
     shown = () if is_summary(dataset) else (name for name in found if name != Status.OK.name)
     examples = {name: cell_values(dataset, found[name][1]) for name in shown}
@@ -82,10 +84,14 @@ def is_summary(dataset: Cells) -> bool:
     return BY_STATUS in dataset and STATUS not in dataset
 
 
-def statuses_of(dataset: xr.Dataset) -> xr.DataArray:
-    """What became of each cell. Raises SweepError where the result is a summary."""
-    if STATUS not in dataset:
+def statuses_of(dataset: Cells) -> Any:
+    """What became of each cell. Raises SweepError where the result is a summary, or the Dataset no result."""
+    if is_summary(dataset):
         raise SweepError("this is a summary, which keeps no cells; run its study without [summary]")
+    if STATUS not in dataset:
+        raise SweepError(
+            "this Dataset has no status of cells, so it is no result; sweep.run and sweep.open_result give one"
+        )
     return dataset[STATUS]
 
 

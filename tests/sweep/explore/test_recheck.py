@@ -31,6 +31,7 @@ def test_an_honest_result_is_judged_by_other_methods_and_has_nothing_beyond(cloc
     found = clocks.sweep.check()
     assert (found.cells, found.sample, found.judged, found.by_another) == (24, 24, 24, 24)
     assert (found.beyond, found.limit) == (0, 0.0)
+    assert " at :" not in str(clocks.isel(mu=3, R=1).sweep.check())
     some = clocks.sweep.check(sample=10)
     assert (some.judged, some.beyond) == (10, 0)
     assert some.limit == pytest.approx(1 - 0.05**0.1)  # the share of which none is drawn in ten with 5 %
@@ -147,7 +148,11 @@ def test_deviations_of_a_small_motion_are_those_of_the_same_motion_in_larger_uni
 
 
 def test_a_dataset_without_statuses_says_what_can_be_done_with_it():
-    assert "in_units" in repr(xr.Dataset({"y": ("x", [1.0])}).sweep)
+    plain = xr.Dataset({"y": ("x", [1.0])})
+    assert "in_units" in repr(plain.sweep)
+    for use in (plain.sweep.statuses, lambda: sweep.where(plain, "y > 0"), lambda: sweep.diff(plain, plain)):
+        with pytest.raises(sweep.SweepError, match="no status of cells, so it is no result"):
+            use()
     summary = sweep.run(build(axes={"height": [1.0, 2.0]}, summary={}))
     assert re.search(r"^  2 +OK ", repr(summary.sweep), re.MULTILINE)
 
