@@ -29,7 +29,12 @@ not, whose exponent is far harder to tell."""
 FADES = np.exp([0, -6, -5, -4, -3, -2, -1, 1, 2, 3, 4, 5, 6]), 0.3, 80.0
 """How fast a correction may fade, per window: those tried about the best, to the power of its relative error, and the
 least and largest."""
-VERDICTS = ("a power law with a correction", "no power law with a correction", "no law at this end")
+VERDICTS = (
+    "a power law with a correction",
+    "no power law with a correction",
+    "no law at this end",
+    "one power law",
+)
 
 
 def fit_exponent(
@@ -213,7 +218,8 @@ def fit_correction(
     -------
     Dataset
         `exponent` with its interval; `verdict`, words; `correction_exponent` (D), `correction`, B x^-D at the outer
-        end, and more. The dimensions are those of `y` but `dim`. NaN of fewer than eight points.
+        end, and more. Of one power law without a correction D is NaN, and that is 0. The dimensions are those of `y`
+        but `dim`. NaN of fewer than eight points.
 
     Raises
     ------
@@ -269,8 +275,8 @@ def _corrected(
             half = fitted((FADING,), s[outer], line[None, outer])[0][FADING.name].numbers[-1] / np.ptp(s[outer])
             reach = 3 * abs(float(half) - exponent) + float(slope_bounds(s, rounded, 5)[-1])
             ends = [exponent - reach, exponent + reach]
-        verdict = VERDICTS[1 if not fits else 0 if abs(left) < 1 else 2]
+        verdict = VERDICTS[1 if not fits else 2 if abs(left) >= 1 else 3 if math.isnan(fade) else 0]
         of = {"exponent": sign * exponent, "correction_exponent": sign * fade, "correction": left, "verdict": verdict}
         of |= {"exponent_low": min(sign * end for end in ends), "exponent_high": max(sign * end for end in ends)}
-        every.append(of | {"residual": fit.residual, "noisy": noisy, "fits": verdict == VERDICTS[0]})
+        every.append(of | {"residual": fit.residual, "noisy": noisy, "fits": fits and abs(left) < 1})
     return every

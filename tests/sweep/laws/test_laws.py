@@ -255,6 +255,7 @@ def test_one_law_is_one_law_with_a_correction_of_zero(power):
         y = line(1.1 + power * T + noise * np.random.default_rng(5).standard_normal(X.size))
         found = sweep.fit_correction(y, "x")
         assert (int(found.fits), float(found.exponent)) == (1, pytest.approx(power, abs=0.1 * noise + 1e-4))
+        assert (found.verdict.item() == "one power law") == (found.correction.item() == 0)
         assert float(found.exponent_low) <= power <= float(found.exponent_high)
         compared = sweep.compare_laws(y, "x")
         assert compared.chosen == "one law"
