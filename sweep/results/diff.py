@@ -64,9 +64,10 @@ class Difference:
         self.missing, self.rtol = tuple(sorted(names[0] ^ names[1])), rtol
         self.outputs = {str(name): Distance() for name in a.data_vars if str(name) in names[0] & names[1]}
         self.statuses, self.examples = dict[tuple[str, str], int](), dict[tuple[str, str], str]()
-        single = [str(name) for name, c in a.coords.items() if not c.dims and name in b.coords]
-        apart = [name for name in single if not a[name].variable.equals(b[name].variable)]
-        self.fixed = {name: (_single(a[name]), _single(b[name])) for name in apart}
+        single = {
+            str(name): (_single(c), _single(b[name])) for name, c in a.coords.items() if name in b.coords and not c.dims
+        }
+        self.fixed = {name: (x, y) for name, (x, y) in single.items() if repr(x) != repr(y)}
         words, compared = [flag_words(d[STATUS]) for d in (first, second)], [*self.outputs, STATUS]
         for x, y in zip(*(pieces(d[compared], cells) for d in (first, second)), strict=True):
             for name, distance in self.outputs.items():
