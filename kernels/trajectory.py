@@ -1,7 +1,7 @@
 """A scene of one's own along its way: its states at each switch, or at given times.
 
-A section is the states just before each switch that is asked for, in one run: a diagram of bifurcations is one study.
-A motion is the states at given times after the start. Each is right to rtol of the largest size that the state had on
+A section is the states just before each switch that is asked for: a diagram of bifurcations is one study. A motion is
+the states at given times after the start. Either is one run with stops. Each is right to rtol of the largest size that the state had on
 the way, and each time to rtol of itself; the worst one counts for the cell.
 """
 
@@ -11,10 +11,10 @@ from typing import Any, Unpack
 
 import numpy as np
 
-from kernels.codegen.return_map import at_times
+from kernels.codegen.return_map import clocked
 from kernels.codegen.to_tolerance import solver
 from kernels.interface import FIRST_REFUSAL, UNSOLVED, Field, Kernel, Status
-from kernels.scene import SceneParts, estimating_kernel, scene_of, states_of
+from kernels.scene import Scene, SceneParts, estimating_kernel, scene_of, states_of
 
 __all__ = ["motion_kernel", "section_kernel"]
 
@@ -34,18 +34,8 @@ def section_kernel(**parts: Unpack[SceneParts]) -> Kernel:
     Kernel
         Along `passage`, the numbers of the switches that a study asks for, rising: `time` and each state just before.
     """
-    scene, states = scene_of(parts), states_of(parts)
     along = Field("passage", "1", "number of the switch, from the start", lower=1.0, upper=MOST, integer=True)
-    outputs = [replace(f, dims=("passage",), gaps=True) for f in (Field("time", "s", "time of the switch"), *states)]
-
-    def solved(method: str, columns: Any, rtol: Any, stops: Any, _: Any) -> Any:
-        columns = [*columns, np.full(len(rtol), stops[-1])]
-        results, status, error = solver(scene, method)(columns, rtol, stops)
-        hangs = (status == Status.GRAZING) & ~(error <= rtol)  # on what is not known: there may be no switch
-        rows = results[[0, *range(2, 1 + len(outputs))]]
-        return on_the_way(rows, status, np.where(hangs | np.isnan(error), math.inf, error))
-
-    return estimating_kernel(parts, parts["parameters"], outputs, [along], METHODS, solved)
+    return _at_stops(parts, scene_of(parts), along, [Field("time", "s", "time of the switch")])
 
 
 def motion_kernel(**parts: Unpack[SceneParts]) -> Kernel:
@@ -57,31 +47,35 @@ def motion_kernel(**parts: Unpack[SceneParts]) -> Kernel:
         Along `at`, rising times after the start: each state then. TOO_SHORT where the motion does not come to all of
         them, as where its switches accumulate: then later states are NaN.
     """
-    scene, states = scene_of(parts), states_of(parts)
     along = Field("at", "s", "time after the start", lower=0.0, open_lower=True)
-    outputs = [replace(f, dims=("at",), gaps=True) for f in states]
+    return _at_stops(parts, clocked(scene_of(parts)), along, [])
 
-    def solved(method: str, columns: Any, rtol: Any, times: Any, _: Any) -> Any:
-        count, many = len(rtol), len(times)
-        cells = [np.tile(c, many) for c in columns]
-        found, status = at_times(scene, method, cells, np.repeat(times, count), np.tile(rtol, many))
-        rows, status = found[: len(states)].reshape(len(states), many, count), status.reshape(many, count)
-        return on_the_way(rows, status, np.where(status == Status.INACCURATE, math.inf, rtol))
+
+def _at_stops(parts: SceneParts, scene: Scene, along: Field, times: list[Field]) -> Kernel:
+    """A kernel of what a scene comes to at stops along the way, followed once.
+
+    A state, or time, is NaN where a motion does not come to. The status is OK, or what was remarked, or why there is
+    nothing at all, or not all. Where a method gives later stops up, which another one may solve, it is INACCURATE, and
+    the error infinite.
+    """
+    outputs = [replace(f, dims=(along.name,), gaps=True) for f in (*times, *states_of(parts))]
+    shown = [*range(len(times)), *range(2, 2 + len(parts["states"]))]
+
+    def solved(method: str, columns: Any, rtol: Any, stops: Any, _: Any) -> Any:
+        ends = (stops[-1], len(stops)) if scene.until else stops[-1:]
+        columns = [*columns, *(np.full(len(rtol), float(end)) for end in ends)]
+        results, status, error = solver(scene, method)(columns, rtol, stops)
+        rows = results[shown]
+        hangs = (status == Status.GRAZING) & ~(error <= rtol)  # on what is not known: there may be no switch
+        error = np.where(hangs | np.isnan(error), math.inf, error)
+        refused, given_up = status >= FIRST_REFUSAL, np.isin(status, UNSOLVED).any(axis=0)
+        ended = refused | np.isnan(rows).any(axis=0)
+        unasked = ended if scene.until else refused  # a time is there, whether or not the motion comes to it
+        why, worst = np.maximum.reduce(status), np.maximum.reduce(np.where(ended, 0, status))
+        short = np.where(why == Status.STICKS, Status.COMES_TO_REST, Status.TOO_SHORT)
+        short = np.where(given_up, Status.INACCURATE, short)
+        error = np.where(given_up, math.inf, np.maximum.reduce(np.where(unasked, 0.0, error)))
+        status = np.where(ended.all(axis=0), why, np.where(ended.any(axis=0), short, worst)).astype(np.int8)
+        return np.where(ended, math.nan, rows), error, status
 
     return estimating_kernel(parts, parts["parameters"], outputs, [along], METHODS, solved)
-
-
-def on_the_way(rows: Any, status: Any, error: Any) -> tuple[Any, Any, Any]:
-    """Rows (n_rows, n_stops, n_cells), NaN where a motion does not come to; the error of each cell, and its status.
-
-    That is OK, or what was remarked, or why there is nothing at all, or not all. Where the method gives later stops up,
-    which another one may solve, it is INACCURATE, and the error infinite. `status`, `error` : of each stop and cell
-    """
-    refused, given_up = status >= FIRST_REFUSAL, np.isin(status, UNSOLVED).any(axis=0)
-    ended = refused | np.isnan(rows).any(axis=0)
-    why, worst = np.maximum.reduce(status), np.maximum.reduce(np.where(ended, 0, status))
-    short = np.where(why == Status.STICKS, Status.COMES_TO_REST, Status.TOO_SHORT)
-    short = np.where(given_up, Status.INACCURATE, short)
-    error = np.where(given_up, math.inf, np.maximum.reduce(np.where(refused, 0.0, error)))
-    status = np.where(ended.all(axis=0), why, np.where(ended.any(axis=0), short, worst)).astype(np.int8)
-    return np.where(ended, math.nan, rows), error, status

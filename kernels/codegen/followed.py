@@ -41,7 +41,7 @@ def followed(runner, columns, rtol, of_a_step=None, shake=0.0, told=False, stops
     shake : 1 or -1 where each event is missed by some roundings, and each state at the start (`driver.missed_by`)
     told : whether the error is
     stops : None, or numbers of switches, of which the last ends the motion: all are by the higher order. Where a motion
-        has ended before, there is what it ended with
+        has ended before, there is what it ended with. Of a scene that ends at a time (`Scene.until`): the times
     """
     steps, high = rtol if of_a_step is None else of_a_step, (rtol < HIGH_BELOW) | (stops is not None)
     cell, tolerance = runner.m.cell, np.maximum(steps, FINEST)
@@ -60,6 +60,11 @@ def followed(runner, columns, rtol, of_a_step=None, shake=0.0, told=False, stops
             if cell.own:
                 cells[:, row["own"]] = float(told)
             for k, stop in enumerate(STOPS if stops is None else stops):
+                if runner.scene.until:  # ahead of the surface again, in a unit of this time; intervals are from 0
+                    unit = np.ldexp(1.0, np.frexp(stop)[1])
+                    cells[:, row["h"]] *= cells[:, row["unit"]] / unit if k else 1.0
+                    cells[:, row["flips"] - 1], cells[:, row["unit"] - 1], cells[:, row["unit"]] = stop, 1.0, unit
+                    cells[:, row["on"]], cells[:, row["since"]], stop = 0.0, cells[:, row["time"]], k + 1.0
                 cells[:, row["flips"]] = np.minimum(whole, stop)
                 to_the_end(run, cells)
                 results[:, 0 if stops is None else k :, places] = cells[:, shown].T[:, None]

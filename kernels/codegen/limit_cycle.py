@@ -17,7 +17,8 @@ import numpy as np
 
 from kernels.codegen.columns_algebra import eigenvalues, identity, largest, most, solved
 from kernels.codegen.followed import put
-from kernels.codegen.return_map import TIGHT, at_times, rating
+from kernels.codegen.return_map import TIGHT, clocked, rating
+from kernels.codegen.to_tolerance import solver
 from kernels.interface import FIRST_REFUSAL, Status
 
 LOOSE, WIDER = 1e-7, 4.0
@@ -44,9 +45,9 @@ VANISHES = 0.1
 """From 1, a multiplier of the last cycle of a branch that ends because it meets another one."""
 RESTS = 1e-11
 """Of the way to an equilibrium, to what it is known."""
-EARLIEST, TIMES, STILL, LASTS = 1e-6, 22, 1e-12, 3
+EARLIEST, TIMES, STILL = 1e-6, 22, 1e-12
 """Seconds after the start, then four times as many, so often, at which a motion is looked at that meets no switch any
-more: where its states move by less than STILL of their sizes, so many times or to where it cannot be followed, it is at
+more: where its states move by less than STILL of their sizes to the last of them to which it can be followed, it is at
 rest."""
 
 
@@ -259,22 +260,17 @@ class Search:
 
         What sticks need not have moved. A creeping motion is still at first too, but has not moved before that.
         """
-        before, size, seconds = np.full((len(self.last), len(left)), np.nan), 0.0, EARLIEST
-        moved, lasted = self.cycles.status[left] == Status.STICKS, np.zeros(len(left))
-        for _ in range(TIMES):
-            if not len(left):
-                break
-            times, tight = np.full(len(left), seconds), np.full(len(left), TIGHT * self.map.fine)
-            z, status = at_times(self.map.own, self.map.method, self.cycles.parameters[:, left], times, tight)
-            ended, size = status > Status.INACCURATE, np.fmax(size, abs(z))
-            still = (abs(z - before) <= STILL * size).all(axis=0)
-            moved = moved | ~(still | ended | np.isnan(before).any(axis=0))
-            lasted, z = np.where(ended, lasted, np.where(still, lasted + 1.0, 0.0)), np.where(ended, before, z)
-            rests = moved & ((lasted >= LASTS) | (ended & (lasted > 0.0)))
-            self._rest(left, z, rests)
-            on = ~rests & ~ended
-            left, before, size, moved, lasted = left[on], z[:, on], size[:, on], moved[on], lasted[on]
-            seconds = 4.0 * seconds
+        times, count = EARLIEST * 4.0 ** np.arange(TIMES), len(left)
+        columns = *self.cycles.parameters[:, left], np.full(count, times[-1]), np.full(count, float(TIMES))
+        followed = solver(clocked(self.map.own), self.map.method, again=False)
+        rows, status, _ = followed(columns, np.full(count, TIGHT * self.map.fine), times)
+        ended = status > Status.INACCURATE
+        z = np.where(ended, np.nan, rows[2 : 2 + len(self.last)])
+        still = (abs(np.diff(z, axis=1)) <= STILL * np.maximum.accumulate(abs(z), axis=1)[:, 1:]).all(axis=0)
+        moved = (self.cycles.status[left] == Status.STICKS) | ~(still | ended[1:]).all(axis=0)
+        last = np.maximum((~ended).sum(axis=0), 2)[None] - 1
+        rests = moved & np.take_along_axis(still, last - 1, axis=0)[0]
+        self._rest(left, np.take_along_axis(z, last[None], axis=1)[:, 0], rests)
 
     def _tangent(self, cycles, way):
         """By how much states change over the whole way of the parameter; NaN where that is 0."""

@@ -111,12 +111,6 @@ class ReturnMap:
         return sizes, np.where(np.isnan(off), np.inf, off)
 
 
-def at_times(scene, method, columns, times, rtol):
-    """The states (n_states, n_cells) at a time after the start each; and the status."""
-    results, status, _ = solver(clocked(scene), method)([*columns, times, np.ones(len(rtol))], rtol)
-    return results[2 : 2 + len(scene.states)], status
-
-
 @functools.cache
 def clocked(scene, drive=None):
     """The scene that ends where its clock has gone on by UNTIL; or which counts its drive's periods, and begins anew.
@@ -124,10 +118,10 @@ def clocked(scene, drive=None):
     `drive` : the period, a number or a function of parameters; then the clock is put back at its end
     """
     timed = scene if scene.start_time is not None else replace(scene, states=(*scene.states, CLOCK), start_time=0.0)
-    clock, parameters = timed.states[-1], (*scene.parameters, *([UNTIL] if drive is None else []))
+    clock, ends = timed.states[-1], drive is None
 
     def until(**given):
-        (begin,), (long,) = returned(timed.start_time, given), returned(given.get(UNTIL, drive), given)
+        (begin,), (long,) = returned(timed.start_time, given), (given[UNTIL],) if ends else returned(drive, given)
         return begin + long - given[clock]
 
     def again(**given):
@@ -137,11 +131,10 @@ def clocked(scene, drive=None):
     everywhere = jumps.pop("", None)
     surfaces = {f"own {name}": function for name, function in own.items()}
     switches = dict.fromkeys(surfaces, everywhere) | {f"own {name}": function for name, function in jumps.items()}
-    if drive is not None:
-        switches[f".{CLOCK}"] = again
     return replace(
-        timed, name=f"{scene.name}_clocked", parameters=parameters, switch=switches, only_first=True,
-        surface={f".{CLOCK}": until} | surfaces, most_kinks=MOST_SWITCHES,
+        timed, name=f"{scene.name}_clocked", parameters=(*scene.parameters, UNTIL) if ends else scene.parameters,
+        surface={f".{CLOCK}": until} | surfaces, switch=switches if ends else switches | {f".{CLOCK}": again},
+        only_first=True, until=ends, most_kinks=MOST_SWITCHES,
     )  # fmt: skip
 
 
