@@ -32,6 +32,8 @@ FAR, QUICK = 1e-4, 0.1
 """Residual over the size, up to which, and over the one before, Newton's method keeps its differences."""
 NEAR = 1e-6
 """Of the states' sizes: within this a cycle is one, and what does not move by more over it is no cycle but at rest."""
+TWO = 10.0
+"""Errors of a cycle by which its halves must differ: of one that doubles no more, Newton's steps are a third of that."""
 LATER = 1, 8, 64
 """How many times as many cycles are followed before Newton's method begins again."""
 FOUND = Status.OK, Status.UNSTABLE, Status.PERIOD_2
@@ -97,6 +99,12 @@ def settling(slopes, moved):
     """(I - J)^-1 of what has been moved, (n, m, cells): by how much the cycle moves."""
     n = len(slopes) - 1
     return solved(identity(n, slopes.shape[-1]) - slopes[1:, :n], moved)
+
+
+def to_root(cycles):
+    """How far cycles may be from what closes exactly, of their sizes: by (I - J)^-1 times their residual."""
+    inverse = settling(cycles.slopes, identity(len(cycles.slopes) - 1, len(cycles.r)))
+    return cycles.off * most(np.add.reduce(abs(inverse), axis=1))
 
 
 def newton(the_map, cycles, swept=()):
@@ -220,8 +228,9 @@ class Search:
         some, moved, by_half = self._newton(self.cycles.some(left)._replace(z=self.last[:, left]))
         size = abs(some.multiplier)
         good, stable = (moved > NEAR) & (some.off <= NEAR * moved), size <= 1.0
-        if doubled:  # not where half of so many switches close the cycle
-            some.status[:], good = Status.PERIOD_2, good & stable & (by_half > NEAR)
+        if doubled:  # not where half of so many switches close the cycle, as well as it is known
+            apart = by_half > np.maximum(NEAR, TWO * to_root(some))
+            some.status[:], good = Status.PERIOD_2, good & stable & apart
         else:
             some.status[:] = np.where(stable, Status.OK, Status.UNSTABLE)
             good &= stable | ~np.isin(before, FOUND)

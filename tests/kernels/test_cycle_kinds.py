@@ -185,6 +185,15 @@ def test_a_doubled_cycle_is_not_followed_onto_the_one_that_it_ends_on():
     assert abs(found["multiplier"][:2] - (4.0 + 2.0 * gain[:2] - gain[:2] ** 2)).max() < 1e-7
 
 
+def test_a_cycle_that_is_about_to_double_is_not_called_two():
+    """The map's multiplier at 1 - 1/gain is 2 - gain; motions come to it hardly at all."""
+    gain = 3.0 - np.array([4e-6, 4e-7, 1e-8])
+    found, status = solve(POPULATION, "taylor", gain=gain, flips=1.0, asked=("period", "u", "multiplier"))
+    assert (status == Status.OK).all()
+    assert abs(found["period"] - 1.0).max() < 1e-12
+    assert abs(found["multiplier"] - (2.0 - gain)).max() < 1e-9
+
+
 def test_a_jump_that_is_not_defined_at_speed_0_begins_like_any_other():
     """A ball that loses 0.5 J/kg as it lands, and is thrown up again by 2 m/s: v = 2 + e sqrt(v^2 - 1)."""
     e = np.array([0.5, 0.3])
