@@ -94,7 +94,7 @@ class Scene:
     start_time : a number, or (parameters) -> one: then the last state is the time `t`, of which the functions know
         nothing but that they may ask for it
     only_first : whether switches at the first surface alone count; others may lie between, as many as kinks
-    until : whether the last parameter is the time after the start at which the first surface is met, and the motion ends
+    until : whether the last parameter is the time after the start at which the first surface is met
     peaks : "all": a kink is wherever a state turns round, so that steps end where its size is largest; "some": of
         states alone whose rate is another one, for a rate may come close to 0 and stay there
 

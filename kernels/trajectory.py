@@ -1,8 +1,8 @@
 """A scene of one's own along its way: its states at each switch, or at given times.
 
 A section is the states just before each switch that is asked for: a diagram of bifurcations is one study. A motion is
-the states at given times after the start. Either is one run with stops. Each is right to rtol of the largest size that the state had on
-the way, and each time to rtol of itself; the worst one counts for the cell.
+the states at given times after the start. Either is followed once, with stops. Each state is right to rtol of the
+largest size that it had on the way, and each time to rtol of itself; the worst one counts for the cell.
 """
 
 import math

@@ -23,8 +23,9 @@ from kernels.interface import Status
 SAFETY = 2.0
 SURE = 0.05
 """How far below 1 Newton's own multiplier tells that the cycle is stable."""
-SHORTER, ROUGHER = 0.1, 20.0
-"""Of the steps of differences, those that are tried where errors are more than so many of the runs' over a step."""
+SHORTER, ROUGHER = (1.0, 0.1, 0.01), 20.0
+"""Of the steps of differences, those that are tried, the next where errors are more than so many of the runs' over a
+step: beside a corner of the map only a step that does not come to it tells its slopes, and its error."""
 ROUNDING, ROUNDINGS = 2.3e-16, 1e-15
 """Relative noise of a period that depends on no state; least noise of any other period and of states."""
 LINEAR = 0.25
@@ -81,9 +82,9 @@ def described(search, swept, modes, asked, rtol, tight):
         left = there & (unclear | ~(error <= rtol)) & ((r is not tight) | (cycles.r > tight))
         cells = np.flatnonzero(left & (cycles.r > r))
         put(cycles, cells, newton(the_map, cycles.some(cells)._replace(r=r[cells]), search.swept))
-        error = by_differences(the_map.step, left)
-        rough = ~(error <= np.maximum(rtol, ROUGHER / the_map.step * cycles.r))
-        error = by_differences(SHORTER * the_map.step, left & rough)
+        for shorter in SHORTER:
+            error = by_differences(shorter * the_map.step, left)
+            left = left & ~(error <= np.maximum(rtol, ROUGHER / the_map.step * cycles.r))
     return {name: values for name, (values, _) in found.items()}, error
 
 

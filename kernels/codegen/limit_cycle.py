@@ -33,7 +33,9 @@ FAR, QUICK = 1e-4, 0.1
 NEAR = 1e-6
 """Of the states' sizes: within this a cycle is one, and what does not move by more over it is no cycle but at rest."""
 TWO = 10.0
-"""Errors of a cycle by which its halves must differ: of one that doubles no more, Newton's steps are a third of that."""
+"""Errors of a cycle by which its halves must differ: where it is one, Newton's steps may still be a third of that."""
+ASTRAY = 1e-3
+"""Of the way to the root, a residual where runs are not right at the root, as they are not at rest."""
 LATER = 1, 8, 64
 """How many times as many cycles are followed before Newton's method begins again."""
 FOUND = Status.OK, Status.UNSTABLE, Status.PERIOD_2
@@ -116,7 +118,7 @@ def newton(the_map, cycles, swept=()):
     at, held, count = the_map.directions, the_map.held, len(cycles.r)
     best, left = cycles.some(np.arange(count)), np.arange(count)
     best.off[:], best.rows[:], best.slopes[:] = math.inf, math.nan, math.nan
-    steady, before, z = np.zeros(count, bool), best.off.copy(), best.z.copy()
+    steady, astray, before, z = np.zeros(count, bool), np.zeros(count, bool), best.off.copy(), best.z.copy()
     for _ in range(ROUNDS):
         if not len(left):
             break
@@ -133,12 +135,13 @@ def newton(the_map, cycles, swept=()):
         far = most(abs(step))
         put(best, left, some, some.off < best.off[left])
         lost = ~((some.off < math.inf) & (far < math.inf))
-        best.r[left[lost]] = np.minimum(WIDER * some.r[lost], LOOSE)
+        astray[left[lost]], best.r[left[lost]] = True, np.minimum(WIDER * some.r[lost], LOOSE)
         onward = some.z[at] + some.scale[at] * step / np.maximum(1.0, far)
         z[np.ix_(at, left)] = np.where(lost, 0.5 * (some.z + best.z[:, left])[at], onward)
         steady[left] = (some.off <= FAR) & (some.off <= QUICK * before[left])
         settled = (some.off <= CLOSED * best.r[left]) | ((some.off <= 1e-9) & (some.off > 0.5 * before[left]))
-        before[left], left = some.off, left[~settled]
+        before[left], astray[left[settled]], left = some.off, False, left[~settled]
+    best.off[astray] = np.fmax(best.off, ASTRAY * to_root(best))[astray]
     best.z[held] = np.where(best.off < math.inf, best.rows[[1 + j for j in held]], best.z[held])
     return best._replace(multiplier=largest(*eigenvalues(best.slopes[1:, : len(at)])[:2]))
 
@@ -269,6 +272,8 @@ class Search:
 
         What sticks need not have moved. A creeping motion is still at first too, but has not moved before that.
         """
+        if not len(left):
+            return
         times, count = EARLIEST * 4.0 ** np.arange(TIMES), len(left)
         columns = *self.cycles.parameters[:, left], np.full(count, times[-1]), np.full(count, float(TIMES))
         followed = solver(clocked(self.map.own), self.map.method, again=False)
