@@ -151,11 +151,12 @@ def started(m, cell):
     through = (lost < 0.0) & (magnitude(e) <= STILL * m.made(state, mode)[0][0]) & (m.passable[0] * d < 0.0)
     at = where(((e <= 0.0) & (e >= 0.0) & away) | through, 1.0, 0.0)
     blur = where(lost > 0.0, lost / magnitude(e), 0.0)  # nothing of nothing is nothing
+    gap = where(through, 0.0, e)  # what it is there is rounding, which says nothing of times
     wrong = not_(magnitude(e) >= 0.0) | not_((cell.flips >= 1.0) & (cell.flips < math.inf))
     cell = cell._replace(
         state=tuple(fma(ONE_ULP * (-1.0) ** j * off, u, u) for j, u in enumerate(state)),
         side=side, signs=joined(signs[:-1], (where((e < 0.0) | through, -1.0, signs[-1]),)), on=joined((at,), on),
-        unit=time_unit(e, d, dd), own=ERRORS.started(m, cell.own, state),
+        unit=time_unit(gap, d, dd), own=ERRORS.started(m, cell.own, state),
         verdict=where(wrong, BAD_INPUT, where(blur <= BLUR * cell.tolerance, 0.0, INACCURATE)),
     )  # fmt: skip
     if m.speeds is not None:

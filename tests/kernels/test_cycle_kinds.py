@@ -8,7 +8,7 @@ from kicked_scene import BRANCHED, KICKED
 from mpmath import mp, mpc, mpf
 
 from kernels.cycle import cycle_kernel
-from kernels.interface import Status
+from kernels.interface import FIRST_REFUSAL, Status
 from kernels.lanes.jit import COMPILED
 from kernels.scene import Field, SceneError, exp
 
@@ -116,27 +116,52 @@ def test_what_winds_round_an_equilibrium_rests_there():
     assert abs(found["v"]).max() < 1e-11
 
 
+ROUND = cycle_kernel(
+    name="round",
+    doc="r' = r (size - r^2) at the speed 1 + r^2",
+    states=(Field("x", "1", "x"), Field("y", "1", "y")),
+    parameters=(
+        Field("size", "1", "its square"),
+        Field("x0", "1", "at the start", 1.5),
+        Field("lift", "1", "of y", 0.0),
+        Field("level", "1", "at which a cycle ends", 0.0),
+    ),
+    rates=lambda x, y, size: (
+        x * (size - x * x - y * y) - y * (1.0 + x * x + y * y),
+        y * (size - x * x - y * y) + x * (1.0 + x * x + y * y),
+    ),
+    surface=lambda y, lift, level: y + lift - level,
+    start=lambda x0: (x0, 0.0),
+)
+
+
 def test_a_round_cycle_begins_where_the_surface_is_met_without_curvature():
-    """r' = r (size - r^2) at the speed 1 + r^2: a run begins where the second derivative of y is rounding alone."""
-    round_cycle = cycle_kernel(
-        name="round",
-        doc="what comes to a circle",
-        states=(Field("x", "1", "x"), Field("y", "1", "y")),
-        parameters=(Field("size", "1", "its square"),),
-        rates=lambda x, y, size: (
-            x * (size - x * x - y * y) - y * (1.0 + x * x + y * y),
-            y * (size - x * x - y * y) + x * (1.0 + x * x + y * y),
-        ),
-        surface=lambda y: y,
-        start=lambda: (1.5, 0.0),
-    )
+    """A run begins where the second derivative of y is rounding alone."""
     size = np.array([0.3, 0.7, 1.3, 1.9])
-    found, status = solve(round_cycle, "taylor", size)
+    found, status = solve(ROUND, "taylor", size)
     assert (status == Status.OK).all()
     true = {"period": 2.0 * np.pi / (1.0 + size), "x": -np.sqrt(size), "x_size": np.sqrt(size), "y_size": np.sqrt(size)}
     true |= {"multiplier": np.exp(-2.0 * size * true["period"]), "period_by_size": -size / (1.0 + size)}
     for name, value in true.items():
         assert abs(found[name] - value).max() < 1e-9, name
+
+
+@pytest.mark.parametrize("method", ["taylor", "dop853"])
+def test_a_run_begins_on_a_level_that_rounding_puts_it_beside(method):
+    y = np.array([-0.95, -0.7, -0.3, 0.1, 0.37, 0.6, 0.9])
+    found, status = solve(ROUND, method, 1.0, lift=1.0, level=1.0 + y, rtol=1e-8, asked=("period", "x"))
+    assert (status == Status.OK).all()
+    assert abs(found["period"] / np.pi - 1.0).max() < 1e-8
+    assert abs(found["x"] + np.sqrt(1.0 - y * y)).max() < 1e-8
+
+
+def test_a_point_of_rest_to_which_newtons_steps_lead_is_no_cycle():
+    """From within a small cycle, which motions come to in some 1/size turns."""
+    size, share = np.array([1e-6, 2e-7, 1.2e-7, 8.6e-7]), np.array([0.39, 0.35, 0.32, 0.5])
+    cells = {"size": size, "x0": share * np.sqrt(size), "rtol": 1e-8, "asked": ("period", "x")}
+    found, status, error = estimated(ROUND, "taylor", **cells)
+    off = abs(found["x"] / np.sqrt(size) + 1.0)
+    assert ((status >= FIRST_REFUSAL) | (off <= error)).all()
 
 
 def test_a_mode_of_three_values_and_three_surfaces():
