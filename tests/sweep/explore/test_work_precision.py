@@ -80,11 +80,7 @@ def test_auto_is_measured_beside_the_methods_and_says_which_it_took():
 @pytest.mark.parametrize(
     ("method", "found", "words"),
     [
-        (
-            saying(Status.OK, share=1.1e-6),
-            {"ok": 1.0, "silent": 0.25},
-            f"silently wrong in 25 % at 1e-06, first {LAST}",
-        ),
+        (saying(Status.OK, share=1.1e-6), {"ok": 1.0, "silent": 0.25}, f"wrong in 25 % at 1e-06, first {LAST}"),
         (saying(Status.OK, share=0.9e-6), {"ok": 1.0}, ""),
         (saying(Status.OK, share=np.nan), {"ok": 0.75, "unsolved": 0.25}, f"first FAILED at {LAST}"),
         (saying(Status.INACCURATE, share=1.0), {"ok": 0.75, "inaccurate": 0.25}, ""),

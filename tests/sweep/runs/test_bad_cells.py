@@ -120,11 +120,10 @@ def test_where_no_process_can_be_started_the_run_ends_and_no_cell_is_blamed(begu
         assert heights_of(found, Status.FAILED) == [bad.CRASHES, bad.EXITS]
 
 
-def test_a_kernel_of_which_every_cell_is_bad_is_told_at_once():
+@pytest.mark.parametrize("isolate", [False, True])
+def test_a_kernel_of_which_every_cell_is_bad_is_told_at_once(isolate):
     with pytest.raises(SweepError, match=r"bad:HOPELESS: .*ZeroDivisionError"):
-        quiet(tall(50, "bad:HOPELESS"))
-    with pytest.raises(SweepError, match=r"bad:HOPELESS: .*ZeroDivisionError"):
-        quiet(tall(50, "bad:HOPELESS"), isolate=True)
+        quiet(tall(50, "bad:HOPELESS"), isolate=isolate)
 
 
 def test_what_compiling_takes_is_not_taken_for_what_a_cell_takes():

@@ -41,13 +41,13 @@ def text():
 
 
 def test_the_page_tells_question_axes_exponents_statuses_and_provenance(text):
-    for words in (
+    told = (
         "How does <b>it</b> fall?",
         "drive torque per moment of inertia",
         "two laws with a smooth bend",
         "Fingerprint",
-    ):
-        assert words in Tree(text).text, words
+    )
+    assert [words for words in told if words not in Tree(text).text] == []
 
 
 def test_nothing_comes_from_elsewhere_and_no_text_of_the_result_becomes_markup(text):
