@@ -169,7 +169,7 @@ def cut(request, tmp_path_factory):
     return path
 
 
-@settings(max_examples=20, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=8, deadline=None, suppress_health_check=list(HealthCheck))
 @given(key=PIECES, cell=st.integers(0, CELLS - 1))
 def test_any_piece_is_right_or_refused(cut, tmp_path, key, cell):
     """A cell that is damaged takes its block along, and nothing else, however blocks are cut."""

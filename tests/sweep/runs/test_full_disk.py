@@ -63,7 +63,7 @@ def falls(heights, **keys):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_disk_that_is_filled_meanwhile_does_not_matter(small, tmp_path, monkeypatch, capsys, kind):
-    study, output = falls(2000, **KINDS[kind]), small / "out.h5"
+    study, output = falls(500, **KINDS[kind]), small / "out.h5"
     real = Store.put
 
     def put(self, index, arrays):
