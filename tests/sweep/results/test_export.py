@@ -93,7 +93,8 @@ import os, signal, sys
 import sweep
 from sweep.file import disk
 disk.sync_folder = lambda path: os.kill(os.getpid(), signal.SIGKILL)
-sweep.export(sweep.run(kernel="toy:KERNEL", axes={"height": [1.0]}, allow_import=True), sys.argv[1])
+keys = {"kernel": "toy:KERNEL", "axes": {"height": [1.0]}, "outputs": ["fall_time"], "allow_import": True}
+sweep.export(sweep.run(**keys), sys.argv[1])
 """
 
 
