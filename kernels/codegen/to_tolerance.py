@@ -194,5 +194,6 @@ def told(one, columns, rtol, of_a_step, least=0.0, stops=None):
     found = followed(one, columns, rtol, of_a_step, told=True, stops=stops)
     results, error = found[:-1], found[-1]
     status = status_of(results, one.outputs)
-    status[~(STATED * np.maximum(error, least) <= rtol) | (rtol < ROUNDING)] = Status.INACCURATE
+    unsure = ~(STATED * np.maximum(error, least) <= rtol) | (rtol < ROUNDING)
+    status[unsure & (results[-1] < FIRST_REFUSAL)] = Status.INACCURATE
     return results, status, error
