@@ -79,7 +79,8 @@ def cycle_kernel(
     begun = [parameters[_number(scene, "branch", "parameter", branch)]] if branch else []
     begun = [replace(f, name=f"{f.name}_from", doc=f"{f.name} where the search begins", default=f.name) for f in begun]
     fields = (*parameters, *begun, flips, SETTLE)
-    outputs, modes = _outputs(parts, [scene.states[j] for j in turning], len(maps["taylor"].directions))
+    end = "at the end of a period of the drive" if drive else "just before the switch that ends a cycle"
+    outputs, modes = _outputs(parts, [scene.states[j] for j in turning], len(maps["taylor"].directions), end)
 
     def solved(method: str, columns: Any, rtol: Any, ranks: Any, asked: set[str]) -> Any:
         """Values of each output, and error and status of each cell."""
@@ -120,12 +121,15 @@ def _turning(scene: Scene, turns: Mapping[str, float], held: list[int]) -> dict[
     return found
 
 
-def _outputs(parts: SceneParts, turning: list[str], many: int) -> tuple[list[Field], list[Field]]:
-    """All that is said of a cycle with so many multipliers, and their number as a coordinate if there are several."""
+def _outputs(parts: SceneParts, turning: list[str], many: int, end: str) -> tuple[list[Field], list[Field]]:
+    """All that is said of a cycle with so many multipliers, and their number as a coordinate if there are several.
+
+    States are given at the `end` of the cycle.
+    """
     states, swept = parts["states"], [f.name for f in parts["parameters"] if not f.integer]
     outputs = [
         Field("period", "s", "period of the limit cycle"),
-        *(replace(f, doc=f"{f.doc}, just before the switch that ends a cycle", sized=True) for f in states),
+        *(replace(f, doc=f"{f.doc}, {end}", sized=True) for f in states),
         *(Field(f"{f.name}_size", f.unit, f"largest size in the cycle of: {f.doc}") for f in states),
         *(Field(f"{name}_turns", "1", "whole turns a cycle", integer=True) for name in turning),
         Field("multiplier", "1", "of small disturbances, a cycle; the largest, or its modulus"),

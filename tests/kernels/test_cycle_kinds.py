@@ -41,6 +41,14 @@ def test_a_driven_oscillator_has_the_cycle_and_both_multipliers_of_the_closed_fo
     assert (second["multipliers_real"][:, 0] == found["multipliers_real"][:, 1]).all()
 
 
+def test_states_are_said_to_be_given_where_the_cycle_ends():
+    ends = [next(f.doc for f in kernel.outputs if f.name == "x") for kernel in (FORCED, WALLS)]
+    assert [doc.split(", ", 1)[1] for doc in ends] == [
+        "at the end of a period of the drive",
+        "just before the switch that ends a cycle",
+    ]
+
+
 def test_cells_of_several_multipliers_where_none_has_a_cycle_or_none_is_asked_for():
     """At resonance without losses; and a study of the period alone, which gives no numbers of multipliers."""
     resonant = {"zeta": 0.0, "omega": [1.3, 1.3, 1.3], "w": 1.3}
