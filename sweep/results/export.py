@@ -6,6 +6,7 @@ import contextlib
 import csv
 import math
 import os
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -148,7 +149,9 @@ def _write_zarr(dataset: xr.Dataset, path: Path, compress: bool = False) -> None
     encoding = {str(name): {"compressors": (blosc,)} for name, v in dataset.data_vars.items() if v.shape and compress}
     whole = _in_pieces(dataset)
     words = {str(name): whole[name].astype(object) for name in whole.variables if whole[name].dtype.kind == "U"}
-    whole.assign(words).drop_encoding().to_zarr(path, mode="w", consolidated=False, encoding=encoding)
+    with warnings.catch_warnings():  # of version 3 it is no part yet; xarray looks for it, and warns where it is not
+        warnings.filterwarnings("ignore", "Consolidated metadata")
+        whole.assign(words).drop_encoding().to_zarr(path, mode="w", consolidated=True, encoding=encoding)
 
 
 def _in_pieces(dataset: xr.Dataset) -> xr.Dataset:

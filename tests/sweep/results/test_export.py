@@ -4,6 +4,7 @@ import csv
 import signal
 import subprocess
 import sys
+import warnings
 
 import numpy as np
 import pytest
@@ -45,6 +46,14 @@ def test_csv_columns_do_not_depend_on_the_order_of_an_outputs_dimensions(tmp_pat
 def test_csv_has_the_digits_of_single_precision_where_a_number_has_no_more(tmp_path):
     heading, rows = read(sweep.export(result().assign(error_bound=np.float32(0.1)), tmp_path / "out.csv"))
     assert {row[heading.index("error_bound")] for row in rows} == {"0.1"}
+
+
+def test_zarr_is_opened_by_plain_xarray_without_a_warning(tmp_path):
+    path = sweep.export(result(), tmp_path / "out.zarr")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with xr.open_zarr(path) as back:
+            np.testing.assert_array_equal(back.fall_time, result().fall_time)
 
 
 def test_netcdf_keeps_full_precision_however_the_source_was_packed(tmp_path):
