@@ -8,6 +8,8 @@ bracket. A step within which the rates may hide more
 than the tolerance (`expression.hidden`) is not taken: the points that an error is estimated from may miss it.
 """
 
+import math
+
 from kernels.integrate.events import cubic_root, dip, finite, first_event, met_at, of_event, passed_another
 from kernels.integrate.pairs import at_least, of_size
 from kernels.integrate.records import Leg, Step
@@ -98,8 +100,9 @@ def to_event(pair, cell, mode, active):
         end, end_rates = events(m, new, mode)
         step = Step(state, new, length, start, start_rates, end, end_rates)
         # by its error, and by what it may hide
-        error, sound = trial.error / tolerance, finite(new)
-        fine = (error <= 1.0) & sound
+        sound = finite(new)
+        error = where(sound, trial.error / tolerance, math.inf)  # over an infinite size an error would be 0
+        fine = error <= 1.0
         box = boxes(state, new, times(length, after(trial.last, -1.0, ONE, (first,))))
         seen = shows_all(m, step, box, mode, first, tolerance)
         longer = where(seen | not_(fine), next_length(pair, h, last_h, error, last_error), COME_UP * h)
