@@ -278,13 +278,16 @@ def in_none(xs):
 
 @symbolic
 def begun(m, pieces, facts, state, mode, on, tolerance, active):
-    """Of a leg's first step: the events behind already, the margins of all; broken and stuck lanes."""
-    sound = finite(state)
-    broken = active & not_(sound & finite(tuple(u[-1] for u in pieces.states)))
+    """Of a leg's first step: the events behind already, the margins of all; broken, steep and stuck lanes.
+
+    Steep is what changes so much faster than the leg is long that a series' terms are no numbers any more.
+    """
+    sound = finite(state) & finite(tuple(u[1] for u in pieces.states))
+    steep = active & sound & not_(finite(tuple(u[-1] for u in pieces.states)))
     now = tuple((o < 0.5) & (fact[0] <= 0.0) for o, fact in zip(on, facts, strict=True))
     pressed = tuple((o > 0.5) & not_(rises(fact[1], fact[2])) for o, fact in zip(on, facts, strict=True))
     margins = tuple(SLACK * tolerance * extent for extent, _ in m.scene.made(state, mode))
-    return now, margins, broken, active & any_of(pressed) & sound
+    return now, margins, active & not_(sound), steep, active & any_of(pressed) & sound & not_(steep)
 
 
 @symbolic
@@ -315,7 +318,7 @@ def to_event(m, cell, mode, active):
     state, unit, h, on, tolerance, errors = cell.state, cell.unit, cell.h, cell.on, cell.tolerance, cell.own
     moving, t, span, tried = active, 0.0 * h, h, 0.0 * h
     nothing, never, margins = active & not_(active), in_none(on), times(0.0, on)
-    stuck, lost, broken, grazing, now, passed = nothing, nothing, nothing, nothing, never, never
+    stuck, steep, broken, grazing, now, passed = nothing, nothing, nothing, nothing, never, never
     refused, longest, furthest = 0.0 * h, 0.0 * h + FAR, 0.0 * h + FAR
     power_h, reach = natural_power(h, m.order - 1), reached(times(0.0, state), state)
     error = carried.begun(m, state, errors, h)
@@ -328,9 +331,9 @@ def to_event(m, cell, mode, active):
         h, power_h, fine = length(m, pieces, state, unit, tolerance, h, power_h, moving, limits, longest, furthest)
         trial = h
         if step == 0:
-            now, margins, broken, stuck = begun(m, pieces, facts, state, mode, on, tolerance, active)
+            now, margins, broken, steep, stuck = begun(m, pieces, facts, state, mode, on, tolerance, active)
             margins = carried.wider(m, margins, state, mode, errors)
-            trial, moving = where(any_of(now), 0.0, h), moving & not_(broken | stuck)
+            trial, moving = where(any_of(now), 0.0, h), moving & not_(broken | steep | stuck)
         tried = where(moving, tried + 1.0, tried)
         # so long that each event is proved to fall all along or to stay clear
         seen = shows_all(m, pieces, state, mode, unit, trial, tolerance)
@@ -365,7 +368,7 @@ def to_event(m, cell, mode, active):
         now, moving = never, moving & not_(meets)
         if not any_lane(moving):
             break
-    lost = moving
+    lost = moving | steep
     met = active & not_(lost | stuck | broken | grazing)
     end, which, hangs, fired, others, ends = ended(m, pieces, facts, passed, met, span, tolerance, state, mode)
     t = where(met, t + end, t)
