@@ -8,7 +8,6 @@ thread. A table in the file has a digest of each chunk, a row of them for each b
 
 from __future__ import annotations
 
-import ctypes
 import errno
 import functools
 import json
@@ -44,6 +43,9 @@ OF_DAMAGE = (errno.EINVAL, errno.EOVERFLOW)
 """What the system says where a damaged file sends one to a place that cannot be."""
 NOTHING = {STATUS: int(Status.PENDING), METHOD_USED: -1}
 """What is handed out of cells that are not computed yet, where that is not NaN."""
+MODULUS, ROW = 65535, 4096
+NUMBERS = np.arange(ROW, dtype=np.uint64)
+"""Numbers of the words in a row, and of the rows that are summed at a time: at most ROW, so that 32 bits hold a sum."""
 
 
 class Damaged(SweepError):
@@ -344,18 +346,25 @@ def key_of(fd: int, end: int) -> bytes:
     return xxhash.xxh3_128_digest(found + struct.pack("<q", os.fstat(fd).st_size))
 
 
-@functools.cache
-def _fletcher32() -> Any:
-    """HDF5's own function, of an address and a number of bytes: it comes with the library that h5py has loaded."""
-    from h5py import h5z
-
-    found = ctypes.CDLL(h5z.__file__).H5_checksum_fletcher32
-    found.argtypes, found.restype = (ctypes.c_void_p, ctypes.c_size_t), ctypes.c_uint32
-    return found
-
-
 def checksum(piece: Any, length: int) -> bytes:
-    """HDF5's checksum of a chunk of so many bytes (its filter fletcher32), which are those of `piece`, then zeros."""
+    """HDF5's checksum of a chunk of so many bytes (its filter fletcher32), which are those of `piece`, then zeros.
+
+    Of big-endian words w[0] .. w[n-1] of 16 bits it is (sum of w[i], sum of (n - i) w[i]) modulo 65535. As 2^16 is 1
+    there, a word with its bytes swapped is 256 times the word. And with the words in rows of K, sum of i w[i] is K
+    times the sum of row numbers by sums of rows, and the sum of column numbers by sums of columns.
+    """
     raw = np.frombuffer(disk.as_bytes(piece), np.uint8)
-    raw = raw if raw.size == length else np.pad(raw, (0, length - raw.size))
-    return int(_fletcher32()(raw.ctypes.data, length)).to_bytes(4, "little")
+    whole, low, high = raw.size - raw.size % (2 * ROW), 0, 0
+    rows = raw[:whole].view("<u2").reshape(-1, ROW)
+    last = np.frombuffer(raw[whole:].tobytes() + bytes(raw.size % 2), "<u2")[None]
+    for part in (*(rows[at : at + ROW] for at in range(0, len(rows), ROW)), last):
+        by_row = part.sum(axis=1, dtype=np.uint32).astype(np.uint64)
+        by_column = part.sum(axis=0, dtype=np.uint32).astype(np.uint64)
+        more = int(by_row.sum())
+        numbered = ROW * int(by_row @ NUMBERS[: len(by_row)]) + int(by_column @ NUMBERS[: len(by_column)])
+        high += part.size * (low + more) - numbered
+        low += more
+    high += (-(-length // 2) - rows.size - last.size) * low  # words are counted from the end of the chunk
+    # 256 times a sum modulo 65535, as HDF5 has it: 0 stands for a sum that is zero itself
+    first, second = (256 * total % MODULUS or (MODULUS if total else 0) for total in (low, high))
+    return (second << 16 | first).to_bytes(4, "little")

@@ -38,3 +38,15 @@ def test_long_chunks_have_the_checksum_of_hdf5(size, fill):
     raw = np.random.default_rng(size).integers(0, 256, size, "u1") if fill == "random" else np.full(size, fill, "u1")
     for more in (0, 1, 8000):
         assert checksum(raw, size + more) == by_hdf5(padded(raw, size + more))
+
+
+def test_sums_that_are_a_multiple_of_65535_are_told_from_zero():
+    # 0xffff is 0 modulo 65535, but HDF5 keeps it apart from words that are zero
+    for words in ([0xFFFF], [0xFFFF, 0xFFFF], [1, 0xFFFE], [0, 0]):
+        raw = np.array(words, "<u2").view("u1")
+        assert checksum(raw, raw.size) == by_hdf5(raw)
+
+
+def test_the_largest_words_do_not_overflow():
+    raw = np.full(16 << 20, 255, "u1")
+    assert checksum(raw, raw.size) == by_hdf5(raw)
