@@ -135,6 +135,36 @@ def growth(random, n):
     return {"x0": 10.0 ** random.uniform(-307, 0, n), "T": 10.0 ** random.uniform(0, 2.84, n)}
 
 
+def _logistic_truth(x0, T):
+    x0, T = REAL(1) * x0, REAL(1) * T
+    x = 1 / (1 + (1 - x0) / x0 * np.exp(-T))
+    return Truth(T, [x, T], [x, T], 1 + T)
+
+
+@family(
+    scene("logistic", "x t", "x0 T", lambda x: (x * (1 - x), 1.0), lambda t, T: T - t, lambda x0: (x0, 0.0)),
+    _logistic_truth,
+)
+def logistic(random, n):
+    """What grows as e^t for long before it bends: what each step errs by, of x, adds up over all steps."""
+    return {"x0": 10.0 ** random.uniform(-120, -1, n), "T": random.uniform(1, 300, n)}
+
+
+def _quick_start_truth(x0, T):
+    x0, T = REAL(1) * x0, REAL(1) * T
+    x = np.sqrt(x0 * x0 + 2 * T)
+    return Truth(T, [x, T], [x, T], 1 + 0 * T)
+
+
+@family(
+    scene("quick_start", "x t", "x0 T", lambda x: (1 / x, 1.0), lambda t, T: T - t, lambda x0: (x0, 0.0)),
+    _quick_start_truth,
+)
+def quick_start(random, n):
+    """Steps that begin 1e27 times shorter than the way: terms of a series in units of it are no numbers."""
+    return {"x0": 10.0 ** random.uniform(-12, 0, n), "T": 10.0 ** random.uniform(-3, 3, n)}
+
+
 def _grazing_truth(h, d, W):
     """x = cos(t) + 1 + d over 0: met at arccos(-1 - d), only where d < 0."""
     d = REAL(1) * d

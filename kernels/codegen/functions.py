@@ -14,7 +14,7 @@ from kernels.expression.graph import ADD, CHOSEN, DIV, HALF_SQUARE, INPUT, MUL, 
 from kernels.expression.hidden import Enclosures
 from kernels.expression.rounding import Losses, Sizes
 from kernels.expression.series import V, Values
-from kernels.expression.tangent import SHORT, Tangents, along, short
+from kernels.expression.tangent import ROUGH, Tangents, along, short
 from kernels.integrate.carried import Changes
 from kernels.integrate.driver import KINK_LIMIT, STILL
 from kernels.integrate.pairs import ROUNDINGS
@@ -334,7 +334,7 @@ class Functions:
         rates = dict(zip(self.states, recorded.timed, strict=True))
         if tells:
             rates |= {f".delta_{s}": self.tangents.of(x) for s, x in rates.items()}
-        lengths = {"inner": short(recorded.rates, self.feeds_back, order), "rough": SHORT[order]} if tells else {}
+        lengths = {"inner": short(recorded.rates, order), "rough": ROUGH[order]} if tells else {}
         taken = {"inner": (), "rough": ()}
 
         def curves(starts, unit, series):
