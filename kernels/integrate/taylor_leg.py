@@ -281,10 +281,10 @@ def begun(m, pieces, facts, state, mode, on, tolerance, active):
     """Of a leg's first step: the events behind already, the margins of all; broken, steep and stuck lanes.
 
     Steep is what changes so much faster than the leg is long that the last terms of a series are no numbers any more;
-    where the first ones are none, the rates or their slopes are not defined.
+    where the first ones are none, rates, their slopes or products are not defined.
     """
-    sound, first, second, last = (finite(tuple(u[k] for u in pieces.states)) for k in (0, 1, 2, -1))
-    steep = active & sound & first & second & not_(last)
+    sound, first, third, last = (finite(tuple(u[k] for u in pieces.states)) for k in (0, 1, 3, -1))
+    steep = active & sound & first & third & not_(last)
     broken = active & not_(sound & last | steep)
     now = tuple((o < 0.5) & (fact[0] <= 0.0) for o, fact in zip(on, facts, strict=True))
     pressed = tuple((o > 0.5) & not_(rises(fact[1], fact[2])) for o, fact in zip(on, facts, strict=True))
