@@ -63,7 +63,7 @@ def export(
     >>> import sweep
     >>> ds = sweep.run(kernel="foliot", outputs=["period"], axes={"mu": [0.5, 1.0, 2.0]}, fixed={"phi0": 1.0, "a": 1.0})
     >>> print(sweep.export(ds, "period.csv", force=True).read_text().splitlines()[-1])
-    2.0,1.0,1.0,0.0,0.0,0.0,1.0,0.0,1.0,5.524901443102082,1e-15,OK,closed
+    2.0,1.0,1.0,0.0,0.0,0.0,1.0,0.0,1.0,5.524901443102082,1.0000001e-15,OK,closed
     """
     require_dataset("export", dataset)
     target = as_path(path)
