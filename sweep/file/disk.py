@@ -66,11 +66,16 @@ def read_all(fd: int, buffers: Sequence[Any], offset: int) -> None:
 
 
 def _through(call: Callable[..., int], fd: int, pieces: Sequence[Any], offset: int) -> None:
-    for view in map(as_bytes, pieces):
-        while view:
-            if not (count := call(fd, [view], offset)):
-                raise EOFError("the file ends early")
-            offset, view = offset + count, view[count:]
+    left = [view for piece in pieces if (view := as_bytes(piece))]
+    while left:
+        count = call(fd, [*left], offset)
+        if not count:
+            raise EOFError("the file ends early")
+        offset += count
+        while left and count >= len(left[0]):
+            count -= len(left.pop(0))
+        if count:
+            left[0] = left[0][count:]
 
 
 def as_bytes(piece: Any) -> memoryview:
@@ -104,10 +109,12 @@ def replacing(target: Path, held: bool = False) -> Iterator[Path]:
         stack.callback(remove, part)
         part.touch()  # says in plain words that there is no such folder, or no permission
         yield part
+        if target.is_dir() and not part.is_dir():
+            raise SweepError(f"{target} is a folder; name a file in it")
         for inner in (*part.rglob("*"), part):
             sync_folder(inner)
-        if part.is_dir() and target.exists():
-            # what is there cannot be replaced by a folder in one step, and stands aside meanwhile
+        if target.is_dir() or (part.is_dir() and target.exists()):
+            # a folder cannot be replaced in one step, and stands aside meanwhile
             remove(old)
             stack.callback(lambda: remove(old) if target.exists() else rename(old, target))
             rename(target, old)

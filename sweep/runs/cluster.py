@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import functools
 import gc
 import logging
 import math
@@ -89,11 +88,13 @@ class Cluster:
         dask blames a worker's death on every block that waited there, so those given up are tried again one by one.
         """
 
-        async def settled() -> Done:
-            ask = functools.partial(self._client.submit, Remote.compute, self._remote, job, wanted, pure=False)
+        def ask() -> Any:
+            return self._client.submit(Remote.compute, self._remote, job, wanted, pure=False)
+
+        async def settled(asked: Any) -> Done:
             try:
                 try:
-                    return await answer(ask())
+                    return await answer(asked)
                 except distributed.KilledWorker:
                     async with self._suspects:
                         return await answer(ask())
@@ -105,7 +106,10 @@ class Cluster:
                 what = f"{label} cannot be computed ({type(fault).__name__}: {fault}); what is finished is kept"
                 raise SweepError(f"cluster: {what}; isolated, a cell of which its process dies is FAILED") from fault
 
-        return asyncio.run_coroutine_threadsafe(settled(), self._client.loop.asyncio_loop)
+        try:
+            return asyncio.run_coroutine_threadsafe(settled(ask()), self._client.loop.asyncio_loop)
+        except Exception as fault:
+            raise _lost(fault) from fault
 
 
 async def answer(asked: Any) -> Done:

@@ -22,7 +22,7 @@ WALLS = {
     },
     "start": lambda x0, y0, v0: (x0, v0, y0, -1.0),
 }  # fmt: skip
-pytestmark = pytest.mark.skipif(COMPILED, reason="compiled in test_functions; run with NUMBA_DISABLE_JIT=1")
+plain = pytest.mark.skipif(COMPILED, reason="compiled in test_functions; run with NUMBA_DISABLE_JIT=1")
 
 
 def found(kernel, method, *cell, flips, rtol=1e-9, **more):
@@ -35,6 +35,7 @@ def walls():
     return scene_kernel(**WALLS)
 
 
+@plain
 @pytest.mark.parametrize(
     ("flips", "time", "x", "v", "w"),
     [(1, 0.5, 1.0, 1.0, -1.0), (2, 1.75, 0.375, -0.5, -1.0), (3, 2.5, 0.0, -0.5, 1.0), (4, 4.5, 1.0, 0.5, 1.0)],
@@ -46,6 +47,7 @@ def test_each_surface_has_its_own_jump(walls, flips, time, x, v, w):
     assert [outputs[name] for name in ("time", "x", "v", "w")] == pytest.approx([time, x, v, w], abs=1e-12)
 
 
+@plain
 def test_surfaces_that_are_met_at_once_all_jump_and_a_start_that_falls_from_one_jumps_at_once(walls):
     """Into the corner at t = 0.5, to the right wall at 1.5; a ball on the right wall that goes on to the right."""
     outputs, status = found(walls, "taylor_once", 0.5, 0.5, 0.5, -1.0, flips=2)
@@ -55,6 +57,7 @@ def test_surfaces_that_are_met_at_once_all_jump_and_a_start_that_falls_from_one_
     assert [outputs[name] for name in ("time", "x", "v")] == pytest.approx([2.0, 0.0, -0.5], abs=1e-12)
 
 
+@plain
 @pytest.mark.parametrize("method", ["taylor", "dop853", "rodas5p"])
 def test_a_section_beside_an_impact_is_passed_and_counts_behind_it_too(method):
     """A falling ball: its top, v through 0, before the floor where it is thrown up by e; resting there it sticks."""
@@ -70,6 +73,7 @@ def test_a_section_beside_an_impact_is_passed_and_counts_behind_it_too(method):
     assert found(kernel, method, 0.0, flips=5)[1] != Status.OK
 
 
+@plain
 @pytest.mark.parametrize("method", ["taylor", "dop853", "rk4"])
 def test_what_both_sides_press_onto_a_surface_does_not_pass_through_it(method):
     """An oscillator whose dry friction is written by `side`: it turns twice, and is held where the spring is weaker."""
@@ -86,6 +90,7 @@ def test_what_both_sides_press_onto_a_surface_does_not_pass_through_it(method):
         assert found(several, method, 0.3, flips=8)[1] == Status.STICKS
 
 
+@plain
 def test_what_an_impact_leaves_at_rest_on_a_moving_wall_sticks_and_goes_where_the_wall_recedes():
     """Behind the impact the relative speed is 0 but for rounding."""
     wall = scene_kernel(
@@ -105,6 +110,7 @@ SECTION = {
 }  # fmt: skip
 
 
+@plain
 @pytest.mark.parametrize("method", ["taylor", "dop853", "rodas5p", "rk4"])
 def test_a_surface_without_a_side_and_without_a_jump_is_passed_once_a_period(method):
     step = {"step": 0.03} if method == "rk4" else {}
@@ -125,10 +131,14 @@ def test_a_surface_without_a_side_and_without_a_jump_is_passed_once_a_period(met
 def test_surfaces_and_switches_that_do_not_fit_are_refused(changed, says):
     with pytest.raises(SceneError, match=says):
         scene_kernel(**WALLS | changed)
+
+
+def test_where_there_is_one_surface_more_are_refused():
     with pytest.raises(SceneError, match="one surface"):
         stepped_kernel(**WALLS)
 
 
+@plain
 @pytest.mark.parametrize("method", ["taylor", "dop853", "rodas5p"])
 def test_the_jump_of_a_surface_that_is_not_met_need_not_be_defined(method):
     """A ball gets 3 J/kg at the floor, and loses 2.25 at a lid 1 m above: more than it comes down with."""
