@@ -82,7 +82,7 @@ def test_a_flipped_bit_is_found_wherever_anything_stands_and_a_whole_result_is_w
         chunks = [int(at) + k for c in columns for at, done in zip(c.at, c.table.done, strict=True) if done
                   for k in (0, c.size, c.size + c.check - 1)]  # fmt: skip
     rng = random.Random(3)
-    for at in special + rng.sample(range(end), 30) + rng.sample(chunks, 20):
+    for at in special + rng.sample(range(end), 60) + rng.sample(chunks, 40):
         flip(file, at, at % 8)
         assert not sweep.verify(path).whole, at
         assert path != file or sweep.verify(path) != before, at
@@ -169,7 +169,7 @@ def cut(request, tmp_path_factory):
     return path
 
 
-@settings(max_examples=8, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=15, deadline=None, suppress_health_check=list(HealthCheck))
 @given(key=PIECES, cell=st.integers(0, CELLS - 1))
 def test_any_piece_is_right_or_refused(cut, tmp_path, key, cell):
     """A cell that is damaged takes its block along, and nothing else, however blocks are cut."""
