@@ -151,7 +151,7 @@ FORCED = {
 
 
 @plain
-@pytest.mark.parametrize("since", [0.0, -3.0, 1e3])
+@pytest.mark.parametrize("since", [0.0, -3.0, -1e3, 1e3])
 def test_the_time_is_asked_for_without_a_state_and_counts_from_the_start_time(since):
     """The output `time` counts from the start."""
     w, end = 1.3, 7.0
