@@ -16,7 +16,7 @@ from sweep.cells.schema import ERROR_BOUND, METHOD_USED, STATUS
 from sweep.cells.solve import GIVEN_UP, among, usable_methods
 from sweep.errors import SweepError
 from sweep.results.filter import cells_at
-from sweep.results.statuses import STATUS_NAMES, cell_text, cell_values, flag_words, statuses_of
+from sweep.results.statuses import STATUS_NAMES, cell_text, cell_values, flag_words, require_as_read, statuses_of
 from sweep.study.model import SMALLEST_RTOL, Study, short
 from sweep.study.read import study as study_of
 from sweep.words import Table, page
@@ -173,12 +173,13 @@ class Checked:
 def again(dataset: xr.Dataset, numbers: Any, allow_import: bool) -> tuple[Study, xr.Dataset, dict[str, Any]]:
     """A result's study, some cells along "cell", and their parameters and rtol as the kernel has them."""
     study, cells = study_of(dataset, allow_import=allow_import), cells_at(dataset, numbers).compute()
+    require_as_read(dataset, study)
     columns = {"rtol": np.full(len(numbers), cells.get("rtol", study.rtol))}
     for field in study.kernel.parameters:
         name = study.follows.get(field.name, field.name)
         column = cells.coords.get(name)
-        if column is None or column.attrs.get("units", field.unit) != field.unit:
-            raise SweepError(f"{name}: is lost or in another unit; take cells of the result as it was read")
+        if column is None:
+            raise SweepError(f"{name}: is lost; take cells of the result as it was read")
         values = np.vectorize(lambda value, field=field: field.choices.get(value, value), otypes=[float])(column)
         columns[field.name] = values if "cell" in column.dims else np.repeat(values[None], len(numbers), axis=0)
     # beside other states it is seen that a state is 0 but for rounding

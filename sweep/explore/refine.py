@@ -34,7 +34,7 @@ from sweep.file import disk
 from sweep.file.disk import check_target
 from sweep.file.open import store_cells
 from sweep.results.filter import cells_at
-from sweep.results.statuses import statuses_of
+from sweep.results.statuses import require_as_read
 from sweep.runs.loop import Task
 from sweep.runs.run import computed
 from sweep.study.model import Axis, Study, frozen
@@ -198,15 +198,15 @@ def _require(dataset: xr.Dataset, study: Study, names: Sequence[str], tolerance:
     axes = study.axes.values()
     if not 0 < tolerance < 1:
         raise SweepError(f"tolerance: expected a number between 0 and 1, found {tolerance}")
-    statuses_of(dataset)
+    require_as_read(dataset, study)
     if any(axis.words is not None or axis.values.ndim > 1 for axis in axes):
         raise SweepError("only number axes can be refined")
     if study.design != "product" and not axes_of(dataset):
         raise SweepError("only a product of axes can be refined, or what was refined before")
     if len(axes) > MOST_AXES:
         raise SweepError(f"at most {MOST_AXES} axes can be refined, found {len(axes)}; fix the others")
-    if study.design == "product" and any(len(axis) < 2 or not (np.diff(axis.values) > 0).all() for axis in axes):
-        raise SweepError("an axis to be refined needs at least two values, in rising order")
+    if any(np.unique(dataset[axis.name]).size < 2 for axis in axes):
+        raise SweepError("an axis to be refined needs at least two values")
     if not all(np.isfinite(axis.values).all() for axis in axes):
         raise SweepError("an axis to be refined needs finite values")
     for name in names:

@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 
 from sweep.errors import SweepError
+from sweep.results.statuses import require_as_read
 from sweep.study.designs import LEVELS, problem, require_salib
 from sweep.study.model import Study, study_together
 
@@ -61,6 +62,7 @@ def sensitivity(dataset: xr.Dataset, y: str | xr.DataArray) -> xr.Dataset:
     study = None if text is None else Study.from_json(study_together(str(text), dataset.coords), declared=True)
     if study is None or study.design not in ("saltelli", "morris"):
         raise SweepError('the design of the result is neither "saltelli" nor "morris"; sensitivity needs one of these')
+    require_as_read(dataset, study, whole=True)  # cells follow each other as the design has them
     found = dataset[y] if isinstance(y, str) and y in dataset else y
     if not isinstance(found, xr.DataArray) or found.dims != dataset["status"].dims:
         known = ", ".join(str(name) for name, v in dataset.data_vars.items() if v.dims == dataset["status"].dims)

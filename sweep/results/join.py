@@ -19,6 +19,7 @@ from sweep.errors import SweepError
 from sweep.file.disk import check_target
 from sweep.file.open import memory, store_cells
 from sweep.results.diff import diff
+from sweep.results.statuses import require_as_read, statuses_of
 from sweep.study.model import SETTINGS, Axis, Block, Study, frozen, setting, study_together
 from sweep.words import as_path, listed, require_dataset
 
@@ -74,12 +75,14 @@ def join(
         require_dataset("join", dataset)
         if STATUS not in dataset or "study_json" not in dataset.attrs:
             raise SweepError("only results that keep their cells can be joined")
-        if bool((dataset[STATUS] == Status.PENDING).any()):
+        if bool((statuses_of(dataset) == Status.PENDING).any()):
             raise SweepError("an unfinished result cannot be joined; run its sweep to the end first")
     if 2 * sum(dataset.nbytes for dataset in results) > memory():
         raise SweepError("the two results together do not fit into the memory")
     texts = (study_together(str(dataset.attrs["study_json"]), dataset.coords) for dataset in results)
     studies = [Study.from_json(text, declared=True) for text in texts]
+    for dataset, study in zip(results, studies, strict=True):
+        require_as_read(dataset, study, whole=True)
     # what they differ in: "axes.mu", "fixed.a", "rtol"; of axes that run together "points"
     old, new = map(_said, studies)
     apart = sorted(name for name in {*old, *new} - {"study"} if old.get(name) != new.get(name))

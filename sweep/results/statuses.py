@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from sweep.file.reading import Numbers, StoredFile
+    from sweep.study.model import Study
 
     Cells: TypeAlias = xr.Dataset | StoredFile
 
@@ -92,7 +93,27 @@ def statuses_of(dataset: Cells) -> Any:
         raise SweepError(
             "this Dataset has no status of cells, so it is no result; sweep.run and sweep.open_result give one"
         )
+    if dataset[STATUS].dtype.kind not in "iu":
+        raise SweepError(
+            "status holds fractions or NaN, as after ds.where(...) or a mean; take the result as it was read, or cells "
+            "of it by sweep.where(ds, \"status == 'OK'\")"
+        )
     return dataset[STATUS]
+
+
+def require_as_read(dataset: xr.Dataset, study: Study, whole: bool = False) -> None:
+    """Raises SweepError where statuses or axes are lost or something is in another unit than the kernel has it; of a
+    `whole` result also where outputs are lost, or its cells are not those of its study in their order."""
+    statuses_of(dataset)
+    needed = (*study.axes, *study.outputs) if whole else study.axes
+    for field in (*study.kernel.parameters, *study.kernel.outputs):
+        column = dataset.get(field.name)
+        if field.name in needed if column is None else column.attrs.get("units", field.unit) != field.unit:
+            raise SweepError(f"{field.name}: is lost or in another unit; take cells of the result as it was read")
+    for name, axis in study.axes.items() if whole else ():
+        values, own = np.asarray(dataset.get(name, ())), np.array(axis.words or axis.values)
+        if not np.array_equal(values, own, equal_nan=own.dtype.kind == "f" == values.dtype.kind):
+            raise SweepError(f"{name}: cells are sorted or left out; take the whole result as it was read")
 
 
 def flag_words(variable: xr.DataArray) -> dict[int, str]:
@@ -170,8 +191,8 @@ def cell_values(dataset: Cells, index: int) -> dict[str, str]:
     cell = {}
     for name, coordinate in dataset.coords.items():
         if coordinate.dims and set(coordinate.dims) <= set(column.dims):
-            value = coordinate.values[tuple(at[str(d)] for d in coordinate.dims)].item()
-            cell[str(name)] = value if isinstance(value, str) else repr(float(f"{value:.6g}"))
+            value = coordinate.values[tuple(at[str(d)] for d in coordinate.dims)]
+            cell[str(name)] = repr(float(f"{value:.6g}")) if isinstance(value, np.number) else str(value)
     return cell
 
 

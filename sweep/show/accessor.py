@@ -51,8 +51,11 @@ class SweepAccessor:
     def __repr__(self) -> str:
         """What `ds.sweep` prints: the table of statuses, if there are any, and what else can be asked."""
         names = ", ".join(name for name in vars(type(self)) if not name.startswith("_"))
-        counted = {"status", "cells_by_status"} & set(self._dataset.variables)
-        return (f"{self.statuses()}\n\n" if counted else "") + f"ds.sweep has: {names}"
+        try:
+            counted = f"{self.statuses()}\n\n"
+        except sweep.SweepError:  # it has none
+            counted = ""
+        return f"{counted}ds.sweep has: {names}"
 
     def plot(self, path: str | os.PathLike[str] | None = None, **keys: Any) -> Any:
         """The figure of one output: as `sweep.plot`, logarithmic along axes whose grid is."""

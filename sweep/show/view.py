@@ -90,7 +90,8 @@ class View:
                 shown = shown.sortby(dim)
         self.y = values = shown[name].transpose(*([across] if across else []), along)
         status = shown["status"] if "status" in shown else xr.zeros_like(values, int)
-        self.status = status.broadcast_like(values).transpose(*values.dims).values.astype(int)
+        # what ds.where has left out has no value either
+        self.status = status.fillna(0).broadcast_like(values).transpose(*values.dims).values.astype(int)
         self.meanings = flag_words(status)
 
     @property

@@ -68,6 +68,8 @@ def test_the_same_cells_have_the_same_errors_in_every_call(kind):
         (lambda: sweep.run(build(axes={"height": [1.0, 2.0]})), "fall_time", 'neither "saltelli" nor "morris"'),
         (lambda: cells("morris", 4), "fal_time", "there is no output 'fal_time'"),
         (lambda: cells("morris", 4, where="v0 > '0.5 m/s'"), "fall_time", "cells have no value"),
+        (lambda: cells("morris", 4).sortby("height"), "fall_time", "sorted"),
+        (lambda: cells("saltelli", 4).isel(cell=slice(16)), "fall_time", "left out"),
     ],
 )
 def test_what_cannot_be_told_is_refused(make, y, message):

@@ -10,6 +10,8 @@ import sweep
 from kernels.interface import Status
 
 HEIGHTS = [1.0, 2.0, 4.0, 8.0]
+AXES = {"axes": {"height": HEIGHTS, "v0": [0.0, 1.0]}}
+UNITS = {"fall_time": "ms", "height": "mm", "v0": "km/h", "g": "mm/s^2"}
 
 
 def of(heights=HEIGHTS, v0=(0.0, 1.0), **keys):
@@ -115,6 +117,35 @@ def unfinished():
 def test_what_does_not_fit_is_refused(results, options, message):
     with pytest.raises(sweep.SweepError, match=message):
         sweep.join(*results(), **options)
+
+
+@pytest.mark.parametrize(
+    ("change", "refused"),
+    [
+        (lambda ds: ds.isel(height=slice(None, None, -1)), "join"),
+        (lambda ds: ds.isel(height=slice(2)), "join"),
+        (lambda ds: ds.isel(height=0), "join refine"),
+        (lambda ds: ds.rename(height="h"), "join refine check"),
+        (lambda ds: ds.where(ds.height > 1), "join refine check statuses"),
+        *((lambda ds, n=n, u=u: sweep.in_units(ds, {n: u}), "join refine check") for n, u in UNITS.items()),
+    ],
+)
+def test_what_is_no_longer_as_it_was_read_is_refused_where_it_would_give_other_numbers(change, refused):
+    keys = {"fixed": {"g": 9.0}, "outputs": ["fall_time"]}
+    uses = {
+        "join": lambda ds: sweep.join(ds, ds, axis="version"),
+        "refine": lambda ds: sweep.refine(ds, "fall_time", 0.2, study=build(**AXES, **keys)).dataset,
+        "check": lambda ds: ds.sweep.check(allow_import=True),
+        "statuses": lambda ds: ds.sweep.statuses(),
+    }
+    changed = change(sweep.run(build(**AXES, **keys)))
+    for name, use in uses.items():
+        if name in refused.split():
+            with pytest.raises(sweep.SweepError, match=r"as it was read|two values"):
+                use(changed)
+        else:
+            use(changed)
+    assert "plot" in repr(changed.sweep)
 
 
 @pytest.mark.parametrize("what", ["status", "fall_time"])
