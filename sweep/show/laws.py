@@ -62,7 +62,7 @@ def pick(dataset: xr.Dataset, choices: Sequence[str]) -> xr.Dataset:
             found = order[np.isclose(values[order], float(value), rtol=1e-5, atol=0, equal_nan=True)]
             nearest = listed(f"{v:.6g}" for v in values[order[:2]])
         else:
-            found = np.flatnonzero(values.astype(str) == value)
+            found = np.flatnonzero(values.astype(object) == value)
             nearest = listed(dict.fromkeys(map(str, values)), quote=True)
         if not len(found):
             raise SweepError(f"{choice}: {name} has no such value; nearest is {nearest}")

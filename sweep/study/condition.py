@@ -161,7 +161,7 @@ def _is_array(value: Any) -> bool:
 def _kind(value: Any) -> str:
     """Kind of values as numpy has it; "b" of arrays alone, "f" of any number, "U" of words."""
     if _is_array(value):
-        return {"O": "U"}.get(value.dtype.kind, str(value.dtype.kind))
+        return {"O": "U", "T": "U"}.get(value.dtype.kind, str(value.dtype.kind))
     return "U" if isinstance(value, str) else "f"
 
 

@@ -49,11 +49,17 @@ def test_csv_has_the_digits_of_single_precision_where_a_number_has_no_more(tmp_p
 
 
 def test_zarr_is_opened_by_plain_xarray_without_a_warning(tmp_path):
-    path = sweep.export(result(), tmp_path / "out.zarr")
+    """Its words have a type of numpy's own."""
+    study = toy_studies.build(axes={"height": [-1.0, 1.0], "method": ["exact", "rough"]})
+    path = sweep.export(found := sweep.run(study), tmp_path / "out.zarr")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         with xr.open_zarr(path) as back:
-            np.testing.assert_array_equal(back.fall_time, result().fall_time)
+            np.testing.assert_array_equal(back.fall_time, found.fall_time)
+            assert str(back.sweep.statuses()) == str(found.sweep.statuses())
+            assert back.sweep.where("method == 'rough'").sizes["cell"] == 2
+            cell = back.sweep.cell(height=1.0, method="rough", allow_import=True)
+            assert cell.method == "rough"
 
 
 def test_netcdf_keeps_full_precision_however_the_source_was_packed(tmp_path):
