@@ -183,9 +183,9 @@ class Solver:
                 rows = slice(begin, begin + self._strip)
                 if wanted is None or wanted[rows].any():
                     self._solve_strip(start + begin, part(cells, rows), None if wanted is None else wanted[rows])
-        except (SystemExit, KeyboardInterrupt) as fault:
+        except BaseException as fault:
             # only in the main thread may it be Ctrl-C, or what a program does at a signal
-            if threading.current_thread() is threading.main_thread():
+            if isinstance(fault, Exception) or threading.current_thread() is threading.main_thread():
                 raise
             raise RuntimeError(f"it raised {type(fault).__name__}, which would have ended Python") from fault
 

@@ -34,7 +34,7 @@ from sweep.file import disk
 from sweep.file.disk import check_target
 from sweep.file.open import store_cells
 from sweep.results.filter import cells_at
-from sweep.results.statuses import require_as_read
+from sweep.results.statuses import require_as_read, statuses_of
 from sweep.runs.loop import Task
 from sweep.runs.run import computed
 from sweep.study.model import Axis, Study, frozen
@@ -198,7 +198,10 @@ def _require(dataset: xr.Dataset, study: Study, names: Sequence[str], tolerance:
     axes = study.axes.values()
     if not 0 < tolerance < 1:
         raise SweepError(f"tolerance: expected a number between 0 and 1, found {tolerance}")
+    statuses_of(dataset)
     require_as_read(dataset, study)
+    if not names:
+        raise SweepError("y: name at least one output")
     if any(axis.words is not None or axis.values.ndim > 1 for axis in axes):
         raise SweepError("only number axes can be refined")
     if study.design != "product" and not axes_of(dataset):

@@ -20,6 +20,7 @@ import numpy as np
 from kernels.interface import FIRST_REFUSAL, Field, Status
 from sweep.cells.sample import drawn, multiplied, solved
 from sweep.cells.schema import STATUS, Columns
+from sweep.results.statuses import require_as_read
 from sweep.study.model import Study, differs
 from sweep.study.read import Given
 from sweep.study.read import study as as_study
@@ -78,7 +79,7 @@ class Scaling:
     """
 
     def __init__(self, study: Study) -> None:
-        held, tried = _held(study)
+        self._study, (held, tried) = study, _held(study)
         fields = [f.name for f in (*study.kernel.parameters, *study.kernel.along)]
         weights = {f: [row[f] for row in held.values()] for f in fields if any(row.get(f) for row in held.values())}
         arrays = any(field.dims for field in study.kernel.parameters)
@@ -148,6 +149,7 @@ class Scaling:
         ['group_1']
         """
         require_dataset("scaling(...).rescaled", dataset)
+        require_as_read(dataset, self._study)
         values = {str(name): dataset[name] for name in dataset.coords}
         for number, group in enumerate(self.groups, 1):
             coordinate = group.of(values).assign_attrs(units="1", long_name=str(group))

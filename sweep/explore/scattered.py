@@ -23,6 +23,7 @@ from kernels.interface import FIRST_REFUSAL, Status
 from sweep.cells.schema import ERROR_BOUND, STATUS
 from sweep.errors import SweepError
 from sweep.explore.mesh import Array, Indices, Mesh
+from sweep.study.units import in_unit
 from sweep.words import require_dataset
 
 LOGARITHMIC = 1.999
@@ -129,7 +130,11 @@ def interpolated(dataset: xr.Dataset, at: Mapping[str, Sequence[float] | Array])
         raise SweepError("only cells that fill a box of two axes and more, as those of `refine`, can be interpolated")
     if set(at) != set(names):
         raise SweepError(f"at: expected values of {', '.join(names)}, found {', '.join(at) or 'none'}")
-    grids = {name: np.asarray(values, dtype=np.float64) for name, values in at.items()}
+    units = {name: str(dataset[name].attrs.get("units", "1")) for name in names}
+    try:
+        grids = {name: np.asarray(in_unit(values, units[name], name), np.float64) for name, values in at.items()}
+    except (TypeError, ValueError) as fault:
+        raise SweepError(f"at: expected numbers: {fault}") from None
     whole = np.meshgrid(*grids.values(), indexing="ij")
     box, status, shape = Box.of(dataset, names), dataset[STATUS], whole[0].shape
     points = box.points(dataset)

@@ -18,6 +18,7 @@ from sweep.errors import SweepError
 from sweep.study.model import SETTINGS, Axis, Study
 from sweep.study.read import Given
 from sweep.study.read import study as as_study
+from sweep.study.units import in_unit
 from sweep.words import listed
 
 
@@ -41,6 +42,7 @@ class PointSolver:
         if study.summary is not None:
             raise SweepError("summary: a solver gives cells; leave it out")
         self.names, self.fields = tuple(study.axes), (*study.outputs, "status")
+        self._units = [(study.kernel.parameter(name).unit, name) for name in self.names]
         self._study = replace(study, design="zip", blocks=(), axes=dict(study.axes))  # the axes are those of each call
         grid = Grid(self._study)
         grid.size = np.iinfo(np.int64).max
@@ -55,7 +57,8 @@ class PointSolver:
         Parameters
         ----------
         *values, **named : float or ndarray
-            In SI units, in the order of `names` or by name; arrays are broadcast.
+            In SI units, in the order of `names` or by name; arrays are broadcast. Quantities of pint, and DataArrays
+            that have a unit, are converted.
 
         Returns
         -------
@@ -72,7 +75,8 @@ class PointSolver:
         try:
             if named or len(values) != len(self.names):
                 values = self._signature.bind(*values, **named).args
-            points = np.array(np.broadcast_arrays(*values), np.float64)
+            given = (in_unit(value, *of) for value, of in zip(values, self._units, strict=True))
+            points = np.array(np.broadcast_arrays(*given), np.float64)
         except (TypeError, ValueError) as error:
             expected = listed(self.names, word="and")
             raise SweepError(f"expected numbers, or arrays of them, for {expected}: {error}") from None

@@ -78,9 +78,17 @@ def check_output(y: Any) -> None:
         raise SweepError(f"{title(y)}: expected real numbers, found {y.dtype}")
 
 
+def number(what: str, value: Any) -> float:
+    """A number; raises SweepError for what is none."""
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        raise SweepError(f"{what}: expected a number, found {value!r}") from None
+
+
 def check_options(confidence: float = 0.95, noise: bool | str | None = None, sigma: Any = None) -> None:
     """Raises SweepError where confidence is no share, or noise none of the words or given beside sigma."""
-    if not 0 < confidence < 1:
+    if not 0 < number("confidence", confidence) < 1:
         raise SweepError(f"confidence: expected a number between 0 and 1, found {confidence}")
     words = [word for word in NOISES if word != "noise"]
     if not (noise is None or isinstance(noise, bool) or noise in words):
@@ -104,7 +112,7 @@ def positive_axis(y: xr.DataArray, dim: str, repeated: bool = False) -> tuple[st
     axes = [str(name) for name, coordinate in y.coords.items() if coordinate.ndim == 1]
     if dim not in axes:
         others = f"; {title(y)} runs along {', '.join(axes) or 'no axis with values'}"
-        if dim in y.coords:
+        if str(dim) in y.coords:
             raise SweepError(f"{dim} has one value here, so nothing can be fitted along it{others}")
         raise SweepError(f"{title(y)} has no axis {dim!r}" + (did_you_mean(dim, axes) or others))
     values = y.coords[dim].values

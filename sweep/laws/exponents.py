@@ -123,7 +123,7 @@ def where_exponent(
     check_names(y, {*y.coords, *y.dims} & {"abscissa", "abscissa_error"})
     if not curve.size:
         raise SweepError(f"{title(curve)} has no line along {dim}; an axis of it is empty: {dict(curve.sizes)}")
-    inside, t, value = curves.inside_window(x, window, dim), np.log(x), float(value)
+    inside, t, value = curves.inside_window(x, window, dim), np.log(x), curves.number("value", value)
     orders = ((6, 0), (4, 0)) if values else ((6, 7), (4, 5))  # points of the interpolation and of the slopes
 
     def one(z: Array) -> tuple[float, float]:
@@ -201,7 +201,8 @@ def exponent_map(y: xr.DataArray, dim: str, levels: Sequence[float] = BORDERS) -
     logarithmic = [is_logarithmic(y[name].values) for name in names]
     across, down = (np.log(y[n].values) if take else y[n].values for n, take in zip(names, logarithmic, strict=True))
     generator = contourpy.contour_generator(across, down, np.ma.masked_invalid(local.exponent.values))
-    by_level = ((level, line) for level in levels for line in generator.lines(float(level)))
+    numbers = [curves.number("levels", level) for level in np.atleast_1d(levels).tolist()]
+    by_level = ((level, line) for level in numbers for line in generator.lines(level))
     lines = [np.insert(np.array(line, np.float64), 2, level, axis=1) for level, line in by_level]
     points = np.concatenate([np.empty((0, 3)), *lines])
     points[:, :2][:, logarithmic] = np.exp(points[:, :2][:, logarithmic])

@@ -102,9 +102,8 @@ def statuses_of(dataset: Cells) -> Any:
 
 
 def require_as_read(dataset: xr.Dataset, study: Study, whole: bool = False) -> None:
-    """Raises SweepError where statuses or axes are lost or something is in another unit than the kernel has it; of a
-    `whole` result also where outputs are lost, or its cells are not those of its study in their order."""
-    statuses_of(dataset)
+    """Raises SweepError where axes are lost, or a unit is not the kernel's; of a `whole` result also where outputs are
+    lost, or its cells are not those of its study in their order."""
     needed = (*study.axes, *study.outputs) if whole else study.axes
     for field in (*study.kernel.parameters, *study.kernel.outputs):
         column = dataset.get(field.name)

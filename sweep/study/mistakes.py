@@ -70,7 +70,8 @@ class Entry:
             unit = str(getattr(found, "units", getattr(found, "unit", "")))
             found = getattr(found, "magnitude", found)
             # what is masked, as netCDF4 does with what is missing, is no number
-            found = found.astype(float).filled(np.nan) if np.ma.is_masked(found) else np.asarray(found)
+            masked = isinstance(found, np.ma.MaskedArray) and np.ma.is_masked(found)
+            found = found.astype(float).filled(np.nan) if masked else np.asarray(found)
             found = found if found.ndim == 1 and found.dtype == np.float64 else found.tolist()
         at = f"{self.where}[{key}]" if isinstance(key, int) else f"{self.where}.{key}".removeprefix(".")
         return replace(self, value=found, where=at, unit=unit)

@@ -84,6 +84,19 @@ def scale(text: str, wanted: str, name: str) -> Decimal | None:
     return factor / wanted_factor
 
 
+def in_unit(value: Any, wanted: str, name: str) -> Any:
+    """Numbers; those of a quantity of pint, or of a DataArray that says its unit, in the unit of the field `name`.
+
+    Raises
+    ------
+    UnitMistake
+        As of `scale`.
+    """
+    unit = str(getattr(value, "units", ""))
+    factor = scale(unit, wanted, name) if unit else None
+    return getattr(value, "magnitude", value) * (1 if factor is None else float(factor)) if unit else value
+
+
 def exponents(text: str) -> dict[str, Fraction]:
     """Powers of the base units in a unit, radian among them: {"radian": 1, "second": -2}. Raises UnitMistake."""
     return {base: Fraction(str(power)).limit_denominator(1000) for base, power in _root(text)[1].items()}

@@ -152,6 +152,8 @@ def _spaced(entry: Entry, field: Field, factor: Decimal | None, shares: Floats |
         elif key == "num":
             cure = "; for a single value write values = [...]"
             found[key] = entry[key].read(math.nan, whole, 2, LARGEST_AXIS, cure)
+        elif (own := entry[key].unit) and (own != field.unit or "unit" in entry):
+            entry[key].wrong(f'has the unit "{own}" itself; give a number, and write unit = "{own}" beside it')
         else:
             found[key] = entry[key].read(math.nan, finite)
             if spacing == "log" and found[key] <= 0:
@@ -237,6 +239,8 @@ def _columns(file: Any, folder: Path, field: Field, numbered: bool) -> Floats:
             headings = next(rows, [])
             names = [f"{name}_{i + 1}" for i in range(len(headings))] if numbered else [name]
             places = [headings.index(n) for n in itertools.takewhile(headings.__contains__, names)]
+            if any(headings.count(n) > 1 for n in names):
+                raise ValueError(f"{path} has two columns of one name; its first line is {','.join(headings)[:60]}")
             if not places and (numbered or len(headings) > 1):
                 columns = f"columns {name}_1, {name}_2, ..." if numbered else f'column "{name}"'
                 raise ValueError(f"{path} has no {columns}; its first line is {','.join(headings)[:60]}")

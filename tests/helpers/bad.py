@@ -17,8 +17,8 @@ RAISES, CRASHES, EXITS, HANGS, HOGS, HUNGRY, ORPHANS, QUITS, MUMBLES = (11.0 * k
 """Heights at which the kernel misbehaves."""
 
 
-class Mumbling(Exception):
-    """Cannot say what it is."""
+class Mumbling(BaseException):
+    """Cannot say what it is, and is no `Exception`."""
 
     def __str__(self):
         raise ValueError("no words")

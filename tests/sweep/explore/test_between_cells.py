@@ -27,6 +27,7 @@ def test_lines_of_an_exponent_are_where_theory_has_them():
     found = sweep.exponent_map(period(), "mu")
     assert found.exponent.dims == ("mu", "a")
     np.testing.assert_allclose(np.unique(found.level), [-0.5], rtol=1e-12)
+    assert sweep.exponent_map(period(), "mu", -0.5).sizes["point"] == found.sizes["point"]
     np.testing.assert_allclose(found.mu_on_border / found.a_on_border, 3**1.5, rtol=2e-3)
     assert set(found.line.values) == {0}
     assert (float(found.a_on_border.min()), float(found.a_on_border.max())) == pytest.approx((0.1, 10))
@@ -88,6 +89,11 @@ def test_a_power_law_is_straight_and_so_interpolated_exactly():
     assert found.y.dims == ("a", "b")
     np.testing.assert_allclose(found.y, 2 * at["a"][:, None] ** 0.5 / np.array(at["b"]), rtol=1e-12)
     assert found.y.attrs == {"units": "s"}
+    ds, in_mm = cells(), xr.DataArray(1000.0 * at["a"], attrs={"units": "mm"})
+    ds.a.attrs["units"] = "m"
+    np.testing.assert_allclose(sweep.interpolated(ds, {**at, "a": in_mm}).y, found.y, rtol=1e-12)
+    with pytest.raises(sweep.SweepError, match="expected numbers"):
+        sweep.interpolated(ds, {**at, "a": ["x"]})
 
 
 def test_between_cells_values_are_those_of_scipy():

@@ -213,6 +213,7 @@ def test_traces_are_kept_for_every_cell():
     [
         ({}, {}, {"y": "periods"}, "periods"),
         ({}, {}, {"y": "status"}, "no output"),
+        ({}, {}, {"y": []}, "one output"),
         ({}, {}, {"y": ["period", "mu"]}, "no output"),
         ({}, {}, {"tolerance": 0.0}, "between 0 and 1"),
         ({"method": ["auto"]}, {}, {}, "number axes"),

@@ -131,5 +131,7 @@ def test_outputs_rescaled_fall_on_one_curve_and_say_what_they_are():
     same = np.diff(np.log(alpha[order])) < 1e-12
     assert same.sum() > 3
     assert (abs(np.diff(np.log(period[order])))[same] < 1e-12).all()
+    with pytest.raises(sweep.SweepError, match="another unit"):
+        sweep.scaling(study).rescaled(sweep.in_units(ds, {"a": "1/minute"}))
     reread = sweep.scaling(study).rescaled(ds)
     xr.testing.assert_identical(reread, free)

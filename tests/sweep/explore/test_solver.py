@@ -1,7 +1,9 @@
 """A study's kernel as a function: the numbers of the sweep itself, bit for bit, of one cell and of many."""
 
 import numpy as np
+import pint
 import pytest
+import xarray as xr
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from running import tall
@@ -49,6 +51,8 @@ def test_arrays_are_broadcast_traces_come_behind_and_no_call_changes_what_an_ear
     assert found.status.shape == (2, 3)
     assert np.allclose(found.drop[..., 1], [[1.0] * 3, [2.0] * 3])
     assert fall([], []).status.shape == (0,)
+    in_mm, in_cm = xr.DataArray(1000.0, attrs={"units": "mm"}), pint.UnitRegistry().Quantity([100.0], "cm")
+    assert fall(in_mm, 0.0).drop[1] == fall(in_cm, [0.0]).drop[0, 1] == fall(1.0, 0.0).drop[1]
     one = fall(3.0, 0.0).drop
     fall(5.0, 0.0)
     assert one.tolist() == [0.0, 3.0]
@@ -69,6 +73,7 @@ def test_what_is_refused_is_nan_and_says_why():
         ((1.0,), {"height": 2.0}, "multiple values"),
         (("x", 1.0), {}, "numbers"),
         (([1.0, 2.0], [1.0, 2.0, 3.0]), {}, "numbers"),
+        ((xr.DataArray(1.0, attrs={"units": "kg"}), 1.0), {}, "mass"),
     ],
 )
 def test_a_wrong_call_is_told(values, named, word):

@@ -231,6 +231,7 @@ def test_a_window_holds_its_ends_to_rounding_and_may_be_open(window, points):
         ({"confidence": 95}, "confidence"),
         ({"confidence": 0.0}, "confidence"),
         ({"confidence": np.nan}, "confidence"),
+        ({"confidence": "a"}, "confidence: expected a number"),
     ],
 )
 def test_what_a_line_cannot_be_fitted_with_is_refused(keys, message):

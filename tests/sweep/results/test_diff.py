@@ -92,6 +92,9 @@ def test_points_are_compared_by_number():
 def test_what_cannot_be_compared_is_refused(result):
     with pytest.raises(sweep.SweepError, match="keeps no cells"):
         sweep.diff(result, sweep.run(build(axes=AXES, summary={})))
+    for name, unit in (("fall_time", "ms"), ("height", "mm"), ("g", "mm/s^2")):
+        with pytest.raises(sweep.SweepError, match=f"{name} is in .* and in "):
+            sweep.diff(result, sweep.in_units(result, {name: unit}))
     with pytest.raises(sweep.SweepError, match="different kernels"):
         sweep.diff(result, result.assign_attrs(kernel="foliot"))
     with pytest.raises(sweep.SweepError, match="height and v0"):

@@ -85,6 +85,7 @@ def test_an_axis_may_be_a_column_of_a_csv_file(read, tmp_path, text):
         ("height,v0\n1,2\n3\n", "line 3: expected 2 columns, found 1"),
         ("height,v0\n1,2\n3,4,5\n", "line 3: expected 2 columns, found 3"),
         ("v0,g\n1,2\n", 'no column "height"'),
+        ("height,v0,height\n1,2,3\n", "two columns"),
         ("v0\n1\n", 'line 1: expected a number, found "v0"'),
         ("height\n", "holds no values"),
         ("", "holds no values"),
@@ -92,7 +93,7 @@ def test_an_axis_may_be_a_column_of_a_csv_file(read, tmp_path, text):
         (b"height\n\x00\n", "points.csv"),
         (bytes(1_000_000), "is not a csv file"),
     ],
-    ids=range(11),
+    ids=range(12),
 )
 def test_a_bad_csv_file_is_told_by_line(mistakes, tmp_path, text, message):
     (tmp_path / "points.csv").write_bytes(text if isinstance(text, bytes) else text.encode())

@@ -8,6 +8,7 @@ from fractions import Fraction
 
 import mpmath
 import numpy as np
+import pandas as pd
 import pint
 import pytest
 from hypothesis import given
@@ -123,9 +124,13 @@ def test_numbers_that_have_a_unit_themselves_are_converted():
     for entry in (in_degrees, {"values": in_degrees}):
         again = sweep.study(**keys | {"axes": {"mu": entry}})
         np.testing.assert_allclose(again.axes["mu"].values, study.axes["mu"].values, rtol=1e-15)
+    of_pandas = sweep.study(**keys | {"axes": {"mu": pd.array([1, None], "Int64")}})  # what is missing is no number
+    np.testing.assert_array_equal(of_pandas.axes["mu"].values, [1.0, np.nan])
     for entry, where in (
         (of_pint([1.0], "kg"), "axes.mu"),
         ({"values": in_degrees, "unit": "rad/s^2"}, "axes.mu.unit"),
+        ({"spacing": "log", "start": in_degrees[0], "stop": 10.0, "num": 2}, "axes.mu.start"),
+        ({"spacing": "log", "start": 1.0, "stop": of_pint(3.0, "rad/s^2"), "num": 2, "unit": "1/s^2"}, "axes.mu.stop"),
     ):
         assert message_of(lambda entry=entry: sweep.study(**keys | {"axes": {"mu": entry}}), where)
 
