@@ -114,7 +114,7 @@ def positive_axis(y: xr.DataArray, dim: str, repeated: bool = False) -> tuple[st
         others = f"; {title(y)} runs along {', '.join(axes) or 'no axis with values'}"
         if str(dim) in y.coords:
             raise SweepError(f"{dim} has one value here, so nothing can be fitted along it{others}")
-        raise SweepError(f"{title(y)} has no axis {dim!r}" + (did_you_mean(dim, axes) or others))
+        raise SweepError(f"{title(y)} has no axis {dim!r}" + (did_you_mean(str(dim), axes) or others))
     values = y.coords[dim].values
     if values.dtype.kind in "mM":
         since = f" since a moment before the first, ({dim} - MOMENT)" if values.dtype.kind == "M" else f", {dim}"
