@@ -94,7 +94,7 @@ def fit_two_laws(
     0.6
     """
     check_output(y)
-    check_names(y, {*y.dims} & {"law"} - {dim})
+    check_names(y, {*y.dims} & {"law"} - {str(dim)})
     keys: dict[str, Any] = {"confidence": confidence, "noise": noise}
     if windows is None:
         law = "equation (1) of sweep.laws.two_laws"
