@@ -120,8 +120,12 @@ def _draw_lines(axes: Any, shown: View) -> None:
     x, lines, status = shown.values(shown.x), np.atleast_2d(shown.y.values), np.atleast_2d(shown.status)
     for i, y in enumerate(lines):
         look = line_look(i)
+        gap = np.pad(~np.isfinite(y), 1, constant_values=True)
+        lone = np.flatnonzero(~gap[1:-1] & gap[:-2] & gap[2:])  # no line would show them
         if not shown.joined:
             look |= {"linestyle": "", "marker": MARKS[i % len(MARKS)], "markersize": 2.5}
+        elif lone.size:
+            look |= {"marker": ".", "markevery": lone.tolist()}
         axes.plot(x, y, label=setting(shown.axis(shown.across)[i]) if shown.across else None, **look)
     for code, mark in zip(shown.codes(), cycle(MARKS), strict=False):
         colour = shown.colour(code)

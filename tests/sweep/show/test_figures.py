@@ -106,6 +106,15 @@ def test_cells_that_are_not_ok_are_marked_on_the_line_or_at_its_foot():
     assert drawn(only.axes[0])[1].get_color() == colours["BAD_INPUT"] != colours["INACCURATE"]
 
 
+def test_a_value_between_two_that_are_missing_is_a_point():
+    ds = dataset(mu=log())
+    assert drawn(plot(ds).axes[0])[0].get_marker() == "None"
+    ds["period"][[1, 5, 7]] = np.nan
+    line = drawn(plot(ds).axes[0])[0]
+    assert (line.get_marker(), line.get_markevery()) == (".", [0, 6])
+    assert drawn(plot(ds.isel(mu=[3])).axes[0])[0].get_markevery() == [0]
+
+
 @pytest.mark.parametrize(
     "axes", [{"mu": log()}, {"mu": log(), "a": [1.0, 2.0]}, {"mu": log(), "a": np.arange(1.0, 12)}]
 )
