@@ -277,9 +277,10 @@ def described(result: xr.Dataset, x: xr.DataArray, y: xr.DataArray) -> xr.Datase
     names = [name for name in FIELDS if name in result]
     ends = {name: [f"{name}_low", f"{name}_high"] if f"{name}_low" in result else [] for name in names}
     result = result[[one for name in ends for one in (name, *ends[name])]]
+    own = {key: str(given.attrs.get("long_name", given.name)) for key, given in (("x", x), ("y", y)) if given.name}
     for name in ends:
         unit = (x if name in IN_X else y).attrs.get("units", "1") if name in IN_X + IN_Y else "1"
-        words = FIELDS[name], *(f"{end} end of the interval of {name}" for end in ("low", "high"))
+        words = own.get(name, FIELDS[name]), *(f"{end} end of the interval of {name}" for end in ("low", "high"))
         for one, text in zip((name, *ends[name]), words, strict=False):
             result.variables[one].attrs = {"units": str(unit), "long_name": text}
     if any(ends.values()):

@@ -226,7 +226,7 @@ def laws_figure(found: xr.Dataset) -> Figure:
             above.plot(x, curve, label=name, linewidth=1.4 if law == chosen else 0.8, **look)
             below.plot(x, y / curve - 1, linewidth=0.8, marker=".", markersize=2, **look)
             if law == chosen:
-                band = {"color": look["color"], "linewidth": 0}
+                band = {"color": look["color"], "linewidth": 0, "label": f"twice the scatter about {law}"}
                 above.fill_between(x, curve * np.exp(-size), curve * np.exp(size), alpha=0.2, **band)
                 below.axhspan(-np.expm1(size), np.expm1(size), alpha=0.15, **band)
         above.set(xscale="log", yscale="log", ylabel=label(found.y.rename(found.attrs["y"])))

@@ -244,4 +244,5 @@ def test_points_and_laws_are_drawn_the_chosen_first():
     assert [line.get_label() for line in laws] == ["law1, AICc +1.23, chosen", "law0, AICc best", "law2, AICc +2.47"]
     for line, off in zip(laws, (1.02, 1.01, 1.03), strict=True):
         np.testing.assert_allclose(line.get_xydata(), np.column_stack([X, Y * off]), rtol=1e-15)
+    assert "twice the scatter about law1" in words(above.figure)
     assert (above.get_title(), len(below.lines)) == ("one law by 10", 4)  # and the zero
