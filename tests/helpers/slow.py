@@ -30,13 +30,6 @@ def called(height, *rest):
     toy.exact(height, *rest)
 
 
-def hungry(height, *rest):
-    """As `toy.exact`, but 13 m is more than the memory."""
-    if (height == 13).any():
-        raise MemoryError
-    toy.exact(height, *rest)
-
-
 def lethal(height, *rest):
     """As `toy.exact`; the process dies of 13 m, if it is a child of another Python."""
     if (height == 13).any() and multiprocessing.parent_process() is not None:
@@ -51,4 +44,4 @@ def kernel(solve):
     )
 
 
-SLOW, CALLED, HUNGRY, LETHAL = map(kernel, (slow, called, hungry, lethal))
+SLOW, CALLED, LETHAL = map(kernel, (slow, called, lethal))

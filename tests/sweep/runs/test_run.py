@@ -391,11 +391,6 @@ def test_a_file_too_large_for_the_system_is_one_clear_line(output):
     assert sweep.verify(output).whole
 
 
-def test_too_little_memory_is_one_line():
-    with pytest.raises(SweepError, match="memory"):
-        quiet(tall(1000, "slow:HUNGRY"), block_cells=1)
-
-
 def test_no_more_threads_compute_than_there_are_workers(tmp_path):
     """Cells that sleep for a twentieth of a second take their time, however fast the machine is."""
     begun = time.monotonic()

@@ -185,3 +185,5 @@ def test_what_is_no_study_is_refused_in_one_line_that_names_the_way(tmp_path):
     for keys, message in (({"workes": 2}, "did you mean workers?"), ({"rtol": 1e-3}, "do not go with a study")):
         with pytest.raises(sweep.SweepError, match=message):
             sweep.run(*([study] if "rtol" in keys else []), **keys)
+    with pytest.raises(sweep.SweepError, match="expected a Study"):
+        sweep.to_toml({})
