@@ -17,12 +17,12 @@ _GAUSS = np.polynomial.legendre.leggauss(24)
 
 
 class Machine:
-    """Arm, tool and work; `type` +1 for A, -1 for B."""
+    """Arm, tool and work, of a cell's parameters; `type` 0 for A, 1 for B."""
 
-    def __init__(self, b, d, f, e, type, omega, b_angle, L, beta, w_x, w_y, Omega, a, width, n, m):
-        self.links, self.side, self.omega, self.b_angle = (b, d, f, e), type, omega, b_angle
+    def __init__(self, b, d, f, e, type, omega, b_angle, L, beta, w_x, w_y, Omega, tool_a, tool_b, tool_n, tool_m, **_):
+        self.links, self.side, self.omega, self.b_angle = (b, d, f, e), -1 if type else 1, omega, b_angle
         self.reach, self.beta, self.centre, self.spin = L, beta, complex(w_x, w_y), Omega
-        self.tool = (a, width, n, m)
+        self.tool = (tool_a, tool_b, tool_n, tool_m)
 
     def arm(self, theta):
         """Angle of the arm from the x axis and its rate by time, at crank angles `theta` from b."""

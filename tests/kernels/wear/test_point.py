@@ -28,11 +28,7 @@ def wear(rtol=NEAREST, **changed):
 def truth(**changed):
     """The same: entries and exits by sampling and bisection, then Gauss between them, in 40 pieces each."""
     p = POINT | changed
-    side = -1 if p["type"] else 1
-    machine = oracles.Machine(
-        p["b"], p["d"], p["f"], p["e"], side, p["omega"], p["b_angle"], p["L"], p["beta"], p["w_x"], p["w_y"],
-        p["Omega"], p["tool_a"], p["tool_b"], p["tool_n"], p["tool_m"],
-    )  # fmt: skip
+    machine = oracles.Machine(**p)
 
     def place(t):
         return machine.ring(p["r0"], p["theta0"] + p["Omega"] * t)
@@ -85,7 +81,7 @@ def test_wear_is_that_of_the_way_within_its_stated_error(name):
 def test_under_a_load_a_point_wears_by_the_speed_over_the_area_of_contact():
     """In time steps of 1e-5 of it, as far as they tell; within the rim as under a pressure."""
     changed = {"w_x": 52.0, "w_y": 0.0, "pressure": 0.0, "load": 3.0, "r0": 4.0, "tau": 3.0}
-    machine = oracles.Machine(62.01, 38.0, 40.5, 10.0, 1, 1.0, -0.66, 50.0, 0.0, 52.0, 0.0, 0.4, 5.0, 5.0, 2.0, 2.0)
+    machine = oracles.Machine(**POINT | changed)
     h = changed["tau"] / 100_000
     t = (np.arange(100_000) + 0.5) * h
     place, theta = machine.ring(4.0, 0.3 + 0.4 * t), t + 0.66

@@ -24,13 +24,7 @@ def wear(radius, rtol=1e-9, **changed):
 
 def truth(radius, oracle_rtol=1e-12, **changed):
     """The same by the oracle."""
-    cell = PAPER | changed
-    names = ("b", "d", "f", "e", "omega", "b_angle", "L", "beta", "w_x", "w_y", "Omega")
-    values = {name: cell[name] for name in names}
-    shape = cell["tool_a"], cell["tool_b"], cell["tool_n"], cell["tool_m"]
-    side = -1 if cell["type"] else 1
-    machine = oracles.Machine(**values, type=side, a=shape[0], width=shape[1], n=shape[2], m=shape[3])
-    return oracles.ring_wear(machine, radius, oracle_rtol) / (4 * math.pi**2)
+    return oracles.ring_wear(oracles.Machine(**PAPER | changed), radius, oracle_rtol) / (4 * math.pi**2)
 
 
 AWKWARD = {
@@ -66,7 +60,7 @@ areas = pytest.mark.skipif(not COMPILED, reason="thousands of areas")
 
 def under_a_load(radius, rim, w_x):
     """Wear by that load on the paper's round tool, by 20 000 instants: arcs and areas in closed form."""
-    machine = oracles.Machine(62.01, 38.0, 40.5, 10.0, 1, 1.0, -0.66, 50.0, 0.0, w_x, 1.0, 0.4, 5.0, 5.0, 2.0, 2.0)
+    machine = oracles.Machine(**PAPER | {"w_x": w_x})
     theta = (np.arange(20_000) + 0.5) / 20_000 * 2 * math.pi
     far = 50.0 * np.exp(1j * machine.arm(theta)[0]) - machine.centre
     half = np.arccos(np.clip((radius**2 + abs(far) ** 2 - 25.0) / (2 * radius * abs(far)), -1, 1))
