@@ -7,6 +7,7 @@ import sys
 import numpy as np
 import pytest
 import xarray as xr
+from running import same
 from toy_studies import build
 
 import sweep
@@ -181,15 +182,21 @@ def test_xarray_opens_a_result_as_one_of_ours(clocks, tmp_path):
         assert opened.period.equals(clocks.period)
 
 
-def test_the_study_of_a_long_axis_is_whole_for_plain_xarray_too(tmp_path):
+def test_the_study_of_a_long_axis_is_whole_for_plain_xarray_too_and_two_of_them_are_joined(tmp_path):
     """Its values stand in the file once, as the coordinate."""
-    with sweep.run(FOLIOT | {"axes": {"mu": np.geomspace(0.3, 30.0, 3000)}}, tmp_path / "long.h5") as written:
-        study = sweep.study(written)
-    with xr.open_dataset(tmp_path / "long.h5") as plain:
-        assert sweep.study(plain) == study
-        assert plain.sweep.check(sample=2).beyond == 0
+    mu = np.geomspace(0.3, 30.0, 3000)
+    for part in (0, 1):
+        with sweep.run(FOLIOT | {"axes": {"mu": mu[part::2]}}, tmp_path / f"{part}.h5") as written:
+            study = sweep.study(written)
+    with (
+        xr.open_dataset(tmp_path / "0.h5", engine="h5netcdf") as even,
+        xr.open_dataset(tmp_path / "1.h5", engine="h5netcdf") as odd,
+    ):
+        assert sweep.study(odd) == study
+        assert odd.sweep.check(sample=2).beyond == 0
+        same(sweep.join(even, odd), sweep.run(FOLIOT | {"axes": {"mu": mu}}))
         with pytest.raises(sweep.SweepError, match="mu"):
-            sweep.study(plain.isel(mu=slice(10)))
+            sweep.study(odd.isel(mu=slice(10)))
 
 
 def test_a_value_where_another_method_finds_that_there_is_none_is_beyond(clocks):

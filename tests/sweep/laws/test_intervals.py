@@ -258,6 +258,8 @@ def test_one_law_is_not_called_two_whatever_its_noise(kind):
     t = axis(12)
     found = sweep.fit_two_laws(curve(t, -0.5 * t + noise_of(kind, 12, 10, seed=11)), "mu", noise=False)
     assert int((found.regimes == 2).sum()) <= 1
+    for z in -0.5 * axis(61) + noise_of(kind, 61, 5):
+        assert sweep.compare_laws(curve(axis(61), z), "mu").attrs["chosen"] == "one law"
 
 
 # other laws

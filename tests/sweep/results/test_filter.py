@@ -22,9 +22,6 @@ SPEED = np.sqrt(V**2 + 2 * 9.80665 * np.where(FALLS, H, np.nan))
     [
         ("status == 'OK'", FALLS),
         ("status != 'OK'", ~FALLS),
-        ("1 < height <= 3 and v0 == 0", (H > 1) & (V == 0)),
-        ("not (height > 1 or v0 > 0.5)", (H <= 1) & (V <= 0.5)),
-        ("v0 < 0.4*height", V < 0.4 * H),
         ("impact_speed**2 - 40 > 0", SPEED**2 > 40),
         ("impact_speed / 2 > -(0 - 3)", SPEED > 6),
         ("method_used == 'rough'", FALLS & (V == 0)),
@@ -54,12 +51,10 @@ def test_a_chosen_cell_keeps_all_its_values():
 @pytest.mark.parametrize(
     ("condition", "message"),
     [
-        ("", "cannot be read"),
         ("status == 'OKAY'", 'status is never "OKAY"; did you mean OK?'),
         ("status == 0", "compares words with numbers"),
         ("drop > 0", "runs along phase"),
         ("__import__('os').system('true')", "is not allowed"),
-        ("height > " + "1+" * 900 + "1", "longer than"),
     ],
 )
 def test_what_is_no_condition_is_told(condition, message):

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-import xarray as xr
 from running import interrupted, same, tall
 from toy_studies import build
 
@@ -30,20 +29,6 @@ def of(heights=HEIGHTS, v0=(0.0, 1.0), **keys):
 def test_a_setting_or_a_fixed_parameter_becomes_an_axis(keys, name, values):
     found = sweep.join(*(of(**each) for each in keys))
     same(found, of(axes={name: values, "height": HEIGHTS, "v0": [0.0, 1.0]}))
-
-
-def test_results_that_xarray_opened_by_itself_are_joined_too(tmp_path):
-    """Their studies leave the values of long axes to the coordinates."""
-    parts = [np.linspace(1.0, 2.0, 600), np.linspace(2.0, 3.0, 600)]
-    for number, heights in enumerate(parts):
-        study = build(axes={"height": heights})
-        sweep.run(study, tmp_path / f"{number}.h5", progress=False).close()
-    with (
-        xr.open_dataset(tmp_path / "0.h5", engine="h5netcdf") as low,
-        xr.open_dataset(tmp_path / "1.h5", engine="h5netcdf") as high,
-        sweep.run(build(axes={"height": np.union1d(*parts)}), progress=False) as whole,
-    ):
-        same(sweep.join(low, high), whole)
 
 
 def test_words_become_an_axis_and_an_axis_of_words_becomes_longer():
