@@ -20,17 +20,13 @@ def cells(kind, n, **keys):
     return sweep.run(build(design={"kind": kind, "n": n, "seed": 5}, axes=AXES, **keys))
 
 
-def test_sobol_indices_of_a_sum_are_shares_of_its_variance():
+def test_sobol_indices_are_shares_of_the_variance_and_what_acts_together_is_in_the_total_alone():
     ds = cells("saltelli", 1024)
     assert ds.sizes["cell"] == 1024 * 5
     found = sweep.sensitivity(ds, 3 * ds.height + 4 * ds.v0 + 0.0 * ds.g)
     assert np.allclose(found.first_order, [9 / 25, 16 / 25, 0], atol=0.01)
     assert np.allclose(found.total, [9 / 25, 16 / 25, 0], atol=0.01)
     assert list(found.parameter.values) == ["height", "v0", "g"]
-
-
-def test_what_acts_together_is_in_the_total_alone():
-    ds = cells("saltelli", 1024)
     found = sweep.sensitivity(ds, (ds.v0 - 0.5) * (ds.height - 1.5))
     assert np.allclose(found.first_order, 0, atol=0.05)
     assert np.allclose(found.total, [1, 1, 0], atol=0.1)

@@ -1,7 +1,6 @@
 """What studies in TOML and Python become: axes, csv files, words, followers, array parameters, summaries, kernels."""
 
 import dataclasses
-import math
 import sys
 
 import numpy as np
@@ -176,11 +175,6 @@ def test_a_kernel_declares_each_name_once_and_none_of_the_results_own(name):
         with pytest.raises(sweep.SweepError, match=said):
             load_kernel("toy:OWN", True)
     del toy.OWN
-
-
-@pytest.mark.parametrize("values", [[1.0, math.nan], [math.inf], [-1.0], [0]])
-def test_values_outside_the_limits_are_no_mistake_of_the_study(values):
-    assert build(axes={"height": values}).axes["height"].values.shape == (len(values),)
 
 
 def test_a_kernel_beside_the_study_is_found(read, tmp_path):
