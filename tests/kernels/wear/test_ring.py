@@ -45,6 +45,7 @@ CHEAP = ("round tool", "resting workpiece")
 
 @pytest.mark.parametrize("name", list(AWKWARD) if COMPILED else CHEAP)
 def test_wear_is_that_of_time_and_arcs_within_its_stated_error(name):
+    """The oracle takes one to five seconds for each."""
     radius, changed = AWKWARD[name]
     rtol = 1e-9 if COMPILED else 1e-6
     value, error, status = wear(radius, rtol, **changed)

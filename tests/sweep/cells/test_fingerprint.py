@@ -45,9 +45,6 @@ def test_words_and_ways_of_writing_do_not_change_it():
     new = fingerprint(build(axes=spaced, title="Stones", question="Why?", along={"phase": {"num": 9}}))
     assert old == new
     assert difference(old, new) == []
-
-
-def test_a_negative_nan_is_the_same_nan():
     assert fingerprint(build(axes={"height": [-np.nan]})) == fingerprint(build(axes={"height": [np.nan]}))
 
 

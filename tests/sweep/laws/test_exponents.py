@@ -88,7 +88,7 @@ def passing_one(y, dim):
         ([-1.0, 2.0, 3.0], "mu", "found -1"),
         ([1.0, np.inf, 3.0], "mu", "finite"),
         ([1.0, 3.0, 2.0], "mu", "sort first"),
-        ([1.0, 1.0, 2.0], "mu", "more than once"),
+        ([1.0, 1.0, 2.0], "mu", "1 stands there more than once"),
         ([1.0, 2.0], "mu", "at least 3 points"),
         (["map", "closed", "auto"], "mu", "words"),
         (np.array(["2026-01-01", "2026-01-02", "2026-01-03"], "M8[ns]"), "mu", "holds times"),

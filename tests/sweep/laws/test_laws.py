@@ -350,7 +350,6 @@ def test_eight_points_are_enough_and_may_fall_or_have_gaps():
         (lambda y: sweep.compare_laws(y.expand_dims(a=[1.0, 2.0]), "x"), "one line"),
         (lambda y: sweep.compare_laws(-y, "x"), "positive values"),
         (lambda y: sweep.fit_correction(y.assign_coords(x=np.repeat([1.0, 9.0], 31)[:61]), "x"), "2 places"),
-        (lambda y: sweep.local_exponent(y.assign_coords(x=np.maximum(X, 3.0)), "x"), "3 stands there more than once"),
         (lambda y: sweep.fit_exponent(y, "x", bound=y.rename("other").to_dataset()), "Dataset has no "),
         (lambda y: sweep.fit_two_laws(y, "nu"), "no axis 'nu'"),
         (lambda y: sweep.fit_two_laws(y, ["x"]), "no axis"),

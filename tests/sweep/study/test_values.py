@@ -174,7 +174,6 @@ def test_the_designs_of_sensitivity_change_one_axis_at_a_time():
 @pytest.mark.parametrize(
     ("design", "where", "message"),
     [
-        ("sobol", "design", "how many points?"),
         ({"kind": "sobol", "n": 12}, "design.n", "write 8 or 16"),
         ({"kind": "random", "n": 8, "scramble": True}, "design.scramble", "no such key"),
         ({"kind": "zip", "n": 8}, "design.n", "no such key"),
@@ -194,19 +193,6 @@ def test_a_sampled_axis_has_no_values_of_its_own(entry):
 # blocks
 
 
-def test_blocks_are_a_product_of_designs():
-    found = sweep.run(build(blocks=BLOCKS))
-    assert dict(found.sizes) == {"point": 3, "g": 2}
-    assert found.height.dims == found.v0.dims == ("point",)
-    time = found.fall_time
-    np.testing.assert_allclose((found.v0 * time + found.g * time**2 / 2).transpose(..., "point"), [found.height] * 2)
-    least = sweep.run(build(blocks=BLOCKS, summary={"over": ["height", "v0"], "outputs": {"fall_time": ["argmin"]}}))
-    first = time.isel(point=time.argmin("point"))
-    np.testing.assert_array_equal(least.fall_time_argmin_height, first.height)
-    wrong = {"over": ["height"], "outputs": {"fall_time": ["min"]}}
-    assert "run together" in message_of(lambda: build(blocks=BLOCKS, summary=wrong), "summary.over")
-
-
 def test_arrays_go_into_a_block_of_their_own():
     arrays = {"design": "zip", "axes": {"mass": [[1.0, 2.0], [3.0, 4.0]], "place": [[1.0, 1.0], [2.0, 2.0]]}}
     keys = {"kernel": "beads:KERNEL", "outputs": ["moment"], "allow_import": True}
@@ -222,6 +208,7 @@ def test_arrays_go_into_a_block_of_their_own():
         ({"blocks": BLOCKS, "design": "zip"}, "design"),
         ({"blocks": {}}, "blocks"),
         ({"blocks": []}, "blocks"),
+        ({"blocks": BLOCKS, "summary": {"over": ["height"]}}, "summary.over"),
         ({"blocks": [3]}, "blocks[0]"),
         ({"blocks": [*BLOCKS, {"axes": {"g": [1.0]}}]}, "blocks[2].axes.g"),
         ({"blocks": [*BLOCKS, {"axes": {"h": [1.0]}}]}, "blocks[2].axes.h"),
