@@ -23,7 +23,8 @@ def where(dataset: xr.Dataset, condition: str) -> xr.Dataset:
         From `run` or `open_result`.
     condition : str
         Of names in the result, numbers and words: "status == 'OK' and R < 0.1*mu". Words are those of `status`,
-        `method_used` and of axes of words. Outputs along a coordinate of their own cannot be used.
+        `method_used` and of axes of words. Beside a name a number may have a unit: "amplitude > '60 degree'". Outputs
+        along a coordinate of their own cannot be used.
 
     Raises
     ------
@@ -54,7 +55,8 @@ def where(dataset: xr.Dataset, condition: str) -> xr.Dataset:
     def words(name: str) -> Iterable[str]:
         return flag_words(dataset[name]).values() or sorted(set(map(str, np.unique(dataset[name].values))))
 
-    chosen = Condition(condition, variable, words, "--where ")
+    units = {str(name): str(v.attrs["units"]) for name, v in dataset.variables.items() if "units" in v.attrs}
+    chosen = Condition(condition, variable, words, "--where ", units)
     status, truth = statuses_of(dataset), chosen.truth()
     dims = [str(dim) for dim in status.dims]
     if others := sorted({str(dim) for dim in truth.dims} - set(dims)):

@@ -7,7 +7,7 @@ import functools
 import operator
 import re
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from decimal import Decimal
 from typing import Any
 
@@ -47,16 +47,18 @@ class Condition:
     says : str
         Begins every message.
     units : mapping of str to str, optional
-        Of every name of numbers. If given, only like quantities can be compared and added, "'3 cm'" may stand beside
-        a name, and powers are whole numbers, computed by products: those of libraries differ from machine to machine
-        in the last digit.
+        Of every name of numbers, beside which "'3 cm'" may stand.
+    exact : bool
+        Only like quantities can be compared and added, and powers are whole numbers, computed by products: those of
+        libraries differ from machine to machine in the last digit.
     """
 
     text: str
     variable: Callable[[str], Any]
     words: Callable[[str], Iterable[str]]
     says: str = ""
-    units: Mapping[str, str] | None = None
+    units: Mapping[str, str] = field(default_factory=dict)
+    exact: bool = False
 
     def truth(self) -> Any:
         """Where it holds. Raises SweepError where it is too long or no expression, or compares what is unlike."""
@@ -83,7 +85,7 @@ class Condition:
                 return value, None
             case ast.Name(id=name):
                 found = self.variable(name)
-                return found, parsed(self.units[name]) if self.units and name in self.units else None
+                return found, parsed(self.units[name]) if self.exact and name in self.units else None
             case ast.UnaryOp(op=ast.USub(), operand=part):
                 number, unit = self._part(part, "fiu", "number")
                 return -number, unit
@@ -100,7 +102,7 @@ class Condition:
                 (value, unit), (other, its) = (self._part(part, "fiu", "number") for part in (left, right))
                 if isinstance(op, ast.Add | ast.Sub):
                     return compute(value, other), self._agreed(left, unit, right, its)
-                if isinstance(op, ast.Pow) and self.units is not None:
+                if isinstance(op, ast.Pow) and self.exact:
                     if not isinstance(other, int) or not 1 <= other <= 9:
                         raise self.refusal("is not allowed; a power is a whole number from 1 to 9", node)
                     return functools.reduce(operator.mul, [value * 1.0] * other), None if unit is None else unit**other
@@ -136,10 +138,10 @@ class Condition:
         """One side of a comparison; '3 cm' is a number in the unit of the name on the other side."""
         value, unit = self._value(node)
         match = re.fullmatch(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s+(\S.*)", value) if isinstance(value, str) else None
-        if match is None or self.units is None:
+        if match is None:
             return value, unit
         if not isinstance(other, ast.Name) or other.id not in self.units:
-            raise self.refusal(f"'{value}' has a unit; compare it with a parameter alone")
+            raise self.refusal(f"'{value}' has a unit; compare it with a name alone")
         try:
             return float((scale(match[2], self.units[other.id], other.id) or 1) * Decimal(match[1])), None
         except UnitMistake as error:
@@ -197,7 +199,7 @@ def cells_where(text: str, kernel: Kernel, settings: Iterable[str], column: Call
         return found
 
     units = {name: field.unit for name, field in fields.items() if not field.choices}
-    condition = Condition(text, variable, lambda name: fields[name].choices, units=units)
+    condition = Condition(text, variable, lambda name: fields[name].choices, units=units, exact=True)
     return condition.truth()
 
 

@@ -26,6 +26,7 @@ SPEED = np.sqrt(V**2 + 2 * 9.80665 * np.where(FALLS, H, np.nan))
         ("impact_speed / 2 > -(0 - 3)", SPEED > 6),
         ("method_used == 'rough'", FALLS & (V == 0)),
         ("g > 9", H == H),
+        ("height > '150 cm' and '1 km/hour' > v0", (H > 1.5) & (V < 1 / 3.6)),
         ("2**height > 3", 2**H > 3),
         ("height > 9**9**9**9", np.inf < H),
         ("height < 1e400", np.inf > H),
@@ -53,6 +54,8 @@ def test_a_chosen_cell_keeps_all_its_values():
     [
         ("status == 'OKAY'", 'status is never "OKAY"; did you mean OK?'),
         ("status == 0", "compares words with numbers"),
+        ("height > '1 kg'", "is a mass"),
+        ("2*height > '1 m'", "compare it with a name alone"),
         ("drop > 0", "runs along phase"),
         ("__import__('os').system('true')", "is not allowed"),
     ],

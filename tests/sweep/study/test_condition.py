@@ -46,7 +46,7 @@ def test_cells_are_those_that_plain_numpy_chooses(text, mask):
         ("v0**2 < height", "m"), ("height - v0 > 1", "meter"), ("height*g < v0", "meter"), ("v0/v0 < height", "meter"),
         ("v0 > 1 or height > v0", "meter"),
         ("height + height < v0", "meter"), ("height < '3 kg'", '"kg" is a mass; height is a length'),
-        ("2*height < '3 m'", "a parameter alone"), ("fall_time > 1", "fall_time"), ("shape == 1", "shape"),
+        ("2*height < '3 m'", "a name alone"), ("fall_time > 1", "fall_time"), ("shape == 1", "shape"),
         ("__import__('os').system('true') == 0", "not allowed"), ("height > 'tall'", "words with numbers"),
         ("g > " + "1 + " * 300 + "1", "longer"),
     ],
