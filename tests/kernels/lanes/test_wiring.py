@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from columns import asked_for, bounds, checked, solve
+from columns import asked_for, bounds, solve
 from numba.core.errors import TypingError
 
 from kernels.interface import Field, Status
@@ -149,11 +149,6 @@ def test_each_output_goes_to_the_column_of_its_name(name):
 
 def test_no_cells_are_no_fault():
     assert solve(TRIANGLE, "pythagoras", np.empty(0), np.empty(0))[1].size == 0
-
-
-def test_the_check_is_of_each_cell():
-    a = [1.0, 0.0, -1.0, math.nan, math.inf, 2.0]
-    assert checked(TRIANGLE, a, 1.0).tolist() == [0, 64, 64, 64, 64, 0]
 
 
 def test_outputs_that_a_method_lacks_are_no_numbers():

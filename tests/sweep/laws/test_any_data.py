@@ -110,14 +110,6 @@ def test_curves_of_any_data_collapse_or_are_refused():
         ), seed
 
 
-def test_curves_over_words_are_refused():
-    curves = xr.DataArray(
-        np.ones((2, 12)), {"clock": ["verge", "anchor"], "x": np.geomspace(1, 100, 12)}, ("clock", "x")
-    )
-    with pytest.raises(sweep.SweepError, match="clock: a collapse needs at least two values, all positive numbers"):
-        sweep.fit_collapse(curves, "x", "clock")
-
-
 # what is no output, no result and no study
 
 X = np.geomspace(1, 100, 12)

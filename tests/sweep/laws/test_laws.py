@@ -352,6 +352,8 @@ def test_eight_points_are_enough_and_may_fall_or_have_gaps():
         (lambda y: sweep.fit_correction(y.assign_coords(x=np.repeat([1.0, 9.0], 31)[:61]), "x"), "2 places"),
         (lambda y: sweep.fit_exponent(y, "x", bound=y.rename("other").to_dataset()), "Dataset has no "),
         (lambda y: sweep.fit_two_laws(y, "nu"), "no axis 'nu'"),
+        (lambda y: sweep.local_exponent(y.drop_vars("x"), "x"), "no axis"),
+        (lambda y: sweep.local_exponent(y.assign_coords(a=1.0), "a"), "one value"),
         (lambda y: sweep.fit_two_laws(y, ["x"]), "no axis"),
         (lambda y: sweep.fit_collapse(y, "x", ["L"]), "L"),
         (lambda y: sweep.where_exponent(y, "x", "a"), "value: expected a number"),
