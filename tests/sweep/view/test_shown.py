@@ -119,6 +119,7 @@ def test_a_list_of_cells_and_a_result_of_no_known_study_have_no_regions(dataset)
     for found, choice, word in (
         (sweep.run(study), Choice("period", "mu"), "list of cells"),
         (bare, MAP, "which study"),
+        (sweep.join(dataset, dataset, axis="version"), MAP, "axis version"),
     ):
         with pytest.raises(sweep.SweepError, match=word):
             region.study_text(found, choice)
