@@ -61,14 +61,16 @@ class CellReport:
         name, self.method = (flag_words(cell[words])[cell[words].item()] for words in (STATUS, METHOD_USED))
         self.status = Status[name]
         self.error_bound = cell[ERROR_BOUND].item() if ERROR_BOUND in cell else np.nan
-        self.methods, self.differs = dict[str, tuple[Status, float, dict[str, float]]](), dict[str, float]()
+        self.methods, columns = dict[str, tuple[Status, float, dict[str, float]]](), dict[str, Any]()
         part = zipped(study, {"rtol": [self.rtol]}, fixed=fixed, follows={})
         for method in (study.kernel.methods[k].name for k in usable_methods(part)):
-            found = solved(replace(part, method=method))
+            columns[method] = found = solved(replace(part, method=method))
             outputs = {name: float(found[name][0]) for name in self.values}
             self.methods[method] = Status[STATUS_NAMES[int(found[STATUS][0])]], float(found[ERROR_BOUND][0]), outputs
-            off = deviations(study, found, cells).values()
-            self.differs[method] = max((float(one[0]) for one in off), default=np.nan)
+        # of all methods together, which tell whether a state is 0 but for rounding
+        by_method = {name: np.concatenate([found[name] for found in columns.values()]) for name in study.outputs}
+        off = deviations(study, by_method, cells.isel(cell=[0] * len(columns))).values()
+        self.differs = {m: max((float(one[k]) for one in off), default=np.nan) for k, m in enumerate(columns)}
 
     def __repr__(self) -> str:
         special = "" if self.status is Status.OK else f" ({self.status.kind})"

@@ -130,8 +130,9 @@ def test_a_scene_whose_parameters_all_have_defaults_is_asked_again_and_what_is_0
     assert ds.sweep.check(allow_import=True).beyond == 0
     report = ds.sweep.cell(allow_import=True)
     assert abs(report.values["x"]) < 1e-15
-    report = ds.assign(x=-ds.x - 1e-17).sweep.cell(allow_import=True)
-    assert report.differs[report.method] == pytest.approx(0, abs=1e-12)
+    for x in (-ds.x - 1e-17, 1.05 * ds.x + 1e-30):  # by chance it may be almost what one method gives
+        report = ds.assign(x=x).sweep.cell(allow_import=True)
+        assert report.differs[report.method] == pytest.approx(0, abs=1e-12)
 
 
 def test_deviations_of_a_small_motion_are_those_of_the_same_motion_in_larger_units():
