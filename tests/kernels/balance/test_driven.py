@@ -64,6 +64,7 @@ def test_formulas_are_right_to_4e_15(drive, zeta, friction):
     ],
 )  # fmt: skip
 def test_newton_finds_the_cycle_to_1e_13_in_all_regimes_and_none_where_there_is_none(drive, zeta, friction, torque):
+    """The oracle takes up to two seconds."""
     columns = scenes(drive, zeta, friction, torque=torque)
     outputs, status = solve(BALANCE_DRIVEN, "newton", *columns, rtol=1e-13)
     assert set(status) <= {Status.OK, Status.INACCURATE, Status.STICKS}

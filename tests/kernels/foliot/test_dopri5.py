@@ -68,6 +68,7 @@ def test_every_term_and_their_mixtures_are_right_to_half_of_rtol():
 
 
 def test_drag_that_is_not_smooth_at_rest_is_right_to_half_of_rtol():
+    """The oracle takes two seconds."""
     rtol, cells = zip(*(NEAR_REST if COMPILED else NEAR_REST[:1]), strict=True)
     compare(cells, [foliot_oracles.cycle(**cell, digits=12) for cell in cells], np.array(rtol))
 

@@ -80,6 +80,7 @@ HARD = [
 
 @pytest.mark.parametrize("cell", HARD if COMPILED else HARD[14:16])
 def test_mixtures_and_degrees_that_are_hard(cell):
+    """The oracle takes up to a second and a half."""
     check([foliot_oracles.cycle(1.0, 1.0, **cell, digits=8)], **cell)
 
 

@@ -64,6 +64,7 @@ def test_sticking_agrees_with_energy_over_a_grid():
 
 @pytest.mark.parametrize("cell", MANY_WAVES)
 def test_errors_that_add_up_over_waves_or_hide_each_other_are_told(cell):
+    """The oracle takes four seconds for the first."""
     truth = ripple_oracles.by_energy(**cell)
     rtol, cells = np.geomspace(1e-5, 1e-2, 64), named(FOLIOT_RIPPLE, [cell] * 64)
     for name, true in zip(NAMES, truth, strict=True):
