@@ -150,8 +150,9 @@ def _widened(t: Array, z: Array, best: Array, low: Array, high: Array) -> tuple[
     local = slopes(t, z, 5)
     half = np.flatnonzero(np.diff(np.sign(local - (best[0] + best[1]) / 2)))
     places = [t[half[np.argmin(abs(t[half] - best[2]))]] if half.size else best[2]]
-    # what noise there is moves the local exponents
-    doubts = 2.5 * roughness(t, z)[0] * np.sqrt((slopes(t, np.eye(t.size), 5)[:, [0, -1]] ** 2).sum(axis=0))
+    # what noise there is moves the local exponents at the ends, each of which depends on five points
+    alone = [slopes(few, np.eye(few.size), 5)[:, end] for few, end in ((t[:5], 0), (t[-5:], -1))]
+    doubts = 2.5 * roughness(t, z)[0] * np.linalg.norm(alone, axis=1)
     ends = [np.add.outer(two, (0, -by, by)) for two, by in zip(tends(t, local, doubts), doubts, strict=True)]
     # where lines of these slopes through the first and the last point meet
     steep = itertools.product(*([*one[:, 0], *one[0, 1:]] for one in ends))
