@@ -395,7 +395,7 @@ class Functions:
         powers, bases = [], {}
         for node in self.graph.powers:
             base = node.args[0]
-            kink, place = self.kinks.index(base.args[1]), self.states.index(base.args[1].args[0])
+            kink, place = self.graph.kinks[base.args[1]], self.states.index(base.args[1].args[0])
             bases[place] = 1 + kink
             of_state, entries = map(self.values, node.args), (entry(place), entry(1 + kink))
             powers.append(Power(self._with_power(node), *of_state, *entries, self._without(place)))
