@@ -3,7 +3,7 @@
 import numpy as np
 from family import PI, REAL, Truth, family, scene
 
-from kernels.scene import cos, exp, floor, sign, sin, where
+from kernels.scene import cos, exp, floor, power, sign, sin, where
 
 
 def _windows_truth(w, T):
@@ -168,6 +168,38 @@ def zeno(random, n):
     """A ball that bounces on, or comes to rest."""
     e = random.choice([0.3, 0.8, 0.9, 0.95, 0.99], n) * random.uniform(0.98, 1.0, n)
     return {"h": random.uniform(0.5, 4.0, n), "e": e, "flips": np.floor(10.0 ** random.uniform(0, 3.5, n))}
+
+
+def _root_over_level(q, b):
+    """The integrals of abs(s^2 + b)^(1/2) and abs(s^2 + b)^(3/2) over s from 0 to q."""
+    h, u = np.sqrt(abs(b)), q * q + b
+    inside, outside = np.arcsin(np.minimum(q / h, 1)), np.arccosh(np.maximum(q / h, 1))
+    over = np.arcsinh(q / h)
+    root = (q * np.sqrt(abs(u)) + b * np.where(b > 0, over, outside - inside)) / 2
+    signed = (np.sign(u) * q * np.sqrt(abs(u)) + b * np.where(b > 0, over, outside + inside)) / 2
+    return root, (q * abs(u) ** REAL(1.5) + 3 * b * signed) / 4
+
+
+def _power_turns_truth(n, d, p, T):
+    n, d, p, T = (REAL(1) * c for c in (n, d, p, T))
+    before, behind = _root_over_level(p, 2 * d), _root_over_level(T - p, 2 * d)
+    y = np.where(n < 1, before[0] + behind[0], before[1] + behind[1]) / 2**n
+    x, v = (T - p) ** 2 / 2 + d, T - p
+    z = (p ** (n + 1) + v ** (n + 1)) / (n + 1)
+    return Truth(T, [T, x, v, y, z], [T, np.maximum(p * p / 2 + d, abs(x)), np.maximum(p, v), y, z], 10 + 0 * T)
+
+
+@family(
+    scene(
+        "power_turns", "t x v y z", "n d p T",
+        lambda x, v, n: (1.0, v, 1.0, power(abs(x), n), power(abs(v), n)), lambda t, T: T - t,
+        lambda d, p: (0.0, p * p / 2 + d, -p, 0.0, 0.0),
+    ), _power_turns_truth,
+)  # fmt: skip
+def power_turns(random, n):
+    """A power of what turns round next to 0, or just behind it; and of its rate, which passes 0 then."""
+    p, d = random.uniform(0.5, 2.0, n), 10.0 ** random.uniform(-8, -0.5, n) * random.choice([-1.0, 1.0], n)
+    return {"n": random.choice([0.5, 1.5], n), "d": d, "p": p, "T": p + random.uniform(0.2, 2.0, n)}
 
 
 def _even_truth(p, d, T):

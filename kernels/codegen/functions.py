@@ -400,8 +400,8 @@ class Functions:
             of_state, entries = map(self.values, node.args), (entry(place), entry(1 + kink))
             powers.append(Power(self._with_power(node), *of_state, *entries, self._without(place)))
 
-        def cores(state, mode, unit, tolerance, on, t, margins):
-            found = [core(p, state, mode, unit, tolerance, on, t, margins) for p in powers]
+        def cores(state, mode, unit, tolerance, on, t, margins, furthest):
+            found = [core(p, state, mode, unit, tolerance, on, t, margins, furthest) for p in powers]
             values, limits, coarse = (tuple(each[k] for each in found) for k in range(3))
             return values, limits, coarse, found[-1][3] if found else None
 

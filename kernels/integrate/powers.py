@@ -2,10 +2,12 @@
 
 From a kink u = 0 on, u is r t, and abs(u)^n has the mean (r t)^n/(n + 1). With the mean in its place the rates' impulse
 is right for whatever n, and what is left of a state whose rate the power changes by D is, in units of time,
-    D t (t + d),  d = (D of u)/r                                                                         (1)
-for the speed between differs from the true one by less than D t, and the motion is not quite even: d, at most 1/4.
-The core ends where that is the tolerance times the state's own size; outside the series steps towards it or away from
-it by parts of the way that is left, as the radius of convergence allows.
+    D t (t + d)                                                                                          (1)
+for the speed between differs from the true one by less than D t, and the motion is not quite even: d, at most 1/4, is
+what r changes by on the way, of itself, by the power and by all else, as where u turns round next to 0. Besides,
+D times what a step is longer or shorter than t is left out.
+The core ends where (1) is the tolerance times the state's own size; outside the series steps towards it or away from it
+by parts of the way that is left, as the radius of convergence allows.
 
 Where nothing but the power acts at u = 0, u' = -c u^n with n < 1 comes to rest there after u^(1 - n)/((1 - n) c), while
 every state's rate changes by the power as u's does: with (1 - n) u^n in the power's place that time and all impulses
@@ -16,7 +18,7 @@ from collections import namedtuple
 
 from kernels.lanes.jit import jit_call
 from kernels.lanes.symbols import symbolic
-from kernels.lanes.tuples import all_of, joined, times
+from kernels.lanes.tuples import after, all_of, joined, times
 from kernels.lanes.vectors import any_lane, choose, fma, magnitude, not_, where
 from kernels.maths.elementary import power
 
@@ -40,7 +42,7 @@ without : (state, mode) -> the state at u = 0
 
 
 @jit_call
-def core(p, state, mode, unit, tolerance, on, t, margins):
+def core(p, state, mode, unit, tolerance, on, t, margins, furthest):
     """The mean of a power in its core, and how far from there a step may go.
 
     Parameters
@@ -48,49 +50,52 @@ def core(p, state, mode, unit, tolerance, on, t, margins):
     p : Power
     t : time since the last event
     margins : of each event, what there is of it for next to nothing
+    furthest : the longest step that may be taken
 
     Returns
     -------
     core : the mean, -1 where the motion is not in the core
     longest : step from the kink on
-    coarse : what (1) leaves of each state
+    coarse : of (1) t, t + d and D of each state: on a step of another length than t the mean is not the right one
     full : the rates with the power as it is
     """
     n, base, nothing = p.exponent(state, mode), p.base(state, mode), 0.0 * mode.side
     value, margin, leaves = power(base, n), p.of_kink(margins), (p.of_kink(on) > 0.5) & (t <= 0.0)
     full = p.rates(state, mode, unit, value)
-    core, longest, coarse = nothing - 1.0, nothing + FAR, times(nothing, state)
+    core, longest, coarse = nothing - 1.0, nothing + FAR, (nothing, nothing, times(nothing, state))
     nears = p.of_kink(joined((0.0,), mode.signs)) * p.of_base(full) < 0.0
     if any_lane(nears):
-        core, longest, coarse = towards(p, state, mode, unit, tolerance, n, base, value, full, margin, nears)
+        core, longest, coarse = towards(p, state, mode, unit, tolerance, n, base, value, full, margin, nears, furthest)
     if any_lane(leaves):
-        behind = away(p, state, mode, unit, tolerance, n)
+        behind = away(p, state, mode, unit, tolerance, n, furthest)
         core, longest, coarse = choose(leaves, behind, (core, longest, coarse))
     return core, longest, coarse, full
 
 
 @symbolic
-def towards(p, state, mode, unit, tolerance, n, base, value, full, margin, nears):
+def towards(p, state, mode, unit, tolerance, n, base, value, full, margin, nears, furthest):
     """`core`, how far a step may go, and what is left out, where u comes to 0."""
     nothing = 0.0 * mode.side
     bare = p.rates(state, mode, unit, nothing)
     over = 1.0 / magnitude(p.of_base(full))
-    t_base, d = base * over, magnitude(p.of_base(full) - p.of_base(bare)) * over
-    uneven = t_base * (t_base + d)
-    left_out = tuple(magnitude(x - y) * uneven for x, y in zip(full, bare, strict=True))
-    small = tuple(x <= tolerance * size_in_unit(u, rate) for x, u, rate in zip(left_out, state, full, strict=True))
-    inside = nears & (d <= UNEVEN) & all_of(small)
-    at_kink = p.of_base(p.rates(p.without(state, mode), mode, unit, nothing))
+    t_base = base * over
+    kink = p.without(after(state, t_base, (1.0,), (full,)), mode)
+    at_kink = p.of_base(p.rates(kink, mode, unit, nothing))
+    d = magnitude(p.of_base(full) - at_kink) * over
+    by_power, uneven = tuple(magnitude(x - y) for x, y in zip(full, bare, strict=True)), t_base + d
+    parts = zip(by_power, state, full, strict=True)
+    small = tuple(x * (t_base * uneven) <= tolerance * size_in_unit(u, rate) for x, u, rate in parts)
+    inside = nears & (d <= UNEVEN) & ((1.0 + UNEVEN) * t_base <= furthest) & all_of(small)
     settles = nears & (at_kink <= 0.0) & (at_kink >= 0.0) & (n < 1.0)
     left = t_base / (1.0 - n)
     rests = settles & (base <= REST * margin)
     core = where(rests, value * (1.0 - n), where(inside, mean_power(value, n), -1.0))
     longest = where(settles & not_(rests), SHORT * left, FAR)
-    return core, longest, tuple(where(inside, x, 0.0) for x in left_out)
+    return core, longest, choose(inside, (t_base, uneven, by_power), (nothing, nothing, times(nothing, state)))
 
 
 @symbolic
-def away(p, state, mode, unit, tolerance, n):
+def away(p, state, mode, unit, tolerance, n, furthest):
     """The same where u = rate t leaves 0: as long as it may be taken for small by (1), at most 1 unit."""
     nothing = 0.0 * mode.side
     bare, whole = p.rates(state, mode, unit, nothing), p.rates(state, mode, unit, nothing + 1.0)
@@ -107,10 +112,15 @@ def away(p, state, mode, unit, tolerance, n):
     mild = where(n > 0.0, power(_no_more_than_one(UNEVEN * over), 1.0 / where(n > 0.0, n, 1.0)), 1.0)
     reach = where(slow < even, slow, even)
     reach = where(reach < mild, reach, mild)
+    reach = where(reach < furthest, reach, furthest)
+    turned = p.of_base(p.rates(after(state, reach, (1.0,), (bare,)), mode, unit, nothing)) - p.of_base(bare)
+    d = magnitude(turned) / rate
+    shorter = power(_no_more_than_one(reach / d), 1.0 / (n + 2.0))
+    shorter = where(shorter * d > UNEVEN, UNEVEN / d, shorter)
+    reach, d = shorter * reach, shorter * d
     mean = mean_power(power(rate * reach, n), n)
     last = (n + 1.0) * mean
-    uneven = reach * fma(of_base, last / rate, reach)
-    return mean, reach, tuple(z * last * uneven for z in by_power)
+    return mean, reach, (reach, fma(of_base, last / rate, reach) + d, times(last, by_power))
 
 
 @symbolic

@@ -58,7 +58,7 @@ class Series(NamedTuple):
     scene : `Written`
     order : of the series
     pieces : (state, mode, unit, cores) -> `Pieces`
-    cores : (state, mode, unit, tolerance, on, t, margins) -> of powers: `powers.core`, a tuple of each part
+    cores : (state, mode, unit, tolerance, on, t, margins, furthest) -> of powers: `powers.core`, a tuple of each part
     on_kink : (state, fires) -> the state, 0 where a kink of a power fires
     ways, watched : how each state, and what each event watches, is evaluated (`taylor.Way`)
     summed, unseen : 1 for each state that is the sum of another one, for each event of more than one state
@@ -326,7 +326,7 @@ def to_event(m, cell, mode, active):
     error = carried.begun(m, state, errors, h)
     for step in range(STEP_LIMIT):
         # a step that the series allow
-        cores, limits, coarse, full = m.cores(state, mode, unit, tolerance, on, t, margins)
+        cores, limits, coarse, full = m.cores(state, mode, unit, tolerance, on, t, margins, longest)
         pieces = m.pieces(state, mode, unit, cores)
         error = carried.since(m, error, full, state, mode, unit, pieces)
         facts = facts_of(pieces.events)
