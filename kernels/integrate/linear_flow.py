@@ -213,10 +213,10 @@ def first_crossing(beta, kappa, v, f, way):
     for _ in range(CROSSING_LIMIT):
         if not any_lane(active):
             break
-        y, speed = motion(beta, kappa, v, f, t)
-        miss = y - way
+        s, c, slope = response(beta, kappa, t)
+        miss, speed = fma(v, s, f * c) - way, fma(v, slope, f * s)
         low, high = where(miss < 0.0, t, low), where(miss < 0.0, high, t)
-        acceleration = f - fma(2.0 * beta, speed, kappa * y)
+        acceleration = fma(f, slope, -v * fma(2.0 * beta, slope, kappa * s))  # f less damping and spring would cancel
         guess = t - 2.0 * miss * speed / (2.0 * speed * speed - miss * acceleration)
         inside = (guess >= low) & (guess <= high)
         fallback = where(high < math.inf, 0.5 * (low + high), 2.0 * t)

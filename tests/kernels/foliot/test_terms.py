@@ -218,3 +218,12 @@ def test_stiction_holds_a_turning_point_that_the_spring_does_not_free_and_none_a
 
 def test_beyond_their_range_segments_leave_the_cell_to_others():
     assert solve(FOLIOT, "segments", [1.0, 1.0], 1.0, [1e80, 1e50], e=0.5)[1].tolist() == [Status.NO_METHOD, Status.OK]
+
+
+@pytest.mark.parametrize("losses", [{"R": 0.0}, {"R": 0.5}, {"e": 0.5}, {"e": -0.5}])
+def test_what_friction_makes_creep_takes_the_way_over_its_terminal_speed(losses):
+    """(mu - R)/a, up to where segments end: no time is lost in the start, as the way of that is (mu - R)/a^2."""
+    a = np.geomspace(1e8, 1e59, 150)
+    outputs, status = solve(FOLIOT, "segments", 1.0, 1.0, a, **losses, rtol=1e-13)
+    assert (status == Status.OK).all()
+    assert relative_error(outputs["period"], 4.0 * a / (1.0 - losses.get("R", 0.0))).max() < 1e-13
