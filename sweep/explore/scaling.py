@@ -157,7 +157,8 @@ class Scaling:
         for name, group in self.scales.items():
             long_name = f"{name}{str(group)[1:]}" if str(group).startswith("1/") else f"{name} {group}".strip()
             output = dataset[name] * group.of(values)
-            dataset[name] = output.assign_attrs({**dataset[name].attrs, "units": "1", "long_name": long_name})
+            attrs = {**dataset[name].attrs, "units": "1", "long_name": long_name}
+            dataset = dataset.assign({name: output.assign_attrs(attrs)})
         return dataset
 
 

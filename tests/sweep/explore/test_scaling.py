@@ -133,5 +133,9 @@ def test_outputs_rescaled_fall_on_one_curve_and_say_what_they_are():
     assert (abs(np.diff(np.log(period[order])))[same] < 1e-12).all()
     with pytest.raises(sweep.SweepError, match="another unit"):
         sweep.scaling(study).rescaled(sweep.in_units(ds, {"a": "1/minute"}))
+    chain = sweep.run(kernel="drivetrain", axes={"f_max": [1.0, 2.0]}, fixed={"J": [1.0, 2.0], "k": [1.0, 0.0]})
+    before = chain.copy(deep=True)  # of arrays there are outputs to free, and no groups
+    assert not sweep.scaling(chain).rescaled(chain).identical(before)
+    xr.testing.assert_identical(chain, before)
     reread = sweep.scaling(study).rescaled(ds)
     xr.testing.assert_identical(reread, free)
