@@ -258,7 +258,8 @@ def study_together(text: str, coords: Mapping[Any, Any]) -> str:
     """
     for name, coordinate in coords.items():
         if (named := ARRAY % f"@{name}") in text:
-            if f'{named},"shape":[{len(coordinate.values)}' not in text:
+            length = (*np.shape(coordinate.values), 1)[0]
+            if not any(f'{named},"shape":[{length}{end}' in text for end in "],"):
                 raise SweepError(f"{name}: a part of this axis is missing; open the file with sweep.open_result")
             text = text.replace(named, ARRAY % coordinate.values.astype("<f8").tobytes().hex())
     return text
