@@ -212,7 +212,11 @@ def sensitivity(arguments: argparse.Namespace) -> None:
     o.RESULT,
     o.output("FILE.csv|.parquet|.nc|.zarr", required=True),
     o.FORCE,
-    option("--where", "only cells for which this holds, e.g. \"status == 'OK' and R < 0.1\"", metavar="CONDITION"),
+    option(
+        "--where",
+        "only cells for which this holds, in SI units: \"status == 'OK' and R < '5 degree/s^2'\"",
+        metavar="CONDITION",
+    ),
     switch("--compress", "of netCDF4 and zarr: smaller, every bit kept"),
     *(o.UNITS, o.UNFINISHED),
 )

@@ -56,7 +56,7 @@ def where(dataset: xr.Dataset, condition: str) -> xr.Dataset:
         return flag_words(dataset[name]).values() or sorted(set(map(str, np.unique(dataset[name].values))))
 
     units = {str(name): str(v.attrs["units"]) for name, v in dataset.variables.items() if "units" in v.attrs}
-    chosen = Condition(condition, variable, words, "--where ", units)
+    chosen = Condition(condition, variable, words, "where ", units)
     status, truth = statuses_of(dataset), chosen.truth()
     dims = [str(dim) for dim in status.dims]
     if others := sorted({str(dim) for dim in truth.dims} - set(dims)):
