@@ -22,6 +22,10 @@ from sweep.cells.schema import METHOD_USED, STATUS, Columns, empty, part
 from sweep.cells.solve import NONE, Solver
 from sweep.errors import SweepError
 from sweep.study.model import Study
+from sweep.words import printable
+
+MOST_LETTERS = 500
+"""Of what is told of a fault."""
 
 
 @contextlib.contextmanager
@@ -151,11 +155,12 @@ class Bench:
 
 
 def told(fault: BaseException) -> str:
-    """What a fault says, in one line."""
+    """What a fault says, in one line that any terminal can show, of so many letters at most."""
     if isinstance(fault, Unsolved):
         return str(fault)
     try:
         text = str(fault)
     except Exception:  # a kernel's own exception may fail in its __str__
         text = ""
-    return " ".join(f"{type(fault).__name__}: {text}".split()).removesuffix(":")
+    text = printable(" ".join(f"{type(fault).__name__}: {text}".split()).removesuffix(":"))
+    return text if len(text) <= MOST_LETTERS else f"{text[:MOST_LETTERS]} ..."

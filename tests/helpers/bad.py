@@ -40,7 +40,7 @@ def misbehave(height, kinds):
         HANGS: lambda: time.sleep(1 << 20),
         HOGS: spin,
         HUNGRY: lambda: (_ for _ in ()).throw(MemoryError()),
-        QUITS: lambda: sys.exit(0),
+        QUITS: lambda: sys.exit("\x1b[31m" + 1000 * "words "),
         MUMBLES: lambda: (_ for _ in ()).throw(Mumbling()),
         ORPHANS: lambda: (os.kill(os.getppid(), signal.SIGKILL), time.sleep(60)),
     }

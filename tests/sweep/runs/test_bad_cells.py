@@ -99,6 +99,8 @@ def test_a_kernel_that_ends_python_or_raises_what_cannot_be_told_costs_those_cel
     with quiet(tall(SOUND, "bad:QUITTING"), tmp_path / "out.h5", isolate=isolate, progress=log) as found:
         assert heights_of(found, Status.FAILED) == [bad.QUITS, bad.MUMBLES]
     assert all(word in log.getvalue() for word in ("SystemExit", "Mumbling"))
+    assert "\x1b" not in log.getvalue()
+    assert len(log.getvalue()) < 3000
 
 
 @pytest.mark.skipif(not hasattr(resource, "prlimit"), reason="the limit of another process is set on Linux only")
