@@ -155,6 +155,8 @@ def _judged(scene, start, k, work, rtol):
         return cycle, INACCURATE
     if fading < 1.0 or tally[swing.MARGIN] <= 4.0 * gap + rounding:
         return cycle, GRAZING
+    if not (modulus > 0.0):  # it is small, but how small, rounding hides
+        return cycle, INACCURATE
     if teeth > cycles:
         return cycle, TOOTH_JUMPED
     return cycle, OK if teeth == 1.0 else PERIOD_2

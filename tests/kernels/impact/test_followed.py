@@ -160,3 +160,12 @@ def test_a_lever_so_bent_that_both_pallets_hold_the_wheel_is_refused():
 def test_what_cannot_be_right_says_so(scene, rtol, status):
     if COMPILED or status[0] in (Status.INACCURATE, Status.NO_METHOD):
         assert events(*scene, rtol=rtol)[1][0] in status
+
+
+def test_a_multiplier_that_is_0_but_for_rounding_is_not_told_as_0():
+    """Of equal masses without restitution a push hands on next to nothing of the speed before it."""
+    scenes = 1.0 + np.concatenate([10.0 ** -np.arange(6.0, 15.0), -(10.0 ** -np.arange(6.0, 15.0))]), 0.2475, 0.0
+    (closed, says), (found, status) = solve(IMPACT, "closed", **clocks(*scenes)), events(*scenes)
+    assert (says == Status.OK).all()
+    assert (np.abs(found["multiplier"] / closed["multiplier"] - 1.0)[status == Status.OK] <= 1e-9).all()
+    np.testing.assert_allclose(found["period"], closed["period"], rtol=1e-13)
