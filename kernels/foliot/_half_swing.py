@@ -71,10 +71,10 @@ slow : the speed above which power-law friction is not smooth, 0 if it is
 scales : what errors are relative to, at least: of speed, of its tangent by ln mu, of those by v0
 """
 
-Half = namedtuple("Half", "end state rate top top_by_start time shrink helped lost")
+Half = namedtuple("Half", "end state rate top time shrink helped lost")
 """A half swing: the speed F at the switch, 0 where it is not reached, and (x, v, x_mu, v_mu, x_start, v_start, Y)
-there, with tangents by ln mu and by v0; x'' there; the turning point and its tangent by v0; the time; J exp(-Y), 0
-where helped; and whether it came to rest on its way in, or met the step limit."""
+there, with tangents by ln mu and by v0; x'' there; the turning point; the time; J exp(-Y), 0 where helped; and whether
+it came to rest on its way in, or met the step limit."""
 
 
 @jit
@@ -245,7 +245,7 @@ def _moved(state, leg, steady, time):
 
 @jit
 def _turned(state, time, leg, slow):
-    """The state behind the turning point by (4), J, the way and its tangent by v0 there, and the time.
+    """The state behind the turning point by (4), J, the turning point, and the time.
 
     Power-law friction that is not smooth at rest is constant from the speed of the state to rest, and from there to
     the speed `slow`.
@@ -265,7 +265,7 @@ def _turned(state, time, leg, slow):
     after_rest = where(free > held_in, speed / (free - held_in), 0.0)
     rest = (x, 0.0 * x, x_mu, jump * v_mu, x_start, jump * v_start, decay)
     behind = _moved(rest, leg, problem.inwards - held_in, after_rest)
-    return choose(still, behind, state), jump, x, x_start, time + (before + after_rest)
+    return choose(still, behind, state), jump, x, time + (before + after_rest)
 
 
 @jit_call
@@ -312,7 +312,7 @@ def half_swing(step, start, problem, tolerance, active):
     state, time, h = (one, start, zero, zero, zero, one, zero), zero, 0.1 / (1.0 + problem.stiffness + root)
     moving, rising = active, active & (start > 0.0)
     turning, helped, lost = active & not_(rising), active & not_(active), active & not_(active)
-    top, top_by_start, jump, forgotten = one, zero, one, zero + math.inf
+    top, jump, forgotten = one, one, zero + math.inf
     varied = (problem.kappa > 0.0) | (problem.depth > 0.0)
     falling = inwards(problem, floor)
     for _ in range(HELP_LIMIT):
@@ -320,8 +320,8 @@ def half_swing(step, start, problem, tolerance, active):
             break
         # past the turning point
         forgotten = where(turning & not_(varied), state[6] + _FORGOTTEN, forgotten)
-        turned, old = _turned(state, time, falling, slow), (state, jump, top, top_by_start, time)
-        state, jump, top, top_by_start, time = choose(turning, turned, old)
+        turned, old = _turned(state, time, falling, slow), (state, jump, top, time)
+        state, jump, top, time = choose(turning, turned, old)
 
         # along a leg, to where it ends
         side, steady = where(rising, 1.0, falling.side), where(rising, problem.outwards, problem.inwards)
@@ -354,4 +354,4 @@ def half_swing(step, start, problem, tolerance, active):
     v, rate = state[1], rates(state, inwards(problem, problem.floor))[1]
     end = where(moving | (helped & not_(v < 0.0)), zero, -v)
     shrink = where(helped, 0.0, jump * exp(-state[6]))
-    return Half(end, state, rate, top, top_by_start, time, shrink, helped, lost)
+    return Half(end, state, rate, top, time, shrink, helped, lost)

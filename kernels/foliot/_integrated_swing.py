@@ -120,8 +120,8 @@ def _swung(step, p, rtol):
 def _manner(name, doc, solve, stiffest):
     found = of_columns(solve, (*Cell._fields, "v1", "tolerance"), (*Found._fields[:-1], *Outputs._fields), in_few_lanes)
 
-    def follow(cells, terms, v, tolerance, rtol, rough, bare):
-        return found(*cells, v, tolerance, rtol)
+    def follow(search, bare):
+        return found(*search[: len(Cell._fields)], search.v, search.tolerance, search.rtol)
 
     def begins(cells, terms):
         mild = terms.stiff <= np.where((terms.kappa > 0.0) | (cells.depth > 0.0), *stiffest)
@@ -129,7 +129,7 @@ def _manner(name, doc, solve, stiffest):
 
     return Manner(
         name, doc, follow, begins, bare=False, steps=True, coarse=1e-3, orderly=3e-5, least=3e-15,
-        finer=4.0, shares=(0.3, 0.1, 0.03), told=(4.0, 4.0, 10.0), steep=10.0, tighter=0.1,
+        finer=4.0, shares=(0.3, 0.1, 0.06), told=(4.0, 4.0, 12.0), tighter=0.1,
     )  # fmt: skip
 
 

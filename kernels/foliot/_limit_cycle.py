@@ -11,10 +11,10 @@ speed, to the next place where the drive wins over dry friction (F = 0 if there 
 v1^2 - F^2 rising; so the one root is found, and if help was needed on the cycle there is none: the scene STICKS.
 
 Each cell goes through stages on its own. SEARCH: Newton's method within a bracket, at a coarse tolerance. NEAR: at one
-that follows the square of its step. ROUGH and FINE: two half swings with tolerances some times apart, whose difference
-tells the error. Where the torque varies, outputs may depend on the speed a thousandfold, and a change of speed can hide
-the effect of the tolerance: LAST, which starts at the speed that the fine one gives and has its tolerance, shows how
-much that is. Where the error is too large, they are followed once more at a tighter tolerance.
+of the order of the square of its step. ROUGH and FINE: two half swings with tolerances some times apart, whose
+difference tells the error. Where it is too large, they are followed once more at a tighter tolerance. So that no change
+of speed hides what the tolerance does, outputs, which may depend on the speed a thousandfold where the torque varies,
+are those at the speed by Newton's step: by their tangents, or as they changed since the half swing before.
 """
 
 from collections import namedtuple
@@ -33,14 +33,10 @@ from kernels.lanes.wiring import kernel, method, signed
 LIMIT, STUCK, AGAIN = 60, 6, 5
 """Half swings of a cell; of them those that come to rest on their way in, one after the other, where none is helped;
 and how often a tighter tolerance is tried."""
-SEARCH, NEAR, ROUGH, FINE, LAST = 0, 1, 2, 3, 4
+SEARCH, NEAR, ROUGH, FINE = 0, 1, 2, 3
 """What a cell's next half swing is for."""
-_CLOSE, _CHECKED = 0.05, 0.01
-"""The relative step below which the search ends, and the one below which a rough swing has a twin."""
 _NOISE, _NOISE_BARE = 100.0, 3000.0
 """Tolerances within which the sign of F - v may be wrong; where no tangents make steps shorter."""
-_CALM = 1e-6
-"""Tolerance at which a half swing is right enough for Newton's method to converge, whatever is wanted."""
 _ROUNDING = 2e-14
 """Of a half swing's speed and time."""
 _SENSITIVITY, _MULTIPLIER = map(Outputs._fields.index, ("sensitivity", "multiplier"))
@@ -49,15 +45,21 @@ Cell = namedtuple("Cell", (*Foliot._fields, "depth", "harmonic"))
 """Columns of cells."""
 Terms = namedtuple("Terms", "drag outwards inwards gamma degree kappa rough pace stiff")
 """Of a cell: terms of `Problem`, and the stiffness f'(V)/V."""
+_State = namedtuple("_State", "rtol index v tolerance before used low high stage stuck again share told linear")
+Search = namedtuple("Search", (*Cell._fields, *Terms._fields, *_State._fields))
+_FOUND = 3 * len(Outputs._fields)
+"""Columns of cells that are searched for: the next v1 and tolerance, those before, the bracket and the stage; how often
+no half swing came back, and a tighter tolerance was tried; share and factor of (5) and (6); whether `bare` may be. And
+columns behind these: outputs before, at Newton's speed and at that of the half swing, and how they follow v1."""
 Found = namedtuple("Found", "end change slope cancels Y A helped outputs")
 """By a half swing: F, Newton's step from the speed before it, dF/dv1; how many times larger than s the terms are that
-it is the sum of; Y, the turning point A, and whether it was helped; the outputs of the cycle by it."""
-Manner = namedtuple("Manner", "name doc follow begins bare steps coarse orderly least finer shares told steep tighter")
+it is the sum of; Y, or 0 where exp(-Y) is; the turning point A; whether it was helped; the outputs of the cycle."""
+Manner = namedtuple("Manner", "name doc follow begins bare steps coarse orderly least finer shares told tighter")
 """A way to follow half swings.
 
 name, doc : of the method
-follow : (cells, terms, v1, tolerance, rtol, rough, bare) -> rows of `Found` and of outputs; statuses. `rough`: cells to
-    be followed with parameters some roundings off; `bare`: those whose tangents are not needed
+follow : (`Search`, bare) -> rows of `Found` and of outputs; statuses. Those at ROUGH may have parameters some roundings
+    off; of those `bare` tangents are not needed
 begins : (cells, terms) -> statuses: OK where the method is worth while, else why it is not
 bare : whether less is followed where torque varies and neither drag nor the sensitivity need tangents
 steps : whether it goes by steps of one order. Cells that take about as many go side by side then, and the search is
@@ -66,8 +68,7 @@ coarse, orderly, least : tolerance of the search; the one below which an error f
 finer : how many times the fine tolerance the rough one is
 shares : of rtol that a half swing may be off by: where friction is smooth at rest, where it is not, and where its
     degree is below 2 or the torque varies, on which time and sensitivity hang steeply
-told, steep : what is stated over what rough and fine half swings differ by, in each of these three; and of the
-    sensitivity where the torque varies
+told : what is stated over what rough and fine half swings differ by, in each of these three
 tighter : by how much less a share is the next time, where it did not do
 """
 
@@ -107,11 +108,11 @@ def found_by(units, problem, v, half):
     by_start = time_by_start * (-fma(half.rate, time_by_mu, v_mu) / (1.0 - slope))
     s = -(by_start + time_by_mu) / half.time
     cancels = (magnitude(by_start) + magnitude(time_by_mu)) / magnitude(s * half.time)
-    amplitude = where(e > 0.0, fma(half.top_by_start, e * change, half.top), 1.0)
-    cycle = fma(time_by_start, change, half.time), amplitude, v + change, s, e * e * half.shrink
+    cycle = fma(time_by_start, change, half.time), half.top, v + change, s, e * e * half.shrink
     held = (e >= 0.0) & not_(1.0 + pull(half.top, problem) > problem.rho_s)
     outputs, status = given(units, cycle, where(half.helped | held, STICKS, OK))
-    return Found(end, change, slope, cancels, decay, half.top, where(half.helped, 1.0, 0.0), outputs), status
+    helped, Y = where(half.helped, 1.0, 0.0), where(decay < 750.0, decay, 0.0)
+    return Found(end, change, slope, cancels, Y, half.top, helped, outputs), status
 
 
 _terms = of_columns(terms_of, Cell._fields, Terms._fields)
@@ -124,62 +125,62 @@ def begun(manner, cells, rtol):
         return terms, manner.begins(cells, terms).astype(np.int8)
 
 
-def _counted(decay):
-    """Y where errors of it count; beyond, the multiplier exp(-Y) is 0 for good."""
-    return np.where(decay < 750.0, decay, 0.0)
-
-
 def _wanted(manner, share, gap, decay, waves):
-    """The tolerance of the last half swings; `share` times rtol is given.
+    """The tolerance of the last half swings; `share`, times rtol, is given.
 
     An error of F counts 1/(1 - dF/dv1)-fold in v1, and Y-fold in exp(-Y); without tangents errors of steps add up over
     the waves of the torque. So it is
         share rtol (1 - dF/dv1)/((1 + Y) (1 + waves)).                                               (5)
     """
-    wanted = share * gap / (1.0 + _counted(decay)) / (1.0 + waves)
+    wanted = share * gap / ((1.0 + decay) * (1.0 + waves))
     return np.fmin(np.fmax(wanted, manner.least), manner.orderly)
 
 
-def _stated(by, former, last, earlier, told, step, moved, tolerance, gap):
-    """Relative errors of what half swings give, a row for each output, and their first term.
+def _stated(by, former, told, step, hangs, tolerance):
+    """Relative errors of what half swings give, a row for each output.
 
-    Where those before gave outputs with a relative difference `apart`, they are
-        told apart + 2 (rate apart + step) + (ROUNDING + tolerance (1 + waves))/(1 - dF/dv1),          (6)
-    where `step` is the relative one that Newton's method would still go, and `rate` what it is of the way `moved` that
-    v1 went since. The last term is more where the sensitivity cancels, and (1 + Y)-fold of exp(-Y).
-
-    Parameters
-    ----------
-    by, former : what is found, and the outputs before
-    last, earlier : the cells at LAST, whose first term before gets `apart` more
-    tolerance, gap : that of the half swings times (1 + waves); 1 - dF/dv1
+    Where those before gave the outputs `former`, with a relative difference `apart`, they are
+        told apart + 2 (1 + abs(hangs)) step + (ROUNDING + tolerance)/(1 - dF/dv1),                  (6)
+    where `step` is the relative one that Newton's method would still go, and `hangs` how an output follows v1. The last
+    term is (1 + Y)-fold of exp(-Y); terms of s that cancel add theirs, with a tenth of the tolerance: they err alike.
     """
-    ratio = by.outputs / former
-    apart = np.where(by.outputs == former, 0.0, np.abs(ratio - 1.0))  # a multiplier may be 0 for good
-    first = np.where(last, earlier + apart, told * apart)
-    rate = np.where(moved > 0.0, step / moved, 0.0)
-    floor = np.tile((_ROUNDING + tolerance) / gap, (len(former), 1))
-    floor[_SENSITIVITY] *= 1.0 + by.cancels
-    floor[_MULTIPLIER] *= 1.0 + _counted(by.Y)
-    return first + 2.0 * (rate * apart + step) + floor, first
+    apart = np.where(by.outputs == former, 0.0, np.abs(by.outputs / former - 1.0))  # a multiplier may be 0 for good
+    floor = (_ROUNDING + tolerance) / (1.0 - by.slope)
+    stated = told * apart + 2.0 * step * (1.0 + np.abs(hangs)) + floor
+    stated[_SENSITIVITY] += (_ROUNDING + 0.1 * tolerance) / (1.0 - by.slope) * by.cancels
+    stated[_MULTIPLIER] += floor * by.Y
+    return stated
 
 
-def _next(manner, stage, final, checked, inside, step, gap, used, wanted, rtol, linear):
-    """The next stage of cells, and its tolerance, at last (5).
+def _first_speed(s):
+    """About v1, within some 5 % where there is no hairspring.
 
-    Where the search is cheap (`linear`), it goes on until what Newton's method leaves of its relative `step` is below
-    what is wanted. `checked` are those whose rough half swing has a twin; `inside`, whose step stays in the bracket.
+    Where friction takes little, accelerations are 1, and by v1^2 (1 - e^2) = 4 - 2 L each kind of it alone gives
+        (1 - e^2 + 2 rho e^2) v1^2 = 2 d (1 + e^3) v1^3/3 = 2 gamma (1 + e^m) v1^m/m = 4 (1 - rho),  m = n + 2.      (7)
+    Where it takes much, it balances the drive, at v1 = 1/pace.
     """
-    near = np.clip(0.01 * np.sqrt(rtol * gap), manner.finer * wanted, manner.coarse)
-    left, converged = step * step, step < np.sqrt(near)
-    near = np.where(linear, np.clip(0.01 * left, np.minimum(4.0 * wanted, _CALM), manner.coarse), near)
-    converged = np.where(linear, (left < wanted) & (used <= manner.finer * wanted), converged)
-    close = inside & np.where(stage == SEARCH, step < _CLOSE, converged)
-    onward = checked | (close & (stage < ROUGH))
-    stage = np.where(onward, stage + 1, np.minimum(stage, ROUGH))
-    rough = manner.finer * wanted
-    coarse = np.clip(0.03 * np.where(gap > 0.0, gap, 1.0), np.fmin(rough, manner.coarse), manner.coarse)
-    return stage, np.choose(stage, [coarse, near, rough, wanted, wanted])
+    out, m, work = np.fmax(s.e, 0.0), s.degree + 2.0, 2.0 * s.inwards
+    dry = (1.0 - s.e * s.e + (s.outwards - s.inwards) * out * out) / (2.0 * work)
+    viscous = s.drag * (1.0 + s.e**3) / (3.0 * work)
+    power = s.gamma * (1.0 + np.sign(s.e) * np.abs(s.e) ** m) / (m * work)
+    little = dry**1.25 + viscous ** (5.0 / 6.0) + power ** (2.5 / m)
+    return (little**1.4 + s.pace**3.5) ** (-1.0 / 3.5)
+
+
+def _begun_search(manner, cells, terms, rtol, i):
+    """The columns of `Search` and those behind them, of the cells i before their first half swing."""
+    known = [*(column[i] for column in (*cells, *terms, rtol)), i]
+    search = np.zeros((len(Search._fields) + _FOUND, len(i)))
+    search[: len(known)] = known
+    s = Search(*search[:-_FOUND])
+    dragged, varies, slow = s.gamma > 0.0, s.depth > 0.0, s.pace > 3.0
+    kind = np.where((dragged & (s.degree < 2.0)) | varies, 2, np.where(s.rough > 0.5, 1, 0))
+    s.share[:], s.told[:] = np.array(manner.shares)[kind] * s.rtol, np.array(manner.told)[kind]
+    s.linear[:], s.stage[:] = ~dragged & varies & manner.bare, np.where(slow & manner.steps, ROUGH, SEARCH)
+    s.high[:], s.v[:] = np.inf, np.where(slow, 1.0 / s.pace, _first_speed(s))
+    rough = manner.finer * _wanted(manner, s.share, 1.0, np.where(s.stiff < 375.0, 2.0 * s.stiff, 0.0), 0.0)
+    s.tolerance[:] = np.where(s.stage == ROUGH, rough, manner.coarse)
+    return search
 
 
 @np.errstate(all="ignore")
@@ -189,77 +190,77 @@ def cycles(manner, cells, rtol, asked):
     `asked` says which of the outputs must be right. The result is outputs and relative errors, a row for each output,
     and statuses: NOT_CONVERGED where half swings come to rest or the bracket closes on nothing.
     """
-    n = len(rtol)
+    n, tangents = len(rtol), asked[_SENSITIVITY]
     terms, status = begun(manner, cells, rtol)
-    dragged, varies, tangents = terms.gamma > 0.0, cells.depth > 0.0, asked[_SENSITIVITY]
-    linear = ~dragged & varies & manner.bare
-    kind = np.where((dragged & (terms.degree < 2.0)) | varies, 2, np.where(terms.rough > 0.5, 1, 0))
-    share, told = np.array(manner.shares)[kind], np.tile(np.array(manner.told)[kind], (len(Outputs._fields), 1))
-    told[_SENSITIVITY, varies] = manner.steep
-    final = np.where(varies, LAST, FINE)
-    low, high, stuck, again = np.zeros(n), np.full(n, np.inf), np.zeros(n, int), np.zeros(n, int)
-    before, outputs = np.full(n, np.nan), np.full((len(Outputs._fields), n), np.nan)
-    errors, by_tolerance = np.full_like(outputs, np.inf), np.full_like(outputs, np.inf)
-
-    i, slow = np.flatnonzero(status == Status.OK), terms.pace > 3.0
-    v = np.where(slow, 1.0 / terms.pace, 2.0 / np.sqrt(1.0 + 4.0 * terms.pace * terms.pace))
-    slow &= manner.steps
-    stage = np.where(slow, ROUGH, SEARCH)
-    tolerance = np.where(slow, manner.finer * _wanted(manner, share * rtol, 1.0, 2.0 * terms.stiff, 0.0), manner.coarse)
-    status[i] = Status.NOT_CONVERGED
+    outputs, errors = np.full((len(asked), n), np.nan), np.full((len(asked), n), np.inf)
+    follows = np.array([not tangents, True, False, tangents, True])[:, None]  # the others by (4)
+    (going,) = np.nonzero(status == Status.OK)
+    status[going] = Status.NOT_CONVERGED
+    search, going = _begun_search(manner, cells, terms, rtol, going), np.arange(len(going))
     for _ in range(LIMIT):
-        if not len(i):
+        if not len(going):
             break
         if manner.steps:  # lanes wait for their slowest
-            i = i[np.argsort((tolerance[i] ** -0.2 + terms.stiff[i]) * (1.0 + np.sqrt(terms.kappa[i])))]
+            s = Search(*search[:-_FOUND])
+            going = going[np.argsort(((s.tolerance**-0.2 + s.stiff) * (1.0 + np.sqrt(s.kappa)))[going])]
+        search = search.take(going, axis=1)
+        s, (former, raw, hangs) = Search(*search[:-_FOUND]), search[-_FOUND:].reshape(3, len(asked), -1)
+        i, now, used, stage = s.index.astype(int), s.v, s.tolerance, s.stage
 
         # the half swings; Newton's step of each, and the cycle by it
-        bare, now, used = linear[i] & ((stage[i] < ROUGH) | (not tangents)), v[i], tolerance[i]
-        own, of_cells = Cell(*(column[i] for column in cells)), Terms(*(column[i] for column in terms))
-        rows, verdict = manner.follow(own, of_cells, now, used, rtol[i], stage[i] == ROUGH, bare)
-        by = Found(*rows[: -len(Outputs._fields)], rows[-len(Outputs._fields) :])
-        free = np.isfinite([by.end, by.change, by.slope]).all(axis=0) & (verdict != Status.STEP_LIMIT)
-        relative, gap = np.abs(by.change / by.end), 1.0 - by.slope
-        stuck[i] = np.where(free, 0, stuck[i] + 1)
-        lost = (stuck[i] > STUCK) | ((stage[i] == SEARCH) & (high[i] - low[i] <= manner.coarse * now))
+        rows, verdict = manner.follow(s, (s.linear > 0.0) & ((stage == SEARCH) | (not tangents)))
+        by = Found(*rows[: -len(asked)], rows[-len(asked) :])
+        many, gap, onward = verdict == Status.STEP_LIMIT, 1.0 - by.slope, by.change / by.end
+        free, step = np.isfinite(onward + by.slope) & ~many, np.abs(onward)
+
+        # outputs go along with v1: by (4), or as they did since the half swing before, if its tolerance was less
+        moved = now / s.before - 1.0
+        secant = (by.outputs / raw - 1.0) / moved
+        hangs[:] = np.where(follows & (np.abs(moved) > s.used) & np.isfinite(secant), secant, hangs)
+        raw[:] = by.outputs
+        by = by._replace(outputs=raw * (1.0 + hangs * onward))
 
         # the error (6), where the last two are done; the end where that will do or nothing helps
-        waves = np.where(linear[i] & (not tangents), cells.harmonic[i] * 0.5 * (1.0 + by.A), 0.0)
-        loose, moved, twin = used * (1.0 + waves), np.abs(now / before[i] - 1.0), stage[i] == LAST
-        stated, by_tolerance[:, i] = _stated(
-            by, outputs[:, i], twin, by_tolerance[:, i], told[:, i], relative, moved, loose, gap
-        )
-        done = free & (stage[i] == final[i])
-        outputs[:, i[free]], errors[:, i[done]] = by.outputs[:, free], stated[:, done]
-        status[i[done]] = verdict[done]
-        over = stated[asked].max(axis=0) / rtol[i]
-        last = done & ((over <= 1.0) | (verdict >= FIRST_REFUSAL) | (again[i] >= AGAIN) | (used <= manner.least))
-        repeated = done & ~last
-        share[i[repeated]] *= manner.tighter
-        again[i] += repeated
+        waves = s.linear * s.harmonic * 0.5 * (1.0 + by.A) if manner.bare and not tangents else 0.0
+        ended, done = many, free & (stage == FINE)
+        if done.any():
+            stated = _stated(by, former, s.told, step, hangs, used * (1.0 + waves))
+            outputs[:, i[done]], errors[:, i[done]] = by.outputs[:, done], stated[:, done]
+            status[i[done]] = verdict[done]
+            enough = stated[asked].max(axis=0) <= s.rtol
+            ended = many | (done & (enough | (verdict >= FIRST_REFUSAL) | (s.again >= AGAIN) | (used <= manner.least)))
+            s.share[done] *= manner.tighter
+            s.again[done] += 1.0
 
         # or where it sticks, as slower swings, that of the cycle too, come to rest before; where the torque varies, a
         # faster one may at its turning point, so that only rest at the switch is for good. Or where steps are too many
-        noise = np.where(linear[i], _NOISE_BARE, _NOISE) * used * now
-        rests = np.where(varies[i], by.end <= 0.0, now - by.end > noise)
-        helped, many = (by.helped > 0.5) & rests, verdict == Status.STEP_LIMIT
-        first = many & (again[i] == 0)
-        status[i[helped | first]] = verdict[helped | first]
+        noise = np.where(s.linear > 0.0, _NOISE_BARE, _NOISE) * used * now
+        slower = now - by.end > noise
+        helped = (by.helped > 0.5) & np.where(s.depth > 0.0, by.end <= 0.0, slower)
+        refused = helped | (many & (s.again < 1.0))
+        status[i[refused]] = verdict[refused]
+        s.stuck[:] = np.where(free, 0.0, s.stuck + 1.0)
+        lost = (s.stuck > STUCK) | ((stage == SEARCH) & (s.high - s.low <= manner.coarse * now))
 
         # the next speed: Newton's, or where that leaves the bracket one that narrows it
-        low[i] = np.where(~free | (by.end - now > noise), now, low[i])
-        high[i] = np.where(free & (now - by.end > noise), now, high[i])
+        s.low[:] = np.where(~free | (by.end - now > noise), now, s.low)
+        s.high[:] = np.where(free & slower, now, s.high)
         new = now + by.change
-        inside = free & (new > low[i]) & (new < high[i]) & (new < 8.0 * now + 8.0)
-        between = np.where(high[i] < np.inf, 0.5 * (low[i] + high[i]), 2.0 * now + 1.0)
-        checked = inside & (stage[i] >= ROUGH) & (stage[i] < final[i]) & (relative < _CHECKED)
-        before[i], v[i] = now, np.where(inside, new, between)
+        inside = free & (new > s.low) & (new < s.high) & (new < 8.0 * now + 8.0)
+        between = np.where(s.high < np.inf, 0.5 * (s.low + s.high), 2.0 * now + 1.0)
+        former[:], s.before[:], s.used[:] = by.outputs, now, used
+        s.v[:] = np.where(inside, new, between)
 
-        wanted = _wanted(manner, share[i] * rtol[i], gap, by.Y, waves)
-        stage[i], tolerance[i] = _next(
-            manner, stage[i], final[i], checked, inside, relative, gap, used, wanted, rtol[i], linear[i]
-        )
-        i = i[~(last | lost | helped | many)]
+        # the next stage, where a step is so small that its square does not count there; its tolerance, at last (5)
+        wanted = _wanted(manner, s.share, gap, by.Y, waves)
+        rough = manner.finer * wanted
+        near = np.fmax(rough, np.fmin(0.003 * np.sqrt(s.rtol * gap), manner.coarse))
+        coarse = np.fmin(np.fmax(np.where(gap > 0.0, 0.03 * gap, 0.03), rough), manner.coarse)
+        close = np.where(stage == SEARCH, 0.08, np.where(stage == NEAR, 2.0 * np.sqrt(near), np.sqrt(0.1 * s.rtol)))
+        s.stage[:] = np.where(inside & (stage < FINE) & (step < close), stage + 1.0, np.fmin(stage, ROUGH))
+        loose, tight = np.where(s.stage == SEARCH, coarse, near), np.where(s.stage == ROUGH, rough, wanted)
+        s.tolerance[:] = np.where(s.stage < ROUGH, loose, tight)
+        (going,) = np.nonzero(~(ended | lost | helped))
     return outputs, errors, status
 
 

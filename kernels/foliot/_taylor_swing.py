@@ -22,7 +22,7 @@ from kernels.codegen.followed import followed, off_by_roundings
 from kernels.codegen.to_tolerance import FINER
 from kernels.expression.graph import cos, power, sign, sin
 from kernels.foliot._half_swing import Half, inwards, problem_of, pull, rates
-from kernels.foliot._limit_cycle import Cell, Found, Manner, Terms, found_by, of_columns
+from kernels.foliot._limit_cycle import ROUGH, Cell, Found, Manner, Terms, found_by, of_columns
 from kernels.foliot._units import Outputs, without_dimensions
 from kernels.interface import FIRST_REFUSAL, Status
 from kernels.lanes.jit import jit
@@ -103,33 +103,32 @@ def taylor(p, rtol):
     rate = rates((p.x, v, p.x_mu, p.v_mu, p.x_start, p.v_start, p.decay), inwards(problem, problem.floor))[1]
     x_mu, v_mu, x_start, v_start = p.x_mu + by_mu * v, p.v_mu + by_mu * rate, p.x_start + by_start * v, p.v_start
     state, never = (p.x, v, x_mu, v_mu, x_start, v_start + by_start * rate, p.decay), e > 2.0
-    half = Half(-v, state, rate, p.top, 0.0 * e, p.time, jump * exp(-p.decay), never, never)
+    half = Half(-v, state, rate, p.top, p.time, jump * exp(-p.decay), never, never)
     return found_by(units, problem, p.v1, half)
 
 
 _found = of_columns(taylor, (*Cell._fields, "v1", *Swung._fields), (*Found._fields[:-1], *Outputs._fields))
 
 
-def follow(cells, terms, v, tolerance, rtol, rough, bare):
+def follow(s, bare):
     """Half swings of cells, as `Manner` says; NaN where one comes to rest on its way.
 
-    Tangents that a form does not follow are NaN by mu, so that the sensitivity is none; by v0 they are 0, which
-    takes from time and amplitude what Newton's last step would better.
+    Tangents that a form does not follow are NaN by mu, so that the sensitivity is none; by v0 they are 0.
     """
-    known = terms._asdict() | {"depth": cells.depth, "wave": cells.harmonic * (0.5 * np.pi)}
-    varies, dragged = cells.depth > 0.0, terms.gamma > 0.0
+    known = s._asdict() | {"wave": s.harmonic * (0.5 * np.pi)}
+    varies, dragged = s.depth > 0.0, s.gamma > 0.0
     form = np.where(varies, np.where(dragged, FORMS.index(RIPPLED), FORMS.index(LINEAR) + bare), FORMS.index(SMOOTH))
-    swung, kind = Swung(*np.empty((len(Swung._fields), len(v)))), 2 * form + rough
+    swung, kind = Swung(*np.empty((len(Swung._fields), len(s.v)))), 2 * form + (s.stage == ROUGH)
     for k in np.unique(kind):
         own, (those,) = FORMS[k // 2], np.nonzero(kind == k)
-        columns = [*(known[name][those] for name in own.terms), cells.e[those] * v[those], np.ones(len(those))]
+        columns = [*(known[name][those] for name in own.terms), s.e[those] * s.v[those], np.ones(len(those))]
         columns = off_by_roundings(columns) if k % 2 else columns
-        rows = followed(_runner(own), columns, tolerance[those])
+        rows = followed(_runner(own), columns, s.tolerance[those])
         found = dict(zip(("time", "interval", *own.states), rows, strict=False))
         found = {"decay": columns[own.terms.index("drag")] * found["time"]} | found
         for name, column in zip(Swung._fields, swung, strict=True):
             column[those] = np.where(rows[-1] < FIRST_REFUSAL, found.get(name, _UNKNOWN.get(name, 0.0)), np.nan)
-    return _found(*cells, v, *swung, rtol)
+    return _found(*s[: len(Cell._fields)], s.v, *swung, s.rtol)
 
 
 def _begins(cells, terms):
@@ -143,6 +142,6 @@ def _begins(cells, terms):
 BY_TAYLOR = Manner(
     "taylor", "Taylor series over half swings, each followed twice, and Newton on their map", follow, _begins,
     bare=True, steps=False, coarse=1e-4, orderly=np.inf, least=1e-17,
-    finer=FINER, shares=(0.1, 0.1, 0.01), told=(4.0, 4.0, 32.0), steep=128.0, tighter=0.01,
+    finer=FINER, shares=(0.1, 0.03, 0.001), told=(4.0, 4.0, 32.0), tighter=0.01,
 )  # fmt: skip
 """Cores of abs(v)^n have a low order; of half swings of smooth ones the fine error is a fifteenth of the difference."""
