@@ -10,7 +10,7 @@ import xarray as xr
 from sweep.errors import SweepError
 from sweep.results.statuses import require_as_read
 from sweep.study.designs import LEVELS, problem, require_salib
-from sweep.study.model import Study, study_together
+from sweep.study.model import Study
 
 SEED = 1
 """Of the resampling that tells the errors; SALib takes 0 for none."""
@@ -58,9 +58,8 @@ def sensitivity(dataset: xr.Dataset, y: str | xr.DataArray) -> xr.Dataset:
     >>> found.total.to_series().idxmin()  # near alpha = 1 friction decides least
     'a'
     """
-    text = dataset.attrs.get("study_json")
-    study = None if text is None else Study.from_json(study_together(str(text), dataset.coords), declared=True)
-    if study is None or study.design not in ("saltelli", "morris"):
+    study = Study.of(dataset, declared=True)
+    if study.design not in ("saltelli", "morris"):
         raise SweepError('the design of the result is neither "saltelli" nor "morris"; sensitivity needs one of these')
     require_as_read(dataset, study, whole=True)  # cells follow each other as the design has them
     found = dataset[y] if isinstance(y, str) and y in dataset else y

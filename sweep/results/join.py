@@ -14,13 +14,13 @@ import xarray as xr
 from kernels.interface import Status
 from sweep.cells.fingerprint import fingerprint, is_of_program
 from sweep.cells.grid import Grid
-from sweep.cells.schema import ANCILLARY, STATUS
+from sweep.cells.schema import ANCILLARY
 from sweep.errors import SweepError
 from sweep.file.disk import check_target
 from sweep.file.open import memory, store_cells
 from sweep.results.diff import diff
 from sweep.results.statuses import require_as_read, statuses_of
-from sweep.study.model import SETTINGS, Axis, Block, Study, frozen, setting, study_together
+from sweep.study.model import SETTINGS, Axis, Block, Study, frozen, setting
 from sweep.words import as_path, listed, require_dataset
 
 PAIR = ("first", "second")
@@ -73,14 +73,11 @@ def join(
     results, labels = (a, b), tuple(labels) if np.iterable(labels) else (labels,)
     for dataset in results:
         require_dataset("join", dataset)
-        if STATUS not in dataset or "study_json" not in dataset.attrs:
-            raise SweepError("only results that keep their cells can be joined")
         if bool((statuses_of(dataset) == Status.PENDING).any()):
             raise SweepError("an unfinished result cannot be joined; run its sweep to the end first")
     if 2 * sum(dataset.nbytes for dataset in results) > memory():
         raise SweepError("the two results together do not fit into the memory")
-    texts = (study_together(str(dataset.attrs["study_json"]), dataset.coords) for dataset in results)
-    studies = [Study.from_json(text, declared=True) for text in texts]
+    studies = [Study.of(dataset, declared=True) for dataset in results]
     for dataset, study in zip(results, studies, strict=True):
         require_as_read(dataset, study, whole=True)
     # what they differ in: "axes.mu", "fixed.a", "rtol"; of axes that run together "points"

@@ -10,7 +10,7 @@ import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,9 @@ from kernels.interface import Field, Kernel, Method, load
 from sweep.errors import SweepError
 from sweep.study.mistakes import show
 from sweep.words import did_you_mean, listed
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 FORMAT = 2
 AUTO = -1
@@ -247,6 +250,13 @@ class Study:
             raise SweepError(f"not the JSON of a study: {type(error).__name__} {error}") from None
         return study if declared else dataclasses.replace(study, kernel=load_kernel(study.kernel_name, allow_import))
 
+    @classmethod
+    def of(cls, dataset: xr.Dataset, *, allow_import: bool = False, declared: bool = False) -> Study:
+        """The study that a Dataset came from; keywords and SweepError as of `from_json`."""
+        if (text := dataset.attrs.get("study_json")) is None:
+            raise SweepError("the Dataset does not say which study it came from; take the result as it was read")
+        return cls.from_json(study_together(str(text), dataset.coords), allow_import=allow_import, declared=declared)
+
 
 def study_together(text: str, coords: Mapping[Any, Any]) -> str:
     """The JSON of a study, with the numbers of the coordinates to which it refers in a file.
@@ -258,7 +268,7 @@ def study_together(text: str, coords: Mapping[Any, Any]) -> str:
     """
     for name, coordinate in coords.items():
         if (named := ARRAY % f"@{name}") in text:
-            length = (*np.shape(coordinate.values), 1)[0]
+            length = len(np.atleast_1d(coordinate.values))
             if not any(f'{named},"shape":[{length}{end}' in text for end in "],"):
                 raise SweepError(f"{name}: a part of this axis is missing; open the file with sweep.open_result")
             text = text.replace(named, ARRAY % coordinate.values.astype("<f8").tobytes().hex())

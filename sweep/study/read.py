@@ -15,7 +15,7 @@ import numpy as np
 from sweep.errors import Mistake, StudyError, SweepError, reason
 from sweep.study.keys import read_keys
 from sweep.study.mistakes import show
-from sweep.study.model import Block, Study, study_together
+from sweep.study.model import Block, Study
 from sweep.words import as_path, did_you_mean, kind, listed
 
 KEYWORDS = 'keywords, e.g. kernel="foliot", axes={"mu": [0.1, 1.0]}, fixed={"phi0": 1.0, "a": 1.0}'
@@ -68,10 +68,7 @@ def study(given: Given | None = None, /, *, allow_import: bool = False, **keys: 
     if isinstance(given, Study):
         return given
     if hasattr(given, "data_vars"):
-        dataset: Any = given
-        if (said := dataset.attrs.get("study_json")) is None:
-            raise SweepError("the dataset does not say which study it came from; pass the study")
-        return Study.from_json(study_together(str(said), dataset.coords), allow_import=allow_import)
+        return Study.of(given, allow_import=allow_import)  # type: ignore[arg-type]
     if given is None or isinstance(given, Mapping):
         return read_keys(keys if given is None else given, "", "study", Path(), allow_import)
     if not isinstance(given, str | os.PathLike):

@@ -22,7 +22,7 @@ from sweep.laws.loglog import is_logarithmic
 from sweep.results.export import export
 from sweep.results.statuses import flag_words
 from sweep.show.view import View, coordinate, is_number_axis, lines_of
-from sweep.study.model import SETTINGS, Axis, Study, study_together
+from sweep.study.model import SETTINGS, Axis, Study
 from sweep.study.read import to_toml
 
 PLACE = "place along "
@@ -142,9 +142,7 @@ def study_text(dataset: xr.Dataset, choice: Choice) -> str:
     SweepError
         The result does not say which study it came from, or that is no grid.
     """
-    if "study_json" not in dataset.attrs:
-        raise SweepError("the result does not say which study it came from")
-    study = Study.from_json(study_together(str(dataset.attrs["study_json"]), dataset.coords), declared=True)
+    study = Study.of(dataset, declared=True)
     if study.design != "product":
         raise SweepError("only a product of axes has regions; this study is a list of cells")
     known = {*SETTINGS, *(parameter.name for parameter in study.kernel.parameters)}

@@ -93,7 +93,7 @@ def unfinished():
         (lambda: (of(), of(fixed={"g": 2.0})), {"axis": "version"}, "fixed.g"),
         *((lambda: (of(), of()), {"axis": name}, "new axis") for name in ("height", "rtol", "fall_time", "a b", 3)),
         *((lambda: (of(), of()), {"axis": "v", "labels": k}, "labels") for k in (["x", "x"], ["x"], ["x", ""], 3)),
-        (lambda: (of(), of(summary={})), {}, "keep their cells"),
+        (lambda: (of(), of(summary={})), {}, "keeps no cells"),
         (lambda: (of(), of(where="height > 1")), {}, "where"),
         (lambda: (of(), of(outputs=["impact_speed"])), {}, "outputs"),
         (lambda: (of(), unfinished()), {}, "unfinished"),
