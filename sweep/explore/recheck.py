@@ -179,9 +179,7 @@ def again(dataset: xr.Dataset, numbers: Any, allow_import: bool) -> tuple[Study,
     columns = {"rtol": np.full(len(numbers), cells.get("rtol", study.rtol))}
     for field in study.kernel.parameters:
         name = study.follows.get(field.name, field.name)
-        column = cells.coords.get(name)
-        if column is None:
-            raise SweepError(f"{name}: is lost; take cells of the result as it was read")
+        column = cells[name]
         values = np.vectorize(lambda value, field=field: field.choices.get(value, value), otypes=[float])(column)
         columns[field.name] = values if "cell" in column.dims else np.repeat(values[None], len(numbers), axis=0)
     # beside other states it is seen that a state is 0 but for rounding

@@ -198,7 +198,8 @@ def _require(dataset: xr.Dataset, study: Study, names: Sequence[str], tolerance:
     axes = study.axes.values()
     if not 0 < tolerance < 1:
         raise SweepError(f"tolerance: expected a number between 0 and 1, found {tolerance}")
-    statuses_of(dataset)
+    if bool((statuses_of(dataset) == Status.PENDING).any()):
+        raise SweepError("the sweep is not finished; run it to its end first")
     require_as_read(dataset, study)
     if not names:
         raise SweepError("y: name at least one output")
@@ -215,8 +216,6 @@ def _require(dataset: xr.Dataset, study: Study, names: Sequence[str], tolerance:
     for name in names:
         if name not in study.outputs or name not in dataset or dataset[name].dims != dataset[STATUS].dims:
             raise SweepError(f"{name}: is no output of one value a cell")
-    if bool((dataset[STATUS] == Status.PENDING).any()):
-        raise SweepError("the sweep is not finished; run it to its end first")
 
 
 def _folder_of_rounds(path: str | os.PathLike[str] | None, dataset: xr.Dataset, force: bool) -> Path | None:

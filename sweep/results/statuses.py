@@ -102,13 +102,14 @@ def statuses_of(dataset: Cells) -> Any:
 
 
 def require_as_read(dataset: xr.Dataset, study: Study, whole: bool = False) -> None:
-    """Raises SweepError where axes are lost, or a unit is not the kernel's; of a `whole` result also where outputs are
-    lost, or its cells are not those of its study in their order."""
-    needed = (*study.axes, *study.outputs) if whole else study.axes
+    """Raises SweepError where a parameter is lost, or a unit is not the kernel's; of a `whole` result also where an
+    output is lost, or its cells are not those of its study in their order."""
+    needed = (*study.axes, *study.fixed, *(study.outputs if whole else ()))
     for field in (*study.kernel.parameters, *study.kernel.outputs):
-        column = dataset.get(field.name)
-        if field.name in needed if column is None else column.attrs.get("units", field.unit) != field.unit:
-            raise SweepError(f"{field.name}: is lost or in another unit; take cells of the result as it was read")
+        unit = dataset[field.name].attrs.get("units", field.unit) if field.name in dataset else None
+        if unit != field.unit and (unit or field.name in needed):
+            cause = f'is in another unit, "{unit}" instead of "{field.unit}"' if unit else "is lost"
+            raise SweepError(f"{field.name}: {cause}; take cells of the result as it was read")
     for name, axis in study.axes.items() if whole else ():
         values, own = np.asarray(dataset.get(name, ())), np.array(axis.words or axis.values)
         if not np.array_equal(values, own, equal_nan=own.dtype.kind == "f" == values.dtype.kind):
