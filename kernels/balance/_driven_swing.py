@@ -161,14 +161,17 @@ def newton(scene, rtol):
     """The cycle and its verdict: by (3), or in 32 digits where conditioning leaves less than rtol."""
     zeta, r, m, beta, w = scene
 
-    # the least p from which it comes to the lift, or to the zero, is 0, or (r - beta)(1 + 1/E) beyond r
+    # the least p from which it comes to the lift, or to the zero, is 0, or (r - beta)(1 + 1/E) beyond r; it passes the
+    # lift from rest at beta where (beta - r + m)(1 + E) > 2 beta, whose small terms must not be added to beta
     creeps, short = zeta >= 1.0, r > beta
     delta, _ = _ringdown.decrement(where(creeps, 0.5, zeta))
     share = where(creeps, 0.0, exp(-delta[0]))
     never = short & not_(share > 1e-300)
     least = where(short, (r - beta) * (1.0 + 1.0 / where(share > 1e-300, share, 1e-300)), 0.0)
     first = _rise(scene, 0.0 * least)
-    swings = first.comes & (first.p > least) & not_(never | (not_(beta > 0.0) & creeps))
+    passes = not_(beta > 0.0) | ((m - r) * (1.0 + share) > beta * where(creeps, 1.0, -expm1(-delta[0])))
+    grows = passes & (not_(short) | (first.p > least))
+    swings = grows & not_(never | (not_(beta > 0.0) & creeps))
     low = where(swings, least, 0.0)
 
     # the start is the a of 2 r a + pi zeta a^2 = work, what light losses tend to

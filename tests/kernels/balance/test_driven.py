@@ -143,6 +143,23 @@ def test_just_below_the_least_drive_the_balance_sticks():
     assert (status == Status.STICKS).all()
 
 
+def test_with_hardly_any_friction_it_sticks_just_below_the_torque_that_it_takes():
+    """m - r > beta tanh(delta/2) passes the lift from rest at its begin; both sides are far below beta."""
+    random = np.random.default_rng(3)
+    n = 400 if COMPILED else 4
+    zeta, r = 10 ** random.uniform(-14, -3, n), np.where(random.random(n) < 0.5, 10 ** random.uniform(-14, -9, n), 0.0)
+    above = random.choice([-1, 1], n) * 10 ** random.uniform(-4, -1, n)
+    least = np.tanh(0.5 * np.pi * zeta / np.sqrt(1 - zeta**2))
+    keeps = least > 1e-4 * r  # the last digit of m decides elsewhere
+    columns = [c[keeps] for c in (zeta, np.ones(n), r, np.zeros(n), r + least * (1 + above), np.ones(n))]
+    outputs, status = solve(BALANCE_DRIVEN, "newton", *columns, rtol=1e-10)
+    assert ((status == Status.OK) == (above > 0)[keeps]).all()
+    assert (status[above[keeps] < 0] == Status.STICKS).all()
+    for i in np.flatnonzero(status == Status.OK)[::20]:
+        for name, true in zip(NAMES, oracles.driven(*(column[i] for column in columns)), strict=True):
+            assert relative_error(outputs[name][i : i + 1], [true])[0] < 1e-10, name
+
+
 @pytest.mark.parametrize("zeta", [1.0, 1 + 1e-12, 10.0])
 def test_an_overdamped_balance_needs_a_lift(zeta):
     for method, r in (("closed", 0.0), ("newton", 0.0), ("newton", 0.1)):
