@@ -11,6 +11,8 @@ from fractions import Fraction
 from functools import cache
 from typing import Any
 
+import numpy as np
+
 from sweep.words import did_you_mean
 
 DIMENSIONS = {
@@ -91,10 +93,14 @@ def in_unit(value: Any, wanted: str, name: str) -> Any:
     ------
     UnitMistake
         As of `scale`.
+    TypeError
+        They are complex.
     """
-    unit = str(getattr(value, "units", ""))
-    factor = scale(unit, wanted, name) if unit else None
-    return getattr(value, "magnitude", value) * (1 if factor is None else float(factor)) if unit else value
+    if unit := str(getattr(value, "units", "")):
+        value = getattr(value, "magnitude", value) * float(scale(unit, wanted, name) or 1)
+    if np.iscomplexobj(value):
+        raise TypeError(f"{name} is complex")
+    return value
 
 
 def exponents(text: str) -> dict[str, Fraction]:
