@@ -149,7 +149,7 @@ def diff(a: xr.Dataset, b: xr.Dataset, rtol: float = 0.0) -> Difference:
     if kernels[0] != kernels[1]:
         raise SweepError(f"the results are of different kernels, {kernels[0]} and {kernels[1]}")
     for name in sorted(map(str, a.variables.keys() & b.variables.keys())):
-        units = [str(d[name].attrs.get("units", "")) for d in (a, b)]
+        units = [str(d[name].attrs.get("units", "no unit")) for d in (a, b)]
         if units[0] != units[1]:
             raise SweepError(
                 f"{name} is in {units[0]} in one result and in {units[1]} in the other; see sweep.in_units"
