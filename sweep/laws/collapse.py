@@ -107,7 +107,7 @@ def _points(y: xr.DataArray, dim: str, over: str, sigma: Any) -> Array:
     """Of the points that are there, one curve behind the other, ln x, ln L, ln y and its standard error, NaN where that
     is not known (4, n)."""
     check_output(y)
-    if y.ndim != 2 or sorted(map(str, (dim, over))) != sorted(map(str, y.dims)):
+    if sorted(map(str, (dim, over))) != sorted(map(str, y.dims)):
         raise SweepError(f"a collapse takes one output along {dim} and {over}, and nothing else; choose with .sel")
     t, sizes = np.log(positive_axis(y, dim)[1]), y[over].values
     if sizes.dtype.kind not in "fiu" or sizes.size < 2 or not (np.isfinite(sizes) & (sizes > 0)).all():
