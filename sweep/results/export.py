@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import xarray as xr
+from xarray.indexes import PandasMultiIndex
 
 from sweep.cells.reduce import BY_METHOD, BY_STATUS
 from sweep.errors import SweepError, missing
@@ -56,7 +57,8 @@ def export(
     Raises
     ------
     SweepError
-        If the suffix is another, what writes it is not installed, or the file cannot be, or is not to be, written.
+        If there is nothing to write, the suffix is another, what writes it is not installed, or the file cannot be, or
+        is not to be, written.
 
     Examples
     --------
@@ -66,6 +68,10 @@ def export(
     2.0,1.0,1.0,0.0,0.0,0.0,1.0,0.0,1.0,5.524901443102082,1.0000001e-15,OK,closed
     """
     require_dataset("export", dataset)
+    if not any(column.size for column in (dataset.data_vars or dataset.coords).values()):
+        raise SweepError(f"{path}: there is nothing to export; no cell meets the condition, or the Dataset is empty")
+    stacked = [dim for dim in dataset.dims if isinstance(dataset.xindexes.get(dim), PandasMultiIndex)]
+    dataset = dataset.reset_index(stacked)  # as columns, which every kind of file can hold
     target = as_path(path)
     kind = target.suffix.lower()
     if kind not in WRITERS:

@@ -45,6 +45,19 @@ def test_words_of_zarr_are_words_to_all_that_takes_a_result(tmp_path):
         assert cell.method == "rough"
 
 
+@pytest.mark.parametrize("suffix", [".csv", ".parquet", ".nc", ".zarr"])
+def test_stacked_cells_are_cells_and_none_at_all_are_a_mistake(tmp_path, suffix):
+    ds, path = result()[["fall_time", "status"]], tmp_path / f"out{suffix}"
+    for none in (sweep.where(ds, "height > 1e9"), ds.isel(v0=[]), xr.Dataset()):
+        with pytest.raises(SweepError, match="nothing to export"):
+            sweep.export(none, path)
+    sweep.export(ds.stack(stone=("height", "v0")), path)
+    if suffix == ".csv":
+        grid = sweep.export(ds, tmp_path / "grid.csv")
+        one, other = ([dict(zip(names, row, strict=True)) for row in rows] for names, rows in map(read, (path, grid)))
+        assert one == other
+
+
 @pytest.mark.parametrize(
     ("name", "word"),
     [
