@@ -57,7 +57,8 @@ def where(dataset: xr.Dataset, condition: str) -> xr.Dataset:
 
     units = {str(name): str(v.attrs["units"]) for name, v in dataset.variables.items() if "units" in v.attrs}
     chosen = Condition(condition, variable, words, "where ", units)
-    status, truth = statuses_of(dataset), chosen.truth()
+    dataset = dataset if statuses_of(dataset).dims else dataset.expand_dims("cell")
+    status, truth = dataset[STATUS], chosen.truth()
     dims = [str(dim) for dim in status.dims]
     if others := sorted({str(dim) for dim in truth.dims} - set(dims)):
         raise chosen.refusal(f"runs along {listed(others)}, not the cells")

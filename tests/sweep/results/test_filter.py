@@ -47,6 +47,7 @@ def test_a_chosen_cell_keeps_all_its_values():
     assert chosen.fall_time.attrs == RESULT.fall_time.attrs
     assert float(chosen.g) == float(RESULT.g)
     assert sweep.where(sweep.where(RESULT, "status == 'OK'"), "v0 > 0").sizes["cell"] == 3
+    assert sweep.where(RESULT.sel(height=2.0, v0=1.0), "v0 > 0").status.dims == ("cell",)
 
 
 @pytest.mark.parametrize(
