@@ -158,7 +158,7 @@ class Scaling:
             long_name = f"{name}{str(group)[1:]}" if str(group).startswith("1/") else f"{name} {group}".strip()
             output = dataset[name] * group.of(values)
             attrs = {**dataset[name].attrs, "units": "1", "long_name": long_name}
-            dataset = dataset.assign({name: output.assign_attrs(attrs)})
+            dataset = dataset.assign({name: (output.dims, output.data, attrs)})
         return dataset
 
 
