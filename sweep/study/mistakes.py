@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from kernels.interface import Field
 from sweep.errors import Mistake, StudyError, SweepError
+from sweep.study.units import unit_of
 from sweep.words import did_you_mean, listed, nearest
 
 T = TypeVar("T")
@@ -67,7 +68,7 @@ class Entry:
         found = self.value[key] if isinstance(key, int) else self.value.get(key)
         unit = ""
         if hasattr(found, "__array__"):
-            unit = str(getattr(found, "units", getattr(found, "unit", "")))
+            unit = unit_of(found)
             found = getattr(found, "magnitude", found)
             # what is masked, as netCDF4 does with what is missing, is no number
             masked = isinstance(found, np.ma.MaskedArray) and np.ma.is_masked(found)

@@ -86,8 +86,13 @@ def scale(text: str, wanted: str, name: str) -> Decimal | None:
     return factor / wanted_factor
 
 
+def unit_of(value: Any) -> str:
+    """The unit that numbers have themselves, as quantities of pint and astropy and a DataArray; "" of others."""
+    return str(getattr(value, "units", getattr(value, "unit", "")))
+
+
 def in_unit(value: Any, wanted: str, name: str) -> Any:
-    """Numbers; those of a quantity of pint, or of a DataArray that says its unit, in the unit of the field `name`.
+    """Numbers; those that have a unit themselves in the unit of the field `name`.
 
     Raises
     ------
@@ -96,7 +101,7 @@ def in_unit(value: Any, wanted: str, name: str) -> Any:
     TypeError
         They are complex.
     """
-    if unit := str(getattr(value, "units", "")):
+    if unit := unit_of(value):
         value = getattr(value, "magnitude", value) * float(scale(unit, wanted, name) or 1)
     if np.iscomplexobj(value):
         raise TypeError(f"{name} is complex")
