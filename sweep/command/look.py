@@ -214,7 +214,7 @@ def sensitivity(arguments: argparse.Namespace) -> None:
     o.FORCE,
     option(
         "--where",
-        "only cells for which this holds, in SI units: \"status == 'OK' and R < '5 degree/s^2'\"",
+        "only cells for which this holds; a number is SI or has a unit: \"status == 'OK' and R < '5 degree/s^2'\"",
         metavar="CONDITION",
     ),
     switch("--compress", "of netCDF4 and zarr: smaller, every bit kept"),
