@@ -25,7 +25,7 @@ from sweep.study.model import Study
 from sweep.words import printable
 
 MOST_LETTERS = 500
-"""Of what is told of a fault."""
+"""Of what is told of a fault; the rest may be a whole array."""
 
 
 @contextlib.contextmanager
@@ -155,7 +155,7 @@ class Bench:
 
 
 def told(fault: BaseException) -> str:
-    """What a fault says, in one line that any terminal can show, of so many letters at most."""
+    """What a fault says, in one line that any terminal can show, without what is beyond MOST_LETTERS."""
     if isinstance(fault, Unsolved):
         return str(fault)
     try:

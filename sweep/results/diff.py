@@ -149,11 +149,9 @@ def diff(a: xr.Dataset, b: xr.Dataset, rtol: float = 0.0) -> Difference:
     if kernels[0] != kernels[1]:
         raise SweepError(f"the results are of different kernels, {kernels[0]} and {kernels[1]}")
     for name in sorted(map(str, a.variables.keys() & b.variables.keys())):
-        units = [str(d[name].attrs.get("units", "no unit")) for d in (a, b)]
-        if units[0] != units[1]:
-            raise SweepError(
-                f"{name} is in {units[0]} in one result and in {units[1]} in the other; see sweep.in_units"
-            )
+        one, other = (str(d[name].attrs.get("units", "no unit")) for d in (a, b))
+        if one != other:
+            raise SweepError(f"{name} is in {one} in one result and in {other} in the other; see sweep.in_units")
     if set(statuses_of(a).dims) != set(statuses_of(b).dims):
         dims = [listed(map(str, d[STATUS].dims), word="and") for d in (a, b)]
         raise SweepError(f"the cells run along {dims[0]} in one result and along {dims[1]} in the other")

@@ -53,7 +53,7 @@ class SweepAccessor:
         names = ", ".join(name for name in vars(type(self)) if not name.startswith("_"))
         try:
             counted = f"{self.statuses()}\n\n"
-        except sweep.SweepError:  # it has none
+        except sweep.SweepError:  # it has none that can be counted
             counted = ""
         return f"{counted}ds.sweep has: {names}"
 
