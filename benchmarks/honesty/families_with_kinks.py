@@ -186,18 +186,20 @@ def _power_turns_truth(n, d, p, T):
     y = np.where(n < 1, before[0] + behind[0], before[1] + behind[1]) / 2**n
     x, v = (T - p) ** 2 / 2 + d, T - p
     z = (p ** (n + 1) + v ** (n + 1)) / (n + 1)
-    return Truth(T, [T, x, v, y, z], [T, np.maximum(p * p / 2 + d, abs(x)), np.maximum(p, v), y, z], 10 + 0 * T)
+    low, s = p ** (n + 2) / (n + 2), (v ** (n + 2) - p ** (n + 2)) / (n + 2)
+    sizes = [T, np.maximum(p * p / 2 + d, abs(x)), np.maximum(p, v), y, z, np.maximum(low, abs(s))]
+    return Truth(T, [T, x, v, y, z, s], sizes, 10 + 0 * T)
 
 
 @family(
     scene(
-        "power_turns", "t x v y z", "n d p T",
-        lambda x, v, n: (1.0, v, 1.0, power(abs(x), n), power(abs(v), n)), lambda t, T: T - t,
-        lambda d, p: (0.0, p * p / 2 + d, -p, 0.0, 0.0),
+        "power_turns", "t x v y z s", "n d p T",
+        lambda x, v, n: (1.0, v, 1.0, power(abs(x), n), power(abs(v), n), power(abs(v), n) * v), lambda t, T: T - t,
+        lambda d, p: (0.0, p * p / 2 + d, -p, 0.0, 0.0, 0.0),
     ), _power_turns_truth,
 )  # fmt: skip
 def power_turns(random, n):
-    """A power of what turns round next to 0, or just behind it; and of its rate, which passes 0 then."""
+    """A power of what turns round next to 0, or just behind it; and of its rate, which passes 0 then, or times that."""
     p, d = random.uniform(0.5, 2.0, n), 10.0 ** random.uniform(-8, -0.5, n) * random.choice([-1.0, 1.0], n)
     return {"n": random.choice([0.5, 1.5], n), "d": d, "p": p, "T": p + random.uniform(0.2, 2.0, n)}
 

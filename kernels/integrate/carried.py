@@ -158,9 +158,9 @@ def moved(m, error, changes, state, mode, unit, x, lanes, pieces, cores, coarse)
     off, spread = (tuple(way.at(x, curve)[0] for way, curve in zip(m.ways, curves, strict=True)) for curves in changes)
     parts = zip(spread, m.error.rates_made(state, mode), state, strict=True)
     spread = tuple(further(y, ULP * fma(x * unit, noise, magnitude(u))) for y, noise, u in parts)
-    for span, uneven, rates in coarse:
-        by = fma(span, uneven, magnitude(x - span))
-        spread = tuple(further(y, rate * by) for y, rate in zip(spread, rates, strict=True))
+    for span, rates, left in coarse:
+        parts = zip(spread, rates, left, strict=True)
+        spread = tuple(further(y, fma(rate, magnitude(x - span), by)) for y, rate, by in parts)
     weight, parts = where(outside(cores, lanes), x, 0.0) * share, zip(m.summed, lasts, strict=True)
     left = tuple(where((summed > 0.5) & (weight > 0.0), unit * power * share * last, 0.0) for summed, last in parts)
     return error._replace(off=off, spread=spread, weight=weight, left=left)

@@ -5,7 +5,8 @@ is right for whatever n, and what is left of a state whose rate the power change
     D t (t + d)                                                                                          (1)
 for the speed between differs from the true one by less than D t, and the motion is not quite even: d, at most 1/4, is
 what r changes by on the way, of itself, by the power and by all else, as where u turns round next to 0. Besides,
-D times what a step is longer or shorter than t is left out.
+D times what a step is longer or shorter than t is left out, and t times what D changes by on the way:
+of abs(u)^n u it is 0 at the kink. Where n < 0, D is that of the mean.
 The core ends where (1) is the tolerance times the state's own size; outside the series steps towards it or away from it
 by parts of the way that is left, as the radius of convergence allows.
 
@@ -16,8 +17,9 @@ are right, and what hangs on u is off by less than u times that time. Generic in
 
 from collections import namedtuple
 
+from kernels.integrate.steps import ONE
 from kernels.lanes.jit import jit_call
-from kernels.lanes.symbols import symbolic
+from kernels.lanes.symbols import left_a_call, symbolic
 from kernels.lanes.tuples import after, all_of, joined, times
 from kernels.lanes.vectors import any_lane, choose, fma, magnitude, not_, where
 from kernels.maths.elementary import power
@@ -27,6 +29,8 @@ UNEVEN = 0.25
 FAR = 1e300
 REST = 0.1
 """Of the margin of u, that below which it does not matter where u is on its way to rest: the motion may end before."""
+ROUNDS, LEAST = 3, 1e-9
+"""How often a core behind a kink is made shorter, of which the rates may change within it; and what of it is left."""
 SHORT = 0.9
 """Of the way to rest, that a step may take: at the end of it the series may turn round instead."""
 
@@ -56,13 +60,13 @@ def core(p, state, mode, unit, tolerance, on, t, margins, furthest):
     -------
     core : the mean, -1 where the motion is not in the core
     longest : step from the kink on
-    coarse : of (1) t, t + d and D of each state: on a step of another length than t the mean is not the right one
+    coarse : of (1) t, D of each state, and what is left of it
     full : the rates with the power as it is
     """
     n, base, nothing = p.exponent(state, mode), p.base(state, mode), 0.0 * mode.side
     value, margin, leaves = power(base, n), p.of_kink(margins), (p.of_kink(on) > 0.5) & (t <= 0.0)
     full = p.rates(state, mode, unit, value)
-    core, longest, coarse = nothing - 1.0, nothing + FAR, (nothing, nothing, times(nothing, state))
+    core, longest, coarse = nothing - 1.0, nothing + FAR, (nothing, times(nothing, state), times(nothing, state))
     nears = p.of_kink(joined((0.0,), mode.signs)) * p.of_base(full) < 0.0
     if any_lane(nears):
         core, longest, coarse = towards(p, state, mode, unit, tolerance, n, base, value, full, margin, nears, furthest)
@@ -79,19 +83,23 @@ def towards(p, state, mode, unit, tolerance, n, base, value, full, margin, nears
     bare = p.rates(state, mode, unit, nothing)
     over = 1.0 / magnitude(p.of_base(full))
     t_base = base * over
-    kink = p.without(after(state, t_base, (1.0,), (full,)), mode)
-    at_kink = p.of_base(p.rates(kink, mode, unit, nothing))
+    kink = p.without(after(state, t_base, ONE, (full,)), mode)
+    bare_there = p.rates(kink, mode, unit, nothing)
+    at_kink = p.of_base(bare_there)
     d = magnitude(p.of_base(full) - at_kink) * over
-    by_power, uneven = tuple(magnitude(x - y) for x, y in zip(full, bare, strict=True)), t_base + d
-    parts = zip(by_power, state, full, strict=True)
-    small = tuple(x * (t_base * uneven) <= tolerance * size_in_unit(u, rate) for x, u, rate in parts)
+    here, there = apart(full, bare), apart(p.rates(kink, mode, unit, value), bare_there)
+    most_of, early = times(steep(n), tuple(where(x < y, y, x) for x, y in zip(here, there, strict=True))), t_base + d
+    parts = zip(most_of, here, there, strict=True)
+    left = times(t_base, tuple(fma(z, early, steep(n) * magnitude(x - y)) for z, x, y in parts))
+    small = tuple(x <= tolerance * size_in_unit(u, rate) for x, u, rate in zip(left, state, full, strict=True))
     inside = nears & (d <= UNEVEN) & ((1.0 + UNEVEN) * t_base <= furthest) & all_of(small)
     settles = nears & (at_kink <= 0.0) & (at_kink >= 0.0) & (n < 1.0)
-    left = t_base / (1.0 - n)
+    way = t_base / (1.0 - n)
     rests = settles & (base <= REST * margin)
     core = where(rests, value * (1.0 - n), where(inside, mean_power(value, n), -1.0))
-    longest = where(settles & not_(rests), SHORT * left, FAR)
-    return core, longest, choose(inside, (t_base, uneven, by_power), (nothing, nothing, times(nothing, state)))
+    longest = where(settles & not_(rests), SHORT * way, FAR)
+    none = times(nothing, state)
+    return core, longest, choose(inside, (t_base, most_of, left), (nothing, none, none))
 
 
 @symbolic
@@ -99,28 +107,51 @@ def away(p, state, mode, unit, tolerance, n, furthest):
     """The same where u = rate t leaves 0: as long as it may be taken for small by (1), at most 1 unit."""
     nothing = 0.0 * mode.side
     bare, whole = p.rates(state, mode, unit, nothing), p.rates(state, mode, unit, nothing + 1.0)
-    by_power, capacity = tuple(magnitude(x - y) for x, y in zip(whole, bare, strict=True)), nothing + FAR
-    for u, y, z in zip(state, bare, by_power, strict=True):
+    by_power, reach = apart(whole, bare), _no_more_than_one(furthest)
+    for _ in range(ROUNDS):
+        reach, mean, most_of, left = shorter(p, state, mode, unit, tolerance, n, bare, by_power, reach)
+    return mean, reach, (reach, most_of, left)
+
+
+@left_a_call
+def shorter(p, state, mode, unit, tolerance, n, bare, by_power, reach):
+    """How long by (1) a core may be, by what rates change on the way of this one; its mean, D, and what is left out."""
+    moved, nothing = after(state, reach, ONE, (bare,)), 0.0 * reach
+    ahead, more = p.rates(moved, mode, unit, nothing), p.rates(moved, mode, unit, nothing + 1.0)
+    rate, there, capacity = magnitude(p.of_base(bare)), apart(more, ahead), nothing + FAR
+    turn = magnitude(p.of_base(ahead) - p.of_base(bare)) / (rate * reach)
+    slopes = tuple(magnitude(x - z) / reach for x, z in zip(there, by_power, strict=True))
+    by = tuple(z + slope for z, slope in zip(by_power, slopes, strict=True))
+    for u, y, z in zip(state, bare, by, strict=True):
         share = size_in_unit(u, y) / z
         capacity = where(share < capacity, share, capacity)
-    rate, of_base = magnitude(p.of_base(bare)), p.of_base(by_power)
-    drag = power(rate, n)
+    drag, of_base = power(rate, n), p.of_base(by)
     room = 0.5 * tolerance * capacity / drag  # D t^2 <= half the tolerance times the size
     over = rate / (of_base * drag)
-    slow = power(_no_more_than_one(room), 1.0 / (n + 2.0))
+    slow = power(_no_more_than_one(room / (1.0 + turn)), 1.0 / (n + 2.0))
     even = power(_no_more_than_one(room * over), 1.0 / (2.0 * n + 1.0))
     mild = where(n > 0.0, power(_no_more_than_one(UNEVEN * over), 1.0 / where(n > 0.0, n, 1.0)), 1.0)
-    reach = where(slow < even, slow, even)
-    reach = where(reach < mild, reach, mild)
-    reach = where(reach < furthest, reach, furthest)
-    turned = p.of_base(p.rates(after(state, reach, (1.0,), (bare,)), mode, unit, nothing)) - p.of_base(bare)
-    d = magnitude(turned) / rate
-    shorter = power(_no_more_than_one(reach / d), 1.0 / (n + 2.0))
-    shorter = where(shorter * d > UNEVEN, UNEVEN / d, shorter)
-    reach, d = shorter * reach, shorter * d
-    mean = mean_power(power(rate * reach, n), n)
-    last = (n + 1.0) * mean
-    return mean, reach, (reach, fma(of_base, last / rate, reach) + d, times(last, by_power))
+    mild = where(mild * turn > UNEVEN, UNEVEN / turn, mild)
+    wanted = where(slow < even, slow, even)
+    wanted = where(wanted < mild, wanted, mild)
+    wanted = where(wanted < reach, wanted, reach)
+    reach = where(wanted > LEAST * reach, wanted, LEAST * reach)
+    last = power(rate * reach, n)
+    early = fma(of_base, last / rate, reach * (1.0 + turn))
+    most_of = tuple(steep(n) * last * fma(slope, reach, z) for z, slope in zip(by_power, slopes, strict=True))
+    return reach, mean_power(last, n), most_of, times(steep(n) * last * reach * early, by)
+
+
+@symbolic
+def apart(xs, ys):
+    """By how much each of a tuple is another."""
+    return tuple(magnitude(x - y) for x, y in zip(xs, ys, strict=True))
+
+
+@symbolic
+def steep(n):
+    """The mean of what falls as t^n over its last value, or 1 of what rises."""
+    return where(n < 0.0, 1.0 / (n + 1.0), 1.0)
 
 
 @symbolic

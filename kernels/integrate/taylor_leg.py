@@ -355,7 +355,6 @@ def to_event(m, cell, mode, active):
         if any_lane(untold):
             refused = where(untold, refused + 1.0, refused)
             steps, seen = steps & not_(untold), seen & not_(untold)
-        longest = where(seen, longest / COME_UP, COME_UP * trial)
         # to its end, or until an event that it passes
         passed, ends = passing(m, pieces, trial, steps, fallings, passed)
         meets = steps & any_of(passed)
@@ -368,6 +367,7 @@ def to_event(m, cell, mode, active):
         reach = reached(reach, state)
         t = where(steps, t + trial, t)
         now, moving = never, moving & not_(meets)
+        longest = where(moving, where(seen, longest / COME_UP, COME_UP * trial), longest)  # what has met keeps its core
         if not any_lane(moving):
             break
     lost = moving | steep
