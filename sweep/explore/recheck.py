@@ -175,7 +175,7 @@ class Checked:
 def again(dataset: xr.Dataset, numbers: Any, allow_import: bool) -> tuple[Study, xr.Dataset, dict[str, Any]]:
     """A result's study, some cells along "cell", and their parameters and rtol as the kernel has them."""
     study, cells = study_of(dataset, allow_import=allow_import), cells_at(dataset, numbers).compute()
-    require_as_read(dataset, study)
+    require_as_read(dataset, study, [METHOD_USED])
     columns = {"rtol": np.full(len(numbers), cells.get("rtol", study.rtol))}
     for field in study.kernel.parameters:
         name = study.follows.get(field.name, field.name)

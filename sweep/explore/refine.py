@@ -200,7 +200,7 @@ def _require(dataset: xr.Dataset, study: Study, names: Sequence[str], tolerance:
         raise SweepError(f"tolerance: expected a number between 0 and 1, found {tolerance}")
     if bool((statuses_of(dataset) == Status.PENDING).any()):
         raise SweepError("the sweep is not finished; run it to its end first")
-    require_as_read(dataset, study)
+    require_as_read(dataset, study, [*study.outputs, *ANCILLARY])
     if not names:
         raise SweepError("y: name at least one output")
     if any(axis.words is not None or axis.values.ndim > 1 for axis in axes):

@@ -149,7 +149,7 @@ class Scaling:
         ['group_1']
         """
         require_dataset("scaling(...).rescaled", dataset)
-        require_as_read(dataset, self._study)
+        require_as_read(dataset, self._study, self.scales)
         values = {str(name): dataset[name] for name in dataset.coords}
         for number, group in enumerate(self.groups, 1):
             coordinate = group.of(values).assign_attrs(units="1", long_name=str(group))

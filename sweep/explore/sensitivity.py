@@ -61,7 +61,7 @@ def sensitivity(dataset: xr.Dataset, y: str | xr.DataArray) -> xr.Dataset:
     study = Study.of(dataset, declared=True)
     if study.design not in ("saltelli", "morris"):
         raise SweepError('the design of the result is neither "saltelli" nor "morris"; sensitivity needs one of these')
-    require_as_read(dataset, study, whole=True)  # cells follow each other as the design has them
+    require_as_read(dataset, study, ["status"], whole=True)  # cells follow each other as the design has them
     found = dataset[y] if isinstance(y, str) and y in dataset else y
     if not isinstance(found, xr.DataArray) or found.dims != dataset["status"].dims:
         known = ", ".join(str(name) for name, v in dataset.data_vars.items() if v.dims == dataset["status"].dims)

@@ -79,7 +79,7 @@ def join(
         raise SweepError("the two results together do not fit into the memory")
     studies = [Study.of(dataset, declared=True) for dataset in results]
     for dataset, study in zip(results, studies, strict=True):
-        require_as_read(dataset, study, whole=True)
+        require_as_read(dataset, study, [*study.outputs, *ANCILLARY], whole=True)
     # what they differ in: "axes.mu", "fixed.a", "rtol"; of axes that run together "points"
     old, new = map(_said, studies)
     apart = sorted(name for name in {*old, *new} - {"study"} if old.get(name) != new.get(name))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -101,17 +101,18 @@ def statuses_of(dataset: Cells) -> Any:
     return dataset[STATUS]
 
 
-def require_as_read(dataset: xr.Dataset, study: Study, whole: bool = False) -> None:
-    """Raises SweepError where a parameter is lost, or a unit is not the kernel's; of a `whole` result also where an
-    output is lost, or its cells are not those of its study in their order."""
-    needed = (*study.axes, *study.fixed, *(study.outputs if whole else ()))
+def require_as_read(dataset: xr.Dataset, study: Study, columns: Iterable[str], whole: bool = False) -> None:
+    """Raises SweepError where a parameter or one of the columns is lost, or a unit is not the kernel's; of a `whole`
+    result also where its cells are not those of its study in their order."""
+    cure = "take cells of the result as it was read"
+    for name in (*study.axes, *study.fixed, *columns):
+        if name not in dataset:
+            raise SweepError(f"{name}: is lost; {cure}")
     for field in (*study.kernel.parameters, *study.kernel.outputs):
-        unit = dataset[field.name].attrs.get("units", field.unit) if field.name in dataset else None
-        if unit != field.unit and (unit or field.name in needed):
-            cause = f'is in another unit, "{unit}" instead of "{field.unit}"' if unit else "is lost"
-            raise SweepError(f"{field.name}: {cause}; take cells of the result as it was read")
+        if field.name in dataset and (unit := dataset[field.name].attrs.get("units", field.unit)) != field.unit:
+            raise SweepError(f'{field.name}: is in another unit, "{unit}" instead of "{field.unit}"; {cure}')
     for name, axis in study.axes.items() if whole else ():
-        values, own = np.asarray(dataset.get(name, ())), np.array(axis.words or axis.values)
+        values, own = dataset[name].values, np.array(axis.words or axis.values)
         if not np.array_equal(values, own, equal_nan=own.dtype.kind == "f" == values.dtype.kind):
             raise SweepError(f"{name}: cells are sorted or left out; take the whole result as it was read")
 

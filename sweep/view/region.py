@@ -147,7 +147,7 @@ def study_text(dataset: xr.Dataset, choice: Choice) -> str:
         raise SweepError("only a product of axes has regions; this study is a list of cells")
     known = {*SETTINGS, *(parameter.name for parameter in study.kernel.parameters)}
     if joined := study.axes.keys() - known:
-        raise SweepError(f"no study has the axis {joined.pop()}, along which results were joined")
+        raise SweepError(f"no study has the axis {joined.pop()}, along which results were joined; view one of them")
     ranges = {choice.x: choice.x_range, choice.across: choice.y_range}
     axes: dict[str, Axis] = {}
     fixed: dict[str, Any] = dict(study.fixed)
