@@ -11,6 +11,7 @@ from sweep.errors import SweepError
 from sweep.results.statuses import require_as_read
 from sweep.study.designs import LEVELS, problem, require_salib
 from sweep.study.model import Study
+from sweep.words import require_dataset
 
 SEED = 1
 """Of the resampling that tells the errors; SALib takes 0 for none."""
@@ -58,6 +59,7 @@ def sensitivity(dataset: xr.Dataset, y: str | xr.DataArray) -> xr.Dataset:
     >>> found.total.to_series().idxmin()  # near alpha = 1 friction decides least
     'a'
     """
+    require_dataset("sensitivity", dataset)
     study = Study.of(dataset, declared=True)
     if study.design not in ("saltelli", "morris"):
         raise SweepError('the design of the result is neither "saltelli" nor "morris"; sensitivity needs one of these')

@@ -59,6 +59,7 @@ def test_the_same_cells_have_the_same_errors_in_every_call_whoever_opened_the_re
         (lambda: cells("morris", 4, where="v0 > '0.5 m/s'"), "fall_time", "cells have no value"),
         (lambda: cells("morris", 4).sortby("height"), "fall_time", "sorted"),
         (lambda: cells("saltelli", 4).isel(cell=slice(16)), "fall_time", "left out"),
+        (lambda: "saltelli.h5", "fall_time", "open the file first"),
     ],
 )
 def test_what_cannot_be_told_is_refused(make, y, message):
