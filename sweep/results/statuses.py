@@ -111,7 +111,11 @@ def require_as_read(dataset: xr.Dataset, study: Study, columns: Iterable[str], w
     for field in (*study.kernel.parameters, *study.kernel.outputs):
         if field.name in dataset and (unit := dataset[field.name].attrs.get("units", field.unit)) != field.unit:
             raise SweepError(f'{field.name}: is in another unit, "{unit}" instead of "{field.unit}"; {cure}')
-    for name, axis in study.axes.items() if whole else ():
+    if not whole:
+        return
+    if set(dataset[STATUS].dims) != set(study.dims):
+        raise SweepError(f"the cells run along other dimensions than those of their study; {cure}")
+    for name, axis in study.axes.items():
         values, own = dataset[name].values, np.array(axis.words or axis.values)
         if not np.array_equal(values, own, equal_nan=own.dtype.kind == "f" == values.dtype.kind):
             raise SweepError(f"{name}: cells are sorted or left out; take the whole result as it was read")

@@ -111,6 +111,8 @@ def test_what_does_not_fit_is_refused(results, options, message):
         (lambda ds: ds.isel(height=slice(2)), "join"),
         (lambda ds: ds.isel(height=0), "join refine"),
         (lambda ds: ds.rename(height="h"), "join refine check"),
+        (lambda ds: ds.expand_dims(run=2), "join"),
+        (lambda ds: ds.assign_coords(drop=2.0 * ds.height).swap_dims(height="drop"), "join"),
         (lambda ds: ds.drop_vars("error_bound"), "join refine"),
         (lambda ds: ds.drop_vars("method_used"), "join refine check"),
         (lambda ds: ds.where(ds.height > 1), "join refine check statuses"),
