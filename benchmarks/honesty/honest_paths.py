@@ -20,6 +20,8 @@ PIECES = (1.0, 2.0, 4.0, 8.0, 16.0, 44.0)
 ROUNDS = 60
 CLOSE = 1e-15
 """How well two grids must agree."""
+MOST_PANELS = 10_000
+"""Of a grid over a swing with a ripple: what friction stops only after more waves is not resolved, which takes 1 GB."""
 
 
 def gauss(n):
@@ -131,6 +133,8 @@ def _rippled(mu, phi0, R, k, depth, harmonic):
         return None
     legs = [(top + 1, -rho), (top - 1, rho)]
     panels = 8 + int(harmonic * (top + 1))
+    if panels > MOST_PANELS:
+        return NotImplemented
     found = [_ripple_legs(legs, top, kappa, depth, harmonic, panels * more) for more in (1, 2)]
     if None in found:
         return None if found == [None, None] else NotImplemented

@@ -17,6 +17,7 @@ of speed hides what the tolerance does, outputs, which may depend on the speed a
 are those at the speed by Newton's step: by their tangents, or as they changed since the half swing before.
 """
 
+import math
 from collections import namedtuple
 
 import numpy as np
@@ -39,6 +40,8 @@ _NOISE, _NOISE_BARE = 100.0, 3000.0
 """Tolerances within which the sign of F - v may be wrong; where no tangents make steps shorter."""
 _ROUNDING = 2e-14
 """Of a half swing's speed and time."""
+_SAME_WAVE, _ANYTHING = 0.1, 1e300
+"""Radians of the torque's wave over which J of (3) is about straight; how ln J that may be anything follows ln v1."""
 _SENSITIVITY, _MULTIPLIER = map(Outputs._fields.index, ("sensitivity", "multiplier"))
 
 Cell = namedtuple("Cell", (*Foliot._fields, "depth", "harmonic"))
@@ -136,19 +139,41 @@ def _wanted(manner, share, gap, decay, waves):
     return np.fmin(np.fmax(wanted, manner.least), manner.orderly)
 
 
-def _stated(by, former, told, step, hangs, tolerance):
+def _by_J(s, by, off):
+    """Where the torque varies: how ln J of (3) follows ln v1, at most, and how many times farther than by dF/dv1 it is.
+
+    dA/dv0 is less than v0/(tau + kappa A). Where v1 may be `off` so far that its turning points lie on other parts of a
+    wave, J may be anything, and 1 - dF/dv1 as small as for the largest J.
+    """
+    gap, wave = 1.0 - by.slope, 0.5 * math.pi * s.harmonic
+    extra = s.kappa * by.A + s.depth * np.array([np.cos(wave * (1.0 - by.A)), np.ones(len(wave))])
+    by_A = s.kappa + s.depth * wave * np.sin(wave * (1.0 - by.A))
+    inwards, outwards = s.inwards + extra, s.outwards + extra
+    farther = gap / (1.0 - by.slope * (inwards / outwards)[1] * (outwards / inwards)[0])
+    apart = 4.0 * wave * by.A * off * farther > _SAME_WAVE
+    steep = np.abs(by_A * (1.0 / inwards[0] - 1.0 / outwards[0])) * (s.e * s.v) ** 2 / outwards[0]
+    varies = (s.depth > 0.0) & (s.e > 0.0)
+    return np.where(varies, np.where(apart, _ANYTHING, steep), 0.0), np.where(varies & apart, farther, 1.0)
+
+
+def _stated(s, by, former, step, hangs, tolerance):
     """Relative errors of what half swings give, a row for each output.
 
     Where those before gave the outputs `former`, with a relative difference `apart`, they are
         told apart + 2 (1 + abs(hangs)) step + (ROUNDING + tolerance)/(1 - dF/dv1),                  (6)
     where `step` is the relative one that Newton's method would still go, and `hangs` how an output follows v1. The last
     term is (1 + Y)-fold of exp(-Y); terms of s that cancel add theirs, with a tenth of the tolerance: they err alike.
+    Both follow J, of which two half swings that are waves of the torque apart say nothing.
     """
     apart = np.where(by.outputs == former, 0.0, np.abs(by.outputs / former - 1.0))  # a multiplier may be 0 for good
-    floor = (_ROUNDING + tolerance) / (1.0 - by.slope)
-    stated = told * apart + 2.0 * step * (1.0 + np.abs(hangs)) + floor
-    stated[_SENSITIVITY] += (_ROUNDING + 0.1 * tolerance) / (1.0 - by.slope) * by.cancels
-    stated[_MULTIPLIER] += floor * by.Y
+    gap = 1.0 - by.slope
+    floor = (_ROUNDING + tolerance) / gap
+    steep, farther = _by_J(s, by, step + floor)
+    floor, step = floor * farther, step * farther
+    by_J = np.where(steep > 0.0, steep * np.abs(by.slope / gap) * by.cancels, 0.0)
+    stated = s.told * apart + 2.0 * step * (1.0 + np.abs(hangs)) + floor
+    stated[_SENSITIVITY] += (_ROUNDING + 0.1 * tolerance) / gap * by.cancels + (floor + 2.0 * step) * by_J
+    stated[_MULTIPLIER] += floor * by.Y + (floor + 2.0 * step) * steep
     return stated
 
 
@@ -224,7 +249,7 @@ def cycles(manner, cells, rtol, asked):
         waves = s.linear * s.harmonic * 0.5 * (1.0 + by.A) if manner.bare and not tangents else 0.0
         ended, done = many, free & (stage == FINE)
         if done.any():
-            stated = _stated(by, former, s.told, step, hangs, used * (1.0 + waves))
+            stated = _stated(s, by, former, step, hangs, used * (1.0 + waves))
             outputs[:, i[done]], errors[:, i[done]] = by.outputs[:, done], stated[:, done]
             status[i[done]] = verdict[done]
             enough = stated[asked].max(axis=0) <= s.rtol

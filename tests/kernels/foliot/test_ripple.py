@@ -74,6 +74,25 @@ def test_errors_that_add_up_over_waves_or_hide_each_other_are_told(cell):
         assert (status == Status.OK).mean() > 0.98
 
 
+@pytest.mark.parametrize("method", ["taylor", "dopri5"])
+def test_what_hangs_on_a_turning_point_among_many_waves_is_right_or_said_to_be_inaccurate(method):
+    """Dry friction alone turns it at A = mu/R; the multiplier is J there: (tau(A) - rho)/(tau(A) + rho).
+
+    Hundreds of waves a swing take seconds.
+    """
+    random, n = np.random.default_rng(1), 500
+    depth, rtol = 1.0 - 10.0 ** random.uniform(-3, -1, n), 10.0 ** random.uniform(-3, -2, n)
+    rho, harmonic = random.uniform(0.05, 0.8, n) * (1.0 - depth), random.integers(2, 33, n)
+    torque = 1.0 + depth * np.cos(harmonic * np.pi * (1.0 - 1.0 / rho) / 2)
+    truths = {"multiplier": (torque - rho) / (torque + rho), "amplitude": 1.0 / rho}
+    cells = {"mu": 1.0, "phi0": 1.0, "R": rho, "k": 0.0, "depth": depth, "harmonic": harmonic}
+    for name, truth in truths.items():
+        outputs, status, told = estimated(FOLIOT_RIPPLE, method, rtol=rtol, asked=[name], **cells)
+        good = status == Status.OK
+        assert good.mean() > 0.15
+        assert (np.abs(outputs[name] / truth - 1.0) <= np.minimum(told, rtol))[good].all(), name
+
+
 EXACT = 1e-12
 """What the exact methods are right to in the cells here, at least."""
 
