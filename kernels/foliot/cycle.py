@@ -55,7 +55,7 @@ OUTPUTS = (
     Field("amplitude", "rad", "largest angle"),
     Field("crossing_speed", "rad/s", "angular speed just before the switch"),
     Field("sensitivity", "1", "sensitivity of the period to torque, -dlnP/dlnmu"),
-    Field("multiplier", "1", "multiplier of the half-cycle map (0 where below 1e-308)"),
+    Field("multiplier", "1", "multiplier of the half-cycle map (of few digits below 1e-308, then 0)"),
 )
 
 _VISCOUS = {"units": _viscous.UNITS, "excludes": ("R", "c", "k", "e")}

@@ -112,8 +112,11 @@ def multiplied(study: Study, factors: Mapping[str, Any]) -> Study:
 
 
 def relative_error(values: Any, true: Any, size: float = 0.0) -> Any:
-    """Largest relative error of an output in each cell; of traces to their largest value, and to `size` if larger."""
-    rest = tuple(range(1, true.ndim))
+    """Largest relative error of an output in each cell; of traces to their largest value, and to `size` if larger.
+
+    A number below the normal ones of float64 has few digits: its error is relative to the least of these.
+    """
+    rest, size = tuple(range(1, true.ndim)), max(size, float(np.finfo(float).tiny))
     scale = np.nanmax(np.abs(true), axis=rest, keepdims=True, initial=0.0) if rest else np.abs(true)
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         off = np.abs(values - true) / np.maximum(scale, size)

@@ -69,6 +69,12 @@ def test_errors_are_those_against_the_truth():
     assert (found.seconds > 0).all()
 
 
+def test_a_number_below_the_normal_ones_that_has_few_digits_is_not_silently_wrong():
+    keys = {"kernel": "foliot", "outputs": ["multiplier"], "axes": {"mu": [0.0014454397707459276]}}
+    found = chart(keys | {"fixed": {"phi0": 0.5235987755982989, "a": 1.0}}, methods=["quadrature"], tolerances=[1e-9])
+    assert shares(found.squeeze()) == {"ok": 1.0}
+
+
 def test_auto_is_measured_beside_the_methods_and_says_which_it_took():
     found = chart(stones())
     assert found.method.values.tolist() == ["auto", "rough", "exact"]
