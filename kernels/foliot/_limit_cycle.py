@@ -17,7 +17,6 @@ of speed hides what the tolerance does, outputs, which may depend on the speed a
 are those at the speed by Newton's step: by their tangents, or as they changed since the half swing before.
 """
 
-import math
 from collections import namedtuple
 
 import numpy as np
@@ -41,7 +40,7 @@ _NOISE, _NOISE_BARE = 100.0, 3000.0
 _ROUNDING = 2e-14
 """Of a half swing's speed and time."""
 _SAME_WAVE, _ANYTHING = 0.1, 1e300
-"""Radians of the torque's wave over which J of (3) is about straight; how ln J that may be anything follows ln v1."""
+"""Radians of the torque's wave over which J of (3) is about straight; for what has no bound."""
 _SENSITIVITY, _MULTIPLIER = map(Outputs._fields.index, ("sensitivity", "multiplier"))
 
 Cell = namedtuple("Cell", (*Foliot._fields, "depth", "harmonic"))
@@ -129,7 +128,7 @@ def begun(manner, cells, rtol):
 
 
 def _wanted(manner, share, gap, decay, waves):
-    """The tolerance of the last half swings; `share`, times rtol, is given.
+    """The tolerance of the last half swings; the argument `share` is the share times rtol.
 
     An error of F counts 1/(1 - dF/dv1)-fold in v1, and Y-fold in exp(-Y); without tangents errors of steps add up over
     the waves of the torque. So it is
@@ -140,17 +139,18 @@ def _wanted(manner, share, gap, decay, waves):
 
 
 def _by_J(s, by, off):
-    """Where the torque varies: how ln J of (3) follows ln v1, at most, and how many times farther than by dF/dv1 it is.
+    """Where the torque varies: how ln J of (3) follows ln v1, at most, and how many times Newton's step it may be away.
 
     dA/dv0 is less than v0/(tau + kappa A). Where v1 may be `off` so far that its turning points lie on other parts of a
-    wave, J may be anything, and 1 - dF/dv1 as small as for the largest J.
+    wave, J may be anything, and 1 - dF/dv1 on the way as small as for the largest J, or nothing.
     """
-    gap, wave = 1.0 - by.slope, 0.5 * math.pi * s.harmonic
+    gap, wave = 1.0 - by.slope, 0.5 * np.pi * s.harmonic
     extra = s.kappa * by.A + s.depth * np.array([np.cos(wave * (1.0 - by.A)), np.ones(len(wave))])
     by_A = s.kappa + s.depth * wave * np.sin(wave * (1.0 - by.A))
     inwards, outwards = s.inwards + extra, s.outwards + extra
-    farther = gap / (1.0 - by.slope * (inwards / outwards)[1] * (outwards / inwards)[0])
-    apart = 4.0 * wave * by.A * off * farther > _SAME_WAVE
+    least = 1.0 - by.slope * (inwards / outwards)[1] * (outwards / inwards)[0]
+    farther = np.where(least > 0.0, gap / least, _ANYTHING)
+    apart = ~(4.0 * wave * by.A * off * farther <= _SAME_WAVE)
     steep = np.abs(by_A * (1.0 / inwards[0] - 1.0 / outwards[0])) * (s.e * s.v) ** 2 / outwards[0]
     varies = (s.depth > 0.0) & (s.e > 0.0)
     return np.where(varies, np.where(apart, _ANYTHING, steep), 0.0), np.where(varies & apart, farther, 1.0)

@@ -1,5 +1,7 @@
 """Local exponents, and where a curve or its exponent passes a value, on curves whose answers are known."""
 
+import functools
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -93,7 +95,7 @@ def test_a_coordinate_along_the_cells_of_a_zip_design_and_an_array_in_pieces_wil
 def test_an_axis_that_has_no_logarithms_is_refused_with_the_reason(x, dim, message):
     y = curve(x, np.arange(1.0, len(x) + 1))
     repeated = list(x) == [1.0, 1.0, 2.0]  # which a line may have
-    passes = lambda y, dim: sweep.where_exponent(y, dim, 1.5, values=True)  # noqa: E731
+    passes = functools.partial(sweep.where_exponent, value=1.5, values=True)
     for fit in (sweep.local_exponent, sweep.fit_exponent, passes)[:: 1 + repeated]:
         with pytest.raises(sweep.SweepError, match=message.replace("?", r"\?")):
             fit(y, dim)
