@@ -162,24 +162,28 @@ def profiles(ds: xr.Dataset) -> Profiles:
     return Profiles(rows, weight, unevenness(rows, weight), ds.radius.values, places)
 
 
-def of_sets(p: Profiles, sets: Any) -> Any:
-    """U of sets of settings, (..., n), by the least square (1) of shares that come to 1; infinite if one is below 0."""
+def squares(p: Profiles) -> Any:
+    """M over settings by (1) of `polisher_robust`: shares t that come to 1 leave t M t = 1 + U^2."""
+    return (p.rows * p.weight) @ p.rows.T + DWELL**2 * np.diag(p.rough**2)
+
+
+def of_sets(square: Any, sets: Any) -> Any:
+    """U of sets of settings, (..., n), by the least t M t of shares that come to 1; infinite if one is below 0."""
     sets = np.asarray(sets)
-    square = (p.rows * p.weight) @ p.rows.T + DWELL**2 * np.diag(p.rough**2)
     times = np.linalg.solve(square[sets[..., :, None], sets[..., None, :]], np.ones((*sets.shape, 1)))[..., 0]
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.where((times >= 0.0).all(-1), np.sqrt(1.0 / times.sum(-1) - 1.0), np.inf)
 
 
-def exchanged(p: Profiles, chosen: list[int]) -> list[int]:
+def exchanged(square: Any, chosen: list[int]) -> list[int]:
     """The set with one setting after another exchanged as long as that helps."""
-    least_yet, here = np.inf, float(of_sets(p, chosen))
+    least_yet, here = np.inf, float(of_sets(square, chosen))
     while here < least_yet - 1e-9 or not np.isfinite(least_yet):
         least_yet = here if np.isfinite(here) else 1.0
         for i in range(len(chosen)):
             rest = chosen[:i] + chosen[i + 1 :]
-            others = [k for k in range(len(p.rows)) if k not in rest]
-            found = of_sets(p, [[*rest, k] for k in others])
+            others = [k for k in range(len(square)) if k not in rest]
+            found = of_sets(square, [[*rest, k] for k in others])
             chosen, here = [*rest, others[int(found.argmin())]], float(found.min())
     return chosen
 
@@ -187,16 +191,16 @@ def exchanged(p: Profiles, chosen: list[int]) -> list[int]:
 def fewest(p: Profiles) -> dict[int, list[int]]:
     """The best sets of 2 to 10 settings: of all pairs and threes; of more, by exchange, from 24 random starts and one
     that grows the set before."""
-    random, sets = np.random.default_rng(1), {}
+    random, sets, square = np.random.default_rng(1), {}, squares(p)
     for n in range(2, 11):
         if n < 4:
             starts = np.array(list(itertools.combinations(range(len(p.rows)), n)))
-            sets[n] = starts[int(of_sets(p, starts).argmin())].tolist()
+            sets[n] = starts[int(of_sets(square, starts).argmin())].tolist()
             continue
         starts = [random.choice(len(p.rows), n, replace=False).tolist() for _ in range(24)]
         grown = [[*sets[n - 1], k] for k in range(len(p.rows)) if k not in sets[n - 1]]
-        starts.append(grown[int(of_sets(p, grown).argmin())])
-        sets[n] = min((exchanged(p, start) for start in starts), key=lambda chosen: float(of_sets(p, chosen)))
+        starts.append(grown[int(of_sets(square, grown).argmin())])
+        sets[n] = min((exchanged(square, start) for start in starts), key=lambda chosen: float(of_sets(square, chosen)))
     return sets
 
 

@@ -12,7 +12,7 @@ starts. The unevenness is the standard deviation over the area, over the mean; t
 import numpy as np
 from _common import Claims, Statement, compared, held, most, said, script
 from _figures import COLOURS, Axis, page, panel, points
-from _polishing import DWELL, KEPT, WANTED, fewest, of_sets, profiles, reached
+from _polishing import DWELL, KEPT, WANTED, fewest, of_sets, profiles, reached, squares
 
 
 def claims(p, sets) -> Claims:
@@ -37,7 +37,7 @@ def claims(p, sets) -> Claims:
     known = [4, 5, 7, 9]  # of three and four all sets were tried, for more there may be better ones
     wanted = ", ".join(f"{100 * x:g}" for x in WANTED)
     equal = min(n for n, chosen in sets.items() if p.best(chosen) < p.expected(everything, exact))
-    off = max(abs(float(of_sets(p, chosen)) / p.best(chosen) - 1.0) for chosen in sets.values())
+    off = max(abs(float(of_sets(squares(p), chosen)) / p.best(chosen) - 1.0) for chosen in sets.values())
     yield most("  errors drawn: largest deviation from (1)", "3 %", drawn, 0.03)
     yield held("  fewest that are as good as the best for exact times", equal, "< 11", "{:.0f}")
     yield said(f"  fewest for {wanted} % with errors", needed == known, ", ".join(map(str, needed)), f"{known}")

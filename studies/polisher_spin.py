@@ -37,8 +37,11 @@ def wear(ds: xr.Dataset, motion: xr.Dataset, w: float, k: float | None, radius):
     half = np.arccos(np.clip(cosine, -1, 1))
     speed, (angle, ring) = np.zeros(half.shape), np.nonzero(half)
     nodes, weights = np.polynomial.legendre.leggauss(8)
-    around = ((turn - work)[angle] * radius[ring])[:, None] * np.exp(1j * half[angle, ring][:, None] * nodes)
-    speed[angle, ring] = abs(ahead[angle][:, None] + around) @ weights
+    turned, around = half[angle, ring][:, None] * nodes, ((turn - work)[angle] * radius[ring])[:, None]
+    along, across = (part[angle][:, None] for part in (ahead.real, ahead.imag))
+    speed[angle, ring] = (
+        np.sqrt((along + around * np.cos(turned)) ** 2 + (across + around * np.sin(turned)) ** 2) @ weights
+    )
     return float(ds.preston * ds.pressure) * (speed * half).mean(0) / (2 * np.pi)
 
 

@@ -126,12 +126,11 @@ TABLE = {
     }, "three_models.swing three_models_denny.amplitude three_models_viscous.multiplier"),
     "timekeeping": Claims({
         f"timekeeping{part}": {
-            "sigma": [0.003, 0.01, 0.1], "tau_c": tau_c, "averaging_time": 3600.0, "half_swings": half_swings,
-            "seed": 2,
+            "sigma": [0.003, 0.01, 0.1], "tau_c": tau_c, "averaging_time": time, "half_swings": half_swings, "seed": 2,
         }
-        for part, tau_c, half_swings in (
-            ("", [0, 1.25, 75, 1800], 15300), ("_buergi", [0, 2.5, 150, 3600], 30600),
-            ("_spring", [0, 10, 600, 14400], 122400),
+        for part, tau_c, half_swings, time in (
+            ("", [0, 1.25, 75, 1800], 15300, 3600.0), ("_buergi", [0, 2.5, 150, 3600], 30600, 3600.0),
+            ("_spring", [0, 2.5, 150, 3600], 30600, 900.0),
         )
     }, "truncated rate_error_s_per_day status", 3),
     "torque_ripple": Claims({"torque_ripple": {
@@ -140,7 +139,7 @@ TABLE = {
     }}, ""),
     "which_average": Claims({"which_average": {}}, ""),
     "verge_unmeshes": Claims({
-        "verge_unmeshes": {"e": [0, 0.4, 0.9], "I_c": 2.5e-6 * 10 ** (np.array([0, 4, 8, 9, 12, 14]) / 4)},
+        "verge_unmeshes": {"e": [0, 0.4, 0.6], "I_c": 2.5e-6 * 10 ** (np.array([0, 4, 8, 9, 12, 14]) / 4)},
     }, "", 2),
     "verge_losses": Claims({
         "verge_losses": {
