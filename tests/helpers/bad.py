@@ -12,6 +12,7 @@ import numba
 import numpy as np
 import slow
 import toy
+from numba.extending import overload
 
 RAISES, CRASHES, EXITS, HANGS, HOGS, HUNGRY, ORPHANS, QUITS, MUMBLES = (11.0 * k for k in range(1, 10))
 """Heights at which the kernel misbehaves."""
@@ -78,15 +79,22 @@ def says(height, *rest):
     rest[-1][:] = height.astype(np.uint8).view(np.int8)
 
 
-@numba.njit
 def _slowly_compiled(x):
     """Takes longer to compile than cells are given in the test."""
-    return np.median(x)
+
+
+@overload(_slowly_compiled)
+def _(x):
+    time.sleep(1.0)
+    return lambda x: None
+
+
+_compiled = numba.njit(lambda x: _slowly_compiled(x))
 
 
 def late(height, *rest):
     """As `toy.exact`, what is compiled at the first cell."""
-    _slowly_compiled(height)
+    _compiled(height)
     toy.exact(height, *rest)
 
 

@@ -9,6 +9,7 @@ import bad
 import numpy as np
 import pytest
 from running import quiet, tall, wait_for
+from toy_studies import build
 
 import sweep
 from kernels.interface import Status
@@ -22,7 +23,8 @@ from sweep.runs.isolate import Processes
 
 SOUND = 100
 BAD = {"bad:RAISING": [11.0], "bad:DYING": [11.0, 22.0, 33.0], "bad:WORST": [11.0, 22.0, 33.0, 44.0, 55.0, 66.0]}
-KEYS = {"bad:RAISING": {"block_cells": 10}, "bad:DYING": {"isolate": True}, "bad:WORST": {"cell_timeout": 10.0}}
+KEYS = {"bad:RAISING": {"block_cells": 10}, "bad:DYING": {"isolate": True}}
+KEYS["bad:WORST"] = {"cell_timeout": 5.0, "block_cells": 10}  # two that never end are waited for at the same time
 
 
 def heights_of(found, status):
@@ -33,19 +35,23 @@ def good(found):
     return found.isel(height=found.status.values != Status.FAILED)
 
 
+@pytest.fixture(scope="module")
+def whole():
+    return quiet(tall(SOUND, "bad:RAISING"), isolate=True)
+
+
 @pytest.mark.parametrize("name", BAD)
-def test_bad_cells_fail_by_name_and_all_others_have_the_bits_of_a_run_without_them(name, tmp_path):
+def test_bad_cells_fail_by_name_and_all_others_have_the_bits_of_a_run_without_them(name, whole, tmp_path):
     log = io.StringIO()
     with quiet(tall(SOUND, name), tmp_path / "out.h5", progress=log, **KEYS[name]) as found:
         assert heights_of(found, Status.FAILED) == BAD[name]
         assert np.isnan(found.fall_time.values[found.status.values == Status.FAILED]).all()
         kept = good(found)
-        whole = quiet(tall(SOUND, "bad:RAISING"), isolate=True)
         assert kept.fall_time.values.tobytes() == whole.fall_time.sel(height=kept.height).values.tobytes()
         assert account(found).by_kind["FAILED"] == len(BAD[name])
     told = [line.partition("FAILED ")[2] for line in log.getvalue().splitlines() if "FAILED" in line]
     assert sorted(text.partition(":")[0] for text in told) == [f"(height={int(height)})" for height in BAD[name]]
-    reasons = {"11": "ZeroDivisionError: eleven", "22": "SIGSEGV", "33": "ended with 7", "44": "longer than 10 s"}
+    reasons = {"11": "ZeroDivisionError: eleven", "22": "SIGSEGV", "33": "ended with 7", "44": "longer than 5 s"}
     for height, reason in reasons.items():
         given = [text for text in told if f"height={height})" in text]
         assert float(height) not in BAD[name] or reason in given[0]
@@ -63,8 +69,9 @@ def test_a_process_that_died_by_itself_was_not_late(monkeypatch):
         return any(process.pipe is pipe and not process.is_alive() for process in processes._all)
 
     monkeypatch.setattr(isolate, "wait", blind)
-    processes, seen = Processes(tall(40, "bad:DYING"), 1.5), []
-    Guard(processes, seen.append).solve(0, empty_cells(processes.study, 40))
+    axes = {"height": [1.0, bad.RAISES, bad.CRASHES, bad.EXITS]}
+    processes, seen = Processes(build(kernel="bad:DYING", axes=axes), 1.0), []
+    Guard(processes, seen.append).solve(0, empty_cells(processes.study, 4))
     processes.end()
     assert [cell.reason for cell in seen] == [
         "ZeroDivisionError: eleven",

@@ -8,6 +8,7 @@ import signal
 import threading
 import time
 from datetime import datetime, timedelta
+from types import SimpleNamespace
 
 import pytest
 from clusters import served
@@ -99,7 +100,7 @@ def test_a_run_of_which_only_the_end_or_nothing_is_missing_needs_no_cluster(outp
 
 def test_a_lost_scheduler_is_one_line_and_the_run_continues(output):
     study = tall(1000, "slow:SLOW")
-    with served(workers=2) as (address, process):
+    with served(workers=1) as (address, process):
         lost = pytest.raises(SweepError, match=r"scheduler is lost.*same.command")
         with after_blocks(output, 5, lambda: os.killpg(process.pid, signal.SIGKILL)), lost as told:
             elsewhere(study, output, cluster=address, block_cells=4)
@@ -110,26 +111,32 @@ def test_a_lost_scheduler_is_one_line_and_the_run_continues(output):
     continues(study, output)
 
 
-def test_a_run_on_a_cluster_ends_at_its_time_and_continues(client, output):
-    study = tall(30_000, "slow:SLOW")  # half a minute of two workers at the least
-    until = datetime.now() + timedelta(seconds=10)
-    with elsewhere(study, output, cluster=client, block_cells=40, until=until) as found:
+def press():
+    os.kill(os.getpid(), signal.SIGINT)
+
+
+def test_ctrl_c_or_its_time_end_a_run_on_a_cluster(client, output, monkeypatch):
+    """The time is up as soon as blocks are kept: the clock is put forward then."""
+    study, late = tall(1000, "slow:SLOW"), datetime.now() + timedelta(hours=2)
+    keys = {"cluster": client, "block_cells": 4, "until": late - timedelta(hours=1)}
+    with after_blocks(output, 3, press), pytest.raises(KeyboardInterrupt):
+        elsewhere(study, output, **keys)
+    before = len(kept(output))
+    assert before >= 3
+    clock = SimpleNamespace(now=lambda: late)
+    with after_blocks(output, before + 3, lambda: monkeypatch.setattr("sweep.runs.loop.datetime", clock)):
+        found = elsewhere(study, output, **keys)
+    with found:
         told = account(found).by_kind
-    assert 0 < told["ok"] < 30_000
-    assert told["ok"] + told["pending"] == 30_000
-    continues(study, output)
-
-
-def test_ctrl_c_ends_a_run_on_a_cluster(client, output):
-    study = tall(1000, "slow:SLOW")
-    with after_blocks(output, 3, lambda: os.kill(os.getpid(), signal.SIGINT)), pytest.raises(KeyboardInterrupt):
-        elsewhere(study, output, cluster=client, block_cells=4)
-    assert kept(output)
+    assert 4 * before < told["ok"] < 1000
+    assert told["ok"] + told["pending"] == 1000
+    monkeypatch.undo()
     continues(study, output)
 
 
 @pytest.mark.parametrize("where", ["tcp://127.0.0.1:1", "nonsense", "missing.json"])
-def test_an_address_where_nobody_answers_is_one_clear_line(output, where):
+def test_an_address_where_nobody_answers_is_one_clear_line(output, where, monkeypatch):
+    monkeypatch.setattr("sweep.runs.cluster.CONNECT_SECONDS", 1)
     with pytest.raises(SweepError, match=r"^cluster: [^\n]*$"):
         elsewhere(tall(3), output, cluster=where)
     assert list(output.parent.iterdir()) == []
@@ -143,10 +150,10 @@ def test_a_worker_with_another_version_refuses(client, output, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("kernel", "options", "bad"), [("bad:RAISING", {"block_cells": 10}, 1), ("bad:WORST", {"cell_timeout": 10.0}, 6)]
+    ("kernel", "options", "bad"), [("bad:RAISING", {}, 1), ("bad:WORST", {"cell_timeout": 5.0}, 6)]
 )
 def test_a_kernel_that_fails_on_a_cluster_costs_its_cells_alone(client, output, kernel, options, bad):
-    with elsewhere(tall(100, kernel), output, cluster=client, **options) as found:
+    with elsewhere(tall(100, kernel), output, cluster=client, block_cells=10, **options) as found:
         assert found.height.values[found.status.values == Status.FAILED].tolist() == [
             11.0 * k for k in range(1, bad + 1)
         ]
