@@ -24,7 +24,7 @@ from sweep.results.statuses import require_as_read
 from sweep.study.model import Study, differs
 from sweep.study.read import Given
 from sweep.study.read import study as as_study
-from sweep.study.units import exponents
+from sweep.units import exponents
 from sweep.words import Table, require_dataset
 
 if TYPE_CHECKING:

@@ -23,7 +23,7 @@ from kernels.interface import FIRST_REFUSAL, Status
 from sweep.cells.schema import ERROR_BOUND, STATUS
 from sweep.errors import SweepError
 from sweep.explore.mesh import Array, Indices, Mesh
-from sweep.study.units import in_unit
+from sweep.units import in_unit
 from sweep.words import require_dataset
 
 LOGARITHMIC = 1.999

@@ -18,7 +18,7 @@ from sweep.errors import SweepError
 from sweep.study.model import SETTINGS, Axis, Study
 from sweep.study.read import Given
 from sweep.study.read import study as as_study
-from sweep.study.units import in_unit
+from sweep.units import in_unit
 from sweep.words import listed
 
 

@@ -7,7 +7,7 @@ from decimal import Decimal
 from typing import TYPE_CHECKING
 
 from sweep.study.mistakes import Mistakes
-from sweep.study.units import UnitMistake, scale
+from sweep.units import UnitMistake, scale
 from sweep.words import did_you_mean, require_dataset
 
 if TYPE_CHECKING:

@@ -1,11 +1,10 @@
-"""A study: TOML (or a dict) in, a checked `Study` out, all mistakes at once. The only room that imports pint.
+"""A study: TOML (or a dict) in, a checked `Study` out, all mistakes at once.
 
 Others may use
     `read`       study: of a file, of keys, or of a result; to_toml: a study as the text of its file
     `model`      Study, Axis, Summary; load_kernel: a kernel by the name that a study gives it
     `keys`       KEYS: what may stand at the top of a study
     `mistakes`   Mistakes, gathered and raised together; limits: what a field allows, in words
-    `units`      scale, exponents
     `condition`  Condition, cells_where, names_in: read by Python's grammar, never run by it
     `designs`    a sampled design's axes for SALib
 

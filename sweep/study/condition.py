@@ -16,7 +16,7 @@ import numpy as np
 from kernels.interface import Kernel
 from sweep.errors import SweepError
 from sweep.study.model import setting
-from sweep.study.units import UnitMistake, parsed, scale
+from sweep.units import UnitMistake, parsed, scale
 from sweep.words import did_you_mean, listed
 
 OPERATORS: dict[type, Callable[[Any, Any], Any]] = {

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from kernels.interface import Field
 from sweep.errors import Mistake, StudyError, SweepError
-from sweep.study.units import unit_of
+from sweep.units import unit_of
 from sweep.words import did_you_mean, listed, nearest
 
 T = TypeVar("T")

@@ -24,7 +24,7 @@ from kernels.interface import Field
 from sweep.errors import Mistake, reason
 from sweep.study.mistakes import Entry, exact_float, finite, limits, one_of, show, text, whole
 from sweep.study.model import Axis, frozen
-from sweep.study.units import scale
+from sweep.units import scale
 from sweep.words import listed, quoted
 
 LARGEST_AXIS = 10_000_000

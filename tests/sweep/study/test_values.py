@@ -17,7 +17,7 @@ from scipy.stats import qmc
 from toy_studies import build, message_of
 
 import sweep
-from sweep.study.units import UnitMistake, scale
+from sweep.units import UnitMistake, scale
 
 RANGES = {
     "height": {"spacing": "log", "start": 1.0, "stop": 1e4},
@@ -94,9 +94,7 @@ def test_a_unit_becomes_the_factor_to_the_field(given, wanted, factor):
 
 
 def test_the_unit_of_the_field_needs_no_pint_and_malformed_ones_are_refused():
-    code = (
-        "import sys; from sweep.study.units import scale; scale('rad/s', 'rad/s', 'x'); sys.exit('pint' in sys.modules)"
-    )
+    code = "import sys; from sweep.units import scale; scale('rad/s', 'rad/s', 'x'); sys.exit('pint' in sys.modules)"
     subprocess.run([sys.executable, "-c", code], check=True)
     for text in ("m/", "(((", "m*", "rad s-2", "3 m", "m**m", "m^", "\n", "m;m", "__import__('os')", "💥"):
         with pytest.raises(UnitMistake):
