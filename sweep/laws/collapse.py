@@ -110,7 +110,7 @@ def _points(y: xr.DataArray, dim: str, over: str, sigma: Any) -> Array:
     if sorted(map(str, (dim, over))) != sorted(map(str, y.dims)):
         raise SweepError(f"a collapse takes one output along {dim} and {over}, and nothing else; choose with .sel")
     t, sizes = np.log(positive_axis(y, dim)[1]), y[over].values
-    if sizes.dtype.kind not in "fiu" or sizes.size < 2 or not (np.isfinite(sizes) & (sizes > 0)).all():
+    if sizes.dtype.kind not in "fiu" or np.unique(sizes).size < 2 or not (np.isfinite(sizes) & (sizes > 0)).all():
         raise SweepError(f"{over}: a collapse needs at least two values, all positive numbers")
     order = np.argsort(t)
     z, errors = (part.transpose(over, dim).values[:, order] for part in (log_of(y), relative_sigma(y, sigma)))

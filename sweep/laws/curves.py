@@ -8,17 +8,19 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from sweep.errors import SweepError
 from sweep.laws.loglog import EPSILON, FEWEST, LINES, VALUES, Array, alike
-from sweep.laws.noise import NOISES
+from sweep.laws.noise import NOISES, roughness, rounding
+from sweep.units import UnitMistake, in_unit, unit_of
 from sweep.words import did_you_mean, kind
 
 Window = tuple[float | None, float | None]
 
 FEWEST_OF_LAW, PLACES_OF_LAW = 8, 6
 """Points, and different places among them, from which on laws with more numbers than a line are fitted."""
+MANY = 10_000
+"""Points that laws are fitted to of twice as many and more, where these are of a smooth curve and without noise."""
 MOST_SIGMA = 1e6
 """Relative standard error beyond which a logarithm says nothing."""
 FIELDS = {
@@ -78,6 +80,14 @@ def check_output(y: Any) -> None:
         raise SweepError(f"{title(y)}: expected real numbers, found {y.dtype}")
 
 
+def converted(what: str, value: Any, of: xr.DataArray) -> Any:
+    """Numbers; those that have a unit themselves in the unit of an array, if it has one. Raises SweepError."""
+    try:
+        return in_unit(value, str(of.attrs.get("units") or unit_of(value)), what)
+    except (TypeError, UnitMistake) as fault:
+        raise SweepError(f"{what}: {fault}") from None
+
+
 def number(what: str, value: Any) -> float:
     """A number; raises SweepError for what is none."""
     try:
@@ -91,7 +101,7 @@ def check_options(confidence: float = 0.95, noise: bool | str | None = None, sig
     if not 0 < number("confidence", confidence) < 1:
         raise SweepError(f"confidence: expected a number between 0 and 1, found {confidence}")
     words = [word for word in NOISES if word != "noise"]
-    if not (noise is None or isinstance(noise, bool) or noise in words):
+    if not (noise is None or isinstance(noise, bool) or (isinstance(noise, str) and noise in words)):
         raise SweepError(f"noise: expected True, False or one of {', '.join(words)}; found {noise!r}")
     if noise is not None and sigma is not None:
         raise SweepError("noise does not go with sigma, which says all of the noise; give one of them")
@@ -113,20 +123,23 @@ def positive_axis(y: xr.DataArray, dim: str, repeated: bool = False) -> tuple[st
     if dim not in axes:
         others = f"; {title(y)} runs along {', '.join(axes) or 'no axis with values'}"
         if str(dim) in y.coords:
-            raise SweepError(f"{dim} has one value here, so nothing can be fitted along it{others}")
+            found = "runs along several dimensions" if y.coords[dim].ndim else "has one value here"
+            raise SweepError(f"{dim} {found}, so nothing can be fitted along it{others}")
         raise SweepError(f"{title(y)} has no axis {dim!r}" + (did_you_mean(str(dim), axes) or others))
     values = y.coords[dim].values
-    if values.dtype.kind in "mM":
-        since = f" since a moment before the first, ({dim} - MOMENT)" if values.dtype.kind == "M" else f", {dim}"
+    if values.size < FEWEST:
+        raise SweepError(f"{dim} has {values.size} of the at least {FEWEST} points that an exponent needs")
+    first, of = values[:1].tolist()[0], values.dtype
+    if of.kind in "mM" or hasattr(first, "calendar"):  # cftime's
+        since = f", {dim}" if of.kind == "m" else f" since a moment before the first, ({dim} - MOMENT)"
         raise SweepError(f"{dim} holds times, not numbers; take seconds{since} / np.timedelta64(1, 's')")
-    if values.dtype.kind not in "fiu":
-        raise SweepError(f"{dim} holds words, not numbers; a power law needs a number axis")
+    if of.kind not in "fiu":
+        held = "words" if isinstance(first, str) else f"{of} values such as {first!r}"
+        raise SweepError(f"{dim} holds {held}, not numbers; a power law needs a number axis")
     x = values.astype(np.float64)
     fit = np.isfinite(x) & (x > 0)
     if not fit.all():
         raise SweepError(f"{dim} must be positive and finite to take logarithms; found {x[~fit][0]:g}, select a part")
-    if x.size < FEWEST:
-        raise SweepError(f"{dim} has {x.size} of the at least {FEWEST} points that an exponent needs")
     steps = np.diff(x)
     if not ((steps >= 0).all() or (steps <= 0).all()):
         raise SweepError(f"{dim} neither rises nor falls throughout; sort first, e.g. ds.sortby({dim!r})")
@@ -136,16 +149,17 @@ def positive_axis(y: xr.DataArray, dim: str, repeated: bool = False) -> tuple[st
     return str(y.coords[dim].dims[0]), x
 
 
-def inside_window(x: Array, window: Window | None, dim: str) -> NDArray[np.bool_]:
-    """Which x are in the window; an end that is a grid point up to rounding is meant to be in."""
+def limits(window: Window | None, axis: xr.DataArray) -> tuple[float, float]:
+    """Ends of a window in the unit of its axis, 0 and infinity where open; what is an end up to rounding is inside."""
     try:
-        low, high = (None, None) if window is None else window
+        low, high = (None, None) if window is None else (converted("window", end, axis) for end in window)
         low, high = 0.0 if low is None else float(low), math.inf if high is None else float(high)
     except (TypeError, ValueError):
-        raise SweepError(f"a window of {dim} is a pair (low, high) of numbers or None; found {window!r}") from None
+        what = f"a window of {axis.name} is a pair (low, high) of numbers or None"
+        raise SweepError(f"{what}; found {window!r}") from None
     if not low < high:
-        raise SweepError(f"the window {low:g} to {high:g} of {dim} is empty; give (low, high) with low < high")
-    return (x >= low * (1 - 8 * EPSILON)) & (x <= high * (1 + 8 * EPSILON))
+        raise SweepError(f"the window {low:g} to {high:g} of {axis.name} is empty; give (low, high) with low < high")
+    return low * (1 - 8 * EPSILON), high * (1 + 8 * EPSILON)
 
 
 def title(y: xr.DataArray) -> str:
@@ -154,7 +168,6 @@ def title(y: xr.DataArray) -> str:
 
 def log_of(y: xr.DataArray, values: bool = False) -> xr.DataArray:
     """Natural logarithm, or the values themselves; NaN where there is none."""
-    check_output(y)
     numbers = y.astype(np.float64)
     numbers = numbers.where(np.isfinite(numbers) & (values | (numbers > 0)))
     return numbers if values else numbers.copy(data=np.log(numbers.data))
@@ -175,7 +188,8 @@ def fit_lines(
     fewest, fewest_places = (FEWEST_OF_LAW, PLACES_OF_LAW) if bound is None else (FEWEST, 2)
     check_options(sigma=sigma, **options)
     dimension, x = positive_axis(y, dim, repeated=True)
-    places = np.flatnonzero(inside_window(x, window, dim))
+    low, high = limits(window, y.coords[dim])
+    places = np.flatnonzero((x >= low) & (x <= high))
     places = places[np.argsort(x[places], kind="stable")]
     part, t = y.isel({dimension: places}).transpose(..., dimension).compute(), np.log(x[places])
     values = part.values.astype(np.float64).reshape(math.prod(part.shape[:-1]), t.size)
@@ -189,17 +203,20 @@ def fit_lines(
         )
     with np.errstate(all="ignore"):
         z = np.where(bad[:, None], np.nan, np.log(values))
-    columns, rows = dict[str, Any](), dict[str, Array]()
+    columns, rows = dict[str, Any](), {"z": z}
     for name, one in (("bound", bound), ("sigma", None if sigma is None else relative_sigma(y, sigma))):
         if one is not None:
-            rows[name] = one.isel({dimension: places}).transpose(..., dimension).values.reshape(z.shape).astype(float)
+            rows[name] = one.isel({dimension: places}).transpose(..., dimension).values.reshape(z.shape)
     present = np.isfinite(z) & np.isfinite(rows.get("sigma", 0.0))
     for pattern, which in alike(present, max(LINES, VALUES // max(1, t.size))):
         if pattern.sum() < fewest or np.unique(t[pattern]).size < fewest_places:
             continue
-        lines = {name: one[which][:, pattern] for name, one in rows.items()}
+        s, lines = t[pattern], {name: one[which][:, pattern] for name, one in rows.items()}
+        if len(lines) == 1 and s.size > 2 * MANY and (roughness(s, **lines)[0] <= 8 * rounding(s, **lines)).all():
+            some = np.linspace(0, s.size - 1, MANY).round().astype(int)
+            s, lines = s[some], {"z": lines["z"][:, some]}
         with np.errstate(all="ignore"):  # what overflows is infinite
-            result = function(t[pattern], z[which][:, pattern], **lines, **options)
+            result = function(s, **lines, **options)
         if isinstance(result, xr.Dataset):
             return described(result.assign_attrs(y=title(y), x=dim), y.coords[dim], y)
         if not isinstance(result, dict):
@@ -211,7 +228,7 @@ def fit_lines(
     if len(columns) == 1:
         where, way = f"along {dim}", "add points"
         if window is not None:
-            ends = ("open" if end is None else f"{float(end):g}" for end in window)
+            ends = ("open" if end in (0.0, math.inf) else f"{end:g}" for end in (low, high))
             where, way = f"in the window {' to '.join(ends)} of {dim}", "choose a wider one"
         raise SweepError(
             f"a fit needs at least {fewest} points, found {columns['points'].max(initial=0)} of {title(y)} {where}, "
@@ -232,7 +249,7 @@ def fit_lines(
 def like(given: Any, y: xr.DataArray, what: str) -> xr.DataArray:
     """A number or DataArray as one of the shape of y. Raises SweepError where it is negative or does not fit."""
     try:
-        array: xr.DataArray = xr.zeros_like(y, dtype=np.float64) + given
+        array: xr.DataArray = (xr.zeros_like(y, dtype=np.float64) + given).astype(np.float64)
     except (TypeError, ValueError):
         array = xr.DataArray(math.nan)
     if array.dims != y.dims or array.shape != y.shape:
@@ -243,8 +260,10 @@ def like(given: Any, y: xr.DataArray, what: str) -> xr.DataArray:
 
 
 def relative_sigma(y: xr.DataArray, sigma: Any) -> xr.DataArray:
-    """Standard errors over y; NaN where none are given. Raises SweepError where they are not above rounding."""
-    errors: xr.DataArray = like(np.nan if sigma is None else sigma, y, "sigma") / abs(y)
+    """Standard errors over y; NaN where none are given or y is not positive. Raises SweepError for those that are not
+    above rounding."""
+    given = np.nan if sigma is None else converted("sigma", sigma, y)
+    errors: xr.DataArray = like(given, y, "sigma") / y.where((y > 0) & np.isfinite(y)).astype(np.float64)
     beyond = errors.where((errors < EPSILON) | (errors > MOST_SIGMA))
     if bool(beyond.notnull().any()):
         worst = float(beyond.min())

@@ -69,8 +69,9 @@ def local_exponent(y: xr.DataArray, dim: str, *, error: bool = False, bound: Any
     True
     """
     dimension, x = positive_axis(y, dim)
-    t, logs, name = np.log(x), log_of(y).transpose(..., dimension).compute(), "" if y.name is None else f"{y.name}_"
-    exponent = logs.copy(data=slopes(t, logs.values, 5)).transpose(*y.dims).rename(f"{name}exponent")
+    t, logs = np.log(x), log_of(y).transpose(..., dimension).compute()
+    name = "exponent" if y.name is None else f"{y.name}_exponent"
+    exponent = logs.copy(data=slopes(t, logs.values, 5)).transpose(*y.dims).rename(name)
     exponent.attrs = {"units": "1", "long_name": f"local exponent of {title(y)} in {dim}"}
     if not error:
         return exponent
@@ -118,18 +119,24 @@ def where_exponent(
     >>> print(f"{float(sweep.where_exponent(ds.period, 'mu', 2.0, values=True).abscissa):.2f}")
     26.40
     """
-    curve = log_of(y, values)
-    dimension, x = positive_axis(curve, dim)
+    dimension, x = positive_axis(y, dim)
     check_names(y, {*y.coords, *y.dims} & {"abscissa", "abscissa_error"})
-    if not curve.size:
-        raise SweepError(f"{title(curve)} has no line along {dim}; an axis of it is empty: {dict(curve.sizes)}")
-    inside, t, value = curves.inside_window(x, window, dim), np.log(x), curves.number("value", value)
+    if not y.size:
+        raise SweepError(f"{title(y)} has no line along {dim}; an axis of it is empty: {dict(y.sizes)}")
+    low, high = curves.limits(window, y.coords[dim])
+    t, inside = np.log(x), (x >= low) & (x <= high)
+    value = curves.number("value", curves.converted("value", value, y) if values else value)
     orders = ((6, 0), (4, 0)) if values else ((6, 7), (4, 5))  # points of the interpolation and of the slopes
+    reach = 0.0 if values else abs(value) * abs(t).max()  # of what rounding of the abscissae does
+    spacing = 1.0 if values else abs(np.diff(t)).min()
 
     def one(z: Array) -> tuple[float, float]:
         """The place in ln dim and its error; NaN and the number of places where that is not one."""
         fine, coarse = ((points, slopes(t, z, stencil) if stencil else z) for points, stencil in orders)
+        noise = EPSILON * (np.nanmax(abs(z), initial=0.0) + reach) / spacing
         places = brackets(np.where(inside, fine[1], np.nan), value)
+        if not (abs(fine[1] - value)[inside] > 8 * noise).any():  # what is the value throughout passes it nowhere
+            places = []
         if len(places) != 1:
             return np.nan, float(len(places))
         at = places[0]
@@ -137,15 +144,14 @@ def where_exponent(
         passage = root(t, fine[1], at, value, fine[0])
         near = [i for i in brackets(coarse[1], value) if abs(i - at) <= 1]
         apart = min((abs(passage - root(t, coarse[1], i, value, coarse[0])) for i in near), default=step)
-        noise = EPSILON * float(np.nanmax(abs(z))) / (1.0 if values else float(abs(np.diff(t)).min()))
         return passage, apart + noise * step / rise + EPSILON * abs(float(t[at]))
 
     keys: dict[str, Any] = {"input_core_dims": [[dimension]], "output_core_dims": [[], []], "keep_attrs": True}
-    place, error = xr.apply_ufunc(one, curve.compute(), vectorize=True, **keys)
+    place, error = xr.apply_ufunc(one, log_of(y, values).compute(), vectorize=True, **keys)
     if not bool(place.notnull().any()):
         count = int(error.max())
         said = f"passes {value:g} {count} times" if count else f"does not pass {value:g}"
-        raise SweepError(f"{title(curve)} {said} along {dim} in the window; choose another window")
+        raise SweepError(f"{title(y)} {said} along {dim} in the window; choose another window")
     result = xr.Dataset({"abscissa": np.exp(place), "abscissa_error": (np.exp(place) * error).where(place.notnull())})
     units, what = str(y.coords[dim].attrs.get("units", "1")), title(y) if values else f"the exponent of {title(y)}"
     result.abscissa.attrs = {"units": units, "long_name": f"where {what} is {value:g}"}
@@ -193,6 +199,9 @@ def exponent_map(y: xr.DataArray, dim: str, levels: Sequence[float] = BORDERS) -
     for name in y.dims:
         if name not in y.coords or y[name].dtype.kind not in "fiu" or y.sizes[name] < 2:
             raise SweepError(f"{name} has no two numbers to draw a map over")
+        steps = np.diff(y[name].values.astype(np.float64))
+        if not (np.isfinite(steps).all() and ((steps > 0).all() or (steps < 0).all())):
+            raise SweepError(f"{name} neither rises nor falls throughout, so no map can be drawn over it; sort first")
     try:
         import contourpy
     except ImportError:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sweep.laws.loglog import Array, alike
-from sweep.laws.noise import ROUNDING, inliers, regress
+from sweep.laws.noise import ROUNDING, apart, inliers, regress
 from sweep.laws.shapes import ONE, Law
 
 DAMPINGS = np.array([1e-6, 0.03, 1.0, 30.0])
@@ -41,6 +41,8 @@ class Fit(NamedTuple):
     errors: Array
     """Standard errors of the numbers beside independent noise; inf of what the points do not determine."""
     deviance: float
+    apart: bool
+    """Whether the distances are more than rounding."""
     more: int = 0
     """Numbers of the noise that are fitted too."""
 
@@ -75,7 +77,7 @@ class Fit(NamedTuple):
         reach = np.clip(line.interval([*range(k)], confidence)[:, :, 0], [[-np.inf], [0.0]], [[0.0], [np.inf]])
         ends[:, determined] = np.where(np.isnan(reach), ends[:, determined], self.numbers[determined] + reach)
         best = self if noise == "even" or self.sigma is not None else self._replace(deviance=line.deviance[0], more=2)
-        return ends, best.aicc, bool(line.denied[0])
+        return ends, best.aicc, self.apart and bool(line.denied[0])
 
 
 def union(
@@ -206,12 +208,13 @@ class _Search:
         lost = 1 - np.einsum("rkn,rnk->rk", inverse, jacobian / unit) > 1e-6
         doubt = np.where(lost, np.inf, np.sqrt((inverse**2).sum(axis=2)) / unit[:, 0])
         every, deviance = [], self.deviance().tolist()
+        clear = apart(self.t, self.z / self.root, off / self.root).tolist()
         for row, law in enumerate(self.laws[k] for k in self.law.tolist()):
             which = [*range(len(law.q)), *range(MOST_Q, MOST_Q + law.columns)]
             size = 1.0 if self.errors is not None else math.sqrt(self.square[row] / (self.t.size - law.numbers))
-            of_points = jacobian[row][:, which] / self.root[:, None], off[row] / self.root, self.errors
-            of_law = size * doubt[row, which], deviance[row], int(self.errors is None)
-            every.append(Fit(law, numbers[row, which], *of_points, *of_law))
+            curve = jacobian[row][:, which] / self.root[:, None], off[row] / self.root, self.errors
+            errors, more = size * doubt[row, which], int(self.errors is None)
+            every.append(Fit(law, numbers[row, which], *curve, errors, deviance[row], clear[row], more))
         return every
 
 

@@ -20,7 +20,7 @@ from sweep.errors import SweepError
 from sweep.laws.curves import Window, fit_lines, stated_bound
 from sweep.laws.fits import fitted, union
 from sweep.laws.loglog import FEWEST, LINES, Array, alike, once, slope_bounds, slopes, tends
-from sweep.laws.noise import BEYOND_DOUBT, RARE, Noise, inliers, regress, rounding, scatters, shaped
+from sweep.laws.noise import BEYOND_DOUBT, RARE, Noise, apart, inliers, regress, rounding, scatters, shaped
 from sweep.laws.shapes import FADING, LOG_CORRECTION, ONE, Number
 
 AS_WELL, HARDER = 13.0, 5.0
@@ -125,7 +125,7 @@ def fit_line(
         reach = ndtri((1 + confidence) / 2) * error
         chance = gammaincc(max(n - 2, 1) / 2, (weight * off**2).sum(axis=1) / 2)
         fit |= {"exponent_low": slope - reach, "exponent_high": slope + reach}
-        fit["fits"] = (chance > RARE) & ~shaped(t, off)
+        fit["fits"] = (chance > RARE) & ~(shaped(t, off) & apart(t, z, off))
     else:
         noisy = scatters(t, z, off, 2, noise) & (n > FEWEST)
         if noise is None:

@@ -127,18 +127,23 @@ def _matrix(t: Array, points: int) -> Any:
     points, row = min(points, t.size), np.arange(t.size)
     first = np.clip(row - points // 2, 0, t.size - points)
     nodes, home = first[:, None] + np.arange(points), row - first
-    apart, barycentric = differences(t[nodes])
-    weights = barycentric / barycentric[row, home][:, None] / apart[row, home]
+    apart, weights = t[:, None] - t[nodes], barycentric(t[nodes])
+    apart[row, home] = 1.0
+    weights = weights / weights[row, home][:, None] / apart
     weights[row, home] = 0.0
     weights[row, home] = -weights.sum(axis=1)
     return csr_array((weights.ravel(), (row.repeat(points), nodes.ravel())), shape=(t.size, t.size))
 
 
-def differences(nodes: Array) -> tuple[Array, Array]:
-    """Differences of nodes (m, k), their own taken for 1 (m, k, k), and barycentric weights (m, k)."""
-    apart, own = nodes[:, :, None] - nodes[:, None, :], np.arange(nodes.shape[1])
-    apart[:, own, own] = 1.0
-    return apart, 1.0 / apart.prod(axis=2)
+def barycentric(nodes: Array) -> Array:
+    """Barycentric weights of nodes (m, k)."""
+    columns = np.ascontiguousarray(nodes.T)
+    weights = np.empty_like(columns)
+    for k, own in enumerate(columns):
+        apart = own - columns
+        apart[k] = 1.0
+        weights[k] = 1.0 / apart.prod(axis=0)
+    return np.ascontiguousarray(weights.T)
 
 
 def tends(t: Array, local: Array, doubts: Any) -> list[tuple[float, float]]:

@@ -15,10 +15,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy.special import fdtrc, gammaincc, stdtrit
 
-from sweep.laws.loglog import EPSILON, Array, alike, differences
+from sweep.laws.loglog import EPSILON, Array, alike, barycentric
 
 CORRELATIONS = np.array([-0.2, 0.0, 0.2, 0.4, 0.6, 0.7, 0.8, 0.85, 0.9, 0.93, 0.96])
 SHAPES = np.array([*itertools.product(np.linspace(-1.6, 1.6, 5), (0.0, 1.6, 3.2))])
@@ -219,9 +220,9 @@ def roughness(t: Array, z: Array) -> tuple[Array, Array]:
     else:
         pairs = []
         for neighbours in (k for k in (2, 4, 6, 8) if t.size > k + 2):
-            nodes = np.arange(t.size - neighbours)[:, None] + np.arange(neighbours + 1)
-            weights = differences(t[nodes])[1]
-            parts = weights / np.sqrt((weights**2).sum(axis=1, keepdims=True)) * z[..., nodes]
+            weights = barycentric(sliding_window_view(t, neighbours + 1))
+            near = sliding_window_view(z, neighbours + 1, axis=-1)
+            parts = weights / np.sqrt((weights**2).sum(axis=1, keepdims=True)) * near
             pairs.append((parts.sum(axis=-1), np.sqrt((parts**2).sum(axis=-1))))
     if not pairs:
         return np.full(z.shape[:-1], np.inf), np.full(z.shape[:-1], np.inf)
@@ -239,10 +240,15 @@ def scatters(t: Array, z: Array, off: Array, numbers: int, noise: Noise) -> NDAr
     """Whether the distances of lines z (m, n) from a law of so many numbers are noise: above rounding; and as is said,
     else as neighbours say less of each other than they do of a smooth curve. About few points of such a curve a law of
     many numbers swings as noise does."""
-    scattered = np.sqrt(np.mean(off**2, axis=1)) > 8 * rounding(t, z)
+    scattered = apart(t, z, off)
     if noise is not None:
         return np.asarray(scattered & bool(noise))
     return np.asarray(scattered & (roughness(t, off)[1] > SMOOTH + (5 * (numbers - 2) ** 2 / (3 * t.size)) ** 4))
+
+
+def apart(t: Array, z: Array, off: Array) -> NDArray[np.bool_]:
+    """Whether the distances of lines z (..., n) from a law are more than rounding."""
+    return np.asarray(np.sqrt(np.mean(off**2, axis=-1)) > 8 * rounding(t, z))
 
 
 def rounding(t: Array, z: Array) -> Array:

@@ -89,6 +89,8 @@ def test_a_coordinate_along_the_cells_of_a_zip_design_and_an_array_in_pieces_wil
         ([1.0, 1.0, 2.0], "mu", "1 stands there more than once"),
         ([1.0, 2.0], "mu", "at least 3 points"),
         (["map", "closed", "auto"], "mu", "words"),
+        ([False, True, True], "mu", "bool values such as False"),
+        (xr.date_range("2026", periods=3, use_cftime=True).values, "mu", "holds times"),
         (np.array(["2026-01-01", "2026-01-02", "2026-01-03"], "M8[ns]"), "mu", "holds times"),
     ],
 )
@@ -99,6 +101,9 @@ def test_an_axis_that_has_no_logarithms_is_refused_with_the_reason(x, dim, messa
     for fit in (sweep.local_exponent, sweep.fit_exponent, passes)[:: 1 + repeated]:
         with pytest.raises(sweep.SweepError, match=message.replace("?", r"\?")):
             fit(y, dim)
+
+
+UNITS = (0.5, "mrad/s^2"), (2.0, "mrad/s^2"), (1.5, "ms")
 
 
 def test_numbers_have_units_and_names_and_further_axes_keep_theirs():
@@ -120,6 +125,17 @@ def test_numbers_have_units_and_names_and_further_axes_keep_theirs():
         assert len(found.to_netcdf())  # attributes are such as files can hold
     assert (local.attrs["units"], local.mu.attrs["units"], local.name) == ("1", "rad/s^2", "period_exponent")
     assert {place.abscissa.attrs["units"], place.abscissa_error.attrs["units"]} == {"rad/s^2"}
+    # what is given in another unit is converted
+    half, two, second = (xr.DataArray(1000.0 * of, attrs={"units": u}) for of, u in UNITS)
+    xr.testing.assert_identical(sweep.fit_two_laws(y, "mu", windows=((None, half), (two, None))), met)
+    passed, weighted = (
+        (lambda v: sweep.where_exponent(y, "mu", v, values=True)),
+        sweep.fit_exponent(y, "mu", sigma=second),
+    )
+    xr.testing.assert_identical(passed(second), passed(1.5))
+    xr.testing.assert_identical(weighted, sweep.fit_exponent(y, "mu", sigma=1.5))
+    with pytest.raises(sweep.SweepError, match='window: "ms" is a time'):
+        sweep.where_exponent(y, "mu", -0.5, (second, None))
     assert (met.crossover.attrs["units"], met.level.attrs["units"]) == ("rad/s^2", "s")
 
 

@@ -70,6 +70,9 @@ def test_a_line_is_that_of_polyfit_with_its_covariance():
     assert fit.points.dtype == np.int64
 
 
+FITS_WITH_SIGMA = sweep.fit_exponent, sweep.fit_two_laws, sweep.fit_correction
+
+
 def test_known_errors_weigh_the_points_and_make_all_errors_of_a_fit():
     sigma = np.linspace(0.05, 0.2, N)
     z = 0.3 - 0.7 * T + 0.5 * sigma * WAVE
@@ -88,6 +91,11 @@ def test_known_errors_weigh_the_points_and_make_all_errors_of_a_fit():
     assert {name: float(fit[name]) for name in expected} == pytest.approx(expected)
     assert (kind(fit), int(fit.fits)) == ("weighted", 1)
     assert int(sweep.fit_exponent(curve(z), "x", sigma=0.1 * sigma * curve(z)).fits) == 0
+    # no more than rounding denies nothing, and errors of what is missing are none
+    exact = curve(np.stack([0.3 - 0.7 * T, 0.3 - 0.0 * T, T])).where(T[0] < T, np.inf)
+    exact[2, 5] = 0.0
+    verdicts = [fit(exact, "x", sigma=0.1).verdict.values.tolist() for fit in FITS_WITH_SIGMA]
+    assert verdicts == [[law, law, "not positive"] for law in ("one power law", "one law", "one power law")]
     # signs in too few runs deny a line that chi-squared allows
     bent = -0.5 * T[0] * np.ones(40) + 0.5 * np.cos(np.linspace(0, np.pi, 40)) ** 2
     assert int(sweep.fit_exponent(curve(bent, np.arange(40.0)), "x", sigma=0.3 * np.exp(bent[0])).fits) == 0
@@ -194,6 +202,8 @@ def test_stacked_axes_are_fitted_as_those_that_they_are_of():
     stacked = sweep.fit_exponent(y.set_index(set=["a", "b"]), "x")
     np.testing.assert_array_equal(stacked.exponent, sweep.fit_exponent(y, "x").exponent)
     assert stacked.attrs["summary"].split()[:2] == ["a", "b"]
+    with pytest.raises(sweep.SweepError, match=r"such as \(1, 1\)"):
+        sweep.fit_exponent(y.set_index(set=["a", "b"]), "set")
 
 
 # windows
@@ -221,6 +231,7 @@ def test_a_window_holds_its_ends_to_rounding_and_may_be_open(window, points):
         ({"window": (1, np.nan)}, "is empty"),
         ({"window": (1, 2, 3)}, "is a pair"),
         ({"window": ("one", 2)}, "is a pair"),
+        ({"noise": np.ones(2)}, "noise: expected True"),
         ({"window": 5.0}, "is a pair"),
         ({"noise": "pink"}, "noise: expected True, False or one of even"),
         ({"sigma": 0.1, "noise": "even"}, "noise does not go with sigma"),
@@ -278,7 +289,7 @@ def test_two_power_laws_meet_where_they_are_equal_in_either_order():
 @pytest.mark.parametrize(
     ("slopes", "windows", "message"),
     [
-        ((-0.5, -0.5), ((None, 0.5), (2, None)), "the same exponent"),
+        *(((p, p), ((None, 0.5), (2, None)), "the same exponent") for p in (-0.6, -0.5, 0.5, 1.2)),
         ((-1.0, -0.5), ((None, 1), (0.5, None)), "overlap"),
         ((-1.0, -0.5), ((0.5, None), (None, 1)), "overlap"),
         ((-1.0, -0.5), (1, 2, 3), "windows"),
