@@ -256,8 +256,8 @@ def compare_laws(y: xr.DataArray, dim: str, window: Window | None = None, *, sig
     Dataset
         Along `law`, the best first: `aicc`, `bic`, `worse` (AICc or BIC above the least), `numbers`, `scatter`,
         `residual`, `chi_squared`, `formula`, `exponents`; `fitted` (law, point), the law at the points, whose
-        places are `x` and values `y` (10,000 of more than 20,000 that have no noise). Attributes `chosen`, `margin` (AICc to the next law; negative where a law with
-        more numbers is nearer), and `verdict`, a sentence.
+        places are `x` and values `y` (10,000 of more than 20,000 that have no noise). Attributes `chosen`, `margin`
+        (AICc to the next law; negative where a law with more numbers is nearer), and `verdict`, a sentence.
 
     Raises
     ------
