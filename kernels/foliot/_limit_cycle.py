@@ -47,12 +47,13 @@ Cell = namedtuple("Cell", (*Foliot._fields, "depth", "harmonic"))
 """Columns of cells."""
 Terms = namedtuple("Terms", "drag outwards inwards gamma degree kappa rough pace stiff")
 """Of a cell: terms of `Problem`, and the stiffness f'(V)/V."""
-_State = namedtuple("_State", "rtol index v tolerance before used low high stage stuck again share told linear")
+_State = namedtuple("_State", "rtol index v tolerance spring before used low high stage stuck again share told linear")
 Search = namedtuple("Search", (*Cell._fields, *Terms._fields, *_State._fields))
 _FOUND = 3 * len(Outputs._fields)
-"""Columns of cells that are searched for: the next v1 and tolerance, those before, the bracket and the stage; how often
-no half swing came back, and a tighter tolerance was tried; share and factor of (5) and (6); whether `bare` may be. And
-columns behind these: outputs before, at Newton's speed and at that of the half swing, and how they follow v1."""
+"""Columns of cells that are searched for: the next v1, its tolerance and (5); v1 and tolerance before, the bracket and
+the stage; how often no half swing came back, and a tighter tolerance was tried; share and factor of (6) and (7); whether
+`bare` may be. And columns behind these: outputs before, at Newton's speed and at that of the half swing, and how they
+follow v1."""
 Found = namedtuple("Found", "end change slope cancels Y A helped outputs")
 """By a half swing: F, Newton's step from the speed before it, dF/dv1; how many times larger than s the terms are that
 it is the sum of; Y, or 0 where exp(-Y) is; the turning point A; whether it was helped; the outputs of the cycle."""
@@ -127,14 +128,23 @@ def begun(manner, cells, rtol):
         return terms, manner.begins(cells, terms).astype(np.int8)
 
 
-def _wanted(manner, share, gap, decay, waves):
-    """The tolerance of the last half swings; the argument `share` is the share times rtol.
+def _spring(s, v):
+    """How many times more an error of a step counts in F than in the speed there, as the hairspring makes it faster.
+
+    What F^2 is off by is what kappa is times the tolerance, less what friction forgets:
+        max(1, kappa/v1^2 exp(-2 f'(V)/V)).                                                          (5)
+    """
+    return np.fmax(1.0, s.kappa / v**2 * np.exp(-2.0 * s.stiff))
+
+
+def _wanted(manner, s, gap, decay, waves):
+    """The tolerance of the last half swings.
 
     An error of F counts 1/(1 - dF/dv1)-fold in v1, and Y-fold in exp(-Y); without tangents errors of steps add up over
-    the waves of the torque. So it is
-        share rtol (1 - dF/dv1)/((1 + Y) (1 + waves)).                                               (5)
+    the waves of the torque. So it is, with (5),
+        share rtol (1 - dF/dv1)/((1 + Y) (1 + waves) spring).                                        (6)
     """
-    wanted = share * gap / ((1.0 + decay) * (1.0 + waves))
+    wanted = s.share / s.spring * gap / ((1.0 + decay) * (1.0 + waves))
     return np.fmin(np.fmax(wanted, manner.least), manner.orderly)
 
 
@@ -160,19 +170,19 @@ def _stated(s, by, former, step, hangs, tolerance):
     """Relative errors of what half swings give, a row for each output.
 
     Where those before gave the outputs `former`, with a relative difference `apart`, they are
-        told apart + 2 (1 + abs(hangs)) step + (ROUNDING + tolerance)/(1 - dF/dv1),                  (6)
+        told apart + 2 (1 + abs(hangs)) step + (ROUNDING + tolerance) spring/(1 - dF/dv1),           (7)
     where `step` is the relative one that Newton's method would still go, and `hangs` how an output follows v1. The last
     term is (1 + Y)-fold of exp(-Y); terms of s that cancel add theirs, with a tenth of the tolerance: they err alike.
     Both follow J, of which two half swings that are waves of the torque apart say nothing.
     """
     apart = np.where(by.outputs == former, 0.0, np.abs(by.outputs / former - 1.0))  # a multiplier may be 0 for good
     gap = 1.0 - by.slope
-    floor = (_ROUNDING + tolerance) / gap
+    floor = (_ROUNDING + tolerance) * s.spring / gap
     steep, farther = _by_J(s, by, step + floor)
     floor, step = floor * farther, step * farther
     by_J = np.where(steep > 0.0, steep * np.abs(by.slope / gap) * by.cancels, 0.0)
     stated = s.told * apart + 2.0 * step * (1.0 + np.abs(hangs)) + floor
-    stated[_SENSITIVITY] += (_ROUNDING + 0.1 * tolerance) / gap * by.cancels + (floor + 2.0 * step) * by_J
+    stated[_SENSITIVITY] += (_ROUNDING + 0.1 * tolerance) * s.spring / gap * by.cancels + (floor + 2.0 * step) * by_J
     stated[_MULTIPLIER] += floor * by.Y + (floor + 2.0 * step) * steep
     return stated
 
@@ -181,7 +191,7 @@ def _first_speed(s):
     """About v1, within some 5 % where there is no hairspring.
 
     Where friction takes little, accelerations are 1, and by v1^2 (1 - e^2) = 4 - 2 L each kind of it alone gives
-        (1 - e^2 + 2 rho e^2) v1^2 = 2 d (1 + e^3) v1^3/3 = 2 gamma (1 + e^m) v1^m/m = 4 (1 - rho),  m = n + 2.      (7)
+        (1 - e^2 + 2 rho e^2) v1^2 = 2 d (1 + e^3) v1^3/3 = 2 gamma (1 + e^m) v1^m/m = 4 (1 - rho),  m = n + 2.      (8)
     Where it takes much, it balances the drive, at v1 = 1/pace.
     """
     out, m, work = np.fmax(s.e, 0.0), s.degree + 2.0, 2.0 * s.inwards
@@ -203,8 +213,9 @@ def _begun_search(manner, cells, terms, rtol, i):
     s.share[:], s.told[:] = np.array(manner.shares)[kind] * s.rtol, np.array(manner.told)[kind]
     s.linear[:], s.stage[:] = ~dragged & varies & manner.bare, np.where(slow & manner.steps, ROUGH, SEARCH)
     s.high[:], s.v[:] = np.inf, np.where(slow, 1.0 / s.pace, _first_speed(s))
-    rough = manner.finer * _wanted(manner, s.share, 1.0, np.where(s.stiff < 375.0, 2.0 * s.stiff, 0.0), 0.0)
-    s.tolerance[:] = np.where(s.stage == ROUGH, rough, manner.coarse)
+    s.spring[:] = _spring(s, s.v)
+    rough = manner.finer * _wanted(manner, s, 1.0, np.where(s.stiff < 375.0, 2.0 * s.stiff, 0.0), 0.0)
+    s.tolerance[:] = np.where(s.stage == ROUGH, rough, np.fmax(manner.coarse / s.spring, manner.least))
     return search
 
 
@@ -245,7 +256,7 @@ def cycles(manner, cells, rtol, asked):
         raw[:] = by.outputs
         by = by._replace(outputs=raw * (1.0 + hangs * onward))
 
-        # the error (6), where the last two are done; the end where that will do or nothing helps
+        # the error (7), where the last two are done; the end where that will do or nothing helps
         waves = s.linear * s.harmonic * 0.5 * (1.0 + by.A) if manner.bare and not tangents else 0.0
         ended, done = many, free & (stage == FINE)
         if done.any():
@@ -276,15 +287,16 @@ def cycles(manner, cells, rtol, asked):
         former[:], s.before[:], s.used[:] = by.outputs, now, used
         s.v[:] = np.where(inside, new, between)
 
-        # the next stage, where a step is so small that its square does not count there; its tolerance, at last (5)
-        wanted = _wanted(manner, s.share, gap, by.Y, waves)
+        # the next stage, where a step is so small that its square does not count there; its tolerance, at last (6)
+        s.spring[:] = _spring(s, s.v)
+        wanted = _wanted(manner, s, gap, by.Y, waves)
         rough = manner.finer * wanted
         near = np.fmax(rough, np.fmin(0.003 * np.sqrt(s.rtol * gap), manner.coarse))
         coarse = np.fmin(np.fmax(np.where(gap > 0.0, 0.03 * gap, 0.03), rough), manner.coarse)
         close = np.where(stage == SEARCH, 0.08, np.where(stage == NEAR, 2.0 * np.sqrt(near), np.sqrt(0.1 * s.rtol)))
         s.stage[:] = np.where(inside & (stage < FINE) & (step < close), stage + 1.0, np.fmin(stage, ROUGH))
-        loose, tight = np.where(s.stage == SEARCH, coarse, near), np.where(s.stage == ROUGH, rough, wanted)
-        s.tolerance[:] = np.where(s.stage < ROUGH, loose, tight)
+        loose, tight = np.where(s.stage == SEARCH, coarse, near) / s.spring, np.where(s.stage == ROUGH, rough, wanted)
+        s.tolerance[:] = np.fmax(np.where(s.stage < ROUGH, loose, tight), manner.least)
         (going,) = np.nonzero(~(ended | lost | helped))
     return outputs, errors, status
 

@@ -59,12 +59,15 @@ def _energy_cycle(mu, phi0, R, k, e, depth, harmonic):
 
 
 def _time(energy, low, top):
-    """Time from low to the turning point, or to x = 1: with x = top - (top - low) u^2 the end's root is gone."""
+    """Time from low to the turning point, or to x = 1: with x = top - (top - low) u^2 the root there is gone.
+
+    Panels become shorter towards low, behind which another root may lie.
+    """
 
     def rate(u):
         return 2 * u * (top - low) / sqrt(2 * energy(top - (top - low) * u**2))
 
-    return quad(rate, [mpf(j) / 8 for j in range(9)], method="gauss-legendre")
+    return quad(rate, [*(1 - mpf(j) ** 6 for j in mp.linspace(1, 0, 13))], method="gauss-legendre")
 
 
 def _root(function):
