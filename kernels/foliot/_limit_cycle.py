@@ -50,8 +50,8 @@ Terms = namedtuple("Terms", "drag outwards inwards gamma degree kappa rough pace
 _State = namedtuple("_State", "rtol index v tolerance spring before used low high stage stuck again share told linear")
 Search = namedtuple("Search", (*Cell._fields, *Terms._fields, *_State._fields))
 _FOUND = 3 * len(Outputs._fields)
-"""Columns of cells that are searched for: the next v1, its tolerance and (5); v1 and tolerance before, the bracket and
-the stage; how often no half swing came back, and a tighter tolerance was tried; share and factor of (6) and (7); whether
+"""Columns of cells that are searched for: the next v1, its tolerance and (5); v1 and tolerance before, the bracket, the
+stage; how often no half swing came back, and a tighter tolerance was tried; share and factor of (6) and (7); whether
 `bare` may be. And columns behind these: outputs before, at Newton's speed and at that of the half swing, and how they
 follow v1."""
 Found = namedtuple("Found", "end change slope cancels Y A helped outputs")
