@@ -2,29 +2,18 @@
 
 import doctest
 
-import numpy as np
 import pytest
 from toy_studies import build
 
 import sweep
-from kernels.interface import FIRST_REFUSAL, Status
 from sweep.cells import solve
 from sweep.cells.sample import sampled
-from sweep.explore.refine import refine
 
 
 def test_the_worked_example_comes_out_as_it_stands_there():
     found = doctest.testmod(solve)
     assert found.attempted
     assert not found.failed
-
-
-def test_a_refined_grid_keeps_the_bounds():
-    keys = {"kernel": "foliot", "axes": {"mu": np.geomspace(0.1, 10, 5)}, "fixed": {"phi0": 1.0, "a": 1.0}}
-    study = sweep.study(**keys, rtol=1e-12, method="asymptotic")
-    found = refine(sweep.run(study, progress=False), ["period"], 1e-2).dataset
-    assert ((found.status < FIRST_REFUSAL) == found.error_bound.notnull()).all()
-    assert ((found.status == Status.INACCURATE) == (found.error_bound > 1e-12)).all()
 
 
 AXES = {"height": [-1.0, 1.0, 2.0, 4.0], "v0": [0.0, 1.0, 3.0]}

@@ -58,29 +58,13 @@ def test_further_terms_add_their_groups(axes, fixed, expected, free):
     assert scaling(study).free == free
 
 
-DRAG = {  # group and scaled period of a foliot with drag c v^n alone, from c = [rad^(1-n) s^(n-2)]
-    1.0: (lambda mu, c, phi0: c**2 * phi0 / mu, ["phi0 c^2/mu"], 2),
-    1.5: (lambda mu, c, phi0: c**4 * phi0**3 / mu, ["phi0^3 c^4/mu"], 2),
-    2.0: (lambda mu, c, phi0: c * phi0, ["phi0 c"], 2),
-}
-
-
 @pytest.mark.parametrize("rtol", [1e-2, 1e-9])
-@pytest.mark.parametrize("n", DRAG)
-def test_a_parameter_whose_unit_depends_on_another_one_is_in_the_group(n, rtol):
-    group, expected, free = DRAG[n]
+@pytest.mark.parametrize(("n", "expected"), [(1.0, "phi0 c^2/mu"), (1.5, "phi0^3 c^4/mu"), (2.0, "phi0 c")])
+def test_a_parameter_whose_unit_depends_on_another_one_is_in_the_group(n, expected, rtol):
+    """Of drag c v^n alone, with c in rad^(1-n) s^(n-2)."""
     found = scaling(replace(foliot("mu", "c", "phi0", n=n), rtol=rtol))
-    assert ([str(g) for g in found.groups], found.free) == (expected, free)
+    assert ([str(g) for g in found.groups], found.free) == ([expected], 2)
     assert "a single cell" not in found.advice
-    # cells with the same group have the same period in units of (phi0/mu)^(1/2)
-    rng = np.random.default_rng(3)
-    mu, phi0 = 10.0 ** rng.uniform(-1, 1, (2, 20))
-    c = {1.0: (mu / phi0) ** 0.5, 1.5: (mu / phi0**3) ** 0.25, 2.0: 1 / phi0}[n]
-    keys = {"axes": {"mu": mu, "phi0": phi0, "c": c}, "fixed": {"n": n}, "design": "zip", "outputs": ["period"]}
-    ds = sweep.run(sweep.study(kernel="foliot", **keys))
-    np.testing.assert_allclose(group(mu, c, phi0), 1.0, rtol=1e-12)
-    scaled = ds.period / np.sqrt(phi0 / mu)
-    np.testing.assert_allclose(scaled, scaled[0], rtol=1e-8)
 
 
 def test_a_law_that_holds_nearly_is_not_taken_for_a_scaling():

@@ -13,42 +13,21 @@ def press():
     time.sleep(0.01)
 
 
-def test_ctrl_c_waits_until_it_may_strike():
+@pytest.mark.parametrize("doings", ["press check", "press", "press press"])
+def test_ctrl_c_waits_until_it_may_strike_or_the_end_and_a_second_one_strikes_at_once(doings):
     reached = []
 
-    def pressed():
+    def run():
         with signals_held() as check:
-            press()
-            reached.append("the check")
-            check()
+            for doing in doings.split():
+                reached.append(doing)
+                press() if doing == "press" else check()
             reached.append("behind it")
 
     with pytest.raises(KeyboardInterrupt):
-        pressed()
-    assert reached == ["the check"]
+        run()
+    assert reached == [*doings.split(), *["behind it"] * (doings == "press")]
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
-
-
-def test_ctrl_c_is_not_lost_where_nobody_checks():
-    with pytest.raises(KeyboardInterrupt), signals_held():
-        press()
-
-
-def test_a_second_ctrl_c_strikes_at_once():
-    struck = False
-
-    def twice():
-        nonlocal struck
-        with signals_held():
-            press()
-            try:
-                press()
-            except KeyboardInterrupt:
-                struck = True
-
-    with pytest.raises(KeyboardInterrupt):
-        twice()
-    assert struck
 
 
 def test_handlers_of_others_and_other_threads_are_left_alone():
