@@ -20,7 +20,7 @@ from sweep.errors import SweepError
 from sweep.laws.curves import Window, fit_lines, stated_bound
 from sweep.laws.fits import fitted, union
 from sweep.laws.loglog import FEWEST, LINES, Array, alike, once, slope_bounds, slopes, tends
-from sweep.laws.noise import BEYOND_DOUBT, RARE, Noise, apart, inliers, regress, rounding, scatters, shaped
+from sweep.laws.noise import BEYOND_DOUBT, RARE, Noise, apart, inliers, regress, roughness, rounding, scatters, shaped
 from sweep.laws.shapes import FADING, LOG_CORRECTION, ONE, Number
 
 AS_WELL, HARDER = 13.0, 5.0
@@ -29,6 +29,8 @@ not, whose exponent is far harder to tell."""
 FADES = np.exp([0, -6, -5, -4, -3, -2, -1, 1, 2, 3, 4, 5, 6]), 0.3, 80.0
 """How fast a correction may fade, per window: those tried about the best, to the power of its relative error, and the
 least and largest."""
+SAME = 1e-6
+"""Relative distance up to which a curve without noise is the law that is fitted to it."""
 VERDICTS = (
     "a power law with a correction",
     "no power law with a correction",
@@ -184,9 +186,19 @@ def _exact(t: Array, z: Array, off: Array, bound: Array, slope: Array) -> dict[s
         local, by_error = slopes(t, z[i], 5), slope_bounds(t, error[i], 5)
         doubt = (abs(local - slopes(t, z[i], 7)) + by_error).max()
         low[i], high[i] = local.min() - doubt, local.max() + doubt
-        limits[0][i], limits[1][i] = (limit for _, limit in tends(t, local, by_error[[0, -1]]))
+        limits[0][i], limits[1][i] = (limit for _, limit, _ in tends(t, local, by_error[[0, -1]]))
     names = ("exponent_low", "exponent_high", "limit_low", "limit_high", "fits", "kind", "noisy")
     return dict(zip(names, (low, high, *limits, straight, kind, 0.0), strict=True))
+
+
+def far_out(t: Array, z: Array) -> tuple[Array, Array, Array, Array, list[tuple[float, float, bool]]]:
+    """A line without noise, each point once, its local exponents, their errors at both ends, and what they tend to."""
+    t, z = once(t, z)
+    local = slopes(t, z, 5)
+    # what noise there is moves the local exponents at the ends, each of which depends on five points
+    alone = [slopes(few, np.eye(few.size), 5)[:, end] for few, end in ((t[:5], 0), (t[-5:], -1))]
+    doubts = 2.5 * roughness(t, z)[0] * np.linalg.norm(alone, axis=1)
+    return t, z, local, doubts, tends(t, local, doubts)
 
 
 def fit_correction(
@@ -203,9 +215,10 @@ def fit_correction(
 
     Where there is noise, the interval is that of a mixture of noises as of `fit_exponent`, and reaches over those of
     all D, of a logarithmic correction (1 + B ln x)^c and of one law that the points do not rule out. Where there is no
-    noise, it is three times as far as the fit to the outer half of the window moves the
-    exponent. There is no interval where the points deny (1): by polynomials beside it that describe them far better;
-    where `noise="even"` or `sigma` is given, by a shape of the distances; where `sigma` is, by chi-squared.
+    noise, it is three times as far as the fit to the outer half of the window moves the exponent, and of a curve that
+    is not (1) reaches to where the local exponent tends; if that changes ever more towards the end, it is no law there.
+    There is no interval where the points deny (1): by polynomials beside it that describe them far better; where
+    `noise="even"` or `sigma` is given, by a shape of the distances; where `sigma` is, by chi-squared.
 
     Parameters
     ----------
@@ -251,7 +264,7 @@ def _corrected(
     bows = np.polynomial.chebyshev.chebvander(2 * (t - t[0]) / span - 1, 4)[:, 2:]
     independent = word == "even" or sigma is not None
     for row, tried in zip(z, fitted((ONE, FADING, LOG_CORRECTION), t, z, sigma), strict=True):
-        fit, one, fits, ends = tried[FADING.name], tried[ONE.name], True, [math.nan, math.nan]
+        fit, one, fits, tended, ends = tried[FADING.name], tried[ONE.name], True, True, [math.nan, math.nan]
         strength, fade, _, exponent = fit.numbers.tolist()
         exponent, fade, left = exponent / span, fade / span, math.expm1(strength) * math.exp(-fade)
         if abs(left) >= 1 and one.aicc <= fit.aicc + BEYOND_DOUBT:  # a correction that is none
@@ -270,13 +283,16 @@ def _corrected(
                 ends = [*union(t, own, others, [-1], word, confidence, AS_WELL)[1][:, 0] / span, exponent]
         else:
             # three times as far as the outer half of the points, and six at least, moves the exponent
-            s, line = once(t, row)
+            s, line, *_, (_, (_, limit, slows)) = far_out(t, row)
             outer, rounded = slice(-max(6, s.size // 2), None), np.full(s.size, 8 * rounding(s, line))
             half = fitted((FADING,), s[outer], line[None, outer])[0][FADING.name].numbers[-1] / np.ptp(s[outer])
             reach = 3 * abs(float(half) - exponent) + float(slope_bounds(s, rounded, 5)[-1])
             ends = [exponent - reach, exponent + reach]
-        verdict = VERDICTS[1 if not fits else 2 if abs(left) >= 1 else 3 if math.isnan(fade) else 0]
+            if abs((one if math.isnan(fade) else fit).off).max() > SAME:
+                ends, tended = [*ends, limit], slows
+        tended &= abs(left) < 1
+        verdict = VERDICTS[1 if not fits else 2 if not tended else 3 if math.isnan(fade) else 0]
         of = {"exponent": sign * exponent, "correction_exponent": sign * fade, "correction": left, "verdict": verdict}
         of |= {"exponent_low": min(sign * end for end in ends), "exponent_high": max(sign * end for end in ends)}
-        every.append(of | {"residual": fit.residual, "noisy": noisy, "fits": fits and abs(left) < 1})
+        every.append(of | {"residual": fit.residual, "noisy": noisy, "fits": fits and tended})
     return every

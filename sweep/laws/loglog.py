@@ -146,8 +146,8 @@ def barycentric(nodes: Array) -> Array:
     return np.ascontiguousarray(weights.T)
 
 
-def tends(t: Array, local: Array, doubts: Any) -> list[tuple[float, float]]:
-    """At each end of a window the exponent there, and the limit beyond it, three times over.
+def tends(t: Array, local: Array, doubts: Any) -> list[tuple[float, float, bool]]:
+    """At each end of a window the exponent there, the limit beyond it, three times over, and whether there is one.
 
     Its change from third to second to first of three points a step apart goes on geometrically, which is a third of the
     way for a bend that fades as 1/ln^2; where it does not slow down towards the end, ten times the last change stands
@@ -159,7 +159,8 @@ def tends(t: Array, local: Array, doubts: Any) -> list[tuple[float, float]]:
         last, before = first - second, second - third
         slows = last * before > 0 and abs(last) < (1 - 1e-6) * abs(before)  # by more than rounding
         left = last * last / (before - last) if slows else 10 * last
-        limits.append((first, first + 3 * left if abs(last) > doubt else first))
+        still = bool(abs(last) <= doubt)
+        limits.append((first, first if still else first + 3 * left, still or slows))
     return limits
 
 

@@ -19,9 +19,9 @@ from scipy.special import gammaincc
 from sweep.errors import SweepError
 from sweep.laws.curves import Window, check_names, check_output, described, fit_lines, title
 from sweep.laws.fits import Fit, fitted, union
-from sweep.laws.lines import fit_exponent, fit_line
-from sweep.laws.loglog import Array, once, slopes, tends
-from sweep.laws.noise import BEYOND_DOUBT, Noise, roughness, scatters
+from sweep.laws.lines import far_out, fit_exponent, fit_line
+from sweep.laws.loglog import Array
+from sweep.laws.noise import BEYOND_DOUBT, Noise, scatters
 from sweep.laws.shapes import BENDS, LAWS, ONE, OTHER_FUNCTIONS, THREE, TWO
 
 OTHER_SHAPES = 20.0
@@ -146,14 +146,10 @@ def _each(t: Array, z: Array, sigma: Array | None = None, *, confidence: float, 
 def _widened(t: Array, z: Array, best: Array, low: Array, high: Array) -> tuple[Array, Array]:
     """Intervals that reach to where the local exponents tend; of the crossover, to where they are half-way between the
     laws and to where the tangents at the ends of the window meet."""
-    t, z = once(t, z)
-    local = slopes(t, z, 5)
+    t, z, local, doubts, tended = far_out(t, z)
     half = np.flatnonzero(np.diff(np.sign(local - (best[0] + best[1]) / 2)))
     places = [t[half[np.argmin(abs(t[half] - best[2]))]] if half.size else best[2]]
-    # what noise there is moves the local exponents at the ends, each of which depends on five points
-    alone = [slopes(few, np.eye(few.size), 5)[:, end] for few, end in ((t[:5], 0), (t[-5:], -1))]
-    doubts = 2.5 * roughness(t, z)[0] * np.linalg.norm(alone, axis=1)
-    ends = [np.add.outer(two, (0, -by, by)) for two, by in zip(tends(t, local, doubts), doubts, strict=True)]
+    ends = [np.add.outer(two, (0, -by, by)) for (*two, _), by in zip(tended, doubts, strict=True)]
     # where lines of these slopes through the first and the last point meet
     steep = itertools.product(*([*one[:, 0], *one[0, 1:]] for one in ends))
     places += [(z[-1] - z[0] + p * t[0] - q * t[-1]) / (p - q) for p, q in steep if p != q]

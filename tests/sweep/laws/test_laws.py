@@ -180,6 +180,7 @@ def test_other_functions_are_called_no_power_law_and_have_no_exponents(name, noi
     assert (str(found.verdict.values), int(found.regimes)) == ("no power law", 0)
     assert all(np.isnan(found[key]).all() for key in ("exponent", "exponent_low", "crossover", "crossover_high"))
     assert str(sweep.fit_exponent(line(z, LINEAR), "x").verdict.values) == "no power law"
+    assert noise or sweep.fit_correction(line(z, LINEAR), "x").verdict.item() == "no law at this end"
     compared = sweep.compare_laws(line(z, LINEAR), "x")
     assert float(compared.worse.sel(law=name)) < 10
     assert noise or (compared.chosen == name and "no power law" in compared.verdict)
