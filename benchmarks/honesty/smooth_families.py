@@ -3,7 +3,7 @@
 import numpy as np
 from family import PI, REAL, Truth, family, scene
 
-from kernels.scene import cos, sqrt
+from kernels.scene import cos, sin, sqrt
 
 
 def _blow_up_truth(x0, T):
@@ -183,6 +183,30 @@ def grazing(random, n):
     """An oscillator that only just meets a level, or only just misses it for ever."""
     d = -(10.0 ** random.uniform(-16, 0, n)) * random.choice([1.0, 1.0, 1.0, -1.0], n)
     return {"h": np.ones(n), "d": d, "W": np.ones(n)}
+
+
+def _touching_truth(level, flips):
+    """x = cos(s) - cos(2 s), s = 1 + t: falls over the level between turns, and before 2 pi only where that is > 0."""
+    level = REAL(1) * level
+    root = np.sqrt(9 - 8 * level)
+    again = 2 * PI - 2 * np.arcsin(np.sqrt(np.maximum(level, 0) / (3 + root)))
+    turns, odd = np.divmod(flips - 1, np.where(level > 0, 2, 1))
+    s = 2 * PI * turns + np.where(odd > 0, again, np.arccos((1 - root) / 4))
+    v, fastest = -np.sin(s) + 2 * np.sin(2 * s), REAL("2.7")
+    return Truth(s - 1, [level, v], [2 + 0 * s, fastest + 0 * s], 1 / np.maximum(abs(level), 1e-30))
+
+
+@family(
+    scene(
+        "touching", "x v", "level", lambda x, v, t: (v, 3.0 * cos(2.0 * (t + 1.0)) - x), lambda x, level: x - level,
+        lambda: (cos(1.0) - cos(2.0), 2.0 * sin(2.0) - sin(1.0)),
+    ), _touching_truth,
+)  # fmt: skip
+def touching(random, n):
+    """A driven oscillator that just meets a level on its way, or just misses it, by less than it need be right to."""
+    rtol = 10.0 ** random.uniform(-9, -3, n)
+    level = rtol * 10.0 ** random.uniform(-3, 0, n) * random.choice([1.0, -1.0], n)
+    return {"level": level, "flips": random.integers(2, 6, n).astype(float), "rtol": rtol}
 
 
 def integrated(coefficients, state, span, step):

@@ -31,13 +31,14 @@ from kernels.integrate.events import of_event
 from kernels.integrate.powers import outside
 from kernels.integrate.taylor import curvature, last_term, natural_power, slope
 from kernels.lanes.symbols import fold, symbolic
+from kernels.lanes.tuples import all_of
 from kernels.lanes.vectors import choose, fma, magnitude, where
 from kernels.maths.intervals import most
 
 ULP = 2.0**-50
 """What rounding may take, four times over: as errors are carried, roundings of two states may cancel by chance."""
 DOUBT = 4.0
-"""By how much an event's margin grows per unit of its error at the start of a leg."""
+"""By how much an event's margin grows per unit of its error at the start of a step."""
 ORDERLY = 8.0
 """How late, of the time since the event before, one may come: else which comes first is not sure."""
 FADES = 0.8
@@ -91,14 +92,18 @@ def begun(m, state, errors, h):
 
 
 @symbolic
-def wider(m, margins, state, mode, errors):
-    """The events' margins, with their errors at the start of a leg."""
+def wider(m, margins, state, mode, error, errors, reach):
+    """The events' margins on a step, with their errors so far: the truth may meet what the series come close to.
+
+    Where errors are not told, by as much as far as they are small against what the states have come to, `reach`.
+    """
     if m.error is None:
         return margins
-    changes, vague = (m.error.of_events(state, mode, x) for x in (errors.off[:-2], errors.spread[:-2]))
-    told = errors.told > 0.5
+    changes, vague = (m.error.of_events(state, mode, x) for x in (error.off, error.spread))
+    parts = zip(error.off, error.spread, reach, strict=True)
+    small = all_of(tuple(magnitude(x) + magnitude(y) <= SMALL * size for x, y, size in parts))
     return tuple(
-        where(told, fma(DOUBT, magnitude(x) + magnitude(y), margin), margin)
+        where(small | (errors.told > 0.5), fma(DOUBT, magnitude(x) + magnitude(y), margin), margin)
         for x, y, margin in zip(changes, vague, margins, strict=True)
     )
 

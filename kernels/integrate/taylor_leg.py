@@ -323,10 +323,10 @@ def to_event(m, cell, mode, active):
     stuck, steep, broken, grazing, now, passed = nothing, nothing, nothing, nothing, never, never
     refused, longest, furthest = 0.0 * h, 0.0 * h + FAR, 0.0 * h + FAR
     power_h, reach = natural_power(h, m.order - 1), reached(times(0.0, state), state)
-    error = carried.begun(m, state, errors, h)
+    error, near = carried.begun(m, state, errors, h), margins
     for step in range(STEP_LIMIT):
         # a step that the series allow
-        cores, limits, coarse, full = m.cores(state, mode, unit, tolerance, on, t, margins, longest)
+        cores, limits, coarse, full = m.cores(state, mode, unit, tolerance, on, t, near, longest)
         pieces = m.pieces(state, mode, unit, cores)
         error = carried.since(m, error, full, state, mode, unit, pieces)
         facts = facts_of(pieces.events)
@@ -334,16 +334,16 @@ def to_event(m, cell, mode, active):
         trial = h
         if step == 0:
             now, margins, broken, steep, stuck = begun(m, pieces, facts, state, mode, on, tolerance, active)
-            margins = carried.wider(m, margins, state, mode, errors)
             trial, moving = where(any_of(now), 0.0, h), moving & not_(broken | steep | stuck)
         tried = where(moving, tried + 1.0, tried)
         # so long that each event is proved to fall all along or to stay clear
+        near = carried.wider(m, margins, state, mode, error, errors, reached(reach, cell.size))
         seen = shows_all(m, pieces, state, mode, unit, trial, tolerance)
         steps = moving & seen
-        sure, fallings = judged(m, m.at_kink, pieces, facts, margins, now, trial, steps, never)
+        sure, fallings = judged(m, m.at_kink, pieces, facts, near, now, trial, steps, never)
         unsure = steps & not_(sure)
         if any_lane(unsure):
-            trial, unsure, fallings = doubted(m, pieces, state, unit, facts, margins, now, trial, unsure, fallings)
+            trial, unsure, fallings = doubted(m, pieces, state, unit, facts, near, now, trial, unsure, fallings)
             if step < AGAIN:
                 unsure = unsure & (fine | not_(power_h < FAR))
         furthest = where(trial > 0.0, BEYOND * trial, furthest)

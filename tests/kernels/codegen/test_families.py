@@ -43,7 +43,7 @@ def drawn(random, name, count, decades):
     [
         *((name, "dop853", 7, 40, BOTH, 0.6) for name in ("blow_up", "behind")),
         *((name, "taylor", 7, 40, BOTH, 0.6) for name in ("moving_surface", "pulses", "flat_start")),
-        ("power_turns", "taylor", 7, 40, BOTH, 0.95),
+        ("power_turns", "taylor", 7, 40, BOTH, 0.95), ("touching", "taylor", 7, 400, WIDE, 0.95),
         *((name, "taylor", 7, 40, WIDE, 0.6) for name in ("windows", "flat_surface", "logistic")),
         ("broken_jump", "taylor", 7, 40, TIGHT, 0.6), ("even_roots", "taylor", 21, 200, WIDE, 0.95),
         ("stiff_windows", "rodas5p", 21, 200, WIDE, 0.95), ("stick_and_break_away", "dop853", 21, 200, WIDE, 0.95),
