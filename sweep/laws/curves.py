@@ -134,7 +134,7 @@ def positive_axis(y: xr.DataArray, dim: str, repeated: bool = False) -> tuple[st
         since = f", {dim}" if of.kind == "m" else f" since a moment before the first, ({dim} - MOMENT)"
         raise SweepError(f"{dim} holds times, not numbers; take seconds{since} / np.timedelta64(1, 's')")
     if of.kind not in "fiu":
-        held = "words" if isinstance(first, str) else f"{of} values such as {first!r}"
+        held = "words" if isinstance(first, str) else f"{of} values such as {first}"
         raise SweepError(f"{dim} holds {held}, not numbers; a power law needs a number axis")
     x = values.astype(np.float64)
     fit = np.isfinite(x) & (x > 0)
@@ -191,23 +191,24 @@ def fit_lines(
     low, high = limits(window, y.coords[dim])
     places = np.flatnonzero((x >= low) & (x <= high))
     places = places[np.argsort(x[places], kind="stable")]
-    part, t = y.isel({dimension: places}).transpose(..., dimension).compute(), np.log(x[places])
-    values = part.values.astype(np.float64).reshape(math.prod(part.shape[:-1]), t.size)
-    values[~np.isfinite(values)] = np.nan
+    part, t = y.isel({dimension: places}).transpose(..., dimension), np.log(x[places])
+    rows, shape = dict[str, Array](), (math.prod(part.shape[:-1]), t.size)
+    for name, one in {"z": y, "bound": bound, "sigma": None if sigma is None else relative_sigma(y, sigma)}.items():
+        if one is not None:
+            ordered = one.isel({dimension: places}).transpose(..., dimension)
+            rows[name] = ordered.values.astype(np.float64).reshape(shape)
+    values = np.where(np.isfinite(rows["z"]), rows["z"], np.nan)
     bad = np.asarray((values <= 0).any(axis=1))
     if bad.size and bad.all():
-        first = part[tuple(np.argwhere((part <= 0).values)[0])]
+        line, place = np.argwhere(values <= 0)[0]
         raise SweepError(
-            f"a power law needs positive values; {(values <= 0).sum()} of {part.size} of {title(y)} in the window are "
-            f"not, e.g. {float(first):g} at {dim} = {float(first.coords[dim]):g}; choose a window without them"
+            f"a power law needs positive values; {(values <= 0).sum()} of {values.size} of {title(y)} in the window are"
+            f" not, e.g. {values[line, place]:g} at {dim} = {x[places][place]:g}; choose a window without them"
         )
     with np.errstate(all="ignore"):
-        z = np.where(bad[:, None], np.nan, np.log(values))
-    columns, rows = dict[str, Any](), {"z": z}
-    for name, one in (("bound", bound), ("sigma", None if sigma is None else relative_sigma(y, sigma))):
-        if one is not None:
-            rows[name] = one.isel({dimension: places}).transpose(..., dimension).values.reshape(z.shape)
-    present = np.isfinite(z) & np.isfinite(rows.get("sigma", 0.0))
+        rows["z"] = np.where(bad[:, None], np.nan, np.log(values))
+    present = np.isfinite(rows["z"]) & np.isfinite(rows.get("sigma", 0.0))
+    unfit, columns = np.where(bad, "not positive", "too few points").astype(object), dict[str, Any]()
     for pattern, which in alike(present, max(LINES, VALUES // max(1, t.size))):
         if pattern.sum() < fewest or np.unique(t[pattern]).size < fewest_places:
             continue
@@ -222,8 +223,8 @@ def fit_lines(
         if not isinstance(result, dict):
             result = {name: np.array([one[name] for one in result]) for name in result[0]}
         for name, column in result.items():
-            empty: Any = ("", object) if column.dtype.kind == "U" else (np.nan, np.float64)
-            columns.setdefault(name, np.full((len(z), *column.shape[1:]), *empty))[which] = column
+            empty = unfit.copy() if column.dtype.kind == "U" else np.full((len(bad), *column.shape[1:]), np.nan)
+            columns.setdefault(name, empty)[which] = column
     columns["points"] = present.sum(axis=1)
     if len(columns) == 1:
         where, way = f"along {dim}", "add points"
@@ -237,8 +238,7 @@ def fit_lines(
     coords: dict[Any, Any] = {name: one for name, one in part.coords.items() if dimension not in one.dims}
     check_names(y, {*coords, *part.dims[:-1]} & {*columns})
     for name, column in columns.items():
-        if column.dtype == object:
-            column = np.where(column == "", np.where(bad, "not positive", "too few points"), column).astype(str)
+        column = column.astype(str) if column.dtype == object else column
         dims = ("law",) * (column.ndim - 1) + part.dims[:-1]
         coords |= {"law": ["low", "high"]} if column.ndim > 1 else {}
         columns[name] = dims, column.T.reshape(column.shape[1:] + part.shape[:-1])

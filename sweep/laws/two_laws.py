@@ -221,11 +221,8 @@ def crossover(low_fit: xr.Dataset, high_fit: xr.Dataset) -> xr.Dataset:
     root = np.sqrt(linear**2 + square * (level_reach**2 + off**2).sum("law"))
     place = meeting.where(square.notnull())
     result = both[["exponent", "exponent_low", "exponent_high"]].assign(level=np.exp(level + slope * place))
-    for name, by in (
-        ("", 0.0),
-        ("_low", (linear - root) / square - moved),
-        ("_high", (linear + root) / square + moved),
-    ):
+    ends = {"": 0.0, "_low": (linear - root) / square - moved, "_high": (linear + root) / square + moved}
+    for name, by in ends.items():
         result[f"crossover{name}"] = np.exp(middle + place + by)
     result["crossover_error"] = (result.crossover_high - result.crossover_low) / 2
     result.attrs = {name: low_fit.attrs[name] for name in ("law", "y", "x", "confidence")}
