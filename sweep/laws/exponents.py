@@ -6,6 +6,7 @@ coordinate along a dimension, such as an axis of a zip design: `local_exponent(d
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from typing import Any, Literal, overload
 
@@ -211,7 +212,9 @@ def exponent_map(y: xr.DataArray, dim: str, levels: Sequence[float] = BORDERS) -
     across, down = (np.log(y[n].values) if take else y[n].values for n, take in zip(names, logarithmic, strict=True))
     generator = contourpy.contour_generator(across, down, np.ma.masked_invalid(local.exponent.values))
     numbers = [curves.number("levels", level) for level in np.atleast_1d(levels).tolist()]
-    by_level = ((level, line) for level in numbers for line in generator.lines(level))
+    # where the exponent is a level throughout, within its error, rounding would draw lines
+    apart = [bool((abs(local.exponent - level) > local.exponent_error).any()) for level in numbers]
+    by_level = ((level, line) for level in itertools.compress(numbers, apart) for line in generator.lines(level))
     lines = [np.insert(np.array(line, np.float64), 2, level, axis=1) for level, line in by_level]
     points = np.concatenate([np.empty((0, 3)), *lines])
     points[:, :2][:, logarithmic] = np.exp(points[:, :2][:, logarithmic])

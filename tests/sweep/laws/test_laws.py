@@ -47,6 +47,8 @@ def test_where_one_law_holds_to_rounding_nothing_meets_anywhere(power):
     assert all(np.isnan(float(found[name])) for name in ("crossover", "width", "level"))
     assert (float(found.crossover_low), float(found.crossover_high)) == (0.0, np.inf)
     assert ((found.exponent_low <= power + 1e-12) & (found.exponent_high >= power - 1e-12)).all()
+    over_two = line(power * T - 4.0 * power).expand_dims(a=[1.0, 2.0])
+    assert sweep.exponent_map(over_two, "x", [power]).sizes["point"] == 0
 
 
 def test_two_laws_with_noise_are_those_of_scipys_least_squares():
