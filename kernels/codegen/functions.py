@@ -86,7 +86,7 @@ class Functions:
         self.feeds_back = any(other != s and s in hangs[other] for s, on in hangs.items() for other in on)
         """Whether the rate of a state hangs on another one whose own rate, or that of a further one, hangs on it."""
         mode, boxes = Mode(ANY, (ANY,) * (kinks + 1), (ANY,) * m, False), ((ANY, ANY),) * n
-        self.any = {"state": (ANY,) * n, "changes": (ANY,) * n, "mode": mode, "boxes": boxes}
+        self.any = {"state": (ANY,) * n, "new": (ANY,) * n, "changes": (ANY,) * n, "mode": mode, "boxes": boxes}
         self.any |= {"parameters": mode.parameters, "cores": (ANY,) * len(self.graph.powers), "on": mode.signs}
 
     def written(self):
@@ -120,7 +120,8 @@ class Functions:
             passable=tuple(float(not any(x.kind == INPUT and x.args[0] == "side" for x in parts)) for parts in sided),
             deciding=deciding if any(deciding) else None,
             jumped=left_a_call(self.rehearsed(self._jumped)) if any(self._jumps()) else None,
-            cell=cell_of(*self.size), roundings=ROUNDINGS, biased=0.0,
+            judged=self._values_and_sizes(tuple(self.graph.judged)) if self.graph.judged else None,
+            shaken=self.inlined(self._shaken), cell=cell_of(*self.size), roundings=ROUNDINGS, biased=0.0,
         )  # fmt: skip
 
     def inlined(self, function):
@@ -141,6 +142,7 @@ class Functions:
     def inputs(self, state, mode, unit=None, changes=()):
         """{name of an input: its value}."""
         found = dict(zip(self.states, state, strict=False)) | {"side": mode.side, ".unit": unit}
+        found |= {f".held_{name}": found.get(name) for name in self.graph.held}
         found |= dict(zip(self.scene.parameters, mode.parameters, strict=True))
         found |= dict(zip((*(f".sign_{j}" for j in range(len(self.kinks))), ".way"), mode.signs, strict=False))
         return found | {f".delta_{s}": delta for s, delta in zip(self.states, changes, strict=False)}
@@ -161,6 +163,11 @@ class Functions:
             return tuple(found.of(x) if x.varies else 0.0 * mode.side + found.of(x) for x in expressions)
 
         return self.inlined(sizes)
+
+    def _values_and_sizes(self, expressions):
+        """A function of state and mode: the value of each expression, and what it is made of in size."""
+        values, sizes = self.values(expressions), self.sizes(expressions)
+        return written(lambda state, mode: tuple(zip(values(state, mode), sizes(state, mode), strict=True)))
 
     @functools.cached_property
     def tangents(self):
@@ -255,7 +262,12 @@ class Functions:
 
     def _states_off(self, state, by):
         parts = (1.0 if clock else STATE_OFF * (-1.0) ** j for j, clock in enumerate(self.clocks))
-        return tuple(V.fma(part * by, u, u) for part, u in zip(parts, state, strict=True))
+        return self._shaken(state, tuple(V.fma(part * by, u, u) for part, u in zip(parts, state, strict=True)))
+
+    def _shaken(self, state, new):
+        parts = zip(self.states, state, new, strict=True)
+        held = self.graph.held
+        return tuple(V.where(V.magnitude(V.nearest(u) - u) > 0.0, x, u) if s in held else x for s, u, x in parts)
 
     @functools.cached_property
     def _event_parts(self):

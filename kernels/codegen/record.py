@@ -13,7 +13,19 @@ from types import SimpleNamespace
 import numpy as np
 
 from kernels.codegen.sliding import slid
-from kernels.expression.graph import ADD, FUNCTIONS, INPUT, NAMED, NUMBER, SCALED, Expression, Graph, SceneError, power
+from kernels.expression.graph import (
+    ADD,
+    FUNCTIONS,
+    INPUT,
+    NAMED,
+    NUMBER,
+    SCALED,
+    Expression,
+    Graph,
+    SceneError,
+    holds,
+    power,
+)
 
 RESERVED = ("side", "flips", "time", "interval", "rtol", "status")
 """Names that a scene's states and parameters cannot have."""
@@ -58,8 +70,17 @@ def record(scene):
 
 @functools.cache
 def _once(scene):
+    """What the scene's functions do; they are called again where one asks for a sign of states that are held alone."""
+    recorded = _recorded(scene, frozenset())
+    held = {name for name, x in zip(scene.states, recorded.rates, strict=True) if x.kind == NUMBER and not x.args[0]}
+    if any(holds(u, held) for j, u in enumerate(recorded.graph.kinks) if j not in recorded.surfaces):
+        recorded = _recorded(scene, frozenset(held))
+    return slid(recorded, scene.states) if scene.slides else recorded
+
+
+def _recorded(scene, held):
     """Calls each function of the scene once with recording objects."""
-    graph = Graph()
+    graph = Graph(held)
     states = {name: graph.series(name) for name in scene.states}
     constants = {name: graph.constant(name) for name in (*scene.parameters, "side")}
     has_clock = scene.start_time is not None
@@ -67,7 +88,7 @@ def _once(scene):
     rates = _called(graph, scene, "rates", scene.rates, states | constants, declared) + clock
     for _, u in map(graph.parts, rates):
         if u.varies and (scene.peaks == "all" or (scene.peaks and u.kind == INPUT)):
-            graph.side_of(u)
+            graph.kink(u)
     surfaces = named_functions(scene.surface)
     found = []
     for name, function in surfaces.items():
@@ -77,7 +98,7 @@ def _once(scene):
     surface, known = found[0], {graph.parts(u)[1] for u in graph.kinks}
     shared = any(graph.parts(u)[1] in known for u in found[1:])
     for u in found[1:]:
-        graph.side_of(u)
+        graph.kink(u)
     numbers = tuple(graph.kinks[u] for u in found[1:])
     met = dict(zip(surfaces, (".way", *(f".sign_{j}" for j in numbers)), strict=True))
     switched = _switched(graph, scene, states, constants, met, declared)
@@ -93,8 +114,7 @@ def _once(scene):
     events = ((wayward, way * factor, u), *kinks)
     rate = dict(zip(states.values(), rates, strict=True)).get(u)
     nested = 0 if rate is None else 1 + graph.kinks.get(graph.parts(rate)[1], -1)
-    recorded = Recorded(graph, rates, timed, surface, switched, started, events, nested, numbers, shared)
-    return slid(recorded, scene.states) if scene.slides else recorded
+    return Recorded(graph, rates, timed, surface, switched, started, events, nested, numbers, shared)
 
 
 def asks_for_time(functions, names):

@@ -7,7 +7,8 @@ half a square needs the fewest operations.
 
 abs(u) and sign(u) bend or jump where u = 0: each such u is a *kink*. Between kinks the sign of u is a constant, an
 input of the graph; an integrator stops at a kink and turns the sign round. floor(u) is one where sin(pi u) = 0, whose
-sign tells whether the integer is even.
+sign tells whether the integer is even. Of what is *held*, states whose rates are 0, no kink is met: between two
+switches it is a constant, and abs, sign and floor are those of a number, at 0 too.
 """
 
 import functools
@@ -114,13 +115,16 @@ class Graph:
     """Expressions over named inputs, each recorded once, in the order in which they can be computed.
 
     `kinks` are the series whose signs are inputs ".sign_0", ".sign_1", ..., with their numbers; `powers` are those of
-    abs(u), u a state, which have no series at u = 0, with theirs.
+    abs(u), u a state, which have no series at u = 0, with theirs. `held` are the names of the states that are held, of
+    which constants are inputs ".held_u"; `judged` what the signs of such constants are taken of.
     """
 
-    def __init__(self):
+    def __init__(self, held=()):
         self.nodes = []
         self.kinks = {}
         self.powers = {}
+        self.held = held
+        self.judged = {}
         self._known = {}
 
     def _node(self, kind, args, varies):
@@ -212,8 +216,11 @@ class Graph:
     def floor(self, x):
         """The largest integer not above x: between two kinks a constant."""
         x = self.of(x)
-        if not x.varies:
-            return self.function("floor", x)
+        constant = self._constant_if_held(x)
+        if constant is not x:  # how far from a whole number
+            self._judge(constant - self.function("floor", constant + 0.5))
+        if not constant.varies:
+            return self.function("floor", constant)
         return self.function("floor", x, self.side_of(self.function("sin", math.pi * x)))
 
     def power(self, x, exponent):
@@ -263,7 +270,23 @@ class Graph:
 
     def side_of(self, u):
         """The sign of a series, constant between kinks."""
+        constant = self._constant_if_held(u)
+        if constant is u:
+            return self.kink(u)
+        return self.function("sign", self._judge(constant))
+
+    def kink(self, u):
+        """The sign of a series, whose 0 is located."""
         return self.constant(f".sign_{self.kinks.setdefault(u, len(self.kinks))}")
+
+    def _judge(self, constant):
+        return self.judged.setdefault(constant, constant)
+
+    def _constant_if_held(self, x):
+        """A constant in the place of what varies by states alone that are held."""
+        if not (self.held and x.varies and holds(x, self.held)):
+            return x
+        return self.again(x, {name: self.constant(f".held_{name}") for name in self.held})
 
     def again(self, x, inputs, done=None):
         """An expression, of any graph, with what is in the dict `inputs` in the place of inputs of these names.
@@ -305,6 +328,11 @@ def needed(*roots):
             found[node.index] = node
             waiting += [a for a in node.args if isinstance(a, Expression)]
     return [found[i] for i in sorted(found)]
+
+
+def holds(x, held):
+    """Whether of the states in an expression all are among those that are held."""
+    return all(node.args[0] in held for node in needed(x) if node.kind == INPUT and node.varies)
 
 
 def _function(name, of_number):

@@ -134,6 +134,12 @@ def raised(verdict, lanes, least):
 
 
 @symbolic
+def too_close(cell, value, size):
+    """Whether a value is so close to 0, but not on it, that its sign is not sure; `size` : what it is made of."""
+    return (magnitude(value) > 0.0) & (magnitude(value) <= BLUR * cell.tolerance * size)
+
+
+@symbolic
 def started(m, cell):
     """The cell at its start; a further surface that it starts on and falls through is met at once.
 
@@ -154,7 +160,7 @@ def started(m, cell):
     gap = where(through, 0.0, e)  # what it is there is rounding, which says nothing of times
     wrong = not_(magnitude(e) >= 0.0) | not_((cell.flips >= 1.0) & (cell.flips < math.inf))
     cell = cell._replace(
-        state=tuple(fma(ONE_ULP * (-1.0) ** j * off, u, u) for j, u in enumerate(state)),
+        state=m.shaken(state, tuple(fma(ONE_ULP * (-1.0) ** j * off, u, u) for j, u in enumerate(state))),
         side=side, signs=joined(signs[:-1], (where((e < 0.0) | through, -1.0, signs[-1]),)), on=joined((at,), on),
         unit=time_unit(gap, d, dd), own=ERRORS.started(m, cell.own, state),
         verdict=where(wrong, BAD_INPUT, where(blur <= BLUR * cell.tolerance, 0.0, INACCURATE)),
@@ -277,12 +283,12 @@ def switched(m, cell, rates, switches, counts, first, met):
         before, *gaps = (where(magnitude(gap) <= MET * size, gap, 0.0) for gap, (size, _) in parts)
     if m.deciding is not None:  # a kink whose side decides what the switch does may be too close to tell its side
         parts = zip(m.deciding, gaps, m.made(old, old_mode)[1:], strict=True)
-        close = tuple(
-            (decides > 0.5) & (magnitude(gap) > 0.0) & (magnitude(gap) <= BLUR * cell.tolerance * size)
-            for decides, gap, (size, _) in parts
-        )
+        close = tuple((decides > 0.5) & too_close(cell, gap, size) for decides, gap, (size, _) in parts)
         verdict = raised(verdict, switches & any_of(close), INACCURATE)
     state = m.switched(old, old_mode)
+    if m.judged is not None:
+        held = m.judged(state, Mode(side, signs, parameters, False))
+        verdict = raised(verdict, switches & any_of(tuple(too_close(cell, *part) for part in held)), INACCURATE)
     gaps_behind = m.kinks(state, Mode(side, signs, parameters, False))
     near = tuple(
         where(magnitude(x) <= 2.0 * magnitude(y), o, 0.0)

@@ -23,7 +23,8 @@ class Mode(NamedTuple):
 Written = namedtuple(
     "Written",
     "rates surface kinks switched started natural_signs underflows jet lost hidden bounds made most_kinks cell "
-    "roundings biased speeds onto surfaces hiding passable deciding jumped on_clock states_off factored solved error",
+    "roundings biased speeds onto surfaces hiding passable deciding jumped on_clock states_off shaken judged factored "
+    "solved error",
     defaults=(None, None, None),
 )
 """What is written of a scene: functions of (state, mode) unless said otherwise, and its numbers.
@@ -51,6 +52,8 @@ jumped : (state, mode, on, blur) -> marks and signs where kinks are met, of what
     next to 0; None where nothing does
 on_clock : (state, unit, h) -> the step next to h > 0 by which each *clock*, a state whose rate is 1, is not rounded
 states_off : (state, by) -> the state, its clocks off by so many parts of themselves, others by fewer
+shaken : (state, new) -> the new state, but of held ones (`Graph.held`) those that are whole numbers as they were
+judged : of each constant of held states whose sign decides, its value and what that is made of; None where none does
 factored, solved : None, or of a scene that may be stiff (`expression.stiff`)
 error : `carried.Changes`; None where no error is carried along
 """

@@ -7,7 +7,7 @@ from columns import fields, solve
 
 from kernels.interface import Status
 from kernels.lanes.jit import COMPILED
-from kernels.scene import SceneError, cos, scene_kernel, sin, sqrt
+from kernels.scene import SceneError, cos, mod, scene_kernel, sign, sin, sqrt, where
 from kernels.stepping import stepped_kernel
 
 WALLS = {
@@ -55,6 +55,22 @@ def test_surfaces_that_are_met_at_once_all_jump_and_a_start_that_falls_from_one_
     assert [outputs[name] for name in ("time", "x", "v", "y", "w")] == pytest.approx([1.5, 1, 1, 1, 1], abs=1e-12)
     outputs, status = found(walls, "taylor_once", 0.5, 1.0, 4.0, 1.0, flips=2)
     assert [outputs[name] for name in ("time", "x", "v")] == pytest.approx([2.0, 0.0, -0.5], abs=1e-12)
+
+
+@plain
+@pytest.mark.parametrize("method", ["taylor", "dop853"])
+def test_a_counter_is_compared_as_a_number_is_where_it_is_equal_too(method):
+    """The number n of switches, one a second, from 0: y gains 0, 110, 121, 101, 111 in the seconds."""
+    kernel = scene_kernel(
+        name="counter", doc="", states=fields("x", "n", "y"), parameters=fields("n0"), surface=lambda x: 1.0 - x,
+        rates=lambda n: (1.0, 0.0, where(n >= 2, 1.0, 0.0) + 10.0 * mod(n, 3) + 100.0 * sign(n)),
+        switch=lambda n, y: (0.0, n + 1.0, y), start=lambda n0: (0.0, n0, 0.0),
+    )  # fmt: skip
+    outputs, status = solve(kernel, method, flips=[1.0, 2.0, 3.0, 4.0, 5.0], n0=0.0)
+    assert (status == Status.OK).all()
+    assert outputs["y"] == pytest.approx([0, 110, 231, 332, 443])
+    outputs, status = solve(kernel, method, flips=2.0, n0=[1.0, 1.0 + 1e-15, 0.3])
+    assert status.tolist() == [Status.OK, Status.INACCURATE, Status.OK]
 
 
 @plain
