@@ -16,7 +16,8 @@ power(abs(u), n), u a state and n > -1 any number, has no Taylor series at u = 0
 A cell is OK where each state is within rtol of the truth, relative to the largest size that the state had on the way,
 and each time within rtol of itself. The surface and the kinks are located, or proved absent, over every step. A motion
 that starts behind the surface, or that a switch puts there, meets no switch before it has come up and falls again; one
-that starts on the surface and falls switches at once. What rounding alone may make of a motion counts: INACCURATE.
+that starts on the surface and falls switches at once, and so does one that a switch puts onto another surface. What
+rounding alone may make of a motion counts: INACCURATE.
 """
 
 import functools

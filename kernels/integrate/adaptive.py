@@ -35,6 +35,8 @@ SUNK, ROUNDED = 0.01, 1e-11
 BENT, NARROWED = 0.5, 8.0
 """Cuts of a step after which a motion that starts on an event may leave it by its bend, and after which one that comes
 close to an event may be called grazing."""
+AT_ONCE = 1e-15
+"""Of its largest value since the last event, a surface's value within which it is met at once with another one."""
 HALVED = 30.0
 """Halvings after which a motion that starts on an event with no rate has not risen from it."""
 
@@ -81,6 +83,13 @@ def next_length(pair, h, last_h, error, before):
     return where(longer > SHRINK * h, longer, SHRINK * h)
 
 
+@symbolic
+def met_besides(values, start, wide, lanes):
+    """1 for each event that is met at once with the one that these are the values at."""
+    parts = zip(values, start, wide, strict=True)
+    return tuple(where(lanes & (x > 0.0) & (magnitude(v) <= AT_ONCE * w), 1.0, 0.0) for v, x, w in parts)
+
+
 @jit
 def to_event(pair, cell, mode, active):
     """Follow the active lanes until an event falls through 0, and stop there; see `taylor_leg`."""
@@ -122,7 +131,7 @@ def to_event(pair, cell, mode, active):
         again = rough | (pressed & away) | (doubt & not_(close))
         shorter = where(rough, longer, where(low > 0.0, low * h, 0.5 * h))
         # onto the event; again where another one is behind by then, or the dense output is vague
-        taken, loose, seeking = h, nothing, met & not_(pressed | again)
+        taken, loose, seeking, also = h, nothing, met & not_(pressed | again), times(0.0, on)
         if any_lane(seeking):
             curved = seeking & (above > 0.0)
             terms = pair.series(m, state, trial, mode, length)
@@ -131,7 +140,10 @@ def to_event(pair, cell, mode, active):
             part, found = where(curved, part, 0.0), choose(curved, found, state)
             vague = of_size(state, new, first, length, pair.vague(m, state, terms, mode, length, part))
             other = curved & (part < 0.999999) & (part > 0.0)
-            other = other & passed_another(events(m, found, mode)[0], which, on)
+            values = events(m, found, mode)[0]
+            other = other & passed_another(values, which, on)
+            if m.surfaces is not None:
+                also = met_besides(values, start, wide, curved)
             loose = curved & not_(other) & (vague > tolerance)
             shorter = where(other, part * h, shorter)
             shorter = where(loose, h * where(part < 0.9, 1.05 * part, 0.5), shorter)
@@ -152,7 +164,7 @@ def to_event(pair, cell, mode, active):
         last_h, last_error = where(moved, h, last_h), where(moved, at_least(error, FORGOTTEN), last_error)
         h = where(again, shorter, where(moved & not_(done), longer, h))
         state, start, start_rates = choose(moved, (new, end, end_rates), (state, start, start_rates))
-        on, fired = choose(moved, times(0.0, on), on), choose(done, marks(which, on), fired)
+        on, fired = choose(moved, times(0.0, on), on), choose(done, reached(also, marks(which, on)), fired)
         wide, reach = reached(wide, start), reached(reach, state)
         moving = moving & not_(done | given_up)
         if not any_lane(moving):

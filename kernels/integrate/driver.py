@@ -308,6 +308,12 @@ def switched(m, cell, rates, switches, counts, first, met):
             for s, o, x, fall, passable, sign in parts
         )
         signs = (*held, signs[-1])
+        parts = zip(m.surfaces, kinks_on, cell.signs[:-1], met, signs[:-1], strict=True)
+        lands = tuple(  # one that the jump puts it onto from above, and that it falls through, is met at once
+            (s > 0.5) & (o > 0.5) & (above > 0.0) & not_(x) & (sign < 0.0) for s, o, above, x, sign in parts
+        )
+        signs = (*(where(x, 1.0, sign) for x, sign in zip(lands, signs[:-1], strict=True)), signs[-1])
+        kinks_on = tuple(where(x, 0.0, o) for x, o in zip(lands, kinks_on, strict=True))
     mode = Mode(side, signs, parameters, False)
     after, extent = m.surface(state, mode), m.made(state, mode)[0][0]
     still = magnitude(after) <= fma(STILL, extent, 2.0 * magnitude(before))

@@ -149,7 +149,7 @@ class Leg(NamedTuple):
     on : 1 for the event that fired, and for what fell with it
     stuck, lost, broken : pressed on what it started on; not there within limits; numbers that are none
     grazing, hangs : neither met nor missed for sure; met, but only just
-    vague : the rates may have hidden something
+    vague : the rates may have hidden something, or two surfaces are met within what is not known of when they are
     tried : steps
     reach : the largest magnitude of each state on the way
     """

@@ -37,7 +37,7 @@ from kernels.integrate.taylor import (
 )
 from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.symbols import fold, left_a_call, symbolic
-from kernels.lanes.tuples import all_of, any_of, reached, times
+from kernels.lanes.tuples import all_of, any_of, reached, times, total
 from kernels.lanes.vectors import any_lane, choose, fma, horner, magnitude, not_, where
 from kernels.maths.intervals import most
 
@@ -224,7 +224,10 @@ def first_root(found, number, way, curve, event, facts, extent, passed, met, spa
 
 @symbolic
 def ended(m, pieces, facts, passed, met, span, tolerance, state, mode):
-    """The end of a leg in its last step, by which event, whether only just; what fires, and others too; the states."""
+    """The end of a leg in its last step, by which event, whether only just; what fires, and others too; the states.
+
+    And whether which of two surfaces comes first, or whether they are met at once, is not sure.
+    """
     numbers, extents = tuple(map(float, range(len(passed)))), tuple(extent for extent, _ in m.scene.made(state, mode))
     end, which, hangs = fold(
         first_root, (span, -1.0 - 0.0 * span, met & not_(met)), (met, span, tolerance),
@@ -232,22 +235,22 @@ def ended(m, pieces, facts, passed, met, span, tolerance, state, mode):
     )  # fmt: skip
     own = tuple(met & (which > j - 0.5) & (which < j + 0.5) for j in numbers)
     near = fma(SAME, tolerance, ROUNDING)
-    beside = tuple(
-        met
-        & before
-        & (
-            magnitude(fma(factor, way.at(end, curve)[0], offset))
-            <= near * (magnitude(offset) + magnitude(factor * u[0]))
-        )
-        for before, way, curve, (offset, factor, u) in zip(
-            passed, m.watched, pieces.of_events, pieces.events, strict=True
-        )
+    gaps = tuple(
+        (magnitude(fma(factor, way.at(end, curve)[0], offset)), magnitude(offset) + magnitude(factor * u[0]))
+        for way, curve, (offset, factor, u) in zip(m.watched, pieces.of_events, pieces.events, strict=True)
     )
+    beside = tuple(met & before & (gap <= near * size) for before, (gap, size) in zip(passed, gaps, strict=True))
     fires = tuple(x | y for x, y in zip(beside, own, strict=True))
     others = any_of(tuple(x & not_(y) for x, y in zip(beside, own, strict=True)))
     at_root = tuple(way.at(end, curve)[0] for way, curve in zip(m.ways, pieces.of_states, strict=True))
     fired, ends = tuple(where(x, 1.0, 0.0) for x in fires), m.on_kink(choose(met, at_root, state), fires)
-    return end, which, hangs, fired, others, ends
+    unsure = met & not_(met)
+    if m.scene.surfaces is not None:
+        marks = tuple(where(x & (s > 0.5), 1.0, 0.0) for x, s in zip(fires, (1.0, *m.scene.surfaces), strict=True))
+        parts = zip(marks, own, gaps, strict=True)
+        unsure = any_of(tuple((x > 0.5) & not_(y) & (gap > ROUNDING * size) for x, y, (gap, size) in parts))
+        unsure = unsure & (total(marks) > 1.5)
+    return end, which, hangs, fired, others, ends, unsure
 
 
 @symbolic
@@ -372,11 +375,11 @@ def to_event(m, cell, mode, active):
             break
     lost = moving | steep
     met = active & not_(lost | stuck | broken | grazing)
-    end, which, hangs, fired, others, ends = ended(m, pieces, facts, passed, met, span, tolerance, state, mode)
+    end, which, hangs, fired, others, ends, unsure = ended(m, pieces, facts, passed, met, span, tolerance, state, mode)
     t = where(met, t + end, t)
     h = where(met & (t > 0.0) & (h > LONGEST * t), LONGEST * t, h)
     late = carried.at_event(
         m, error, errors, changes, full, state, mode, unit, ends, end, t, which, others, pieces, cores, coarse
     )
     reach = choose(met, reached(reach, ends), reach)
-    return Leg(ends, t, h, fired, stuck, lost, broken, grazing, hangs, nothing, tried, reach), late
+    return Leg(ends, t, h, fired, stuck, lost, broken, grazing, hangs, unsure, tried, reach), late
