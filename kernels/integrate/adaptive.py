@@ -23,6 +23,8 @@ from kernels.lanes.vectors import any_lane, choose, fma, magnitude, not_, where
 STEP_LIMIT = 10_000
 SAFETY = 0.25
 """Of the tolerance, for which the next step is chosen."""
+FURTHEST = 1e301
+"""Units of time, a step of which comes to no event any more: at an equilibrium every step is right."""
 SHRINK, GROW = 0.2, 5.0
 """Least and most of the step before that the next one is."""
 FORGOTTEN = 1e-4
@@ -156,7 +158,7 @@ def to_event(pair, cell, mode, active):
         cuts = where(again & not_(rough | loose), cuts + 1.0, once_more)
         # moved on, unless it comes to nothing
         stuck, grazing, blown = stuck | (pressed & not_(away)), grazing | close, blown | (moving & not_(sound))
-        lost, broken = lost | (moving & (cuts > CUTS)), broken | (moving & not_(h > 1e-280))
+        lost, broken = lost | (moving & not_((cuts <= CUTS) & (h < FURTHEST))), broken | (moving & not_(h > 1e-280))
         given_up = stuck | grazing | broken | lost
         moved = moving & not_(again | given_up)
         done = moved & (which > -0.5)

@@ -56,6 +56,7 @@ def test_the_series_gives_up_where_stability_limits_its_steps_and_auto_goes_on()
     eps = [1e-1, 1e-6, 1e-9]
     _, status = solve(LAG, "taylor", mu=1.0, a=0.5, b=0.0, eps=eps, flips=1.0)
     assert status.tolist() == [Status.OK, Status.STEP_LIMIT, Status.STEP_LIMIT]
+    assert solve(LAG, "rodas5p", [0.0], a=0.5, b=0.0, eps=1e-6, flips=1.0)[1] == Status.STEP_LIMIT  # at rest for ever
     fixed = {"mu": 1.0, "a": 0.5, "b": 0.0, "flips": 1}
     study = sweep.study(kernel="lag_scene:KERNEL", axes={"eps": eps}, fixed=fixed, allow_import=True)
     found = sweep.run(study, progress=False)
