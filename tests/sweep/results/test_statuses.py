@@ -14,7 +14,7 @@ from sweep.results.statuses import account
 from sweep.study.read import to_toml
 
 
-@pytest.mark.parametrize("number", [60, 200])
+@pytest.mark.parametrize("number", [60, int(Status.NOT_ASKED), 200])
 def test_a_status_that_is_none_is_failed_with_the_exit_status_of_that(number, tmp_path, monkeypatch, capsys):
     """And those that a kernel may give are kept, and of them none is called FAILED."""
     monkeypatch.chdir(tmp_path)

@@ -246,3 +246,4 @@ def test_points_and_laws_are_drawn_the_chosen_first():
         np.testing.assert_allclose(line.get_xydata(), np.column_stack([X, Y * off]), rtol=1e-15)
     assert "twice the scatter about law1" in words(above.figure)
     assert (above.get_title(), len(below.lines)) == ("one law by 10", 4)  # and the zero
+    assert 0.125 < below.get_ylim()[1] < 1.0  # how far the chosen law is off is seen

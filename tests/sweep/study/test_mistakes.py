@@ -102,7 +102,7 @@ BEADS = {"kernel": "beads:KERNEL", "axes": {"g": [1.0]}}
         ({**BEADS, "fixed": {"mass": MASS}, "method": "quick"}, "method", "quick does not give share"),
         ({**BEADS, "axes": {"mass": [MASS, MASS]}}, "axes.mass", 'design = "zip"'),
         ({**ROWS, "axes": {"mass": [MASS, MASS[:2]]}}, "axes.mass", "equal length"),
-        ({**ROWS, "axes": {"mass": [1.0, 2.0]}}, "axes.mass", "list of lists"),
+        ({**ROWS, "axes": {"mass": [[1.0], 2.0]}}, "axes.mass", "list of lists"),
         ({**ROWS, "axes": {"mass": {**SPACED, "num": 3}}}, "axes.mass.spacing", ""),
         ({**ROWS, "axes": {"mass": np.ones((0, 2))}}, "axes.mass", ""),
         ({**ROWS, "design": {"kind": "sobol", "n": 4}, "fixed": {"mass": [1.0]}, "axes": {"place": SPACED}},
