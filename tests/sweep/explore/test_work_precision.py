@@ -67,6 +67,8 @@ def test_errors_are_those_against_the_truth():
     assert shares(cell) == {"ok": 0.5, "inaccurate": 0.5}
     assert float(at(found, "exact").error_worst) == found.attrs["reference_error"] == 1e-14
     assert (found.seconds > 0).all()
+    unsure = chart(stones(saying(Status.INACCURATE), EXACT, heights=[10.0], speeds=[0.0]), reference="exact")
+    assert at(unsure, "it").worst_cell.item() == ""
 
 
 def test_a_number_below_the_normal_ones_that_has_few_digits_is_not_silently_wrong():

@@ -67,13 +67,13 @@ def test_of_a_run_that_is_killed_no_process_is_left(begun):
 
 def test_a_machine_that_sleeps_costs_no_cell(begun):
     """All processes of the run are stopped for longer than a cell may take, some of them inside cells."""
-    process, output = begun("bad:SLOW", 200, "--cell-timeout", "5 s")
+    process, output = begun("bad:SLOW", 100, "--cell-timeout", "3 s")
     wait_for(lambda: solved(output) >= 20, process)
     os.killpg(process.pid, signal.SIGSTOP)
-    time.sleep(8.0)
+    time.sleep(5.0)
     os.killpg(process.pid, signal.SIGCONT)
     process.communicate(timeout=120)
-    assert (process.returncode, solved(output)) == (0, 200)
+    assert (process.returncode, solved(output)) == (0, 100)
 
 
 # the time that is up
