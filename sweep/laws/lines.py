@@ -121,8 +121,9 @@ def fit_line(
     size = np.sqrt((share * off * off).sum(axis=1) / max(n - 2, 1)) if sigma is None else np.sqrt(n / sums)
     error, unknown = size / np.sqrt(spread), ("exponent_low", "exponent_high", "limit_low", "limit_high")
     fit: dict[str, Any] = {"exponent": slope, "exponent_error": error, "level": level, "level_error": size / n**0.5}
-    fit |= {name: np.full(len(z), np.nan) for name in unknown}
+    fit |= {name: np.full(len(z), np.nan) for name in unknown} | {"drift": drift, "centre": np.exp(centre)}
     fit |= {"kind": np.full(len(z), "weighted", "U10"), "fits": np.ones(len(z)), "noisy": np.ones(len(z))}
+    fit |= {"low": np.exp(t[0]), "high": np.exp(t[-1]), "start": np.exp(z[:, 0]), "stop": np.exp(z[:, -1])}
     if sigma is not None:
         reach = ndtri((1 + confidence) / 2) * error
         chance = gammaincc(max(n - 2, 1) / 2, (weight * off**2).sum(axis=1) / 2)
@@ -142,9 +143,7 @@ def fit_line(
     prefactor = np.exp(level - slope * centre)
     fit |= {"prefactor_error": prefactor * np.hypot(fit["level_error"], centre * fit["exponent_error"])}
     residual = np.expm1(np.minimum(abs(z - level[:, None] - slope[:, None] * u).max(axis=1), 700))
-    fit |= {"drift": drift, "residual": residual, "prefactor": prefactor, "level": np.exp(level)}
-    fit |= {"low": np.exp(t[0]), "high": np.exp(t[-1]), "start": np.exp(z[:, 0]), "stop": np.exp(z[:, -1])}
-    fit |= {"centre": np.exp(centre)}
+    fit |= {"residual": residual, "prefactor": prefactor, "level": np.exp(level)}
     return fit | {"verdict": np.where(fit["fits"] == 1, "one power law", "no power law")}
 
 

@@ -24,8 +24,6 @@ if TYPE_CHECKING:
 MOST_ROWS = 40
 POINTS = 12
 """Local exponents of a line that are printed."""
-RULED_OUT = 10.0
-"""AICc or BIC above the least, from which on a law is ruled out."""
 REST = "Points, drift, residual, prefactor, and what the columns mean: --all; other laws: --compare."
 EXPLANATION = (
     "If the values scatter, the interval contains the exponent with {confidence:g} % confidence, and is never "
@@ -252,9 +250,11 @@ def comparison(dataset: xr.Dataset, y: str | None, x: str, windows: Sequence[Seq
 
 def comparison_text(found: xr.Dataset, complete: bool = False) -> str:
     """Which laws are ruled out, and the verdict; by wish all columns and what they mean."""
+    from sweep.laws.noise import BEYOND_DOUBT
+
     rows = []
     for one in found.drop_dims("point").to_dataframe().reset_index().to_dict("records"):
-        told = "ruled out" if one["worse"] > RULED_OUT else str(one["exponents"])
+        told = "ruled out" if one["worse"] > BEYOND_DOUBT else str(one["exponents"])
         more = (f"{one['bic'] - float(found.bic.min()):.4g}", str(one["numbers"])) if complete else ()
         rows.append((one["law"], f"{one['worse']:.4g}", *more, f"{one['residual']:.1e}", told))
     heading = ("law", "worse by", *(("BIC", "numbers") if complete else ()), "residual")
