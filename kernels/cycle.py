@@ -92,7 +92,7 @@ def cycle_kernel(
         swept = {k: f"period_by_{f.name}" for k, f in enumerate(parameters) if f"period_by_{f.name}" in asked}
         status, there = search.cycles.status, np.isin(search.cycles.status, FOUND)
         found, error = described(search, swept, ranks.astype(int) - 1, asked, rtol, tight)
-        error = np.where(status == Status.COMES_TO_REST, RESTS, np.where(there, error, 0.0))
+        error = np.where(status == Status.COMES_TO_REST, RESTS, np.where(there, error, math.inf))
         return [found.get(f.name) for f in outputs], error, status
 
     def check(*columns: Any) -> None:

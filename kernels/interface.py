@@ -160,7 +160,7 @@ class Method:
 
     `estimates`: the method knows only afterwards what its values are right to. It is called as
     `solve(*parameters, rtol, *along, asked, *outputs, error, status)`, fills `error` as a bound would, and leaves it to
-    the engine to call INACCURATE where that exceeds `rtol`.
+    the engine to call INACCURATE what is not GRAZING where that exceeds `rtol`; `auto` goes on after both.
 
     `excludes` are parameters it cannot do: `auto` gives it no cell where one is away from its default; by name it is
     not to be had for a study that sets one, away from its default or as an axis. `lacks` are outputs it does not give:

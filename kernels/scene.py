@@ -171,10 +171,25 @@ def scene_kernel(**parts: Unpack[SceneParts]) -> Kernel:
     SceneError
         Where the functions ask for what is not there, or do what cannot be recorded.
     """
-    scene = scene_of(parts)
-    fields, outputs = (*parts["parameters"], flips_field(40.0, MOST_FLIPS)), (*TIMES, *states_of(parts))
-    methods = _methods(scene, [f.name for f in fields], [f.name for f in outputs])
-    return declared(parts, fields, outputs, methods)
+    scene, fields = scene_of(parts), (*parts["parameters"], flips_field(40.0, MOST_FLIPS))
+    outputs = (*TIMES, *states_of(parts))
+    docs = {
+        "taylor": f"{SERIES}; the error propagated, or three runs compared",
+        "taylor_once": "the same in one run, each step accurate to rtol; total error unknown (bound inf)",
+        "rodas5p": f"for stiff equations: Rosenbrock's method Rodas5P, L-stable, {LOCATED}",
+        "dop853": f"Dormand-Prince 8(5,3) {LOCATED}",
+        "dopri5": f"Dormand-Prince 5(4) {LOCATED}",
+    }
+
+    followed = {name: solver(scene, name) for name in docs}
+    followed["taylor_once"] = functools.partial(once, runner(scene, "taylor"))
+
+    def solved(method: str, columns: Any, rtol: Any, *_: Any) -> Any:
+        results, status, *_ = followed[method](columns, rtol)
+        doubted = np.isin(status, (Status.INACCURATE, Status.GRAZING))
+        return results[: len(outputs)], np.where(doubted, math.inf, rtol), status
+
+    return estimating_kernel(parts, fields, outputs, (), docs, solved, blind=("taylor_once",))
 
 
 def declared(
@@ -234,37 +249,6 @@ def flips_field(default: float, most: float) -> Field:
     return Field("flips", "1", "switches to follow", default=default, lower=1.0, upper=float(most), integer=True)
 
 
-def _methods(scene: Scene, parameters: list[str], outputs: list[str]) -> tuple[Method, ...]:
-    """The methods to a tolerance."""
-    by_series, n = runner(scene, "taylor"), len(parameters)
-    docs = {
-        "taylor": f"{SERIES}; the error propagated, or three runs compared",
-        "taylor_once": "the same in one run, each step accurate to rtol; total error unknown (bound inf)",
-        "rodas5p": f"for stiff equations: Rosenbrock's method Rodas5P, L-stable, {LOCATED}",
-        "dop853": f"Dormand-Prince 8(5,3) {LOCATED}",
-        "dopri5": f"Dormand-Prince 5(4) {LOCATED}",
-    }
-
-    def no_bound(*columns: Any) -> None:
-        columns[-1][:] = math.inf
-
-    def method(name: str) -> Method:
-        single = name == "taylor_once"
-        how = functools.partial(once, by_series) if single else solver(scene, name)
-
-        def solve(*columns: Any) -> None:
-            if len(columns[0]):
-                with compiling(scene.name, name):
-                    results, columns[-1][:], *_ = how(columns[:n], columns[n])
-                for column, row in zip(columns[n + 1 : -1], results, strict=False):
-                    column[:] = row
-
-        bound = signed(no_bound, [*parameters, "rtol", "asked", "out"]) if single else None
-        return Method(name, docs[name], signed(solve, [*parameters, "rtol", *outputs, "status"]), bound)
-
-    return tuple(map(method, docs))
-
-
 def estimating_kernel(
     parts: SceneParts,
     parameters: Sequence[Field],
@@ -273,6 +257,7 @@ def estimating_kernel(
     docs: Mapping[str, str],
     solved: Function,
     check: OnColumns | None = None,
+    blind: Sequence[str] = (),
 ) -> Kernel:
     """A kernel of a scene by methods that know afterwards what their values are right to.
 
@@ -283,8 +268,12 @@ def estimating_kernel(
     solved : (method, columns of parameters, rtol, values along, names of outputs that are asked for) -> values of each
         output, (n_cells,) or (n_values, n_cells), or None where there are none; error; status
     check : as in `declared`
+    blind : methods whose values may be off by any amount
     """
     count, names = len(parameters), [f.name for f in outputs]
+
+    def no_bound(*columns: Any) -> None:
+        columns[-1][:] = math.inf
 
     def method(name: str) -> Method:
         def solve(*columns: Any) -> None:
@@ -303,8 +292,9 @@ def estimating_kernel(
             for column, row in zip(found, rows, strict=True):
                 column[:] = math.nan if row is None else np.where(status >= FIRST_REFUSAL, math.nan, row).T
 
-        columns = [*(f.name for f in parameters), "rtol", *(f.name for f in along), "asked", *names, "error", "status"]
-        return Method(name, docs[name], signed(solve, columns), estimates=True)
+        given = [*(f.name for f in parameters), "rtol", *(f.name for f in along), "asked"]
+        bound = signed(no_bound, [*given, "out"]) if name in blind else None
+        return Method(name, docs[name], signed(solve, [*given, *names, "error", "status"]), bound, estimates=True)
 
     return declared(parts, parameters, outputs, map(method, docs), along, check)
 

@@ -27,7 +27,8 @@ from family import FAMILIES, judged
 
 from kernels.interface import FIRST_REFUSAL, Status
 
-GIVEN_UP = (Status.NOT_CONVERGED, Status.STEP_LIMIT, Status.NO_METHOD, Status.INACCURATE)
+DOUBTED = (Status.INACCURATE, Status.GRAZING)
+GIVEN_UP = (Status.NOT_CONVERGED, Status.STEP_LIMIT, Status.NO_METHOD, *DOUBTED)
 """After which `auto` goes on, as in `sweep.cells.solve`."""
 
 
@@ -37,7 +38,7 @@ def by_auto(found):
     outputs, status = ({k: v.copy() for k, v in found[names[0]][0].items()}, found[names[0]][1].copy())
     for name in names[1:]:
         takes = np.isin(status, GIVEN_UP)
-        better = takes & ((status != Status.INACCURATE) | (found[name][1] < Status.INACCURATE))
+        better = takes & (~np.isin(status, DOUBTED) | (found[name][1] < Status.INACCURATE))
         for key in outputs:
             outputs[key][better] = found[name][0][key][better]
         status[better] = found[name][1][better]

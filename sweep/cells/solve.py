@@ -1,11 +1,11 @@
 """Solves runs of cells: checks them, chooses their methods, and says what became of each.
 
 A cell that the study's condition leaves out, or that `check` refuses, is never solved. With a method given, the cell
-is solved by it and remarked INACCURATE, whatever else is special about it, where the method's bound or estimate
-exceeds rtol. With `auto` it goes to the first method, cheapest first, that can do its terms and whose bound meets rtol,
-and on to the next where that one gives up or says INACCURATE. Where none meets rtol, the values of the smallest bound
-are given, INACCURATE. A later method replaces only what it betters. Where a kernel of somebody's own says OK without a
-number, or a status that a kernel has not got, the cell FAILED.
+is solved by it and remarked INACCURATE, whatever else is special about it but GRAZING, where the method's bound or
+estimate exceeds rtol. With `auto` it goes to the first method, cheapest first, that can do its terms and whose bound
+meets rtol, and on to the next where that one gives up or says INACCURATE, or GRAZING with an error above rtol. Where
+none meets rtol, the values of the smallest bound are given, INACCURATE. A later method replaces only what it betters.
+Where a kernel of somebody's own says OK without a number, or a status that a kernel has not got, the cell FAILED.
 """
 
 from __future__ import annotations
@@ -41,6 +41,8 @@ def _these(*statuses: Status) -> bytes:
 
 GIVEN_UP = _these(*UNSOLVED, Status.NO_CYCLE, Status.INACCURATE, Status.UNSTABLE, Status.FAILED)
 """After these `auto` tries the next method."""
+DOUBTED = _these(Status.INACCURATE, Status.GRAZING)
+"""What another method may know better, as far as the error exceeds rtol."""
 NO_STATUS = bytes(code not in map(int, Status) or code >= Status.NOT_ASKED for code in range(256))
 """What a kernel must not say."""
 NO_METHOD, INACCURATE = np.int8(Status.NO_METHOD), np.int8(Status.INACCURATE)
@@ -223,7 +225,7 @@ class Solver:
             with np.errstate(over="ignore", invalid="ignore"):
                 np.multiply(self._error[:n], ROUNDED_UP, out=error, casting="unsafe")
             # what meets rtol meets it in single precision, too
-            meets = self.status != INACCURATE
+            meets = ~among(self.status, DOUBTED) | (self._error[:n] <= wanted_rtol)
             np.minimum(error, np.float32(wanted_rtol), out=error, where=True if meets.all() else meets)
             if np.count_nonzero(refused):
                 error[refused] = np.nan
@@ -250,7 +252,9 @@ class Solver:
                     able, bound = able[meets], bound[meets]
             if len(able):
                 self._better(turn.number, able, bound)
-                cells = _where(cells, among(self.status[_rows(cells)], GIVEN_UP))
+                rows = _rows(cells)
+                doubted = among(self.status[rows], DOUBTED) & (self._error[rows] > self.inputs[-1][rows])
+                cells = _where(cells, doubted | among(self.status[rows], GIVEN_UP))
         if not (missed and len(cells)):
             return
         bounds = np.full((len(missed), len(self.status)), np.inf)
@@ -261,7 +265,8 @@ class Solver:
             for k in np.unique(turns_of_cells):
                 status = self.status[cells]
                 known = np.where(status < FIRST_REFUSAL, 0.0, np.inf)
-                known[status == INACCURATE] = self._error[cells[status == INACCURATE]]
+                doubted = among(status, DOUBTED)
+                known[doubted] = self._error[cells[doubted]]
                 hits = (turns_of_cells == k) & (bounds[k] < known)
                 if hits.any():
                     self._better(missed[k][0], cells[hits], bounds[k, hits])
@@ -282,8 +287,8 @@ class Solver:
         status, error, (*_, old_error, old) = self.status[rows], self._error[rows], kept
         vaguer = among(status, VAGUE) & ~among(old, VAGUE)
         lost = (status >= FIRST_REFUSAL) & ((old < FIRST_REFUSAL) | vaguer)
-        looser = (status == Status.UNSTABLE) | ((status == INACCURATE) & ~(error < old_error))
-        worse = lost | ((old == INACCURATE) & looser)
+        looser = (status == Status.UNSTABLE) | (among(status, DOUBTED) & ~(error < old_error))
+        worse = lost | (among(old, DOUBTED) & looser)
         for column, values in zip(columns, kept, strict=True):
             column[cells[worse]] = values[worse]
         open_ = tried & among(old, UNKNOWN) & (self.status[rows] == Status.NO_CYCLE)
@@ -331,7 +336,7 @@ class Solver:
         self._error[rows] = known
         if known is not inputs[-1] and np.count_nonzero(meets := known <= inputs[-1]) < len(cells):
             self._error[rows] = np.where(np.isnan(known), np.inf, known)
-            status[~meets & (status < FIRST_REFUSAL)] = INACCURATE
+            status[~meets & (status < FIRST_REFUSAL) & (status != Status.GRAZING)] = INACCURATE
         if aside:
             for k in self._wanted:
                 self.targets[k][cells] = results[k]

@@ -47,7 +47,7 @@ def estimated(kernel: Kernel, method: str, *parameters, rtol=1e-9, along=(), ask
     tolerances = np.ascontiguousarray(np.broadcast_to(np.asarray(rtol, float), (len(columns[0]),)))
     outputs, status, error = called(kernel, method, columns, tolerances, along, asked)
     if kernel.method(method).estimates:
-        status[~(error <= tolerances) & (status < FIRST_REFUSAL)] = Status.INACCURATE
+        status[~(error <= tolerances) & (status < FIRST_REFUSAL) & (status != Status.GRAZING)] = Status.INACCURATE
     return outputs, status, error
 
 

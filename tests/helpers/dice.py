@@ -16,8 +16,9 @@ before_check = None
 """Called with the x of the cells before they are checked, where it is not None: to count, to stop, to fail."""
 
 SAID = (
-    *(Status.OK,) * 5, Status.INACCURATE, *(Status.NO_METHOD, Status.NO_CYCLE) * 2, Status.NOT_CONVERGED,
-    Status.STEP_LIMIT, Status.UNSTABLE, Status.PERIOD_2, Status.STICKS, Status.OUT_OF_RANGE, Status.PENDING, -3,
+    *(Status.OK,) * 5, Status.INACCURATE, Status.GRAZING, *(Status.NO_METHOD, Status.NO_CYCLE) * 2,
+    Status.NOT_CONVERGED, Status.STEP_LIMIT, Status.UNSTABLE, Status.PERIOD_2, Status.STICKS, Status.OUT_OF_RANGE,
+    Status.PENDING, -3,
 )  # fmt: skip
 PROMISED = (1e-13, 1e-9, 1e-9, 1e-6, 1e-6, 3e-5, 3e-5, 1e-3, 1e-3, 0.1, np.inf, np.nan)
 NUMBERS = (np.nan, np.inf, -0.0, 1e16, -1e16, *np.linspace(-3.0, 9.0, 37))

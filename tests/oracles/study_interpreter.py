@@ -13,6 +13,7 @@ from columns import bounds, called, checked, columns_of, unwritten
 from kernels.interface import Status
 
 GIVES_UP = {"NO_METHOD", "NO_CYCLE", "NOT_CONVERGED", "STEP_LIMIT", "INACCURATE", "UNSTABLE", "FAILED"}
+DOUBTED = Status.INACCURATE, Status.GRAZING
 
 
 def interpreted(kernel, keys):
@@ -89,7 +90,8 @@ class Cell:
         error = told if method.estimates else inf if status == Status.INACCURATE else 0.0
         bound = 0.0 if method.estimates and not method.bound else self.bound(method)
         error = inf if isnan(error) else max(error, bound)
-        return number, Status.INACCURATE if status < 64 and error > self.rtol else status, error, outputs
+        kept = status >= 64 or status == Status.GRAZING or error <= self.rtol
+        return number, status if kept else Status.INACCURATE, error, outputs
 
     def auto(self):
         """The first method that can do the cell, promises rtol and does not give up; else the best of what there is."""
@@ -101,10 +103,11 @@ class Cell:
                 early = method.sooner is not None and method.sooner(*self.columns, self.rtol)[0]
                 turns.append((max(self.bound(method), self.rtol[0]), number - 1.5 if early else number, number))
         for bound, _, number in sorted(turns):
-            least = inf if best[1] >= 64 else best[2] if best[1] == Status.INACCURATE else 0.0
+            least = inf if best[1] >= 64 else best[2] if best[1] in DOUBTED else 0.0
             if bound <= self.rtol or bound < least:
                 best = better(best, self.ran(number))
-            if bound <= self.rtol and best[1].name not in GIVES_UP:
+            grazes = best[1] == Status.GRAZING and best[2] > self.rtol
+            if bound <= self.rtol and not (grazes or best[1].name in GIVES_UP):
                 return best
         return best
 
@@ -118,8 +121,8 @@ def better(old, new):
     """Which of two is handed out: values before refusals, the smaller error, the refusal that tells more, the later."""
     tried, (_, was, error, _), (_, is_, less, _) = old[0] >= 0, old, new
     if was < 64:
-        looser = is_ == Status.UNSTABLE or (is_ == Status.INACCURATE and not less < error)
-        return old if is_ >= 64 or (was == Status.INACCURATE and looser) else new
+        looser = is_ == Status.UNSTABLE or (is_ in DOUBTED and not less < error)
+        return old if is_ >= 64 or (was in DOUBTED and looser) else new
     vague = Status.NO_METHOD, Status.NO_CYCLE
     if tried and is_ == Status.NO_CYCLE and was in (Status.NO_METHOD, Status.NOT_CONVERGED, Status.STEP_LIMIT):
         return old
