@@ -66,14 +66,14 @@ def half_swing(torque, scene, start):
 
 
 @jit_apart
-def passed_on(scene, start, legs):
-    """dE_1/dE_0 of a half swing that began with the speed `start`; dT by abs(start), the size of its terms; the noise.
+def passed_on(scene, start, speed, legs):
+    """dE_1/dE_0 of a half swing from the speed `start` to `speed`; dT by abs(start), the size of its terms; the noise.
 
     By (3), and for e > 0 by (2), with d for a change by that of the speed:
         dA = S1,  dt1 = S1'/back,  dg2 = kappa dA,  dt2 = (dA - C2 dg2)/v.
     The noise is what rounding adds to E_1 and to the time.
     """
-    rises, back, speed, push = scene.e > 0.0, legs.back, legs.speed, scene.kappa * legs.s1
+    rises, back, push = scene.e > 0.0, legs.back, scene.kappa * legs.s1
     kept = exp(-scene.d * legs.time) * where(rises, legs.g2 / back, 1.0)
     longer = where(rises, legs.slope1 / back + (legs.s1 - legs.c2 * push) / speed, -legs.s2 / speed)
     of_push = scene.kappa * magnitude(legs.s1)
@@ -143,8 +143,9 @@ def segments(scene, rtol):
     zero = 0.0 * d
     energy, active = in_bracket(_gain, zero, zero, zero + 1e308, zero < 1.0, scene, NEWTON_LIMIT, -1.0)
     _, noise, balanced, legs = _turn(scene, energy)
-    lost, speed, end, time = _lost(scene, legs), legs.speed, legs.end, legs.time
-    start = magnitude(scene.e) * sqrt(2.0 * energy)
+    lost, end, time = _lost(scene, legs), legs.end, legs.time
+    speed = sqrt(2.0 * energy)  # that of the half swing has lost digits where most of the energy is the hairspring's
+    start = magnitude(scene.e) * speed
 
     # (6) and (7): what the torque changes of both legs and of their losses, and so of E_1
     dtop, dt1 = where(rises, -legs.c1, 0.0), where(rises, -legs.s1 / legs.back, 0.0)
@@ -160,8 +161,8 @@ def segments(scene, rtol):
     gain, of_gain = where(balanced, work, speed * dspeed), where(balanced, of_work, speed * of_speed)
 
     # (8); and dlnT/dlnE
-    area, by_start, of_start, _, _ = passed_on(scene, start, legs)
-    by_gain = magnitude(scene.e) / sqrt(2.0 * energy) / lost
+    area, by_start, of_start, _, _ = passed_on(scene, start, speed, legs)
+    by_gain = magnitude(scene.e) / speed / lost
     chain, longer = by_start * (by_gain * gain), dt1 + dt2
     of_chain = magnitude(by_start) * (by_gain * of_gain) + of_start * (by_gain * magnitude(gain))
     s, terms = -(longer + chain) / time, (magnitude(longer) + magnitude(chain)) / time
@@ -183,5 +184,5 @@ def segments(scene, rtol):
     passes = (scene.e < 0.0) | (1.0 + kappa * legs.top > scene.rho_s)  # nothing rests where e < 0
     verdict = where(legs.comes & (energy > 0.0) & passes, verdict, STICKS)
     verdict = where(d < _STIFFEST, verdict, NO_METHOD)
-    cycle = Cycle(time, legs.top, sqrt(2.0 * energy), s, scene.e * scene.e * area)
+    cycle = Cycle(time, legs.top, speed, s, scene.e * scene.e * area)
     return cycle, errors(loose_cycle, loose_s, loose_m), legs, verdict

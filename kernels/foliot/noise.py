@@ -155,7 +155,7 @@ def segments(first, columns, radii, turns, radii_apart, turns_apart):
 
     # error of the rate as a fraction: of each half swing, and of all that they pass on
     start = e * cycle.speed
-    kept, longer, _, energy, late = _linear_swing.passed_on(scene, start, legs)
+    kept, longer, _, energy, late = _linear_swing.passed_on(scene, start, legs.speed, legs)
     passed_on = energy / (cycle.speed * cycle.speed * (1.0 - e * e * kept))
     accurate = (late + magnitude(longer * start) * passed_on) / cycle.half_period <= columns.rtol[i]
 

@@ -86,7 +86,7 @@ def _next(scene, flip):
     legs = _linear_swing.half_swing(1.0, scene, start)
     held, unsure = _held(scene, legs.top)
     turns = not_(start < 0.0)
-    kept, longer, _, energy_noise, time_noise = _linear_swing.passed_on(scene, start, legs)
+    kept, longer, _, energy_noise, time_noise = _linear_swing.passed_on(scene, start, legs.speed, legs)
     wrong = fma(kept * start * start, flip.wrong, energy_noise) / (legs.speed * legs.speed)
     late = flip.late + magnitude(longer * start) * flip.wrong + time_noise
     energy = start * start * (flip.wrong + ROUNDING)

@@ -153,6 +153,14 @@ def test_errors_told_of_each_output_hold_next_to_the_threshold_of_a_spring():
         assert (error <= told[found]).all(), name
 
 
+@pytest.mark.parametrize("R", [0.0, 0.3])
+def test_the_sensitivity_to_the_torque_beside_a_strong_hairspring_is_as_right_as_is_said(R):
+    k = np.geomspace(1e2, 1e5, 24 if COMPILED else 4)
+    cells = {"mu": np.ones(k.size), "phi0": np.ones(k.size), "R": np.full(k.size, R), "k": k, "e": np.full(k.size, 0.7)}
+    outputs, _, told = estimated(FOLIOT, "segments", **cells)
+    assert (relative_error(outputs["sensitivity"], [t[3] for t in truths(cells)]) <= told).all()
+
+
 def test_the_multiplier_of_viscous_and_coulomb_friction_is_as_right_as_is_promised():
     n = 64 if COMPILED else 10
     random = np.random.default_rng(3)
