@@ -5,7 +5,7 @@
 A scene may have several surfaces, each with its own jump; what is 0 at one of them is located as a kink is (`record`).
 The functions are plain Python of named scalars; each asks by name for the states, parameters and `side` that it needs,
 and for the time `t`, which is 0 at the start, or `start_time`, unless a state or a parameter is called t.
-They are called once, with objects that record what is done to them (`expression.graph`); of that compiled functions
+They are called with objects that record what is done to them (`expression.graph`); of that compiled functions
 are made, for one cell and for lanes (`functions`). In them are allowed + - * / ** abs, and sqrt, exp, log, sin, cos,
 tan, arcsin, arccos, arctan, sinh, cosh, tanh, hypot, power, sign, floor, mod, maximum, minimum and where of this
 module; numpy's of these names are the same, and so are math's in the module that the function is written in.
