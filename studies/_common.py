@@ -192,8 +192,9 @@ def solved_by(kernel: Any, method: str, rtol: float, **given: Any) -> tuple[Any,
     """The first output of cells by the kernel's own function, without the engine, and their statuses."""
     shape = np.broadcast_shapes(*map(np.shape, given.values()))
     columns = [np.broadcast_to(given.get(p.name, p.default), shape).astype(float) for p in kernel.parameters]
-    outputs, status = [np.empty(shape) for _ in kernel.outputs], np.empty(shape, np.int8)
-    kernel.method(method).solve(*columns, np.full(shape, rtol), *outputs, status)
+    by, outputs, status = kernel.method(method), [np.empty(shape) for _ in kernel.outputs], np.empty(shape, np.int8)
+    asked, error = ([np.ones(len(outputs), np.uint8)], [np.empty(shape)]) if by.estimates else ([], [])
+    by.solve(*columns, np.full(shape, rtol), *asked, *outputs, *error, status)
     return outputs[0], status
 
 

@@ -39,9 +39,7 @@ def wear(ds: xr.Dataset, motion: xr.Dataset, w: float, k: float | None, radius):
     nodes, weights = np.polynomial.legendre.leggauss(8)
     turned, around = half[angle, ring][:, None] * nodes, ((turn - work)[angle] * radius[ring])[:, None]
     along, across = (part[angle][:, None] for part in (ahead.real, ahead.imag))
-    speed[angle, ring] = (
-        np.sqrt((along + around * np.cos(turned)) ** 2 + (across + around * np.sin(turned)) ** 2) @ weights
-    )
+    speed[angle, ring] = np.hypot(along + around * np.cos(turned), across + around * np.sin(turned)) @ weights
     return float(ds.preston * ds.pressure) * (speed * half).mean(0) / (2 * np.pi)
 
 
