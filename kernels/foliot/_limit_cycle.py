@@ -129,9 +129,9 @@ def begun(manner, cells, rtol):
 
 
 def _spring(s, v):
-    """How many times more an error of a step counts in F than in the speed there, as the hairspring makes it faster.
+    """How many times larger an error of F is than that of a step, where most of the energy is the hairspring's.
 
-    What F^2 is off by is what kappa is times the tolerance, less what friction forgets:
+    An error of x changes F^2 by kappa times as much, of which friction leaves its share:
         max(1, kappa/v1^2 exp(-2 f'(V)/V)).                                                          (5)
     """
     return np.fmax(1.0, s.kappa / v**2 * np.exp(-2.0 * s.stiff))
