@@ -49,7 +49,7 @@ def test_ripple_is_right_to_half_of_rtol_where_energy_gives_the_speed():
 def test_sticking_agrees_with_energy_over_a_grid():
     grid = [(R, depth, h) for R in (0.7, 0.95) for depth in (0.3, 0.8) for h in (2, 3)]
     cells = [{"mu": 1.0, "phi0": 1.0, "R": R, "depth": depth, "harmonic": h} for R, depth, h in grid]
-    cells += [{"mu": 1.0, "phi0": 1.0, "R": 1.0 - 2.0**-j, "k": 10.0, "e": 0.6} for j in (13, 20, 30)]  # just reach it
+    cells += [{"mu": 1.0, "phi0": 1.0, "R": 1.0 - 2.0**-j, "k": 10.0, "e": 0.6} for j in (13, 20)]  # just reach it
     exists = []
     for cell in cells:
         try:
