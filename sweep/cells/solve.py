@@ -45,7 +45,7 @@ DOUBTED = _these(Status.INACCURATE, Status.GRAZING)
 """What another method may know better, as far as the error exceeds rtol."""
 NO_STATUS = bytes(code not in map(int, Status) or code >= Status.NOT_ASKED for code in range(256))
 """What a kernel must not say."""
-NO_METHOD, INACCURATE = np.int8(Status.NO_METHOD), np.int8(Status.INACCURATE)
+NO_METHOD, INACCURATE, GRAZING = map(np.int8, (Status.NO_METHOD, Status.INACCURATE, Status.GRAZING))
 """Not as a `Status`, which numpy compares ten times as slowly."""
 VAGUE = _these(Status.NO_METHOD, Status.NO_CYCLE)
 """Refusals that tell less than how another method gave up."""
@@ -225,8 +225,9 @@ class Solver:
             with np.errstate(over="ignore", invalid="ignore"):
                 np.multiply(self._error[:n], ROUNDED_UP, out=error, casting="unsafe")
             # what meets rtol meets it in single precision, too
-            meets = ~among(self.status, DOUBTED) | (self._error[:n] <= wanted_rtol)
-            np.minimum(error, np.float32(wanted_rtol), out=error, where=True if meets.all() else meets)
+            doubted = among(self.status, DOUBTED)
+            meets = ~doubted | (self._error[:n] <= wanted_rtol) if doubted.any() else True
+            np.minimum(error, np.float32(wanted_rtol), out=error, where=meets)
             if np.count_nonzero(refused):
                 error[refused] = np.nan
 
@@ -253,8 +254,10 @@ class Solver:
             if len(able):
                 self._better(turn.number, able, bound)
                 rows = _rows(cells)
-                doubted = among(self.status[rows], DOUBTED) & (self._error[rows] > self.inputs[-1][rows])
-                cells = _where(cells, doubted | among(self.status[rows], GIVEN_UP))
+                on, grazing = among(self.status[rows], GIVEN_UP), self.status[rows] == GRAZING
+                if grazing.any():
+                    on = on | (grazing & (self._error[rows] > self.inputs[-1][rows]))
+                cells = _where(cells, on)
         if not (missed and len(cells)):
             return
         bounds = np.full((len(missed), len(self.status)), np.inf)
@@ -336,7 +339,7 @@ class Solver:
         self._error[rows] = known
         if known is not inputs[-1] and np.count_nonzero(meets := known <= inputs[-1]) < len(cells):
             self._error[rows] = np.where(np.isnan(known), np.inf, known)
-            status[~meets & (status < FIRST_REFUSAL) & (status != Status.GRAZING)] = INACCURATE
+            status[~meets & (status < FIRST_REFUSAL) & (status != GRAZING)] = INACCURATE
         if aside:
             for k in self._wanted:
                 self.targets[k][cells] = results[k]

@@ -103,9 +103,6 @@ def test_an_axis_that_has_no_logarithms_is_refused_with_the_reason(x, dim, messa
             fit(y, dim)
 
 
-UNITS = (0.5, "mrad/s^2"), (2.0, "mrad/s^2"), (1.5, "ms")
-
-
 def test_numbers_have_units_and_names_and_further_axes_keep_theirs():
     x = grid(-2, 2)
     y = curve(x, bend(x)) * xr.DataArray([1.0, 2.0], dims="R", coords={"R": ("R", [1.0, 2.0], {"units": "m"})})
@@ -126,16 +123,13 @@ def test_numbers_have_units_and_names_and_further_axes_keep_theirs():
     assert (local.attrs["units"], local.mu.attrs["units"], local.name) == ("1", "rad/s^2", "period_exponent")
     assert {place.abscissa.attrs["units"], place.abscissa_error.attrs["units"]} == {"rad/s^2"}
     # what is given in another unit is converted
-    half, two, second = (xr.DataArray(1000.0 * of, attrs={"units": u}) for of, u in UNITS)
+    half, two = (xr.DataArray(of, attrs={"units": "mrad/s^2"}) for of in (500.0, 2000.0))
+    second, passed = xr.DataArray(1500.0, attrs={"units": "ms"}), functools.partial(sweep.where_exponent, y, "mu")
     xr.testing.assert_identical(sweep.fit_two_laws(y, "mu", windows=((None, half), (two, None))), met)
-    passed, weighted = (
-        (lambda v: sweep.where_exponent(y, "mu", v, values=True)),
-        sweep.fit_exponent(y, "mu", sigma=second),
-    )
-    xr.testing.assert_identical(passed(second), passed(1.5))
-    xr.testing.assert_identical(weighted, sweep.fit_exponent(y, "mu", sigma=1.5))
+    xr.testing.assert_identical(passed(second, values=True), passed(1.5, values=True))
+    xr.testing.assert_identical(sweep.fit_exponent(y, "mu", sigma=second), sweep.fit_exponent(y, "mu", sigma=1.5))
     with pytest.raises(sweep.SweepError, match='window: "ms" is a time'):
-        sweep.where_exponent(y, "mu", -0.5, (second, None))
+        passed(-0.5, (second, None))
     assert (met.crossover.attrs["units"], met.level.attrs["units"]) == ("rad/s^2", "s")
 
 
