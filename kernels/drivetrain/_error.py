@@ -3,7 +3,7 @@
 receptance(w, model, scene)             of the spindle, by the model
 """
 
-from kernels.drivetrain._chain import GRID, MAKE, TURN, Model, off_by
+from kernels.drivetrain._chain import CHAIN_ROUNDING, GRID, MAKE, TURN, Model, off_by
 from kernels.drivetrain._rivin import receptance_of_chain
 from kernels.lanes.jit import jit_apart
 from kernels.lanes.vectors import fma, magnitude, sqrt
@@ -25,7 +25,7 @@ def reduce_enough(n_keep, tol, f_max, order, scene):
     """The model of n_keep masses.
 
     Where that is 0, its masses are those before the first number, from all of them downwards, with which a frequency of
-    the full chain up to f_max is off by more than tol, or missing.
+    the full chain up to f_max, which counts itself, rounded or not, is off by more than tol, or missing.
     """
     full, kept, n, fixed = scene.full, scene.kept, scene.full.J.size, n_keep > 0.0
     p = int(n_keep) if fixed else n
@@ -35,7 +35,7 @@ def reduce_enough(n_keep, tol, f_max, order, scene):
         if fixed:
             break
         for i in range(n):
-            if full.f[i] <= f_max:
+            if full.f[i] <= (1.0 + CHAIN_ROUNDING) * f_max:
                 worst = max(worst, magnitude(off_by(kept.f[i], full.f[i])) if i < p else float("inf"))
         holds = model.status == 0.0 and worst <= tol
         if holds and p > 1:

@@ -3,7 +3,8 @@
 A chain is J_1 -k_1- J_2 - ... - J_n -k_n- ground, dampers h_j beside the springs k_j = 1/e_j. A partial system is
     a: one mass and the springs on both sides of it,  w0^2 = (k_{j-1} + k_j)/J_j,
     b: one spring and the masses at its ends,         w0^2 = k_j (J_j + J_{j+1})/(J_j J_{j+1});      (25)-(27)
-the one of the largest w0 is replaced. With K_j = k_j + i w h_j both have an equivalent at one frequency:
+the one of the largest w0 is replaced, of equal ones (to 1e-12, so that rounding decides nothing) a before b, and the
+one next to the spindle. With K_j = k_j + i w h_j both have an equivalent at one frequency:
     a: J* = J_j K_{j-1}/S to the left, J** = J_j K_j/S to the right, K* = K_{j-1} K_j/S,
        S = K_{j-1} + K_j - w^2 J_j;
     b: J' = J_j + J_{j+1} - w^2 J_j J_{j+1}/K_j between K_left = K_j J'/J_{j+1} and K_right = K_j J'/J_j, in series with
@@ -40,8 +41,9 @@ from kernels.maths.small_dense import over
 
 TYPE_A, TYPE_B = 0.0, 1.0
 STRICT, PAPER = 0.0, 1.0
-PAPER_TIE = 1.01
-"""The source compares J e of two digits: within 1 % it takes type a (J3 before spring 2 of the Fu-la)."""
+TIE, PAPER_TIE = 1.0 + 1e-12, 1.01
+"""By how much J e differ that are not equal. The source compares two digits: within 1 % it takes type a (J3 before
+spring 2 of the Fu-la)."""
 STEP_LIMIT = 400
 """Counts for one frequency; 15 to 25 are usual."""
 _DIGITS = 2.0**-51  # relative width at which a frequency is found
@@ -138,11 +140,11 @@ def step(J, k, h, m, order, springs_too):
     """
     of_mass, mass, of_spring, spring = -1.0, 1, -1.0, 0
     for j in range(m):
-        if j > 0 and (k[j - 1] + k[j]) / J[j] > of_mass:
+        if j > 0 and (k[j - 1] + k[j]) / J[j] > TIE * of_mass:
             of_mass, mass = (k[j - 1] + k[j]) / J[j], j
-        if j < m - 1 and k[j] / J[j] + k[j] / J[j + 1] > of_spring:
+        if j < m - 1 and k[j] / J[j] + k[j] / J[j + 1] > TIE * of_spring:
             of_spring, spring = k[j] / J[j] + k[j] / J[j + 1], j
-    if springs_too and of_spring > (PAPER_TIE if order == PAPER else 1.0) * of_mass:
+    if springs_too and of_spring > (PAPER_TIE if order == PAPER else TIE) * of_mass:
         j, total = spring, J[spring] + J[spring + 1]
         to_left, to_right = total / J[j + 1], total / J[j]
         k_left, h_left, k_right, h_right = k[j] * to_left, h[j] * to_left, k[j] * to_right, h[j] * to_right

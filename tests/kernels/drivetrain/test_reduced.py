@@ -193,6 +193,18 @@ def test_the_fewest_masses_hold_the_tolerance_and_one_less_does_not(reduction, t
         assert kept == 4
 
 
+def test_a_band_that_ends_at_a_frequency_and_systems_that_tie_are_told_alike_in_any_units():
+    """In units of 0.1 and 0.3 the third frequency, and J e that are equal, are another number in their last digit."""
+    whole = {"J": np.array([1.0, 1.0, 2.0, 3.0, 2.0]), "k": np.array([2.0, 3.0, 2.0, 2.0, 3.0]), "h": np.zeros(5)}
+    scaled = {"J": 0.1 * whole["J"], "k": 0.3 * whole["k"], "h": np.zeros(5)}
+    one, other = (reduced("rivin", chain, n_keep=1)[0]["J_kept"][0, 0] for chain in (whole, scaled))
+    assert other == pytest.approx(0.1 * one, rel=1e-13)
+    with oracles.mp.workdps(50):
+        third = float(frequencies(scaled["J"], scaled["k"])[2])
+    for f_max in third * (1 + np.array([-3e-16, 0.0, 3e-16])):
+        assert reduced("modal", scaled, tol=1e-6, f_max=f_max)[0]["n_kept"][0] == 3
+
+
 @pytest.mark.parametrize("reduction", ["none", *REDUCING] if COMPILED else ["rivin", "irs", "craig_bampton"])
 def test_a_chain_with_free_ends_keeps_its_free_motion(reduction):
     chain = FULA | {"k": np.append(FULA["k"][:-1], 0.0)}
