@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import os
+import signal
 import sys
 from collections.abc import Sequence
 from typing import NoReturn
@@ -15,7 +16,7 @@ from typing import NoReturn
 from sweep.command import look, solve
 from sweep.command.options import command, option
 from sweep.command.reading import Outcome, explained, say
-from sweep.errors import COMPLETE, EXIT_CODES, MISTAKE, missing
+from sweep.errors import COMPLETE, EXIT_CODES, MISTAKE, missing, terminate
 from sweep.words import paragraph
 
 
@@ -29,6 +30,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     arguments, ended = parser().parse_args(argv), Outcome(COMPLETE, "")
     try:
+        if argv is None and arguments.command is solve.run:  # which ends in its own words from the first moment on
+            signal.signal(signal.SIGTERM, terminate)
         ended = arguments.command.run(arguments) or ended
         if sys.stdout is not None:  # closed by whoever has started us
             sys.stdout.flush()

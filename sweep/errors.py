@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NoReturn
 
 
 class SweepError(Exception):
@@ -37,6 +38,15 @@ def missing(what: str, extra: str) -> SweepError:
     """The fault that a library is not installed: what needs which, and the extra that brings it."""
     commands = f"in a checkout pip install -e '.[{extra}]', elsewhere pip install 'foliot[{extra}]'"
     return SweepError(f'{what}, of the extra "{extra}"; install it: {commands}')
+
+
+class Terminated(SystemExit):
+    """The system, or somebody, asked this process to end (SIGTERM); it does, with the usual exit status 143."""
+
+
+def terminate(*signal: object) -> NoReturn:
+    """What SIGTERM does where a run is to end in its own words."""
+    raise Terminated(TERMINATED)
 
 
 COMPLETE, FAULT, MISTAKE, INCOMPLETE, CELLS_FAILED, INTERRUPTED, TERMINATED = 0, 1, 2, 3, 4, 130, 143

@@ -105,7 +105,7 @@ def in_unit(value: Any, wanted: str, name: str) -> Any:
         value = getattr(value, "magnitude", value) * float(scale(unit, wanted, name) or 1)
     if np.iscomplexobj(value):
         raise TypeError(f"{name} is complex")
-    return value
+    return np.ma.array(value, np.float64).filled(np.nan) if np.ma.isMaskedArray(value) else value
 
 
 def exponents(text: str) -> dict[str, Fraction]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 import itertools
 import math
@@ -12,6 +13,7 @@ import shutil
 import textwrap
 from collections.abc import Iterable, Sequence
 from html import escape
+from numbers import Integral
 from pathlib import Path
 from typing import Any
 
@@ -169,6 +171,21 @@ def one_digit(seconds: float) -> str:
     count = max(seconds, SHORTEST) / size
     digit = 10.0 ** math.floor(math.log10(count))
     return f"{math.ceil(count / digit - 1e-9) * digit:g} {unit}"
+
+
+def number(what: str, value: Any) -> float:
+    """A number; raises SweepError for what is none."""
+    with contextlib.suppress(TypeError, ValueError):
+        if not isinstance(value, str):
+            return float(value)
+    raise SweepError(f"{what}: expected a number, found {value!r}")
+
+
+def whole_number(what: str, value: Any, least: int = 1) -> int:
+    """The number, if it is a whole one from the least on. Raises SweepError."""
+    if isinstance(value, bool) or not isinstance(value, Integral) or value < least:
+        raise SweepError(f"{what}: expected a whole number from {least} on, found {value!r}")
+    return int(value)
 
 
 def seconds_of(name: str, text: float | str) -> float:

@@ -19,7 +19,7 @@ from sweep.results.filter import cells_at
 from sweep.results.statuses import STATUS_NAMES, cell_text, cell_values, flag_words, require_as_read, statuses_of
 from sweep.study.model import SMALLEST_RTOL, Study, short
 from sweep.study.read import study as study_of
-from sweep.words import Table, page
+from sweep.words import Table, page, whole_number
 
 CLOSER = 100.0
 """A second opinion is asked for at rtol over this, or at the smallest rtol."""
@@ -107,10 +107,8 @@ class Checked:
     """
 
     def __init__(self, dataset: xr.Dataset, sample: int, seed: int, allow_import: bool) -> None:
-        if sample < 1:
-            raise SweepError(f"sample: expected 1 or more, found {sample}")
-        if seed < 0:
-            raise SweepError(f"seed: expected 0 or more, found {seed}")
+        whole_number("sample", sample)
+        whole_number("seed", seed, least=0)
         ok = np.flatnonzero(statuses_of(dataset).values == Status.OK)
         if not len(ok):
             raise SweepError("no cell is OK, so there is nothing to check")

@@ -39,7 +39,7 @@ from sweep.runs.loop import Task
 from sweep.runs.run import computed
 from sweep.study.model import Axis, Study, frozen
 from sweep.study.read import study as as_study
-from sweep.words import as_path, require_dataset
+from sweep.words import as_path, number, require_dataset, whole_number
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -167,6 +167,7 @@ def refine(
     study = study or as_study(dataset)
     names = [y] if isinstance(y, str) else list(y)
     _require(dataset, study, names, tolerance)
+    whole_number("most_cells", most_cells)
     rounds, numbers = _folder_of_rounds(path, dataset, force), itertools.count(1)
     options: dict[str, Any] = {"workers": workers, "isolate": isolate, "cell_timeout": cell_timeout}
 
@@ -196,7 +197,7 @@ def refine(
 def _require(dataset: xr.Dataset, study: Study, names: Sequence[str], tolerance: float) -> None:
     """Raises SweepError for what cannot be refined."""
     axes = study.axes.values()
-    if not 0 < tolerance < 1:
+    if not 0 < number("tolerance", tolerance) < 1:
         raise SweepError(f"tolerance: expected a number between 0 and 1, found {tolerance}")
     if bool((statuses_of(dataset) == Status.PENDING).any()):
         raise SweepError("the sweep is not finished; run it to its end first")

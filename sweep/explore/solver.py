@@ -57,8 +57,8 @@ class PointSolver:
         Parameters
         ----------
         *values, **named : float or ndarray
-            In SI units, in the order of `names` or by name; arrays are broadcast. Quantities of pint, and DataArrays
-            that have a unit, are converted.
+            In SI units, in the order of `names` or by name; arrays are broadcast, and NaN where they are masked.
+            Quantities of pint, and DataArrays that have a unit, are converted.
 
         Returns
         -------

@@ -30,7 +30,7 @@ from sweep.runs.run import run
 from sweep.study.model import Study, frozen
 from sweep.study.read import Given
 from sweep.study.read import study as as_study
-from sweep.words import Table, did_you_mean, duration, page, paragraph
+from sweep.words import Table, did_you_mean, duration, number, page, paragraph, whole_number
 
 TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13)
 CELLS = 1024
@@ -137,11 +137,9 @@ def _charted(
     study: Given, methods: Sequence[str] | None, tolerances: Sequence[float], cells: int, reference: str | None
 ) -> tuple[Study, list[str], list[str]]:
     """The cells that are taken, the methods that are charted, and all that can do them. Raises SweepError."""
-    if not tolerances or not all(0 < rtol < 1 for rtol in tolerances):
+    if not tolerances or not all(0 < number("rtol", rtol) < 1 for rtol in tolerances):
         raise SweepError(f"rtol: expected numbers above 0 and below 1, found {tolerances}")
-    if cells < 1:
-        raise SweepError(f"cells: expected at least 1, found {cells}")
-    part = sampled(as_study(study), cells)
+    part = sampled(as_study(study), whole_number("cells", cells))
     able = [part.kernel.methods[number].name for number in usable_methods(part)]
     names = ["auto", *able] if methods is None else list(dict.fromkeys(methods))
     if not able:

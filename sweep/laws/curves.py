@@ -13,7 +13,7 @@ from sweep.errors import SweepError
 from sweep.laws.loglog import EPSILON, FEWEST, LINES, VALUES, Array, alike
 from sweep.laws.noise import NOISES, roughness, rounding
 from sweep.units import UnitMistake, in_unit, unit_of
-from sweep.words import did_you_mean, kind
+from sweep.words import did_you_mean, kind, number
 
 Window = tuple[float | None, float | None]
 
@@ -86,14 +86,6 @@ def converted(what: str, value: Any, of: xr.DataArray) -> Any:
         return in_unit(value, str(of.attrs.get("units") or unit_of(value)), what)
     except (TypeError, UnitMistake) as fault:
         raise SweepError(f"{what}: {fault}") from None
-
-
-def number(what: str, value: Any) -> float:
-    """A number; raises SweepError for what is none."""
-    try:
-        return float(value)
-    except (TypeError, ValueError):
-        raise SweepError(f"{what}: expected a number, found {value!r}") from None
 
 
 def check_options(confidence: float = 0.95, noise: bool | str | None = None, sigma: Any = None) -> None:

@@ -17,6 +17,7 @@ from sweep.errors import SweepError, missing
 from sweep.laws import curves
 from sweep.laws.curves import Window, check_names, log_of, positive_axis, title
 from sweep.laws.loglog import EPSILON, Array, brackets, by_runs, is_logarithmic, root, slope_errors, slopes
+from sweep.words import number
 
 BORDERS = (-1.0, -0.5, -1 / 3)
 """Exponents of a period in the drive: weak drive, losses that scale with it, strong drive."""
@@ -126,7 +127,7 @@ def where_exponent(
         raise SweepError(f"{title(y)} has no line along {dim}; an axis of it is empty: {dict(y.sizes)}")
     low, high = curves.limits(window, y.coords[dim])
     t, inside = np.log(x), (x >= low) & (x <= high)
-    value = curves.number("value", curves.converted("value", value, y) if values else value)
+    value = number("value", curves.converted("value", value, y) if values else value)
     orders = ((6, 0), (4, 0)) if values else ((6, 7), (4, 5))  # points of the interpolation and of the slopes
     reach = 0.0 if values else abs(value) * abs(t).max()  # of what rounding of the abscissae does
     spacing = 1.0 if values else abs(np.diff(t)).min()
@@ -211,7 +212,7 @@ def exponent_map(y: xr.DataArray, dim: str, levels: Sequence[float] = BORDERS) -
     logarithmic = [is_logarithmic(y[name].values) for name in names]
     across, down = (np.log(y[n].values) if take else y[n].values for n, take in zip(names, logarithmic, strict=True))
     generator = contourpy.contour_generator(across, down, np.ma.masked_invalid(local.exponent.values))
-    numbers = [curves.number("levels", level) for level in np.atleast_1d(levels).tolist()]
+    numbers = [number("levels", level) for level in np.atleast_1d(levels).tolist()]
     # where the exponent is a level throughout, within its error, rounding would draw lines
     apart = [bool((abs(local.exponent - level) > local.exponent_error).any()) for level in numbers]
     by_level = ((level, line) for level in itertools.compress(numbers, apart) for line in generator.lines(level))

@@ -12,7 +12,7 @@ import xarray as xr
 from sweep.cells.schema import ANCILLARY, STATUS
 from sweep.errors import SweepError
 from sweep.results.statuses import cell_text, cell_values, flag_words, pieces, statuses_of
-from sweep.words import Table, listed, require_dataset
+from sweep.words import Table, listed, number, require_dataset
 
 
 @dataclass
@@ -143,7 +143,7 @@ def diff(a: xr.Dataset, b: xr.Dataset, rtol: float = 0.0) -> Difference:
     """
     require_dataset("diff", a)
     require_dataset("diff", b)
-    if not rtol >= 0.0:
+    if not number("rtol", rtol) >= 0.0:
         raise SweepError(f"rtol: expected 0 or more, found {rtol:g}")
     kernels = [str(d.attrs.get("kernel", "")) for d in (a, b)]
     if kernels[0] != kernels[1]:
@@ -157,12 +157,13 @@ def diff(a: xr.Dataset, b: xr.Dataset, rtol: float = 0.0) -> Difference:
         raise SweepError(f"the cells run along {dims[0]} in one result and along {dims[1]} in the other")
     for dim in a[STATUS].dims:
         if dim in a.coords and dim in b.coords:
+            a, b = (d if dim in d.indexes else d.set_xindex([dim]) for d in (a, b))
             if not (a.indexes[dim].is_unique and b.indexes[dim].is_unique):
                 raise SweepError(f"{dim} has a value twice; take one of each, e.g. ds.drop_duplicates({str(dim)!r})")
             continue
         # cells without a value of their own are told apart by their number, so they must be the same ones
-        along = [name for name, c in a.coords.items() if c.dims[:1] == (dim,)]
-        if a.sizes[dim] != b.sizes[dim] or not all(name in b.coords and a[name].equals(b[name]) for name in along):
+        along = [{name: c.variable for name, c in d.coords.items() if c.dims[:1] == (dim,)} for d in (a, b)]
+        if a.sizes[dim] != b.sizes[dim] or not xr.Dataset(along[0]).equals(xr.Dataset(along[1])):
             raise SweepError(f"the points along {dim} are not the same in both; compare results of one design")
     return Difference(a, b, rtol)
 

@@ -6,9 +6,10 @@ from collections.abc import Mapping
 from decimal import Decimal
 from typing import TYPE_CHECKING
 
+from sweep.errors import SweepError
 from sweep.study.mistakes import Mistakes
 from sweep.units import UnitMistake, scale
-from sweep.words import did_you_mean, require_dataset
+from sweep.words import did_you_mean, kind, require_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -37,10 +38,12 @@ def in_units(dataset: xr.Dataset, units: Mapping[str, str]) -> xr.Dataset:
     'degree'
     """
     require_dataset("in_units", dataset)
+    if not isinstance(units, Mapping):
+        raise SweepError(f'units: expected a mapping of names to units, e.g. {{"A0": "degree"}}; found {kind(units)}')
     mistakes, found = Mistakes(), {}
     for name, unit in units.items():
         if name not in dataset.variables:
-            mistakes.add(name, f"the result has no such variable{did_you_mean(name, map(str, dataset.variables))}")
+            mistakes.add(str(name), f"the result has no such variable{did_you_mean(name, map(str, dataset.variables))}")
         elif "units" not in dataset[name].attrs or dataset[name].dtype.kind != "f":
             mistakes.add(name, "has words or counts, which have no unit")
         else:

@@ -29,13 +29,13 @@ from sweep.cells.partition import Partition
 from sweep.cells.reduce import output_schema
 from sweep.cells.schema import Schema
 from sweep.cells.timing import GOLDEN, Sample, cut, sampled_study, work_clock
-from sweep.errors import SweepError, missing
+from sweep.errors import SweepError, missing, terminate
 from sweep.file import disk
 from sweep.runs.extend import Reused
 from sweep.runs.isolate import Processes
 from sweep.runs.progress import Progress, log
 from sweep.study.model import Study
-from sweep.words import as_path, seconds_of
+from sweep.words import as_path, seconds_of, whole_number
 
 if TYPE_CHECKING:
     from sweep.runs.cluster import Cluster
@@ -52,24 +52,18 @@ class TimeUp(Exception):
     """A run is to end before it is complete; the text says why."""
 
 
-class Terminated(SystemExit):
-    """The system, or somebody, asked this process to end (SIGTERM); it does, with the usual exit status 143."""
-
-    def __init__(self) -> None:
-        super().__init__(128 + signal.SIGTERM)
-
-
 @contextlib.contextmanager
 def signals_held() -> Iterator[Callable[[], None]]:
     """Holds Ctrl-C and SIGTERM back, for Python's locks are left in disorder where they strike in them.
 
     What it gives raises KeyboardInterrupt or Terminated after one of them, and is called at the end. The second one
-    strikes at once. Other handlers than Python's own are left alone.
+    strikes at once. Other handlers than Python's own, and `terminate`, are left alone.
     """
     pressed: list[int] = []
     here = threading.current_thread() is threading.main_thread()
-    python: dict[int, Any] = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
-    own = {number: handler for number, handler in python.items() if here and signal.getsignal(number) is handler}
+    known = signal.default_int_handler, signal.SIG_DFL, terminate
+    found = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM) if here}
+    own = {number: handler for number, handler in found.items() if handler in known}
 
     def give_back(*press: Any) -> None:
         pressed.extend(press[:1])
@@ -78,7 +72,7 @@ def signals_held() -> Iterator[Callable[[], None]]:
 
     def check() -> None:
         if pressed:
-            raise Terminated if pressed[0] == signal.SIGTERM else KeyboardInterrupt
+            (terminate if pressed[0] == signal.SIGTERM else signal.default_int_handler)(pressed[0], None)
 
     for number in own:
         signal.signal(number, give_back)
@@ -153,13 +147,6 @@ class Task:
 def cores() -> int:
     """Cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def whole_number(name: str, number: int) -> int:
-    """The number, if it is a whole one from 1 on. Raises SweepError."""
-    if isinstance(number, bool) or not isinstance(number, int | np.integer) or number < 1:
-        raise SweepError(f"{name}: expected a whole number from 1 on, found {number!r}")
-    return int(number)
 
 
 def deadline(text: str | datetime | None, now: datetime | None = None) -> datetime | None:

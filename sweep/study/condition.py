@@ -17,7 +17,7 @@ from kernels.interface import Kernel
 from sweep.errors import SweepError
 from sweep.study.model import setting
 from sweep.units import UnitMistake, parsed, scale
-from sweep.words import did_you_mean, listed
+from sweep.words import did_you_mean, kind, listed
 
 OPERATORS: dict[type, Callable[[Any, Any], Any]] = {
     ast.Eq: operator.eq, ast.NotEq: operator.ne, ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt,
@@ -62,6 +62,8 @@ class Condition:
 
     def truth(self) -> Any:
         """Where it holds. Raises SweepError where it is too long or no expression, or compares what is unlike."""
+        if not isinstance(self.text, str):
+            raise SweepError(f'{self.says.strip()}: expected words such as "R < 0.1", found {kind(self.text)}')
         if len(self.text) > LONGEST:
             raise SweepError(f"{self.says}{self.text[:40]}...: is longer than {LONGEST} letters")
         try:

@@ -105,6 +105,7 @@ def test_what_is_no_cell_is_refused(clocks):
         (lambda: clocks.assign_coords(phi0=clocks.phi0.assign_attrs(units="degree")).sweep.check(), "unit"),
         (lambda: clocks.drop_vars("phi0").sweep.check(), "phi0"),
         (lambda: clocks.sweep.check(seed=-1), "seed"),
+        (lambda: clocks.sweep.check(sample="a"), "sample"),
         (lambda: clocks.where(False).assign(status=clocks.status * 0 + 64).sweep.check(), "OK"),
         (lambda: summary.sweep.check(allow_import=True), "summary"),
         (lambda: summary.sweep.cell(allow_import=True), "summary"),

@@ -217,6 +217,8 @@ def test_traces_are_kept_for_every_cell():
         ({}, {}, {"y": []}, "one output"),
         ({}, {}, {"y": ["period", "mu"]}, "no output"),
         ({}, {}, {"tolerance": 0.0}, "between 0 and 1"),
+        ({}, {}, {"tolerance": "0.1"}, "a number"),
+        ({}, {}, {"most_cells": "a"}, "whole number"),
         ({"method": ["auto"]}, {}, {}, "number axes"),
         ({"mu": [1.0]}, {}, {}, "two values"),
         ({"mu": [1.0, np.nan]}, {}, {}, "finite"),

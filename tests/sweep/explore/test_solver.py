@@ -47,6 +47,8 @@ def test_arrays_are_broadcast_traces_come_behind_and_no_call_changes_what_an_ear
     assert fall(in_mm, 0.0).drop[1] == fall(in_cm, [0.0]).drop[0, 1] == fall(1.0, 0.0).drop[1]
     of_astropy = np.array(1000.0).view(type("Quantity", (np.ndarray,), {"unit": "mm"}))
     assert fall(of_astropy, 0.0).drop[1] == fall(1.0, 0.0).drop[1]
+    masked = np.ma.array([1, 2], mask=[False, True])
+    assert fall(masked, 0.0).status.tolist() == [Status.OK, Status.BAD_INPUT]
     one = fall(3.0, 0.0).drop
     fall(5.0, 0.0)
     assert one.tolist() == [0.0, 3.0]

@@ -23,6 +23,7 @@ def test_a_result_is_the_same_as_itself(result):
     assert "bit for bit" in repr(found)
     assert all((distance.cells, distance.largest) == (0, 0.0) for distance in found.outputs.values())
     assert sweep.diff(result, result.transpose("v0", "phase", "height")).same
+    assert sweep.diff(result.drop_indexes("height").isel(height=[2, 0, 1]), result).same
     assert sweep.diff(*[result.fall_time.to_dataset().assign(status=result.status).isel(height=1, v0=1)] * 2).same
 
 
@@ -34,8 +35,8 @@ def test_the_cell_and_the_distance_are_told(result):
     found = sweep.diff(result, other)
     assert found.outputs["fall_time"].cells == 2
     assert found.outputs["fall_time"].largest == pytest.approx(1e-3, rel=1e-9)
-    assert found.outputs["fall_time"].example == "e.g. height=4.0 v0=1.0"
-    assert (found.outputs["drop"].cells, found.outputs["drop"].example) == (1, "e.g. height=1.0 v0=1.0")
+    assert found.outputs["fall_time"].example == "e.g. height=4 v0=1"
+    assert (found.outputs["drop"].cells, found.outputs["drop"].example) == (1, "e.g. height=1 v0=1")
     assert not found.same
     assert sweep.diff(result, other, rtol=1e-5).outputs["fall_time"].cells == 1
     other = result.copy(deep=True)
@@ -59,7 +60,7 @@ def test_statuses_are_compared(result):
     other.status[2, :] = Status.BAD_INPUT
     found = sweep.diff(result, other, rtol=1.0)
     assert found.statuses == {("OK", "INACCURATE"): 1, ("OK", "BAD_INPUT"): 2}
-    assert found.examples["OK", "BAD_INPUT"] == "e.g. height=4.0 v0=0.0"
+    assert found.examples["OK", "BAD_INPUT"] == "e.g. height=4 v0=0"
     assert not found.same
 
 
@@ -85,8 +86,9 @@ def test_points_are_compared_by_number():
     a = sweep.run(build(**points))
     assert sweep.diff(a, a.copy()).same
     b = sweep.run(build(design="zip", axes={"height": [1.0, 3.0], "v0": [0.0, 1.0]}))
-    with pytest.raises(sweep.SweepError, match="points along cell"):
-        sweep.diff(a, b)
+    for pair in ((a, b), (a, a.drop_vars("v0")), (a.drop_vars("v0"), a)):
+        with pytest.raises(sweep.SweepError, match="points along cell"):
+            sweep.diff(*pair)
 
 
 def test_what_cannot_be_compared_is_refused(result):
@@ -112,14 +114,14 @@ def test_cells_of_large_results_are_found_wherever_they_are():
     other.status[2, 7] = Status.BAD_INPUT
     other.time[0, 5], other.time[2, 9] = 2.0, 1.5
     found = sweep.diff(ds, other)
-    assert found.examples["0", str(int(Status.BAD_INPUT))] == "e.g. x=3.0 y=7.0"
+    assert found.examples["0", str(int(Status.BAD_INPUT))] == "e.g. x=3 y=7"
     assert (found.outputs["time"].cells, found.outputs["time"].largest) == (2, 0.5)
-    assert found.outputs["time"].example == "e.g. x=1.0 y=5.0"
+    assert found.outputs["time"].example == "e.g. x=1 y=5"
     assert account(other).statuses == {"OK": 5_999_999, "BAD_INPUT": 1}
-    assert account(other).examples == {"BAD_INPUT": {"x": "3.0", "y": "7.0"}}
+    assert account(other).examples == {"BAD_INPUT": {"x": "3", "y": "7"}}
 
 
-@pytest.mark.parametrize("rtol", [-1.0, np.nan])
+@pytest.mark.parametrize("rtol", [-1.0, np.nan, "a"])
 def test_a_tolerance_that_is_none_is_refused(result, rtol):
     """By NaN any two results would be the same, by -1 a result would differ from itself."""
     with pytest.raises(sweep.SweepError, match="rtol"):

@@ -54,6 +54,7 @@ def test_a_chosen_cell_keeps_all_its_values():
     ("condition", "message"),
     [
         ("status == 'OKAY'", 'status is never "OKAY"; did you mean OK?'),
+        (3, "found an int"),
         ("status == 0", "compares words with numbers"),
         ("height > '1 kg'", "is a mass"),
         ("2*height > '1 m'", "compare it with a name alone"),

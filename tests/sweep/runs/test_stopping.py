@@ -52,6 +52,12 @@ def test_a_kernel_that_never_ends_does_not_keep_a_run_from_it(begun, number, opt
     assert f"ended with {128 + number}" in list(read_lines(log_path(output).read_text()))[-1]["text"]
 
 
+def test_a_run_whose_kernel_is_being_imported_ends_in_its_own_words(begun, tmp_path):
+    (tmp_path / "early.py").write_text("import os, signal\nos.kill(os.getpid(), signal.SIGTERM)\n")
+    process, _ = begun("early:KERNEL", 10)
+    assert (process.communicate(timeout=60)[1], process.returncode) == ("stopped\n", 143)
+
+
 def test_of_a_run_that_is_killed_no_process_is_left(begun):
     """Not even one in a kernel that never lets Python run."""
     psutil = pytest.importorskip("psutil")
@@ -186,10 +192,10 @@ def test_an_unfinished_result_is_reported_exported_and_fitted_only_when_that_is_
 
 def test_show_names_the_cells_that_failed_and_why(command, tmp_path):
     command("run", "bad.toml", *OWN)
-    assert "cell 10  height=11.0  ZeroDivisionError: eleven" in command("show", "bad.h5")[1]
+    assert "cell 10  height=11  ZeroDivisionError: eleven" in command("show", "bad.h5")[1]
     assert reasons(tmp_path / "bad.h5") == {10: "ZeroDivisionError: eleven"}
     log_path(tmp_path / "bad.h5").unlink()
-    assert "cell 10  height=11.0" in command("show", "bad.h5")[1]
+    assert "cell 10  height=11 " in command("show", "bad.h5")[1]
 
 
 @pytest.mark.parametrize("options", [[], ["--log-json"]])
