@@ -197,7 +197,7 @@ def cell_values(dataset: Cells, index: int) -> dict[str, str]:
     for name, coordinate in dataset.coords.items():
         if coordinate.dims and set(coordinate.dims) <= set(column.dims):
             value = coordinate.values[tuple(at[str(d)] for d in coordinate.dims)]
-            cell[str(name)] = repr(float(f"{value:.6g}")) if isinstance(value, np.number) else str(value)
+            cell[str(name)] = f"{value:.6g}" if isinstance(value, np.number) else str(value)
     return cell
 
 

@@ -94,7 +94,7 @@ def test_a_status_is_told_with_the_part_of_each_axis_where_it_occurs(design):
     found.status.values.reshape(31, 4)[20:23, 1] = Status.NOT_CONVERGED
     text = " ".join(result_text("x.h5", found).split())
     assert " 3 NOT_CONVERGED " in text
-    assert "height 100 to 158.489, v0 1; e.g. height=100.0 v0=1.0" in text
+    assert "height 100 to 158.489, v0 1; e.g. height=100 v0=1" in text
 
 
 @pytest.mark.parametrize("heights", [[2.0], [2.0, 2.0 + 1e-9]])
