@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import textwrap
 from collections.abc import Sequence
@@ -42,15 +43,20 @@ LONGEST = 50
 """Letters of a meaning on an axis; of a longer one the name stands there."""
 OWN = {"INACCURATE": "#D55E00", "NOT_CONVERGED": "#B2182B", "FAILED": "#000000", "PENDING": "#999999"}
 """Colours of statuses that any kernel may give, none of them a map's own."""
-OTHERS = ("#CC79A7", "#E69F00", "#8C510A", "#FF9DA7", "#444444", "#FF7F50")
-"""Colours of the other statuses; one keeps its colour in all pictures of a result."""
+OTHERS = (
+    *("#CC79A7", "#E69F00", "#8C510A", "#FF9DA7", "#444444"),
+    *("#FF7F50", "#E7298A", "#D9D9D9", "#7F0000", "#FFD8B1"),
+)
+"""Colours of the other statuses; one keeps its colour in all pictures of a result, and no kernel remarks on two of one
+colour."""
 
 
 class View:
     """An output `y` along coordinate `x` of dimension `along`, once for each value of dimension `across`.
 
     By default the `preferred` output, along what a trace runs along, else the longest axis. `y` and `status` have the
-    dimensions (across, along), or (along,) where `across` is None; `held` says where the other axes stand.
+    dimensions (across, along), or (along,) where `across` is None; `held` says where the other axes stand, and what
+    parameters of one value are, unless it is their default.
 
     Raises
     ------
@@ -79,7 +85,9 @@ class View:
         others = sorted((str(d) for d in output.dims if d != along), key=lambda d: -dataset.sizes[d])
         self.across = across = others[0] if others else None
         held = {dim: dataset.sizes[dim] // 2 for dim in others[1:]}
-        self.held = ", ".join(setting(coordinate(output, dim)[index]) for dim, index in held.items())
+        single = [coordinate(output, dim)[index] for dim, index in held.items()]
+        single += [dataset[name] for name in given(dataset) if name in dataset.coords and not dataset[name].dims]
+        self.held = ", ".join(map(setting, single))
         shown = dataset[[name] + (["status"] if "status" in dataset else [])].isel(held)
         # no more cells than a picture can show
         mapped = across is not None and shown.sizes[across] > FAMILY
@@ -178,8 +186,23 @@ def preferred(dataset: xr.Dataset, outputs: Sequence[str]) -> str:
     return outputs[0]
 
 
+def given(dataset: xr.Dataset) -> list[str]:
+    """Axes, and parameters that are fixed to something else than their default, as the study of a result has them."""
+    study = json.loads(str(dataset.attrs.get("study_json", "{}")))
+    defaults = {field["name"]: field.get("default") for field in study.get("kernel", {}).get("parameters", ())}
+    fixed = {name: study["fixed"].get(name) for name in defaults}
+    usual = {name: fixed.get(default, default) for name, default in defaults.items()}
+    return [name for name, value in fixed.items() if value is None or value != usual[name]]
+
+
 def coordinate(y: xr.DataArray, name: str) -> xr.DataArray:
-    """Coordinate of that name; a dimension that has none is counted from 0."""
+    """Coordinate of that name; of bins their middle; a dimension that has none is counted from 0."""
+    if name not in y.coords and f"{name}_lower" in y.coords:
+        ends = [y[f"{name}_{end}"] for end in ("lower", "upper")]
+        product, total = ends[0] * ends[1].values, ends[0] + ends[1].values
+        middle = product**0.5 if is_logarithmic(ends[0]) else total / 2
+        what = str(y.attrs.get("long_name", "")).partition(": ")[2]
+        return middle.assign_attrs({**ends[0].attrs, "long_name": what}).rename(name)
     return y[name] if name in y.coords else xr.DataArray(np.arange(y.sizes[name]), dims=name, name=name)
 
 
@@ -211,13 +234,14 @@ def symbol(name: str) -> str:
 
 
 def unit_text(unit: str) -> str:
-    """Unit with its powers raised, "" for a pure number."""
+    """Unit with its powers raised, "" for a pure number; a number cannot stand before 1/s."""
+    unit = re.sub(r"^1/([A-Za-z]+)(?:\^(\d+))?$", lambda found: f"{found[1]}^-{found[2] or 1}", unit)
     return "" if unit in ("", "1") else re.sub(r"\^(-?\d+)", r"$^{\1}$", unit)
 
 
 def meaning(variable: xr.DataArray) -> str:
     """What a variable is: its long name up to the first break; "" where that is too long for an axis."""
-    words = re.split(r"[;:(]|, |\. ", str(variable.attrs.get("long_name", "")).strip())[0].strip(" .\n")
+    words = re.split(r"[;:]| \(|, |\. ", str(variable.attrs.get("long_name", "")).strip())[0].strip(" .\n")
     return words if len(words) <= LONGEST and "\n" not in words else ""
 
 
@@ -241,4 +265,5 @@ def setting(value: xr.DataArray) -> str:
     """One value of an axis, e.g. "a = 0.5 1/s"."""
     name, unit = str(value.name), unit_text(str(value.attrs.get("units", "")))
     number = f"{value.item():.4g}" if value.dtype.kind in "fiu" else str(value.item())
+    number = flag_words(value).get(value.item(), number)
     return f"{symbol(name) or name.replace('_', ' ')} = {number}" + (f" {unit}" if unit else "")

@@ -7,9 +7,11 @@ import pytest
 import xarray as xr
 from matplotlib.colors import LogNorm
 
+import sweep
+from kernels.interface import Status
 from sweep.errors import SweepError
 from sweep.show.figures import plot
-from sweep.show.view import SIDE, evened
+from sweep.show.view import SIDE, View, evened, label
 
 FLAGS = {"flag_values": np.array([0, 1, 64, 127], np.int8), "flag_meanings": "OK INACCURATE BAD_INPUT PENDING"}
 UNITS = {"mu": "rad/s^2", "a": "1/s", "R": "rad/s^2", "phase": "1"}
@@ -88,6 +90,21 @@ def test_further_axes_are_held_at_their_middle_and_the_title_says_so():
     np.testing.assert_array_equal(figure.axes[0].collections[0].get_array(), ds.period.sel(R=10).transpose("a", "mu"))
 
 
+def test_the_title_says_what_is_fixed_and_a_histogram_runs_along_its_bins():
+    keys = {"kernel": "foliot", "outputs": ["period"], "fixed": {"a": 0.5, "phi0": 1.0, "e": 1.0}}
+    ds = sweep.run(axes={"mu": [1.0, 2.0], "R": [0.0, 0.1]}, **keys)
+    title = "foliot over mu and R\n$\\varphi_{\\mathrm{0}}$ = 1 rad, $a$ = 0.5 s$^{-1}$"
+    assert plot(ds).axes[0].get_title() == title
+    assert plot(ds.isel(R=1)).axes[0].get_title() == title + ", $R$ = 0.1 rad/s$^{2}$"
+    summary = {"over": ["mu"], "outputs": {"period": ["histogram"]}, "edges": {"period": np.geomspace(1, 100, 13)}}
+    bins = sweep.run(axes={"mu": log(), "R": [0.0, 0.1, 0.2]}, summary=summary, **keys)
+    axes = plot(bins, y="period_histogram").axes[0]
+    assert axes.get_ylabel() == "period of the limit cycle [s]"
+    np.testing.assert_allclose(axes.get_ylim(), (1.0, 100.0))
+    ratio = xr.DataArray(1.0, name="z", attrs={"long_name": "ratio c/(2 sqrt(k I)) (0 in vacuum)"})
+    assert label(ratio) == "ratio c/(2 sqrt(k I)), $z$"
+
+
 def test_cells_that_are_not_ok_are_marked_on_the_line_or_at_its_foot():
     ds = dataset(mu=log())
     ds["status"][[3, 5]] = 1
@@ -104,6 +121,10 @@ def test_cells_that_are_not_ok_are_marked_on_the_line_or_at_its_foot():
     colours = {text: mark.get_color() for text, mark in zip(words(figure), (remark, foot), strict=True)}
     only = plot(ds.assign(status=ds.status.where(ds.status != 1, 0).assign_attrs(FLAGS)))
     assert drawn(only.axes[0])[1].get_color() == colours["BAD_INPUT"] != colours["INACCURATE"]
+    flags = {"flag_values": [*map(int, Status)], "flag_meanings": " ".join(Status.__members__)}
+    shown = View(ds.assign(status=ds.status.assign_attrs(flags)))
+    cycles = Status.GRAZING, Status.UNSTABLE, Status.PERIOD_2, Status.NOT_PERIODIC
+    assert len({shown.colour(code) for code in cycles}) == 4
 
 
 def test_a_value_between_two_that_are_missing_is_a_point():
