@@ -44,18 +44,18 @@ speed `down`, with the acceleration `end` in the end. s, c and slope are the res
 
 
 @jit_call
-def half_swing(torque, scene, start):
-    """From x = 1 with speed `start`, outward if positive, else inward, to x = -1."""
+def half_swing(more, scene, start):
+    """From x = 1 with speed `start`, outward if positive, else inward, to x = -1, by a torque of 1 + more."""
     kappa, beta = scene.kappa, 0.5 * scene.d
     up = where(start > 0.0, start, 0.0)
-    g1 = torque + scene.rho + kappa
+    g1 = (1.0 + more) + scene.rho + kappa
     t1 = linear_flow.first_reversal(beta, kappa, where(up > 0.0, up, 1.0), -g1)
     t1 = where(up > 0.0, t1, 0.0)
     s1, c1, slope1 = linear_flow.response(beta, kappa, t1)
     rise = fma(up, s1, -g1 * c1)
     top = 1.0 + rise
     down = where(start < 0.0, -start, 0.0)
-    g2 = (torque - 1.0) + scene.slack + kappa * top
+    g2 = more + scene.slack + kappa * top
     t2 = linear_flow.first_crossing(beta, kappa, down, g2, 2.0 + rise)
     comes = t2 < 1e300
     t2 = where(comes, t2, 0.0)
@@ -101,7 +101,7 @@ def _turn(scene, energy):
     (strong drive), with leg 1 taken backwards from its turning point.
     """
     d, e, kappa = scene.d, scene.e, scene.kappa
-    legs = half_swing(1.0, scene, e * sqrt(2.0 * energy))
+    legs = half_swing(0.0, scene, e * sqrt(2.0 * energy))
     back, g2 = legs.back, legs.g2
     after = 0.5 * legs.speed * legs.speed
     balanced = (after > 2.0) & (e > 0.0)

@@ -11,7 +11,7 @@ and between switches D runs straight from D_n to D_(n+1). Over all, it gains 86 
 y_j = (D(j tau) - D(j tau - tau))/tau for j = 1 ... M, M whole averaging times tau, it scatters by 86 400 times
     the Allan deviation, sqrt(sum of (y_(j+1) - y_j)^2/(2 (M - 1))),  M >= 2.                                (3)
 floor = h + (mu - h)/100, where h is the least torque with which a swing from rest at the switch comes to the next
-switch and is not held by stiction: R_s without a hairspring. So noise never stops the clock.
+switch and is not held by stiction: R_s without a hairspring. So noise of the torque never stops the clock.
 To first order long times see white noise as y = s sigma sqrt(T/tau) (s the sensitivity, `foliot`), and correlated
 noise as that times sqrt((1 + r)/(1 - r)); with noise of the friction s sigma becomes the root of (s sigma)^2 +
 ((2 s - 1) sigma_a)^2 - 2 shared s sigma (2 s - 1) sigma_a. To second order noise of the torque slows the clock by a
@@ -50,9 +50,12 @@ PAIRS = 64
 """Pairs of random numbers that are made at a time."""
 
 _COUNTABLE = 2.0**50
+_WILDEST = 1e100
+"""Noise beyond which squares of speeds leave float64."""
 
-Clock = namedtuple("Clock", "scene sigma sigma_a remembered fresh floor nominal tau shared own")
-"""What a half swing needs: (1) in units of mu, T and the averaging time in those of the scene."""
+Clock = namedtuple("Clock", "scene sigma sigma_a remembered fresh least grip nominal tau shared own")
+"""What a half swing needs: (1) in units of mu, the floor less 1, 1 - rho_s, T and the averaging time in those of the
+scene."""
 
 Run = namedtuple("Run", "x apart speed t gain truncated closed reading rate squares")
 """x, x' and the speed, t and D of (2) after a half swing, and how many had their torque raised to the floor; how many
@@ -65,15 +68,15 @@ def _beat(run, z, z_apart, clock):
     begun = run.t > 0.0
     x = where(begun, fma(clock.remembered, run.x, clock.fresh * z), z)
     apart = where(begun, fma(clock.remembered, run.apart, clock.fresh * z_apart), z_apart)
-    torque = fma(clock.sigma, x, 1.0)
-    short = not_(torque > clock.floor)
-    torque = where(short, clock.floor, torque)
+    more = clock.sigma * x  # torque less mu, of which friction may leave little
+    short = not_(more > clock.least)
+    more = where(short, clock.least, more)
     friction = larger(fma(clock.sigma_a, fma(clock.shared, x, clock.own * apart), 1.0), LEAST_FRICTION + 0.0 * x)
     d, rho, rho_s, gamma, n, kappa, e, slack = clock.scene
     scene = Scene(d * friction, rho, rho_s, gamma, n, kappa, e, slack)
     start = scene.e * run.speed
-    legs = _linear_swing.half_swing(torque, scene, start)
-    goes_on = legs.comes & ((start < 0.0) | (fma(scene.kappa, legs.top, torque) > scene.rho_s))
+    legs = _linear_swing.half_swing(more, scene, start)
+    goes_on = legs.comes & ((start < 0.0) | (fma(scene.kappa, legs.top, more) > -clock.grip))
     later = run.t + legs.time
     closed, reading, rate, squares, tau = run.closed, run.reading, run.rate, run.squares, clock.tau
     passes = later >= (closed + 1.0) * tau
@@ -129,10 +132,13 @@ def segments(first, columns, radii, turns, radii_apart, turns_apart):
     cycle, _, legs, found = _linear_swing.segments(scene, columns.rtol[i])
 
     # the floor of (1): from rest at the switch the force must reach over the way 2, which grows with it
-    d, kappa, rho, e = scene.d, scene.kappa, scene.rho, scene.e
-    swings = 2.0 / linear_flow.reach(0.5 * d, kappa, 0.0 * d, 0.0 * d + 1.0) + rho - kappa
-    least = larger(larger(swings, where(e >= 0.0, scene.rho_s, rho) - kappa), 0.0 * d)
-    floor = fma(HEADROOM, 1.0 - least, least)
+    d, kappa, e, slack = scene.d, scene.kappa, scene.e, scene.slack
+    strain = 2.0 / linear_flow.reach(0.5 * d, kappa, 0.0 * d, 0.0 * d + 1.0) - kappa
+    grip = where(magnitude(scene.rho_s - scene.rho) > 0.0, 1.0 - scene.rho_s, slack)
+    spare, held = slack - strain, where(e >= 0.0, grip, slack) + kappa  # of the drive, above the least
+    spare = where(spare < held, spare, held)
+    spare = where(spare < 1.0, spare, 1.0)
+    least = (HEADROOM - 1.0) * spare
 
     # r and sqrt(1 - r^2) of (1); white where tau_c = 0
     white = not_(columns.tau_c[i] > 0.0)
@@ -143,8 +149,9 @@ def segments(first, columns, radii, turns, radii_apart, turns_apart):
     tau = number(over(averaging_time, units.time))
     sigma, sigma_a, shared = columns.sigma[i], columns.sigma_a[i], columns.shared[i]
     own = sqrt((1.0 - shared) * (1.0 + shared))
-    clock = Clock(scene, sigma, sigma_a, remembered, fresh, floor, cycle.half_period, tau, shared, own)
-    runs = units.fine & (found < FIRST_REFUSAL) & (least < 1.0)
+    clock = Clock(scene, sigma, sigma_a, remembered, fresh, least, grip, cycle.half_period, tau, shared, own)
+    tame = units.fine & (sigma + sigma_a < _WILDEST)
+    runs = tame & (found < FIRST_REFUSAL) & (spare > 0.0)
     numbers = radii, turns, radii_apart, turns_apart
     run, stopped = _run(first, columns.seed, columns.half_swings, clock, cycle.speed, runs, *numbers)
     t, enough = where(runs, run.t, 1.0), run.closed > 1.0
@@ -153,16 +160,18 @@ def segments(first, columns, radii, turns, radii_apart, turns_apart):
     columns.rate_scatter_s_per_day[i] = where(enough, SECONDS_PER_DAY * deviation, math.nan)
     columns.truncated[i] = run.truncated / columns.half_swings[i]
 
-    # error of the rate as a fraction: of each half swing, and of all that they pass on
+    # error of the rate as a fraction: of each half swing, and of all that they pass on; the force that the floor leaves
+    # has two digits fewer
     start = e * cycle.speed
     kept, longer, _, energy, late = _linear_swing.passed_on(scene, start, legs.speed, legs)
     passed_on = energy / (cycle.speed * cycle.speed * (1.0 - e * e * kept))
-    accurate = (late + magnitude(longer * start) * passed_on) / cycle.half_period <= columns.rtol[i]
+    enough_digits = columns.rtol[i] * where(run.truncated > 0.0, HEADROOM, 1.0)
+    accurate = (late + magnitude(longer * start) * passed_on) / cycle.half_period <= enough_digits
 
     verdict = where(enough, where(magnitude(found - NOT_SELF_STARTING) > 0.0, OK, found), TOO_SHORT)
-    verdict = where(stopped | not_(least < 1.0), STICKS, where(accurate, verdict, INACCURATE))
+    verdict = where(stopped | not_(spare > 0.0), STICKS, where(accurate, verdict, INACCURATE))
     verdict = where(found < FIRST_REFUSAL, verdict, found)  # of the cycle without noise
-    fine = units.fine & is_normal(clock.tau) & (t < _COUNTABLE * clock.tau)
+    fine = tame & is_normal(clock.tau) & (t < _COUNTABLE * clock.tau)
     columns.status[i] = where(fine | (verdict >= FIRST_REFUSAL), verdict, OUT_OF_RANGE)
 
 

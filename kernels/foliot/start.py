@@ -83,7 +83,7 @@ def _release(scene, x, way):
 def _next(scene, flip):
     """The flip after `flip`, whether it comes, and whether the last digits decide that."""
     start = scene.e * flip.speed
-    legs = _linear_swing.half_swing(1.0, scene, start)
+    legs = _linear_swing.half_swing(0.0, scene, start)
     held, unsure = _held(scene, legs.top)
     turns = not_(start < 0.0)
     kept, longer, _, energy_noise, time_noise = _linear_swing.passed_on(scene, start, legs.speed, legs)

@@ -7,7 +7,7 @@ is the way since then: S answers an impulse, C a constant force, S = C'. With p 
 and K(t), the integral of S^2, is what damping takes. A *response* is the tuple (S, C, S'). One form holds through free
 (kappa = 0), under-, critically and overdamped motion: in C and K, which cancel in (2), a power series takes over
 before digits are lost. beta may be negative: that is the same motion run backwards.
-Errors: S and C 2e-15, K 6e-15, S' 2e-15 of its largest value (tests/kernels/integrate/test_linear_flow.py).
+Errors: S and C 2e-15, K 6e-15, S' 2e-15 of its largest value.
 """
 
 import math
@@ -178,7 +178,7 @@ def first_reversal(beta, kappa, v, f):
     ratio = v / where(ahead, slowing, 1.0)
     x = big * ratio * ratio
     gap = fma(f, fma(-2.0 * beta, v, f), kappa * v * v) / where(ahead, slowing * slowing, 1.0)  # 1 - x
-    turns = ahead & (gap > 0.0) & (x < 1.0)
+    turns = ahead & (gap > 0.0) & ((x < 1.0) | (f < 0.0))  # against a force it always turns
     soon = ratio * _artanh_ratio(where(turns, x, 0.0), where(turns, gap, 1.0))
     root = sqrt(where(big < 0.0, -big, 1.0))
     angle = _PI - arctan(v * root / where(slowing < 0.0, -slowing, 1.0))
