@@ -160,9 +160,11 @@ def _draw_map(axes: Any, shown: View) -> None:
     for code, hatch in zip(shown.codes(), cycle(HATCHES), strict=False):
         here, name, colour = shown.status == code, shown.name(code), shown.colour(code)
         empty = here & ~np.isfinite(shown.y.values)
-        if (here & ~empty).any():
+        valued = here & ~empty
+        if valued.any():
             around = (np.concatenate([ends[:1], grid, ends[-1:]]) for grid, ends in zip(grids, (x, y), strict=True))
-            axes.contour(*around, np.pad(here, 1), levels=[0.5], colors=[colour])
+            axes.contour(*around, np.pad(valued, 1), levels=[0.5], colors=[colour])
+            axes.plot([], [], color=colour, label=name)
         if empty.any():
             # a rectangle for each run of cells side by side
             runs = [
@@ -171,9 +173,7 @@ def _draw_map(axes: Any, shown: View) -> None:
                 for left, right in np.flatnonzero(np.diff(np.pad(cells.astype(int), 1))).reshape(-1, 2)
             ]
             look: dict[str, Any] = {"facecolor": "0.94", "edgecolor": "0.45", "linewidth": 0.0, "hatch": hatch}
-            axes.add_collection(PolyCollection(runs, label=name, **look))
-        else:
-            axes.plot([], [], color=colour, label=name)
+            axes.add_collection(PolyCollection(runs, label=name + ", no value" * bool(valued.any()), **look))
 
 
 def precision_figure(found: xr.Dataset) -> Figure:

@@ -69,6 +69,7 @@ class View:
         if not known:
             raise SweepError("there is nothing to draw: no output runs along an axis")
         name = one_of(y or preferred(dataset, known), known, f"there is no output {y!r} to draw")
+        fixed = [dataset[name] for name in given(dataset) if name in dataset.coords and not dataset[name].dims]
         if x is None:
             dataset = evened(dataset, axes=2)
         output, cells = dataset[name], dataset["status"].dims if "status" in dataset else ()
@@ -86,8 +87,7 @@ class View:
         self.across = across = others[0] if others else None
         held = {dim: dataset.sizes[dim] // 2 for dim in others[1:]}
         single = [coordinate(output, dim)[index] for dim, index in held.items()]
-        single += [dataset[name] for name in given(dataset) if name in dataset.coords and not dataset[name].dims]
-        self.held = ", ".join(map(setting, single))
+        self.held = ", ".join(map(setting, [*single, *fixed]))
         shown = dataset[[name] + (["status"] if "status" in dataset else [])].isel(held)
         # no more cells than a picture can show
         mapped = across is not None and shown.sizes[across] > FAMILY

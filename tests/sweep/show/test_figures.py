@@ -96,6 +96,7 @@ def test_the_title_says_what_is_fixed_and_a_histogram_runs_along_its_bins():
     title = "foliot over mu and R\n$\\varphi_{\\mathrm{0}}$ = 1 rad, $a$ = 0.5 s$^{-1}$"
     assert plot(ds).axes[0].get_title() == title
     assert plot(ds.isel(R=1)).axes[0].get_title() == title + ", $R$ = 0.1 rad/s$^{2}$"
+    assert plot(sweep.refine(ds, "period", 0.1).dataset).axes[0].get_title() == title.replace("R\n", "R, refined\n")
     summary = {"over": ["mu"], "outputs": {"period": ["histogram"]}, "edges": {"period": np.geomspace(1, 100, 13)}}
     bins = sweep.run(axes={"mu": log(), "R": [0.0, 0.1, 0.2]}, summary=summary, **keys)
     axes = plot(bins, y="period_histogram").axes[0]
@@ -125,6 +126,10 @@ def test_cells_that_are_not_ok_are_marked_on_the_line_or_at_its_foot():
     shown = View(ds.assign(status=ds.status.assign_attrs(flags)))
     cycles = Status.GRAZING, Status.UNSTABLE, Status.PERIOD_2, Status.NOT_PERIODIC
     assert len({shown.colour(code) for code in cycles}) == 4
+    ds = dataset(mu=log(), a=np.arange(1.0, 12))
+    ds["status"][3:5] = 1
+    ds["period"][3] = np.nan
+    assert words(plot(ds)) == ["INACCURATE", "INACCURATE, no value"]
 
 
 def test_a_value_between_two_that_are_missing_is_a_point():
