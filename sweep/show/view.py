@@ -69,6 +69,8 @@ class View:
         if not known:
             raise SweepError("there is nothing to draw: no output runs along an axis")
         name = one_of(y or preferred(dataset, known), known, f"there is no output {y!r} to draw")
+        if not dataset[name].size:
+            raise SweepError(f"there is nothing to draw: an axis of {name} has no values")
         fixed = [dataset[name] for name in given(dataset) if name in dataset.coords and not dataset[name].dims]
         if x is None:
             dataset = evened(dataset, axes=2)

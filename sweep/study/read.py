@@ -157,7 +157,8 @@ def to_toml(study: Study) -> str:
     found["fixed"] = {}
     for name, value in study.fixed.items():
         field = study.kernel.parameter(name)
-        default = float(field.default) if isinstance(field.default, float | int) else field.default
+        default = study.fixed.get(field.default) if isinstance(field.default, str) else field.default
+        default = float(default) if isinstance(default, int) else default
         if repr(value) != repr(default):  # -0.0 is not 0.0
             words = {float(number): word for word, number in field.choices.items()}
             found["fixed"][name] = words[float(value)] if words else np.asarray(value).tolist()

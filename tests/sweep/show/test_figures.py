@@ -158,6 +158,8 @@ def test_a_result_without_one_value_is_drawn_all_the_same(tmp_path, axes):
 def test_an_unknown_output_or_axis_is_refused_with_those_there_are(keys, word):
     with pytest.raises(SweepError, match=word):
         plot(dataset(mu=log(5), method=["map", "closed"]), **keys)
+    with pytest.raises(SweepError, match="no values"):
+        plot(dataset(mu=[]))
 
 
 @pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])

@@ -81,6 +81,15 @@ def test_a_study_comes_back_exactly(layout, keys):
     same(study, Study.from_json(study.to_json(), allow_import=True))
 
 
+def test_what_follows_another_parameter_is_written_where_it_differs_alone():
+    """An axis of R may then be added to the text."""
+    for stiction, written in (({}, False), ({"R_s": 0.3}, False), ({"R_s": 0.5}, True)):
+        fixed = {"a": 1.0, "phi0": 1.0, "R": 0.3, **stiction}
+        study = sweep.study(kernel="foliot", axes={"mu": [1.0]}, fixed=fixed)
+        assert ("R_s" in sweep.to_toml(study)) is written
+        same(study, sweep.study(tomllib.loads(sweep.to_toml(study))))
+
+
 @pytest.mark.parametrize("length", [3, 5000])
 def test_arrays_come_back_exactly_and_json_of_long_ones_is_short(length):
     values = np.random.default_rng(1).standard_normal(length)
