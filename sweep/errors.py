@@ -1,11 +1,17 @@
-"""What a user is told when something cannot be done: one clear line each, never a traceback."""
+"""What a user is told when something cannot be done: one clear line each, never a traceback.
+
+Also how Ctrl-C and SIGTERM are held back.
+"""
 
 from __future__ import annotations
 
+import contextlib
 import os
-from collections.abc import Sequence
+import signal
+import threading
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import NoReturn
+from typing import Any, NoReturn
 
 
 class SweepError(Exception):
@@ -44,9 +50,40 @@ class Terminated(SystemExit):
     """The system, or somebody, asked this process to end (SIGTERM); it does, with the usual exit status 143."""
 
 
-def terminate(*signal: object) -> NoReturn:
+def terminate(*struck: object) -> NoReturn:
     """What SIGTERM does where a run is to end in its own words."""
     raise Terminated(TERMINATED)
+
+
+@contextlib.contextmanager
+def signals_held() -> Iterator[Callable[[], None]]:
+    """Holds Ctrl-C and SIGTERM back, for Python's locks are left in disorder where they strike in them.
+
+    What it gives raises KeyboardInterrupt or Terminated after one of them, and is called at the end. The second one
+    strikes at once. Other handlers than Python's own, and `terminate`, are left alone.
+    """
+    pressed: list[int] = []
+    here = threading.current_thread() is threading.main_thread()
+    known = signal.default_int_handler, signal.SIG_DFL, terminate
+    found = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM) if here}
+    own = {number: handler for number, handler in found.items() if handler in known}
+
+    def give_back(*press: Any) -> None:
+        pressed.extend(press[:1])
+        for number, handler in own.items():
+            signal.signal(number, handler)
+
+    def check() -> None:
+        if pressed:
+            (terminate if pressed[0] == signal.SIGTERM else signal.default_int_handler)(pressed[0], None)
+
+    for number in own:
+        signal.signal(number, give_back)
+    try:
+        yield check
+    finally:
+        give_back()
+    check()
 
 
 COMPLETE, FAULT, MISTAKE, INCOMPLETE, CELLS_FAILED, INTERRUPTED, TERMINATED = 0, 1, 2, 3, 4, 130, 143

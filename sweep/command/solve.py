@@ -8,16 +8,12 @@ import os
 import subprocess
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import sweep
 from sweep.command import options as o
 from sweep.command.options import command, option, switch
 from sweep.command.reading import DIFFERENT, Outcome, explained, opened, say, solving, study_from, tell
-from sweep.errors import CELLS_FAILED, COMPLETE, EXIT_CODES, INCOMPLETE, SweepError
-
-if TYPE_CHECKING:
-    from sweep.study.model import Study
+from sweep.errors import CELLS_FAILED, COMPLETE, EXIT_CODES, INCOMPLETE, SweepError, signals_held
 
 NOTIFY_SECONDS = 60
 """What the command of --notify may take."""
@@ -57,8 +53,10 @@ def plan(arguments: argparse.Namespace) -> None:
 )
 def run(arguments: argparse.Namespace) -> Outcome:
     """Compute a study, or continue where it stopped."""
-    study, target = study_from(arguments), arguments.output
-    from sweep.runs.progress import log, log_path, logging_to
+    with signals_held():  # struck by one, a library's import fails in words of its own
+        study, target = study_from(arguments), arguments.output
+        from sweep.runs.progress import log, log_path, logging_to
+        from sweep.runs.run import complete
 
     path = log_path(target) if target.parent.is_dir() else None
     with contextlib.ExitStack() as stack:
@@ -67,7 +65,8 @@ def run(arguments: argparse.Namespace) -> Outcome:
         except OSError as fault:
             raise SweepError(f"{target} cannot be written with its log beside it, {path}: {fault.strerror}") from None
         try:
-            outcome = _computed(arguments, study, target)
+            options = {name: getattr(arguments, name) for name in RUN_OPTIONS}
+            outcome = _accounted(target, complete(study, target, **options, **solving(arguments, study)))
         except BaseException as error:
             outcome = explained(error)
             raise
@@ -76,15 +75,12 @@ def run(arguments: argparse.Namespace) -> Outcome:
     return outcome
 
 
-def _computed(arguments: argparse.Namespace, study: Study, target: Path) -> Outcome:
-    """Runs, and says what became of all cells."""
+def _accounted(target: Path, ending: str) -> Outcome:
+    """Says what became of all cells."""
     from sweep.file.reading import StoredFile
     from sweep.file.store import unfinished_of
     from sweep.results.statuses import account, summary_text
-    from sweep.runs.run import complete
 
-    options = {name: getattr(arguments, name) for name in RUN_OPTIONS}
-    ending = complete(study, target, **options, **solving(arguments, study))
     if ending == "not begun":
         say(text := f"{target}: unfinished; no cell is computed yet")
         return Outcome(INCOMPLETE, text)

@@ -9,10 +9,9 @@ from __future__ import annotations
 import contextlib
 import os
 import platform
-import signal
 import threading
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from datetime import datetime, timedelta
@@ -29,7 +28,7 @@ from sweep.cells.partition import Partition
 from sweep.cells.reduce import output_schema
 from sweep.cells.schema import Schema
 from sweep.cells.timing import GOLDEN, Sample, cut, sampled_study, work_clock
-from sweep.errors import SweepError, missing, terminate
+from sweep.errors import SweepError, missing, signals_held
 from sweep.file import disk
 from sweep.runs.extend import Reused
 from sweep.runs.isolate import Processes
@@ -50,37 +49,6 @@ MOST_TOLD = 1000
 
 class TimeUp(Exception):
     """A run is to end before it is complete; the text says why."""
-
-
-@contextlib.contextmanager
-def signals_held() -> Iterator[Callable[[], None]]:
-    """Holds Ctrl-C and SIGTERM back, for Python's locks are left in disorder where they strike in them.
-
-    What it gives raises KeyboardInterrupt or Terminated after one of them, and is called at the end. The second one
-    strikes at once. Other handlers than Python's own, and `terminate`, are left alone.
-    """
-    pressed: list[int] = []
-    here = threading.current_thread() is threading.main_thread()
-    known = signal.default_int_handler, signal.SIG_DFL, terminate
-    found = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM) if here}
-    own = {number: handler for number, handler in found.items() if handler in known}
-
-    def give_back(*press: Any) -> None:
-        pressed.extend(press[:1])
-        for number, handler in own.items():
-            signal.signal(number, handler)
-
-    def check() -> None:
-        if pressed:
-            (terminate if pressed[0] == signal.SIGTERM else signal.default_int_handler)(pressed[0], None)
-
-    for number in own:
-        signal.signal(number, give_back)
-    try:
-        yield check
-    finally:
-        give_back()
-    check()
 
 
 endless = threading.Event()

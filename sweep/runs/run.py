@@ -17,14 +17,14 @@ from sweep.cells.fingerprint import difference
 from sweep.cells.reduce import gathered
 from sweep.cells.sample import require_asked
 from sweep.cells.schema import empty, ending, now, part
-from sweep.errors import SweepError, Terminated
+from sweep.errors import SweepError, Terminated, signals_held
 from sweep.file import disk
 from sweep.file.frame import cuts_of
 from sweep.file.open import in_memory, memory, open_result, verdict
 from sweep.file.reading import StoredFile
 from sweep.file.store import alone, begun, earlier, lock_of, reopened, unfinished_of
 from sweep.runs.extend import Reused, has_failed, obstacle
-from sweep.runs.loop import Loop, Task, TimeUp, signals_held
+from sweep.runs.loop import Loop, Task, TimeUp
 from sweep.study.keys import KEYS
 from sweep.study.model import Study
 from sweep.study.read import Given

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from kernels import catalogue
 from kernels.interface import Field, Kernel, Method, load
-from sweep.errors import SweepError, Terminated
+from sweep.errors import SweepError
 from sweep.study.mistakes import show
 from sweep.words import did_you_mean, listed
 
@@ -301,8 +301,6 @@ def load_kernel(name: object, allow_import: bool = False, folders: Iterable[Path
             # for good: a kernel may import modules beside it later
             sys.path.extend(folder for f in folders if (folder := str(f.resolve())) not in sys.path)
         kernel = load(name) if ":" in name else catalogue.get(name)
-    except Terminated:
-        raise
     except (Exception, SystemExit) as error:
         raise SweepError(f"{show(name)} cannot be loaded: {type(error).__name__}: {error}") from error
     if not isinstance(kernel, Kernel):

@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from sweep.runs.loop import signals_held
+from sweep.errors import signals_held
 
 
 def press():

@@ -53,7 +53,9 @@ def test_a_kernel_that_never_ends_does_not_keep_a_run_from_it(begun, number, opt
 
 
 def test_a_run_whose_kernel_is_being_imported_ends_in_its_own_words(begun, tmp_path):
-    (tmp_path / "early.py").write_text("import os, signal\nos.kill(os.getpid(), signal.SIGTERM)\n")
+    """Behind the import, which would fail in words of a library's own."""
+    text = "import os, signal\nos.kill(os.getpid(), signal.SIGTERM)\nfrom bad import SLOW as KERNEL\n"
+    (tmp_path / "early.py").write_text(text)
     process, _ = begun("early:KERNEL", 10)
     assert (process.communicate(timeout=60)[1], process.returncode) == ("stopped\n", 143)
 
