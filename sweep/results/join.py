@@ -176,4 +176,4 @@ def _longer(a: Study, b: Study, results: Sequence[xr.Dataset], name: str) -> tup
 
 def _numbers(dataset: xr.Dataset, study: Study) -> xr.Dataset:
     """Outputs and what is said of them, without coordinates."""
-    return dataset[[*study.outputs, *ANCILLARY]].drop_vars(list(dataset.coords)).compute()
+    return dataset[[*study.outputs, *ANCILLARY]].drop_vars(list(dataset.coords), errors="ignore").compute()

@@ -77,6 +77,9 @@ def test_a_new_axis_has_labels_and_a_file_that_opens(tmp_path):
     assert sweep.verify(tmp_path / "c.h5").whole
     with pytest.raises(sweep.SweepError, match="another study"):
         sweep.run(build(axes={"height": HEIGHTS, "v0": [0.0, 1.0]}), tmp_path / "c.h5")
+    keys = {"kernel": "beads:KERNEL", "allow_import": True, "axes": {"g": [1.0]}, "fixed": {"mass": [1.0, 2.0]}}
+    beads = sweep.run(**keys, outputs=["total"])  # no output runs along the beads
+    assert sweep.join(beads, beads, axis="v", labels=["a", "b"]).total.values.tolist() == [[3.0], [3.0]]
 
 
 def unfinished():
