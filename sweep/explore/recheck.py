@@ -128,6 +128,8 @@ class Checked:
             # that there is no such answer is an answer, which differs from any value
             status = found[STATUS]
             none = (status >= FIRST_REFUSAL) & ~among(status, GIVEN_UP)
+            if others:  # its own numbers may overflow where those of the cell do not
+                none &= status != Status.OUT_OF_RANGE
             right = np.where(status <= Status.INACCURATE, found[ERROR_BOUND], np.inf)
             error[some], another[some] = np.where(none, 0.0, right), others
             source[some] = [asked[n].name if n >= 0 else STATUS_NAMES[s] for n, s in np.c_[found[METHOD_USED], status]]

@@ -3,15 +3,17 @@
 import re
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
+import toy
 import xarray as xr
 from running import same
 from toy_studies import build
 
 import sweep
-from kernels.interface import Status
+from kernels.interface import Method, Status
 from sweep.cells.sample import sampled
 
 FOLIOT = {
@@ -208,3 +210,15 @@ def test_a_value_where_another_method_finds_that_there_is_none_is_beyond(clocks)
     found = false.sweep.check()
     assert (found.judged, found.by_another, found.beyond) == (2, 2, 1)
     assert found.worst["off"] == np.inf
+
+
+def test_where_another_method_overflows_it_has_no_opinion(monkeypatch):
+    """As an explicit one in a stiff cell, which it takes for OUT_OF_RANGE."""
+
+    def explicit(height, v0, g, rtol, phase, fall_time, impact_speed, drop, status):
+        status[...] = Status.OUT_OF_RANGE
+
+    methods = toy.KERNEL.methods[1], Method("explicit", "", explicit)
+    monkeypatch.setattr(toy, "STIFF", replace(toy.KERNEL, methods=methods), raising=False)
+    found = sweep.run(build(kernel="toy:STIFF", axes={"height": [1.0]})).sweep.check(allow_import=True)
+    assert (found.by_another, found.beyond) == (0, 0)
