@@ -14,11 +14,11 @@ from kernels.integrate.events import cubic_root, dip, finite, first_event, met_a
 from kernels.integrate.pairs import at_least, of_size
 from kernels.integrate.records import Leg, Step
 from kernels.integrate.steps import ONE, events
-from kernels.integrate.taylor import COME_UP, next_step
+from kernels.integrate.taylor import COME_UP, PATIENCE, next_step
 from kernels.lanes.jit import jit
 from kernels.lanes.symbols import symbolic
 from kernels.lanes.tuples import after, boxes, marks, reached, times
-from kernels.lanes.vectors import any_lane, choose, fma, magnitude, not_, where
+from kernels.lanes.vectors import any_lane, choose, fma, is_rare, magnitude, not_, where
 
 STEP_LIMIT = 10_000
 SAFETY = 0.25
@@ -102,8 +102,8 @@ def to_event(pair, cell, mode, active):
     stuck, lost, blown, broken, grazing, hangs = nothing, nothing, nothing, nothing, nothing, nothing
     t, cuts, tried, last_h, last_error = 0.0 * h, 0.0 * h, 0.0 * h, h, 0.0 * h
     start, start_rates = events(m, state, mode)
-    wide, reach = reached(fired, start), reached(times(0.0, state), state)
-    for _ in range(STEP_LIMIT):
+    wide, reach, waited, paused = reached(fired, start), reached(times(0.0, state), state), 0, nothing
+    for tries in range(STEP_LIMIT):
         h = m.on_clock(state, unit, h)
         length = h * unit
         trial = pair.tried(m, state, mode, length)
@@ -171,7 +171,13 @@ def to_event(pair, cell, mode, active):
         moving = moving & not_(done | given_up)
         if not any_lane(moving):
             break
+        if tries > PATIENCE and is_rare(moving, active):
+            waited += 1
+            if 2 * waited > tries:
+                paused, moving = moving, nothing
+                break
     lost = lost | moving
     return Leg(
-        state, t, h, fired, stuck, lost & not_(blown), broken | (lost & blown), grazing, hangs, nothing, tried, reach,
+        state, t, h, fired, stuck, lost & not_(blown), broken | (lost & blown), grazing, hangs, nothing, paused, tried,
+        reach,
     ), ()  # fmt: skip

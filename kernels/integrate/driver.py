@@ -349,7 +349,7 @@ def advance(m, leg, memory, i):
     active = fresh | ((stage > 1.5) & (stage < 2.5))
     if any_lane(fresh):
         cell = choose(fresh, started(m, cell), cell)
-    done = active & not_(active)
+    done = paused = active & not_(active)
     for _ in range(EVENTS):
         moving = active & (cell.verdict < REFUSED)
         found, own = leg(cell, mode_of(cell), moving)
@@ -358,9 +358,10 @@ def advance(m, leg, memory, i):
         if any_lane(switches):
             cell, rates = switched(m, cell, rates, switches, counts, first, met)
         cell = gone_on(m, cell, rates, left, moving, found.grazing)
-        done = active & (found.grazing | (cell.verdict >= REFUSED) | (cell.count >= cell.flips))
+        paused = found.paused
+        done = active & (paused | found.grazing | (cell.verdict >= REFUSED) | (cell.count >= cell.flips))
         if any_lane(done):
             break
     write(memory, i, cell)
-    memory[0, i] = where(done, 3.0, where(active, 2.0, stage))
+    memory[0, i] = where(paused, 4.0, where(done, 3.0, where(active, 2.0, stage)))
     return any_lane(done)

@@ -180,5 +180,5 @@ def to_event(m, cell, mode, active):
         moving = moving & not_(lost)
         if not any_lane(moving):
             break
-    leg = Leg(state, t / cell.unit, cell.h, fired, stuck, lost, broken, nothing, hangs, vague, trials, reach)
+    leg = Leg(state, t / cell.unit, cell.h, fired, stuck, lost, broken, nothing, hangs, vague, nothing, trials, reach)
     return leg, Fixed(reach, slim, steps, calls, wide, own.scheme)

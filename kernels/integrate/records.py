@@ -150,6 +150,7 @@ class Leg(NamedTuple):
     stuck, lost, broken : pressed on what it started on; not there within limits; numbers that are none
     grazing, hangs : neither met nor missed for sure; met, but only just
     vague : the rates may have hidden something, or two surfaces are met within what is not known of when they are
+    paused : not there yet, when most others have waited for long
     tried : steps
     reach : the largest magnitude of each state on the way
     """
@@ -164,5 +165,6 @@ class Leg(NamedTuple):
     grazing: bool
     hangs: bool
     vague: bool
+    paused: bool
     tried: float
     reach: tuple

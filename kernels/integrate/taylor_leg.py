@@ -18,6 +18,7 @@ from kernels.integrate.taylor import (
     COME_UP,
     HALVINGS,
     LONGEST,
+    PATIENCE,
     ROUNDING,
     SAME,
     SLACK,
@@ -38,7 +39,7 @@ from kernels.integrate.taylor import (
 from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.symbols import fold, left_a_call, symbolic
 from kernels.lanes.tuples import all_of, any_of, reached, times, total
-from kernels.lanes.vectors import any_lane, choose, fma, horner, magnitude, not_, where
+from kernels.lanes.vectors import any_lane, choose, fma, horner, is_rare, magnitude, not_, where
 from kernels.maths.intervals import most
 
 WITHIN, REFUSALS = 0.6, 20.0
@@ -326,7 +327,7 @@ def to_event(m, cell, mode, active):
     stuck, steep, broken, grazing, now, passed = nothing, nothing, nothing, nothing, never, never
     refused, longest, furthest = 0.0 * h, 0.0 * h + FAR, 0.0 * h + FAR
     power_h, reach = natural_power(h, m.order - 1), reached(times(0.0, state), state)
-    error, near = carried.begun(m, state, errors, h), margins
+    error, near, waited, paused = carried.begun(m, state, errors, h), margins, 0, nothing
     for step in range(STEP_LIMIT):
         # a step that the series allow
         cores, limits, coarse, full = m.cores(state, mode, unit, tolerance, on, t, near, longest)
@@ -373,8 +374,13 @@ def to_event(m, cell, mode, active):
         longest = where(moving, where(seen, longest / COME_UP, COME_UP * trial), longest)  # what has met keeps its core
         if not any_lane(moving):
             break
+        if step > PATIENCE and is_rare(moving, active):
+            waited += 1
+            if 2 * waited > step:
+                paused, moving = moving, nothing
+                break
     lost = moving | steep
-    met = active & not_(lost | stuck | broken | grazing)
+    met = active & not_(lost | stuck | broken | grazing | paused)
     end, which, hangs, fired, others, ends, unsure = ended(m, pieces, facts, passed, met, span, tolerance, state, mode)
     t = where(met, t + end, t)
     h = where(met & (t > 0.0) & (h > LONGEST * t), LONGEST * t, h)
@@ -382,4 +388,4 @@ def to_event(m, cell, mode, active):
         m, error, errors, changes, full, state, mode, unit, ends, end, t, which, others, pieces, cores, coarse
     )
     reach = choose(met, reached(reach, ends), reach)
-    return Leg(ends, t, h, fired, stuck, lost, broken, grazing, hangs, unsure, tried, reach), late
+    return Leg(ends, t, h, fired, stuck, lost, broken, grazing, hangs, unsure, paused, tried, reach), late

@@ -312,6 +312,19 @@ def _lower_any_lane(context, builder, signature, values):
     return builder.icmp_unsigned("!=", bits, ir.Constant(bits.type, 0))
 
 
+def is_rare(condition, among):
+    """Whether a condition holds in a quarter, or less, of the cells in which another one does that it is a case of."""
+    return 4 * condition <= among
+
+
+def _lower_is_rare(context, builder, signature, values):
+    if not isinstance(signature.args[0], MaskType):
+        return builder.not_(builder.icmp_unsigned("!=", values[0], ir.Constant(values[0].type, 0)))
+    bits = ir.IntType(signature.args[0].width)
+    few, many = (builder.ctpop(builder.bitcast(value, bits)) for value in values)
+    return builder.icmp_unsigned("<=", builder.shl(few, bits(2)), many)
+
+
 def not_(condition):
     """The opposite of a condition."""
     return not condition
@@ -319,6 +332,7 @@ def not_(condition):
 
 in_place(where, 3, lambda condition, x, y: _number(condition, x, y), _lower_where)
 in_place(any_lane, 1, lambda condition: types.boolean, _lower_any_lane)
+in_place(is_rare, 2, lambda condition, among: types.boolean, _lower_is_rare)
 in_place(not_, 1, lambda condition: condition, lambda context, builder, signature, values: builder.not_(values[0]))
 
 
