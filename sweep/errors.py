@@ -59,8 +59,9 @@ def terminate(*struck: object) -> NoReturn:
 def signals_held() -> Iterator[Callable[[], None]]:
     """Holds Ctrl-C and SIGTERM back, for Python's locks are left in disorder where they strike in them.
 
-    What it gives raises KeyboardInterrupt or Terminated after one of them, and is called at the end. The second one
-    strikes at once. Other handlers than Python's own, and `terminate`, are left alone.
+    What it gives raises KeyboardInterrupt or Terminated after one of them, and is called at the end, also where
+    something fails then: the second one strikes at once, maybe in an import. Other handlers than Python's own, and
+    `terminate`, are left alone.
     """
     pressed: list[int] = []
     here = threading.current_thread() is threading.main_thread()
@@ -81,6 +82,9 @@ def signals_held() -> Iterator[Callable[[], None]]:
         signal.signal(number, give_back)
     try:
         yield check
+    except Exception:
+        check()
+        raise
     finally:
         give_back()
     check()

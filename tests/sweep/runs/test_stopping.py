@@ -53,11 +53,12 @@ def test_a_kernel_that_never_ends_does_not_keep_a_run_from_it(begun, number, opt
 
 
 def test_a_run_whose_kernel_is_being_imported_ends_in_its_own_words(begun, tmp_path):
-    """Behind the import, which would fail in words of a library's own."""
-    text = "import os, signal\nos.kill(os.getpid(), signal.SIGTERM)\nfrom bad import SLOW as KERNEL\n"
-    (tmp_path / "early.py").write_text(text)
-    process, _ = begun("early:KERNEL", 10)
-    assert (process.communicate(timeout=60)[1], process.returncode) == ("stopped\n", 143)
+    """Behind the import, which would fail in words of a library's own; where it fails for a second signal, too."""
+    for signals in (1, 2):
+        text = "import os, signal\n" + signals * "os.kill(os.getpid(), signal.SIGTERM)\n"
+        (tmp_path / "early.py").write_text(f"{text}from bad import SLOW as KERNEL\n")
+        process, _ = begun("early:KERNEL", 10)
+        assert (process.communicate(timeout=60)[1], process.returncode) == ("stopped\n", 143)
 
 
 def test_of_a_run_that_is_killed_no_process_is_left(begun):
