@@ -166,6 +166,7 @@ def refine(
     require_dataset("refine", dataset)
     study = study or as_study(dataset)
     names = [y] if isinstance(y, str) else list(y)
+    tolerance = number("tolerance", tolerance)
     _require(dataset, study, names, tolerance)
     whole_number("most_cells", most_cells)
     rounds, numbers = _folder_of_rounds(path, dataset, force), itertools.count(1)
@@ -197,7 +198,7 @@ def refine(
 def _require(dataset: xr.Dataset, study: Study, names: Sequence[str], tolerance: float) -> None:
     """Raises SweepError for what cannot be refined."""
     axes = study.axes.values()
-    if not 0 < number("tolerance", tolerance) < 1:
+    if not 0 < tolerance < 1:
         raise SweepError(f"tolerance: expected a number between 0 and 1, found {tolerance}")
     if bool((statuses_of(dataset) == Status.PENDING).any()):
         raise SweepError("the sweep is not finished; run it to its end first")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import threading
 import warnings
 from collections import namedtuple
 from dataclasses import replace
@@ -23,7 +24,7 @@ from sweep.words import listed
 
 
 class PointSolver:
-    """Solves single cells, or arrays of them, of parameters given when it is called; for one thread at a time.
+    """Solves single cells, or arrays of them, of parameters given when it is called; threads take turns.
 
     Attributes
     ----------
@@ -48,6 +49,7 @@ class PointSolver:
         grid.size = np.iinfo(np.int64).max
         self._solver = Guard(Solver(self._study, grid), _warn)
         self._solved: Any = namedtuple("solved", self.fields)  # type: ignore[misc]  # as many as the study asks for
+        self._turn = threading.Lock()  # what is solved is that of the last call
         one = inspect.Parameter.POSITIONAL_OR_KEYWORD
         self._signature = inspect.Signature([inspect.Parameter(name, one) for name in self.names])
 
@@ -81,10 +83,11 @@ class PointSolver:
             expected = listed(self.names, word="and")
             raise SweepError(f"expected numbers, or arrays of them, for {expected}: {error}") from None
         shape, columns = points.shape[1:], points.reshape(len(self.names), -1)
-        for name, column in zip(self.names, columns, strict=True):
-            self._study.axes[name] = Axis(name, column, "values")
-        cells = empty_cells(self._study, columns.shape[1])
-        self._solver.solve(0, cells)
+        with self._turn:
+            for name, column in zip(self.names, columns, strict=True):
+                self._study.axes[name] = Axis(name, column, "values")
+            cells = empty_cells(self._study, columns.shape[1])
+            self._solver.solve(0, cells)
         found = (cells[name].reshape(shape + cells[name].shape[1:]) for name in self.fields)
         return self._solved(*(column if column.ndim else column.item() for column in found))
 

@@ -1,5 +1,7 @@
 """A study's kernel as a function: the numbers of the sweep itself, bit for bit, of one cell and of many."""
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pint
 import pytest
@@ -78,6 +80,14 @@ def test_a_study_that_is_no_function_of_numbers_is_refused(keys):
     study = build(axes={"height": [1.0], **keys}, **({} if keys else {"summary": {}}))
     with pytest.raises(sweep.SweepError, match="a solver"):
         sweep.solver(study)
+
+
+def test_threads_that_share_a_solver_have_the_values_of_their_own_cells():
+    fall = sweep.solver(build(axes={"height": [1.0]}, outputs=["fall_time"], method="exact"))
+    heights = [*np.arange(1.0, 9.0)] * 100
+    with ThreadPoolExecutor(4) as threads:
+        found = [cell.fall_time for cell in threads.map(fall, heights)]
+    assert found == [fall(height).fall_time for height in heights]
 
 
 def test_where_a_kernel_raises_the_cell_fails_and_others_have_values():
