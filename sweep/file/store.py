@@ -32,7 +32,7 @@ from sweep.file.frame import PAGE, Cut, create, expected_size
 from sweep.file.reading import BYTES, UNFINISHED, Damaged, StoredFile
 from sweep.words import quantity
 
-OTHERS = (".csv", ".parquet", ".zarr", ".toml")
+OTHERS = (".csv", ".parquet", ".zarr", ".toml", ".png", ".svg", ".pdf", ".html")
 """Endings of other kinds of file, which no result is given."""
 SYNC_SECONDS = 0.2
 """How often blocks are brought to the disk, and it is looked whether the file is still in its place."""

@@ -69,9 +69,11 @@ def write_page(dataset: xr.Dataset, result: Path, path: str | os.PathLike[str]) 
     Raises
     ------
     SweepError
-        The file cannot be written.
+        The path is no .html, or the file cannot be written.
     """
     target = Path(path)
+    if target.suffix.lower() not in (".html", ".htm"):
+        raise SweepError(f"{target}: a report is a page of HTML; name it *.html")
     with disk.replacing(target) as part:
         part.write_text(page(dataset, result), encoding="utf-8")
     return target

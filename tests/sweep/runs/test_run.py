@@ -66,7 +66,7 @@ def test_cells_that_are_cheap_beside_a_call_are_solved_by_few_calls():
         ({"workers": 2, "cluster": "tcp://127.0.0.1:1"}, "cluster"),
         ({"worker": 2}, "workers"),
         ({"path": "nowhere/out.h5"}, "nowhere"),
-        ({"path": "out.csv"}, "export"),
+        *(({"path": name}, "export") for name in ("out.csv", "out.png")),
         ({"path": "out.h5.unfinished"}, "unfinished"),
         ({"path": "a" * 300}, "cannot be written"),
         ({"path": "/", "force": True}, "is a folder"),

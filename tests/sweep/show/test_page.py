@@ -82,6 +82,7 @@ def test_the_command_writes_it_in_the_units_asked_for(tmp_path, monkeypatch, cap
     assert main(["report", "foliot.h5", "--unit", "amplitude=degree"]) == 0
     assert capsys.readouterr().out == "foliot.html\n"
     assert "[degree]" in (tmp_path / "foliot.html").read_text()
-    with pytest.raises(sweep.SweepError, match="cannot be written"):
-        write_page(sweep.open_result("foliot.h5"), tmp_path / "foliot.h5", tmp_path / "no" / "page.html")
+    for path, word in (("no/page.html", "cannot be written"), ("page.pdf", "name it")):
+        with pytest.raises(sweep.SweepError, match=word):
+            write_page(sweep.open_result("foliot.h5"), tmp_path / "foliot.h5", tmp_path / path)
     assert [p.name for p in tmp_path.iterdir() if "tmp" in p.name] == []
