@@ -222,6 +222,6 @@ def exponent_map(y: xr.DataArray, dim: str, levels: Sequence[float] = BORDERS) -
     about = [*(dict(y[name].attrs) for name in names), {"units": "1", "long_name": "exponent on the line"}]
     names = [f"{name}_on_border" for name in names]
     borders = {n: ("point", points[:, k], about[k]) for k, n in enumerate((*names, "level"))}
-    number = np.repeat(np.arange(len(lines)), [len(line) for line in lines])
-    borders["line"] = "point", number, {"units": "1", "long_name": "number of the line"}
+    of_line = np.repeat(np.arange(len(lines)), [len(line) for line in lines])
+    borders["line"] = "point", of_line, {"units": "1", "long_name": "number of the line"}
     return local.assign(borders).assign_attrs(y=title(y), x=dim)
