@@ -139,6 +139,8 @@ def interpolated(dataset: xr.Dataset, at: Mapping[str, Sequence[float] | Array])
     box, status, shape = Box.of(dataset, names), dataset[STATUS], whole[0].shape
     points = box.points(dataset)
     places = box.points({name: column.ravel() for name, column in zip(grids, whole, strict=True)})
+    if any(grid.ndim != 1 for grid in grids.values()) or not np.isfinite(places).all():
+        raise SweepError("at: expected a list of finite values for each axis, above 0 where the axis is logarithmic")
     nearest = dataset.isel({status.dims[0]: cKDTree(points).query(places)[1]})
     valued, refined = nearest[STATUS].values < FIRST_REFUSAL, json.loads(dataset.attrs.get(REFINED_TO, "{}"))
     columns, error = dict[Any, Any](), np.zeros(len(places))

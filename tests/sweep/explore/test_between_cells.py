@@ -92,8 +92,9 @@ def test_a_power_law_is_straight_and_so_interpolated_exactly():
     ds, in_mm = cells(), xr.DataArray(1000.0 * at["a"], attrs={"units": "mm"})
     ds.a.attrs["units"] = "m"
     np.testing.assert_allclose(sweep.interpolated(ds, {**at, "a": in_mm}).y, found.y, rtol=1e-12)
-    with pytest.raises(sweep.SweepError, match="expected numbers"):
-        sweep.interpolated(ds, {**at, "a": ["x"]})
+    for values, word in ((["x"], "numbers"), ([np.nan], "finite"), ([-1.0], "above 0"), (2.0, "a list")):
+        with pytest.raises(sweep.SweepError, match=f"at: expected .*{word}"):
+            sweep.interpolated(ds, {**at, "a": values})
 
 
 def test_between_cells_values_are_those_of_scipy():
