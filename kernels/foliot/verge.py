@@ -12,7 +12,8 @@ ever turned the foliot back, it coasts outwards while the wheel runs free. UNMES
 rest with its wheel at the drop, comes to that within its first swings or as they grow; there is no cycle then.
 
 A bounce of a heavy wheel may throw it so far back that the pallet which it left comes back in front of its tooth: it is
-pushed by that tooth once more, until this escapes again, and so on, within one half period.
+pushed by that tooth once more, until this escapes again, and so on, within one half period. The speed at the escape is
+that of the first time.
 
 OK: the cycle that the clock comes to from there, one tooth a period, within the error that is stated. Its halves are
 alike, or the clock limps: with e > 0 and a heavy wheel one half may last longer, and have more landings, than the
