@@ -133,7 +133,7 @@ def to_toml(study: Study) -> str:
     --------
     >>> import sweep
     >>> study = sweep.study(kernel="foliot", axes={"mu": [0.1, 1.0]}, fixed={"phi0": 1.0, "a": 1.0})
-    >>> print(sweep.to_toml(study).splitlines()[-6])
+    >>> print(sweep.to_toml(study).splitlines()[-5])
     mu = [0.1, 1.0]
     """
     if not isinstance(study, Study):
