@@ -20,7 +20,8 @@ SHORT = 0.01
 LEAST = 6
 """Switches of which the last five are looked at: the first interval is of another kind."""
 NEAR = 1e-2
-"""Of the time of rest, what may be left to it: then the intervals are believed to go on as they do."""
+"""Of the time of rest, what may be left to it: then the intervals are believed to go on as they do. Where the last one
+before a motion ended is longer, its switches do not accumulate, and it is not followed again to see."""
 TINY = 1e-12
 """Of the time, an interval that is not worth to be followed: by less, rounding tells on what intervals shrink."""
 STILL = 1e-16
@@ -42,8 +43,9 @@ def to_rest(how, columns, rtol, results, status):
     """
     flips, outputs = columns[-1], (len(results) + 1) // 2
     time, interval = results[:2]
+    ended = np.isin(status, ENDED) & ~(interval > NEAR * time)
     faint = (np.isin(status, FAINT) & ~(interval * flips > SHORT * time)) | (interval <= STILL * time)
-    cells = np.flatnonzero((flips >= LEAST) & (np.isin(status, ENDED) | faint))
+    cells = np.flatnonzero((flips >= LEAST) & (ended | faint))
     if not len(cells):
         return
     tolerance = np.minimum(0.5 * rtol[cells], FINE)

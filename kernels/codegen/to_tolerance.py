@@ -149,14 +149,19 @@ def by_runs(one, columns, rtol, tightest=0.0, stops=None):
 
 
 def three_runs(one, columns, rtol, wanted, stops):
-    """Results of the finest of three runs to the tolerance `rtol`, statuses where `wanted` is to be met, and doubts."""
+    """Results of the finest of three runs to the tolerance `rtol`, statuses where `wanted` is to be met, and doubts.
 
-    def run(columns, finer, shake):
-        return followed(one, columns, rtol, rtol / finer, shake, stops=stops)
-
-    rough = run(off_by_roundings(columns, MANY), ROUGH, 1.0)
-    other = run(off_by_roundings(columns, -MANY), ROUGH * MIDDLE, -1.0)
-    fine, states = run(columns, ROUGH * FINER, 0.0), len(one.scene.states)
+    Where the rough one comes to no end, nor to any stop, the others, which take more steps, are not run.
+    """
+    rough = followed(one, off_by_roundings(columns, MANY), rtol, rtol / ROUGH, 1.0, stops=stops)
+    cells, (other, fine) = np.flatnonzero(some_stop(rough[-1] != Status.STEP_LIMIT)), (rough.copy(), rough.copy())
+    some, of_some = [c[cells] for c in columns], rtol[cells]
+    for found, given, finer, shake in (
+        (other, off_by_roundings(some, -MANY), ROUGH * MIDDLE, -1.0),
+        (fine, some, ROUGH * FINER, 0.0),
+    ):
+        found[..., cells] = followed(one, given, of_some, of_some / finer, shake, stops=stops)
+    states = len(one.scene.states)
     scale = np.concatenate([abs(fine[:2]), fine[2 + states : -1]])
     with np.errstate(all="ignore"):
         apart = (abs(fine - run)[: 2 + states] for run in (rough, other))

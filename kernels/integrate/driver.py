@@ -260,13 +260,13 @@ def turned(m, cell, moving):
 def switched(m, cell, rates, switches, counts, first, met):
     """The cell behind the switch that it is on, and what that makes of the rates before it.
 
-    What there is to say of the switch is kept where that is the first or the last one.
+    Its error, and whether it underflows, are told where it is the first or the last one.
     """
     count = where(counts, cell.count + 1.0, cell.count)
     watched = counts & ((count < 1.5) | (count >= cell.flips))
     own = ERRORS.at_switch(m, cell.own, rates, switches, watched, cell)
     cell = cell._replace(
-        count=count, interval=where(watched, cell.since, cell.interval), at=choose(watched, cell.state, cell.at),
+        count=count, interval=where(counts, cell.since, cell.interval), at=choose(counts, cell.state, cell.at),
         verdict=where(watched & m.underflows(cell.state, mode_of(cell), cell.unit), OUT_OF_RANGE, cell.verdict),
         since=where(counts, 0.0, cell.since), own=own,
     )  # fmt: skip
