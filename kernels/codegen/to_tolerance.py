@@ -151,10 +151,12 @@ def by_runs(one, columns, rtol, tightest=0.0, stops=None):
 def three_runs(one, columns, rtol, wanted, stops):
     """Results of the finest of three runs to the tolerance `rtol`, statuses where `wanted` is to be met, and doubts.
 
-    Where the rough one comes to no end, nor to any stop, the others, which take more steps, are not run.
+    Where the rough one comes to no end, nor to any stop, the others, which take more steps, are not run; but along a
+    kink they may tell that the motion sticks.
     """
     rough = followed(one, off_by_roundings(columns, MANY), rtol, rtol / ROUGH, 1.0, stops=stops)
-    cells, (other, fine) = np.flatnonzero(some_stop(rough[-1] != Status.STEP_LIMIT)), (rough.copy(), rough.copy())
+    cells = np.flatnonzero(some_stop(rough[-1] != Status.STEP_LIMIT) | one.scene.slides)
+    other, fine = rough.copy(), rough.copy()
     some, of_some = [c[cells] for c in columns], rtol[cells]
     for found, given, finer, shake in (
         (other, off_by_roundings(some, -MANY), ROUGH * MIDDLE, -1.0),
