@@ -39,6 +39,9 @@ BENT, NARROWED = 0.5, 8.0
 close to an event may be called grazing."""
 AT_ONCE = 1e-15
 """Of its largest value since the last event, a surface's value within which it is met at once with another one."""
+LATELY, OFTEN = 0.9, 0.1
+"""What a step came to counts so much less at the next one; and the share of steps lately tried that came to no number
+above which a motion that does not reach its end is out of range. On a stiff scene some steps come to none, too."""
 HALVED = 30.0
 """Halvings after which a motion that starts on an event with no rate has not risen from it."""
 
@@ -99,8 +102,8 @@ def to_event(pair, cell, mode, active):
     state, unit, on, tolerance = cell.state, cell.unit, cell.on, cell.tolerance
     h = pair.first(m, state, mode, unit, cell.h)
     moving, nothing, fired = active, active & not_(active), times(0.0, on)
-    stuck, lost, blown, broken, grazing, hangs = nothing, nothing, nothing, nothing, nothing, nothing
-    t, cuts, tried, last_h, last_error = 0.0 * h, 0.0 * h, 0.0 * h, h, 0.0 * h
+    stuck, lost, broken, grazing, hangs = nothing, nothing, nothing, nothing, nothing
+    t, cuts, tried, blown, last_h, last_error = 0.0 * h, 0.0 * h, 0.0 * h, 0.0 * h, h, 0.0 * h
     start, start_rates = events(m, state, mode)
     wide, reach, waited, paused = reached(fired, start), reached(times(0.0, state), state), 0, nothing
     for tries in range(STEP_LIMIT):
@@ -157,7 +160,8 @@ def to_event(pair, cell, mode, active):
         once_more = where(again, cuts, 0.0)
         cuts = where(again & not_(rough | loose), cuts + 1.0, once_more)
         # moved on, unless it comes to nothing
-        stuck, grazing, blown = stuck | (pressed & not_(away)), grazing | close, blown | (moving & not_(sound))
+        stuck, grazing = stuck | (pressed & not_(away)), grazing | close
+        blown = where(moving, where(sound, LATELY * blown, LATELY * blown + 1.0 - LATELY), blown)
         lost, broken = lost | (moving & not_((cuts <= CUTS) & (h < FURTHEST))), broken | (moving & not_(h > 1e-280))
         given_up = stuck | grazing | broken | lost
         moved = moving & not_(again | given_up)
@@ -176,7 +180,7 @@ def to_event(pair, cell, mode, active):
             if 2 * waited > tries:
                 paused, moving = moving, nothing
                 break
-    lost = lost | moving
+    lost, blown = lost | moving, blown > OFTEN
     return Leg(
         state, t, h, fired, stuck, lost & not_(blown), broken | (lost & blown), grazing, hangs, nothing, paused, tried,
         reach,

@@ -75,6 +75,8 @@ def test_a_stiff_law_that_is_not_linear_keeps_to_the_wave_that_it_follows(rtol):
     time = mp.asin(mpf(level))  # force = cos(clock), speed = sin(clock)
     assert not status.any()
     assert (off(outputs, [(time, time, mp.cos(time))] * len(eps), ("time", "clock", "force")) < rtol).all()
+    for explicit in ("dop853", "dopri5"):  # no value is out of range, though some of the steps tried come to none
+        assert solve(DRAWN, explicit, [1e-9], level, 0.0, flips=1.0, rtol=rtol)[1] == Status.STEP_LIMIT
 
 
 @many
