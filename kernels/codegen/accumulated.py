@@ -43,7 +43,7 @@ def to_rest(how, columns, rtol, results, status):
     """
     flips, outputs = columns[-1], (len(results) + 1) // 2
     time, interval = results[:2]
-    ended = np.isin(status, ENDED) & ~(interval > NEAR * time)
+    ended = np.isin(status, ENDED) & (interval <= NEAR * time)
     faint = (np.isin(status, FAINT) & ~(interval * flips > SHORT * time)) | (interval <= STILL * time)
     cells = np.flatnonzero((flips >= LEAST) & (ended | faint))
     if not len(cells):
