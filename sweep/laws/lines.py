@@ -132,7 +132,7 @@ def fit_line(
     else:
         noisy = scatters(t, z, off, 2, noise) & (n > FEWEST)
         if noise is None:
-            noisy &= ~(bound.any(axis=1) & (abs(off) <= 2 * bound).all(axis=1))
+            noisy &= ~(bound.any(axis=1) & (abs(off) <= moved(t, bound)).all(axis=1))
         word = noise if isinstance(noise, str) else "noise"
         for which, of in ((noisy, functools.partial(_noisy, word=word, confidence=confidence)), (~noisy, _exact)):
             if which.any():
@@ -178,7 +178,7 @@ def _exact(t: Array, z: Array, off: Array, bound: Array, slope: Array) -> dict[s
     u, least = t - t.mean(), rounding(t, z)
     error = bound + least[:, None]
     reach = (abs(u) * error).sum(axis=1) / (u @ u) + least / np.ptp(t)
-    straight = (abs(off) <= 2 * bound + 8 * least[:, None]).all(axis=1)
+    straight = (abs(off) <= moved(t, bound) + 8 * least[:, None]).all(axis=1)
     kind = np.where(straight, np.where(bound.any(axis=1), "bounded", "exact"), "curved")
     low, high, *limits = slope - reach, slope + reach, slope.copy(), slope.copy()
     for i in np.flatnonzero(~straight & (t.size >= FEWEST)):
@@ -188,6 +188,12 @@ def _exact(t: Array, z: Array, off: Array, bound: Array, slope: Array) -> dict[s
         limits[0][i], limits[1][i] = (limit for _, limit, _ in tends(t, local, by_error[[0, -1]]))
     names = ("exponent_low", "exponent_high", "limit_low", "limit_high", "fits", "kind", "noisy")
     return dict(zip(names, (low, high, *limits, straight, kind, 0.0), strict=True))
+
+
+def moved(t: Array, bound: Array) -> Array:
+    """How far errors up to `bound` (m, n) can move points from the straight line that is fitted to them."""
+    u = abs(t - t.mean())
+    return np.asarray(bound + bound.mean(axis=1, keepdims=True) + u * (bound @ u / (u @ u))[:, None])
 
 
 def far_out(t: Array, z: Array) -> tuple[Array, Array, Array, Array, list[tuple[float, float, bool]]]:

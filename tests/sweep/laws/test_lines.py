@@ -110,6 +110,13 @@ def test_the_interval_within_error_bounds_is_all_that_they_can_do_to_a_slope(siz
     assert kind(fit) == ("bounded" if size else "exact")
     assert float(fit.exponent_high + fit.exponent_low) == pytest.approx(-1.4)
     assert float(fit.exponent_high - fit.exponent_low) == pytest.approx(2 * reach, rel=0.01, abs=1e-13)
+    # values with three digits, of which the bounds differ tenfold, are a law
+    y = np.exp(np.random.default_rng(1).uniform(0, 2.3, (300, 1)) - 0.5 * np.linspace(0, 4.6, N))
+    last = 10 ** (np.floor(np.log10(y)) - 2)
+    digits = curve(np.log(np.round(y / last) * last), np.linspace(0, 4.6, N))
+    fit = sweep.fit_exponent(digits, "x", bound=0.505 * last / digits)
+    assert (fit.kind == "bounded").all()
+    assert (abs(fit.exponent + 0.5) <= fit.exponent_high - fit.exponent).all()
 
 
 # kinds of noise
