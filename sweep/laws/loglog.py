@@ -75,7 +75,7 @@ def slope_errors(t: Array, z: Array, bound: Array) -> Array:
     itself there, and where a bend is within a step, so that more points do not tell more, the slopes of the steps
     beside the point. What errors up to `bound` (m, n) in the values can do is added.
     """
-    from scipy.ndimage import maximum_filter1d, median_filter
+    from scipy.ndimage import maximum_filter1d, median_filter, uniform_filter1d
     from scipy.sparse import diags_array
 
     orders = (7, 5, 3) if t.size > 5 else (t.size, max(2, t.size - 2), 2)  # beside few points lower orders
@@ -97,10 +97,17 @@ def slope_errors(t: Array, z: Array, bound: Array) -> Array:
     # the median over six points to each side, which a bend or a spike does not change
     noise = 1.4826 * median_filter(apart_by_noise, (1, 1 + 2 * min(6, (t.size - 1) // 2)), mode="mirror")
     least = np.minimum(noise, 1.4826 * np.median(apart_by_noise, axis=-1, keepdims=True))
+    # noise changes the sign of what seven points say otherwise from point to point, a smooth curve does not; on an
+    # uneven grid that is then no measure of the error, which differs from point to point by far more than that of noise
+    row, rounded = np.arange(t.size), 8.0 * EPSILON * (1.0 + abs(z).max(axis=-1, keepdims=True))
+    signs = np.sign(level @ fine.T - slope) * (-1.0) ** (row - np.clip(row - 2, 0, max(0, t.size - 5)))
+    same = (np.diff(signs, prepend=signs[:, :1]) == 0) | (apart_by_noise <= rounded)
+    smooth = maximum_filter1d(uniform_filter1d(1.0 * same, 13, mode="mirror"), 5, mode="nearest") > 0.7
     # a bend beyond four standard errors, which noise does not reach; few points do not tell it from noise
     few, rises = t.size < 20, maximum_filter1d(apart_by_noise, 5, mode="nearest") > 4.0 * least
-    by_bend = np.maximum(apart, np.where(sharp, np.maximum(*both), coarse if few else 0.0))
-    error = np.maximum(noise * size, np.where(few | rises, maximum_filter1d(by_bend, 5, mode="nearest"), 0.0))
+    by_bend = np.where(smooth, np.sqrt(apart * coarse), 0.0)
+    by_bend = np.maximum(np.maximum(apart, by_bend), np.where(sharp, np.maximum(*both), coarse if few else 0.0))
+    error = np.maximum(noise * size, np.where(few | rises | smooth, maximum_filter1d(by_bend, 5, mode="nearest"), 0.0))
     bar: Array = 2.3 * error + rounding  # 1.96 and what the median, of few points, is too small
     return np.where(_beside_pole(steps) & rises, np.inf, bar) + slope_bounds(t, bound, 5)
 

@@ -313,6 +313,10 @@ def test_the_error_bar_is_above_what_the_sampling_leaves_and_falls_with_it(point
     assert found.exponent_error.max() < 2.0 * (12 / points) ** 3
     constant = sweep.local_exponent(curve(np.log(x), np.full(points, 2.0)), "mu", error=True)
     assert (constant.exponent_error < 1e-13).all()
+    for seed in range(20 if points < 100 else 0):  # uneven spacing, errors far above rounding
+        t = np.sort(np.random.default_rng(seed).uniform(0.0, 5.0, points))
+        found = sweep.local_exponent(curve(t, 0.42 * np.logaddexp(0, (t - 2.5) / 0.7) - t), "mu", error=True)
+        assert (abs(found.exponent + 1 - 0.6 / (1 + np.exp((2.5 - t) / 0.7))) <= found.exponent_error).all()
 
 
 def test_the_error_bar_at_the_middle_of_a_symmetric_bend_is_not_decided_by_rounding():
