@@ -290,6 +290,14 @@ def test_intervals_of_a_collapse_hold_the_truth_and_curves_that_are_not_one_do_n
     assert (held >= 8).all()
     shapes = y * (1 + 0.1 * np.log(y.L) * np.tanh(np.log(y.x)))
     assert int(sweep.fit_collapse(shapes, "x", "L").fits) == 0
+    for seed in range(40):  # nothing is told of a and b apart where f is a power law, whatever the noise
+        noise = np.random.default_rng(seed).standard_normal((5, 32))
+        noise = (noise[:, :-2] + noise[:, 1:-1] + noise[:, 2:] if seed % 2 else noise[:, 2:]) / 100
+        y = xr.DataArray(
+            np.exp(noise), {"L": 10.0 * np.arange(1, 6), "x": np.linspace(1, 50, 30)}, ("L", "x"), name="y"
+        )
+        with pytest.raises(sweep.SweepError, match="a and b are not determined"):
+            sweep.fit_collapse(y * y.L * y.x**-0.5, "x", "L")
 
 
 # the error bar of the local exponent
