@@ -69,7 +69,7 @@ def fit_two_laws(
     Dataset
         `exponent`, `exponent_low`, `exponent_high` along `law` ("low", "high"); `crossover` with its interval, in
         the unit of `dim`; `verdict`: "two laws" where they are beyond doubt, "one law" where one does as well and is
-        not denied as in `fit_exponent`, "three laws", "no power law" where AICc and BIC prefer others to one law by
+        not denied as in `fit_exponent`, "three laws", "no power law" where it is, AICc and BIC prefer others to it by
         more than 10 and two laws are ruled out likewise, or a function that is no power law is not, "no meeting in the
         window", "undecided"; and more, each with a `long_name`. NaN where the verdict is "three laws" or "no power
         law", and of fewer than eight points.
@@ -116,7 +116,7 @@ def _each(t: Array, z: Array, sigma: Array | None = None, *, confidence: float, 
     tried, straight = fitted((ONE, *BENDS, *OTHER_FUNCTIONS, THREE), t, z, sigma), fit_line(t, z, 0 * z, sigma)["fits"]
     for row, laws, line in zip(z, tried, straight, strict=True):
         two, (verdict, evidence) = laws[TWO.name], _verdict(t, laws)
-        if verdict == "one law" and not line:
+        if verdict == ("no power law" if line else "one law"):
             verdict = "undecided"
         noisy = sigma is not None or bool(scatters(t, row[None], two.off[None], 5, noise)[0])
         word = noise if isinstance(noise, str) else "noise" if noisy else "even"

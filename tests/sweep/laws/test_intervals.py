@@ -260,6 +260,8 @@ def test_one_law_is_not_called_two_whatever_its_noise(kind):
     assert int((found.regimes == 2).sum()) <= 1
     for z in -0.5 * axis(61) + noise_of(kind, 61, 5):
         assert sweep.compare_laws(curve(axis(61), z), "mu").attrs["chosen"] == "one law"
+    few = curve(axis(25), 1.1 - 0.5 * axis(25) + noise_of(kind, 25, 50))
+    assert (sweep.fit_two_laws(few, "mu").verdict == "no power law").mean() <= 0.06
 
 
 # other laws
