@@ -128,7 +128,9 @@ def test_a_run_is_that_of_40_digits(seed, terms, sigma, tau_c, tau):
         floor = floor_of(**terms)
         wanted = np.array([1 + mpf(sigma) * mpf(x) for x in correlated(noise(seed, SHORT), tau_c)])
         rate, scatter = scatter_of(*followed([max(torque, floor) for torque in wanted], **terms), tau)
-    found, status = run(sigma=sigma, tau_c=tau_c, seed=seed, half_swings=SHORT, averaging_time=tau, rtol=1e-12, **terms)
+    keys = {"sigma": sigma, "tau_c": tau_c, "seed": seed, "half_swings": SHORT, "averaging_time": tau}
+    rtol = 1e-12 if (wanted <= floor).any() else 1e-13  # the force that the floor leaves has two digits fewer
+    found, status = run(rtol=rtol, **keys, **terms)
     assert found["rate_error_s_per_day"][0] == pytest.approx(rate, rel=1e-10, abs=1e-9)
     assert found["rate_scatter_s_per_day"][0] == pytest.approx(scatter, rel=1e-10, abs=1e-9)
     assert found["truncated"][0] == (wanted <= floor).mean()
