@@ -11,6 +11,7 @@ import math
 from kernels.integrate import carried
 from kernels.integrate.records import Mode
 from kernels.lanes.codes import BAD_INPUT, GRAZING, INACCURATE, OUT_OF_RANGE, REFUSED, STEP_LIMIT, STICKS
+from kernels.lanes.columns import DONE, MOVING, PAUSED
 from kernels.lanes.jit import jit
 from kernels.lanes.symbols import left_a_call, symbolic, taking_symbols
 from kernels.lanes.tuples import any_of, joined, reached, read, total, write
@@ -363,5 +364,5 @@ def advance(m, leg, memory, i):
         if any_lane(done):
             break
     write(memory, i, cell)
-    memory[0, i] = where(paused, 4.0, where(done, 3.0, where(active, 2.0, stage)))
+    memory[0, i] = where(paused, PAUSED, where(done, DONE, where(active, MOVING, stage)))
     return any_lane(done)

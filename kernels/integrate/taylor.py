@@ -18,8 +18,9 @@ from kernels.lanes.vectors import any_lane, exponent, fma, horner, magnitude, ne
 STEP_LIMIT = 10_000
 """Steps between two events after which a cell is given up."""
 PATIENCE = 16
-"""Steps of a leg after which lanes may be paused: a quarter of all or less, for which the others have waited as many
-steps again. Few cells of a thousand that never meet their event, each beside others, took half of the time."""
+"""Steps of a leg from which on it is counted how many wait for a last quarter of the lanes, or less: where these are
+more than half of all its steps, that quarter is paused. Else one cell of a thousand that never meets its event, beside
+others, takes half of the time."""
 HALVINGS = 40
 ROOT_LIMIT = 60
 SLACK = 4.0
