@@ -189,7 +189,7 @@ def onto_kinks(m, cell, left, lanes):
 
 @symbolic
 def arrived(m, cell, found, own, active):
-    """The cell at the end of a leg; which lanes are on an event; the rates there, before rounding misses it.
+    """The cell at the end of a leg; which lanes are on an event.
 
     `own` : what the method carries along, there
     """
@@ -200,10 +200,25 @@ def arrived(m, cell, found, own, active):
         sliding = total(tuple(magnitude(sign) for sign in cell.signs[:-1])) < len(cell.signs) - 1.5
         verdict = where(active & sliding & (found.lost | found.broken), STICKS, verdict)
     moving = active & (cell.verdict < REFUSED) & (verdict < REFUSED) & not_(found.grazing)
-    state, mode = choose(moving, found.state, cell.state), mode_of(cell)
+    state = choose(moving, found.state, cell.state)
+    return cell._replace(
+        verdict=verdict, h=found.h, on=found.on, size=reached(cell.size, found.reach), state=state,
+        time=where(moving, fma(found.t, cell.unit, cell.time), cell.time),
+        since=where(moving, fma(found.t, cell.unit, cell.since), cell.since),
+        steps=where(active, found.tried, cell.steps), before=where(active, cell.steps, cell.before),
+        own=own,
+    ), moving  # fmt: skip
+
+
+@symbolic
+def shaken(m, cell, found, rates, moving):
+    """The cell off its event as rounding may miss it: in a shaken run, and at the end of a slide.
+
+    `rates` : those on the event
+    """
     # for how long rounding may keep open what fires, or by how much it lengthens the way to it
-    longest, rates, size = found.t * cell.unit, m.rates(state, mode), reached(cell.size, found.reach)
-    for extent, rate in zip(size, rates, strict=True):
+    longest, state, mode = found.t * cell.unit, cell.state, mode_of(cell)
+    for extent, rate in zip(cell.size, rates, strict=True):
         memory = REMEMBERED * extent / magnitude(rate)
         longest = where((memory > 0.0) & (memory < longest), memory, longest)
     longest = m.biased * ONE_ULP * longest
@@ -220,14 +235,7 @@ def arrived(m, cell, found, own, active):
         ends = moving & any_of(tuple((magnitude(sign) < 0.5) & (on > 0.5) for sign, on in slides))
         shaken, off = shaken | ends, where(ends & (longest < math.inf), magnitude(off) + longest, off)
     missed = tuple(where(shaken, fma(off, rate, u), u) for rate, u in zip(rates, state, strict=True))
-    return cell._replace(
-        shake=shake, verdict=verdict, h=found.h, on=found.on, size=size,
-        state=choose(shakes, m.states_off(missed, aside), missed),
-        time=where(moving, fma(found.t, cell.unit, cell.time), cell.time),
-        since=where(moving, fma(found.t, cell.unit, cell.since), cell.since),
-        steps=where(active, found.tried, cell.steps), before=where(active, cell.steps, cell.before),
-        own=own,
-    ), moving, rates  # fmt: skip
+    return cell._replace(shake=shake, state=choose(shakes, m.states_off(missed, aside), missed))
 
 
 @symbolic
@@ -354,7 +362,10 @@ def advance(m, leg, memory, i):
     for _ in range(EVENTS):
         moving = active & (cell.verdict < REFUSED)
         found, own = leg(cell, mode_of(cell), moving)
-        cell, moving, rates = arrived(m, cell, found, own, active)
+        cell, moving = arrived(m, cell, found, own, active)
+        rates = m.rates(cell.state, mode_of(cell))
+        if m.speeds is not None or any_lane(moving & (magnitude(cell.shake) > 0.0)):
+            cell = shaken(m, cell, found, rates, moving)
         cell, left, switches, counts, first, met = turned(m, cell, moving)
         if any_lane(switches):
             cell, rates = switched(m, cell, rates, switches, counts, first, met)
