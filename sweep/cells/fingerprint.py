@@ -43,12 +43,11 @@ def fingerprint(study: Study) -> dict[str, str]:
         not in it: kernels give the same bits on each.
     """
     said = _said(study)
-    own = [] if study.kernel_name in catalogue.KERNELS else _own_packages(study.kernel_name.partition(":")[0])
     return {
         "study": hashlib.sha256(json.dumps(said).encode()).hexdigest(),
         **said,
         **{SOURCE + name: _as_begun(name) for name in OURS},
-        **{SOURCE + name: digest for name in own if (digest := _digest(name))},
+        **own_sources(study.kernel_name),
         **{name: version(name) for name in COMPILERS},
     }
 
@@ -96,6 +95,31 @@ def _values(values: Any) -> str:
     digest = hashlib.sha256(values.astype("<f8").tobytes()).hexdigest()[:16]
     ends = short(values[0]) if len(values) == 1 else f"{short(values[0])} to {short(values[-1])}"
     return f"{len(values)} value{'s' * (len(values) > 1)}, {ends} (digest {digest})"
+
+
+def own_sources(kernel_name: str) -> dict[str, str]:
+    """The entries of a user's own packages that a kernel is made of, as this process has loaded them.
+
+    An edit changes neither them nor the numbers that are computed here, until one of their modules is imported anew.
+    """
+    if kernel_name in catalogue.KERNELS:
+        return {}
+    module = kernel_name.partition(":")[0]
+    names, loaded, found = _loaded.get(module, ([module], [], {}))
+    if not loaded or [*map(id, loaded)] != [*map(id, _specs(names))]:
+        names = _own_packages(module)
+        found = {SOURCE + name: digest for name in names if (digest := _digest(name))}
+        _loaded[module] = names, _specs(names), found
+    return found
+
+
+_loaded: dict[str, tuple[list[str], list[Any], dict[str, str]]] = {}
+"""By a kernel's module: its packages, what Python found of their modules as it imported them, and their entries."""
+
+
+def _specs(names: list[str]) -> list[Any]:
+    """What each import of a module of some packages has made anew."""
+    return [vars(m).get("__spec__") for name, m in [*sys.modules.items()] if m and name.partition(".")[0] in names]
 
 
 def _own_packages(module: str) -> list[str]:

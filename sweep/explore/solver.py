@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import inspect
 import threading
 import warnings
@@ -48,10 +49,13 @@ class PointSolver:
         grid = Grid(self._study)
         grid.size = np.iinfo(np.int64).max
         self._solver = Guard(Solver(self._study, grid), _warn)
-        self._solved: Any = namedtuple("solved", self.fields)  # type: ignore[misc]  # as many as the study asks for
+        self._given = study
         self._turn = threading.Lock()  # what is solved is that of the last call
         one = inspect.Parameter.POSITIONAL_OR_KEYWORD
         self._signature = inspect.Signature([inspect.Parameter(name, one) for name in self.names])
+
+    def __reduce__(self) -> Any:
+        return PointSolver, (self._given,)
 
     def __call__(self, *values: Any, **named: Any) -> Any:
         """Outputs and status of cells.
@@ -89,7 +93,19 @@ class PointSolver:
             cells = empty_cells(self._study, columns.shape[1])
             self._solver.solve(0, cells)
         found = (cells[name].reshape(shape + cells[name].shape[1:]) for name in self.fields)
-        return self._solved(*(column if column.ndim else column.item() for column in found))
+        return _solved(self.fields, *(column if column.ndim else column.item() for column in found))
+
+
+def _solved(fields: tuple[str, ...], *values: Any) -> Any:
+    return _record(fields)(*values)
+
+
+@functools.cache
+def _record(fields: tuple[str, ...]) -> Any:
+    """A namedtuple of as many as a study asks for, which other processes can send."""
+    made: Any = namedtuple("solved", fields)  # type: ignore[misc]
+    made.__reduce__ = lambda self: (_solved, (fields, *self))
+    return made
 
 
 def _warn(cell: BadCell) -> None:

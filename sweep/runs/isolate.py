@@ -15,6 +15,7 @@ import signal
 import sys
 import threading
 import time
+from collections.abc import Mapping
 from multiprocessing import forkserver
 from multiprocessing.connection import wait
 from pathlib import Path
@@ -22,6 +23,7 @@ from types import ModuleType
 from typing import Any
 
 from sweep.cells.block import Unsolved, told
+from sweep.cells.fingerprint import difference, own_sources
 from sweep.cells.grid import Grid
 from sweep.cells.schema import STATUS, Columns, columns, empty
 from sweep.cells.solve import Solver
@@ -51,6 +53,7 @@ class Processes:
     def __init__(self, study: Study, limit: float | None, cost: float = 0.0) -> None:
         self.study, self.grid, self.limit, self.cost, self.seconds = study, Grid(study), limit, cost, 0.0
         self._over, self._sampling, self._alone = False, False, threading.Lock()
+        self._words = study.to_json(), own_sources(study.kernel_name)
         self._all, self._idle = set[Any](), list[Any]()
 
     def sampled(self) -> Sample:
@@ -120,20 +123,22 @@ class Processes:
                 with _starting:
                     if self._over:
                         raise SweepError("the run is being stopped")
-                    self._all.add(process := _started(self.study.to_json()))
+                    self._all.add(process := _started(*self._words))
                 reason = _answer(process, LOAD_SECONDS, 0, 0, None)[1]
                 if not reason:
                     return process
             except SweepError:
                 raise
             except Exception as fault:
-                reason = told(fault)
+                reason = f"{told(fault)}; the name of the folder TMPDIR must be short, ulimit -n and -u large enough"
             if process is not None:
                 self._killed(process)
+            if reason.startswith(SweepError.__name__):  # it would be no other the next time
+                break
             time.sleep(0.5)
         raise SweepError(
-            f"{self.study.kernel_name}: no process of its own can be started and load it ({reason}); what is "
-            "finished is kept. The name of the folder TMPDIR must be short, and ulimit -n and -u large enough"
+            f"{self.study.kernel_name}: no process of its own can be started and load it; what is finished is kept "
+            f"({reason})"
         )
 
     def _killed(self, process: Any) -> int | None:
@@ -162,8 +167,8 @@ def _answer(process: Any, limit: float, *words: Any) -> Any:
 _starting = threading.Lock()  # what is done for that is seen by all threads
 
 
-def _started(text: str) -> Any:
-    """A process that solves cells of a study, with its `pipe` and whether it is `compiling`.
+def _started(text: str, sources: Mapping[str, str]) -> Any:
+    """A process that solves cells of a study from the same sources, with its `pipe` and whether it is `compiling`.
 
     It is made by a clean process, for one with threads cannot be copied. It does not run the program again that asks
     for it: kernels are looked up by name, so nothing of `__main__` is needed there. Workers of dask are daemons, which
@@ -176,7 +181,7 @@ def _started(text: str) -> Any:
     (ours, theirs), flag = context.Pipe(), context.RawValue("i")
     try:
         sys.modules["__main__"], flags["daemon"] = ModuleType("__main__"), False
-        process: Any = context.Process(target=_serve, args=(theirs, flag, text), daemon=True)
+        process: Any = context.Process(target=_serve, args=(theirs, flag, text, sources), daemon=True)
         process.start()
     finally:
         sys.modules["__main__"], flags["daemon"] = main, daemon
@@ -185,7 +190,7 @@ def _started(text: str) -> Any:
     return process
 
 
-def _serve(pipe: Any, flag: Any, text: str) -> None:
+def _serve(pipe: Any, flag: Any, text: str, sources: Mapping[str, str]) -> None:
     """In the process: loads the kernel, and solves cells, until nobody asks any more.
 
     It ends with the run, and before the run where the memory is short. Linux kills it with its fork server, also in a
@@ -211,7 +216,11 @@ def _serve(pipe: Any, flag: Any, text: str) -> None:
         while True:
             start, count, wanted = pipe.recv()
             try:
-                solver = solver or Solver(Study.from_json(text, allow_import=True))
+                if solver is None:
+                    study = Study.from_json(text, allow_import=True)
+                    if changed := difference(sources, own_sources(study.kernel_name)):
+                        raise SweepError(f"{changed[0]} since the run began; undo that, or run it anew")
+                    solver = Solver(study)
                 cells = empty(columns(solver.study), count)
                 begun = work_clock()
                 solver.solve(start, cells, wanted)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import itertools
 import json
 import math
@@ -154,6 +155,9 @@ class Study:
 
     def __hash__(self) -> int:
         return hash(self.to_json())
+
+    def __reduce__(self) -> Any:
+        return functools.partial(Study.from_json, allow_import=True), (self.to_json(),)
 
     def __repr__(self) -> str:
         axes = ", ".join(f"{name} ({len(axis)})" for name, axis in self.axes.items())

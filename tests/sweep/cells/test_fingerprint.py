@@ -80,6 +80,11 @@ def package(tmp_path, monkeypatch):
         (tmp_path / name).write_text(text)
     monkeypatch.syspath_prepend(tmp_path)
     yield tmp_path
+    forget()
+
+
+def forget():
+    """The next import reads the files again."""
     for name in [name for name in sys.modules if name.partition(".")[0] in ("ownscenes", "ownhelper")]:
         del sys.modules[name]
 
@@ -100,6 +105,12 @@ def test_an_edit_of_what_a_kernel_of_ones_own_is_made_of_is_named(package, file,
     old = fingerprint(study)
     path = package / file
     path.write_text(path.read_text() + "# edited\n")
+    assert fingerprint(study) == old  # numbers still come of what was read before
+    if told:
+        with pytest.raises(sweep.SweepError, match=f"{told[0]} since the run began"):
+            sweep.run(study, isolate=True, progress=False)
+    forget()
+    study = build(kernel="ownscenes.scene:KERNEL", axes={"height": [1.0]})
     assert difference(old, fingerprint(study)) == told
 
 
@@ -160,11 +171,11 @@ def test_a_fixed_array_counts_whole():
 def test_cells_of_another_version_are_not_extended(package, tmp_path):
     """Another version has another source text, and may give other numbers."""
     output, source = tmp_path / "out.h5", package / "ownscenes" / "scene.py"
-    few, more = (
-        build(kernel="ownscenes.scene:KERNEL", axes={"height": heights}) for heights in ([1.0, 2.0], [1.0, 1.5, 2.0])
-    )
+    few = build(kernel="ownscenes.scene:KERNEL", axes={"height": [1.0, 2.0]})
     sweep.run(few, output, progress=False).close()
     source.write_text(source.read_text() + "# edited\n")
+    forget()
+    more = build(kernel="ownscenes.scene:KERNEL", axes={"height": [1.0, 1.5, 2.0]})
     before = output.read_bytes()
     with pytest.raises(sweep.SweepError, match="cannot be extended"):
         sweep.run(more, output, progress=False, extend=True)

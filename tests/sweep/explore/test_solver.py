@@ -1,5 +1,6 @@
 """A study's kernel as a function: the numbers of the sweep itself, bit for bit, of one cell and of many."""
 
+import pickle
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -80,6 +81,15 @@ def test_a_study_that_is_no_function_of_numbers_is_refused(keys):
     study = build(axes={"height": [1.0], **keys}, **({} if keys else {"summary": {}}))
     with pytest.raises(sweep.SweepError, match="a solver"):
         sweep.solver(study)
+
+
+def test_a_solver_and_what_it_gives_can_be_sent_to_another_process():
+    study = sweep.study({**FOLIOT, "fixed": {"a": 1.0}})
+    clock = pickle.loads(pickle.dumps(sweep.solver(study)))
+    found = clock([1.0, 2.0], phi0=1.0)
+    again = pickle.loads(pickle.dumps(found))
+    assert (again.period == found.period).all()
+    assert pickle.loads(pickle.dumps(study)) == study
 
 
 def test_threads_that_share_a_solver_have_the_values_of_their_own_cells():
