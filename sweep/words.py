@@ -13,7 +13,7 @@ import shutil
 import textwrap
 from collections.abc import Iterable, Sequence
 from html import escape
-from numbers import Integral
+from numbers import Integral, Real
 from pathlib import Path
 from typing import Any
 
@@ -179,6 +179,14 @@ def number(what: str, value: Any) -> float:
         if not isinstance(value, str):
             return float(value)
     raise SweepError(f"{what}: expected a number, found {value!r}")
+
+
+def several(what: str, given: Any) -> list[Any]:
+    """Names or numbers in their order, each once, of several or of one alone. Raises SweepError for what is neither."""
+    found = [given] if isinstance(given, str | Real) or not isinstance(given, Iterable) else [*given]
+    if not all(isinstance(one, str | Real) for one in found):
+        raise SweepError(f"{what}: expected a list of names or numbers, or one alone; found {kind(given)}")
+    return list(dict.fromkeys(found))
 
 
 def whole_number(what: str, value: Any, least: int = 1) -> int:

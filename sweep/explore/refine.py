@@ -39,7 +39,7 @@ from sweep.runs.loop import Task
 from sweep.runs.run import computed
 from sweep.study.model import Axis, Study, frozen
 from sweep.study.read import study as as_study
-from sweep.words import as_path, number, require_dataset, whole_number
+from sweep.words import as_path, number, require_dataset, several, whole_number
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -164,8 +164,7 @@ def refine(
     True
     """
     require_dataset("refine", dataset)
-    study = study or as_study(dataset)
-    names = [y] if isinstance(y, str) else list(y)
+    study, names = as_study(dataset if study is None else study), several("y", y)
     tolerance = number("tolerance", tolerance)
     _require(dataset, study, names, tolerance)
     whole_number("most_cells", most_cells)

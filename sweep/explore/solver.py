@@ -8,7 +8,7 @@ import threading
 import warnings
 from collections import namedtuple
 from dataclasses import replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -103,7 +103,7 @@ def _solved(fields: tuple[str, ...], *values: Any) -> Any:
 @functools.cache
 def _record(fields: tuple[str, ...]) -> Any:
     """A namedtuple of as many as a study asks for, which other processes can send."""
-    made: Any = namedtuple("solved", fields)  # type: ignore[misc]
+    made: Any = cast(Any, namedtuple)("solved", fields)
     made.__reduce__ = lambda self: (_solved, (fields, *self))
     return made
 

@@ -30,7 +30,7 @@ from sweep.runs.run import run
 from sweep.study.model import Study, frozen
 from sweep.study.read import Given
 from sweep.study.read import study as as_study
-from sweep.words import Table, did_you_mean, duration, number, page, paragraph, whole_number
+from sweep.words import Table, did_you_mean, duration, number, page, paragraph, several, whole_number
 
 TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13)
 CELLS = 1024
@@ -111,7 +111,7 @@ def work_precision(
     >>> found.method.values.tolist()
     ['closed', 'asymptotic']
     """
-    tolerances = list(dict.fromkeys(tolerances))
+    tolerances = several("tolerances", tolerances)
     part, names, able = _charted(study, methods, tolerances, cells, reference)
     note(f"methods: {len(names)}, tolerances: {len(tolerances)}, cells: {Grid(part).size} ...")
     if isolate or cell_timeout is not None:
@@ -141,7 +141,7 @@ def _charted(
         raise SweepError(f"rtol: expected numbers above 0 and below 1, found {tolerances}")
     part = sampled(as_study(study), whole_number("cells", cells))
     able = [part.kernel.methods[number].name for number in usable_methods(part)]
-    names = ["auto", *able] if methods is None else list(dict.fromkeys(methods))
+    names = ["auto", *able] if methods is None else several("methods", methods)
     if not able:
         raise SweepError("no method of the kernel can do this study")
     if not names:

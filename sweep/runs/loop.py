@@ -34,7 +34,7 @@ from sweep.runs.extend import Reused
 from sweep.runs.isolate import Processes
 from sweep.runs.progress import Progress, log
 from sweep.study.model import Study
-from sweep.words import as_path, seconds_of, whole_number
+from sweep.words import as_path, kind, seconds_of, whole_number
 
 if TYPE_CHECKING:
     from sweep.runs.cluster import Cluster
@@ -87,6 +87,8 @@ class Task:
                 raise SweepError(f"{self.path}: there is no folder {self.output.parent}")
             if self.path is not None and self.output.is_dir():
                 raise SweepError(f"{self.path} is a folder; name a file in it")
+        if not (self.progress is None or isinstance(self.progress, bool) or hasattr(self.progress, "write")):
+            raise SweepError(f"progress: expected True, False or a stream to print to, found {kind(self.progress)}")
         self.cores = cores() if self.workers is None else whole_number("workers", self.workers)
         if self.block_cells is not None:
             whole_number("block_cells", self.block_cells)
@@ -123,8 +125,8 @@ def deadline(text: str | datetime | None, now: datetime | None = None) -> dateti
         return text and text.astimezone()
     here = (now or datetime.now()).astimezone()
     try:
-        clock = day_time.fromisoformat(text.strip())
-    except (ValueError, AttributeError):
+        clock = day_time.fromisoformat(str(text).strip())
+    except ValueError:
         try:
             return datetime.fromisoformat(str(text).strip()).astimezone()
         except ValueError:

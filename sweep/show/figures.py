@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from itertools import cycle
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -29,7 +28,7 @@ from sweep.show.charts import (
     style,
 )
 from sweep.show.view import View, edges, label, setting
-from sweep.words import require_dataset
+from sweep.words import as_path, require_dataset
 
 HATCHES = ("////", "\\\\\\\\", "....", "xxxx", "----")
 """Patterns of cells without a value, told apart without colour."""
@@ -82,7 +81,7 @@ def plot(
     """
     require_dataset("plot", dataset)
     if path is not None:
-        check_target(Path(path), force=force)
+        check_target(as_path(path), force=force)
     drawn = precision_figure if "reference" in dataset.attrs else laws_figure if "chosen" in dataset.attrs else None
     if drawn and (y or x):
         raise SweepError("y and x choose what is shown of a result; this Dataset has one picture, without them")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 import textwrap
 from collections.abc import Sequence
@@ -18,6 +17,7 @@ from sweep.errors import SweepError
 from sweep.explore.scattered import MOST_AXES, Box, axes_of, interpolated
 from sweep.laws.loglog import is_logarithmic
 from sweep.results.statuses import flag_words, is_summary
+from sweep.study.model import Study
 from sweep.words import did_you_mean, listed
 
 GREEK = frozenset(
@@ -71,7 +71,9 @@ class View:
         name = one_of(y or preferred(dataset, known), known, f"there is no output {y!r} to draw")
         if not dataset[name].size:
             raise SweepError(f"there is nothing to draw: an axis of {name} has no values")
-        fixed = [dataset[name] for name in given(dataset) if name in dataset.coords and not dataset[name].dims]
+        study = Study.of(dataset, declared=True) if "study_json" in dataset.attrs else None
+        given = [p.name for p in study.kernel.parameters if p.name in study.terms] if study else []
+        fixed = [dataset[name] for name in given if name in dataset.coords and not dataset[name].dims]
         if x is None:
             dataset = evened(dataset, axes=2)
         output, cells = dataset[name], dataset["status"].dims if "status" in dataset else ()
@@ -186,15 +188,6 @@ def preferred(dataset: xr.Dataset, outputs: Sequence[str]) -> str:
         if float(column.max() - column.min()) > max(SAME * float(abs(column).max()), ROUNDING * largest):
             return name
     return outputs[0]
-
-
-def given(dataset: xr.Dataset) -> list[str]:
-    """Axes, and parameters that are fixed to something else than their default, as the study of a result has them."""
-    study = json.loads(str(dataset.attrs.get("study_json", "{}")))
-    defaults = {field["name"]: field.get("default") for field in study.get("kernel", {}).get("parameters", ())}
-    fixed = {name: study["fixed"].get(name) for name in defaults}
-    usual = {name: fixed.get(default, default) for name, default in defaults.items()}
-    return [name for name, value in fixed.items() if value is None or value != usual[name]]
 
 
 def coordinate(y: xr.DataArray, name: str) -> xr.DataArray:

@@ -251,7 +251,8 @@ class Study:
             kernel["methods"] = tuple(Method(solve=_missing, **method) for method in kernel["methods"])
             study = cls(**keys | {"kernel": Kernel(**kernel)})
         except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
-            raise SweepError(f"not the JSON of a study: {type(error).__name__} {error}") from None
+            what = f"study_json is not the JSON of a study ({type(error).__name__}: {error})"
+            raise SweepError(f"{what}; take the result as it was read") from None
         return study if declared else dataclasses.replace(study, kernel=load_kernel(study.kernel_name, allow_import))
 
     @classmethod

@@ -242,9 +242,10 @@ def test_no_more_cells_are_taken_than_are_wanted():
     ("options", "word"),
     [
         ({"methods": ["exakt"]}, "did you mean exact"),
-        ({"methods": []}, "methods"),
+        *(({"methods": methods}, "methods") for methods in ([], object(), [["exact"]])),
+        ({"methods": 3}, "no method 3"),
         ({"reference": "magic"}, "magic"),
-        *(({"tolerances": tolerances}, "rtol") for tolerances in ([0.0], [np.nan], [np.inf], [])),
+        *(({"tolerances": tolerances}, "rtol") for tolerances in ([0.0], [np.nan], [np.inf], [], "1e-3", 2)),
         ({"cells": 0}, "cells"),
         ({"truth": {"impact_sped": [1.0] * 4}}, "impact_speed"),
         ({"truth": {"impact_speed": [1.0] * 3}}, r"\(4,\)"),

@@ -61,6 +61,7 @@ def test_cells_that_are_cheap_beside_a_call_are_solved_by_few_calls():
     [
         *(({"workers": number}, "workers") for number in (0, -1, True, 1.5)),
         ({"block_cells": 0}, "block_cells"),
+        *(({"progress": stream}, "progress") for stream in ("yes", 3, [])),
         ({"until": "07:00"}, "path"),
         ({"extend": True, "retry_failed": True}, "retry_failed"),
         ({"workers": 2, "cluster": "tcp://127.0.0.1:1"}, "cluster"),

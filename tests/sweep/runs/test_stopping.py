@@ -94,7 +94,7 @@ def test_a_time_of_day_is_the_next_one_and_a_date_that_moment():
         assert deadline(text, now) == now + timedelta(hours=hours)
 
 
-@pytest.mark.parametrize("text", ["7 o'clock", "", "25:00", 7])
+@pytest.mark.parametrize("text", ["7 o'clock", "", "25:00", 7, b"07:00"])
 def test_what_is_no_time_is_told(text, tmp_path):
     with pytest.raises(SweepError, match="until"):
         quiet(tall(3), tmp_path / "out.h5", until=text)

@@ -160,6 +160,10 @@ def test_an_unknown_output_or_axis_is_refused_with_those_there_are(keys, word):
         plot(dataset(mu=log(5), method=["map", "closed"]), **keys)
     with pytest.raises(SweepError, match="no values"):
         plot(dataset(mu=[]))
+    with pytest.raises(SweepError, match="study_json"):
+        plot(dataset(mu=log(5)).assign_attrs(study_json="garbage"))
+    with pytest.raises(SweepError, match="expected a path"):
+        plot(dataset(mu=log(5)), 3)
 
 
 @pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])
