@@ -96,6 +96,11 @@ def _block(keys: Entry, kernel: Kernel) -> tuple[dict[str, Axis], Block]:
     if not given.value and given.good():
         given.wrong(f"missing; give at least one, e.g. axes.mu = {EXAMPLE}")
     design, options = _design(keys["design"], len(given.value)) if "design" in keys else ("product", {})
+    said = [entry.get("num") for entry in given.value.values() if isinstance(entry, Mapping)] * (design == "product")
+    if (cells := math.prod(num for num in said if isinstance(num, int) and num > 0)) > LARGEST_GRID:
+        given.wrong(f"{cells:.3g} cells; a study may have at most {LARGEST_GRID:.0e}")
+        given.mistakes.unread = True
+        return {}, Block(design, ())
     sampled, shares = design in GENERATORS, np.full((len(given.value), 1), 0.5)
     if options and given.value:  # else anywhere: the design has a mistake
         shares = keys["design"].read(shares, lambda _: _unit_points(design, len(given.value), **options).T)

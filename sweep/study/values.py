@@ -14,6 +14,7 @@ import operator
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from decimal import Context, Decimal, localcontext
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -163,25 +164,29 @@ def _spaced(entry: Entry, field: Field, factor: Decimal | None, shares: Floats |
         entry["stop"].wrong(f"equals start; for a single value write values = [{start:g}]")
     if spacing is None or len(entry.mistakes) > before:
         return NONE
-    decimals: Iterable[Decimal]
+    exact: Iterable[Decimal | float]
     with localcontext(DIGITS):
         first, last = (_decimal(end) * (factor or 1) for end in (start, stop))
+        ends = float(first), float(last)
+        if not all(math.isfinite(end) and (end or spacing == "linear") for end in ends):
+            entry.wrong(f"{start:g} to {stop:g} leaves the range of float64 once converted to the kernel's unit")
+            return NONE
         steps = 0 if shares is not None else int(num) - 1
         if shares is not None and spacing == "linear":
-            decimals = (first + (last - first) * Decimal(share) for share in shares.tolist())
+            exact = (first + (last - first) * Decimal(share) for share in shares.tolist())
         elif shares is not None:
             logarithm = (last / first).ln()
-            decimals = (first * (Decimal(share) * logarithm).exp() for share in shares.tolist())
+            exact = (first * (Decimal(share) * logarithm).exp() for share in shares.tolist())
         elif spacing == "linear":
-            decimals = ((first * (steps - i) + last * i) / steps for i in range(steps + 1))
+            # whole numbers over a common denominator, a division of which is rounded once
+            low, high = Fraction(first), Fraction(last)
+            denominator = math.lcm(low.denominator, high.denominator)
+            begin, step, below = int(low * denominator) * steps, int((high - low) * denominator), denominator * steps
+            exact = ((begin + step * i) / below for i in range(steps + 1))
         else:
             ratios = itertools.repeat((last / first) ** (1 / Decimal(steps)), steps - 1)
-            decimals = itertools.chain(itertools.accumulate(ratios, operator.mul, initial=first), [last])
-        values = np.fromiter(map(float, decimals), np.float64)
-    if np.isfinite(values).all() and (spacing == "linear" or values.all()):
-        return values
-    entry.wrong(f"{start:g} to {stop:g} leaves the range of float64 once converted to the kernel's unit")
-    return NONE
+            exact = itertools.chain(itertools.accumulate(ratios, operator.mul, initial=first), [last])
+        return np.fromiter(map(float, exact), np.float64)
 
 
 def _list(entry: Entry, field: Field, rows: bool = False) -> Floats:

@@ -60,9 +60,7 @@ def test_a_misspelt_name_is_checked_as_the_one_that_is_meant():
 
 def test_too_many_values_or_cells_are_refused_before_memory_is_asked_for(mistakes):
     axis = '{{ spacing = "linear", start = 1, stop = 2, num = {} }}'
-    found = mistakes(
-        f"axes.height = {axis.format(30_000)}\naxes.v0 = {axis.format(20_000)}\naxes.g = {axis.format(10_000)}"
-    )
+    found = mistakes("\n".join(f"axes.{name} = {axis.format(10**7)}" for name in ("height", "v0", "g")))
     assert "at most 1e+12" in found["axes"]
     assert "10000001" in message_of(lambda: build(axes={"height": range(10_000_001)}), "axes.height")
 
