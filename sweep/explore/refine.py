@@ -210,6 +210,8 @@ def _require(dataset: xr.Dataset, study: Study, names: Sequence[str], tolerance:
         raise SweepError("only a product of axes can be refined, or what was refined before")
     if len(axes) > MOST_AXES:
         raise SweepError(f"at most {MOST_AXES} axes can be refined, found {len(axes)}; fix the others")
+    if dataset[STATUS].dims == tuple(study.axes) and not all(dataset.indexes[axis.name].is_unique for axis in axes):
+        raise SweepError("an axis has a value twice; take one of each, e.g. by ds.drop_duplicates(...)")
     if any(np.unique(dataset[axis.name]).size < 2 for axis in axes):
         raise SweepError("an axis to be refined needs at least two values")
     if not all(np.isfinite(axis.values).all() for axis in axes):

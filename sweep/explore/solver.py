@@ -81,7 +81,10 @@ class PointSolver:
         try:
             if named or len(values) != len(self.names):
                 values = self._signature.bind(*values, **named).args
-            given = (in_unit(value, *of) for value, of in zip(values, self._units, strict=True))
+            given = [np.asarray(in_unit(value, *of)) for value, of in zip(values, self._units, strict=True)]
+            for name, column in zip(self.names, given, strict=True):
+                if column.dtype.kind not in "fiub":
+                    raise TypeError(f"{name} is no number")
             points = np.array(np.broadcast_arrays(*given), np.float64)
         except (TypeError, ValueError) as error:
             expected = listed(self.names, word="and")

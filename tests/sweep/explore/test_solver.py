@@ -64,7 +64,7 @@ def test_arrays_are_broadcast_traces_come_behind_and_no_call_changes_what_an_ear
         ((1.0, 2.0, 3.0), {}, "too many"),
         ((1.0,), {"hight": 2.0}, "for height and v0"),
         ((1.0,), {"height": 2.0}, "multiple values"),
-        (("x", 1.0), {}, "numbers"),
+        *(((value, 1.0), {}, "height is no number") for value in ("1.0", None, np.datetime64("2020-01-01"), 10**400)),
         ((1.0, [2.0, 1j]), {}, "v0 is complex"),
         (([1.0, 2.0], [1.0, 2.0, 3.0]), {}, "numbers"),
         ((xr.DataArray(1.0, attrs={"units": "kg"}), 1.0), {}, "mass"),
