@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import io
 import os
 import signal
 import sys
@@ -28,6 +29,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     int
         One of `EXIT_CODES`.
     """
+    if argv is None and isinstance(sys.stdout, io.TextIOWrapper):  # what a terminal cannot show is written out, as \xfc
+        sys.stdout.reconfigure(errors="backslashreplace")
     arguments, ended = parser().parse_args(argv), Outcome(COMPLETE, "")
     try:
         if argv is None and arguments.command is solve.run:  # which ends in its own words from the first moment on
