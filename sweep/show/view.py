@@ -71,9 +71,7 @@ class View:
         name = one_of(y or preferred(dataset, known), known, f"there is no output {y!r} to draw")
         if not dataset[name].size:
             raise SweepError(f"there is nothing to draw: an axis of {name} has no values")
-        study = Study.of(dataset, declared=True) if "study_json" in dataset.attrs else None
-        given = [p.name for p in study.kernel.parameters if p.name in study.terms] if study else []
-        fixed = [dataset[name] for name in given if name in dataset.coords and not dataset[name].dims]
+        fixed = [dataset[name] for name in given(dataset) if name in dataset.coords and not dataset[name].dims]
         if x is None:
             dataset = evened(dataset, axes=2)
         output, cells = dataset[name], dataset["status"].dims if "status" in dataset else ()
@@ -188,6 +186,14 @@ def preferred(dataset: xr.Dataset, outputs: Sequence[str]) -> str:
         if float(column.max() - column.min()) > max(SAME * float(abs(column).max()), ROUNDING * largest):
             return name
     return outputs[0]
+
+
+def given(dataset: xr.Dataset) -> list[str]:
+    """Axes, and parameters that are fixed to something else than their default, as the study of a result has them."""
+    if "study_json" not in dataset.attrs:
+        return []
+    study = Study.of(dataset, declared=True)
+    return [p.name for p in study.kernel.parameters if p.default is None or p.name in study.terms]
 
 
 def coordinate(y: xr.DataArray, name: str) -> xr.DataArray:
