@@ -22,7 +22,7 @@ perturbation of the quadratic eigenvalue problem, derived here.
 """
 
 from kernels.drivetrain import _holzer
-from kernels.drivetrain._chain import TURN, extremes
+from kernels.drivetrain._chain import CHAIN_ROUNDING, NORMAL_LOW, TURN, extremes
 from kernels.drivetrain._holzer import FLEXIBILITY, SHAPE, STRAIN
 from kernels.lanes.addresses import jit_by_address
 from kernels.lanes.jit import jit_apart
@@ -40,16 +40,17 @@ _SETTLED = 1e-12  # correction over root
 _NEAR = 1e-6  # step over root, above which another joint may do better
 _TWIN = 2.0**-20  # below which rounding moves a double root
 _LIGHT = 0.03
+_TURN = 1e-3
+_SAME = 4e-16
 
 
 @jit_apart
-def _start(n, j, w, half, s):
-    """Roots of mode j, s^2 + 2 half s + w^2 = 0, turned a little so that none is real and no two are equal."""
+def _of_mode(j, w, half, turn, s):
+    """Roots of mode j, s^2 + 2 half s + w^2 = 0, turned by as little as `turn` so that no two are equal."""
     rest = (w - half) * (w + half)
     far = -half - sqrt(-rest) if rest < 0.0 else -half
     near = w * w / far if rest < 0.0 else -half
     up = sqrt(rest) if rest > 0.0 else 0.0
-    turn = 1e-3 * (1.0 + j / n)
     s[2 * j] = complex(near - turn * up, up - turn * near)
     s[2 * j + 1] = complex(far - 0.7 * turn * up, 0.7 * turn * far - up)
 
@@ -223,6 +224,27 @@ def _refine(n, J, k, h, fixed, s, errors, ways, e):
 
 
 @jit_apart
+def _by_proportion(n, k, h, f, fixed, s):
+    """Where h = b k, poles by s^2 + b w^2 s + w^2 = 0 of each mode; a bound on their errors, inf where h is not.
+
+    Of stiff modes a pole each is next to -1/b, too close together to be told apart as roots of the determinant.
+    """
+    b, worst = h[0] / k[0], 0.0
+    for j in range(n):
+        if not (magnitude(h[j] - b * k[j]) <= _SAME * h[j] and b > NORMAL_LOW):
+            return float("inf")
+    for j in range(n):
+        w, half = TURN * f[j], 0.5 * b * (TURN * f[j]) ** 2
+        _of_mode(j, w, half, 0.0, s)
+        if 2 * j >= fixed:
+            root = sqrt(magnitude((w - half) * (w + half)))
+            worst = max(worst, CHAIN_ROUNDING * (3.0 * half + w) / root if root > 0.0 else float("inf"))
+    for i in range(fixed):
+        s[i] = 0.0j
+    return worst
+
+
+@jit_apart
 def undamped_poles(chain):
     """Poles on the imaginary axis."""
     for i in range(chain.f.size):
@@ -244,13 +266,15 @@ def poles_of_chain(chain, n, room):
     fixed = 0 if k[n - 1] > 0.0 else 1 if h[n - 1] > 0.0 else 2
     for j in range(n):
         solid, viscous, _ = _holzer.mode(n, J, k, h, TURN * f[j], room.ways, room.e)
-        _start(n, j, TURN * f[j], 0.5 * viscous / solid, s)
+        _of_mode(j, TURN * f[j], 0.5 * viscous / solid, _TURN * (1.0 + j / n), s)
     for i in range(fixed):
         s[i] = 0.0j
     settled = _approach(_newton_of_chain, (n, J, k, h), fixed, s, room.work)
     error = _refine(n, J, k, h, fixed, s, room.work, room.waves, room.e)
+    if not (settled and error < float("inf")):
+        error = _by_proportion(n, k, h, f, fixed, s)
     complete = _in_pairs(fixed, 0.0, s, room.pairs)
-    return error if settled and complete and strongest < REACH else float("inf")
+    return error if complete and strongest < REACH else float("inf")
 
 
 @jit_apart
@@ -278,7 +302,7 @@ def modal_poles(p, modes, free, s, room):
     """
     fixed = 0 if not free else 1 if modes.C[0, 0] > 0.0 else 2
     for i in range(p):
-        _start(p, i, modes.w[i], 0.5 * modes.C[i, i], s)
+        _of_mode(i, modes.w[i], 0.5 * modes.C[i, i], _TURN * (1.0 + i / p), s)
     for i in range(fixed):
         s[i] = 0.0j
     model = p, modes.w, modes.C, modes.A, modes.B

@@ -110,6 +110,15 @@ def test_damping_is_that_of_the_poles_to_rtol_or_the_cell_says_that_it_is_not(ki
             assert relative_error(np.sort(row), truth).max() <= rtol
 
 
+def test_poles_next_to_each_other_by_damping_in_proportion_to_the_springs_are_told_apart():
+    J, k = 10.0 ** np.random.default_rng(1).uniform(-3, 3, (2, 200, 4))
+    _, found, status = solved(J, k, 50.0 * k)
+    assert (status == Status.OK).all()
+    for i in range(0, 200, 50):
+        poles = sorted(oracles.poles(J[i], k[i], 50.0 * k[i]), key=abs)
+        assert relative_error(np.sort(found[i]), sorted(reduction_oracles.dampings(poles))).max() <= 1e-9
+
+
 def nearly_critical(share):
     """A chain with proportional damping, whose lowest mode has 1 + share of the critical one."""
     J, k = chains("plain", 3, 1, 4)
