@@ -234,7 +234,7 @@ def _by_proportion(n, k, h, f, fixed, s):
         if not (magnitude(h[j] - b * k[j]) <= _SAME * h[j] and b > NORMAL_LOW):
             return float("inf")
     for j in range(n):
-        w, half = TURN * f[j], 0.5 * b * (TURN * f[j]) ** 2
+        w, half = TURN * f[j], 0.5 * b * (TURN * f[j]) * (TURN * f[j])
         _of_mode(j, w, half, 0.0, s)
         if 2 * j >= fixed:
             root = sqrt(magnitude((w - half) * (w + half)))

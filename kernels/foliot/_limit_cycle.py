@@ -244,7 +244,7 @@ def cycles(manner, cells, rtol, asked):
         i, now, used, stage = s.index.astype(int), s.v, s.tolerance, s.stage
 
         # the half swings; Newton's step of each, and the cycle by it
-        rows, verdict = manner.follow(s, (s.linear > 0.0) & ((stage == SEARCH) | (not tangents)))
+        rows, verdict = manner.follow(s, (s.linear > 0.0) & ((stage < ROUGH) | (not tangents)))
         by = Found(*rows[: -len(asked)], rows[-len(asked) :])
         many, gap, onward = verdict == Status.STEP_LIMIT, 1.0 - by.slope, by.change / by.end
         free, step = np.isfinite(onward + by.slope) & ~many, np.abs(onward)
