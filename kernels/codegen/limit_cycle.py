@@ -276,7 +276,7 @@ class Search:
             return
         times, count = EARLIEST * 4.0 ** np.arange(TIMES), len(left)
         columns = *self.cycles.parameters[:, left], np.full(count, times[-1]), np.full(count, float(TIMES))
-        followed = solver(clocked(self.map.own), self.map.method, again=False)
+        followed = solver(clocked(self.map.own), self.map.method, sure=False)
         rows, status, _ = followed(columns, np.full(count, TIGHT * self.map.fine), times)
         ended = status > Status.INACCURATE
         z = np.where(ended, np.nan, rows[2 : 2 + len(self.last)])

@@ -63,15 +63,19 @@ SLIDERS = {"taylor": ("dop853", "rodas5p")}
 """Methods by which a method follows what slides along a kink, where that is not itself."""
 
 
-def solver(scene, method, again=True):
+def solver(scene, method, again=True, sure=True):
     """The function of columns, rtol and, maybe, stops that solves cells by a method: results, statuses and errors.
 
     Results are rows as those of `followed`; an error is what the results of a cell, at a stop, are right to, infinite
     or NaN where that is not known.
     `again` : whether what three runs leave unsure is followed with tighter tolerances
+    `sure` : whether errors are wanted; else cells are followed once
     """
 
     def how(columns, rtol, stops=None):
+        if not sure:
+            results, status = once(runner(scene, "told" if method == "taylor" else method), columns, rtol, stops)
+            return results, status, 0.0 * results[-1]
         if method == "taylor":
             return by_error(runner(scene, "told"), columns, rtol, 0.0 if again else np.inf, stops)
         return by_runs(runner(scene, method), columns, rtol, TIGHTEST if again else np.inf, stops)
@@ -116,9 +120,9 @@ def some_stop(condition):
     return np.atleast_2d(condition).any(axis=0)
 
 
-def once(one, columns, rtol):
+def once(one, columns, rtol, stops=None):
     """Results and status by one run, each step right to `rtol`."""
-    results = followed(one, columns, rtol)
+    results = followed(one, columns, rtol, stops=stops)
     return results, status_of(results, one.outputs)
 
 
