@@ -49,7 +49,7 @@ LEAST_FRICTION = 0.01
 PAIRS = 64
 """Pairs of random numbers that are made at a time."""
 
-_COUNTABLE = 2.0**50
+_COUNTABLE, _ROUNDING = 2.0**50, 2.0**-51
 _WILDEST = 1e100
 """Noise beyond which squares of speeds leave float64."""
 
@@ -57,15 +57,15 @@ Clock = namedtuple("Clock", "scene sigma sigma_a remembered fresh least grip nom
 """What a half swing needs: (1) in units of mu, the floor less 1, 1 - rho_s, T and the averaging time in those of the
 scene."""
 
-Run = namedtuple("Run", "x apart speed t gain truncated closed reading rate squares")
-"""x, x' and the speed, t and D of (2) after a half swing, and how many had their torque raised to the floor; how many
-averaging times are closed, D at the end of the last, its y, and the sum of squares in (3)."""
+Run = namedtuple("Run", "x apart speed gain truncated closed since lead rate squares")
+"""x, x', the speed and D of (2) after a half swing, and how many had their torque raised to the floor; how many
+averaging times are closed, the time since, the change of D since, y of the last, and the sum of squares in (3)."""
 
 
 @jit_call
 def _beat(run, z, z_apart, clock):
     """One half swing with the torque of (1), and whether it comes to the switch."""
-    begun = run.t > 0.0
+    begun = run.closed + run.since > 0.0
     x = where(begun, fma(clock.remembered, run.x, clock.fresh * z), z)
     apart = where(begun, fma(clock.remembered, run.apart, clock.fresh * z_apart), z_apart)
     more = clock.sigma * x  # torque less mu, of which friction may leave little
@@ -77,21 +77,22 @@ def _beat(run, z, z_apart, clock):
     start = scene.e * run.speed
     legs = _linear_swing.half_swing(more, scene, start)
     goes_on = legs.comes & ((start < 0.0) | (fma(scene.kappa, legs.top, more) > -clock.grip))
-    later = run.t + legs.time
-    closed, reading, rate, squares, tau = run.closed, run.reading, run.rate, run.squares, clock.tau
-    passes = later >= (closed + 1.0) * tau
+    closed, since, rate, squares, tau = run.closed, run.since + legs.time, run.rate, run.squares, clock.tau
+    gained = clock.nominal - legs.time
+    lead, passes = run.lead + gained, since >= tau
     if any_lane(passes):  # averaging times end within the half swing; those that lie wholly within it share one y
-        slope, ratio = (clock.nominal - legs.time) / legs.time, later / tau
-        until = nearest(ratio)
-        until = where(until > ratio, until - 1.0, until)
-        first = (fma(slope, (closed + 1.0) * tau - run.t, run.gain) - reading) / tau
+        slope, ratio = gained / legs.time, since / tau
+        ended = nearest(ratio)
+        ended = where(ended > ratio, ended - 1.0, ended)
+        first = fma(slope, tau - run.since, run.lead) / tau
         total = where(closed > 0.0, fma(first - rate, first - rate, squares), squares)
-        more = until > closed + 1.0
+        more = ended > 1.0
         total = where(more, fma(slope - first, slope - first, total), total)
-        ended = until, fma(slope, until * tau - run.t, run.gain), where(more, slope, first), total
-        closed, reading, rate, squares = choose(passes, ended, (closed, reading, rate, squares))
-    truncated, gain = where(short, run.truncated + 1.0, run.truncated), run.gain + (clock.nominal - legs.time)
-    return Run(x, apart, legs.speed, later, gain, truncated, closed, reading, rate, squares), goes_on
+        rest = fma(-ended, tau, since)
+        behind = closed + ended, rest, slope * rest, where(more, slope, first), total
+        closed, since, lead, rate, squares = choose(passes, behind, (closed, since, lead, rate, squares))
+    truncated = where(short, run.truncated + 1.0, run.truncated)
+    return Run(x, apart, legs.speed, run.gain + gained, truncated, closed, since, lead, rate, squares), goes_on
 
 
 @jit_call
@@ -154,7 +155,7 @@ def segments(first, columns, radii, turns, radii_apart, turns_apart):
     runs = tame & (found < FIRST_REFUSAL) & (spare > 0.0)
     numbers = radii, turns, radii_apart, turns_apart
     run, stopped = _run(first, columns.seed, columns.half_swings, clock, cycle.speed, runs, *numbers)
-    t, enough = where(runs, run.t, 1.0), run.closed > 1.0
+    t, enough = where(runs, fma(run.closed, tau, run.since), 1.0), run.closed > 1.0
     deviation = sqrt(run.squares / (2.0 * where(enough, run.closed - 1.0, 1.0)))
     columns.rate_error_s_per_day[i] = SECONDS_PER_DAY * run.gain / t
     columns.rate_scatter_s_per_day[i] = where(enough, SECONDS_PER_DAY * deviation, math.nan)
@@ -167,6 +168,8 @@ def segments(first, columns, radii, turns, radii_apart, turns_apart):
     passed_on = energy / (cycle.speed * cycle.speed * (1.0 - e * e * kept))
     enough_digits = columns.rtol[i] * where(run.truncated > 0.0, HEADROOM, 1.0)
     accurate = (late + magnitude(longer * start) * passed_on) / cycle.half_period <= enough_digits
+    # and of the scatter: averaging times end where time has been rounded
+    accurate = accurate & (_ROUNDING * run.closed * deviation <= columns.rtol[i])
 
     verdict = where(enough, where(magnitude(found - NOT_SELF_STARTING) > 0.0, OK, found), TOO_SHORT)
     verdict = where(stopped | not_(spare > 0.0), STICKS, where(accurate, verdict, INACCURATE))
