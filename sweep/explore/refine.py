@@ -168,7 +168,15 @@ def refine(
     tolerance = number("tolerance", tolerance)
     _require(dataset, study, names, tolerance)
     whole_number("most_cells", most_cells)
-    rounds, numbers = _folder_of_rounds(path, dataset, force), itertools.count(1)
+    rounds, numbers, source = None, itertools.count(1), dataset.encoding.get("source")
+    if path is not None:  # the rounds on the way to a file are kept beside it
+        target = as_path(path)
+        check_target(target, force=force, read=[Path(source)] if source else [])
+        rounds = target.with_name(f"{target.name}.rounds")
+        with disk.refusing(target):
+            if force:
+                shutil.rmtree(rounds, ignore_errors=True)
+            rounds.mkdir(exist_ok=True)
     options: dict[str, Any] = {"workers": workers, "isolate": isolate, "cell_timeout": cell_timeout}
 
     def study_of(values: Mapping[str, Array], design: str = "zip") -> Study:
@@ -219,20 +227,6 @@ def _require(dataset: xr.Dataset, study: Study, names: Sequence[str], tolerance:
     for name in names:
         if name not in study.outputs or name not in dataset or dataset[name].dims != dataset[STATUS].dims:
             raise SweepError(f"{name}: is no output of one value a cell")
-
-
-def _folder_of_rounds(path: str | os.PathLike[str] | None, dataset: xr.Dataset, force: bool) -> Path | None:
-    """Where the rounds on the way to a result are kept. Raises SweepError where it is not to be written."""
-    if path is None:
-        return None
-    target, source = as_path(path), dataset.encoding.get("source")
-    check_target(target, force=force, read=[Path(source)] if source else [])
-    rounds = target.with_name(f"{target.name}.rounds")
-    with disk.refusing(target):
-        if force:
-            shutil.rmtree(rounds, ignore_errors=True)
-        rounds.mkdir(exist_ok=True)
-    return rounds
 
 
 class Refiner:

@@ -112,7 +112,18 @@ def work_precision(
     ['closed', 'asymptotic']
     """
     tolerances = several("tolerances", tolerances)
-    part, names, able = _charted(study, methods, tolerances, cells, reference)
+    if not tolerances or not all(0 < number("rtol", rtol) < 1 for rtol in tolerances):
+        raise SweepError(f"rtol: expected numbers above 0 and below 1, found {tolerances}")
+    part = sampled(as_study(study), whole_number("cells", cells))
+    able = [part.kernel.methods[number].name for number in usable_methods(part)]
+    names = ["auto", *able] if methods is None else several("methods", methods)
+    if not able:
+        raise SweepError("no method of the kernel can do this study")
+    if not names:
+        raise SweepError(f"methods: expected at least one of auto, {', '.join(able)}; found none")
+    for name in {*names, reference or able[0]} - {"auto", *able} | {reference} & {"auto"}:
+        hint = did_you_mean(name, able) or f"; there are auto, {', '.join(able)}"
+        raise SweepError(f"no method {name} that can do this study{hint}")
     note(f"methods: {len(names)}, tolerances: {len(tolerances)}, cells: {Grid(part).size} ...")
     if isolate or cell_timeout is not None:
         part = _without_failing(part, ["auto", *able], cell_timeout, note)
@@ -131,25 +142,6 @@ def work_precision(
     about = {"title": part.title, "kernel": part.kernel_name}
     found = xr.Dataset(columns, {"method": names, "rtol": tolerances}, {**about, **basis})
     return found.assign_attrs(omissions="; ".join(_omissions(found, part, able if methods is None else None)))
-
-
-def _charted(
-    study: Given, methods: Sequence[str] | None, tolerances: Sequence[float], cells: int, reference: str | None
-) -> tuple[Study, list[str], list[str]]:
-    """The cells that are taken, the methods that are charted, and all that can do them. Raises SweepError."""
-    if not tolerances or not all(0 < number("rtol", rtol) < 1 for rtol in tolerances):
-        raise SweepError(f"rtol: expected numbers above 0 and below 1, found {tolerances}")
-    part = sampled(as_study(study), whole_number("cells", cells))
-    able = [part.kernel.methods[number].name for number in usable_methods(part)]
-    names = ["auto", *able] if methods is None else several("methods", methods)
-    if not able:
-        raise SweepError("no method of the kernel can do this study")
-    if not names:
-        raise SweepError(f"methods: expected at least one of auto, {', '.join(able)}; found none")
-    for name in {*names, reference or able[0]} - {"auto", *able} | {reference} & {"auto"}:
-        hint = did_you_mean(name, able) or f"; there are auto, {', '.join(able)}"
-        raise SweepError(f"no method {name} that can do this study{hint}")
-    return part, names, able
 
 
 def _without_failing(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from kernels.interface import KINDS, Status
+from sweep.cells import partition
 from sweep.cells.reduce import BY_METHOD, BY_STATUS
 from sweep.cells.schema import METHOD_USED, STATUS
 from sweep.errors import SweepError
@@ -166,14 +166,10 @@ def _counts(dataset: Cells, by_word: str, codes: str, words: Mapping[int, str]) 
 
 
 def boxes(shape: Sequence[int], most: int = NUMBERS_AT_ONCE) -> Iterator[tuple[slice, ...]]:
-    """Boxes of at most so many places, in C order: a run along one dimension, whole ones behind it."""
-    steps: list[int] = []
-    inner = 1
-    for length in reversed(shape):
-        steps.insert(0, max(1, min(length, most // max(1, inner))))
-        inner *= length
-    for corner in itertools.product(*(range(0, length, step) for length, step in zip(shape, steps, strict=True))):
-        yield tuple(slice(start, start + step) for start, step in zip(corner, steps, strict=True))
+    """Boxes of about so many places, in C order: a run along one dimension, whole ones behind it."""
+    if 0 not in shape:
+        blocks = partition.boxes(tuple(shape), most)
+        yield from (partition.box_slices(tuple(shape), *blocks.bounds(block)) for block in range(blocks.count))
 
 
 def pieces(dataset: xr.Dataset, dims: Sequence[Hashable], most: int = NUMBERS_AT_ONCE) -> Iterator[xr.Dataset]:
