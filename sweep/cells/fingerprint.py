@@ -26,11 +26,6 @@ OURS = ("kernels", "sweep.cells", "sweep.study")
 SOURCE = "source "
 
 
-def is_of_program(name: str) -> bool:
-    """Whether an entry of a fingerprint tells of the program, not of the study."""
-    return name.startswith(SOURCE) or name in COMPILERS
-
-
 def fingerprint(study: Study) -> dict[str, str]:
     """Everything that decides the numbers of a result, as texts: equal fingerprints, equal bits.
 
@@ -42,10 +37,10 @@ def fingerprint(study: Study) -> dict[str, str]:
         that a kernel "module:NAME" is made of among them, and the versions of compiler and arrays. The processor is
         not in it: kernels give the same bits on each.
     """
-    said = _said(study)
+    of_study = said(study)
     return {
-        "study": hashlib.sha256(json.dumps(said).encode()).hexdigest(),
-        **said,
+        "study": hashlib.sha256(json.dumps(of_study).encode()).hexdigest(),
+        **of_study,
         **{SOURCE + name: _as_begun(name) for name in OURS},
         **own_sources(study.kernel_name),
         **{name: version(name) for name in COMPILERS},
@@ -67,9 +62,9 @@ def difference(old: Mapping[str, str], new: Mapping[str, str]) -> list[str]:
     return lines
 
 
-def _said(study: Study) -> dict[str, str]:
-    """What the study says, exactly."""
-    said = {
+def said(study: Study) -> dict[str, str]:
+    """What the study says, exactly: the entries of a fingerprint that do not tell of the program."""
+    found = {
         "kernel": study.kernel_name,
         "method": study.method,
         "rtol": repr(study.rtol),
@@ -77,17 +72,17 @@ def _said(study: Study) -> dict[str, str]:
         "design": study.design,
         "axes": ", ".join(study.axes),
     }
-    said |= {"where": study.where} if study.where else {}
-    said |= {"dims": ", ".join(f"{dim} ({', '.join(n)})" for dim, n in study.dims.items())} if study.blocks else {}
-    said |= {f"axes.{name}": _values(axis.values) for name, axis in study.axes.items()}
-    said |= {f"fixed.{n}": _values(value) if np.ndim(value) else repr(value) for n, value in study.fixed.items()}
-    said |= {f"fixed.{name}": f"as {axis}" for name, axis in study.follows.items()}
-    said |= {f"along.{name}": _values(values) for name, values in study.along.items() if len(values)}
+    found |= {"where": study.where} if study.where else {}
+    found |= {"dims": ", ".join(f"{dim} ({', '.join(n)})" for dim, n in study.dims.items())} if study.blocks else {}
+    found |= {f"axes.{name}": _values(axis.values) for name, axis in study.axes.items()}
+    found |= {f"fixed.{n}": _values(value) if np.ndim(value) else repr(value) for n, value in study.fixed.items()}
+    found |= {f"fixed.{name}": f"as {axis}" for name, axis in study.follows.items()}
+    found |= {f"along.{name}": _values(values) for name, values in study.along.items() if len(values)}
     if study.summary is not None:
-        said |= {"summary.over": ", ".join(study.summary.over)}
-        said |= {f"summary.outputs.{name}": ", ".join(words) for name, words in study.summary.outputs.items()}
-        said |= {f"summary.edges.{name}": _values(edges) for name, edges in study.summary.edges.items()}
-    return said
+        found |= {"summary.over": ", ".join(study.summary.over)}
+        found |= {f"summary.outputs.{name}": ", ".join(words) for name, words in study.summary.outputs.items()}
+        found |= {f"summary.edges.{name}": _values(edges) for name, edges in study.summary.edges.items()}
+    return found
 
 
 def _values(values: Any) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 
 from kernels.interface import Status
-from sweep.cells.fingerprint import fingerprint, is_of_program
+from sweep.cells.fingerprint import said
 from sweep.cells.grid import Grid
 from sweep.cells.schema import ANCILLARY
 from sweep.errors import SweepError
@@ -81,8 +81,8 @@ def join(
     for dataset, study in zip(results, studies, strict=True):
         require_as_read(dataset, study, [*study.outputs, *ANCILLARY], whole=True)
     # what they differ in: "axes.mu", "fixed.a", "rtol"; of axes that run together "points"
-    old, new = map(_said, studies)
-    apart = sorted(name for name in {*old, *new} - {"study"} if old.get(name) != new.get(name))
+    old, new = map(said, studies)
+    apart = sorted(name for name in {*old, *new} if old.get(name) != new.get(name))
     if studies[0].dims == studies[1].dims and len(studies[0].dims) == 1 and studies[0].design != "product":
         apart = list(dict.fromkeys("points" if name.startswith("axes.") else name for name in apart))
     longer = apart[0].removeprefix("axes.") if axis is None and len(apart) == 1 else ""
@@ -101,13 +101,8 @@ def join(
         check_target(as_path(path), force=force, read=sources)
     versions = "\n".join(f"{k}: {d.attrs.get('versions', '')}" for k, d in zip(labels, results, strict=False))
     # no run continues it, nor is it of the program that joins
-    mark = {**_said(study), "joined": "of two results"}
+    mark = {**said(study), "joined": "of two results"}
     return store_cells(study, path, arrays, force, mark, {"taken_over": versions})
-
-
-def _said(study: Study) -> dict[str, str]:
-    """The entries of a fingerprint that tell of the study, not of the program."""
-    return {name: text for name, text in fingerprint(study).items() if not is_of_program(name)}
 
 
 def _new_axis(

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import os
-import re
 from pathlib import Path
 
 from sweep.errors import SweepError
 from sweep.file.open import stored
+from sweep.file.reading import UNFINISHED
 from sweep.results.statuses import Account, account
 from sweep.words import Table, as_path, percent
 
-UNFINISHED = re.compile(r"(.+\.(?:h5|nc))\.unfinished")
-"""What a sweep that still runs has beside its output."""
 HEADINGS = ("result", "cells", "done", "statuses", "when", "version", "question")
 LATER = ("when", "version")
 """Of these, what is printed by `sweep list --all` only."""
@@ -96,7 +94,5 @@ def list_results(folder: str | os.PathLike[str] = ".") -> Listing:
     place = as_path(folder)
     if not place.is_dir():
         raise SweepError(f"{place}: there is no such folder")
-    names = {entry.name for entry in place.iterdir()}
-    found = {name for name in names if name.endswith((".h5", ".nc"))}
-    found |= {match[1] for name in names if (match := UNFINISHED.fullmatch(name))}
-    return Listing(Listed(place / name) for name in sorted(found))
+    names = {entry.name.removesuffix(UNFINISHED) for entry in place.iterdir()}
+    return Listing(Listed(place / name) for name in sorted(names) if name.endswith((".h5", ".nc")))

@@ -76,14 +76,15 @@ def study(given: Given | None = None, /, *, allow_import: bool = False, **keys: 
     if "\n" in os.fspath(given):
         raise SweepError("this is the text of a study, not its path; write sweep.study(tomllib.loads(text))")
     path = as_path(given)
-    text = _text(path)
-    first = next(line.strip() for line in text.splitlines() if line.strip())
-    question = {"question": first.lstrip("# ").rstrip()} if first.startswith("#") else {}
-    return read_keys({**question, **_keys(text, str(path))}, text, str(path), path.parent, allow_import)
+    keys, text = _of_file(path)
+    return read_keys(keys, text, str(path), path.parent, allow_import)
 
 
-def _text(path: Path) -> str:
-    """The text of a study file. Raises SweepError where it is none."""
+def _of_file(path: Path) -> tuple[dict[str, Any], str]:
+    """The keys of a study file, its first line as the question, and its text.
+
+    Raises SweepError where it is none; StudyError with what tomllib says, and the line as it is written.
+    """
     others = {
         ".h5": "a result, not a study; look at it with: sweep show",
         ".py": "a study in Python; run it with: python",
@@ -103,13 +104,10 @@ def _text(path: Path) -> str:
         raise SweepError(f"{path} cannot be read: {reason(error)}") from None
     if not text.strip():
         raise SweepError(f"{path} is empty; `sweep kernels` lists what can be swept")
-    return text
-
-
-def _keys(text: str, source: str) -> dict[str, Any]:
-    """The keys of a study file. Raises StudyError with what tomllib says, and the line as it is written."""
+    first = next(line.strip() for line in text.splitlines() if line.strip())
+    question = {"question": first.lstrip("# ").rstrip()} if first.startswith("#") else {}
     try:
-        return tomllib.loads(text)
+        return {**question, **tomllib.loads(text)}, text
     except tomllib.TOMLDecodeError as error:
         what, _, place = str(error).rpartition(" (at ")  # "... (at line 3, column 6)"
         if what.startswith(("Cannot overwrite", "Cannot declare")):
@@ -121,7 +119,7 @@ def _keys(text: str, source: str) -> dict[str, Any]:
         mistake = Mistake("file", "an integer has thousands of digits; no float64 is that large")
     except RecursionError:
         mistake = Mistake("file", "lists or tables are nested too deeply")
-    raise StudyError(source, [mistake])
+    raise StudyError(str(path), [mistake])
 
 
 def to_toml(study: Study) -> str:
