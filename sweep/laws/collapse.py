@@ -85,12 +85,6 @@ def fit_collapse(y: xr.DataArray, dim: str, over: str, *, sigma: Any = None, con
     far = 0.3 * (1 + abs(start))
     fit = _common(points, *np.linspace(start - far, start + far, 41))
     off, exact = fit.off, 1e-6 * (1 + np.ptp(z)) if sigma is None else 0.0
-    moved = [_common(points, fit.numbers[0] + by) for by in (-0.25, 0.25)]
-    if any(one.deviance < fit.deviance + DETERMINED or abs(one.off).max() < 1e-4 * exact for one in moved):
-        raise SweepError(
-            "the curves collapse for any exponents of x: as far as the points tell, f is a power law, so a and b are "
-            "not determined apart"
-        )
     # whether a level, a slope and a bow of each curve describe the points far better than the common one
     u, sizes = t - t.mean(), np.unique(size)[1:, None]
     own = np.concatenate([(size == sizes) * u**power for power in range(3)]).T
@@ -99,6 +93,12 @@ def fit_collapse(y: xr.DataArray, dim: str, over: str, *, sigma: Any = None, con
     own = left[:, moves > 1e-6 * moves.max()][:, : max(0, off.size - basis.shape[1] - 3)]
     ends, _, denied = fit.beside(np.arange(float(off.size)), "correlated", confidence, own)
     fits = not denied or abs(off).max() <= exact
+    moved = [_common(points, fit.numbers[0] + by) for by in (-0.25, 0.25)]
+    if fits and any(one.deviance < fit.deviance + DETERMINED or abs(one.off).max() < 1e-4 * exact for one in moved):
+        raise SweepError(
+            "the curves collapse for any exponents of x: as far as the points tell, f is a power law, so a and b are "
+            "not determined apart"
+        )
     result: dict[str, Any] = {"scatter": np.sqrt(np.mean(off**2)), "points": off.size, "dropped": y.size - off.size}
     result |= {"fits": int(fits), "verdict": "one curve" if fits else "not one curve"}
     for number, name in enumerate(("x_exponent", "y_exponent")):
