@@ -107,9 +107,9 @@ def running(functions, of_lanes, kind):
     return _RUNS.setdefault(name, cached(run) if COMPILED else run)
 
 
-def _all_cells(cells, memories, held):
+def _all_cells(cells, memory, held):
     """Each cell, a row of what a lane knows, until its last switch; ADVANCE is of the scene (`running`)."""
-    each_refilled(ADVANCE, cells, memories, held)  # noqa: F821  a name of `running`
+    each_refilled(ADVANCE, cells, memory, held)  # noqa: F821  a name of `running`
 
 
 @contextlib.contextmanager

@@ -20,8 +20,9 @@ HIGH_BELOW = 5e-10
 FINEST = 1e-25
 AT_ONCE = 8192
 """Cells whose lanes' memory stays in a core's cache."""
-STOPS = 2.0, 4.0, math.inf
-"""Switches behind which cells are put in the order of the steps of their last two legs, from event to event."""
+STOPS, FEW_CELLS = (2.0, 4.0, math.inf), 128
+"""Switches behind which cells are put in the order of the steps of their last two legs, from event to event; so many
+cells or fewer are run to their end at once, which takes less time."""
 ROUNDINGS = 8.0
 """By how many roundings a parameter is changed at most."""
 FAINT = 16.0 * TINY
@@ -52,6 +53,7 @@ def followed(runner, columns, rtol, of_a_step=None, shake=0.0, told=False, stops
     for run, chosen in ((runner.low, np.flatnonzero(~high)), (runner.high, np.flatnonzero(high))):
         for begin in range(0, len(chosen), AT_ONCE):
             places = chosen[begin : begin + AT_ONCE]
+            own_stops = STOPS if len(places) > FEW_CELLS else STOPS[-1:]
             cells, whole = fresh(rows, inputs[:, places]), inputs[-3, places]
             whole = np.where(whole < math.inf, whole, math.nan)  # NaN is refused, without end not followed
             cells[:, row["interval"] : row["size"]] = np.nan
@@ -59,7 +61,7 @@ def followed(runner, columns, rtol, of_a_step=None, shake=0.0, told=False, stops
             cells[:, row["h"]] = 1.0 if runner.order is None else tolerance[places] ** (1.0 / runner.order)
             if cell.own:
                 cells[:, row["own"]] = float(told)
-            for k, stop in enumerate(STOPS if stops is None else stops):
+            for k, stop in enumerate(own_stops if stops is None else stops):
                 if runner.scene.until:  # ahead of the surface again, in a unit of this time; intervals are from 0
                     unit = np.ldexp(1.0, np.frexp(stop)[1])
                     cells[:, row["h"]] *= cells[:, row["unit"]] / unit if k else 1.0

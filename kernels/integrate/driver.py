@@ -360,7 +360,7 @@ def advance(m, leg, memory, i):
         cell = choose(fresh, started(m, cell), cell)
     done = paused = active & not_(active)
     for _ in range(EVENTS):
-        moving = active & (cell.verdict < REFUSED)
+        moving, before = active & (cell.verdict < REFUSED), cell
         found, own = leg(cell, mode_of(cell), moving)
         cell, moving = arrived(m, cell, found, own, active)
         rates = m.rates(cell.state, mode_of(cell))
@@ -371,6 +371,8 @@ def advance(m, leg, memory, i):
             cell, rates = switched(m, cell, rates, switches, counts, first, met)
         cell = gone_on(m, cell, rates, left, moving, found.grazing)
         paused = found.paused
+        if any_lane(paused):
+            cell = choose(paused, before, cell)
         done = active & (paused | found.grazing | (cell.verdict >= REFUSED) | (cell.count >= cell.flips))
         if any_lane(done):
             break

@@ -18,8 +18,8 @@ from kernels.lanes.vectors import any_lane, exponent, fma, horner, magnitude, ne
 STEP_LIMIT = 10_000
 """Steps between two events after which a cell is given up."""
 PATIENCE = 16
-"""Steps of a leg from which on it is counted how many wait for a last quarter of the lanes, or less: where these are
-more than half of all its steps, that quarter is paused. Else one cell of a thousand that never meets its event, beside
+"""Steps of a leg from which on it is counted how many wait for a last quarter of the lanes, or for one: where these are
+more than half of all its steps, those lanes are paused. Else one cell of a thousand that never meets its event, beside
 others, takes half of the time."""
 HALVINGS = 40
 ROOT_LIMIT = 60

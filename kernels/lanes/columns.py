@@ -8,7 +8,7 @@ Cells of very different length are *refilled*: a lane that has finished its cell
 lanes. A *memory* has a row for each number that a lane knows between two events, and a column for each lane. The first
 row is the lane's stage; then come its cell's inputs. `advance(memory, i)` takes every lane on until one has finished,
 or for a limited number of events or steps, and returns whether one has; i is the index of all lanes. A lane that keeps
-the others waiting may be *paused*: its cell goes on later from where it was before, beside others of that kind.
+the others waiting may be *paused*: its cell goes on later from the event before, beside others of that kind.
 """
 
 import numpy as np
@@ -115,40 +115,38 @@ def fresh(numbers, inputs):
 
 def to_the_end(run, cells):
     """Runs every cell, (n_cells, numbers that a lane knows), by a compiled `each_refilled`."""
-    memories, held = np.zeros((2, cells.shape[1], FEW)), np.zeros(FEW, np.int64)
+    memory, held = np.zeros((cells.shape[1], FEW)), np.zeros(FEW, np.int64)
     with np.errstate(all="ignore"):  # of plain Python
-        run(cells, memories, held)
+        run(cells, memory, held)
         while len(paused := np.flatnonzero(cells[:, 0] < DONE)):
             some = cells[paused]
-            run(some, memories, held)
+            run(some, memory, held)
             cells[paused] = some
 
 
 @jit
-def each_refilled(advance, cells, memories, held):
-    """Every cell to its end, but for those that have been paused, which are as they were before.
+def each_refilled(advance, cells, memory, held):
+    """Every cell to its end, but for those that have been paused, which are as they were at their last event.
 
     Parameters
     ----------
-    cells : (n_cells, numbers that a lane knows), fresh or moving; in the end done, fresh or moving
-    memories, held : room for two memories, and for the lanes' cells; numba takes long to compile what makes arrays
+    cells : (n_cells, numbers that a lane knows), fresh or moving; in the end done or moving
+    memory, held : room for the memory, and for the lanes' cells; numba takes long to compile what makes arrays
     """
-    n, memory, before = cells.shape[0], memories[0], memories[1]
+    n = cells.shape[0]
     for lane in range(FEW):
         held[lane] = lane if lane < n else n - 1
         _give(memory, lane, cells, held[lane])
         memory[0, lane] = memory[0, lane] if lane < n else IDLE
     handed, left = FEW, n
     while left > 0:  # every lane ends: cells have a limit of events and each event one of steps
-        for row in range(cells.shape[1]):
-            before[row, few_at(0)] = memory[row, few_at(0)]
         if not advance(memory, few_at(0)):
             continue
         for lane in range(FEW):
             if memory[0, lane] >= DONE:
-                kept = memory if memory[0, lane] == DONE else before
                 for row in range(cells.shape[1]):
-                    cells[held[lane], row] = kept[row, lane]
+                    cells[held[lane], row] = memory[row, lane]
+                cells[held[lane], 0] = DONE if memory[0, lane] == DONE else MOVING
                 left -= 1
                 held[lane] = handed
                 _give(memory, lane, cells, handed)

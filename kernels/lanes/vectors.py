@@ -313,16 +313,19 @@ def _lower_any_lane(context, builder, signature, values):
 
 
 def is_rare(condition, among):
-    """Whether a condition holds in a quarter, or less, of the cells in which another one does that it is a case of."""
-    return 4 * condition <= among
+    """Whether a condition holds in a quarter, or less, of the cells in which another one does that it is a case of; or
+    in one of several."""
+    return condition < among
 
 
 def _lower_is_rare(context, builder, signature, values):
     if not isinstance(signature.args[0], MaskType):
-        return builder.not_(builder.icmp_unsigned("!=", values[0], ir.Constant(values[0].type, 0)))
+        return builder.icmp_unsigned("<", *values)
     bits = ir.IntType(signature.args[0].width)
     few, many = (builder.ctpop(builder.bitcast(value, bits)) for value in values)
-    return builder.icmp_unsigned("<=", builder.shl(few, bits(2)), many)
+    one = builder.icmp_unsigned("<=", few, bits(1))
+    quarter = builder.icmp_unsigned("<=", builder.shl(few, bits(2)), many)
+    return builder.and_(builder.or_(one, quarter), builder.icmp_unsigned("<", few, many))
 
 
 def not_(condition):
