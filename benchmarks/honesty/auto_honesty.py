@@ -95,8 +95,8 @@ class Tally:
         self.unknown = 0
         self.remarked, self.wrongly_remarked = 0, []
 
-    def add(self, cell, rtol, values, status, method, truth, over):
-        """Judge one cell, and say whether it is wrong; `values` by the names of the outputs, `over` as in a case."""
+    def add(self, cell, rtol, values, status, method, truth, case):
+        """Judge one cell, and say whether it is wrong; `values` by the names of the outputs."""
         self.statuses[Status(status).name] += 1
         self.unknown += truth == UNKNOWN
         if truth == UNKNOWN or status >= FIRST_REFUSAL or status in UNSURE:
@@ -104,7 +104,9 @@ class Tally:
         if truth == NO_CYCLE:
             errors = dict.fromkeys(values, math.inf)
         else:
-            errors = {name: error_of(v, truth[name], truth.get(over.get(name))) for name, v in values.items()}
+            errors = {
+                name: error_of(v, truth[name], truth.get(case.over.get(name))) - case.blur for name, v in values.items()
+            }
         name = max(errors, key=errors.get)
         found = errors[name] / rtol, f"{name} off by {errors[name]:.2g} at rtol {rtol:.2g} by {method}: {cell}"
         if status != Status.OK:
@@ -145,9 +147,9 @@ def judge(case, n, seed, pool):
         tally = tallies["all outputs" if outputs == asked[0] else "one output alone"]
         for i, cell in enumerate(cells):
             given = cell, rtol[i], {name: values[name][i] for name in outputs}, status[i], used[i]
-            if case.path and Tally().add(*given, truths[i], case.over):
+            if case.path and Tally().add(*given, truths[i], case):
                 truths[i] = truth_of((case, cell))
-            tally.add(*given, truths[i], case.over)
+            tally.add(*given, truths[i], case)
     return {title: tally for title, tally in tallies.items() if tally.statuses}, apart
 
 

@@ -24,6 +24,8 @@ import impact_oracles
 import oracles
 import polisher_oracles
 import ripple_oracles
+import verge_oracles
+import wear_oracles
 
 mp.dps = 50
 NO_CYCLE, UNKNOWN = "no cycle", "unknown"
@@ -64,6 +66,8 @@ class Case:
     fixed: Mapping[str, float] = field(default_factory=dict)
     path: Callable[..., list[Any]] | None = None
     """Truths of columns of cells by a second path, where the oracle is too slow (`honest_paths`)."""
+    blur: float = 0.0
+    """What an oracle in float64 may be off by."""
     over: Mapping[str, str] = field(default_factory=dict)
     """Of an output the error is over another one at the same place, as its kernel says."""
 
@@ -153,6 +157,38 @@ def flips_truth(mu, phi0, phi_start, **losses):
     times, speeds = foliot_oracles.flips(mu, phi0, phi_start, int(FLIPS[-1]), **losses)
     pairs = {"flip_time": times, "flip_speed": speeds}
     return {name: [v[int(j) - 1] if j <= len(v) else None for j in FLIPS] for name, v in pairs.items()}
+
+
+def stepped(random, n):
+    """As `linear`, from rest at the centre, by steps of 0.001 to 0.1 of the drive's time."""
+    cells = linear(random, n)
+    return {**cells, "step": decades(random, -3, -1, n) * np.sqrt(cells["phi0"] / cells["mu"])}
+
+
+def steps_truth(mu, phi0, step, **losses):
+    times, speeds = foliot_oracles.flips(mu, phi0, 0.0, 3, **losses)
+    if len(times) < 3:
+        return NO_CYCLE
+    return {"period": 2 * (times[2] - times[1]), "time": times[2], "crossing_speed": speeds[2]}
+
+
+def verges(random, n):
+    """Inertias of a ratio from 1e-2 to 1e2; drop, restitution and dry friction each in some cells."""
+    tau, I_v, ratio, phi0 = (decades(random, *ends, n) for ends in ((-3, 3), (-3, 3), (-1.3, 0), (-1, 0)))
+    rate = np.sqrt(ratio * tau / (I_v * phi0))
+    return {
+        "tau": tau, "I_v": I_v, "I_c": decades(random, -2, 2, n) * I_v / ratio**2, "n": ratio, "phi0": phi0,
+        "drop": some(random, 0.7, random.uniform(0, 0.5, n) * ratio * phi0),
+        "e": some(random, 0.5, random.uniform(0, 0.8, n)), "c_v": decades(random, -1, 1, n) * I_v * rate,
+        "R_v": some(random, 0.5, random.uniform(0, 0.9, n) * ratio * tau),
+    }  # fmt: skip
+
+
+def verge_truth(**cell):
+    """Of the 30th tooth from rest, if the one before took as long."""
+    *values, before, met, share = verge_oracles.cycle(cell, 30)
+    settled = abs(before / values[0] - 1) < 1e-11 and met == 1 and abs(share - 0.5) < 1e-11
+    return dict(zip(VERGE, map(mpf, values), strict=True)) if settled else UNKNOWN
 
 
 def rippled(random, n):
@@ -284,6 +320,21 @@ def arm_truth(b, d, f, e, type, omega):
     return {name: [p[j] * mpf(omega) ** j for p in points] for j, name in enumerate(names)}
 
 
+def worn(random, n):
+    """The paper's machine with other tools, rates and centres of the work, at a radius that the tool may reach."""
+    exponent = random.choice([0.5, 1.0, 2.0, 3.3, 100.0], n)
+    return {
+        "e": random.uniform(1, 16, n), "w_x": random.uniform(40, 60, n), "w_y": random.uniform(-9, 9, n),
+        "Omega": decades(random, -1, 1.5, n) * random.choice([-1.0, 1.0], n), "tool_a": random.uniform(2, 9, n),
+        "tool_b": random.uniform(2, 9, n), "tool_n": exponent, "tool_m": exponent,
+    }  # fmt: skip
+
+
+def wear_truth(**cell):
+    machine = wear_oracles.Machine(**PAPER | {"type": 0.0}, **cell)
+    return {"wear": [mpf(wear_oracles.ring_wear(machine, RADII[0]) / (4 * np.pi**2))]}
+
+
 # drivetrain
 
 
@@ -314,6 +365,12 @@ def by_drag_of_degree_1(mu, phi0, a, R):
 
 CLOSED = tuple(polisher_oracles.closed(62.01, 38.0, 40.5, 10.0))
 BALANCE = ("half_swings", "stop_angle", "stop_time", "margin", "period")
+VERGE = ("period", "amplitude", "escape_speed", "recoil", "impact_share", "dry_share")
+RADII = (6.0,)
+PAPER = {
+    "b": 62.01, "d": 38.0, "f": 40.5, "type": "A", "omega": 1.0, "b_angle": 0.0, "L": 50.0, "beta": 0.0, "preston": 1.0,
+    "pressure": 1.0,
+}  # fmt: skip
 RECEPTANCE = ("receptance_re", "receptance_im", "amplitude")
 CASES = (
     Case("foliot", "viscous", viscous, viscous_truth, CYCLE),
@@ -323,6 +380,10 @@ CASES = (
     Case("foliot_design", "", wanted, design_truth, ("a", "mu"), 0.12),
     Case("foliot_motion", "viscous", viscous, motion_truth, ("angle", "speed"), 0.12, along={"phase": PHASES}),
     Case("foliot_start", "linear", released, flips_truth, ("flip_time", "flip_speed"), 0.12, along={"flip": FLIPS}),
+    Case(
+        "foliot_steps", "linear", stepped, steps_truth, ("period", "time", "crossing_speed"), 0.12, fixed={"flips": 3.0}
+    ),
+    Case("verge", "", verges, verge_truth, VERGE, 0.01, blur=1e-9),
     Case("foliot_ripple", "Coulomb and spring", rippled, ripple_truth, CYCLE, 0.12, path=honest_paths.rippled),
     Case("balance", "", swinging, balance_truth, BALANCE),
     Case("balance_trace", "", swinging, trace_truth, ("turning_point",), 0.2, along={"half_swing": HALF_SWINGS}),
@@ -334,6 +395,9 @@ CASES = (
         "polisher_motion", "", turning, arm_truth, ("alpha", "alpha_rate", "alpha_acceleration"), 0.2,
         along={"crank_angle": CRANK_ANGLES},
     ),
+    Case(
+        "polisher_wear", "", worn, wear_truth, ("wear",), 0.002, along={"radius": RADII}, fixed=PAPER, blur=1e-10
+    ),
     Case("drivetrain", "frequencies", chains, modes_truth, ("frequency",), 0.12),
     Case(
         "drivetrain_frf", "", damped_chains, receptance_truth, RECEPTANCE, 0.12, along={"frequency": FREQUENCIES},
@@ -342,7 +406,6 @@ CASES = (
 )  # fmt: skip
 WITHOUT = {
     "foliot_noise": "statistics of a random torque; its tests compare means and scatter with theory",
-    "polisher_wear": "its tests compare with integration over time and arcs, in float64",
     "polisher_wear_point": "its tests compare with integration over time, in float64",
 }
 """Kernels without a 50-digit oracle, and what they are compared with."""

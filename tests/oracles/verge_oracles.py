@@ -13,6 +13,8 @@ import numpy as np
 DEAD = 1e-6
 STEP = 0.02
 """Most time to the next event, in units of the drive."""
+MOST = 20_000
+"""Steps of a run."""
 
 
 def _first(f, low, high):
@@ -145,8 +147,12 @@ def followed(p, teeth):
     """What comes of so many teeth from rest on, a list each: time, lost energy, way, angle, speed and recoil of each
     tooth; and how often it was met."""
     clock = Verge(p)
-    while len(clock.passed) <= teeth:
+    for _ in range(MOST):
         clock.step()
+        if len(clock.passed) > teeth:
+            break
+    else:
+        raise ArithmeticError("the clock stands still, or is thrown out of mesh")
     last = max(clock.passed)  # it may be met again
     return np.array([clock.passed[m] for m in range(min(clock.passed), last)]).T, clock.met[last - 1]
 
