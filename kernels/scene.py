@@ -229,10 +229,13 @@ def states_of(parts: SceneParts) -> list[Field]:
 def scene_of(parts: SceneParts) -> Scene:
     """The scene of states and parameters that are given as fields; the time is its last state if it is asked for.
 
-    Raises TypeError where one of `parts` is missing, or there is none of that name.
+    Raises TypeError where one of `parts` is missing or no field, or there is none of that name.
     """
     if wrong := (parts.keys() - SceneParts.__annotations__.keys()) | (SceneParts.__required_keys__ - parts.keys()):
         raise TypeError(f"a scene wants {', '.join(SceneParts.__annotations__)}; wrong or missing: {min(wrong)!r}")
+    for field in (*parts["states"], *parts["parameters"]):
+        if not isinstance(field, Field):
+            raise TypeError(f'states and parameters are Fields, e.g. Field("x", "m", "where it is"); found {field!r}')
     states, parameters = (tuple(field.name for field in parts[key]) for key in ("states", "parameters"))
     surface, switch, start_time = parts.get("surface"), parts.get("switch"), parts.get("start_time")
     scene = Scene(parts["name"], parts["doc"], states, parameters, parts["rates"], surface, parts["start"], switch)

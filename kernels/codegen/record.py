@@ -89,8 +89,9 @@ def _recorded(scene, held):
     for _, u in map(graph.parts, rates):
         if u.varies and (scene.peaks == "all" or (scene.peaks and u.kind == INPUT)):
             graph.kink(u)
-    surfaces = named_functions(scene.surface)
-    found = []
+    if scene.surface is None:
+        raise SceneError(f"the scene {scene.name} needs a surface, at which its switches are")
+    surfaces, found = named_functions(scene.surface), []
     for name, function in surfaces.items():
         found += _called(graph, scene, f"surface {name}".rstrip(), function, states | constants, 1)
         if not found[-1].varies:

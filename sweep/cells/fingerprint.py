@@ -47,6 +47,11 @@ def fingerprint(study: Study) -> dict[str, str]:
     }
 
 
+def is_own_source(name: str) -> bool:
+    """Whether an entry of a fingerprint is of a package of a user's own."""
+    return name.startswith(SOURCE) and name.removeprefix(SOURCE) not in OURS
+
+
 def difference(old: Mapping[str, str], new: Mapping[str, str]) -> list[str]:
     """What two fingerprints differ in, a line each: 'axes.mu: was 401 values ..., now 101 values ...'."""
     names = [name for name in {**new, **old} if old.get(name) != new.get(name)]

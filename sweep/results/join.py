@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Sequence
 from dataclasses import replace
@@ -12,7 +13,7 @@ import numpy as np
 import xarray as xr
 
 from kernels.interface import Status
-from sweep.cells.fingerprint import said
+from sweep.cells.fingerprint import is_own_source, said
 from sweep.cells.grid import Grid
 from sweep.cells.schema import ANCILLARY
 from sweep.errors import SweepError
@@ -39,7 +40,8 @@ def join(
 
     They may differ in the values of one axis, which becomes longer, or in one fixed parameter, method or rtol, which
     becomes an axis. If their studies are equal, for example where two versions computed them, `axis` and `labels` make
-    a new axis. Cells that are in both results must agree to the last bit, and are kept once.
+    a new axis. Cells that are in both results must agree to the last bit, and are kept once. Without a new axis, the
+    sources of a kernel of one's own must not have changed between the two.
 
     Parameters
     ----------
@@ -78,6 +80,13 @@ def join(
     if 2 * sum(dataset.nbytes for dataset in results) > memory():
         raise SweepError("the two results together do not fit into the memory")
     studies = [Study.of(dataset, declared=True) for dataset in results]
+    known = [json.loads(dataset.attrs.get("fingerprint", "{}")) for dataset in results]
+    own, other = ({name: one[name] for name in one if is_own_source(name)} for one in known)
+    if axis is None and (changed := [name for name in own if own[name] != other.get(name, own[name])]):
+        raise SweepError(
+            f"the kernel's own {listed(changed, word='and')} changed between the two; compute one of them again, or "
+            'tell them apart along a new axis (axis="version")'
+        )
     for dataset, study in zip(results, studies, strict=True):
         require_as_read(dataset, study, [*study.outputs, *ANCILLARY], whole=True)
     # what they differ in: "axes.mu", "fixed.a", "rtol"; of axes that run together "points"
@@ -101,7 +110,7 @@ def join(
         check_target(as_path(path), force=force, read=sources)
     versions = "\n".join(f"{k}: {d.attrs.get('versions', '')}" for k, d in zip(labels, results, strict=False))
     # no run continues it, nor is it of the program that joins
-    mark = {**said(study), "joined": "of two results"}
+    mark = {**said(study), **(own if axis is None else {}), "joined": "of two results"}
     return store_cells(study, path, arrays, force, mark, {"taken_over": versions})
 
 

@@ -20,6 +20,7 @@ from kernels import catalogue
 from kernels.interface import Field, Kernel, Method, load
 from sweep.errors import SweepError
 from sweep.study.mistakes import show
+from sweep.units import UnitMistake, exponents
 from sweep.words import did_you_mean, listed
 
 if TYPE_CHECKING:
@@ -291,9 +292,11 @@ def load_kernel(name: object, allow_import: bool = False, folders: Iterable[Path
     Raises
     ------
     SweepError
-        There is no such kernel, it may not be imported, importing it fails, or it declares a name twice.
+        There is no such kernel, it may not be imported, importing it fails, or it declares a name twice or a unit that
+        is none.
     """
-    known, there = list(catalogue.KERNELS), f"there are {listed(catalogue.KERNELS)}"
+    known = list(catalogue.KERNELS)
+    there = f'there are {listed(known)}, and those of your own as "module:KERNEL"'
     if not isinstance(name, str) or not name:
         raise SweepError(f"expected the name of a kernel, found {show(name)}; {there}")
     if ":" not in name and name not in known:
@@ -319,6 +322,11 @@ def load_kernel(name: object, allow_import: bool = False, folders: Iterable[Path
     if lost := sorted({dim for field in kernel.outputs for dim in field.dims} - dims):
         cure = "neither in `along` nor a dim of array parameters"
         raise SweepError(f"kernel {name} has outputs along {listed(lost)}, {cure}")
+    for each in fields if ":" in name else ():
+        try:
+            exponents(each.unit)
+        except UnitMistake as fault:
+            raise SweepError(f"kernel {name}: unit of {each.name}: {fault}") from None
     return kernel
 
 

@@ -44,6 +44,8 @@ def test_an_argument_that_is_missing_or_misspelt_is_refused(make):
         make(**parts, surface=lambda x: 1.0 - x, surfaces=None)
     with pytest.raises(TypeError, match="parameters"):
         make(**{name: part for name, part in parts.items() if name != "parameters"}, surface=lambda x: 1.0 - x)
+    with pytest.raises(TypeError, match="Field"):
+        make(**parts | {"states": ["x"]}, surface=lambda x: 1.0 - x)
 
 
 @pytest.mark.skipif(COMPILED, reason="one more compilation; run with NUMBA_DISABLE_JIT=1")

@@ -163,6 +163,7 @@ def test_a_surface_without_a_side_and_without_a_jump_is_passed_once_a_period(met
     ("changed", "says"),
     [
         ({"switch": {"up": lambda x, v, y, w: (x, v, y, w)}}, "'up'"), ({"surface": {}}, "a surface"),
+        ({"surface": None, "switch": None}, "a surface"),
         ({"surface": {"left": lambda x: x, "right": lambda e: e}}, "state"),
         ({"switch": {"left": lambda x: x}}, "switch left.*1 values"),
     ],

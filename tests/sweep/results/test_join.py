@@ -1,5 +1,7 @@
 """Two results as one, against the sweep of both."""
 
+import json
+
 import numpy as np
 import pytest
 from running import interrupted, same, tall
@@ -88,6 +90,13 @@ def unfinished():
     return found
 
 
+def of_other_sources():
+    found = of([16.0])
+    mark = json.loads(found.fingerprint)
+    own = next(name for name in mark if name.startswith("source ") and "kernels" not in name and "sweep" not in name)
+    return found.assign_attrs(fingerprint=json.dumps({**mark, own: "0"}))
+
+
 @pytest.mark.parametrize(
     ("results", "options", "message"),
     [
@@ -100,6 +109,8 @@ def unfinished():
         (lambda: (of(), of(where="height > 1")), {}, "where"),
         (lambda: (of(), of(outputs=["impact_speed"])), {}, "outputs"),
         (lambda: (of(), unfinished()), {}, "unfinished"),
+        (lambda: (of(), of_other_sources()), {}, "changed"),
+        (lambda: (sweep.join(of(), of([32.0])), of_other_sources()), {}, "changed"),
     ],
 )  # fmt: skip
 def test_what_does_not_fit_is_refused(results, options, message):

@@ -168,8 +168,12 @@ def test_no_reduction_may_be_called_as_an_axis():
 
 
 @pytest.mark.parametrize("name", ["status", "method_used", "error_bound", "method", "rtol", "cell", "height", "phase"])
-def test_a_kernel_declares_each_name_once_and_none_of_the_results_own(name):
-    wrong = {name: (Field(name, "s", ""),), "place": (*toy.KERNEL.outputs, Field("trace", "s", "", dims=("place",)))}
+def test_a_kernel_declares_each_name_once_and_none_of_the_results_own_and_units(name):
+    wrong = {
+        name: (Field(name, "s", ""),),
+        "foo": (Field("time", "foo", ""),),
+        "place": (*toy.KERNEL.outputs, Field("trace", "s", "", dims=("place",))),
+    }
     for said, outputs in wrong.items():
         toy.OWN = dataclasses.replace(toy.KERNEL, outputs=outputs)
         with pytest.raises(sweep.SweepError, match=said):
