@@ -322,7 +322,7 @@ def arm_truth(b, d, f, e, type, omega):
 
 def worn(random, n):
     """The paper's machine with other tools, rates and centres of the work, at a radius that the tool may reach."""
-    exponent = random.choice([0.5, 1.0, 2.0, 3.3, 100.0], n)
+    exponent = random.choice([1.0, 2.0, 3.3, 100.0], n)
     return {
         "e": random.uniform(1, 16, n), "w_x": random.uniform(40, 60, n), "w_y": random.uniform(-9, 9, n),
         "Omega": decades(random, -1, 1.5, n) * random.choice([-1.0, 1.0], n), "tool_a": random.uniform(2, 9, n),

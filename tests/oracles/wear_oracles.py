@@ -2,7 +2,9 @@
 
 Unlike the kernel it integrates over time outside and over arcs of the ring inside: at each instant the arcs in contact
 are found by sampling and bisection; time is split where arcs appear, merge or vanish, where corners of the tool cross
-the ring, and where the speed vanishes. Plain float64: right to some 1e-12. Lengths in any one unit; rates in rad/s.
+the ring, and where the speed vanishes. Plain float64: right to some 1e-12. Of tools of an exponent below 1 slivers may
+be missed, for 3e-7 in one ring of ten; 3841 instants and 2881 samples find them. Lengths in any one unit; rates in
+rad/s.
 """
 
 import itertools
