@@ -28,7 +28,7 @@ from family import FAMILIES, judged
 from kernels.interface import FIRST_REFUSAL, Status
 
 DOUBTED = (Status.INACCURATE, Status.GRAZING)
-GIVEN_UP = (Status.NOT_CONVERGED, Status.STEP_LIMIT, Status.NO_METHOD, *DOUBTED)
+GIVEN_UP = (Status.NOT_CONVERGED, Status.STEP_LIMIT, Status.NO_METHOD, Status.OUT_OF_RANGE, *DOUBTED)
 """After which `auto` goes on, as in `sweep.cells.solve`."""
 
 

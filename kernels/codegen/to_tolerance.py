@@ -49,7 +49,7 @@ LOST, MET_AGAIN = 1e-2, 1e-2
 """The doubt, as a share of a state's size, from which on runs have lost each other; and the factor by which doubts may
 shrink more than tolerances do. Behind a transient of chaos all runs may be on one cycle of several, and the truth not:
 of Duffing's oscillator in one cell of 400, with a factor of 5e-4 where motions that were not lost had 5e-2 and more."""
-TRIED_AGAIN = Status.INACCURATE, Status.GRAZING, Status.STEP_LIMIT, Status.OUT_OF_RANGE
+TRIED_AGAIN = Status.INACCURATE, Status.GRAZING, Status.STEP_LIMIT
 STATED = 1.5
 """Stated error over the one carried along."""
 OF_A_STEP = 0.25

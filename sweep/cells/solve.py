@@ -3,9 +3,10 @@
 A cell that the study's condition leaves out, or that `check` refuses, is never solved. With a method given, the cell
 is solved by it and remarked INACCURATE, whatever else is special about it but GRAZING, where the method's bound or
 estimate exceeds rtol. With `auto` it goes to the first method, cheapest first, that can do its terms and whose bound
-meets rtol, and on to the next where that one gives up or says INACCURATE, or GRAZING with an error above rtol. Where
-none meets rtol, the values of the smallest bound are given, INACCURATE. A later method replaces only what it betters.
-Where a kernel of somebody's own says OK without a number, or a status that a kernel has not got, the cell FAILED.
+meets rtol, and on to the next where that one gives up or says INACCURATE, or GRAZING with an error above rtol, or
+where a method that estimates says OUT_OF_RANGE. Where none meets rtol, the values of the smallest bound are given,
+INACCURATE. A later method replaces only what it betters. Where a kernel of somebody's own says OK without a number, or
+a status that a kernel has not got, the cell FAILED.
 """
 
 from __future__ import annotations
@@ -41,6 +42,8 @@ def _these(*statuses: Status) -> bytes:
 
 GIVEN_UP = _these(*UNSOLVED, Status.NO_CYCLE, Status.INACCURATE, Status.UNSTABLE, Status.FAILED)
 """After these `auto` tries the next method."""
+UNSURE = _these(*(code for code in Status if GIVEN_UP[code]), Status.OUT_OF_RANGE)
+"""And after these where it estimates: what is out of range may be derivatives that another method does not need."""
 DOUBTED = _these(Status.INACCURATE, Status.GRAZING)
 """What another method may know better, as far as the error exceeds rtol."""
 NO_STATUS = bytes(code not in map(int, Status) or code >= Status.NOT_ASKED for code in range(256))
@@ -254,7 +257,8 @@ class Solver:
             if len(able):
                 self._better(turn.number, able, bound)
                 rows = _rows(cells)
-                on, grazing = among(self.status[rows], GIVEN_UP), self.status[rows] == GRAZING
+                method, grazing = self.study.kernel.methods[turn.number], self.status[rows] == GRAZING
+                on = among(self.status[rows], UNSURE if method.estimates else GIVEN_UP)
                 if grazing.any():
                     on = on | (grazing & (self._error[rows] > self.inputs[-1][rows]))
                 cells = _where(cells, on)
@@ -288,7 +292,7 @@ class Solver:
         kept = [np.array(column[rows]) for column in columns]
         self._run(number, cells, bound)
         status, error, (*_, old_error, old) = self.status[rows], self._error[rows], kept
-        vaguer = among(status, VAGUE) & ~among(old, VAGUE)
+        vaguer = (among(status, VAGUE) & ~among(old, VAGUE)) | (among(status, UNKNOWN) & (old == Status.OUT_OF_RANGE))
         lost = (status >= FIRST_REFUSAL) & ((old < FIRST_REFUSAL) | vaguer)
         looser = (status == Status.UNSTABLE) | (among(status, DOUBTED) & ~(error < old_error))
         worse = lost | (among(old, DOUBTED) & looser)

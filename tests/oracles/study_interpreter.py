@@ -107,7 +107,8 @@ class Cell:
             if bound <= self.rtol or bound < least:
                 best = better(best, self.ran(number))
             grazes = best[1] == Status.GRAZING and best[2] > self.rtol
-            if bound <= self.rtol and not (grazes or best[1].name in GIVES_UP):
+            unsure = best[1] == Status.OUT_OF_RANGE and self.kernel.methods[number].estimates
+            if bound <= self.rtol and not (grazes or unsure or best[1].name in GIVES_UP):
                 return best
         return best
 
@@ -123,8 +124,8 @@ def better(old, new):
     if was < 64:
         looser = is_ == Status.UNSTABLE or (is_ in DOUBTED and not less < error)
         return old if is_ >= 64 or (was in DOUBTED and looser) else new
-    vague = Status.NO_METHOD, Status.NO_CYCLE
-    if tried and is_ == Status.NO_CYCLE and was in (Status.NO_METHOD, Status.NOT_CONVERGED, Status.STEP_LIMIT):
+    vague, unsolved = (Status.NO_METHOD, Status.NO_CYCLE), (Status.NO_METHOD, Status.NOT_CONVERGED, Status.STEP_LIMIT)
+    if (tried and is_ == Status.NO_CYCLE and was in unsolved) or (was == Status.OUT_OF_RANGE and is_ in unsolved):
         return old
     return old if is_ in vague and was not in vague else new
 
