@@ -281,17 +281,26 @@ def in_none(xs):
 
 
 @symbolic
+def lasts_in_range(pieces):
+    """Whether the last terms of all states are numbers."""
+    return finite(tuple(u[-1] for u in pieces.states))
+
+
+@symbolic
 def begun(m, pieces, facts, state, mode, on, tolerance, active):
     """Of a leg's first step: the events behind already, the margins of all; broken, steep and stuck lanes.
 
-    Steep is what changes so much faster than the leg is long that the last terms of a series are no numbers any more;
-    where the first ones are none, rates, their slopes or products are not defined.
+    Steep is what changes so much faster than the leg is long that the last terms of a series are no numbers any more,
+    or what never meets an event, for all its rates are 0; where the first ones are none, rates, their slopes or
+    products are not defined.
     """
-    sound, first, third, last = (finite(tuple(u[k] for u in pieces.states)) for k in (0, 1, 3, -1))
-    steep = active & sound & first & third & not_(last)
-    broken = active & not_(sound & last | steep)
+    sound, first, third = (finite(tuple(u[k] for u in pieces.states)) for k in (0, 1, 3))
+    last = lasts_in_range(pieces)
     now = tuple((o < 0.5) & (fact[0] <= 0.0) for o, fact in zip(on, facts, strict=True))
     pressed = tuple((o > 0.5) & not_(rises(fact[1], fact[2])) for o, fact in zip(on, facts, strict=True))
+    moves = (total(tuple(magnitude(u[1]) for u in pieces.states)) > 0.0) | any_of((*now, *pressed))
+    steep = active & sound & first & third & not_(last & moves)
+    broken = active & not_(sound & last | steep)
     margins = tuple(SLACK * tolerance * extent for extent, _ in m.scene.made(state, mode))
     return now, margins, broken, steep, active & any_of(pressed) & sound & not_(steep)
 
@@ -352,7 +361,8 @@ def to_event(m, cell, mode, active):
                 unsure = unsure & (fine | not_(power_h < FAR))
         furthest = where(trial > 0.0, BEYOND * trial, furthest)
         broken = broken | (unsure & not_(power_h < FAR))  # it goes off to where no event is
-        grazing = grazing | (unsure & not_(broken))
+        steep = steep | (unsure & not_(lasts_in_range(pieces)))
+        grazing = grazing | (unsure & not_(broken | steep))
         moving, steps = moving & not_(unsure), steps & fine & not_(unsure)
         # of which the series are those of rates and events
         untold = unlike(m, pieces, cores, mode, unit, trial, t, tolerance, steps & (refused < REFUSALS))

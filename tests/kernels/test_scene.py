@@ -76,6 +76,19 @@ def test_a_state_too_small_for_its_relative_error_is_refused_and_is_right_above(
     assert np.allclose(outputs["x"][2:] / x0[2:], np.exp(6.0), rtol=1e-6)
 
 
+def test_a_start_at_rest_falls_from_the_surface_at_once_or_never_and_a_pole_does_not_graze():
+    kernel = scene_kernel(
+        name="at_rest", doc="x'' = c x'^2 - g", states=fields("x", "v"), parameters=fields("x0", "v0", "g", "c"),
+        rates=lambda v, g, c: (v, c * v * v - g), surface=lambda x: x, start=lambda x0, v0: (x0, v0),
+    )  # fmt: skip
+    cells = [0.0, 1.0, 1.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]
+    for method in ["taylor"] if COMPILED else ["taylor", "dop853"]:
+        outputs, status = solve(kernel, method, *(column[: 3 if COMPILED else 1] for column in cells), flips=1.0)
+        assert status[0] == Status.OK
+        assert outputs["time"][0] == 0.0
+    assert not COMPILED or list(status[1:]) == [Status.STEP_LIMIT] * 2
+
+
 def test_the_studys_own_scene_is_right():
     outputs, status = solve(own_scene.KERNEL, "taylor", [0.3, 5.0], [1.2], [0.05], [0.4], [0.7], [1.0], rtol=1e-9)
     for i, mu in enumerate((0.3, 5.0)):
