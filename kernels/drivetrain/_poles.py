@@ -40,13 +40,15 @@ _SETTLED = 1e-12  # correction over root
 _NEAR = 1e-6  # step over root, above which another joint may do better
 _TWIN = 2.0**-20  # below which rounding moves a double root
 _LIGHT = 0.03
-_TURN = 1e-3
+_APART = 1e-3
+"""Share of their size by which starts of a search are turned, so that none is real and no two are equal."""
 _SAME = 4e-16
+"""What rounding leaves of dampings in proportion to the springs: two roundings each."""
 
 
 @jit_apart
 def _of_mode(j, w, half, turn, s):
-    """Roots of mode j, s^2 + 2 half s + w^2 = 0, turned by as little as `turn` so that no two are equal."""
+    """Roots of mode j, s^2 + 2 half s + w^2 = 0, turned by a share of their size; 0: not at all."""
     rest = (w - half) * (w + half)
     far = -half - sqrt(-rest) if rest < 0.0 else -half
     near = w * w / far if rest < 0.0 else -half
@@ -266,7 +268,7 @@ def poles_of_chain(chain, n, room):
     fixed = 0 if k[n - 1] > 0.0 else 1 if h[n - 1] > 0.0 else 2
     for j in range(n):
         solid, viscous, _ = _holzer.mode(n, J, k, h, TURN * f[j], room.ways, room.e)
-        _of_mode(j, TURN * f[j], 0.5 * viscous / solid, _TURN * (1.0 + j / n), s)
+        _of_mode(j, TURN * f[j], 0.5 * viscous / solid, _APART * (1.0 + j / n), s)
     for i in range(fixed):
         s[i] = 0.0j
     settled = _approach(_newton_of_chain, (n, J, k, h), fixed, s, room.work)
@@ -302,7 +304,7 @@ def modal_poles(p, modes, free, s, room):
     """
     fixed = 0 if not free else 1 if modes.C[0, 0] > 0.0 else 2
     for i in range(p):
-        _of_mode(i, modes.w[i], 0.5 * modes.C[i, i], _TURN * (1.0 + i / p), s)
+        _of_mode(i, modes.w[i], 0.5 * modes.C[i, i], _APART * (1.0 + i / p), s)
     for i in range(fixed):
         s[i] = 0.0j
     model = p, modes.w, modes.C, modes.A, modes.B
