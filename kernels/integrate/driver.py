@@ -96,10 +96,13 @@ def pressed(m, state, mode, on, left, margin, lanes):
 
     `left` : 1 for the kink that the state has just slid along to its end
     """
-    among, unsure, signs, marks = total(on[1:]), lanes & not_(lanes), [], []
-    for sign, o, gone, speeds in zip(mode.signs[:-1], on[1:], left, m.speeds(state, mode), strict=True):
+    kinks = on[1:]
+    if m.surfaces is not None:  # what is on a surface may slide along a kink all the same
+        kinks = tuple(where(s > 0.5, 0.0, o) for s, o in zip(m.surfaces, kinks, strict=True))
+    among, unsure, signs, marks = total(kinks), lanes & not_(lanes), [], []
+    for sign, o, at, gone, speeds in zip(mode.signs[:-1], on[1:], kinks, left, m.speeds(state, mode), strict=True):
         ahead, behind = speeds
-        asked = (o > 0.5) & (gone < 0.5) & ((among < 1.5) | (magnitude(sign) < 0.5))
+        asked = (at > 0.5) & (gone < 0.5) & ((among < 1.5) | (magnitude(sign) < 0.5))
         new = where((ahead < 0.0) & (behind > 0.0), 0.0, sign)
         new = where((ahead > 0.0) & (behind > 0.0), 1.0, where((ahead < 0.0) & (behind < 0.0), -1.0, new))
         at_end = where(magnitude(ahead) < magnitude(behind), 1.0, -1.0)

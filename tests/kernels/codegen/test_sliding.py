@@ -197,3 +197,20 @@ def test_a_body_that_dry_friction_holds_rests_there_whatever_other_kinks_its_rat
     outputs, status = solve(kernel, "dop853", f=np.array([0.75]), flips=1.0, rtol=1e-9)
     assert status[0] == Status.OK
     np.testing.assert_allclose([outputs["x"][0], outputs["v"][0]], [0.5, 0.0], atol=1e-9)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_slide_goes_on_through_a_further_surface_that_it_passes(method):
+    """A belt that carries a mass as x = t: past a gate, without a jump, on to the end."""
+    kernel = scene_kernel(
+        name="gate",
+        doc="a body on a belt, carried past a gate",
+        states=(Field("x", "m", "place"), Field("v", "m/s", "speed")),
+        parameters=(Field("gate", "m", "where it is"),),
+        rates=lambda x, v: (v, -x - 2.0 * sign(v - 1.0)),
+        surface={"end": lambda x: 1.0 - x, "gate": lambda x, gate: gate - x},
+        start=lambda: (0.0, 1.0),
+    )
+    outputs, status = solve(kernel, method, gate=np.array([0.25, 0.7]), flips=2.0)
+    assert (status == Status.OK).all()
+    np.testing.assert_allclose([outputs["time"], outputs["v"]], 1.0, rtol=1e-9)
