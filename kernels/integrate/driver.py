@@ -63,6 +63,9 @@ def settled(m, state, side, parameters, unit, near):
     `near` : 1 where the state is nearly on a kink
     """
     signs, turned, marks = m.natural_signs(state, Mode(side, (), parameters, False)), [], []
+    if m.speeds is not None:  # what is met next may hang on whether the motion slides
+        mode, nothing = Mode(side, signs, parameters, False), tuple(0.0 * x for x in near)
+        signs, *_ = pressed(m, state, mode, (0.0 * side, *near), nothing, 0.0, side < math.inf)
     events = m.jet(state, Mode(side, signs, parameters, False), unit)
     for sign, close, (_, factor, u) in zip(signs[:-1], near, events[1:], strict=True):
         on = ((u[0] <= 0.0) & (u[0] >= 0.0)) | (close > 0.5)

@@ -201,16 +201,17 @@ def test_a_body_that_dry_friction_holds_rests_there_whatever_other_kinks_its_rat
 
 @pytest.mark.parametrize("method", METHODS)
 def test_a_slide_goes_on_through_a_further_surface_that_it_passes(method):
-    """A belt that carries a mass as x = t: past a gate, without a jump, on to the end."""
+    """A relay that follows x = 1 - t, past a gate that counts, to the end."""
     kernel = scene_kernel(
         name="gate",
-        doc="a body on a belt, carried past a gate",
-        states=(Field("x", "m", "place"), Field("v", "m/s", "speed")),
+        doc="a relay that follows its set point past a gate",
+        states=(Field("x", "m", "place"), Field("n", "1", "gates that it has passed")),
         parameters=(Field("gate", "m", "where it is"),),
-        rates=lambda x, v: (v, -x - 2.0 * sign(v - 1.0)),
-        surface={"end": lambda x: 1.0 - x, "gate": lambda x, gate: gate - x},
-        start=lambda: (0.0, 1.0),
+        rates=lambda x, t: (-3.0 * sign(x - 1.0 + t), 0.0),
+        surface={"end": lambda x: x, "gate": lambda x, gate: x - gate},
+        switch={"gate": lambda x, n: (x, n + 1.0)},
+        start=lambda: (1.0, 0.0),
     )
     outputs, status = solve(kernel, method, gate=np.array([0.25, 0.7]), flips=2.0)
     assert (status == Status.OK).all()
-    np.testing.assert_allclose([outputs["time"], outputs["v"]], 1.0, rtol=1e-9)
+    np.testing.assert_allclose([outputs["time"], outputs["n"]], 1.0, rtol=1e-9)
