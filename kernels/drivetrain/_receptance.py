@@ -24,6 +24,8 @@ ROUNDING = 2.0**-50
 """Of an inertia and a spring in (1): 8 half ulps."""
 REACH = 2.0**300
 """Largest w and w h without units."""
+SLOWEST = 2.0**-400
+"""Least w without units of a chain without ground: below it w^2 J loses digits."""
 _FAR = 2.0**100
 
 
@@ -103,6 +105,6 @@ def receptance(chain, w, drive, read, at, rows):
     total = total + scale(near.work * (complex.size(far.x) / complex.size(near.x)), near.e + far.e - e_W)
     total = total + right.work * (complex.size(left.x) / complex.size(right.x))
     error = ROUNDING * (1.0 + total / complex.size(net))
-    sound = (w < REACH) & (w * extremes(n, h)[1] < REACH)
+    sound = (w < REACH) & (w * extremes(n, h)[1] < REACH) & (w + k[n - 1] > SLOWEST)
     re, im = choose(sound, ratio, (math.nan * w, math.nan * w))
     return re, im, near.e - left.e - own, where(sound & (error < math.inf), error, math.inf)

@@ -115,6 +115,13 @@ def test_where_a_receptance_is_infinite_it_alone_is_left_out(count):
     assert (receptances(J, k, h, 1, 3, [0.0])[1] == Status.OUT_OF_RANGE).all()  # nothing is left
 
 
+def test_a_free_chain_turned_so_slowly_that_its_inertia_loses_digits_is_refused():
+    large = np.array([[1e100, 1e100]])
+    for last, at_1e_160_hertz in ((0.0, Status.OUT_OF_RANGE), (1e100, Status.OK)):
+        k = np.array([[1e100, last]])
+        assert receptances(large, k, 0.0 * k, 1, 1, [1e-160])[1] == at_1e_160_hertz
+
+
 def test_at_rest_the_receptance_is_the_flexibility_to_ground():
     J, k, h = chains(6, 12, 0.1)
     for drive, read in ((1, 1), (2, 5), (6, 3)):
