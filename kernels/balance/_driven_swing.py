@@ -171,7 +171,7 @@ def newton(scene, rtol):
     first = _rise(scene, 0.0 * least)
     passes = not_(beta > 0.0) | ((m - r) * (1.0 + share) > beta * where(creeps, 1.0, -expm1(-delta[0])))
     grows = passes & (not_(short) | (first.p > least))
-    swings = grows & not_(never | (not_(beta > 0.0) & creeps))
+    swings = grows & not_(never | (creeps & not_(beta > r)))
     low = where(swings, least, 0.0)
 
     # the start is the a of 2 r a + pi zeta a^2 = work, what light losses tend to

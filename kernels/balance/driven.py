@@ -5,8 +5,8 @@ The drive is either an impulse, the energy k w given at each passage of th = 0, 
 motion over abs(th) < beta; it turns round once the balance has left the lift. Leaves out: what an escapement does to
 the balance outside, and stiction: a cycle turns at more than r. No impulse starts a balance at rest at the zero.
 Source: "Theory of Horology", 2-3, for the motion; the cycle, its existence and its multiplier are derived in
-`_driven_swing`. A drive too weak to keep a swing up is refused as STICKS; so is an impulse for zeta >= 1, where no
-balance released from rest comes to th = 0.
+`_driven_swing`. A drive too weak to keep a swing up is refused as STICKS; so is for zeta >= 1, where a balance released
+from rest creeps to r, an impulse or a lift with beta <= r.
 """
 
 import math

@@ -143,6 +143,11 @@ def test_just_below_the_least_drive_the_balance_sticks():
     assert (status == Status.STICKS).all()
 
 
+def test_an_overdamped_balance_that_creeps_to_the_edge_of_its_lift_sticks():
+    _, status = solve(BALANCE_DRIVEN, "newton", [1.0, 1.5, 30.0], 1.0, 0.75, 0.0, 5.0, 0.75)
+    assert (status == Status.STICKS).all()
+
+
 def test_with_hardly_any_friction_it_sticks_just_below_the_torque_that_it_takes():
     """m - r > beta tanh(delta/2) passes the lift from rest at its begin; both sides are far below beta."""
     random = np.random.default_rng(3)
