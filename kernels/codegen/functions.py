@@ -142,7 +142,7 @@ class Functions:
     def inputs(self, state, mode, unit=None, changes=()):
         """{name of an input: its value}."""
         found = dict(zip(self.states, state, strict=False)) | {"side": mode.side, ".unit": unit}
-        found |= {f".held_{name}": found.get(name) for name in self.graph.held}
+        found |= {f".held_{name}": found.get(name) for name in self.states}
         found |= dict(zip(self.scene.parameters, mode.parameters, strict=True))
         found |= dict(zip((*(f".sign_{j}" for j in range(len(self.kinks))), ".way"), mode.signs, strict=False))
         return found | {f".delta_{s}": delta for s, delta in zip(self.states, changes, strict=False)}

@@ -100,7 +100,7 @@ def _recorded(scene, held):
     shared = any(graph.parts(u)[1] in known for u in found[1:])
     for u in found[1:]:
         graph.kink(u)
-    numbers = tuple(graph.kinks[u] for u in found[1:])
+    graph.surfaces = numbers = tuple(graph.kinks[u] for u in found[1:])
     met = dict(zip(surfaces, (".way", *(f".sign_{j}" for j in numbers)), strict=True))
     switched = _switched(graph, scene, states, constants, met, declared)
     unit = graph.constant(".unit")

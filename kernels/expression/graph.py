@@ -116,7 +116,8 @@ class Graph:
 
     `kinks` are the series whose signs are inputs ".sign_0", ".sign_1", ..., with their numbers; `powers` are those of
     abs(u), u a state, which have no series at u = 0, with theirs. `held` are the names of the states that are held, of
-    which constants are inputs ".held_u"; `judged` what the signs of such constants are taken of.
+    which constants are inputs ".held_u"; `judged` what the signs of such constants are taken of; `surfaces` the numbers
+    of the kinks that are further surfaces, once these are recorded.
     """
 
     def __init__(self, held=()):
@@ -125,6 +126,7 @@ class Graph:
         self.powers = {}
         self.held = held
         self.judged = {}
+        self.surfaces = ()
         self._known = {}
 
     def _node(self, kind, args, varies):
@@ -272,12 +274,28 @@ class Graph:
         """The sign of a series, constant between kinks."""
         constant = self._constant_if_held(u)
         if constant is u:
-            return self.kink(u)
+            opposite = self.add(*map(self._opposite, u.args)) if u.kind == ADD else None  # y - x, of x - y
+            return -self.kink(opposite) if opposite in self.kinks else self.kink(u)
         return self.function("sign", self._judge(constant))
 
+    def _opposite(self, x):
+        """-x, of which the opposite is x again."""
+        if x.kind == MUL and any(_is(factor, -1.0) for factor in x.args):
+            return x.args[_is(x.args[0], -1.0)]
+        return self._opposite(x.args[0]) * x.args[1] if x.kind == SCALED else -x
+
     def kink(self, u):
-        """The sign of a series, whose 0 is located."""
-        return self.constant(f".sign_{self.kinks.setdefault(u, len(self.kinks))}")
+        """The sign of a series, whose 0 is located; of a further surface, in a switch, by its value where not met."""
+        number = self.kinks.setdefault(u, len(self.kinks))
+        sign = self.constant(f".sign_{number}")
+        if number in self.surfaces:
+            return self.chosen(sign, self.of(1.0), self.function("sign", self._at_once(u)))
+        return sign
+
+    def _at_once(self, x):
+        """A constant: what varies, as it is at this moment."""
+        states = [s.args[0] for s in needed(x) if s.kind == INPUT and s.varies]
+        return self.again(x, {name: self.constant(f".held_{name}") for name in states})
 
     def _judge(self, constant):
         return self.judged.setdefault(constant, constant)

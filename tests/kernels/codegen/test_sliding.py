@@ -9,7 +9,7 @@ from sliding_scene import SLIDING
 
 from kernels.interface import Status
 from kernels.lanes.jit import COMPILED
-from kernels.scene import Field, maximum, scene_kernel, sign
+from kernels.scene import Field, maximum, scene_kernel, sign, where
 from kernels.trajectory import section_kernel
 
 METHODS = ["taylor", "dop853", "rodas5p"]
@@ -201,13 +201,13 @@ def test_a_body_that_dry_friction_holds_rests_there_whatever_other_kinks_its_rat
 
 @pytest.mark.parametrize("method", METHODS)
 def test_a_slide_goes_on_through_a_further_surface_that_it_passes(method):
-    """A relay that follows x = 1 - t, past a gate that counts, to the end."""
+    """A relay that follows x = 1 - t, past a gate that counts, to the end. Its kink is written twice."""
     kernel = scene_kernel(
         name="gate",
         doc="a relay that follows its set point past a gate",
         states=(Field("x", "m", "place"), Field("n", "1", "gates that it has passed")),
         parameters=(Field("gate", "m", "where it is"),),
-        rates=lambda x, t: (-3.0 * sign(x - 1.0 + t), 0.0),
+        rates=lambda x, t: (-2.0 * sign(x - (1.0 - t)) - where(x >= 1.0 - t, 1.0, -1.0), 0.0),
         surface={"end": lambda x: x, "gate": lambda x, gate: x - gate},
         switch={"gate": lambda x, n: (x, n + 1.0)},
         start=lambda: (1.0, 0.0),

@@ -192,3 +192,12 @@ def test_the_jump_of_a_surface_that_is_not_met_need_not_be_defined(method):
     time = sum(abs(math.sqrt(begin) - math.sqrt(end)) for begin, end in speeds)
     assert status == Status.OK
     assert [outputs[name] for name in ("time", "x", "v")] == pytest.approx([time, 0.0, -2.0], abs=1e-8)
+
+
+@pytest.mark.parametrize("factor", [lambda x: where(x < 1.0, 1.0, 2.0), lambda x: where(x > 1.0, 2.0, 1.0)])
+def test_a_jump_knows_on_which_side_of_another_surface_it_is_made(factor):
+    """From the middle to the left wall and across, as fast, since that wall is not behind the right one."""
+    kernel = scene_kernel(**WALLS | {"switch": {"left": lambda x, v, y, w: (x, -v * factor(x), y, w)}})
+    outputs, status = found(kernel, "taylor", 0.5, 0.5, 9.0, -1.0, flips=2)
+    assert status == Status.OK
+    assert outputs["time"] == pytest.approx(1.5)
