@@ -64,7 +64,7 @@ name, doc : of the method
 follow : (`Search`, bare) -> rows of `Found` and of outputs; statuses. Those at ROUGH may have parameters some roundings
     off; of those `bare` tangents are not needed
 begins : (cells, terms) -> statuses: OK where the method is worth while, else why it is not
-bare : whether less is followed where torque varies and neither drag nor the sensitivity need tangents
+bare : whether less is followed where torque varies and neither drag nor what is asked needs tangents
 steps : whether it goes by steps of one order. Cells that take about as many go side by side then, and the search is
     left out where friction soon balances the drive: steps are short there in any case
 coarse, orderly, least : tolerance of the search; the one below which an error falls as it does; the finest
@@ -226,7 +226,7 @@ def cycles(manner, cells, rtol, asked):
     `asked` says which of the outputs must be right. The result is outputs and relative errors, a row for each output,
     and statuses: NOT_CONVERGED where half swings come to rest or the bracket closes on nothing.
     """
-    n, tangents = len(rtol), asked[_SENSITIVITY]
+    n, tangents = len(rtol), asked[_SENSITIVITY] or asked[_MULTIPLIER]
     terms, status = begun(manner, cells, rtol)
     outputs, errors = np.full((len(asked), n), np.nan), np.full((len(asked), n), np.inf)
     follows = np.array([not tangents, True, False, tangents, True])[:, None]  # the others by (4)
