@@ -130,7 +130,8 @@ def to_event(pair, cell, mode, active):
         flat = (below < 0.0) & (-length * rate <= -fma(SUNK, tolerance, ROUNDED) * below)
         away = (rate > 0.0) | (flat & (cuts < HALVED))  # leaves the event that it starts on and has met again
         doubt, near = doubted(m, step, box, mode, on, cuts, margins, tolerance)
-        doubt = doubt & moving & not_(rough | pressed | (met & not_(above > 0.0) & (below < 0.0)))
+        at_once = met & not_(above > 0.0) & (below < 0.0) & (cell.time <= 0.0)  # starts there at rest, and falls
+        doubt = doubt & moving & not_(rough | pressed | at_once)
         low = where(doubt & not_(met | not_(cuts < 0.5)), dip(step), 0.0)
         close = doubt & near & (cuts > NARROWED)
         again = rough | (pressed & away) | (doubt & not_(close))

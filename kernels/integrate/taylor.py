@@ -262,5 +262,5 @@ def crossing(at, curve, event, facts, extent, h, tolerance, searching):
             break
         before = change
     blur = GRAZING * tolerance * extent
-    at_once = (h <= 0.0) & (rate <= 0.0) & (bend < 0.0)  # begins there at rest, and falls
+    at_once = (h <= 0.0) & (rate <= 0.0) & (bend < 0.0)  # starts there at rest, and falls
     return t, searching & not_(at_once | (magnitude(rate) > blur / magnitude(rate) * (2.0 * magnitude(bend))))

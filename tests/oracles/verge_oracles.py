@@ -13,8 +13,8 @@ import numpy as np
 DEAD = 1e-6
 STEP = 0.02
 """Most time to the next event, in units of the drive."""
-MOST = 20_000
-"""Steps of a run."""
+MOST = 4_000
+"""Steps of a tooth, on average."""
 
 
 def _first(f, low, high):
@@ -147,7 +147,7 @@ def followed(p, teeth):
     """What comes of so many teeth from rest on, a list each: time, lost energy, way, angle, speed and recoil of each
     tooth; and how often it was met."""
     clock = Verge(p)
-    for _ in range(MOST):
+    for _ in range(MOST * teeth):
         clock.step()
         if len(clock.passed) > teeth:
             break
