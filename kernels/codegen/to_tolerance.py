@@ -75,7 +75,7 @@ def solver(scene, method, again=True, sure=True):
     def how(columns, rtol, stops=None):
         if not sure:
             results, status = once(runner(scene, "told" if method == "taylor" else method), columns, rtol, stops)
-            return results, status, 0.0 * results[-1]
+            return results, status, np.full_like(results[-1], np.nan)
         if method == "taylor":
             return by_error(runner(scene, "told"), columns, rtol, 0.0 if again else np.inf, stops)
         return by_runs(runner(scene, method), columns, rtol, TIGHTEST if again else np.inf, stops)
