@@ -63,7 +63,9 @@ def run(arguments: argparse.Namespace) -> Outcome:
         try:
             stack.enter_context(logging_to(path, arguments.log_json))
         except OSError as fault:
-            raise SweepError(f"{target} cannot be written with its log beside it, {path}: {fault.strerror}") from None
+            if not target.exists():  # else it may be done, and there is nothing to write
+                cause = f"{target} cannot be written with its log beside it, {path}: {fault.strerror}"
+                raise SweepError(cause) from None
         try:
             options = {name: getattr(arguments, name) for name in RUN_OPTIONS}
             outcome = _accounted(target, complete(study, target, **options, **solving(arguments, study)))

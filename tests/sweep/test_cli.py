@@ -214,6 +214,16 @@ def test_a_mistake_ends_in_one_message_and_status_2(here, call, argv, message):
     assert "/proc" not in message or err.startswith(("/proc/x.h5 ", "/proc/x.h5:"))
 
 
+def test_a_finished_result_without_room_for_its_log_is_done_before(done, call):
+    """As in a folder that is read-only. What has to write there is told so."""
+    Path("stones.h5.log").mkdir()
+    code, out, _ = call("run", "stones.toml", *OWN)
+    assert (code, "done before" in out) == (0, True)
+    Path("new.h5.log").mkdir()
+    code, _, err = call("run", "stones.toml", *OWN, "-o", "new.h5")
+    assert (code, "new.h5.log" in err) == (2, True)
+
+
 @pytest.mark.parametrize(
     "argv",
     [
