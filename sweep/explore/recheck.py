@@ -150,7 +150,8 @@ class Checked:
             i = np.where(judged, largest / rtol, -1.0).argmax()
             output = max(off, key=lambda name: off[name][i])
             pair = [np.ravel(some[output][i]) for some in (cells, values)]
-            place = np.argmax(abs(pair[0] - pair[1]))
+            same = (pair[0] == pair[1]) | np.isnan(pair).all(axis=0)  # NaN fills up lists of frequencies
+            place = np.argmax(np.where(same, 0.0, abs(pair[0] - pair[1])))
             said = [(methods[used[i]].name, float(pair[0][place])), (source[i], float(pair[1][place]))]
             self.worst = {"cell": cell_values(dataset, int(drawn[i])), "output": output, "values": said}
             self.worst["off"] = float(largest[i] / rtol[i])

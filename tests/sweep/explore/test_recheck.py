@@ -126,6 +126,14 @@ def test_traces_are_judged_and_differ_relative_to_their_amplitude():
     assert differs == pytest.approx(dict.fromkeys(differs, 0.25), rel=1e-3)
 
 
+def test_the_worst_of_a_list_that_nan_fills_up_is_a_number():
+    keys = {"kernel": "drivetrain", "outputs": ["frequency"], "axes": {"n_keep": [1, 2]}}
+    ds = sweep.run(keys | {"fixed": {"J": [1.0, 2.0, 4.0], "k": [1e3, 2e3, 0.0]}})
+    found = ds.assign(frequency=ds.frequency * 1.1).sweep.check()
+    (_, old), (_, new) = found.worst["values"]
+    assert (found.beyond, old) == (2, pytest.approx(1.1 * new))
+
+
 def test_a_scene_whose_parameters_all_have_defaults_is_asked_again_and_what_is_0_to_rounding_is_the_same():
     keys = {"kernel": "kicked_scene:KICKED", "fixed": {"kick": 1.0}, "allow_import": True, "outputs": ["period", "x"]}
     assert sampled(sweep.study(**keys, axes={"rtol": [1e-6, 1e-3]}), 5).axes["zeta"].values.tolist() == [0.0]
