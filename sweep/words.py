@@ -175,7 +175,7 @@ def one_digit(seconds: float) -> str:
 
 def number(what: str, value: Any) -> float:
     """A number; raises SweepError for what is none."""
-    with contextlib.suppress(TypeError, ValueError):
+    with contextlib.suppress(TypeError, ValueError, OverflowError):
         if not isinstance(value, str):
             return float(value)
     raise SweepError(f"{what}: expected a number, found {value!r}")
@@ -183,7 +183,8 @@ def number(what: str, value: Any) -> float:
 
 def several(what: str, given: Any) -> list[Any]:
     """Names or numbers in their order, each once, of several or of one alone. Raises SweepError for what is neither."""
-    found = [given] if isinstance(given, str | Real) or not isinstance(given, Iterable) else [*given]
+    alone = isinstance(given, str | Real) or not isinstance(given, Iterable) or getattr(given, "ndim", 1) == 0
+    found = [given] if alone else [*given]
     if not all(isinstance(one, str | Real) for one in found):
         raise SweepError(f"{what}: expected a list of names or numbers, or one alone; found {kind(given)}")
     return list(dict.fromkeys(found))
@@ -191,9 +192,30 @@ def several(what: str, given: Any) -> list[Any]:
 
 def whole_number(what: str, value: Any, least: int = 1) -> int:
     """The number, if it is a whole one from the least on. Raises SweepError."""
-    if isinstance(value, bool) or not isinstance(value, Integral) or value < least:
+    if isinstance(value, bool) or not isinstance(value, Integral) or not least <= int(value) < 2**63:
         raise SweepError(f"{what}: expected a whole number from {least} on, found {value!r}")
     return int(value)
+
+
+def flag(what: str, value: Any) -> bool:
+    """A truth value. Raises SweepError for all else, lest force="no" overwrites."""
+    if isinstance(value, bool) or type(value).__name__ == "bool":  # of numpy
+        return bool(value)
+    raise SweepError(f"{what}: expected True or False, found {kind(value)}")
+
+
+def a_name(what: str, value: Any) -> str:
+    """A text. Raises SweepError for all else."""
+    if isinstance(value, str):
+        return value
+    raise SweepError(f"{what}: expected a name, found {kind(value)}")
+
+
+def function(what: str, value: Any) -> Any:
+    """What can be called. Raises SweepError for all else."""
+    if callable(value):
+        return value
+    raise SweepError(f"{what}: expected a function, found {kind(value)}")
 
 
 def seconds_of(name: str, text: float | str) -> float:

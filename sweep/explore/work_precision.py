@@ -30,7 +30,7 @@ from sweep.runs.run import run
 from sweep.study.model import Study, frozen
 from sweep.study.read import Given
 from sweep.study.read import study as as_study
-from sweep.words import Table, did_you_mean, duration, number, page, paragraph, several, whole_number
+from sweep.words import Table, a_name, did_you_mean, duration, function, number, page, paragraph, several, whole_number
 
 TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13)
 CELLS = 1024
@@ -121,10 +121,11 @@ def work_precision(
         raise SweepError("no method of the kernel can do this study")
     if not names:
         raise SweepError(f"methods: expected at least one of auto, {', '.join(able)}; found none")
+    reference = None if reference is None else a_name("reference", reference)
     for name in {*names, reference or able[0]} - {"auto", *able} | {reference} & {"auto"}:
         hint = did_you_mean(name, able) or f"; there are auto, {', '.join(able)}"
         raise SweepError(f"no method {name} that can do this study{hint}")
-    note(f"methods: {len(names)}, tolerances: {len(tolerances)}, cells: {Grid(part).size} ...")
+    function("note", note)(f"methods: {len(names)}, tolerances: {len(tolerances)}, cells: {Grid(part).size} ...")
     if isolate or cell_timeout is not None:
         part = _without_failing(part, ["auto", *able], cell_timeout, note)
     against = _given(part, truth) if truth is not None else _best(part, [reference] if reference else able)
@@ -215,6 +216,10 @@ known that there is nothing to give."""
 
 def _given(study: Study, values: Mapping[str, Any]) -> Reference:
     """Values of some outputs in all cells of a study; NaN in all of them: there is nothing to give."""
+    if not isinstance(values, Mapping):
+        raise SweepError(
+            f"truth: expected a mapping of outputs to arrays, found an object of type {type(values).__name__}"
+        )
     size = Grid(study).size
     shapes = {name: (size, *shape) for name, shape in study.shapes.items()}
     taken = {name: np.asarray(column, np.float64) for name, column in values.items()}

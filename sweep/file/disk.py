@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from sweep.errors import SweepError, reason
+from sweep.words import flag
 
 
 def open_file(path: Path | str, flags: int) -> int:
@@ -162,7 +163,7 @@ def check_target(target: Path, *, force: bool = False, read: Sequence[Path] = ()
 
     Of folders, which hold what nobody meant to overwrite, only those of zarr are given up.
     """
-    there = bool(mark(target))
+    force, there = flag("force", force), bool(mark(target))
     with refusing(target):
         if target.is_dir() and not (target / "zarr.json").is_file():
             raise SweepError(f"{target} is a folder; name a file in it")

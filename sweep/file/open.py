@@ -17,13 +17,13 @@ from sweep.cells.fingerprint import fingerprint
 from sweep.cells.partition import boxes
 from sweep.cells.schema import Schema, cell_schema
 from sweep.cells.timing import BLOCK_BYTES
-from sweep.errors import SweepError
+from sweep.errors import SweepError, reason
 from sweep.file import disk
 from sweep.file.frame import cuts_of
 from sweep.file.reading import Damaged, StoredFile, Table
 from sweep.file.store import alone, begun, earlier, unfinished_of
 from sweep.study.model import Study
-from sweep.words import as_path
+from sweep.words import as_path, flag
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -66,6 +66,7 @@ def open_result(path: str | os.PathLike[str], strict: bool = False, *, chunks: A
 
     from sweep.file.columns import Result
 
+    strict = flag("strict", strict)
     file: Any = stored(as_path(path))
     if strict and not file.finished:
         left = f"{len(file.missing())} of {file.work.blocks.count} blocks are missing"
@@ -73,7 +74,11 @@ def open_result(path: str | os.PathLike[str], strict: bool = False, *, chunks: A
         raise SweepError(f"{file.path}: unfinished, {left}; run its sweep again to continue")
     if chunks is None and os.fstat(file.fd).st_size > MEMORY_SHARE * memory():
         chunks = "auto"
-    return xr.open_dataset(file, engine=Result, chunks=chunks)
+    try:
+        return xr.open_dataset(file, engine=Result, chunks=chunks)
+    except (TypeError, ValueError) as fault:
+        file.close()
+        raise SweepError(f"{file.path}: cannot be opened with chunks={chunks!r}: {reason(fault)}") from fault
 
 
 def stored(output: Path) -> StoredFile:

@@ -13,7 +13,7 @@ from sweep.errors import SweepError
 from sweep.laws.loglog import EPSILON, FEWEST, LINES, VALUES, Array, alike
 from sweep.laws.noise import NOISES, roughness, rounding
 from sweep.units import UnitMistake, in_unit, unit_of
-from sweep.words import did_you_mean, kind, number
+from sweep.words import a_name, did_you_mean, kind, number
 
 Window = tuple[float | None, float | None]
 
@@ -111,6 +111,7 @@ def check_names(y: xr.DataArray, taken: Iterable[Hashable]) -> None:
 def positive_axis(y: xr.DataArray, dim: str, repeated: bool = False) -> tuple[str, Array]:
     """Dimension that `dim` runs along, and its values, fit to take logarithms of; some may be `repeated`."""
     check_output(y)
+    a_name("dim", dim)
     axes = [str(name) for name, coordinate in y.coords.items() if coordinate.ndim == 1]
     if dim not in axes:
         others = f"; {title(y)} runs along {', '.join(axes) or 'no axis with values'}"
@@ -242,7 +243,7 @@ def like(given: Any, y: xr.DataArray, what: str) -> xr.DataArray:
     """A number or DataArray as one of the shape of y. Raises SweepError where it is negative or does not fit."""
     try:
         array: xr.DataArray = (xr.zeros_like(y, dtype=np.float64) + given).astype(np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         array = xr.DataArray(math.nan)
     if array.dims != y.dims or array.shape != y.shape:
         raise SweepError(f"{what}: expected a number, or an array along axes of {title(y)}; found {kind(given)}")

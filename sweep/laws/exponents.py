@@ -17,7 +17,7 @@ from sweep.errors import SweepError, missing
 from sweep.laws import curves
 from sweep.laws.curves import Window, check_names, log_of, positive_axis, title
 from sweep.laws.loglog import EPSILON, Array, brackets, by_runs, is_logarithmic, root, slope_errors, slopes
-from sweep.words import number
+from sweep.words import flag, number, several
 
 BORDERS = (-1.0, -0.5, -1 / 3)
 """Exponents of a period in the drive: weak drive, losses that scale with it, strong drive."""
@@ -71,6 +71,7 @@ def local_exponent(y: xr.DataArray, dim: str, *, error: bool = False, bound: Any
     True
     """
     dimension, x = positive_axis(y, dim)
+    error = flag("error", error)
     t, logs = np.log(x), log_of(y).transpose(..., dimension).compute()
     name = "exponent" if y.name is None else f"{y.name}_exponent"
     exponent = logs.copy(data=slopes(t, logs.values, 5)).transpose(*y.dims).rename(name)
@@ -122,6 +123,7 @@ def where_exponent(
     26.40
     """
     dimension, x = positive_axis(y, dim)
+    values = flag("values", values)
     check_names(y, {*y.coords, *y.dims} & {"abscissa", "abscissa_error"})
     if not y.size:
         raise SweepError(f"{title(y)} has no line along {dim}; an axis of it is empty: {dict(y.sizes)}")
@@ -212,7 +214,7 @@ def exponent_map(y: xr.DataArray, dim: str, levels: Sequence[float] = BORDERS) -
     logarithmic = [is_logarithmic(y[name].values) for name in names]
     across, down = (np.log(y[n].values) if take else y[n].values for n, take in zip(names, logarithmic, strict=True))
     generator = contourpy.contour_generator(across, down, np.ma.masked_invalid(local.exponent.values))
-    numbers = [number("levels", level) for level in np.atleast_1d(levels).tolist()]
+    numbers = [number("levels", level) for level in several("levels", levels)]
     # where the exponent is a level throughout, within its error, rounding would draw lines
     apart = [bool((abs(local.exponent - level) > local.exponent_error).any()) for level in numbers]
     by_level = ((level, line) for level in itertools.compress(numbers, apart) for line in generator.lines(level))

@@ -22,6 +22,7 @@ from sweep.laws.fits import fitted, union
 from sweep.laws.loglog import FEWEST, LINES, Array, alike, once, slope_bounds, slopes, tends
 from sweep.laws.noise import BEYOND_DOUBT, RARE, Noise, apart, inliers, regress, roughness, rounding, scatters, shaped
 from sweep.laws.shapes import FADING, LOG_CORRECTION, ONE, Number
+from sweep.words import a_name
 
 AS_WELL, HARDER = 13.0, 5.0
 """Difference of AICc up to which another D is not ruled out, and up to which one law and a logarithmic correction are
@@ -252,7 +253,7 @@ def fit_correction(
     >>> print(f"{float(sweep.fit_correction(ds.period, 'mu').exponent):.4f}")
     -0.3334
     """
-    if end not in ("low", "high"):
+    if a_name("end", end) not in ("low", "high"):
         raise SweepError(f'end: expected "low" or "high", found {end!r}')
     law, each = f"{{y}} = A {{x}}^p (1 + B {{x}}^-D), {end} end", functools.partial(_corrected, low=end == "low")
     return fit_lines(each, law, y, dim, window, sigma, confidence=confidence, noise=noise)

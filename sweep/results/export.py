@@ -19,7 +19,7 @@ from sweep.errors import SweepError, missing
 from sweep.file import disk
 from sweep.file.disk import check_target
 from sweep.results.statuses import flag_words, is_summary, pieces
-from sweep.words import as_path, cell, listed, require_dataset
+from sweep.words import as_path, cell, flag, listed, require_dataset
 
 EXPORTED = "exported by foliot"
 """In the history of what is exported."""
@@ -77,7 +77,7 @@ def export(
     if kind not in WRITERS:
         found = f'"{target.suffix}"' if target.suffix else "no suffix"
         raise SweepError(f"{target}: found {found}; export writes {listed(WRITERS, word='and')}, as the suffix says")
-    if compress and kind not in PACKED:
+    if flag("compress", compress) and kind not in PACKED:
         raise SweepError(f"{target}: compress is for {listed(PACKED, word='and')}")
     source = dataset.encoding.get("source")
     check_target(target, force=force, read=[Path(source)] if source else [])

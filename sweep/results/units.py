@@ -46,6 +46,8 @@ def in_units(dataset: xr.Dataset, units: Mapping[str, str]) -> xr.Dataset:
             mistakes.add(str(name), f"the result has no such variable{did_you_mean(name, map(str, dataset.variables))}")
         elif "units" not in dataset[name].attrs or dataset[name].dtype.kind != "f":
             mistakes.add(name, "has words or counts, which have no unit")
+        elif not isinstance(unit, str):
+            mistakes.add(name, f'expected a unit, e.g. "mm", found {kind(unit)}')
         else:
             try:
                 old = dataset[name]

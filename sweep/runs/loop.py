@@ -34,7 +34,7 @@ from sweep.runs.extend import Reused
 from sweep.runs.isolate import Processes
 from sweep.runs.progress import Progress, log
 from sweep.study.model import Study
-from sweep.words import as_path, kind, seconds_of, whole_number
+from sweep.words import as_path, flag, function, kind, seconds_of, whole_number
 
 if TYPE_CHECKING:
     from sweep.runs.cluster import Cluster
@@ -80,6 +80,8 @@ class Task:
     note: Any = None
 
     def __post_init__(self) -> None:
+        for name in ("force", "extend", "repair", "isolate", "retry_failed"):
+            flag(name, getattr(self, name))
         self.fingerprint = fingerprint(self.study)
         self.output = Path(os.path.realpath(as_path("." if self.path is None else self.path)))
         with disk.refusing(self.output):
@@ -101,7 +103,7 @@ class Task:
             raise SweepError("until: give a path as well, or what is computed by then would be lost")
         if self.extend and self.retry_failed:
             raise SweepError("extend, retry_failed: give one of the two; each continues another result")
-        self.note = self.note or Progress(1, self.progress, self.name).note
+        self.note = Progress(1, self.progress, self.name).note if self.note is None else function("note", self.note)
 
     @property
     def name(self) -> str:
@@ -121,8 +123,8 @@ def cores() -> int:
 
 def deadline(text: str | datetime | None, now: datetime | None = None) -> datetime | None:
     """The time that is meant, with a time zone: "07:00" is the next time it is seven, here. Raises SweepError."""
-    if text is None or isinstance(text, datetime):
-        return text and text.astimezone()
+    if text is None:
+        return None
     here = (now or datetime.now()).astimezone()
     try:
         clock = day_time.fromisoformat(str(text).strip())

@@ -18,7 +18,7 @@ from sweep.explore.scattered import MOST_AXES, Box, axes_of, interpolated
 from sweep.laws.loglog import is_logarithmic
 from sweep.results.statuses import flag_words, is_summary
 from sweep.study.model import Study
-from sweep.words import did_you_mean, listed
+from sweep.words import a_name, did_you_mean, listed
 
 GREEK = frozenset(
     (
@@ -65,6 +65,7 @@ class View:
     """
 
     def __init__(self, dataset: xr.Dataset, y: str | None = None, x: str | None = None) -> None:
+        y, x = (name if name is None else a_name(what, name) for what, name in (("y", y), ("x", x)))
         known = outputs(dataset)
         if not known:
             raise SweepError("there is nothing to draw: no output runs along an axis")

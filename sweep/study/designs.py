@@ -97,7 +97,8 @@ def _block(keys: Entry, kernel: Kernel) -> tuple[dict[str, Axis], Block]:
         given.wrong(f"missing; give at least one, e.g. axes.mu = {EXAMPLE}")
     design, options = _design(keys["design"], len(given.value)) if "design" in keys else ("product", {})
     said = [entry.get("num") for entry in given.value.values() if isinstance(entry, Mapping)] * (design == "product")
-    if (cells := math.prod(num for num in said if isinstance(num, int) and num > 0)) > LARGEST_GRID:
+    nums = (num for num in said if isinstance(num, int) and 0 < num <= LARGEST_AXIS)
+    if (cells := math.prod(nums, start=1.0)) > LARGEST_GRID:
         given.wrong(f"{cells:.3g} cells; a study may have at most {LARGEST_GRID:.0e}")
         given.mistakes.unread = True
         return {}, Block(design, ())

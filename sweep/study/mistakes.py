@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from kernels.interface import Field
 from sweep.errors import Mistake, StudyError, SweepError
 from sweep.units import unit_of
-from sweep.words import did_you_mean, listed, nearest
+from sweep.words import did_you_mean, kind, listed, nearest
 
 T = TypeVar("T")
 U = TypeVar("U")
@@ -204,8 +204,7 @@ def show(value: Any) -> str:
         return str(value) if abs(int(value)) < 10**40 else "an integer of more than 40 digits"
     if isinstance(value, numbers.Real):
         return repr(float(value))
-    words = {"dict": "a table", "list": "a list", "tuple": "a list", "NoneType": "nothing"}
-    return words.get(type(value).__name__, f"a {type(value).__name__}")
+    return {"dict": "a table", "tuple": "a list"}.get(type(value).__name__) or kind(value)
 
 
 def limits(field: Field) -> str:

@@ -21,7 +21,7 @@ from kernels.interface import Field, Kernel, Method, load
 from sweep.errors import SweepError
 from sweep.study.mistakes import show
 from sweep.units import UnitMistake, exponents
-from sweep.words import did_you_mean, listed
+from sweep.words import did_you_mean, flag, listed
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -301,7 +301,7 @@ def load_kernel(name: object, allow_import: bool = False, folders: Iterable[Path
         raise SweepError(f"expected the name of a kernel, found {show(name)}; {there}")
     if ":" not in name and name not in known:
         raise SweepError(f"no kernel {show(name)}{did_you_mean(name, known) or ';'} {there}")
-    if ":" in name and not allow_import:
+    if ":" in name and not flag("allow_import", allow_import):
         cure = "allow it with --allow-import (Python: allow_import=True)"
         raise SweepError(f"{show(name)} runs code of your own; {cure}")
     try:

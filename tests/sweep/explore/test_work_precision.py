@@ -249,7 +249,9 @@ def test_no_more_cells_are_taken_than_are_wanted():
         ({"cells": 0}, "cells"),
         ({"truth": {"impact_sped": [1.0] * 4}}, "impact_speed"),
         ({"truth": {"impact_speed": [1.0] * 3}}, r"\(4,\)"),
-        ({"truth": {}}, "truth"),
+        *(({"truth": truth}, "truth") for truth in ({}, [1.0] * 4)),
+        *(({"reference": name}, "reference") for name in (["exact"], np.ones(2))),
+        ({"note": None}, "note"),
     ],
 )
 def test_mistakes_are_told(options, word):

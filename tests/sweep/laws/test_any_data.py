@@ -138,6 +138,14 @@ def test_what_is_no_output_no_dataset_or_no_study_is_refused(given):
         sweep.scaling(given)
 
 
+@pytest.mark.parametrize("given", [np.ones(3), "no", LINE, None])
+def test_what_is_neither_true_nor_false_is_refused(given):
+    with pytest.raises(sweep.SweepError, match="values: expected True or False"):
+        sweep.where_exponent(LINE, "x", -0.5, values=given)
+    with pytest.raises(sweep.SweepError, match="error: expected True or False"):
+        sweep.local_exponent(LINE, "x", error=given)
+
+
 @pytest.mark.parametrize("sigma", [0.0, 1e-20, 1e9, LINE * 0])
 def test_standard_errors_of_nothing_or_beyond_all_sense_are_refused(sigma):
     for fit in (sweep.fit_exponent, sweep.compare_laws):

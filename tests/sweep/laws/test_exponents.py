@@ -82,6 +82,7 @@ def test_a_coordinate_along_the_cells_of_a_zip_design_and_an_array_in_pieces_wil
     [
         ([1.0, 2.0, 3.0], "mu_", "did you mean mu?"),
         ([1.0, 2.0, 3.0], "phase", "runs along mu"),
+        ([1.0, 2.0, 3.0], np.ones(3), "expected a name"),
         ([0.0, 2.0, 3.0], "mu", "found 0"),
         ([-1.0, 2.0, 3.0], "mu", "found -1"),
         ([1.0, np.inf, 3.0], "mu", "finite"),

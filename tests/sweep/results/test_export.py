@@ -148,6 +148,8 @@ def test_outputs_axes_and_fixed_parameters_change_their_unit():
 def test_all_mistakes_are_told_at_once():
     with pytest.raises(SweepError, match="a mapping of names"):
         sweep.in_units(result(), "period")
+    with pytest.raises(sweep.StudyError, match="expected a unit"):
+        sweep.in_units(result(), {"height": ["mm"]})
     with pytest.raises(sweep.StudyError) as caught:
         sweep.in_units(result(), {"fall_tim": "s", "height": "kg", "status": "1", "g": "parsec/furlong^"})
     text = str(caught.value)

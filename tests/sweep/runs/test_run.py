@@ -60,7 +60,9 @@ def test_cells_that_are_cheap_beside_a_call_are_solved_by_few_calls():
     ("keys", "word"),
     [
         *(({"workers": number}, "workers") for number in (0, -1, True, 1.5)),
-        ({"block_cells": 0}, "block_cells"),
+        *(({"block_cells": number}, "block_cells") for number in (0, 10**400)),
+        *(({name: "no"}, name) for name in ("force", "extend", "repair", "isolate", "retry_failed")),
+        ({"extend": np.array([True, False])}, "extend"),
         *(({"progress": stream}, "progress") for stream in ("yes", 3, [])),
         ({"until": "07:00"}, "path"),
         ({"extend": True, "retry_failed": True}, "retry_failed"),

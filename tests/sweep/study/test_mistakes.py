@@ -62,6 +62,7 @@ def test_too_many_values_or_cells_are_refused_before_memory_is_asked_for(mistake
     axis = '{{ spacing = "linear", start = 1, stop = 2, num = {} }}'
     found = mistakes("\n".join(f"axes.{name} = {axis.format(10**7)}" for name in ("height", "v0", "g")))
     assert "at most 1e+12" in found["axes"]
+    assert "more than 40 digits" in mistakes(f"axes.height = {axis.format(10**99)}")["axes.height.num"]
     assert "10000001" in message_of(lambda: build(axes={"height": range(10_000_001)}), "axes.height")
 
 
