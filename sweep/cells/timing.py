@@ -36,6 +36,8 @@ SHARE = 0.005
 """or this share of the run, where that is more."""
 PROBE_SECONDS = 5e-4
 """A probe as long as this sees past the cost of a call, and 64 of them take a few hundredths of a second."""
+STALL = 0.02
+"""Seconds of a probe that are tried again, for on a busy machine they may be those of other processes."""
 DEAR = 2e-3
 """Seconds of a probe that counts among those of the sample, wherever it was made; one that fails counts as many."""
 BLOCK_SECONDS = (0.05, 1.0)
@@ -99,12 +101,13 @@ def take_sample(solver: SolveCells, columns: Sequence[Column], size: int, clock:
     faults, made = list[Exception](), dict[tuple[int, int], float]()
 
     def probe(start: int, cells: int) -> float:
-        """Seconds of so many cells; infinity where the kernel fails. What is dear is not done twice."""
-        if made.get((start, cells), 0.0) < DEAR:
+        """Seconds of so many cells, the least so far; infinity where the kernel fails. What is dear is done once."""
+        before = made.get((start, cells))
+        if before is None or before < STALL:
             arrays, begun = empty(columns, cells), clock()
             try:
                 solver.solve(start, arrays)
-                made[start, cells] = clock() - begun
+                made[start, cells] = min(before or math.inf, clock() - begun)
             except (SweepError, MemoryError):
                 raise
             except Exception as fault:
@@ -120,8 +123,8 @@ def take_sample(solver: SolveCells, columns: Sequence[Column], size: int, clock:
     alone = anywhere(1)
     if alone == math.inf:
         raise faults[-1]
-    if alone < 2 * PROBE_SECONDS:  # what is met for the first time matters in it
-        alone = min(alone, anywhere(1))
+    if alone < STALL:  # what is met for the first time matters in it
+        alone = anywhere(1)
     cells, lanes = 1, False
     if size > 1 and alone > PROBE_SECONDS:
         # where two cells take as long as one, as many as lanes will
@@ -131,6 +134,8 @@ def take_sample(solver: SolveCells, columns: Sequence[Column], size: int, clock:
         taken, more = alone, LANES
         while (cells == 1 or taken <= PROBE_SECONDS) and size >= (4 if cells == 1 else POSITIONS) * more:
             cells, taken, more = more, anywhere(more), 4 * more
+            if taken > PROBE_SECONDS:
+                taken = anywhere(cells)
     probes = {start: seconds for (start, n), seconds in made.items() if n == cells and DEAR <= seconds < math.inf}
     spent = sum(probes.values())
     for start in _places(size, max(1, min(POSITIONS, size // (4 * cells))), cells):
