@@ -16,11 +16,12 @@ pushed by that tooth once more, until this escapes again, and so on, within one 
 that of the first time.
 
 OK: the cycle that the clock comes to from there, one tooth a period, within the error that is stated. Its halves are
-alike, or the clock limps: with e > 0 and a heavy wheel one half may last longer, and have more landings, than the
-other. Then amplitude and recoil are the larger ones, speed and shares the means. NOT_CONVERGED: it did not come to such
-a cycle in 600 half periods; some clocks come to a cycle of several teeth, or to none. STEP_LIMIT: half a period has
-more than 3000 landings and escapes. NO_METHOD: groups beyond 2^+-40 or kappa above 2^13. Without friction and with
-e = 0 this is `impact`, without inertia of the wheel `foliot`. Leaves out: friction of the wheel, the shape of the
+alike, or the clock limps: with a heavy wheel that bounces, or next to the dry friction that stops it, one half may
+last longer, and have more landings, than the other. Then amplitude and recoil are the larger ones, speed and shares
+the means. NOT_CONVERGED: it did not come to such a cycle in 600 half periods; some clocks come to a cycle of several
+teeth, or to none. STEP_LIMIT: half a period has more than 3000 landings and escapes, or without drop the clock comes
+to rest between a tooth and the one before. NO_METHOD: groups beyond 2^+-40 or kappa above 2^13. Without friction and
+with e = 0 this is `impact`, without inertia of the wheel `foliot`. Leaves out: friction of the wheel, the shape of the
 pallets. Derived here.
 
 Without dimensions the foliot is at y phi0, counted along the push of the pallet that meets a tooth, that tooth at
@@ -42,6 +43,7 @@ from kernels.lanes.ranges import judged
 from kernels.lanes.vectors import choose, magnitude, sqrt, where
 from kernels.lanes.wiring import kernel, method
 from kernels.maths.elementary import log
+from kernels.maths.pairs import two_product
 from kernels.maths.wide import number, over, root, size, times, wide
 
 HALF_PERIODS = 600
@@ -57,9 +59,12 @@ STEPS, EVENTS = 500, 3000
 is 1e-12 of the first after 540 landings."""
 DIES_OUT = 1e-12
 """Share of the first closing speed at which the bodies go on together: they would part by 1e-24 of the way."""
+FADES = 1e-5
+"""Share of the first closing speed at which a clock without drop comes to rest between two teeth: further returns to
+the tooth it left, ever shorter, would follow."""
 
-Scene = namedtuple("Scene", "kappa d r drop e")
-"""kappa, d, r, and drop as above, and the restitution."""
+Scene = namedtuple("Scene", "kappa d r slack drop e")
+"""kappa, d, r, and drop as above, slack = 1 - r without the rounding of r, and the restitution."""
 
 Half = namedtuple("Half", "v w gap time swing way back lost closing end")
 """Speed of the foliot and of the wheel, and the gap, at escape, and what happened in the half period: `swing` is the
@@ -77,7 +82,9 @@ def without_dimensions(p):
     fine = (kappa[1] <= 12.0) & (kappa[1] >= -40.0)
     fine = fine & ((magnitude(d[1]) <= 40.0) | (p.c_v <= 0.0)) & ((magnitude(drop[1]) <= 40.0) | (p.drop <= 0.0))
     kappa, d, drop = choose(fine, (kappa, d, drop), ((1.0, 0.0), (1.0, 0.0), (1.0, 0.0)))
-    scene = Scene(number(kappa), number(d), number(over(R_v, push)), number(drop), p.e)
+    dry, (drive, rest) = over(R_v, (1.0, push[1])), two_product(n[0], tau[0])
+    slack = ((drive - number(dry)) + rest) / drive
+    scene = Scene(number(kappa), number(d), number(over(R_v, push)), slack, number(drop), p.e)
     return scene, (time, phi0, wheel, fine)
 
 
@@ -110,10 +117,10 @@ def _safe_step(scene, gap, v, w, force):
 
 
 @jit
-def _flight(scene, y, v, w, gap, watched):
-    """(2) until the gap closes or the tooth escapes: y, v, w, gap, time, the foliot's way, the wheel's, the least of
-    that on the way, and how it ends. After a landing the other pallet is `watched`: back at y = -1 it must find the
-    tooth that it let go ahead."""
+def _flight(scene, edge, off, v, w, gap, watched):
+    """(2) from y = edge + off until the gap closes or the tooth escapes: edge, off, v, w, gap, time, the foliot's way,
+    the wheel's, the least of that on the way, and how it ends. After a landing the other pallet is `watched`: back at
+    y = -1 it must find the tooth that it let go ahead. A tooth that was let go may be met within 1e-14 of an edge."""
     beta, time, way, rim, least = 0.5 * scene.d, 0.0, 0.0, 0.0, 0.0
     for _ in range(STEPS):
         rub = -scene.r if v > 0.0 else scene.r if v < 0.0 else 0.0
@@ -122,41 +129,41 @@ def _flight(scene, y, v, w, gap, watched):
         stop = linear_flow.first_reversal(beta, 0.0, speed, -scene.r) if speed > 0.0 else math.inf
         stops, escapes, falls = stop <= step, False, False
         step = min(step, stop)
-        if watched and v > 0.0 and y < -1.0:
-            back = linear_flow.first_crossing(beta, 0.0, v, rub, -1.0 - y)
-            falls = back <= step and gap - 1.0 - y - (w + 0.5 * back / scene.kappa) * back > scene.drop
+        if watched and v > 0.0 and off < -1.0 - edge:
+            back = linear_flow.first_crossing(beta, 0.0, v, rub, -1.0 - edge - off)
+            falls = back <= step and gap + (-1.0 - edge - off) - (w + 0.5 * back / scene.kappa) * back > scene.drop
             step, stops = (back, False) if falls else (step, stops)
         if watched and v > 0.0 and not falls:
-            out = linear_flow.first_crossing(beta, 0.0, v, rub, 1.0 - y)
+            out = linear_flow.first_crossing(beta, 0.0, v, rub, 1.0 - edge - off)
             escapes = out <= step
             step, stops = (out, False) if escapes else (step, stops)
         s, c, _ = linear_flow.response(beta, 0.0, step)
         moved, rolled = v * step + force * c, (w + 0.5 * step / scene.kappa) * step
         if w < 0.0:
             least = min(least, rim - 0.5 * w * w * scene.kappa if -w * scene.kappa < step else rim + rolled)
-        time, way, rim, y = time + step, way + magnitude(moved), rim + rolled, y + moved
+        time, way, rim, off = time + step, way + magnitude(moved), rim + rolled, off + moved
         gap = max(gap + (v - w) * step + force * c - 0.5 * step * step / scene.kappa, 0.0)
         v, w = (0.0 if stops else v + force * s), w + step / scene.kappa
         if escapes:
-            return 1.0, v, w, gap, time, way, rim, least, DONE
+            return 1.0, 0.0, v, w, gap, time, way, rim, least, DONE
         if falls:
-            return -1.0, v, w, gap, time, way, rim, least, FALLS_BACK
+            return -1.0, 0.0, v, w, gap, time, way, rim, least, FALLS_BACK
         if not (gap > 0.0) or (step <= 1e-15 * time and not stops):
-            return y, v, w, 0.0, time, way, rim, least, LANDED
-    return y, v, w, gap, time, way, rim, least, TOO_MANY
+            return edge, off, v, w, 0.0, time, way, rim, least, LANDED
+    return edge, off, v, w, gap, time, way, rim, least, TOO_MANY
 
 
 @jit
-def _contact(scene, y, v):
-    """(1) from y with speed v to the escape: speed there, time, and the way back before the push wins."""
+def _contact(scene, ahead, v):
+    """(1) with speed v to the escape, so far ahead: speed there, time, and the way back before the push wins."""
     both = 1.0 + scene.kappa
-    beta, against, push = 0.5 * scene.d / both, (1.0 + scene.r) / both, (1.0 - scene.r) / both
+    beta, against, push = 0.5 * scene.d / both, (1.0 + scene.r) / both, scene.slack / both
     back, turn = 0.0, 0.0
     if v < 0.0:
         turn = linear_flow.first_reversal(beta, 0.0, -v, -against)
         back, _ = linear_flow.motion(beta, 0.0, -v, -against, turn)
         v = 0.0
-    time = linear_flow.first_crossing(beta, 0.0, v, push, 1.0 - y + back)
+    time = linear_flow.first_crossing(beta, 0.0, v, push, ahead + back)
     _, out = linear_flow.motion(beta, 0.0, v, push, time)
     return out, turn + time, back
 
@@ -169,15 +176,15 @@ def half_period(scene, v, w, gap):
     is met again, and all is seen from that pallet until the tooth escapes once more: one `fallen` back, or several.
     """
     kappa, mesh = scene.kappa, 2.0 + scene.drop
-    y, v, gap = -1.0, -v, gap + scene.drop
+    edge, off, v, gap = -1.0, 0.0, -v, gap + scene.drop
     time, way, rim, least, swing = 0.0, 0.0, 0.0, 0.0, 1.0
     lost, first, scale, last = 0.0, 0.0, 0.0, 0.0
     impacts, fallen, how = 0, 0, TOO_MANY
     for _ in range(EVENTS):
-        y, v, w, gap, t, moved, rolled, low, end = _flight(scene, y, v, w, gap, impacts > 0)
+        edge, off, v, w, gap, t, moved, rolled, low, end = _flight(scene, edge, off, v, w, gap, impacts > 0)
         if impacts > 0:
             least, rim = min(least, rim + low), rim + rolled
-        time, way, swing = time + t, way + moved, max(swing, magnitude(y))
+        time, way, swing = time + t, way + moved, max(swing, magnitude(edge + off))
         if -least > mesh:
             how = OUT_OF_MESH
             break
@@ -191,14 +198,17 @@ def half_period(scene, v, w, gap):
             v, w = together + kappa * e * last / (1.0 + kappa), together - e * last / (1.0 + kappa)
             if not dies or (together < 0.0 and kappa * (scene.r - scene.d * together) > 1.0):
                 continue
-            out, t, back = _contact(scene, y, together)
-            least, swing = min(least, rim - back), max(swing, back - y)
-            way, time, rim = way + 2.0 * back + 1.0 - y, time + t, rim + 1.0 - y
+            ahead = 1.0 - edge - off
+            out, t, back = _contact(scene, ahead, together)
+            least, swing = min(least, rim - back), max(swing, back + ahead - 1.0)
+            way, time, rim = way + 2.0 * back + ahead, time + t, rim + ahead
             v, w, gap, end = out, out, 0.0, OUT_OF_MESH if -least > mesh else DONE
         if end == FALLS_BACK:
-            fallen, y, v, gap, scale = fallen + 1, 1.0, -v, gap - scene.drop, 0.0
+            if scene.drop == 0.0 and v <= FADES * first:
+                break
+            fallen, edge, off, v, gap, scale = fallen + 1, 1.0, 0.0, -v, gap - scene.drop, 0.0
         elif end == DONE and fallen > 0:
-            fallen, y, v, gap, scale = fallen - 1, -1.0, -v, gap + scene.drop, 0.0
+            fallen, edge, off, v, gap, scale = fallen - 1, -1.0, 0.0, -v, gap + scene.drop, 0.0
         else:
             how = end
             break
@@ -220,9 +230,10 @@ def return_map(scene, rtol):
     Where it repeats only after the one between, the clock limps, and the answer is of both. Where bounces die out
     before the escape the next half period depends on one speed alone, and secants lead to the speed that repeats. A
     speed tried by a secant may unmesh where the clock itself does not come to it: then it is a ceiling, and halfway to
-    it is tried next.
+    it is tried next. A speed that repeats, but that the clock leaves again, is forgotten: it is followed from rest
+    anew, without secants.
     """
-    v, w, gap, tried, floor, ceiling = 0.0, 0.0, 0.0, False, 0.0, math.inf
+    v, w, gap, tried, floor, ceiling, secants = 0.0, 0.0, 0.0, False, 0.0, math.inf, True
     old_v, old_image, slope, before = -1.0, 0.0, 0.0, math.inf
     half, error, status = half_period(scene, v, w, gap), math.nan, NOT_CONVERGED
     one, first_v, first_w, first_gap = half, -1.0, 0.0, 0.0
@@ -235,20 +246,24 @@ def return_map(scene, rtol):
             v, w, gap, tried, ceiling = floor, floor, 0.0, False, v
             half = half_period(scene, v, w, gap)
             continue
-        alone = max(gap, half.gap) == 0.0 and w == v and half.w == half.v
+        alone = secants and max(gap, half.gap) == 0.0 and w == v and half.w == half.v
         change, twice = distance(half, v, w, gap), math.inf
-        if alone and old_v >= 0.0 and magnitude(v - old_v) > 1e-7 * v:
+        if alone and old_v >= 0.0 and magnitude(v - old_v) > 1e-10 * v:
             slope = (half.v - old_image) / (v - old_v)
         elif not alone and change > 1e-9:
             slope = change / before
         if slope < 1.0 and change <= 1e-13 and (change <= 2e-16 or change >= 0.5 * before):
+            if slope <= -1.0:
+                v, tried, secants, slope, before, earlier = 0.0, False, False, 0.0, math.inf, math.inf
+                half = half_period(scene, v, v, gap)
+                continue
             error, status = (change + ROUNDING) / (1.0 - max(slope, 0.0)), OK
             break
         if not alone and first_v >= 0.0:
             twice = distance(half, first_v, first_w, first_gap)
             if twice > 1e-9:
                 pace = twice / earlier
-            if pace < 1.0 and change > 1e-6 and twice <= 1e-13 and (twice <= 2e-16 or twice >= 0.5 * earlier):
+            if pace < 1.0 and change > 1e-10 and twice <= 1e-13 and (twice <= 2e-16 or twice >= 0.5 * earlier):
                 error, status = (twice + ROUNDING) / (1.0 - pace), OK
                 half = Half(  # both as one: the larger of what is largest, the means of all else
                     0.5 * (one.v + half.v), 0.5 * (one.w + half.w), one.gap, 0.5 * (one.time + half.time),
@@ -278,7 +293,7 @@ def return_map(scene, rtol):
 def check(p):
     """NEVER_STARTS for dry friction that holds the drive."""
     scene, _ = without_dimensions(p)
-    return where(scene.r < 1.0, OK, NEVER_STARTS)
+    return where(scene.slack > 0.0, OK, NEVER_STARTS)
 
 
 VERGE = kernel(

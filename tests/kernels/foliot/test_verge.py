@@ -1,5 +1,7 @@
 """Two bodies with friction and restitution, against an event simulation and the kernels that they turn into."""
 
+from fractions import Fraction
+
 import numpy as np
 from columns import solve
 from verge_oracles import cycle, followed
@@ -112,6 +114,35 @@ def test_wheels_thrown_back_to_the_tooth_before_with_friction_are_those_of_an_ev
     for name, values in (("period", period), ("amplitude", amplitude), ("impact_share", impacts)):
         assert np.allclose(outputs[name], values, rtol=1e-9, atol=1e-9), name
     assert np.allclose(period, before, rtol=1e-9)
+
+
+def test_a_clock_whose_bounces_die_out_may_limp():
+    """Just above the dry friction that stops it; the speed that repeats at each escape is left again."""
+    limping = dict(
+        zip(NAMES, (0.4045, 0.0463, 100.0, 0.015, 0.235, 6e-4, 0.685, 0.0, 0.015 * 0.4045 * 0.99995), strict=True)
+    )
+    outputs, status = found([limping], 1e-12)
+    period, amplitude, *_, half = cycle(limping, 100)
+    assert status == Status.OK
+    assert abs(half - 0.5) > 1e-4
+    assert np.allclose((outputs["period"], outputs["amplitude"]), ([period], [amplitude]), rtol=1e-9)
+
+
+def test_next_to_the_dry_friction_that_stops_it_the_drive_is_known_exactly():
+    """Without drop, bounces and viscous friction, with kappa = 3, P = 8 sqrt(I_v phi0/(3 (n tau - R_v)))."""
+    n, tau, I_v = 1.1, 0.7, 1e-4
+    R_v = np.float64(n * tau) * (1 - np.geomspace(1e-15, 1e-3, 13))
+    push = np.array([float(Fraction(n) * Fraction(tau) - Fraction(R)) for R in R_v])
+    two, status = solve(VERGE, "return_map", tau, I_v, 3 * I_v / n**2, n, PHI0, 0.0, 0.0, 0.0, R_v, rtol=1e-12)
+    assert (status == Status.OK).all()
+    assert np.allclose(two["period"], 8 * np.sqrt(I_v * PHI0 / (3 * push)), rtol=1e-14)
+
+
+def test_without_drop_a_clock_whose_wheel_bounces_may_come_to_rest_between_two_teeth():
+    """With less and less drop it returns to the tooth before ever more often, and its period grows."""
+    outputs, status = found([clock(1e4, 64.0, 0.104, drop=d) for d in (1e-4, 1e-6, 0.0)])
+    assert (status == (Status.OK, Status.OK, Status.STEP_LIMIT)).all()
+    assert outputs["period"][1] > outputs["period"][0]
 
 
 def test_where_it_says_so_a_clock_comes_to_no_cycle_of_one_tooth():
