@@ -102,7 +102,8 @@ def of_other_sources():
     [
         (lambda: (of(), of()), {}, "name a new axis"),
         (lambda: (of(), of(fixed={"g": 2.0}, rtol=1e-3)), {}, "fixed.g and rtol"),
-        (lambda: (of(), of(fixed={"g": 2.0})), {"axis": "version"}, "fixed.g"),
+        (lambda: (of(), of(fixed={"g": 2.0})), {"axis": "version"}, "fixed.g$"),
+        (lambda: (of(), of(fixed={"g": 2.0})), {"axis": "g"}, "joined along g"),
         *((lambda: (of(), of()), {"axis": name}, "new axis") for name in ("height", "rtol", "fall_time", "a b", 3)),
         *((lambda: (of(), of()), {"axis": "v", "labels": k}, "labels") for k in (["x", "x"], ["x"], ["x", ""], 3)),
         (lambda: (of(), of(summary={})), {}, "keeps no cells"),
