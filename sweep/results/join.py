@@ -120,8 +120,9 @@ def _new_axis(
     """What two results stand along: two labels, or the one parameter or setting that they differ in. SweepError."""
     if axis is not None:
         if apart:
+            fault = f"along {axis} all else is to be the same; they differ in {listed(apart, word='and')}"
             cure = f"; without a new axis they are joined along {axis}" * apart[0].endswith(f".{axis}")
-            raise SweepError(f"along {axis} all else is to be the same; they differ in {listed(apart, word='and')}{cure}")
+            raise SweepError(fault + cure)
         taken = (*dataset.variables, *SETTINGS, *dataset.dims)
         if not isinstance(axis, str) or not axis.isidentifier() or axis in taken:
             raise SweepError(f'"{axis}" cannot be the name of a new axis; choose another')

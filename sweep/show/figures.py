@@ -97,7 +97,10 @@ def view_figure(shown: View, title: Any = "") -> Figure:
         figure = new_figure(120.0, 82.0)
         axes = figure.subplots()
         axes.set(xlabel=label(shown.axis(shown.x), 80), ylabel=label(shown.y))
-        axes.set_xscale("log" if is_logarithmic(shown.values(shown.x)) else "linear")
+        values = shown.values(shown.x)
+        axes.set_xscale("log" if (logarithmic := is_logarithmic(values)) else "linear")
+        if not logarithmic and (values == np.round(values)).all():  # there is no mode 1.25
+            axes.locator_params("x", integer=True)
         (_draw_passages if shown.passed else _draw_map if shown.mapped else _draw_lines)(axes, shown)
         if shown.passed or shown.mapped or not shown.joined:  # what is drawn lies everywhere
             handles, names = axes.get_legend_handles_labels()

@@ -222,7 +222,7 @@ def _summary(
     over = tuple(axes)
     if axes and table["over"].value is not None:
         example = 'a list of axes, e.g. ["mu"]; leave it out to reduce all'
-        named = table["over"].words([*axes, *keys.mistakes.meant], example)
+        named = table["over"].words([*axes, *(keys.mistakes.meant - {""})], example)
         over = tuple(name for name in axes if name in named)
         for block in (block for block in together if len({name in named for name in block}) > 1):
             cure = f"{listed(block, word='and')} run together and are reduced together; name all of them, or none"

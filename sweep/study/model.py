@@ -21,7 +21,7 @@ from kernels.interface import Field, Kernel, Method, load
 from sweep.errors import SweepError
 from sweep.study.mistakes import show
 from sweep.units import UnitMistake, exponents
-from sweep.words import did_you_mean, flag, listed
+from sweep.words import did_you_mean, flag, kind, listed
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -312,7 +312,7 @@ def load_kernel(name: object, allow_import: bool = False, folders: Iterable[Path
     except (Exception, SystemExit) as error:
         raise SweepError(f"{show(name)} cannot be loaded: {type(error).__name__}: {error}") from error
     if not isinstance(kernel, Kernel):
-        raise SweepError(f"{show(name)} is a {type(kernel).__name__}, not a kernels.interface.Kernel")
+        raise SweepError(f"{show(name)} is {kind(kernel)}, not a kernels.interface.Kernel")
     # no result could hold it otherwise
     fields = (*kernel.parameters, *kernel.outputs, *kernel.along)
     names = [*RESERVED, *(field.name for field in fields)]

@@ -57,6 +57,11 @@ def test_one_axis_makes_one_line_on_logarithmic_scales_with_names_and_units():
     assert axes.get_xlabel() == r"$\mu$ [rad/s$^{2}$]"
 
 
+def test_an_axis_of_whole_numbers_has_whole_ticks():
+    (axes,) = plot(dataset(mu=[1.0, 2.0, 3.0])).axes
+    assert not (axes.get_xticks() % 1).any()
+
+
 def test_two_long_axes_make_a_map_with_a_logarithmic_colour_scale():
     ds = dataset(mu=log(61), a=np.linspace(1, 2, 21))
     figure = plot(ds)

@@ -56,6 +56,8 @@ def test_a_misspelt_name_is_checked_as_the_one_that_is_meant():
         sweep.study(kernel="folio", axes={"m_u": {"values": [1.0], "unit": "kg"}}, fixed={"phi_0": -1.0, "a": 1.0})
     told = [m.where for m in caught.value.mistakes]
     assert told == ["kernel", "axes.m_u", "axes.m_u.unit", "fixed.phi_0", "fixed.phi_0"]
+    with pytest.raises(sweep.StudyError, match=r'over\[0\] +expected "mu" or "q", found "nu"'):
+        sweep.study(kernel="foliot", axes={"mu": [1.0], "q": [1.0]}, summary={"over": ["nu"]})
 
 
 def test_too_many_values_or_cells_are_refused_before_memory_is_asked_for(mistakes):
