@@ -138,8 +138,8 @@ def write_starter(name: str, path: Path, allow_import: bool = False, force: bool
 
     text = starter(name, load_kernel(name, allow_import, [path.parent]))
     disk.check_target(path, force=force)
-    with disk.refusing(path):
-        path.write_text(text, encoding="utf-8")
+    with disk.replacing(path) as part:
+        part.write_text(text, encoding="utf-8")
 
 
 def starter(name: str, kernel: Kernel | None = None) -> str:

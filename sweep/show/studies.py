@@ -73,5 +73,7 @@ def copy_study(name: str, target: Path = Path(), force: bool = False) -> list[Pa
         copy = target / source.name
         same = copy.is_file() and copy.read_bytes() == source.read_bytes()
         disk.check_target(copy, force=force or same, read=[source])
-    with disk.refusing(target):
-        return [Path(shutil.copyfile(source, target / source.name)) for source in sources]
+    for source in sources:
+        with disk.replacing(target / source.name) as part:
+            shutil.copyfile(source, part)
+    return [target / source.name for source in sources]

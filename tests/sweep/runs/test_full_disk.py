@@ -116,3 +116,11 @@ def test_what_is_made_of_a_result_tells_of_a_full_disk_and_leaves_nothing(small,
     told = " ".join(capsys.readouterr().err.split())
     assert "No space left on device" in told or "disk is full" in told
     assert sorted(path.name for path in small.iterdir()) == ["filler", "out.h5"]
+
+
+@pytest.mark.parametrize("words", [["kernels", "foliot", "--study", "new.toml"], ["studies", "foliot_scaling"]])
+def test_a_study_to_begin_with_leaves_nothing_on_a_full_disk(small, monkeypatch, words):
+    monkeypatch.chdir(small)
+    fill(small)
+    assert main(words) == MISTAKE
+    assert [path.name for path in small.iterdir()] == ["filler"]
