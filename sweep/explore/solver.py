@@ -54,6 +54,9 @@ class PointSolver:
         one = inspect.Parameter.POSITIONAL_OR_KEYWORD
         self._signature = inspect.Signature([inspect.Parameter(name, one) for name in self.names])
 
+    def __repr__(self) -> str:
+        return f"<solver of {self._given.kernel_name}: {', '.join(self.names)} -> {', '.join(self.fields)}>"
+
     def __reduce__(self) -> Any:
         return PointSolver, (self._given,)
 

@@ -188,7 +188,7 @@ class Progress:
     def line(self) -> str:
         """What is told now: `12,300/1,000,000 cells (1.2 %), 5,100 cells/s, 3 min left`."""
         left = self.left
-        return self._counts() + ("" if left is None else f", {speed(self.rate)}, {one_digit(left)} left")
+        return self._counts() + (f", {speed(self.rate)}, {one_digit(left)} left" if left else "")
 
     def _counts(self) -> str:
         share = 100 * self.done / self.total if self.total else 100.0

@@ -52,7 +52,7 @@ def pick(dataset: xr.Dataset, choices: Sequence[str]) -> xr.Dataset:
         values, dim = dataset[name].values, str(dataset[name].dims[0])
         if values.dtype.kind in "fiu":
             try:
-                off = abs(values - float(value))
+                off = abs(values - np.clip(float(value), np.fmin.reduce(values), np.fmax.reduce(values)))
             except ValueError:
                 raise SweepError(f"{choice}: expected a number after =") from None
             # six digits are what `sweep show` and `sweep run` print

@@ -265,3 +265,9 @@ def test_no_folder_gives_way_to_what_a_command_writes(done, call, argv, target):
 def test_a_fault_has_its_status_and_its_words(error, code, word):
     found = explained(error)
     assert (found.code, word in found.text) == (code, True)
+
+
+@pytest.mark.parametrize(("height", "nearest"), [("1e99", "1000 or 794.328"), ("-1", "1 or 1.25893"), ("2", "1.99526")])
+def test_a_value_that_an_axis_has_not_is_told_with_those_next_to_it(done, call, height, nearest):
+    code, _, err = call("cell", "stones.h5", f"height={height}", "v0=0")
+    assert (code, f"nearest is {nearest}" in " ".join(err.split())) == (2, True)

@@ -42,6 +42,7 @@ def test_cells_are_those_of_the_sweep(keys, cells):
 def test_arrays_are_broadcast_traces_come_behind_and_no_call_changes_what_an_earlier_one_gave():
     fall = sweep.solver(build(axes={"height": [1.0], "v0": [0.0]}, outputs=["drop"], along={"phase": [0.0, 1.0]}))
     found = fall(height=np.array([[1.0], [2.0]]), v0=[0.0, 1.0, 2.0])
+    assert repr(fall).endswith("height, v0 -> drop, status>")
     assert found.drop.shape == (2, 3, 2)
     assert found.status.shape == (2, 3)
     assert np.allclose(found.drop[..., 1], [[1.0] * 3, [2.0] * 3])

@@ -358,7 +358,7 @@ def test_eight_points_are_enough_and_may_fall_or_have_gaps():
         (lambda y: sweep.fit_two_laws(y, "nu"), "no axis 'nu'"),
         (lambda y: sweep.local_exponent(y.drop_vars("x"), "x"), "no axis"),
         (lambda y: sweep.local_exponent(y.assign_coords(a=1.0), "a"), "one value"),
-        (lambda y: sweep.fit_two_laws(y, ["x"]), "no axis"),
+        (lambda y: sweep.fit_two_laws(y, ["x"]), "expected a name"),
         (lambda y: sweep.fit_collapse(y, "x", ["L"]), "L"),
         (lambda y: sweep.where_exponent(y, "x", "a"), "value: expected a number"),
         (lambda y: sweep.exponent_map(curves(1.5, 0.7, lambda u: u**-0.5), "x", "a"), "levels: expected a number"),
