@@ -117,7 +117,7 @@ def _swung(step, p, rtol):
     return found, where(half.lost, STEP_LIMIT, status)
 
 
-def _manner(name, doc, solve, stiffest):
+def _manner(name, doc, solve, stiffest, rounding):
     found = of_columns(solve, (*Cell._fields, "v1", "tolerance"), (*Found._fields[:-1], *Outputs._fields), in_few_lanes)
 
     def follow(search, bare):
@@ -128,10 +128,10 @@ def _manner(name, doc, solve, stiffest):
         return np.where(terms.inwards > 0.0, np.where(mild, Status.OK, Status.STEP_LIMIT), Status.STICKS)
 
     return Manner(
-        name, doc, follow, begins, bare=False, steps=True, coarse=1e-3, orderly=3e-5, least=3e-15,
+        name, doc, follow, begins, bare=False, steps=True, coarse=1e-3, orderly=3e-5, least=3e-15, rounding=rounding,
         finer=4.0, shares=(0.3, 0.1, 0.06), told=(4.0, 4.0, 12.0), tighter=0.1,
     )  # fmt: skip
 
 
-BY_DOPRI5 = _manner("dopri5", "adaptive Runge-Kutta of order 5, Newton on the half-swing map", dopri5, EXPLICIT)
-BY_SDIRK4 = _manner("sdirk4", "implicit Runge-Kutta of order 4, L-stable, for stiff cells", sdirk4, IMPLICIT)
+BY_DOPRI5 = _manner("dopri5", "adaptive Runge-Kutta of order 5, Newton on the half-swing map", dopri5, EXPLICIT, 2e-14)
+BY_SDIRK4 = _manner("sdirk4", "implicit Runge-Kutta of order 4, L-stable, for stiff cells", sdirk4, IMPLICIT, 8e-14)

@@ -37,8 +37,6 @@ SEARCH, NEAR, ROUGH, FINE = 0, 1, 2, 3
 """What a cell's next half swing is for."""
 _NOISE, _NOISE_BARE = 100.0, 3000.0
 """Tolerances within which the sign of F - v may be wrong; where no tangents make steps shorter."""
-_ROUNDING = 2e-14
-"""Of a half swing's speed and time."""
 _SAME_WAVE, _ANYTHING = 0.1, 1e300
 """Radians of the torque's wave over which J of (3) is about straight; for what has no bound."""
 _SENSITIVITY, _MULTIPLIER = map(Outputs._fields.index, ("sensitivity", "multiplier"))
@@ -57,7 +55,9 @@ follow v1."""
 Found = namedtuple("Found", "end change slope cancels Y A helped outputs")
 """By a half swing: F, Newton's step from the speed before it, dF/dv1; how many times larger than s the terms are that
 it is the sum of; Y, or 0 where exp(-Y) is; the turning point A; whether it was helped; the outputs of the cycle."""
-Manner = namedtuple("Manner", "name doc follow begins bare steps coarse orderly least finer shares told tighter")
+Manner = namedtuple(
+    "Manner", "name doc follow begins bare steps coarse orderly least rounding finer shares told tighter"
+)
 """A way to follow half swings.
 
 name, doc : of the method
@@ -68,6 +68,7 @@ bare : whether less is followed where torque varies and neither drag nor what is
 steps : whether it goes by steps of one order. Cells that take about as many go side by side then, and the search is
     left out where friction soon balances the drive: steps are short there in any case
 coarse, orderly, least : tolerance of the search; the one below which an error falls as it does; the finest
+rounding : of a half swing's speed and time
 finer : how many times the fine tolerance the rough one is
 shares : of rtol that a half swing may be off by: where friction is smooth at rest, where it is not, and where its
     degree is below 2 or the torque varies, on which time and sensitivity hang steeply
@@ -166,23 +167,23 @@ def _by_J(s, by, off):
     return np.where(varies, np.where(apart, _ANYTHING, steep), 0.0), np.where(varies & apart, farther, 1.0)
 
 
-def _stated(s, by, former, step, hangs, tolerance):
+def _stated(rounding, s, by, former, step, hangs, tolerance):
     """Relative errors of what half swings give, a row for each output.
 
     Where those before gave the outputs `former`, with a relative difference `apart`, they are
-        told apart + 2 (1 + abs(hangs)) step + (ROUNDING + tolerance) spring/(1 - dF/dv1),           (7)
+        told apart + 2 (1 + abs(hangs)) step + (rounding + tolerance) spring/(1 - dF/dv1),           (7)
     where `step` is the relative one that Newton's method would still go, and `hangs` how an output follows v1. The last
     term is (1 + Y)-fold of exp(-Y); terms of s that cancel add theirs, with a tenth of the tolerance: they err alike.
     Both follow J, of which two half swings that are waves of the torque apart say nothing.
     """
     apart = np.where(by.outputs == former, 0.0, np.abs(by.outputs / former - 1.0))  # a multiplier may be 0 for good
     gap = 1.0 - by.slope
-    floor = (_ROUNDING + tolerance) * s.spring / gap
+    floor = (rounding + tolerance) * s.spring / gap
     steep, farther = _by_J(s, by, step + floor)
     floor, step = floor * farther, step * farther
     by_J = np.where(steep > 0.0, steep * np.abs(by.slope / gap) * by.cancels, 0.0)
     stated = s.told * apart + 2.0 * step * (1.0 + np.abs(hangs)) + floor
-    stated[_SENSITIVITY] += (_ROUNDING + 0.1 * tolerance) * s.spring / gap * by.cancels + (floor + 2.0 * step) * by_J
+    stated[_SENSITIVITY] += (rounding + 0.1 * tolerance) * s.spring / gap * by.cancels + (floor + 2.0 * step) * by_J
     stated[_MULTIPLIER] += floor * by.Y + (floor + 2.0 * step) * steep
     return stated
 
@@ -260,7 +261,7 @@ def cycles(manner, cells, rtol, asked):
         waves = s.linear * s.harmonic * 0.5 * (1.0 + by.A) if manner.bare and not tangents else 0.0
         ended, done = many, free & (stage == FINE)
         if done.any():
-            stated = _stated(s, by, former, step, hangs, used * (1.0 + waves))
+            stated = _stated(manner.rounding, s, by, former, step, hangs, used * (1.0 + waves))
             outputs[:, i[done]], errors[:, i[done]] = by.outputs[:, done], stated[:, done]
             status[i[done]] = verdict[done]
             enough = stated[asked].max(axis=0) <= s.rtol

@@ -141,7 +141,7 @@ def _begins(cells, terms):
 
 BY_TAYLOR = Manner(
     "taylor", "Taylor series over half swings, each followed twice, and Newton on their map", follow, _begins,
-    bare=True, steps=False, coarse=1e-4, orderly=np.inf, least=1e-17,
+    bare=True, steps=False, coarse=1e-4, orderly=np.inf, least=1e-17, rounding=2e-14,
     finer=FINER, shares=(0.1, 0.03, 0.001), told=(4.0, 4.0, 32.0), tighter=0.01,
 )  # fmt: skip
 """Cores of abs(v)^n have a low order; of half swings of smooth ones the fine error is a fifteenth of the difference."""

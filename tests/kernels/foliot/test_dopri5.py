@@ -6,7 +6,8 @@ Every term of the losses is in `test_ripple.py`, and beside other methods in `te
 import foliot_oracles
 import numpy as np
 import pytest
-from columns import named, relative_error, solve
+from columns import estimated, named, relative_error, solve
+from oracles import foliot
 
 from kernels.foliot.cycle import FOLIOT
 from kernels.interface import Status
@@ -117,3 +118,14 @@ def test_however_stiff_the_implicit_method_is_right_to_half_of_rtol(exact, cells
     for name in NAMES:
         there = true[name] > 1e-300
         assert np.abs(found[name][there] / true[name][there] - 1.0).max() <= 0.5 * rtol + 1e-12
+
+
+def test_the_error_that_is_stated_at_strong_drive_covers_the_rounding_of_many_steps():
+    """Friction takes little there, and errors of a half swing are some hundred times as large in the cycle."""
+    mu = np.geomspace(1e3, 1e8, 200 if COMPILED else 2)
+    truths = np.array([[float(value) for value in foliot(x, 1.0, 1.0)[:2]] for x in mu]).T
+    for method in ("dopri5", "sdirk4"):
+        outputs, status, error = estimated(FOLIOT, method, mu=mu, phi0=1.0, a=1.0, rtol=1e-13, asked=NAMES[:2])
+        assert (status <= Status.INACCURATE).all()
+        for name, truth in zip(NAMES, truths, strict=False):
+            assert (relative_error(outputs[name], truth) <= error).all(), (method, name)
