@@ -9,6 +9,7 @@ nice python benchmarks/honesty/grazing_sections.py [FAMILY ...] [--cells 200] [-
 - `passes`: x'' = -x from 1, at x = -1 - d in passages 1, 2, 5 and 20, which it meets only where d < 0
 - `fades`: the same with damping, in passages 1 to 4, of which the last one, or the next, is nearly missed
 - `round`: a limit cycle, the circle of radius 1, which is met at x = -1 - d
+- `stopped`: a driven oscillator that touches a stop once a period, and its multiplier
 """
 
 from __future__ import annotations
@@ -21,9 +22,11 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.append(str(Path(__file__).parents[2] / "tests" / "helpers"))
+sys.path += [str(Path(__file__).parents[2] / "tests" / room) for room in ("helpers", "oracles")]
 from columns import estimated
 from family import PI, REAL
+from forced_scene import STOPPED
+from scene_oracles import one_impact_a_period
 
 from kernels.cycle import cycle_kernel
 from kernels.interface import FIRST_REFUSAL, Status
@@ -89,7 +92,22 @@ def round_cycle(random, n):
     return ROUND, {"d": d, "k": k}, [], true | {"multiplier": (multiplier + nothing, np.maximum(1, multiplier))}
 
 
-FAMILIES = {"passes": passes, "fades": fades, "round": round_cycle}
+def stopped(random, n):
+    drawn, true = [], []
+    while len(true) < n:
+        zeta, w, e, speed = 10.0 ** random.uniform([-2.0, -0.7, -3.0, -7.0], [0.3, 0.8, 0.0, 0.0])
+        if (found := one_impact_a_period(zeta, w, e, speed)) is not None:
+            drawn.append((zeta, w, e))
+            true.append(found)
+    cells = dict(zip(("zeta", "w", "e"), np.transpose(drawn), strict=True))
+    stop, x, v, x_size, v_size, multiplier = np.array(true, REAL).T
+    cells |= {"stop": stop, "x0": x, "v0": v, "settle": np.zeros(n), "flips": np.ones(n)}
+    cells = {name: np.asarray(column, float) for name, column in cells.items()}
+    true = {"x": (x, x_size), "v": (v, v_size), "multiplier": (multiplier, np.maximum(1.0, abs(multiplier)))}
+    return STOPPED, cells, [np.array([1.0, 2.0])], true
+
+
+FAMILIES = {"passes": passes, "fades": fades, "round": round_cycle, "stopped": stopped}
 
 
 def worst(found, true):

@@ -2,9 +2,9 @@
 
 Derivatives are central differences of runs to a tolerance r, at h, 2 h and 4 h of the size of each state and of each
 parameter; the sixth order by Richardson's rule is given, and what it differs by from the fourth is what it leaves out.
-The noise of the runs, r/h at most, is what second and fourth derivatives leave of the sums of both sides: all slopes
-are believed to have as much as the worst one. With rho, J and T as in `limit_cycle` and to first order, the root is
-off by
+The noise of the runs is what second and fourth derivatives leave of the sums of both sides, and ODD of r/h at least:
+all slopes are believed to have as much as the worst one. With rho, J and T as in `limit_cycle` and to first order, the
+root is off by
     dz = (I - J)^-1 (rho + r),  dT = (dT/dz) dz + r T,                                                     (1)
 and the period changes with a parameter p by dT/dp + (dT/dz) (I - J)^-1 dP/dp. Derivatives at that root are off by the
 second derivatives times dz besides, which is most of their error where a multiplier is close to 1.
@@ -30,9 +30,12 @@ ROUNDING, ROUNDINGS = 2.3e-16, 1e-15
 """Relative noise of a period that depends on no state; least noise of any other period and of states."""
 LINEAR = 0.25
 """Largest error of slopes, as a share of I - J, for which first order holds."""
-SHARP = 1e-3
-"""Largest noise of slopes: more is no noise but a corner, as where a motion touches the surface, and they tell nothing.
-"""
+ODD = 0.1
+"""Least noise of slopes, over r/h: of a part of the motion that the cycle has not got, as a swing that has died out,
+runs may miss the same share on both sides, which sums do not show (found: 0.05)."""
+SHARP = 3.0
+"""Largest noise of slopes, over r/h: what more is left is no noise but a corner of the map, as where a motion touches
+the surface, or what the sixth order leaves out; shorter differences may do."""
 ONE = 1e-8
 """To what a multiplier must be known where it cannot be told from 1: what is 1 leaves no cycle by itself; what is 1 in
 modulus alone lets disturbances neither grow nor fade."""
@@ -117,8 +120,8 @@ def differences(the_map, cycles, swept, h):
         even[:1, n:] = 0.0  # of how the period goes with a parameter these are most of what is left out
     shown = most(most(abs(even[:, :, 0] - 0.3125 * even[:, :, 1] + even[:, :, 2] / 64.0))) / (2.0 * h)
     bent = most(most(abs(even[:, :n, 0]))) / (h * h)
-    right = right & (shown <= SHARP)
-    here = np.minimum(np.maximum(shown, ROUNDINGS / h), 1.5 * cycles.r / h) + cycles.r
+    right = right & (shown <= SHARP * cycles.r / h)
+    here = np.maximum(np.maximum(shown, ROUNDINGS / h), ODD * cycles.r / h) + cycles.r
     noise = here + bent * np.add.reduce(spread)
     of_time = np.where((slopes[0, :n] == 0.0).all(axis=(0, 1)), ROUNDING / h, noise)
     J, signs = high[1:, :n], (-1.0) ** np.arange(n)[:, None]

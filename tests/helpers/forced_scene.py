@@ -9,6 +9,7 @@ POPULATION : once a season u becomes gain u (1 - bend u) - cube u^3
 THROWN : a ball that lands at v and leaves at 2 + e sqrt(v^2 - 1)
 PUSHED : a body between walls at -1 and 1, which leave it the share e of its speed, in air that takes 0.1 m/s of it a
     metre; as it passes 0 to the left it is pushed on. A cycle ends there, or at a section that changes nothing
+STOPPED : x'' = cos(w t) - x - 2 zeta x' with a stop, at which v becomes -e v
 """
 
 from kernels.cycle import cycle_kernel
@@ -132,3 +133,21 @@ PUSHED = {
     )
     for first in ("middle", "section")
 }
+STOPPED = cycle_kernel(
+    name="stopped",
+    doc="driven oscillator beside a stop",
+    states=MOVING,
+    parameters=(
+        Field("zeta", "1", "damping"),
+        Field("w", "1/s", "frequency of the drive"),
+        Field("e", "1", "restitution"),
+        Field("stop", "m", "place of the stop"),
+        Field("x0", "m", "place at the start"),
+        Field("v0", "m/s", "speed at the start"),
+    ),
+    rates=lambda x, v, t, zeta, w: (v, cos(w * t) - x - 2.0 * zeta * v),
+    surface={"stop": lambda x, stop: stop - x},
+    switch={"stop": lambda x, v, e: (x, -e * v)},
+    start=lambda x0, v0: (x0, v0),
+    drive=lambda w: 2.0 * pi / w,
+)

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 from columns import checked, estimated, solve
-from forced_scene import FORCED, MOVING, POPULATION, PUSHED, RESTING, TABLE, THROWN, WALLS
+from forced_scene import FORCED, MOVING, POPULATION, PUSHED, RESTING, STOPPED, TABLE, THROWN, WALLS
 from kicked_scene import BRANCHED, KICKED
 from mpmath import mp, mpc, mpf
+from scene_oracles import one_impact_a_period
 
 from kernels.cycle import cycle_kernel
 from kernels.interface import FIRST_REFUSAL, Status
@@ -91,6 +92,31 @@ def test_a_ball_on_a_table_is_in_step_with_it():
     assert abs(real.sum(axis=1) - trace).max() < 1e-8
     product = np.where(imaginary[:, 0] > 1e-6, (real**2 + imaginary**2)[:, 0], real.prod(axis=1))
     assert abs(product - e**2).max() < 1e-8
+
+
+def test_multipliers_of_an_oscillator_that_just_touches_a_stop():
+    """The map has a corner as near as the square of the speed; what it multiplies has mostly died out meanwhile."""
+    w, speed = (np.ravel(x) for x in np.meshgrid([0.36, 0.44, 0.6], 10.0 ** -np.arange(2.0, 6.0, 0.5)))
+    true = np.array([one_impact_a_period(0.957, one, 0.594, u) for one, u in zip(w, speed, strict=True)], float).T
+    cells = {"zeta": 0.957, "w": w, "e": 0.594, "stop": true[0], "x0": true[1], "v0": true[2], "settle": 0.0}
+    found, status, error = estimated(
+        STOPPED, "taylor", **cells, flips=1.0, along=RANKS, rtol=4e-6, asked=("x", "v", "multiplier")
+    )
+    off = abs(found["multiplier"] - true[5]) / np.maximum(1.0, abs(true[5]))
+    for k, name in enumerate(("x", "v"), 1):
+        off = np.maximum(off, abs(found[name] - true[k]) / true[k + 2])
+    assert (status[:3] == Status.OK).all()
+    assert (off <= error)[status <= Status.INACCURATE].all()
+
+
+def test_a_swing_that_a_cycle_has_not_got_is_not_known_from_it_to_its_own_digits():
+    """Of a slowly driven oscillator, runs take steps too long for its own motion, of which the cycle has nothing."""
+    zeta, omega = (np.ravel(x) for x in np.meshgrid([0.02, 0.05, 0.1], np.linspace(3.0, 9.0, 30)))
+    found, status, error = estimated(
+        FORCED, "taylor", zeta=zeta, omega=omega, a=0.7, flips=1.0, along=RANKS, rtol=3e-11, asked=("multiplier",)
+    )
+    assert (status <= Status.INACCURATE).all()
+    assert (abs(found["multiplier"] - np.exp(-2.0 * np.pi / 1.3 * zeta * omega)) <= error).all()
 
 
 def test_what_meets_no_switch_any_more_rests_where_it_stays():

@@ -93,3 +93,43 @@ def _arrives(mu, a, c, n, to_go, most):
             return new
         v = new if low < new < high else (low + high) / 2
     raise AssertionError("no root")
+
+
+def one_impact_a_period(zeta, w, e, speed):
+    """A cycle of x'' = cos(w t) - x - 2 zeta x' that meets a stop, where v becomes -e v, once a period, at this speed.
+
+    Place of the stop; place and speed at t = 0, and their largest sizes on a grid; the multiplier of largest modulus.
+    None where the motion passes the stop elsewhere, or where one that does not meet it is a cycle too. Between impacts
+    it is the swing of the drive and one that decays, which the impact brings back to what it was.
+    """
+    with mp.workdps(50):
+        zeta, w, e, speed = (mpf(float(x)) for x in (zeta, w, e, speed))
+        period, swing = 2 * mp.pi / w, 1 / mp.mpc(1 - w * w, 2 * zeta * w)
+
+        def decayed(t):
+            return mp.expm(mp.matrix([[0, 1], [-1, -2 * zeta]]) * t)
+
+        behind = mp.lu_solve(decayed(period) - mp.eye(2), mp.matrix([0, (1 + e) * speed]))
+        sine = (behind[1] + e * speed) / (w * abs(swing))
+        if abs(sine) >= 1:
+            return None
+        phase = mp.asin(sine) - mp.arg(swing)
+        stop = behind[0] + abs(swing) * sqrt(1 - sine * sine)
+        left = period - (phase / w) % period
+
+        def place_and_speed(since):
+            turned = swing * mp.expj(w * since + phase)
+            own = decayed(since) * behind
+            return re(turned) + own[0], re(mp.j * w * turned) + own[1]
+
+        way = [place_and_speed(period * mpf(k) / 64) for k in range(65)]
+        force = mp.cos(phase) - stop
+        if max(*(x for x, _ in way[1:-1]), stop + force + 2 * zeta * e * speed) > stop or stop >= abs(swing):
+            return None
+        bent = ((1 + e) * force) / speed
+        J = decayed(left) * mp.matrix([[-e, 0], [bent, -e]]) * decayed(period - left)
+        half, product = (J[0, 0] + J[1, 1]) / 2, e * e * mp.exp(-2 * zeta * period)
+        root = mp.sqrt(mp.mpc(half * half - product))
+        multiplier = abs(half + root) if root.imag else half + mp.sign(half) * re(root)
+        sizes = (max(abs(one[k]) for one in way) for k in (0, 1))
+        return stop, *place_and_speed(left), *sizes, multiplier
