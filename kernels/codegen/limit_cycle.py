@@ -168,8 +168,9 @@ class Search:
         if branch:
             ends, parameters[branch[0]] = parameters[branch[0]].copy(), branch[1]
         self._from_later_and_later(settle)
-        # where iterates alternate about a cycle, that of twice as many switches
-        twice = np.flatnonzero((status == Status.UNSTABLE) & (self.cycles.multiplier < -1.0) & (settle > 0))
+        # where iterates alternate about a cycle, or come to none, that of twice as many switches
+        alternate = (status == Status.UNSTABLE) & (self.cycles.multiplier < -1.0)
+        twice = np.flatnonzero((alternate | ((status == Status.NOT_CONVERGED) & ~self.fades)) & (settle > 0))
         self.cycles.flips[twice] *= 2.0
         self._settled(twice, doubled=True)
         self.cycles.flips[twice[status[twice] != Status.PERIOD_2]] *= 0.5

@@ -109,6 +109,22 @@ def test_multipliers_of_an_oscillator_that_just_touches_a_stop():
     assert (off <= error)[status <= Status.INACCURATE].all()
 
 
+def test_a_cycle_of_two_periods_is_found_where_one_of_a_single_period_is_not():
+    """The oscillator meets its stop in every second period; no cycle that meets it in each is near."""
+    w, speed = (np.ravel(x) for x in np.meshgrid([3.5, 4.3], [0.35, 0.4]))
+    zeta, e = np.where(w < 4.0, 0.3, 0.2), np.where(w < 4.0, 0.4, 0.316)
+    true = np.array([one_impact_a_period(*cell, 2) for cell in zip(zeta, w, e, speed, strict=True)], float).T
+    cells = {"zeta": zeta, "w": w, "e": e, "stop": true[0], "x0": -0.2, "v0": 0.0}
+    asked = "period", "x", "v", "multiplier"
+    found, status = solve(STOPPED, "taylor", **cells, along=RANKS, rtol=1e-8, flips=1.0, asked=asked)
+    both, verdict = solve(STOPPED, "taylor", **cells, along=RANKS, rtol=1e-8, flips=2.0, asked=asked)
+    assert list(zip(status, verdict, strict=True)) == [(Status.PERIOD_2, Status.OK)] * 4
+    for one in (found, both):
+        assert abs(one["period"] * w / (4.0 * np.pi) - 1.0).max() < 1e-12
+        assert abs(one["multiplier"] - true[5]).max() < 1e-8
+    assert abs(found["x"] - both["x"]).max() < 1e-8
+
+
 def test_a_swing_that_a_cycle_has_not_got_is_not_known_from_it_to_its_own_digits():
     """Of a slowly driven oscillator, runs take steps too long for its own motion, of which the cycle has nothing."""
     zeta, omega = (np.ravel(x) for x in np.meshgrid([0.02, 0.05, 0.1], np.linspace(3.0, 9.0, 30)))

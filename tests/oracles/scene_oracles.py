@@ -95,8 +95,8 @@ def _arrives(mu, a, c, n, to_go, most):
     raise AssertionError("no root")
 
 
-def one_impact_a_period(zeta, w, e, speed):
-    """A cycle of x'' = cos(w t) - x - 2 zeta x' that meets a stop, where v becomes -e v, once a period, at this speed.
+def one_impact_a_period(zeta, w, e, speed, periods=1):
+    """A cycle of x'' = cos(w t) - x - 2 zeta x' that meets a stop, where v becomes -e v, once in `periods`, at a speed.
 
     Place of the stop; place and speed at t = 0, and their largest sizes on a grid; the multiplier of largest modulus.
     None where the motion passes the stop elsewhere, or where one that does not meet it is a cycle too. Between impacts
@@ -104,7 +104,7 @@ def one_impact_a_period(zeta, w, e, speed):
     """
     with mp.workdps(50):
         zeta, w, e, speed = (mpf(float(x)) for x in (zeta, w, e, speed))
-        period, swing = 2 * mp.pi / w, 1 / mp.mpc(1 - w * w, 2 * zeta * w)
+        period, swing = 2 * mp.pi * periods / w, 1 / mp.mpc(1 - w * w, 2 * zeta * w)
 
         def decayed(t):
             return mp.expm(mp.matrix([[0, 1], [-1, -2 * zeta]]) * t)
