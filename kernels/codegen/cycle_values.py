@@ -33,9 +33,10 @@ LINEAR = 0.25
 ODD = 0.1
 """Least noise of slopes, over r/h: of a part of the motion that the cycle has not got, as a swing that has died out,
 runs may miss the same share on both sides, which sums do not show (found: 0.05)."""
-SHARP = 3.0
-"""Largest noise of slopes, over r/h: what more is left is no noise but a corner of the map, as where a motion touches
-the surface, or what the sixth order leaves out; shorter differences may do."""
+SHARP, CORNER = 1e-3, 3.0
+"""Largest noise of slopes that tell where the root is; and, over r/h, of those that are given: what more is left is no
+noise but a corner of the map, as where a motion touches the surface, or what the sixth order leaves out; shorter
+differences may do."""
 ONE = 1e-8
 """To what a multiplier must be known where it cannot be told from 1: what is 1 leaves no cycle by itself; what is 1 in
 modulus alone lets disturbances neither grow nor fade."""
@@ -120,7 +121,8 @@ def differences(the_map, cycles, swept, h):
         even[:1, n:] = 0.0  # of how the period goes with a parameter these are most of what is left out
     shown = most(most(abs(even[:, :, 0] - 0.3125 * even[:, :, 1] + even[:, :, 2] / 64.0))) / (2.0 * h)
     bent = most(most(abs(even[:, :n, 0]))) / (h * h)
-    right = right & (shown <= SHARP * cycles.r / h)
+    right = right & (shown <= SHARP)
+    smooth = right & (shown <= CORNER * cycles.r / h)
     here = np.maximum(np.maximum(shown, ROUNDINGS / h), ODD * cycles.r / h) + cycles.r
     noise = here + bent * np.add.reduce(spread)
     of_time = np.where((slopes[0, :n] == 0.0).all(axis=(0, 1)), ROUNDING / h, noise)
@@ -139,8 +141,9 @@ def differences(the_map, cycles, swept, h):
         found[name] = value, SAFETY * (abs(value - rough) + doubt) / np.maximum(1.0, abs(value))
     # to first order only where the noise leaves 1 - J what it is
     linear = right & (noise * most(np.add.reduce(W, axis=1)) < LINEAR)
-    found = {name: (value, np.where(linear, error, math.inf)) for name, (value, error) in found.items()}
-    unsure = np.where(right, SAFETY * unsure, math.inf)
+    known = {name: linear if name == "period" or name in the_map.states else linear & smooth for name in found}
+    found = {name: (value, np.where(known[name], error, math.inf)) for name, (value, error) in found.items()}
+    unsure = np.where(smooth, SAFETY * unsure, math.inf)
     return found, *judged(cycles.status, real, imaginary, unsure, *found["multiplier"])
 
 
