@@ -5,7 +5,7 @@ rounding loses nothing, and a start on the surface lies there for sure. Of a fun
 losses go on as errors do. Along a motion it is enough to know them roughly, an ulp of the terms of every sum.
 """
 
-from kernels.expression.graph import ADD, DIV, HALF_SQUARE, INPUT, MUL, NUMBER, SCALED, needed
+from kernels.expression.graph import ADD, CHOSEN, DIV, HALF_SQUARE, INPUT, MUL, NUMBER, SCALED, needed
 from kernels.expression.series import V, Values, added, product
 from kernels.expression.tangent import partials
 from kernels.lanes.symbols import taking_symbols
@@ -94,6 +94,8 @@ class Sizes:
             return u + w if x.kind == ADD else u * w
         if x.kind == HALF_SQUARE:
             return 0.5 * self.of(x.args[0]) * self.of(x.args[0])
+        if x.kind == CHOSEN:
+            return V.where(self.values.value(x.args[0]) > 0.0, *map(self.of, x.args[1:]))
         total = V.magnitude(self.values.value(x))
         for u, slope in slopes(self.values, x):
             total = V.fma(slope, self.of(u), total)

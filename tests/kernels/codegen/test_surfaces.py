@@ -201,3 +201,21 @@ def test_a_jump_knows_on_which_side_of_another_surface_it_is_made(factor):
     outputs, status = found(kernel, "taylor", 0.5, 0.5, 9.0, -1.0, flips=2)
     assert status == Status.OK
     assert outputs["time"] == pytest.approx(1.5)
+
+
+@pytest.mark.parametrize("method", ["taylor", "dop853"])
+def test_a_jump_may_ask_for_the_mode_that_another_surfaces_jump_sets(method):
+    """A body between walls: the right one makes it f times as fast in mode 1, the left one as slow again in mode -1."""
+    modes = scene_kernel(
+        name="modes_at_walls", doc="body between walls", states=fields("x", "v", "m"), parameters=fields("f"),
+        rates=lambda v: (v, 0.0, 0.0), surface={"right": lambda x: 1.0 - x, "left": lambda x: x},
+        switch={
+            "right": lambda x, v, m, f: (x, -v * where(m > 0.0, f, 1.0), -1.0),
+            "left": lambda x, v, m, f: (x, -v * where(m > 0.0, 1.0, 1.0 / f), 1.0),
+        },
+        start=lambda: (0.5, 1.0, 1.0),
+    )  # fmt: skip
+    values, status = found(modes, method, 3.0, flips=4)
+    assert status == Status.OK
+    assert values["time"] == pytest.approx(1.5 + 2.0 / 3.0, rel=1e-12)
+    assert (values["v"], values["m"]) == (pytest.approx(-3.0, rel=1e-12), -1.0)
