@@ -11,6 +11,7 @@ move by as much over LEFT/(1 - q) switches, as it does where intervals shrink by
 import numpy as np
 
 from kernels.interface import Status
+from kernels.lanes.columns import to_eight_bits
 
 ENDED = Status.STICKS, Status.OUT_OF_RANGE, Status.STEP_LIMIT
 FAINT = Status.GRAZING, Status.INACCURATE
@@ -98,11 +99,11 @@ def _limits(solved, those, last, flips, sizes):
         scale = abs(rows).max(axis=0)
         scale[0], scale[2:] = values[0], np.fmax(scale[2:], sizes)
         moved = (abs(values - before) / np.where(scale > 0, scale, 1.0)).max(axis=0)
-        error = moved * (1.0 + LEFT * q**4 / (1.0 - q))
+        error = moved * (1.0 + LEFT * (q * q) ** 2 / (1.0 - q))
         shrinks = (q < SLOWEST) & (q_before < SLOWEST) & (values[0] - rows[0, 0] <= NEAR * values[0])
         settles = abs(values - rows[0]) <= abs(before - rows[1]) + 1e-9 * scale
         far = np.delete(abs(values - rows[0]) / np.where(scale > 0, scale, 1.0), 1, axis=0).max(axis=0)
-        left = far * q ** (0.5 * (flips - last))
+        left = far * to_eight_bits(q ** (0.5 * (flips - last)))
     return good.all(axis=0) & shrinks & settles.all(axis=0) & np.isfinite(values).all(axis=0), values, error, left
 
 

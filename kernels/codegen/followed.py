@@ -11,7 +11,7 @@ import numpy as np
 from kernels.integrate.driver import GOLDEN
 from kernels.integrate.taylor import TINY
 from kernels.interface import FIRST_REFUSAL, Status
-from kernels.lanes.columns import MOVING, fresh, to_the_end
+from kernels.lanes.columns import MOVING, fresh, to_eight_bits, to_the_end
 from kernels.lanes.tuples import first_rows, flat
 from kernels.maths.elementary import NORMAL_HIGH, NORMAL_LOW
 
@@ -58,7 +58,8 @@ def followed(runner, columns, rtol, of_a_step=None, shake=0.0, told=False, stops
             whole = np.where(whole < math.inf, whole, math.nan)  # NaN is refused, without end not followed
             cells[:, row["interval"] : row["size"]] = np.nan
             # two runs by a pair that began alike would share the steps that grow by the most allowed, and their errors
-            cells[:, row["h"]] = 1.0 if runner.order is None else tolerance[places] ** (1.0 / runner.order)
+            begin = 1.0 if runner.order is None else to_eight_bits(tolerance[places] ** (1.0 / runner.order))
+            cells[:, row["h"]] = begin
             if cell.own:
                 cells[:, row["own"]] = float(told)
             for k, stop in enumerate(own_stops if stops is None else stops):

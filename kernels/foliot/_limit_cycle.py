@@ -25,7 +25,7 @@ from kernels.foliot._half_swing import problem_of, pull
 from kernels.foliot._units import Foliot, Outputs, given, without_dimensions
 from kernels.interface import FIRST_REFUSAL, Field, Method, Status
 from kernels.lanes.codes import OK, STICKS
-from kernels.lanes.columns import in_lanes
+from kernels.lanes.columns import in_lanes, to_eight_bits
 from kernels.lanes.jit import jit
 from kernels.lanes.vectors import fma, magnitude, not_, where
 from kernels.lanes.wiring import kernel, method, signed
@@ -135,7 +135,7 @@ def _spring(s, v):
     An error of x changes F^2 by kappa times as much, of which friction leaves its share:
         max(1, kappa/v1^2 exp(-2 f'(V)/V)).                                                          (5)
     """
-    return np.fmax(1.0, s.kappa / v**2 * np.exp(-2.0 * s.stiff))
+    return np.fmax(1.0, to_eight_bits(s.kappa / v**2 * np.exp(-2.0 * s.stiff)))
 
 
 def _wanted(manner, s, gap, decay, waves):
@@ -156,8 +156,9 @@ def _by_J(s, by, off):
     wave, J may be anything, and 1 - dF/dv1 on the way as small as for the largest J, or nothing.
     """
     gap, wave = 1.0 - by.slope, 0.5 * np.pi * s.harmonic
-    extra = s.kappa * by.A + s.depth * np.array([np.cos(wave * (1.0 - by.A)), np.ones(len(wave))])
-    by_A = s.kappa + s.depth * wave * np.sin(wave * (1.0 - by.A))
+    sine, cosine = (to_eight_bits(of(wave * (1.0 - by.A))) for of in (np.sin, np.cos))
+    extra = s.kappa * by.A + s.depth * np.array([cosine, np.ones(len(wave))])
+    by_A = s.kappa + s.depth * wave * sine
     inwards, outwards = s.inwards + extra, s.outwards + extra
     least = 1.0 - by.slope * (inwards / outwards)[1] * (outwards / inwards)[0]
     farther = np.where(least > 0.0, gap / least, _ANYTHING)
@@ -200,7 +201,7 @@ def _first_speed(s):
     viscous = s.drag * (1.0 + s.e**3) / (3.0 * work)
     power = s.gamma * (1.0 + np.sign(s.e) * np.abs(s.e) ** m) / (m * work)
     little = dry**1.25 + viscous ** (5.0 / 6.0) + power ** (2.5 / m)
-    return (little**1.4 + s.pace**3.5) ** (-1.0 / 3.5)
+    return to_eight_bits((little**1.4 + s.pace**3.5) ** (-1.0 / 3.5))
 
 
 def _begun_search(manner, cells, terms, rtol, i):

@@ -105,6 +105,12 @@ def write_row(first, j, values, row, trace):
         trace[first + cell, j] = row[cell]
 
 
+def to_eight_bits(column):
+    """A column to eight bits: the last digits of a library's powers and functions are those of one processor."""
+    mantissa, exponent = np.frexp(column)
+    return np.ldexp(np.rint(256.0 * mantissa), exponent - 8)
+
+
 def fresh(numbers, inputs):
     """Cells before anything runs: of so many numbers each, of which the first behind the stage are the inputs."""
     cells = np.zeros((len(inputs[0]), numbers))
