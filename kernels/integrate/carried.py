@@ -32,7 +32,7 @@ from kernels.integrate.powers import outside
 from kernels.integrate.taylor import curvature, last_term, natural_power, slope
 from kernels.lanes.symbols import fold, symbolic
 from kernels.lanes.tuples import all_of
-from kernels.lanes.vectors import choose, fma, magnitude, where
+from kernels.lanes.vectors import choose, fma, magnitude, not_, where
 from kernels.maths.intervals import most
 
 ULP = 2.0**-50
@@ -225,6 +225,10 @@ def at_event(m, error, errors, changes, full, state, mode, unit, ends, end, t, w
     most_by = magnitude(by) + magnitude(spread_late) + noise
     doubtful = (magnitude(bend) * most_by * STRAIGHT > magnitude(per_time)) | (most_by * ORDERLY > t)
     late = where(doubtful | others, math.inf, by)
+    # where it comes up from behind the surface the motion goes on as before
+    late, spread_late = (
+        where((which < 0.5) & (mode.signs[-1] < 0.0) & not_(others), 0.0, x) for x in (late, spread_late)
+    )
     rates = (*rates, *TIMES)
     off = zip(rates, (*error.off, *errors.off[-2:]), strict=True)
     spread = zip(rates, (*error.spread, *errors.spread[-2:]), strict=True)
