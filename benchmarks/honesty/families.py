@@ -1,4 +1,4 @@
-"""Is a scene of one's own that says OK right, over twenty-six families of scenes that mislead integrators?
+"""Is a scene of one's own that says OK right, over twenty-seven families of scenes that mislead integrators?
 
 Prints, by family and method, how many cells were OK, remarked and refused, and the largest error of an OK cell over its
 rtol, and how many OK cells there are of those that can be solved; exit status 1 where one is off by more than its rtol:

@@ -244,6 +244,40 @@ def relay_oscillation(random, n):
     return {"x0": x0, "T": random.uniform(3.0, 10.0, n)}
 
 
+def _thrown_truth(c, g, w, flips):
+    """Arcs of cos t between the switches; by how much speeds at the end follow that of the start is their condition."""
+    c, g, speed = (REAL(1) * column for column in (c, g, w))
+    time, last, reach, largest, grown = (0 * speed + x for x in (0, 0, 1, 0, 1))
+    for k in range(int(flips.max())):
+        going, size = k < flips, np.hypot(1, speed)
+        arrived, took = -np.sqrt(size * size - c * c), np.arccos(c / size) - np.arctan2(-speed, 1)
+        time, last = np.where(going, time + took, time), np.where(going, arrived, last)
+        turns = np.where(speed > 0, size, 1)
+        reach, largest = (
+            np.where(going, np.maximum(reach, turns), reach),
+            np.where(going, np.maximum(largest, size), largest),
+        )
+        grown = np.where(
+            going,
+            np.maximum(1, grown) * abs(4 * g * (2 * arrived + REAL(1.1) + REAL(1.6))) * abs(speed / arrived),
+            grown,
+        )
+        speed = np.where(going, 4 * g * (arrived + REAL(1.1)) * (arrived + REAL(1.6)) - 1, speed)
+    return Truth(time, [c, last], [reach, largest], 10 + 10 * grown)
+
+
+@family(
+    scene(
+        "thrown", "x v", "c g w", lambda x, v: (v, -x), lambda x, c: x - c, lambda w: (1.0, w),
+        lambda v, g: (1.0, 4.0 * g * (v + 1.1) * (v + 1.6) - 1.0),
+    ), _thrown_truth,
+)  # fmt: skip
+def thrown(random, n):
+    """A swing that is thrown off anew by what it arrives with, so that switches multiply what it is off by."""
+    cells = {"c": random.uniform(-0.2, 0.3, n), "g": random.uniform(2.0, 4.0, n), "w": random.uniform(-0.5, 0.5, n)}
+    return {**cells, "flips": random.integers(1, 9, n).astype(float), "rtol": 10.0 ** random.uniform(-10, -2, n)}
+
+
 def _relay_truth(M, T, y0, a):
     """Slides along y = x from the start: x' = -x + y, y' pressed; on y = s(t): see the scene. Formula below."""
     M, T, y0, a = (REAL(1) * c for c in (M, T, y0, a))

@@ -136,7 +136,8 @@ def newton(the_map, cycles, swept=()):
         put(best, left, some, some.off < best.off[left])
         lost = ~((some.off < math.inf) & (far < math.inf))
         astray[left[lost]], best.r[left[lost]] = True, np.minimum(WIDER * some.r[lost], LOOSE)
-        onward = some.z[at] + some.scale[at] * step / np.maximum(1.0, far)
+        vague = (some.off <= CLOSED * r) & (far > FAR)  # closed as well as runs tell, it may be a cycle at any size
+        onward = some.z[at] + some.scale[at] * np.where(vague, 0.0, step) / np.maximum(1.0, far)
         z[np.ix_(at, left)] = np.where(lost, 0.5 * (some.z + best.z[:, left])[at], onward)
         steady[left] = (some.off <= FAR) & (some.off <= QUICK * before[left])
         settled = (some.off <= CLOSED * best.r[left]) | ((some.off <= 1e-9) & (some.off > 0.5 * before[left]))

@@ -2,9 +2,10 @@
 
 Each step is right to a tolerance; what many steps come to depends on the scene. By Taylor series the error is carried
 along (`integrate.carried`), signed and of first order; STATED times that is to be believed. A cell of which that does
-not show that it is right is followed again with a tolerance as much smaller; what then is left, and every cell by
-another method, is followed three times. But where the error grows as large as the motion, several runs may agree by
-chance, so that is INACCURATE.
+not show that it is right is followed again with a tolerance as much smaller, up to TRIALS times; what then is left, and
+every cell by another method, is followed three times. But where the error grows as large as the motion, several runs
+may agree by chance, so that is INACCURATE; and where it has been told, by how much switches multiply what each leg
+leaves out, the same in all runs where it is one step, only runs of which the tolerance is far smaller tell of rounding.
 
 Of three runs, the rough and the finest one have tolerances FINER apart: what they differ by is the rough one's error,
 of which the finest, whose results are given, has about 1/FINER. The rough run's parameters are some roundings off
@@ -54,8 +55,9 @@ STATED = 1.5
 """Stated error over the one carried along."""
 OF_A_STEP = 0.25
 """Tolerance of a step over the one of the whole motion: errors of some steps may add up."""
-SMALLER, SMALLEST = 4.0, 1e-5
-"""By how much less than what would do a second tolerance is, and the least share of the first one that is tried."""
+SMALLER, SMALLEST, TRIALS = 4.0, 1e-5, 3
+"""By how much less than what would do the next tolerance is, its least share of the first one, and how many are tried.
+"""
 NEAR_POWERS = 0.125
 """The tolerance of three runs by series, over rtol, where there are powers: on the way to the kink of one, and from it,
 steps are many, and err to one side."""
@@ -126,20 +128,22 @@ def once(one, columns, rtol, stops=None):
     return results, status_of(results, one.outputs)
 
 
-def by_runs(one, columns, rtol, tightest=0.0, stops=None):
+def by_runs(one, columns, rtol, tightest=0.0, stops=None, begin=None):
     """Results, statuses and errors by three runs; INACCURATE where the finest one may be off by more than rtol.
 
-    Where it may, or a run breaks off, the cell is followed by three again, with a tighter tolerance, of at least
-    `tightest`; where that breaks off too, as of what is stiff, with one between. Runs that were LOST, and then differ
-    by much less than their tolerances say, may have met again only where motions of all sorts end: INACCURATE.
+    Where it may, or a run breaks off, the cell is followed by three again, with a tolerance tighter than that of the
+    first three, `begin` (None: rtol), of at least `tightest`; where that breaks off too, as of what is stiff, with one
+    between. Runs that were LOST, and then differ by much less than their tolerances say, may have met again only where
+    motions of all sorts end: INACCURATE.
     """
     by_series_of_powers = one.order is None and written_of(one.scene)[0].graph.powers
-    steps = NEAR_POWERS * rtol if by_series_of_powers else rtol
+    begin = rtol if begin is None else begin
+    steps = NEAR_POWERS * begin if by_series_of_powers else begin
     found = _, status, error = three_runs(one, columns, steps, rtol, stops)
     left, last = np.flatnonzero(some_stop(np.isin(status, TRIED_AGAIN) & (rtol >= ROUNDING))), 0.0 * rtol
     for tighter in (np.minimum(TIGHT, TIGHTER * rtol), BETWEEN * rtol):
         steps = np.maximum(tighter, tightest)
-        left = left[((steps < rtol) & (steps > last))[left]]
+        left = left[((steps < begin) & (steps > last))[left]]
         if len(left):
             fine, better, doubt = three_runs(one, [c[left] for c in columns], steps[left], rtol[left], stops)
             before, doubted = status[..., left], error[..., left]
@@ -182,21 +186,30 @@ def three_runs(one, columns, rtol, wanted, stops):
 
 
 def by_error(one, columns, rtol, tightest=0.0, stops=None):
-    """Results, statuses and errors by one run where that states an error below `rtol`, else by three."""
+    """Results, statuses and errors by a run that states an error below `rtol`, else by three."""
     found = results, status, error = told(one, columns, rtol, rtol * OF_A_STEP, stops=stops)
-    known = (status != Status.OK) & (results[-1] == Status.OK) & (error < np.inf) & (rtol >= ROUNDING)
-    again, least = np.flatnonzero(some_stop(known)), np.atleast_2d(np.where(known, error, 0.0)).max(axis=0)
-    if len(again):
-        wanted, most = rtol[again], least[again]
-        share = np.maximum(wanted / (SMALLER * STATED * most), SMALLEST)
-        share[most > SMALL] = SMALLEST  # first order does not say how much of it is steps'
-        some, least[again] = [c[again] for c in columns], most * share
-        put(found, again, told(one, some, wanted, OF_A_STEP * share * wanted, least[again], stops))
+    least, share = 0.0 * rtol, np.ones_like(rtol)
+    for _ in range(TRIALS):
+        known = (status != Status.OK) & (results[-1] == Status.OK) & (error < np.inf) & (rtol >= ROUNDING)
+        again = np.flatnonzero(some_stop(known) & (share > SMALLEST))
+        if not len(again):
+            break
+        wanted, most = rtol[again], np.atleast_2d(np.where(known, error, 0.0)).max(axis=0)[again]
+        # first order does not say how much of what is large is steps'
+        smaller = np.where(most > SMALL, SMALLEST, np.maximum(wanted / (SMALLER * STATED * most), SMALLEST))
+        share[again], most = np.maximum(smaller * share[again], SMALLEST), most * smaller
+        new = told(one, [c[again] for c in columns], wanted, OF_A_STEP * share[again] * wanted, most, stops)
+        right = ~some_stop((new[1] >= FIRST_REFUSAL) & (status[..., again] < FIRST_REFUSAL))
+        least[again[right]] = most[right]
+        put(found, again, new, right)
     by_chance = (error > SMALL) & (error < np.inf) & (results[-1] < FIRST_REFUSAL)
     left = np.flatnonzero(some_stop(status != Status.OK) & ~some_stop(by_chance))
+    known = (results[-1] == Status.OK) & (error < np.inf)
+    begin = np.where(some_stop(known) & (tightest < np.inf), SMALLEST, 1.0) * rtol
     error[:] = STATED * np.maximum(error, least)
     if len(left):
-        put(found, left, by_runs(one, [c[left] for c in columns], rtol[left], tightest, stops))
+        new = by_runs(one, [c[left] for c in columns], rtol[left], tightest, stops, begin[left])
+        put(found, left, new, ~some_stop(known[..., left] & (new[1] == Status.INACCURATE)))
     return found
 
 

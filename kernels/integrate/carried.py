@@ -4,8 +4,8 @@ What a step leaves out is told by the defect of its polynomial U(t) of order p a
 as t^p, so that it comes to h/(p + 1) times that; f(U(h)) is the first coefficient of the next step. A state that is the
 sum of another one, w, leaves out w_p h^(p+1)/(p + 1). As it grows, what is left out, l, changes the rates too, and with
 them the states by h/(p + 2) Df l more. From step to step the error follows the tangent of the motion, of low order. At
-an event e the motion is late by
-    -(De off)/(De f),                                                                                     (1)
+an event, of which the search for it has left the value e, the motion is late by
+    -(e + De off)/(De f),                                                                                 (1)
 and compared there, each at its own time, states are off by f times that more; behind it goes on what the jump leaves of
 it. That is to first order; `late` is infinite, and so is the error, where the event bends, or comes so soon after the
 one before, that it may not do.
@@ -214,14 +214,16 @@ def at_event(m, error, errors, changes, full, state, mode, unit, ends, end, t, w
             m.unseen, m.error.events_made(ends, mode), pieces.events, strict=True
         )
     )
-    parts = zip(pieces.events, m.watched, pieces.of_events, strict=True)
-    bends = tuple(event[1] * way.at(end, curve)[2] for event, way, curve in parts)
-    noise, bend = (of_event(values, which) for values in (noises, bends))
+    at_end = (way.at(end, curve) for way, curve in zip(m.watched, pieces.of_events, strict=True))
+    parts = [(offset, factor, *at) for (offset, factor, _), at in zip(pieces.events, at_end, strict=True)]
+    left = tuple(fma(factor, u, offset) for offset, factor, u, _, _ in parts)
+    bends = tuple(factor * bend for _, factor, *_, bend in parts)
+    noise, left, bend = (of_event(values, which) for values in (noises, left, bends))
     change, vague, per_unit = (
         of_event(m.error.of_events(ends, mode, changed), which) for changed in (error.off, error.spread, rates)
     )
     per_time = unit * per_unit
-    by, spread_late, noise = -change / per_time, -vague / per_time, magnitude(noise / per_time)
+    by, spread_late, noise = -(change + left) / per_time, -vague / per_time, magnitude(noise / per_time)
     most_by = magnitude(by) + magnitude(spread_late) + noise
     doubtful = (magnitude(bend) * most_by * STRAIGHT > magnitude(per_time)) | (most_by * ORDERLY > t)
     late = where(doubtful | others, math.inf, by)
