@@ -63,7 +63,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 @command('eval "$(sweep completion bash)"', option("shell", choices=("bash", "zsh", "tcsh")))
 def completion(arguments: argparse.Namespace) -> None:
-    """What makes a shell complete the command."""
+    """Print the script that makes a shell complete this command."""
     try:
         import shtab
     except ImportError:

@@ -108,6 +108,16 @@ def in_unit(value: Any, wanted: str, name: str) -> Any:
     return np.ma.array(value, np.float64).filled(np.nan) if np.ma.isMaskedArray(value) else value
 
 
+def measured(text: str, wanted: str, name: str) -> float:
+    """The number in "0.1", or in "3 cm", converted to the unit `wanted` of the field `name`.
+
+    Raises ValueError where it is no number, and UnitMistake as `scale`.
+    """
+    number, *unit = text.split(None, 1)
+    factor = scale(unit[0].strip(), wanted, name) if unit else None
+    return float((factor or 1) * Decimal(repr(float(number))))
+
+
 def exponents(text: str) -> dict[str, Fraction]:
     """Powers of the base units in a unit, radian among them: {"radian": 1, "second": -2}. Raises UnitMistake."""
     return {base: Fraction(str(power)).limit_denominator(1000) for base, power in _root(text)[1].items()}

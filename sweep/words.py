@@ -130,6 +130,11 @@ def listed(words: Iterable[str], quote: bool = False, word: str = "or") -> str:
     return f" {word} ".join([", ".join(texts[:-1]), texts[-1]]) if len(texts) > 1 else "".join(texts)
 
 
+def counted(count: int, noun: str) -> str:
+    """'1 cell', '1,401 cells'."""
+    return f"{count:,} {noun}{'s' * (count != 1)}"
+
+
 def quoted(words: Iterable[str]) -> str:
     """'"a", "b"'."""
     return ", ".join(f'"{word}"' for word in words)
@@ -178,7 +183,7 @@ def number(what: str, value: Any) -> float:
     with contextlib.suppress(TypeError, ValueError, OverflowError):
         if not isinstance(value, str):
             return float(value)
-    raise SweepError(f"{what}: expected a number, found {value!r}")
+    raise SweepError(f"{what}: expected a number, found {repr(value) if isinstance(value, str) else kind(value)}")
 
 
 def several(what: str, given: Any) -> list[Any]:
@@ -212,8 +217,8 @@ def a_name(what: str, value: Any) -> str:
 
 
 def function(what: str, value: Any) -> Any:
-    """What can be called. Raises SweepError for all else."""
-    if callable(value):
+    """What can be called; a class is no function. Raises SweepError for all else."""
+    if callable(value) and not isinstance(value, type):
         return value
     raise SweepError(f"{what}: expected a function, found {kind(value)}")
 

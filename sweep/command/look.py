@@ -18,12 +18,12 @@ from sweep.errors import COMPLETE, SweepError
 
 @command(
     "sweep kernels foliot --study foliot.toml",
-    option("name", "describe this one", metavar="NAME", nargs="?"),
-    option("--study", "write a study of this kernel to start from", metavar="FILE.toml", type=Path),
+    option("name", "describe this kernel", metavar="NAME", nargs="?"),
+    option("--study", "write an example study of this kernel", metavar="FILE.toml", type=Path),
     *(o.FORCE, o.ALLOW_IMPORT, switch("--all", "parameters, outputs and methods of all kernels, and all statuses")),
 )
 def kernels(arguments: argparse.Namespace) -> None:
-    """The kernels that can be swept: parameters, units, outputs, methods."""
+    """List the kernels, or describe one: parameters, units, outputs, methods."""
     from sweep.show.kernels import catalogue_text, write_starter
 
     name, path = arguments.name, arguments.study
@@ -40,7 +40,7 @@ def kernels(arguments: argparse.Namespace) -> None:
     o.FORCE,
 )
 def studies(arguments: argparse.Namespace) -> None:
-    """The studies that come with foliot; with a name: copy it here to work on."""
+    """List the studies that come with foliot, or copy one here to work on."""
     from sweep.show.studies import copy_study, studies_text
 
     name = arguments.name
@@ -50,7 +50,7 @@ def studies(arguments: argparse.Namespace) -> None:
 
 @command("sweep show foliot.h5", o.RESULT)
 def show(arguments: argparse.Namespace) -> None:
-    """Contents of a result, how much is computed, and a count of statuses."""
+    """Show what a result contains, how much of it is computed, and its statuses."""
     from sweep.show.text import result_text
 
     with opened(arguments) as dataset:
@@ -59,7 +59,7 @@ def show(arguments: argparse.Namespace) -> None:
 
 @command("sweep verify foliot.h5", o.RESULT, o.JSON)
 def verify(arguments: argparse.Namespace) -> None:
-    """Check a result's checksums, finished or not."""
+    """Verify the checksums of a result, complete or not."""
     verdict = sweep.verify(arguments.result)
     if not verdict.whole:
         raise SweepError(str(verdict))
@@ -72,7 +72,7 @@ def verify(arguments: argparse.Namespace) -> None:
     *(o.ALL, o.JSON),
 )
 def list_(arguments: argparse.Namespace) -> None:
-    """The results in a folder: cells, how much is computed, statuses, question."""
+    """List the results in a folder: cells, share computed, statuses, question."""
     found = sweep.list_results(arguments.folder)
     tell(arguments, found, found.table(arguments.all))
 
@@ -86,7 +86,7 @@ def list_(arguments: argparse.Namespace) -> None:
     o.JSON,
 )
 def diff(arguments: argparse.Namespace) -> Outcome:
-    """Differences between two results, by cell and status; exit status 1 if there are any."""
+    """Compare two results, cell by cell; exit status 1 if they differ."""
     with opened(arguments) as a, opened(arguments, "other") as b:
         found = sweep.diff(a, b, arguments.rtol)
     tell(arguments, found)
@@ -96,11 +96,11 @@ def diff(arguments: argparse.Namespace) -> Outcome:
 @command(
     "sweep plot foliot.h5 --y period --unit period=hour",
     o.RESULT,
-    o.output("FILE.png", "default: the result's name with _plot.png, here; or .svg, .pdf", "_plot.png"),
+    o.output("FILE.png", ".png, .svg or .pdf; default: the result's name with _plot.png, here", "_plot.png"),
     *(o.FORCE, o.OUTPUT_Y, option("--x", "default: the longest axis", metavar="AXIS"), o.AT, o.UNITS),
 )
 def plot(arguments: argparse.Namespace) -> None:
-    """A figure of one output."""
+    """Plot one output."""
     with opened(arguments) as dataset:
         sweep.plot(dataset, arguments.output, y=arguments.y, x=arguments.x, force=True)
 
@@ -108,11 +108,11 @@ def plot(arguments: argparse.Namespace) -> None:
 @command(
     "sweep view foliot.h5",
     o.RESULT,
-    option("--port", "of this machine; default: a free one", metavar="N", type=int, default=0),
-    switch("--no-browser", "only print the address of the page"),
+    option("--port", "port to serve the page on; default: a free one", metavar="N", type=int, default=0),
+    switch("--no-browser", "do not open a browser, only print the address"),
 )
 def view(arguments: argparse.Namespace) -> None:
-    """Look at a result in the browser: any two axes, sliders for the others."""
+    """View a result in the browser: any two axes, sliders for the others."""
     from sweep.view.page import serve
 
     with opened(arguments):
@@ -126,7 +126,7 @@ def view(arguments: argparse.Namespace) -> None:
     *(o.FORCE, o.UNITS, o.UNFINISHED),
 )
 def report(arguments: argparse.Namespace) -> None:
-    """One self-contained page of HTML: figures, exponents, provenance."""
+    """Write a self-contained HTML page: figures, exponents, provenance."""
     from sweep.show.page import write_page
 
     with opened(arguments) as dataset:
@@ -147,18 +147,18 @@ def report(arguments: argparse.Namespace) -> None:
         action="append",
         default=[],
     ),
-    option("--confidence", "of the intervals; default: 0.95", type=float, default=0.95, metavar="SHARE"),
+    option("--confidence", "confidence of the intervals; default: 0.95", type=float, default=0.95, metavar="SHARE"),
     option(
         "--noise",
-        "whether the values scatter, or how; default: as tests find",
+        "whether, or how, the values scatter; default: decided by tests",
         choices=("yes", "no", "even", "uneven", "correlated", "outliers"),
     ),
-    switch("--compare", "which law: one, two or three power laws, an offset, a correction, an exponential ..."),
-    o.output("FILE.csv|.png", "also write the table; with --compare a picture of all laws, .png, .svg or .pdf"),
-    *(o.FORCE, o.AT, o.UNFINISHED, switch("--all", "all columns, and what they mean"), o.JSON),
+    switch("--compare", "compare laws: one, two or three power laws, an offset, a correction, an exponential ..."),
+    o.output("FILE.csv|.png", "also save the table; with --compare a figure of all laws, .png, .svg or .pdf"),
+    *(o.FORCE, o.AT, o.UNFINISHED, switch("--all", "all columns, with their meaning"), o.JSON),
 )
 def fit(arguments: argparse.Namespace) -> None:
-    """Exponent of a power law with its interval, and where two laws meet."""
+    """Fit a power law: its exponent with an interval, and where two laws meet."""
     from sweep.explore.scattered import on_lines
     from sweep.show import laws
 
@@ -181,11 +181,11 @@ def fit(arguments: argparse.Namespace) -> None:
 @command(
     "sweep exponent foliot.h5 --x mu --y period",
     *(o.RESULT, o.OUTPUT_Y, option("--x", "the axis of the power law", metavar="AXIS", required=True)),
-    o.output("FILE.png", "also a picture; or .svg, .pdf"),
-    *(o.FORCE, o.AT, o.UNFINISHED, switch("--all", "every point, not a dozen of each line"), o.JSON),
+    o.output("FILE.png", "also save a figure, .png, .svg or .pdf"),
+    *(o.FORCE, o.AT, o.UNFINISHED, switch("--all", "all points, instead of a dozen per line"), o.JSON),
 )
 def exponent(arguments: argparse.Namespace) -> None:
-    """The local exponent of an output along an axis, with its error."""
+    """Print the local exponent of an output along an axis, with its error."""
     from sweep.explore.scattered import on_lines
     from sweep.show import laws
 
@@ -199,7 +199,7 @@ def exponent(arguments: argparse.Namespace) -> None:
 
 @command("sweep sensitivity saltelli.h5 --y period", o.RESULT, o.OUTPUT_Y, o.JSON)
 def sensitivity(arguments: argparse.Namespace) -> None:
-    """Influence of each axis on an output, from a design "saltelli" or "morris"."""
+    """Print sensitivity indices of an output, from a design "saltelli" or "morris"."""
     from sweep.show import laws
 
     with opened(arguments) as dataset:
@@ -214,10 +214,10 @@ def sensitivity(arguments: argparse.Namespace) -> None:
     o.FORCE,
     option(
         "--where",
-        "only cells for which this holds; a number is SI or has a unit: \"status == 'OK' and R < '5 degree/s^2'\"",
+        "only cells that satisfy this; numbers are SI or have a unit: \"status == 'OK' and R < '5 degree/s^2'\"",
         metavar="CONDITION",
     ),
-    switch("--compress", "of netCDF4 and zarr: smaller, every bit kept"),
+    switch("--compress", "compress netCDF4 or zarr, without loss"),
     *(o.UNITS, o.UNFINISHED),
 )
 def export(arguments: argparse.Namespace) -> None:

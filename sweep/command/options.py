@@ -77,30 +77,30 @@ RESULT = option("result", metavar="OUT.h5", type=Path)
 OTHER = option("other", metavar="OTHER.h5", type=Path)
 OUTPUT_Y = option(
     "--y",
-    "default: the first output other than time; of a section the first state that differs between passages",
+    "default: the first output other than time; for a section, the first state that varies",
     metavar="OUTPUT",
 )
 ALLOW_IMPORT = switch("--allow-import", 'allow a kernel "module:NAME" of your own')
-FORCE = switch("--force", "overwrite what is there")
+FORCE = switch("--force", "overwrite an existing file")
 UNFINISHED = switch("--unfinished", "accept a result that is not complete yet")
 ALL = switch("--all", "all columns of the table")
-JSON = switch("--json", "as JSON, for programs; NaN is null")
+JSON = switch("--json", "print JSON, with null for NaN")
 SEVERAL: dict[str, Any] = {"nargs": "+", "action": "extend", "default": []}
-AT = option("--at", "pick one value of another axis", metavar="AXIS=VALUE", **SEVERAL)
-UNIT_TEXT = "give a variable in another unit, e.g. A0=degree e=mm wear=mm/hour"
+AT = option("--at", 'select one value of another axis, e.g. "A0=3 degree"', metavar="AXIS=VALUE", **SEVERAL)
+UNIT_TEXT = "convert a variable to another unit, e.g. A0=degree e=mm wear=mm/hour"
 UNITS = option("--unit", UNIT_TEXT, metavar="NAME=UNIT", **SEVERAL)
 SOLVING = (
     option("--workers", "cores to use; default: all", metavar="N", type=int),
     ALLOW_IMPORT,
     option(
         "--isolate",
-        "solve cells in separate processes, so that one that crashes or never ends is lost alone; "
+        "solve cells in separate processes, so that a crash or endless loop costs one cell; "
         'default: for a kernel "module:NAME"',
         action=argparse.BooleanOptionalAction,
     ),
     option(
         "--cell-timeout",
-        "time limit of a cell, e.g. 90s or 1h; default: 60s, longer if cells take long",
+        "time limit per cell, e.g. 90s or 1h; default: 60s, more for slow cells",
         metavar="TIME",
     ),
 )

@@ -23,7 +23,7 @@ RUN_OPTIONS = ("cluster", "force", "extend", "until", "retry_failed", "repair")
 
 @command("sweep plan foliot_scaling.toml", o.STUDY, *o.SOLVING, o.JSON)
 def plan(arguments: argparse.Namespace) -> None:
-    """Before a run: its cells, size, memory, and the time it will take."""
+    """Estimate cells, file size, memory and time of a run, before it begins."""
     from sweep.runs.progress import Progress
 
     study = study_from(arguments)
@@ -38,18 +38,20 @@ def plan(arguments: argparse.Namespace) -> None:
     o.STUDY,
     o.output("OUT.h5", "default: the study's name with .h5, here", ".h5", checked=False),
     switch("--force", "overwrite the result of another study"),
-    switch("--extend", "of a result of the same study with fewer values on its axes, compute the new cells only"),
-    switch("--repair", "of a result that is damaged on the disk, compute the damaged cells again and nothing else"),
+    switch("--extend", "add the new cells to a result of the same study with fewer values on its axes"),
+    switch("--repair", "compute only the damaged cells of a result that is damaged on disk"),
     option(
         "--cluster",
         "compute on the workers of a dask scheduler, e.g. tcp://10.0.0.1:8786, instead of here",
         metavar="ADDRESS",
     ),
-    option("--until", "stop within seconds of it, with exit status 3; the same command continues", metavar="07:00"),
+    option("--until", "stop at this time, with exit status 3; the same command continues", metavar="07:00"),
     *o.SOLVING,
-    switch("--retry-failed", "of a complete result, compute the cells that FAILED again"),
-    option("--notify", "run this at the end; $SWEEP_EXIT and $SWEEP_SUMMARY say how it ended", metavar="COMMAND"),
-    switch("--log-json", "the log, OUT.h5.log, as JSON, an object a line"),
+    switch("--retry-failed", "compute the FAILED cells of a complete result again"),
+    option(
+        "--notify", "run this command at the end; $SWEEP_EXIT and $SWEEP_SUMMARY say how it ended", metavar="COMMAND"
+    ),
+    switch("--log-json", "write the log, OUT.h5.log, as JSON, one object per line"),
 )
 def run(arguments: argparse.Namespace) -> Outcome:
     """Compute a study, or continue where it stopped."""
@@ -112,14 +114,14 @@ def notify(arguments: argparse.Namespace, ended: Outcome) -> None:
     "sweep refine foliot.h5 --y period --tolerance 1e-3 -o fine.h5",
     o.RESULT,
     option("--y", metavar="OUTPUT", nargs="+", required=True),
-    option("--tolerance", "relative, e.g. 1e-3", metavar="SHARE", type=float, required=True),
+    option("--tolerance", "relative interpolation error, e.g. 1e-3", metavar="SHARE", type=float, required=True),
     o.output("REFINED.h5", checked=False, required=True),
     o.FORCE,
     option("--most-cells", "largest number of cells; default: 1000000", metavar="N", type=int, default=1_000_000),
     *o.SOLVING,
 )
 def refine(arguments: argparse.Namespace) -> None:
-    """Add cells to a result where it is curved, until interpolation is accurate."""
+    """Add cells where an output is curved, until interpolation is accurate."""
     with opened(arguments) as dataset:
         study = study_from(arguments, dataset)
         keys = {"most_cells": arguments.most_cells, "force": arguments.force, **solving(arguments, study)}
@@ -132,15 +134,15 @@ def refine(arguments: argparse.Namespace) -> None:
     o.STUDY,
     o.output("FILE.png", "default: the study's name with _chart.png, here", "_chart.png"),
     o.FORCE,
-    option("--methods", "default: auto and all that can do the study", metavar="METHOD", nargs="+"),
+    option("--methods", "default: auto and every method that can do the study", metavar="METHOD", nargs="+"),
     option("--rtol", "default: 1e-3 to 1e-13", metavar="RTOL", nargs="+", type=float),
-    option("--cells", "of the study at most; default: 1024", metavar="N", type=int, default=1024),
-    option("--reference", "method taken as true; default: the one with the smallest bound", metavar="METHOD"),
-    *(switch("--all", "every tolerance, and all columns of the table"), o.JSON),
+    option("--cells", "largest number of cells; default: 1024", metavar="N", type=int, default=1024),
+    option("--reference", "method taken as exact; default: the one with the smallest bound", metavar="METHOD"),
+    *(switch("--all", "all tolerances, and all columns of the table"), o.JSON),
     *o.SOLVING[1:],
 )
 def chart(arguments: argparse.Namespace) -> None:
-    """Error against time of every method of a kernel, on the cells of a study or a result."""
+    """Chart error against time for every method, on cells of a study or a result."""
     from sweep.explore.work_precision import TOLERANCES, precision_text
     from sweep.runs.progress import Progress
 
@@ -159,12 +161,12 @@ def chart(arguments: argparse.Namespace) -> None:
 @command(
     "sweep check foliot.h5 --sample 200",
     o.RESULT,
-    option("--sample", "cells at most; default: 200", metavar="N", type=int, default=200),
-    option("--seed", "another number draws other cells; default: 0", metavar="N", type=int, default=0),
+    option("--sample", "largest number of cells to check; default: 200", metavar="N", type=int, default=200),
+    option("--seed", "seed of the random sample; default: 0", metavar="N", type=int, default=0),
     *(o.UNFINISHED, o.ALLOW_IMPORT, o.JSON),
 )
 def check(arguments: argparse.Namespace) -> Outcome:
-    """Solve some OK cells again by another method and compare; exit status 1 if one is beyond its rtol."""
+    """Solve some OK cells again by another method; exit status 1 if any differs by more than its rtol."""
     with opened(arguments) as dataset:
         found = dataset.sweep.check(arguments.sample, arguments.seed, allow_import=arguments.allow_import)
     tell(arguments, found)
@@ -173,10 +175,10 @@ def check(arguments: argparse.Namespace) -> Outcome:
 
 @command(
     "sweep cell foliot.h5 mu=0.1",
-    *(o.RESULT, option("at", metavar="AXIS=VALUE", nargs="*"), o.ALLOW_IMPORT, o.JSON),
+    *(o.RESULT, option("at", 'e.g. "A0=3 degree"', metavar="AXIS=VALUE", nargs="*"), o.ALLOW_IMPORT, o.JSON),
 )
 def cell(arguments: argparse.Namespace) -> None:
-    """One cell: its values, the meaning of its status, and the result of each method."""
+    """Show one cell: its values, the meaning of its status, each method's result."""
     with opened(arguments) as dataset:
         found = dataset.sweep.cell(allow_import=arguments.allow_import)
     tell(arguments, found)

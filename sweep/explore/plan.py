@@ -29,7 +29,7 @@ from sweep.runs.loop import SILENT_SECONDS, Loop, Task
 from sweep.study.model import Study
 from sweep.study.read import Given
 from sweep.study.read import study as as_study
-from sweep.words import Table, duration, paragraph, quantity
+from sweep.words import Table, counted, duration, paragraph, quantity
 
 DRAWN = 64
 """Cells beside the ends of axes that are solved to see their methods and statuses,"""
@@ -114,7 +114,7 @@ class Plan:
         def shares(found: dict[str, float]) -> str:
             # cells that are refused have no method, and a status that says why
             texts = ", ".join(f"{name} {100 * share:.3g} %" for name, share in found.items() if name != "none")
-            return f"{texts or 'none'} of a sample of {self.sampled:,} cell{'s' * (self.sampled > 1)}"
+            return f"{texts or 'none'} of a sample of {counted(self.sampled, 'cell')}"
 
         when = "just now; the machine code is kept" if self._is_kept else "of it, before the first cell"
         shape = " x ".join(f"{name} {n:,}" for name, n in self.shape.items())
@@ -122,12 +122,12 @@ class Plan:
             "kernel": self.kernel,
             "outputs": ", ".join(self.outputs),
             "cells": f"{self.cells:,} = {shape}" if len(self.shape) > 1 else f"{self.cells:,}",
-            "blocks": f"{self.blocks:,} of {self.cells_per_block:,} cells",
+            "blocks": f"{self.blocks:,} of {counted(self.cells_per_block, 'cell')}",
             "output": quantity(self.output_bytes),
             "disk": f"{quantity(self.free_bytes)} free in {self.folder}",
             "memory": quantity(self.memory_bytes),
-            "time": f"{duration(self.seconds)} on {self.workers} core{'s' * (self.workers > 1)}, "
-            f"{duration(self.cell_seconds)} a cell",
+            "time": f"{duration(self.seconds)} on {counted(self.workers, 'core')}, "
+            f"{duration(self.cell_seconds)} per cell",
             "compile": f"about {duration(self.compile_seconds)} {when}" if self.compile_seconds else "",
             "methods": shares(self.methods),
             "statuses": shares(self.statuses),

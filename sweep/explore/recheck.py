@@ -167,7 +167,7 @@ class Checked:
         ]
         rows += [("left out", f"{', '.join(self.left_out)}: 0 but for rounding")] if self.left_out else []
         if self.worst:
-            said = " against ".join(f"{value:.12g} ({who})" for who, value in self.worst["values"])
+            said = " against ".join(f"{value!r} ({who})" for who, value in self.worst["values"])
             by, cell = f"{self.worst['output']} by {self.worst['off']:.2g} rtol", cell_text(self.worst["cell"])
             rows += [("largest deviation", f"{by}{' at ' if cell else ''}{cell}: {said}")]
         return Table(rows).text()

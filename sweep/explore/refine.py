@@ -39,7 +39,7 @@ from sweep.runs.loop import Task
 from sweep.runs.run import computed
 from sweep.study.model import Axis, Study, frozen
 from sweep.study.read import study as as_study
-from sweep.words import as_path, number, require_dataset, several, whole_number
+from sweep.words import as_path, counted, number, require_dataset, several, whole_number
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -99,17 +99,17 @@ class Refinement:
         self.noise = max(cells.noise.values())
 
     def __repr__(self) -> str:
-        text = f"{self.dataset[STATUS].size:,} cells, {self.added:,} of them added"
+        text = f"{counted(self.dataset[STATUS].size, 'cell')}, {self.added:,} of them added"
         if len(self.unseen) == 1:
-            text += f"; an even grid as fine has {self.uniform:,}"
+            text += f"; a uniform grid of the same resolution has {self.uniform:,}"
         text += f"\nlargest interpolation error: {self.error:.2g}, estimated from neighbouring cells"
         if self.noise:
             text += f"; values scatter by {self.noise:.1g} of their size from cell to cell, or bend within less than "
-            text += "the distance of cells, and more cells do not lessen that"
+            text += "the distance between cells; more cells do not reduce this"
         elif self.error > self.tolerance:
-            text += "; the tolerance is not met everywhere, allow more cells"
+            text += "; the tolerance is not met everywhere; allow more cells"
         if self.jumps:
-            text += f"; not in {self.jumps:,} place{'s' * (self.jumps > 1)} where it jumps or diverges"
+            text += f"; except at {counted(self.jumps, 'place')} where it jumps or diverges"
         apart = ", ".join(f"{width} in {name}" for name, width in self.unseen.items())
         return f"{text}\ncells are up to {apart} apart; a peak narrower than that is not seen"
 

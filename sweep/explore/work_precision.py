@@ -182,12 +182,12 @@ def precision_text(found: xr.Dataset, complete: bool = False) -> str:
         row += [duration(cell["seconds"]), *(f"{cell[name]:.4g}" for name in work)]
         rows.append([*row, *(f"{100 * cell[name]:.3g} %" for name in shares), *[cell["worst_cell"]] * complete])
     headings = ["method", "rtol", "median", "worst", "time", *work, *shares, *["worst cell"] * complete]
-    basis = f"errors against {found.attrs['reference']}, in {found.attrs['cells']} cells"
+    basis = f"errors against {found.attrs['reference']}, on {found.attrs['cells']} cells"
     basis += f"; its own error is at most {found.attrs['reference_error']:.1e}"
     if found.attrs["open_cells"]:
-        basis += f"; {found.attrs['open_cells']} cells left aside, of which it is not sure"
+        basis += f"; left out where it is INACCURATE or has no value: {found.attrs['open_cells']} cells"
     left_out = f"Omissions: {found.attrs['omissions']}" if found.attrs["omissions"] else ""
-    rest = "" if complete else "Every tolerance, inaccurate cells, and where the worst cell is: --all."
+    rest = "" if complete else "For every tolerance, the inaccurate cells and the worst cell: --all."
     table = Table(rows, [name.replace("_", " ") for name in headings]).text(wide=complete)
     return page(table, paragraph(basis), paragraph(left_out), rest)
 

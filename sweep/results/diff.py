@@ -12,7 +12,7 @@ import xarray as xr
 from sweep.cells.schema import ANCILLARY, STATUS
 from sweep.errors import SweepError
 from sweep.results.statuses import cell_text, cell_values, flag_words, pieces, statuses_of
-from sweep.words import Table, listed, number, require_dataset
+from sweep.words import Table, counted, listed, number, require_dataset
 
 
 @dataclass
@@ -98,20 +98,19 @@ class Difference:
 
     def __repr__(self) -> str:
         lines = [
-            f"{self.cells:,} cells in both, {self.only_a:,} in the first alone, {self.only_b:,} in the second alone"
+            f"cells in both: {self.cells:,}; only in the first: {self.only_a:,}; only in the second: {self.only_b:,}"
         ]
         if self.missing:
-            lines.append(f"outputs of one alone: {listed(self.missing, word='and')}")
+            lines.append(f"outputs in only one of them: {listed(self.missing, word='and')}")
         lines += [f"fixed: {name} is {x} in the first and {y} in the second" for name, (x, y) in self.fixed.items()]
         rows = [
-            (name, f"{found.cells:,} cells differ", f"by up to {found.largest:.2g}", found.example)
+            (name, f"differs in {counted(found.cells, 'cell')}", f"by up to {found.largest:.2g}", found.example)
             for name, found in self.outputs.items()
             if found.cells
         ]
-        rows += [(f"{a} -> {b}", f"{n:,} cells", "", self.examples[a, b]) for (a, b), n in self.statuses.items()]
+        rows += [(f"{a} -> {b}", counted(n, "cell"), "", self.examples[a, b]) for (a, b), n in self.statuses.items()]
         if self.same:
-            within = f" to {self.rtol:g}" if self.rtol else ", bit for bit but for NaN"
-            lines.append(f"the same{within}")
+            lines.append(f"equal within {self.rtol:g}" if self.rtol else "identical, bit for bit; NaN equals NaN")
         return "\n".join([*lines, Table(rows).text()] if rows else lines)
 
 
@@ -143,7 +142,7 @@ def diff(a: xr.Dataset, b: xr.Dataset, rtol: float = 0.0) -> Difference:
     """
     require_dataset("diff", a)
     require_dataset("diff", b)
-    if not number("rtol", rtol) >= 0.0:
+    if not (rtol := number("rtol", rtol)) >= 0.0:
         raise SweepError(f"rtol: expected 0 or more, found {rtol:g}")
     kernels = [str(d.attrs.get("kernel", "")) for d in (a, b)]
     if kernels[0] != kernels[1]:

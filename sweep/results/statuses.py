@@ -14,6 +14,7 @@ from sweep.cells import partition
 from sweep.cells.reduce import BY_METHOD, BY_STATUS
 from sweep.cells.schema import METHOD_USED, STATUS
 from sweep.errors import SweepError
+from sweep.words import counted
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -62,7 +63,7 @@ class Account:
 
     def __str__(self) -> str:
         counts = [f"{cells:,} {kind}" for kind, cells in self.by_kind.items() if cells]
-        return f"{self.total:,} cells: {', '.join(counts) or 'none'}"
+        return f"{counted(self.total, 'cell')}: {', '.join(counts) or 'none'}"
 
 
 def account(dataset: Cells) -> Account:
@@ -142,7 +143,8 @@ def summary_text(dataset: Cells) -> str:
     for name, cells in found.statuses.items():
         if name != Status.OK.name:
             example = cell_text(found.examples.get(name, {}))
-            lines.append(f"{cells:,} of {found.total:,} cells: {name}" + (f", e.g. {example}" if example else ""))
+            share = f"{cells:,} of {counted(found.total, 'cell')}"
+            lines.append(f"{share}: {name}" + (f", e.g. {example}" if example else ""))
     return "\n".join(lines)
 
 

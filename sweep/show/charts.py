@@ -116,6 +116,7 @@ def draw_precision(axes: Any, found: xr.Dataset, key: str) -> None:
     """
     accurate = found.attrs.get("reference_error", np.nan)
     floor = max(FLOOR, accurate / 3) if np.isfinite(accurate) else FLOOR
+    top = 3 * min(np.fmax.reduce(found.error_worst.values, axis=None, initial=10 * floor), CEILING)
     for i, name in enumerate(map(str, found["method"].values)):
         row, look = found.sel({"method": name}), {**method_look(name, i), "markersize": 4}
         if not np.isfinite(row.error_median).any():
@@ -127,7 +128,7 @@ def draw_precision(axes: Any, found: xr.Dataset, key: str) -> None:
         axes.plot(seconds[silent], error[silent], "x", color="black", markersize=7)
     if np.isfinite(accurate):
         axes.axhspan(floor / 3, max(accurate, floor), color="0.9", linewidth=0)
-    axes.set(xscale="log", yscale="log", xlabel="time per cell on one core [s]", ylim=(floor / 3, 10))
+    axes.set(xscale="log", yscale="log", xlabel="time per cell on one core [s]", ylim=(floor / 3, top))
 
 
 @contextlib.contextmanager

@@ -28,7 +28,7 @@ from sweep.show.charts import (
     style,
 )
 from sweep.show.view import View, edges, label, setting
-from sweep.words import as_path, require_dataset
+from sweep.words import as_path, counted, require_dataset
 
 HATCHES = ("////", "\\\\\\\\", "....", "xxxx", "----")
 """Patterns of cells without a value, told apart without colour."""
@@ -189,7 +189,7 @@ def precision_figure(found: xr.Dataset) -> Figure:
         panels = figure.subplots(1, 2, sharex=True, sharey=True)
         for axes, key in zip(panels, ("median", "worst"), strict=True):
             draw_precision(axes, found, f"error_{key}")
-            axes.set_title(f"{key} of {attrs['cells']} cells")
+            axes.set_title(f"{key} of {counted(attrs['cells'], 'cell')}")
         low, high = panels[0].get_xlim()
         wide = np.sqrt(max(LEAST_SPAN * low / high, 1.0))
         panels[0].set(ylabel=f"relative error against {attrs['reference']} [1]", xlim=(low / wide, high * wide))

@@ -16,7 +16,8 @@ from sweep.errors import SweepError
 from sweep.file import disk
 from sweep.results.statuses import flag_words
 from sweep.show.view import one_of, preferred
-from sweep.words import Table, cell, listed, page, paragraph
+from sweep.units import UnitMistake, measured
+from sweep.words import Table, cell, counted, listed, page, paragraph
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -40,24 +41,26 @@ COMPARED = (
 
 
 def pick(dataset: xr.Dataset, choices: Sequence[str]) -> xr.Dataset:
-    """The part of a result where axes have the given values, "axis=value" each, up to rounding in the sixth digit.
+    """The part of a result at some values of its axes, "mu=0.1" or "mu=6 degree/s^2" each, compared to six digits.
 
     Raises SweepError where there is no such axis, or it has no such value.
     """
     for choice in choices:
         name, equals, value = choice.partition("=")
         if not equals:
-            raise SweepError(f'{choice}: expected axis=value, e.g. "mu=0.1"')
+            raise SweepError(f'{choice}: expected axis=value, e.g. "mu=0.1" or "mu=6 degree/s^2"')
         one_of(name, [str(n) for n, c in dataset.coords.items() if c.ndim == 1], f"{choice}: no axis {name}")
         values, dim = dataset[name].values, str(dataset[name].dims[0])
         if values.dtype.kind in "fiu":
             try:
-                off = abs(values - np.clip(float(value), np.fmin.reduce(values), np.fmax.reduce(values)))
-            except ValueError:
-                raise SweepError(f"{choice}: expected a number after =") from None
+                wanted = measured(value, str(dataset[name].attrs.get("units", "1")), name)
+            except ValueError as error:
+                cause = error if isinstance(error, UnitMistake) else 'expected a number after =, or e.g. "3 degree"'
+                raise SweepError(f"{choice}: {cause}") from None
+            off = abs(values - np.clip(wanted, np.fmin.reduce(values), np.fmax.reduce(values)))
             # six digits are what `sweep show` and `sweep run` print
             order = np.argsort(off, kind="stable")
-            found = order[np.isclose(values[order], float(value), rtol=1e-5, atol=0, equal_nan=True)]
+            found = order[np.isclose(values[order], wanted, rtol=1e-5, atol=0, equal_nan=True)]
             nearest = listed(f"{v:.6g}" for v in values[order[:2]])
         else:
             found = np.flatnonzero(values.astype(object) == value)
@@ -124,7 +127,7 @@ def laws(
             for cells, fate in ((valued, "in the fit"), (~valued, "left out")):
                 if count := int((cells & (status == code)).sum()):
                     parts.append(f"{count} {words.get(code, code)} ({fate})")
-        remarks += [f"Of {status.size} cells: {', '.join(parts)}."] if parts else []
+        remarks += [f"Of {counted(status.size, 'cell')}: {', '.join(parts)}."] if parts else []
     return Laws(y, x, fits, bend, meeting, confidence, " ".join(filter(None, remarks)))
 
 
@@ -160,7 +163,8 @@ def exponents_text(found: xr.Dataset, x: str, complete: bool = False) -> str:
     along, place, rows = str(found[x].dims[0]), dict[str, str](), list[Sequence[str]]()
     for place, line in _lines(found, along):
         here = line.where(line.exponent.notnull(), drop=True)
-        for point in range(0, here.sizes[along], 1 if complete else max(1, -(-here.sizes[along] // POINTS))):
+        count = here.sizes[along]
+        for point in range(count) if complete else np.unique(np.linspace(0, count - 1, min(POINTS, count), dtype=int)):
             at, exponent, error = (float(here[name][point]) for name in (x, "exponent", "exponent_error"))
             rows.append((*place.values(), f"{at:.6g}", f"{exponent:.6g}", f"{error:.1e}"))
     return Table(rows, (*place, x, "exponent", "error"), str(found.exponent.attrs["long_name"])).text()

@@ -25,7 +25,7 @@ from sweep.results.statuses import (
 )
 from sweep.runs.progress import log_path, read_lines
 from sweep.study.model import short
-from sweep.words import Table, page, paragraph, percent
+from sweep.words import Table, counted, page, paragraph, percent
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -62,9 +62,9 @@ def result_text(path: Path, dataset: xr.Dataset) -> str:
 def head(path: Path, dataset: xr.Dataset) -> list[str]:
     """Name and completeness, title, question, and what became of the cells."""
     found = account(dataset)
-    total, waiting, done = found.total, found.by_kind["pending"], f"complete, {found.total:,} cells"
+    total, waiting, done = found.total, found.by_kind["pending"], f"complete, {counted(found.total, 'cell')}"
     if waiting:
-        done = f"unfinished: {total - waiting:,} of {total:,} cells ({percent(found.done)})"
+        done = f"unfinished: {total - waiting:,} of {counted(total, 'cell')} ({percent(found.done)})"
     texts = [f"{path}: {done}", dataset.attrs.get("title", ""), dataset.attrs.get("question", ""), str(found)]
     return list(dict.fromkeys(str(text) for text in texts if text))
 

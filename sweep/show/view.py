@@ -156,7 +156,7 @@ def lines_of(output: xr.DataArray) -> list[str]:
 def one_of(name: str, known: Sequence[str], fault: str) -> str:
     """The name. Raises SweepError where it is not known: the fault, and a name that is."""
     if name not in known:
-        raise SweepError(fault + (did_you_mean(name, known) or f"; there are {listed(known, word='and') or 'none'}"))
+        raise SweepError(fault + (did_you_mean(name, known) or f"; known: {listed(known, word='and') or 'none'}"))
     return name
 
 

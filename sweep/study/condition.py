@@ -8,7 +8,6 @@ import operator
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from decimal import Decimal
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,7 @@ import numpy as np
 from kernels.interface import Kernel
 from sweep.errors import SweepError
 from sweep.study.model import setting
-from sweep.units import UnitMistake, parsed, scale
+from sweep.units import UnitMistake, measured, parsed
 from sweep.words import did_you_mean, kind, listed
 
 OPERATORS: dict[type, Callable[[Any, Any], Any]] = {
@@ -145,7 +144,7 @@ class Condition:
         if not isinstance(other, ast.Name) or other.id not in self.units:
             raise self.refusal(f"'{value}' has a unit; compare it with a name alone")
         try:
-            return float((scale(match[2], self.units[other.id], other.id) or 1) * Decimal(match[1])), None
+            return measured(value, self.units[other.id], other.id), None
         except UnitMistake as error:
             raise self.refusal(str(error)) from None
 

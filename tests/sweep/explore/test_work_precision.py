@@ -251,7 +251,7 @@ def test_no_more_cells_are_taken_than_are_wanted():
         ({"truth": {"impact_speed": [1.0] * 3}}, r"\(4,\)"),
         *(({"truth": truth}, "truth") for truth in ({}, [1.0] * 4)),
         *(({"reference": name}, "reference") for name in (["exact"], np.ones(2))),
-        ({"note": None}, "note"),
+        *(({"note": note}, "note") for note in (None, dict)),
     ],
 )
 def test_mistakes_are_told(options, word):

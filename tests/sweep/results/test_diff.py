@@ -121,8 +121,12 @@ def test_cells_of_large_results_are_found_wherever_they_are():
     assert account(other).examples == {"BAD_INPUT": {"x": "3", "y": "7"}}
 
 
-@pytest.mark.parametrize("rtol", [-1.0, np.nan, "a"])
+@pytest.mark.parametrize("rtol", [-1.0, np.nan, "a", xr.DataArray([1.0, 2.0])])
 def test_a_tolerance_that_is_none_is_refused(result, rtol):
     """By NaN any two results would be the same, by -1 a result would differ from itself."""
     with pytest.raises(sweep.SweepError, match="rtol"):
         sweep.diff(result, 2.0 * result, rtol=rtol)
+
+
+def test_a_tolerance_may_be_an_array_of_one_number(result):
+    assert sweep.diff(result, result, rtol=result.fall_time[0, 0]).same

@@ -244,6 +244,11 @@ def test_a_chart_of_precision_has_every_method_where_it_is_and_says_where_cells_
     assert any("2e-12" in word for word in words(figure))
 
 
+def test_a_chart_has_no_empty_decades_above_its_errors():
+    figure = plot(precision(error_worst=precision().error_worst * 1e-4))
+    assert all(9e-3 < axes.get_ylim()[1] < 9e-2 for axes in figure.axes)
+
+
 def test_a_method_has_one_colour_in_every_chart_whatever_stands_beside_it():
     """Methods of the project by their names; others by their place."""
     one, two = precision(), precision()

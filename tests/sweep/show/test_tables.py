@@ -82,6 +82,15 @@ def test_a_number_is_found_to_its_sixth_digit(value):
         assert pick(dataset, [f"a={value}"]).y.item() == (7.0 if value == "nan" else 5.0)
 
 
+@pytest.mark.parametrize("value", ["2 rad", "114.591559 degree", "  0.3183099 turn "])
+def test_a_number_may_have_a_unit(value):
+    angle = xr.DataArray([1.0, 2.0], dims="angle", attrs={"units": "rad"})
+    dataset = xr.Dataset({"y": ("angle", [5.0, 6.0])}, {"angle": angle})
+    assert pick(dataset, [f"angle={value}"]).y.item() == 6.0
+    with pytest.raises(SweepError, match='"kg" is a mass'):
+        pick(dataset, ["angle=2 kg"])
+
+
 # results
 
 
