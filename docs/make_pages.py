@@ -89,7 +89,7 @@ def _kernel_page(name: str, chart: Path | None) -> Iterator[str]:
     )
     yield from _table(("method", "how", "error", "cannot do"), map(_method, kernel.methods))
     yield from _picture(name, chart) if chart else ()
-    yield from ("## A study to begin with", "", "```toml", *starter(name).splitlines(), "```")
+    yield from ("## Example of a study", "", "```toml", *starter(name).splitlines(), "```")
 
 
 def _parameter(field: Field) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""The command `sweep`. Every fault that a user can act on ends in one message and an exit status, never in a traceback.
+"""The command `sweep`. An error that a user can act on ends in one message and an exit status, never in a traceback.
 
 Modules are imported by the command that needs them, so that `sweep --help` is quick.
 """

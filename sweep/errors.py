@@ -1,6 +1,6 @@
-"""What a user is told when something cannot be done: one clear line each, never a traceback.
+"""Errors that a user can act on: one clear line each, never a traceback.
 
-Also how Ctrl-C and SIGTERM are held back.
+Also deferral of Ctrl-C and SIGTERM.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Any, NoReturn
 
 
 class SweepError(Exception):
-    """A fault the user can act on; its text is the whole message. The command line prints it and exits with 2.
+    """An error that the user can act on; its text is the complete message. The command line prints it and exits with 2.
 
     Examples
     --------
@@ -29,7 +29,7 @@ class SweepError(Exception):
 
 
 class Incomplete(SweepError):
-    """A run had to end early through no mistake of the user's; the command line exits with 3."""
+    """A run that ended early, without a mistake in the study; the command line exits with 3."""
 
 
 def reason(fault: BaseException) -> str:
@@ -112,7 +112,7 @@ class Mistake:
 
 
 class StudyError(SweepError):
-    """All mistakes of one study at once.
+    """All mistakes in a study, in one message.
 
     Examples
     --------

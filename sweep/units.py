@@ -1,4 +1,4 @@
-"""Units at the border of the engine: what a study writes becomes the unit of the kernel's field.
+"""Conversion of units: a number in a study is converted to the unit of the kernel's field.
 
 Only this module imports pint, and only for units beyond a few everyday ones.
 """

@@ -1,4 +1,4 @@
-"""Words for people: tables, lists, the word that was meant, times, sizes, and what was found instead."""
+"""Text for people: tables, lists, suggestions for misspelt words, times, sizes; checks of arguments."""
 
 from __future__ import annotations
 

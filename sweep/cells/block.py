@@ -1,6 +1,6 @@
-"""A study cut into blocks of rows, and how one of them is computed.
+"""Division of a study into blocks of rows, and computation of a block.
 
-A bad cell costs one cell: what makes a kernel raise, die or run for ever is found by halving, and FAILED.
+A cell that makes a kernel raise, crash or run for ever is found by bisection of the block, and is FAILED.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What decides the numbers of a result: the study, the sources of its kernel and of this engine, and the compiler."""
+"""Fingerprint of a result: the study, the sources of its kernel and of this engine, and the compiler."""
 
 from __future__ import annotations
 

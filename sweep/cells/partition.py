@@ -1,9 +1,9 @@
-"""How a grid is cut: into blocks that are computed and kept as a whole, and into rows.
+"""Division of a grid into blocks, each computed and stored as a whole, and into rows.
 
-A block holds a line of numbers for each row: a cell; or, of a study with a summary, a row block, whose cells are
-reduced to one. Row blocks depend on the study alone, so that a summary has the same bits for any blocks, workers and
-interruptions. The axes that are kept come first, so a group (the cells that are reduced to one number in the end) is
-one run of flat cell numbers; it is cut into row blocks of equal length, the last one shorter.
+A block has a line of numbers for each row. A row is a cell, or in a study with a summary a row block, whose cells are
+reduced to one line. Row blocks depend on the study alone, so the bits of a summary do not depend on blocks, workers
+and interruptions. The axes that are kept come first, so a group (cells that are finally reduced to one number) is a run
+of flat cell numbers; it is divided into row blocks of equal length, the last one shorter.
 """
 
 from __future__ import annotations

@@ -1,11 +1,11 @@
-"""What an output holds: every cell, or reductions of cells to rows, and of rows to one.
+"""Variables of an output: every cell, or reductions of cells to rows, and of rows to one.
 
-Counts, extremes, sums and histograms have the same bits however they are cut.
+Counts, extremes, sums and histograms have the same bits however the grid is divided.
 
-All but the sum are the same in any order; of equal extremes the one with the smallest cell number counts. A sum is
-taken as an unevaluated pair sum + rest: over a strip in a binary tree of error-free additions, each addition's rounding
-error kept in `rest` (Ogita, Rump & Oishi 2005, Sum2: as exact as in twice the digits); strips and rows then follow in
-their order. NaN is no value and counts nowhere; infinities are values.
+All but the sum are independent of order; of equal extremes the one with the smallest cell number counts. A sum is an
+unevaluated pair sum + rest: within a strip by a binary tree of error-free additions, whose rounding errors are added up
+in `rest` (Ogita, Rump & Oishi 2005, Sum2: as accurate as in twice the digits), then over strips and rows in order. NaN
+is not a value and is not counted; infinities are values.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Some cells of a study as a study of their own, to try things on."""
+"""Samples of a study's cells, as studies of their own."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a result holds, before there is any: its columns, coordinates and attributes, named as CF wants them."""
+"""Layout of a result before it exists: columns, coordinates and attributes, named after the CF conventions."""
 
 from __future__ import annotations
 

@@ -1,12 +1,12 @@
-"""Solves runs of cells: checks them, chooses their methods, and says what became of each.
+"""Solves runs of cells: checks them, chooses their methods, and sets their statuses.
 
-A cell that the study's condition leaves out, or that `check` refuses, is never solved. With a method given, the cell
-is solved by it and remarked INACCURATE, whatever else is special about it but GRAZING, where the method's bound or
-estimate exceeds rtol. With `auto` it goes to the first method, cheapest first, that can do its terms and whose bound
-meets rtol, and on to the next where that one gives up or says INACCURATE, or GRAZING with an error above rtol, or
-where a method that estimates says OUT_OF_RANGE. Where none meets rtol, the values of the smallest bound are given,
-INACCURATE. A later method replaces only what it betters. Where a kernel of somebody's own says OK without a number, or
-a status that a kernel has not got, the cell FAILED.
+A cell that the study's condition excludes, or that `check` refuses, is not solved. If the study names a method, that
+method solves the cell; where its bound or estimate exceeds rtol, the status is INACCURATE instead of any other remark
+but GRAZING. With `auto` the cell goes to the cheapest method that covers its terms and whose bound meets rtol, and on
+to the next where that one gives up, returns INACCURATE, GRAZING with an error above rtol, or OUT_OF_RANGE from a method
+that only estimates its error. Where none meets rtol, the values with the smallest bound are kept, INACCURATE. A later
+method replaces only values that it improves. If a kernel of a user returns OK without a number, or an unknown status,
+the cell is FAILED.
 """
 
 from __future__ import annotations

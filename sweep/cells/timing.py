@@ -1,7 +1,7 @@
-"""A timed sample spread over the grid, and blocks of a size that follows from it.
+"""Times a sample spread over the grid, which decides the size of blocks.
 
-A function of columns is compiled when it is called first, which takes seconds and does not count. How long numba
-compiles, numba itself tells.
+The first call of a function compiles it, which takes seconds and is not counted. Compile times are those that numba
+reports.
 """
 
 from __future__ import annotations

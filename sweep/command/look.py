@@ -1,7 +1,7 @@
 """Commands that look at results and write what they show: show, verify, list, diff, plot, view, report, fit, exponent,
 sensitivity, export.
 
-Also those that have no result yet: kernels and studies that come with foliot.
+Also the commands that need no result: kernels and studies.
 """
 
 from __future__ import annotations

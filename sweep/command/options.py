@@ -1,4 +1,4 @@
-"""How a command is declared: a function whose docstring is its help, an example, and what may stand behind its name."""
+"""Declaration of a command: a function whose docstring is its help, an example, and its options."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What commands read, opened and checked; what they say, to people or with --json to programs; how they end."""
+"""Input of commands, opened and checked; their output, as text or with --json as JSON; their exit status."""
 
 from __future__ import annotations
 

@@ -1,14 +1,14 @@
-"""What runs sweeps to learn something.
+"""Tools that run sweeps of their own: forecasts, charts, refinement, checks.
 
 Others may use
-    `plan`            what a study will take
+    `plan`            forecast of a run
     `work_precision`  error against time of every method of a kernel
-    `refine`          cells where they are needed
-    `scattered`       values between cells that lie anywhere in a box, and those of them that lie on lines
+    `refine`          adaptive refinement of a grid
+    `scattered`       interpolation between scattered cells; those cells that lie on lines
     `solver`          a study's kernel as a function of its axes
-    `recheck`         one cell solved again by each method; a sample of OK cells, to see whether they are right to rtol
-    `sensitivity`     which parameters decide an output
-    `scaling`         superfluous axes, outputs free of units
+    `recheck`         one cell solved again by each method; a sample of OK cells checked to rtol
+    `sensitivity`     global sensitivity indices of an output
+    `scaling`         superfluous axes, dimensionless groups
 
-Behind `refine` is `mesh` (cells joined to simplices, how far lines in them are off).
+Behind `refine` is `mesh` (simplices of cells, and the error of linear interpolation in them).
 """

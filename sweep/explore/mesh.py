@@ -1,19 +1,19 @@
-"""Cells joined to simplices; how far straight lines between them are off, and which edge to cut for it.
+"""Simplices of cells, the error of linear interpolation in them, and the edge to halve next.
 
 Simplices (intervals, triangles, tetrahedra) are those of Delaunay's triangulation.
 
-Over a simplex with barycentric coordinates l_i a parabola is off its straight interpolation by
+Over a simplex with barycentric coordinates l_i, a quadratic function differs from its linear interpolation by
 
     E(l) = sum_{i<j} c_ij l_i l_j                                 (1)
 
-so a quarter of c_ij is the error in the middle of the edge from i to j. The c_ij are fitted to how far the cells around
-are off the simplex continued to them; what such a parabola leaves of these distances tells kinks, peaks and whatever
-else is no parabola, and counts too.
+so a quarter of c_ij is the error in the middle of the edge from i to j. The c_ij are fitted to the deviations of the
+neighbouring cells from the linear extrapolation of the simplex; the residual of this fit, which shows kinks and peaks,
+is added.
 
-A box is stretched to where an output bends, so that cells are joined along what it does not depend on. Over an edge e
-straight lines are off by e |H| e / 8 at most, H the matrix of second derivatives. Multiplied by the square root of the
-mean of |H|, a box bends alike in all directions; an axis that matters nothing, or a direction along which a
-dimensionless group stays as it is, shrinks. Source: A. Loseille, F. Alauzet, SIAM J. Numer. Anal. 49 (2011) 38.
+The box is stretched where an output is curved, so that simplices are long in directions on which it does not depend. On
+an edge e linear interpolation is off by at most e |H| e / 8, H the matrix of second derivatives. Coordinates multiplied
+by the square root of the mean of |H| make the curvature equal in all directions; an axis without influence, or a
+direction of constant dimensionless groups, shrinks. Source: A. Loseille, F. Alauzet, SIAM J. Numer. Anal. 49 (2011) 38.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What a study will take, before it runs: cells, bytes, memory, time."""
+"""Forecast of a run: cells, bytes, memory and time."""
 
 from __future__ import annotations
 
@@ -52,20 +52,19 @@ class Plan:
         Length of every axis ("cell" of a zip).
     output_bytes : int
     memory_bytes : int
-        While it runs with an output; without one, `output_bytes` come on top.
+        During a run to a file; a run in memory needs `output_bytes` in addition.
     free_bytes : int
         On the disk of the output.
     cell_seconds, seconds : float
-        On one core; and altogether, from the call of `run` in a program that has called it before, with what has to
-        be compiled again then.
+        Per cell on one core; and of the complete `run`, in a process that has called it before, compilation included.
     compile_seconds : float
-        What compiling the methods took just now; 0 where their machine code was kept.
+        Time that compiling the methods took just now; 0 if their machine code was cached.
     methods, statuses : dict of str to float
-        Shares of the sampled cells.
+        Share of the sampled cells that each method solves, and that has each status.
     sampled : int
-        How many these are; the ends of all axes are among them.
+        Number of sampled cells, which include the ends of all axes.
     scaling : str
-        Which axes are superfluous, since they change nothing but the units; "" where none is.
+        Axes that are superfluous, since they only rescale the outputs; "" if there are none.
     """
 
     def __init__(self, task: Task) -> None:
@@ -146,18 +145,18 @@ def plan(
     isolate: bool = False,
     cell_timeout: float | str | None = None,
 ) -> Plan:
-    """Forecast of a run: its cells, size, memory and time, from some cells that are computed.
+    """Forecast the cells, file size, memory and time of a run, from a sample of its cells.
 
     Parameters
     ----------
     workers : int, optional
         Cores; default: all this process may use.
     path : path, optional
-        Where the output would be; default: the current folder.
+        Path of the output; default: in the current folder.
     note : callable, optional
-        Called with a message where compiling takes long.
+        Called with a message before a compilation that takes long.
     isolate, cell_timeout
-        As of `run`: the cells that are tried are solved in processes of their own.
+        As in `run`: the sampled cells are solved in separate processes.
 
     Raises
     ------

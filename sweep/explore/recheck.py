@@ -1,4 +1,4 @@
-"""Cells of a result solved again: one of them, by every method; a sample of the OK ones, is each right to its rtol?"""
+"""Solves cells of a result again: one cell by every method; a sample of the OK cells to check their accuracy."""
 
 from __future__ import annotations
 

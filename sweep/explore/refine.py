@@ -1,13 +1,13 @@
-"""Cells where they are needed: a finished sweep refined until straight lines between cells are accurate to a tolerance.
+"""Adaptive refinement: cells are added to a finished sweep until linear interpolation meets a tolerance.
 
-In every round cells are joined to simplices, intervals along one axis, in a box stretched to where an output bends.
-Each is judged: inside of one status by the cells around it (`mesh`), across a border between statuses by the length of
-its edges. Where that is not good enough an edge is cut in the middle, down to a fixed share of the first grid's step,
-but not beside a pole, where cuts lessen nothing. Where errors stay as they are all over a region, values are noisy, and
-no more cells are added. Errors are those of logarithms where values are positive, as a scaling law wants it; elsewhere
-they are relative to the largest value.
+In every round the cells are the corners of simplices (intervals along one axis), in coordinates stretched where
+an output is curved. The error of a simplex is estimated from the surrounding cells (`mesh`); across a border between
+statuses it is the length of its edges. Where it is too large, an edge is halved, down to a fixed fraction of the first
+step, but not beside a pole, where halving does not help. Where errors do not decrease throughout a region, the values
+are noisy, and no more cells are added. Errors are those of logarithms where values are positive, as a scaling law
+needs; elsewhere they are relative to the largest value.
 
-Cells of one axis are a sweep over its values like any other. Cells of more axes lie anywhere, as those of a zip design.
+With one axis the result is an ordinary sweep over its values; with several, a list of cells as of a zip design.
 """
 
 from __future__ import annotations
@@ -58,19 +58,19 @@ SAME = 2.0**-40
 
 
 class Refinement:
-    """What came of it.
+    """Result of `refine`.
 
     Attributes
     ----------
     dataset : Dataset
-        All cells, the first ones and those added, in rising order: along the axis, or of several along `cell`.
+        All cells, original and added, in ascending order: along the axis, or for several axes along `cell`.
     added : int
-        Cells beyond the first ones.
+        Number of added cells.
     uniform : int
-        Cells of an even grid as fine as the finest step.
+        Number of cells of a uniform grid with the smallest step.
     error : float
-        Largest error left of straight lines between cells, relative, estimated from the cells around; not across
-        borders of statuses, nor in `jumps`.
+        Largest remaining relative error of linear interpolation, estimated from neighbouring cells; without borders
+        between statuses, and without `jumps`.
     tolerance : float
     complete : bool
         Whether the tolerance is met; not so where `most_cells` ran out, an output jumps, goes to infinity or is noisy.
@@ -132,28 +132,28 @@ def refine(
     Parameters
     ----------
     dataset : Dataset
-        From `run` or `open_result`, of a product of at most five number axes; or refined before.
+        From `run` or `open_result`, a product of at most five axes of numbers; or an earlier result of `refine`.
     y : str or sequence of str
-        Outputs, one value a cell.
+        Outputs with one value per cell.
     tolerance : float
         Relative error of the interpolation.
     path : path, optional
-        Where all cells are written at the end, an HDF5 file as of `run`; the rounds on the way are kept beside it until
-        then, and the same call continues after the last of them. None: in memory.
+        HDF5 file for all cells, as of `run`. Until it is complete the rounds are kept beside it, and the same call
+        continues after the last of them. None: in memory.
     study : Study, optional
-        That of the dataset; default: the one in its attributes.
+        The study of the dataset; default: the one in its attributes.
     most_cells : int
-        Largest number of cells altogether.
+        Largest total number of cells.
     workers, isolate, cell_timeout
         As of `run`.
     force : bool
-        Overwrite what is at `path`, and give up the rounds of an earlier call.
+        Overwrite an existing file at `path`, and discard the rounds of an earlier call.
 
     Raises
     ------
     SweepError
-        The dataset is not a finished product of number axes, and was not refined before; an output does not exist or
-        has a coordinate of its own; `path` is there already, or cannot be written.
+        The dataset is neither a finished product of axes of numbers nor a refined result; an output does not exist or
+        has a coordinate of its own; `path` exists already, or cannot be written.
 
     Examples
     --------

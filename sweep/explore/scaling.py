@@ -1,4 +1,4 @@
-"""Which axes of a sweep matter: scalings are tried on cells, and dimensionless groups follow from those that hold.
+"""Superfluous axes and dimensionless groups, from scalings that are tried on a few cells.
 
 A scaling multiplies each field i by a power s^w_i of a factor s. It holds if every output j is then multiplied by some
 power s^v_j, the same in every cell. Measuring lengths, masses, times or angles in another unit is such a scaling, so
@@ -64,14 +64,14 @@ class Group(dict[str, Fraction]):
 
 
 class Scaling:
-    """What scalings say about a study.
+    """Result of `scaling`.
 
     Attributes
     ----------
     groups : tuple of Group
-        All that its cells depend on, beside parameters that do not scale. None of a kernel with array parameters.
+        Groups that determine the outputs, together with parameters that do not scale; none for array parameters.
     scales : dict of output to Group
-        What an output is multiplied by to have no unit.
+        Factor that makes an output dimensionless.
     free : int
         How many of the study's axes change nothing but the numbers.
     advice : str
@@ -163,13 +163,13 @@ class Scaling:
 
 
 def scaling(study: Given) -> Scaling:
-    """Groups of a study's parameters, and how many of its axes are superfluous.
+    """Dimensionless groups of a study's parameters, and the number of superfluous axes.
 
-    Scalings are tried on four cells, and those that hold there on 24.
+    Scalings are tested on four cells, and those that hold there on 24.
 
     Parameters
     ----------
-    study : Study, path, mapping of its keys, or Dataset that came from it
+    study : Study, path of a study file, mapping of its keys, or Dataset that `run` made of it
 
     Raises
     ------

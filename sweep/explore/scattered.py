@@ -1,4 +1,4 @@
-"""Values between cells that lie anywhere in a box: straight lines between neighbours, as pictures draw them.
+"""Linear interpolation between scattered cells, as figures of refined results use it.
 
 Neighbours are the corners of the simplices (intervals, triangles, tetrahedra) of Delaunay's triangulation of the cells,
 in coordinates in which each axis reaches from 0 to 1, in logarithms where it reaches from a positive value to twice
@@ -93,27 +93,27 @@ def axes_of(dataset: xr.Dataset) -> list[str]:
 
 
 def interpolated(dataset: xr.Dataset, at: Mapping[str, Sequence[float] | Array]) -> xr.Dataset:
-    """Outputs on an even or uneven grid of values, between the cells of a refined result.
+    """Interpolate the outputs of a refined result on a grid of values.
 
     Parameters
     ----------
     dataset : Dataset
-        From `refine`, of two axes and more.
+        From `refine`, with two or more axes.
     at : mapping of axis to values
-        Values of every axis.
+        Values for every axis.
 
     Returns
     -------
     Dataset
-        Outputs of one value a cell, and the status of the nearest cell, over the axes in the order of `at`. NaN outside
-        of the cells, and beside cells without a value. INACCURATE, with `error_bound`, where the estimated error of
-        linear interpolation exceeds the tolerance of the refinement, and across borders of statuses, where the error is
-        unknown.
+        Outputs with one value per cell, and the status of the nearest cell, over the axes in the order of `at`. NaN
+        outside the range of the cells, and beside cells without a value. INACCURATE, with `error_bound`, where the
+        estimated error of linear interpolation exceeds the tolerance of the refinement, and across borders of statuses,
+        where the error is unknown.
 
     Raises
     ------
     SweepError
-        The cells do not fill a box, an axis is missing, or there is no such axis.
+        The cells do not fill a box, values for an axis are missing, or there is no such axis.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Which parameters decide an output: Sobol' indices and Morris' elementary effects, by SALib on a study's design."""
+"""Global sensitivity of an output: Sobol' indices and Morris' elementary effects, by SALib on a study's design."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ MORRIS = {
 
 
 def sensitivity(dataset: xr.Dataset, y: str | xr.DataArray) -> xr.Dataset:
-    """Indices of every axis of a design "saltelli" (Sobol') or "morris".
+    """Sensitivity indices of every axis, from a design "saltelli" (Sobol') or "morris".
 
     Parameters
     ----------
     dataset : Dataset
-        From `run` or `open_result` of a study of such a design.
+        From `run` or `open_result`, of a study with such a design.
     y : str or DataArray
-        An output of one value a cell, or a function of outputs: np.log(ds.period).
+        An output with one value per cell, or a function of outputs: np.log(ds.period).
 
     Returns
     -------
@@ -48,7 +48,7 @@ def sensitivity(dataset: xr.Dataset, y: str | xr.DataArray) -> xr.Dataset:
     Raises
     ------
     SweepError
-        The design is another, a cell has no value, or SALib is missing.
+        The design is neither of the two, a cell has no value, or SALib is not installed.
 
     Examples
     --------

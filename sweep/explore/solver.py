@@ -1,4 +1,4 @@
-"""A study's kernel as a function of its swept parameters, for optimisers, fits and integrals."""
+"""A study's kernel as a function of its axes, for optimisers, fits and integrals."""
 
 from __future__ import annotations
 
@@ -120,17 +120,17 @@ def _warn(cell: BadCell) -> None:
 
 
 def solver(study: Given) -> PointSolver:
-    """The study's kernel as a function of its axes; the values of the axes in the study are not used.
+    """Make a function of a study, whose arguments are its axes; the values of the axes in the study are not used.
 
     Parameters
     ----------
     study : as of `sweep.study`
-        Its axes are numbers of the kernel; everything else is fixed by it.
+        Its axes, parameters of the kernel that are numbers, become the arguments; it fixes everything else.
 
     Raises
     ------
     SweepError
-        An axis is an array, a word, a method or a tolerance; the study keeps a summary.
+        An axis is an array, a word, a method or a tolerance; the study has a [summary].
 
     Examples
     --------

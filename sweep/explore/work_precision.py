@@ -1,10 +1,10 @@
-"""Speed against accuracy: every method of a kernel on the same cells, in one run.
+"""Work-precision charts: error and time of every method of a kernel on the same cells, in one run.
 
-Errors are against values that are given, or against a reference: the method that leaves the fewest cells open, of those
-that state a bound before those that do not. The error of the reference itself is the floor below which no error
-here means anything; cells that it has solved itself, by name or by `auto`, are told to be that much off. Times are what
-one core spends on it, not what it spends on others, the least of a few rounds over all methods; they are noisy, errors,
-shares of cells and counts of work are not.
+Errors are relative to true values that the caller supplies, or to a reference method: the one that solves most cells,
+methods with an error bound first. The error of the reference itself is the floor below which no error is meaningful;
+it is also the error that is reported for cells which the reference itself has solved, by name or by `auto`. Times are
+CPU times of one core, the least of a few rounds over all methods; they are noisy, whereas errors, shares of cells and
+counts of work are reproducible.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ ESTIMATES = ("error", "wear_error")
 
 
 def precision_cells(study: Study, cells: int = CELLS) -> dict[str, Any]:
-    """Values of the study's axes in the cells that `work_precision` takes, in their order: what truth is given for."""
+    """Values of the study's axes in the cells that `work_precision` uses, in the order in which it expects `truth`."""
     return {name: axis.values for name, axis in sampled(study, cells).axes.items()}
 
 
@@ -66,41 +66,41 @@ def work_precision(
     isolate: bool = False,
     cell_timeout: float | str | None = None,
 ) -> xr.Dataset:
-    """Error and time per cell of methods at several tolerances, on cells spread over a study's grid.
+    """Measure error and time per cell of each method at several tolerances, on cells spread over a study's grid.
 
     Parameters
     ----------
     study : Study
-        Its method and rtol, and axes of these, are left aside.
+        Its method and rtol, and axes of these, are ignored.
     methods : sequence of str, optional
-        Default: "auto" and all that can do the study's terms and outputs.
+        Default: "auto" and every method that covers the study's terms and outputs.
     tolerances : sequence of float
         Values of rtol.
     cells : int
-        At most so many.
+        Largest number of cells.
     reference : str, optional
-        The method whose results are taken for the truth: in each cell at the least rtol at which it says OK.
+        Method whose results are taken as exact: in each cell at the smallest rtol at which its status is OK.
     truth : mapping of output to ndarray, optional
-        True values in the cells that `precision_cells` names; NaN in all outputs where there is nothing to give. Errors
-        are then over these outputs alone.
+        True values in the cells that `precision_cells` lists; NaN in all outputs where there is no solution. Only these
+        outputs are then compared.
     note : callable, optional
-        Told how much there is to do, and how many cells are left out.
+        Called with messages: the amount of work, and the number of cells that are left out.
     isolate, cell_timeout
-        As of `run`: cells are tried in processes of their own first, and left out where a method fails.
+        As in `run`: cells are first tried in separate processes, and left out where a method fails.
 
     Returns
     -------
     Dataset
         Over `method` and `rtol`: `error_median`, `error_worst`, `seconds`; shares of cells `ok`, `remarked`,
         `inaccurate`, `unsolved`, `silent`; texts `worst_cell`, `unsolved_as`, `silent_at`, `methods_used`; and means of
-        the outputs asked for that count work. Attributes `reference`, `reference_error` (the largest error of the truth
-        itself), `cells` (in which methods can be told right or wrong), `open_cells` (in which they cannot), and
-        `omissions` (which methods cannot do the study, and what fails where).
+        the study's outputs that count work. Attributes `reference`, `reference_error` (the largest error of the
+        reference), `cells` (where the truth is known), `open_cells` (where it is not), and `omissions` (methods that
+        cannot do the study, and failures).
 
     Raises
     ------
     SweepError
-        There is no such method, or none that can do the study; the reference solves no cell; truth has another shape;
+        A method does not exist, or none can do the study; the reference solves no cell; `truth` has the wrong shape;
         a tolerance is not between 0 and 1; a method fails in every cell.
 
     Examples

@@ -1,4 +1,4 @@
-"""Results as xarray opens them: columns are read when they are used, and compared with their digests."""
+"""Lazy arrays for xarray: columns are read when they are used, and compared with their digests."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
-"""A result before its first number: HDF5 makes all of it; but for numbers, digests and the ending it stays as it is.
+"""Layout of a result by HDF5 before the first number; later only numbers, digests and the ending change.
 
 HDF5 checks every byte of names, attributes and coordinates that it reads: texts have a fixed length and stand in object
 headers, coordinates are one chunk with a checksum each, single numbers stand in headers too. Each chunk of statuses
-says PENDING. The zeros that HDF5 writes over other chunks are kept from the disk: a wrong checksum stands behind them
-instead, so that nobody takes what is not computed yet for numbers.
+says PENDING. Zeros that HDF5 would write over other chunks do not reach the disk; those chunks have a wrong
+checksum instead, so that nobody takes cells that are not computed yet for numbers.
 """
 
 from __future__ import annotations

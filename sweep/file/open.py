@@ -1,4 +1,4 @@
-"""Results as Datasets, of a finished sweep or of one that still runs, and whether they are what was written."""
+"""Opens results as Datasets, also while the sweep is running, and verifies their checksums."""
 
 from __future__ import annotations
 
@@ -35,24 +35,24 @@ MOST_TOLD = 8
 
 
 def open_result(path: str | os.PathLike[str], strict: bool = False, *, chunks: Any = None) -> xr.Dataset:
-    """The result of a sweep, finished or not.
+    """Open the result of a sweep, finished or not.
 
-    Cells that are not computed yet are NaN, with status PENDING. Values are read when they are used, and compared with
-    their digests; what is larger than a quarter of the memory comes as dask arrays.
+    Cells that are not computed yet are NaN, with status PENDING. Values are read and compared with their checksums when
+    they are used; arrays larger than a quarter of the memory are dask arrays.
 
     Parameters
     ----------
     path : path
-        The output of a sweep, also while it is not finished.
+        The output of a sweep, finished or not.
     strict : bool
-        Refuse a sweep that is not finished.
+        Raise SweepError if the sweep is not finished.
     chunks : as of `xarray.open_dataset`, optional
-        Dask arrays whatever the size: {} has the chunks of the file, "auto" those that dask likes.
+        Dask arrays of any size: {} has the chunks of the file, "auto" those that dask chooses.
 
     Raises
     ------
     SweepError
-        There is no result, or it cannot be read, or it is unfinished and `strict`; `path` is no path.
+        There is no result at `path`, or it cannot be read, or it is unfinished and `strict`.
 
     Examples
     --------
@@ -169,15 +169,14 @@ class Verdict:
 
 
 def verify(path: str | os.PathLike[str]) -> Verdict:
-    """Check all checksums of a result, finished or not.
+    """Verify all checksums of a result, finished or not.
 
-    All numbers, and all that stands before its key, are read and compared with their digests; HDF5 has checked texts
-    and coordinates, and tables of places behind the key. Where nothing stands is not compared.
+    All numbers and all metadata are read and compared with their checksums, except for unused bytes of the file.
 
     Raises
     ------
     SweepError
-        There is nothing to verify, or it cannot be read.
+        There is no result at `path`, or it cannot be read.
 
     Examples
     --------

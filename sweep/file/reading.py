@@ -1,9 +1,9 @@
-"""Numbers of a result, finished or not, that are compared with their digests before they are handed out.
+"""Reads the numbers of a result, finished or not, and compares them with their digests.
 
-HDF5 says what is in the file and where, and checks that: names, texts, coordinates and places have its checksums. The
-lists of dimensions in its global heap have none, and are not read: in a damaged heap HDF5 2.0 loops for ever. Numbers
-stand in chunks, one a block of each column, each followed by HDF5's checksum; they are read from their places by any
-thread. A table in the file has a digest of each chunk, a row of them for each block; zeros: the block is not done.
+The contents of the file are looked up by HDF5, whose checksums cover names, texts, coordinates and addresses. The lists
+of dimensions in its global heap have none, and are not read: in a damaged heap HDF5 2.0 loops for ever. The chunks of
+numbers, one for each block and column, each followed by HDF5's checksum, are read from their addresses by any thread. A
+table in the file has a row of digests for each block, one for each chunk; zeros mean that the block is not done.
 """
 
 from __future__ import annotations

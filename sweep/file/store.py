@@ -1,6 +1,6 @@
-"""OUT.h5.unfinished: a result that is written in place, block by block, and renamed when it is complete.
+"""OUT.h5.unfinished: a result written in place, block by block, and renamed when it is complete.
 
-    OUT.h5.unfinished       the result; its structure is whole before the first number is written, and stays as it is
+    OUT.h5.unfinished       the result; its structure is complete before the first number and never changes
     .OUT.h5.unfinished.tmp  for a moment, while that structure is written
     OUT.h5.lock             held while a sweep runs; the system frees it when the process ends
 

@@ -1,10 +1,10 @@
-"""The two exponents of a collapse, by which curves of a second parameter are one.
+"""The two exponents of a scaling collapse, which maps the curves of a second parameter onto one.
 
     y = L^b f(x / L^a)                                                                              (1)
 
-In logarithms the curves of all L are one, ln y = b ln L + g(ln x - a ln L). With g a polynomial, b and g are linear
-for given a, and (1) is a law with one number that is not (`shapes`), searched over all of its range, so there is no
-start to be stuck at.
+In logarithms, ln y = b ln L + g(ln x - a ln L) for all L. With g a polynomial, b and g enter linearly for given a, so
+that (1) is a law with one nonlinear parameter (`shapes`). It is searched over its complete range, and needs no initial
+guess.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ if there are but two curves)."""
 
 
 def fit_collapse(y: xr.DataArray, dim: str, over: str, *, sigma: Any = None, confidence: float = 0.95) -> xr.Dataset:
-    """Exponents a, b for which all curves y(x; L) fall on one, equation (1), and whether they do.
+    """Exponents a, b that collapse all curves y(x; L) onto one, equation (1), and whether they do collapse.
 
     Parameters
     ----------
     y : DataArray
         Along `dim` and `over`.
     dim, over : str
-        Dimensions of x and L; positive.
+        Dimensions of x and of L, whose values are positive.
     sigma : number or DataArray, optional
         Standard errors of the values, in the unit of y.
     confidence : float
@@ -46,16 +46,16 @@ def fit_collapse(y: xr.DataArray, dim: str, over: str, *, sigma: Any = None, con
     Returns
     -------
     Dataset
-        `x_exponent` (a), `y_exponent` (b), each with `_low`, `_high`; `verdict`, words; `scatter`; `points`,
-        `dropped`; `fits`. The intervals are of noise about the common curve that may be autocorrelated along each
-        curve, or of `sigma`; without noise of how well a polynomial follows the curve. There are none where the curves
-        do not fall on one another: where levels, slopes and bows of their own describe them far better.
+        `x_exponent` (a), `y_exponent` (b), each with `_low`, `_high`; `verdict`, in words; `scatter`; `points`,
+        `dropped`; `fits`. The intervals allow for noise about the common curve, autocorrelated along each curve, or for
+        `sigma`; without noise, for the error of the polynomial. There are none where the curves do not collapse, that
+        is where a level, slope and curvature for each of them fit far better.
 
     Raises
     ------
     SweepError
-        An axis is unknown or unfit, there are fewer than two curves or ten points, or y does not change, f is a power
-        law or L does not matter, so that a and b are not both determined.
+        An axis is unknown or unsuitable; there are fewer than two curves or ten points; or a and b are not both
+        determined, as where y is constant, f is a power law, or L has no influence.
 
     Examples
     --------

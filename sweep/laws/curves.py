@@ -1,4 +1,4 @@
-"""What all fits share: the axis that curves run along, windows, logarithms, lines of an array, and names of numbers."""
+"""Shared by all fits: the axis of the curves, windows, logarithms, lines of an array, and names of results."""
 
 from __future__ import annotations
 

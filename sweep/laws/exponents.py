@@ -1,4 +1,4 @@
-"""Local exponents, where curves or their exponents pass a value, and exponents over two parameters.
+"""Local exponents, where they or the curves themselves pass a value, and maps of exponents over two parameters.
 
 Everything here works on plain `xarray` objects along one dimension and keeps all others. `dim` may also name a
 coordinate along a dimension, such as an axis of a zip design: `local_exponent(ds.period, "mu")`.
@@ -30,35 +30,34 @@ def local_exponent(y: xr.DataArray, dim: str, *, error: Literal[True], bound: An
 def local_exponent(y: xr.DataArray, dim: str, *, error: bool = False, bound: Any = None) -> xr.DataArray | xr.Dataset:
     """Local exponent d ln y / d ln dim [1], of fourth order in the spacing on any grid, ends included.
 
-    Each value is the slope at a grid point of the polynomial through five neighbours in log-log (centred inside,
+    Each value is the slope, at a grid point, of the polynomial through five neighbours in log-log (centred inside,
     one-sided at the ends). On a smooth curve the error is at most h^4/5 times the fifth derivative, h the spacing
     of ln dim: a few 1e-8 at 50 points a decade. A run of three or four neighbours gives order two or three.
 
     Parameters
     ----------
     y : DataArray
-        Any shape. A point that is missing or not positive is NaN in the result, and no stencil reaches across it;
-        so are runs of fewer than three points.
+        Of any shape. A point that is missing or not positive is NaN in the result, and no stencil extends across it;
+        runs of fewer than three points are NaN too.
     dim : str
         Dimension of `y`, or 1-D coordinate along one; positive and strictly monotone.
     error : bool
-        Whether to add an error bar, which takes longer. Where the values carry noise, it is half an interval that
-        holds the truth in 94 % and more of the cases, be the noise even, uneven or autocorrelated up to 0.9 (of even
-        noise in 98 %). Where they do not, it is more than the error that the spacing leaves, typically 100 times as
-        much; but no points show a feature that is narrower than their spacing. What errors up to `bound` can do is
-        added.
+        Whether to add an error bar, which takes longer. With noisy values, it is half the width of an interval that
+        contains the truth in at least 94 % of the cases, for homogeneous, heteroscedastic and autocorrelated (up to
+        0.9) noise. Without noise, it exceeds the discretisation error, typically by a factor of 100, unless there is
+        a feature narrower than the spacing. The effect of errors up to `bound` is added.
     bound : number, DataArray or Dataset, optional
-        Largest relative error of the values, for the error bar. Default: as of `fit_exponent`.
+        Largest relative error of the values, for the error bar. Default: as in `fit_exponent`.
 
     Returns
     -------
     DataArray, or with `error` a Dataset
-        Shape, dimensions and coordinates of `y`; the Dataset has `exponent` and `exponent_error`.
+        With the dimensions and coordinates of `y`; the Dataset has `exponent` and `exponent_error`.
 
     Raises
     ------
     SweepError
-        If `dim` is unknown, not positive, not monotone, or shorter than three; `bound` is negative or does not fit.
+        If `dim` is unknown, not positive, not monotone, or shorter than three; `bound` is negative or misshapen.
 
     Examples
     --------
@@ -90,21 +89,20 @@ def where_exponent(
 ) -> xr.Dataset:
     """Where the local exponent of y, or y itself, passes a value: `abscissa` and `abscissa_error`.
 
-    The exponent is taken by differences of sixth order and interpolated through six points. The error is the
-    distance to the same by fourth order and four points, plus rounding: an estimate, not a bound.
+    The exponent is computed by differences of sixth order and interpolated through six points. The error is the
+    difference from the same with fourth order and four points, plus rounding: an estimate, not a bound.
 
     Parameters
     ----------
     y, dim
-        As of `local_exponent`.
+        As in `local_exponent`.
     value : float
-        The exponent looked for, with its sign: -0.5 for y ~ dim^(-1/2).
+        The exponent to find, with its sign: -0.5 for y ~ dim^(-1/2).
     window : (low, high), optional
-        Part of `dim` to look in; differences at its ends still use the points beyond.
+        Part of `dim` to search; differences at its ends also use the points beyond.
     values : bool
-        Whether the values of y themselves are to pass `value`, as for an output that is an exponent already
-        (`sensitivity`). The place is then the root of the polynomial through six neighbours, and its error the
-        distance to that through four.
+        Find where y itself passes `value`, for an output that is an exponent already (`sensitivity`). The place is the
+        root of the polynomial through six neighbours, and its error the difference from that through four.
 
     Raises
     ------
@@ -164,28 +162,28 @@ def where_exponent(
 
 
 def exponent_map(y: xr.DataArray, dim: str, levels: Sequence[float] = BORDERS) -> xr.Dataset:
-    """The local exponent of y in `dim` over two parameters, and the lines where it has given values.
+    """Map of the local exponent of y in `dim` over two parameters, and its contour lines.
 
     Parameters
     ----------
     y : DataArray
-        Two dimensions, both with number coordinates; one of them is `dim`.
+        With two dimensions, both with coordinates of numbers; one of them is `dim`.
     dim : str
         Positive and strictly monotone.
     levels : sequence of float
-        Exponents, with their sign: -1/3 for y ~ dim^(-1/3).
+        Exponents of the contour lines, with their sign: -1/3 for y ~ dim^(-1/3).
 
     Returns
     -------
     Dataset
-        `exponent` and its `exponent_error`, of the shape of y, and the lines along `point`: both coordinates under the
-        names of the dimensions with `_on_border` behind, `level`, and `line`, the number of the line, from 0 on. Lines
-        are linear between points, in logarithms of axes that are logarithmic; where the exponent is NaN no line goes.
+        `exponent` and its `exponent_error`, with the shape of y, and the contour lines along `point`: both coordinates,
+        named after the dimensions with the suffix `_on_border`, `level`, and `line`, the number of the line, from 0.
+        Lines are straight between grid points (in logarithms on logarithmic axes), and avoid points that are NaN.
 
     Raises
     ------
     SweepError
-        y has not two dimensions, or an axis is unfit.
+        y does not have two dimensions, or an axis is unsuitable.
 
     Examples
     --------

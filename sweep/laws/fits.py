@@ -1,7 +1,7 @@
-"""Laws of the table fitted to points, and what the points tell of each of their numbers.
+"""Fits laws of the table to points, with the uncertainty of each parameter.
 
-For given q, the numbers b are a linear least-squares fit (variable projection): a grid over q gives the start, damped
-Gauss-Newton steps of q the end. All laws of all lines are fitted at once.
+For given q, the parameters b follow from linear least squares (variable projection). A grid over q gives initial
+values, which damped Gauss-Newton steps improve. All laws of all lines are fitted together.
 """
 
 from __future__ import annotations

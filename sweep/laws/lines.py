@@ -1,9 +1,9 @@
-"""The exponent of a power law: by a straight line in log-log, or far out, by a correction to scaling.
+"""The exponent of a power law, from a straight line in log-log, or asymptotically, from a correction to scaling.
 
     y = A x^p,   y = A x^p (1 + B x^-D)                                                             (1)
 
-D > 0 where p holds at large x, D < 0 where it holds at small x. B and D are hardly told apart, so the interval reaches
-over those of every D that the points do not rule out.
+D > 0 where p holds at large x, D < 0 where it holds at small x. B and D are strongly correlated, so the interval of p
+is the union over every D that the points do not rule out.
 """
 
 from __future__ import annotations
@@ -50,23 +50,23 @@ def fit_exponent(
     sigma: Any = None,
     bound: Any = None,
 ) -> xr.Dataset:
-    """Power law y = prefactor dim^exponent by a straight line in log-log over a window.
+    """Fit the power law y = prefactor dim^exponent, a straight line in log-log, over a window.
 
-    What the interval of the exponent is depends on what the distances of the points from the line are, `kind`:
+    The interval of the exponent depends on the residuals of the points, `kind`:
 
-    - *exact*, *bounded*: rounding, or within stated error bounds; all that such errors can do to the exponent.
-    - *weighted*: `sigma` is given; by the normal distribution, if chi-squared allows it and distances have no shape.
-    - *noise*: noise of which nothing is known. It may be autocorrelated, louder at one end, at both or in the middle,
-      and have outliers; the interval is over a mixture of such noises. The price is a wider interval beside few points.
-    - *even*, *uneven*, *correlated*, *outliers*: only if `noise` says so. Of *even* noise the interval is that of
-      ordinary least squares, and distances with a shape deny it.
-    - *curved*, *bent*: no power law, without and among noise. `fits` is 0 and the interval is the range of the local
+    - *exact*, *bounded*: rounding, or errors within stated bounds; the interval is the largest effect of such errors.
+    - *weighted*: `sigma` is given; the normal distribution, if chi-squared allows it and the residuals have no trend.
+    - *noise*: noise of unknown kind. It may be autocorrelated, larger at one end, at both or in the middle, and have
+      outliers; the interval is that of a mixture of such noise models, and therefore wider where points are few.
+    - *even*, *uneven*, *correlated*, *outliers*: only if `noise` says so. For *even* noise the interval is that of
+      ordinary least squares, which residuals with a trend contradict.
+    - *curved*, *bent*: not a power law, without and with noise. `fits` is 0 and the interval is the range of the local
       exponent in the window.
 
     Parameters
     ----------
     y : DataArray
-        Any shape; missing points are left out. The `kind` of a line with a value that is not positive says so.
+        Of any shape; missing points are left out. The `kind` of a line says if a value is not positive.
     dim : str
         Dimension of `y`, or 1-D coordinate along one; positive and monotone. Equal values are repeated measurements.
     window : (low, high), optional
@@ -74,19 +74,19 @@ def fit_exponent(
     confidence : float
         Of the interval, where there is noise.
     noise : bool or "even", "uneven", "correlated", "outliers", optional
-        Whether there is noise, or of which kind. Default: as the points show.
+        Whether there is noise, or of which kind. Default: decided from the points.
     sigma : number or DataArray, optional
-        Standard errors of the values, in the unit of y; they say all of the noise, so `noise` is not given.
+        Standard errors of the values, in the unit of y; excludes `noise`.
     bound : number, DataArray or Dataset, optional
-        Largest relative error of the values, which is not noise; of the result that y is an output of, what it states
-        for each cell. Default: the `rtol` in the attributes of y. Rounding to single precision is added; of values
-        that are rounded to fewer digits otherwise, such as those of a text, give half of the last one.
+        Largest relative error of the values, apart from noise; for a Dataset of a sweep, the error stated for each
+        cell. Default: the `rtol` in the attributes of y. Rounding to single precision is allowed for; for values with
+        fewer digits, as from a text file, give half a unit of the last digit.
 
     Returns
     -------
     Dataset
         `exponent` with its interval and standard error, `verdict`, `kind` and more, each with a `long_name`. The
-        dimensions are those of `y` but `dim`. NaN where there is no exponent. `attrs["summary"]` is a table.
+        dimensions are those of `y` without `dim`. NaN where there is no exponent. `attrs["summary"]` is a table.
 
     Raises
     ------
@@ -217,33 +217,33 @@ def fit_correction(
     noise: bool | str | None = None,
     sigma: Any = None,
 ) -> xr.Dataset:
-    """Asymptotic exponent by a correction to scaling, equation (1), and whether the points follow it.
+    """Asymptotic exponent from a correction to scaling, equation (1), and whether the points follow it.
 
-    Where there is noise, the interval is that of a mixture of noises as of `fit_exponent`, and reaches over those of
-    all D, of a logarithmic correction (1 + B ln x)^c and of one law that the points do not rule out. Where there is no
-    noise, it is three times as far as the fit to the outer half of the window moves the exponent, and of a curve that
-    is not (1) reaches to where the local exponent tends; if that changes ever more towards the end, it is no law there.
-    There is no interval where the points deny (1): by polynomials beside it that describe them far better; where
-    `noise="even"` or `sigma` is given, by a shape of the distances; where `sigma` is, by chi-squared.
+    With noise, the interval is that of a mixture of noise models as in `fit_exponent`; it is the union over all D, a
+    logarithmic correction (1 + B ln x)^c and a single law, as far as the points do not rule them out. Without noise, it
+    is three times the change of the exponent when only the outer half of the window is fitted; for a curve other than
+    (1), it extends to the limit of the local exponent, and where there is no such limit there is no law. There is no
+    interval where the points contradict (1): where added polynomials fit far better; with `noise="even"` or `sigma`,
+    where the residuals have a trend; with `sigma`, by chi-squared.
 
     Parameters
     ----------
     y, dim, window, confidence, noise, sigma
-        As of `fit_exponent`.
+        As in `fit_exponent`.
     end : "high" or "low"
-        Where (1) tends to a power law.
+        End of the window towards which (1) tends to a power law.
 
     Returns
     -------
     Dataset
-        `exponent` with its interval; `verdict`, words; `correction_exponent` (D), `correction`, B x^-D at the outer
-        end, and more. Of one power law without a correction D is NaN, and that is 0. The dimensions are those of `y`
-        but `dim`. NaN of fewer than eight points.
+        `exponent` with its interval; `verdict`, in words; `correction_exponent` (D), `correction`, B x^-D at the outer
+        end, and more. For a power law without a correction D is NaN and B is 0. The dimensions are those of `y` without
+        `dim`. NaN for fewer than eight points.
 
     Raises
     ------
     SweepError
-        If `dim` or `end` is unknown or unfit, y is nowhere positive in the window, or no line has eight points.
+        If `dim` or `end` is unknown or unsuitable, y is nowhere positive in the window, or no line has eight points.
 
     Examples
     --------

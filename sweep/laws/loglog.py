@@ -1,6 +1,6 @@
-"""Slopes and roots of curves given at the points of an uneven grid; plain arrays, the curve along the last axis.
+"""Slopes and roots of curves on a nonuniform grid; plain arrays, with the curve along the last axis.
 
-A missing point is NaN, and no stencil reaches across one: each run of neighbours stands for itself.
+A missing point is NaN, and no stencil extends across one: each run of neighbours is treated separately.
 """
 
 from __future__ import annotations

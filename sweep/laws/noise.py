@@ -1,10 +1,10 @@
-"""The one size of noise, and the one regression: numbers of a linear law beside noise of which nothing is known.
+"""Linear regression with noise of unknown kind, and the size of that noise.
 
     z = X b + s(t) e,   e_i = phi e_(i-1) + sqrt(1 - phi^2) new_i,   ln s = a u + c |u|,   -1 <= u <= 1     (1)
 
-s is the size of the noise along the window: it may grow to one end (a) or to both (c). phi, a and c are not estimated,
-since from few points any estimate is off and intervals that take it for true hold 60 to 85 % instead of 95: the points
-give each (phi, a, c) of a grid its weight, by restricted likelihood. Points far off such noise are left out.
+s is the size of the noise along the window, which may grow towards one end (a) or both (c). phi, a and c are averaged
+over, each (phi, a, c) of a grid weighted by its restricted likelihood: estimates from few points are inaccurate, and
+intervals that rely on them have a coverage of 60 to 85 % instead of 95. Outliers are left out.
 """
 
 from __future__ import annotations

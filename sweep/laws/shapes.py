@@ -1,8 +1,8 @@
-"""The table of laws: each a curve ln y(ln x) that is linear in all but a few of its numbers.
+"""The table of laws: each a curve ln y(ln x) that is linear in all but a few of its parameters.
 
     z = shift(q) + columns(q) b,   s = (ln x - first) / span from 0 to 1                            (1)
 
-q are those few; positions and widths are parts of the window, exponents per window.
+q are those few; positions and widths are in units of the window, exponents per window.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""Two power laws and the smooth bend between them, fitted at once, and whether one law, or which other, would do.
+"""Two power laws with a smooth crossover, fitted together, and whether one law, or another one, describes the points.
 
     ln y = c + p1 u + (p2 - p1) w ln(1 + exp(u/w)),   u = ln(x/x0)                                  (1)
 
-p1 holds far below x0 and p2 far above; w is the width of the bend in ln x.
+p1 holds far below x0 and p2 far above; w is the width of the crossover in ln x.
 """
 
 from __future__ import annotations
@@ -44,38 +44,37 @@ def fit_two_laws(
     sigma: Any = None,
     windows: tuple[Window, Window] | None = None,
 ) -> xr.Dataset:
-    """Two power laws with a smooth crossover, equation (1), and whether one law would do.
+    """Fit two power laws with a smooth crossover, equation (1), and decide whether one law suffices.
 
-    Where there is noise, intervals are those of the same mixture of noises as of `fit_exponent`, and also reach over
-    those of bends of other shapes that the points do not rule out (AICc within 20): hyperbolic, of two widths, of three
-    scales. They are no promise for a truth like none of these. Where there is none, the uncertainty is how far the
-    truth is from (1): the interval of an exponent then reaches to where the local exponent tends at its end of the
-    window; that of the crossover to where the local exponent is half-way between the two, and to where the tangents at
-    the ends meet.
+    With noise, intervals are those of the mixture of noise models of `fit_exponent`, and include crossovers of other
+    shapes that the points do not rule out (AICc within 20): hyperbolic, with two widths, with three scales. They need
+    not hold for other shapes. Without noise, the uncertainty is the deviation of the curve from (1): the interval of an
+    exponent then extends to the limit of the local exponent at its end of the window; that of the crossover to where
+    the local exponent is half-way between the two, and to where the tangents at the ends meet.
 
     Parameters
     ----------
     y, dim, window, confidence, sigma
-        As of `fit_exponent`.
+        As in `fit_exponent`.
     noise : bool or "even", "uneven", "correlated", "outliers", optional
-        Whether there is noise, or of which kind. Default: as the points show; fewer than some 16 show nothing, and
-        intervals are then wide enough for both.
+        Whether there is noise, or of which kind. Default: decided from the points; fewer than about 16 do not decide
+        it, and intervals are then wide enough for both.
     windows : pair of (low, high), optional
-        Fit a straight line in each of two windows, which share at most an end point, and say where the two lines
-        meet; nothing is fitted between them. The results are in the order of the windows.
+        Fit a straight line in each of two windows, which share at most an end point, and find where the two lines
+        meet, without a fit between them. The results are in the order of the windows.
 
     Returns
     -------
     Dataset
         `exponent`, `exponent_low`, `exponent_high` along `law` ("low", "high"); `crossover` with its interval, in
-        the unit of `dim`; `verdict`: "two laws" where they are beyond doubt, "one law" where one does as well and is
-        not denied as in `fit_exponent`, "three laws", "no power law" where it is, AICc and BIC prefer others to it by
-        more than 10 and two laws are ruled out likewise, or a function that is no power law is not, "no meeting in the
-        window", "undecided"; and more, each with a `long_name`. NaN where the verdict is "three laws" or "no power
-        law", and of fewer than eight points.
+        the unit of `dim`; `verdict`: "two laws" where two are significant, "one law" where one fits as well and is not
+        contradicted as in `fit_exponent`, "three laws", "no power law" where AICc and BIC prefer other laws by more
+        than 10 to one law and to two, or do not rule out a function other than power laws, "no meeting in the window",
+        "undecided"; and more, each with a `long_name`. NaN where the verdict is "three laws" or "no power law", and for
+        fewer than eight points.
 
-        With `windows`, without noise, the interval of `crossover` is a bound: how far the place moves if a law is not
-        the line through its window but goes through the outer end of it with the exponent to which the local one tends.
+        With `windows`, without noise, the interval of `crossover` is a bound: how far it moves if a law is not the line
+        fitted in its window but passes through the window's outer end with the limiting local exponent.
 
     Raises
     ------
@@ -230,32 +229,32 @@ def crossover(low_fit: xr.Dataset, high_fit: xr.Dataset) -> xr.Dataset:
 
 
 def compare_laws(y: xr.DataArray, dim: str, window: Window | None = None, *, sigma: Any = None) -> xr.Dataset:
-    """What laws say of one line, which of them are ruled out, and the simplest that is not.
+    """Fit many laws to one line, and find which are ruled out and the simplest that is not.
 
-    A law with more numbers is believed only where AICc and BIC prefer it by more than 10 to every law with fewer: so
-    many times e^5 more likely, and a margin that correlated, uneven or outlying noise does not bridge, which one law is
-    tried with. Beside a function that is no power law, a power law with as few numbers is taken where it is not ruled
-    out. The laws are one, two (with bends of four shapes) and three power laws, an offset, a correction to
-    scaling, a peak or a step on one law; and functions that are none: logarithm, exponential, stretched exponential, a
-    cut-off at one end or at both, lognormal, two exponentials.
+    A law with more parameters is accepted only where AICc and BIC prefer it by more than 10 to every law with fewer (a
+    likelihood ratio of e^5), also to a single power law with correlated, uneven or outlying noise. A power law that is
+    not ruled out precedes other functions with as many parameters. The laws are one, two (with crossovers of four
+    shapes) and three power laws, an offset, a correction to scaling, a peak or a step on a power law; and other
+    functions: logarithm, exponential, stretched exponential, a cut-off at one end or at both, lognormal, two
+    exponentials.
 
     Parameters
     ----------
     y, dim, window, sigma
-        As of `fit_exponent`; y has one dimension. Without `sigma` errors are the same share of y for all points.
+        As in `fit_exponent`; y has one dimension. Without `sigma` all points have the same relative error.
 
     Returns
     -------
     Dataset
-        Along `law`, the best first: `aicc`, `bic`, `worse` (AICc or BIC above the least), `numbers`, `scatter`,
-        `residual`, `chi_squared`, `formula`, `exponents`; `fitted` (law, point), the law at the points, whose
-        places are `x` and values `y` (10,000 of more than 20,000 that have no noise). Attributes `chosen`, `margin`
-        (AICc to the next law; negative where a law with more numbers is nearer), and `verdict`, a sentence.
+        Along `law`, the best first: `aicc`, `bic`, `worse` (AICc or BIC above the smallest), `numbers` (parameters),
+        `scatter`, `residual`, `chi_squared`, `formula`, `exponents`; `fitted` (law, point), the law at the points `x`,
+        whose values are `y` (10,000 of them where there are more than 20,000 without noise). Attributes `chosen`,
+        `margin` (AICc to the next law; negative if a law with more parameters fits better), and `verdict`, a sentence.
 
     Raises
     ------
     SweepError
-        y has further dimensions, or fewer than 8 points, or is not positive in the window.
+        y has several dimensions, fewer than 8 points, or values that are not positive in the window.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""What a result says, and what is made of it: statuses, choices, differences, joined results, exports, lists.
+"""Operations on results: statuses, selections, differences, joins, exports, lists.
 
 Others may use `statuses`, `filter`, `export`, `units`, `diff`, `join`, `listing`.
 """

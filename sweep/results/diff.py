@@ -1,4 +1,4 @@
-"""In what two results differ: which cells, which statuses, and by how much."""
+"""Differences between two results: which cells, which statuses, and by how much."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from sweep.words import Table, counted, listed, number, require_dataset
 
 @dataclass
 class Distance:
-    """How far an output of two results is apart.
+    """Difference of one output between two results.
 
     Attributes
     ----------
     cells : int
-        Cells that differ by more than the tolerance, or of which one alone has no value.
+        Cells that differ by more than the tolerance, or have a value in only one result.
     largest : float
-        Largest relative distance, abs(a - b) / max(abs(a), abs(b)); infinite where one alone has no value.
+        Largest relative difference, abs(a - b) / max(abs(a), abs(b)); infinite where only one has a value.
     example : str
-        The cell of that.
+        The cell where it occurs.
     """
 
     cells: int = 0
@@ -35,24 +35,24 @@ class Distance:
 
 
 class Difference:
-    """What two results differ in; `str` of it is what `sweep diff` prints.
+    """Result of `diff`; its `str` is what `sweep diff` prints.
 
     Attributes
     ----------
     cells : int
-        Cells that both have.
+        Cells in both results.
     only_a, only_b : int
-        Cells that one of them alone has.
+        Cells in only one of them.
     missing : tuple of str
-        Outputs that one of them alone has.
+        Outputs in only one of them.
     fixed : dict of str to (a, b)
-        Parameters with one value for all cells, which is another in each result.
+        Fixed parameters whose values differ.
     outputs : dict of str to Distance
-        Of every output that both have.
+        For every output in both.
     statuses : dict of (str, str) to int
-        Cells of one status here and another there.
+        Number of cells with one status in `a` and another in `b`.
     examples : dict of (str, str) to str
-        A cell of each of these.
+        A cell for each of these.
     """
 
     def __init__(self, a: xr.Dataset, b: xr.Dataset, rtol: float) -> None:
@@ -115,9 +115,9 @@ class Difference:
 
 
 def diff(a: xr.Dataset, b: xr.Dataset, rtol: float = 0.0) -> Difference:
-    """Differences between two results of one kernel.
+    """Compare two results of one kernel, cell by cell.
 
-    Cells with equal parameters are compared; where both results are lists of cells, those with equal number.
+    Cells with equal parameters are compared; if both results are lists of cells, cells with the same number.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ def diff(a: xr.Dataset, b: xr.Dataset, rtol: float = 0.0) -> Difference:
     Raises
     ------
     SweepError
-        They are not two results, of different kernels or axes, or summaries.
+        A Dataset is not a result of cells, or the results have different kernels or axes.
 
     Examples
     --------

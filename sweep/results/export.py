@@ -41,7 +41,7 @@ def export(
 ) -> Path:
     """Write a Dataset to `path`, as its suffix says: .csv, .parquet, .nc or .zarr.
 
-    What is there already is replaced by `force` alone, once all is written; what the Dataset is read from never is.
+    An existing file is replaced only with `force`, once the new one is complete; that of the Dataset itself never is.
 
     csv: one row per cell (per cell and phase, for outputs along a phase), one column per coordinate and output,
     `status` and `method_used` as words, numbers with all their digits. Lines that start with "#" name the unit of
@@ -51,14 +51,14 @@ def export(
     parquet: the same table with types; units and meanings are in the metadata of each field, the Dataset's attributes
     in that of the schema.
 
-    nc, zarr: netCDF4, or a folder of zarr, with units, flags and all attributes; with `compress` smaller, every bit
-    kept.
+    nc, zarr: netCDF4, or a folder of zarr, with units, flags and all attributes; `compress` makes them smaller
+    without loss.
 
     Raises
     ------
     SweepError
-        If there is nothing to write, the suffix is another, what writes it is not installed, or the file cannot be, or
-        is not to be, written.
+        If there is nothing to write, the suffix is unknown, a library is not installed, or the file exists already or
+        cannot be written.
 
     Examples
     --------

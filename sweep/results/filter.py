@@ -1,4 +1,4 @@
-"""Cells of a result chosen by a condition such as `status == 'OK' and R < 0.1`."""
+"""Selects cells of a result by a condition such as `status == 'OK' and R < 0.1`."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from sweep.words import did_you_mean, listed, require_dataset
 
 
 def where(dataset: xr.Dataset, condition: str) -> xr.Dataset:
-    """The cells for which a condition holds, along one dimension `cell`, with their parameters as coordinates.
+    """Select the cells that satisfy a condition, along one dimension `cell`, with their parameters as coordinates.
 
     Parameters
     ----------
     dataset : Dataset
         From `run` or `open_result`.
     condition : str
-        Of names in the result, numbers and words: "status == 'OK' and R < 0.1*mu". Words are those of `status`,
-        `method_used` and of axes of words. Beside a name a number may have a unit: "amplitude > '60 degree'". Outputs
-        along a coordinate of their own cannot be used.
+        Made of names in the result, numbers and words: "status == 'OK' and R < 0.1*mu". Words are compared with
+        `status`, `method_used` and axes of words. A number compared with a name may have a unit: "amplitude > '60
+        degree'". Outputs along a coordinate of their own cannot be used.
 
     Raises
     ------

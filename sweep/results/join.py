@@ -1,4 +1,4 @@
-"""Two results of one kernel as one: longer along an axis, or along a new one."""
+"""Joins two results of one kernel along an axis, or along a new one."""
 
 from __future__ import annotations
 
@@ -38,29 +38,29 @@ def join(
 ) -> xr.Dataset:
     """Join two finished results of one kernel.
 
-    They may differ in the values of one axis, which becomes longer, or in one fixed parameter, method or rtol, which
-    becomes an axis. If their studies are equal, for example where two versions computed them, `axis` and `labels` make
-    a new axis. Cells that are in both results must agree to the last bit, and are kept once. Without a new axis, the
-    sources of a kernel of one's own must not have changed between the two.
+    They may differ in the values of one axis, which are merged, or in one fixed parameter, method or rtol, which
+    becomes an axis. If their studies are equal, for example when two versions computed them, `axis` and `labels` make a
+    new axis. Cells in both results must be identical to the last bit. Without a new axis, the source of a kernel of
+    your own must not have changed in between.
 
     Parameters
     ----------
     a, b : Dataset
         From `run` or `open_result`.
     path : path, optional
-        Where to write it, a result like that of `run`; it can be extended no further. None: in memory.
+        File to write, like that of `run`, except that it cannot be extended. None: in memory.
     axis : str, optional
         Name of a new axis of words.
     labels : two str
         Its values.
     force : bool
-        Overwrite what is there.
+        Overwrite an existing file.
 
     Raises
     ------
     SweepError
-        They are not two results, cannot be joined, are unfinished, or are larger than the memory; or `path` is there
-        already, or what a run of another study left there unfinished.
+        A Dataset is not a finished result, the results do not fit together or exceed the memory, or there is a file, or
+        an unfinished result of another study, at `path`.
 
     Examples
     --------

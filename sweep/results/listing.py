@@ -1,4 +1,4 @@
-"""The results in a folder, a line each: question, cells, how much is done, statuses, when, by which version."""
+"""Lists the results in a folder, one per line: question, cells, share computed, statuses, date, version."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ class Listing(tuple[Listed, ...]):
 
 
 def list_results(folder: str | os.PathLike[str] = ".") -> Listing:
-    """The results in a folder, finished or not, by name; of other HDF5 files, why they are not results.
+    """List the results in a folder, finished or not, by name; for other HDF5 files, why they are not results.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Which statuses a result holds, with a cell of each to look at."""
+"""Counts the statuses in a result, with an example of each."""
 
 from __future__ import annotations
 

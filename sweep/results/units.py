@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def in_units(dataset: xr.Dataset, units: Mapping[str, str]) -> xr.Dataset:
-    """The Dataset with some outputs, parameters or coordinates in other units, which their `units` attribute names.
+    """Convert some outputs, parameters or coordinates to other units, which become their `units` attribute.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ def in_units(dataset: xr.Dataset, units: Mapping[str, str]) -> xr.Dataset:
     Raises
     ------
     StudyError
-        Unknown names, or units of another quantity; all of them are listed.
+        A name is unknown, or a unit measures something else; all mistakes are listed.
 
     Examples
     --------

@@ -1,9 +1,9 @@
 """The workers of a dask scheduler: `--cluster tcp://...`, or a `Client` passed to `run`. Imports distributed.
 
-A worker makes a bench of its own from what it is told of the run, and computes blocks on it as a thread here would.
-Where it sees the file of the result it writes them there itself, and tells their digests; elsewhere it sends the
-numbers back. dask unpickles what its processes send each other. Whoever reaches a scheduler runs code on its workers,
-so let none but friends reach it, or use its TLS. Of files, nothing is ever unpickled.
+A worker receives the description of the run, makes its own bench, and computes blocks on it as a thread here would. If
+it sees the file of the result, it writes the blocks there and returns their digests; otherwise it returns the numbers.
+dask unpickles what its processes send each other: whoever can reach a scheduler can run code on its workers, so
+restrict access to it, or use its TLS. Nothing is unpickled from files.
 """
 
 from __future__ import annotations

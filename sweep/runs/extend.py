@@ -1,4 +1,4 @@
-"""Extending a finished result: a study with more values on its axes takes the cells it shares over, bit for bit."""
+"""Extends a finished result: a study with more values on its axes reuses the common cells, bit for bit."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Cells solved in processes of their own, which may die of them or be killed: for kernels that crash or never end.
+"""Solves cells in separate processes, which may crash or be killed: for kernels that crash or never end.
 
-Each call has a process to itself, so that it is known which cells it died of. What a kernel does there comes back as an
-exception here, and `Guard` finds the cell.
+Each call has its own process, so that the cells which crash it are known. The crash becomes an exception here, and
+`Guard` finds the cell.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""The loop of a run: numbers of blocks go to an executor, threads here or the workers of a cluster, and come back.
+"""The loop of a run: submits block numbers to an executor, that is threads here or the workers of a cluster.
 
-Wherever a block is computed, it is on a `Bench`, which puts it into the arrays of a run in memory, or into the file.
-What a worker that sees no file has computed, the loop puts there.
+A block is computed on a `Bench`, which stores it in the arrays of a run in memory, or in the file. The loop stores the
+blocks of workers that do not see the file.
 """
 
 from __future__ import annotations

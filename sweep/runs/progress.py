@@ -1,7 +1,7 @@
-"""What a run tells: a bar on a terminal or in a notebook, lines elsewhere, and the log beside its output, OUT.h5.log.
+"""Progress of a run: a bar on a terminal or in a notebook, lines elsewhere, and the log beside its output, OUT.h5.log.
 
-The log is written by Python's logging, a line for people or a line of JSON each. All that is logged goes to the logger
-"sweep", so a program of one's own may send it elsewhere.
+The log is written by Python's logging, as text or JSON, one record per line. All records go to the logger "sweep", so
+that a program can redirect them.
 """
 
 from __future__ import annotations

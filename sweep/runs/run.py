@@ -1,6 +1,6 @@
-"""Runs a study: what is asked for is checked, and computed into memory, or into a file.
+"""Runs a study: checks the arguments, then computes all cells in memory or into a file.
 
-What stands at the place of a file is looked at, and continued; blocks go to a store that survives a kill.
+An existing output is examined and continued; blocks go to a store that survives a kill.
 """
 
 from __future__ import annotations
@@ -55,27 +55,26 @@ def run(
     retry_failed: bool = False,
     **keys: Any,
 ) -> xr.Dataset:
-    """Compute every cell of a study. The result is the same to the last bit, however often the run is interrupted.
+    """Compute every cell of a study. Interruptions do not change a bit of the result.
 
     Parameters
     ----------
     study : Study, path of a study file, mapping of its keys, or Dataset of an earlier run, optional
-        None: the study is given as keywords.
+        None: the study's keys are keyword arguments.
     path : path, optional
         The output, an HDF5 (netCDF4) file. A run that was stopped or killed is continued; an output that is complete
         for the same study is opened and left alone. None: in memory.
     workers : int, optional
-        Cells are computed on so many cores at once; default: all this process may use.
+        Number of cores; default: all that this process may use.
     force : bool
-        Overwrite the result of another study, give up one that is not finished, compute a complete one anew.
+        Overwrite the result of another study, discard an unfinished one, or compute a complete one anew.
     progress : bool or text stream, optional
         Where progress is printed; None and True: stderr, False: nowhere. A run of less than a second prints nothing.
     block_cells : int, optional
-        Cells a block, instead of a size taken from a timed sample. A run that is continued keeps its own.
+        Cells per block; default: chosen from a timed sample. A continued run keeps its blocks.
     extend : bool
-        Where the output is complete for a study of which this one has all values on every axis, and more, compute the
-        new cells only; the output is replaced when all are there. One that another version of foliot has computed
-        cannot be extended.
+        If the output is complete for a study whose axis values are a subset of this one's, compute only the new cells;
+        the output is replaced when all are done. A result of another version of foliot cannot be extended.
     until : str or datetime, optional
         Stop at "07:00" or "2027-01-31 07:00", at most the time of a block later; the unfinished result is returned.
     cluster : str or distributed.Client, optional
@@ -83,23 +82,23 @@ def run(
         Workers that can write to the folder of the output write there; others send their numbers. If there are no
         workers, or all are lost, the run waits for new ones.
     repair : bool
-        Where the output is complete for this study, but damaged on the disk, compute the damaged blocks again.
+        If the output is complete for this study, but damaged on disk, compute the damaged blocks again.
     isolate : bool
         Solve cells in separate processes, so that a crash or an endless loop loses only the cells where it happens.
         `sweep run` does so for every kernel "module:NAME".
     cell_timeout : float or str, optional
-        Seconds, or "90 s", "5 min", "1 h", that a cell may take; with it cells are isolated. Default: a minute, or a
-        hundred times the dearest cell of the timed sample, where that is more.
+        Time limit per cell, in seconds or as "90 s", "5 min", "1 h"; implies `isolate`. Default: a minute, or a hundred
+        times the slowest cell of the timed sample if that is longer.
     retry_failed : bool
-        Where the output is complete, compute the cells that FAILED again.
+        If the output is complete, compute its FAILED cells again.
     **keys
-        Of `sweep.study`.
+        Keys of the study, as in `sweep.study`.
 
     Raises
     ------
     SweepError
         The output cannot be written, belongs to another study or another run, the disk is full, or a kernel failed.
-        What is finished is kept.
+        Finished blocks are kept.
     KeyboardInterrupt, SystemExit
         After Ctrl-C or SIGTERM, when the blocks in progress have been stored.
 

@@ -1,14 +1,14 @@
-"""Results for people: pictures, pages and words. Runs nothing; the only room that imports matplotlib.
+"""Figures, HTML pages and text for people. It runs nothing, and is the only room that imports matplotlib.
 
 Others may use
-    `figures`  plot, of whatever it is given
-    `charts`   for figures of one's own: style, new_figure, save, and the line of a method
-    `accessor` `ds.sweep`: what a Dataset of a sweep can do by itself
+    `figures`  plot: figures of results, work-precision charts and comparisons of laws
+    `charts`   for figures of your own: style, new_figure, save, and the look of each method
+    `accessor` `ds.sweep`, the accessor of Datasets
     `page`     write_page: a result as one page of HTML
-    `text`     result_text; a sweep watched from its log
-    `laws`     power laws along an axis and which law, as text and csv; pick
-    `studies`  what comes with foliot, and copies to work on
-    `kernels`  what can be swept, as text and HTML, and a study to begin with
+    `text`     result_text: what `sweep show` prints
+    `laws`     fits and comparisons of laws, as text and csv; pick: cells by the values of axes
+    `studies`  the studies that come with foliot, and copies of them
+    `kernels`  descriptions of kernels, as text and HTML, and example studies
 
-`view` chooses and letters what `figures` draws.
+`view` selects and labels what `figures` draws.
 """

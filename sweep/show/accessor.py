@@ -1,7 +1,6 @@
-"""What a Dataset of a sweep can do by itself: `ds.sweep`, and results for `xarray.open_dataset`.
+"""The accessor `ds.sweep` of xarray Datasets, and the engine for `xarray.open_dataset`.
 
-xarray imports this module when it first looks for engines to open a file with, so that `ds.sweep` is there also where
-`sweep` was never imported.
+xarray imports this module when it first opens a file, so that `ds.sweep` exists even if `sweep` was never imported.
 """
 
 from __future__ import annotations
@@ -22,10 +21,10 @@ if TYPE_CHECKING:
 
 @xr.register_dataset_accessor("sweep")  # type: ignore[no-untyped-call]
 class SweepAccessor:
-    """Look at a result, in one line each.
+    """Examine a result, by one call each.
 
-    Works on a Dataset of `sweep.run` and `sweep.open_result`, on one that `xarray.open_dataset` read from such a file,
-    and on parts of these. `allow_import` allows a kernel named "module:NAME", whose module is imported.
+    Works on a Dataset from `sweep.run`, `sweep.open_result` or `xarray.open_dataset`, and on parts of it.
+    `allow_import` allows a kernel named "module:NAME", whose module is imported.
 
     Examples
     --------
@@ -58,38 +57,38 @@ class SweepAccessor:
         return f"{counted}ds.sweep has: {names}"
 
     def plot(self, path: str | os.PathLike[str] | None = None, **keys: Any) -> Any:
-        """The figure of one output: as `sweep.plot`, logarithmic along axes whose grid is."""
+        """Plot one output, see `sweep.plot`; returns a matplotlib figure, and saves it to `path`."""
         return sweep.plot(self._dataset, path, **keys)
 
     def in_units(self, units: Mapping[str, str] | None = None, **more: str) -> xr.Dataset:
-        """The Dataset with some variables in other units: as `sweep.in_units`, e.g. `A0="degree"`."""
+        """Convert some variables to other units, e.g. `A0="degree"`; see `sweep.in_units`."""
         return sweep.in_units(self._dataset, {**(units or {}), **more})
 
     def where(self, condition: str) -> xr.Dataset:
-        """The cells for which a condition holds: as `sweep.where`."""
+        """Select the cells that satisfy a condition; see `sweep.where`."""
         return sweep.where(self._dataset, condition)
 
     def fit(self, y: str, x: str, **options: Any) -> xr.Dataset:
-        """The exponent of an output along an axis, of cells that have values: as `sweep.fit_exponent`."""
+        """Fit the exponent of an output along an axis, over cells that have values; see `sweep.fit_exponent`."""
         from sweep.show.laws import output_of
 
         return sweep.fit_exponent(self._dataset[output_of(self._dataset, y)], x, **options)
 
     def statuses(self) -> Table:
-        """How many cells have each status, what it says, and where: as `sweep show`."""
+        """Table of statuses: number of cells, meaning, and where they occur; as in `sweep show`."""
         from sweep.show.text import status_table
 
         return status_table(self._dataset)
 
     def cell(self, *, allow_import: bool = False, **values: float | str) -> CellReport:
-        """What there is to say of one cell, named by the values of its axes: as the command `sweep cell`."""
+        """Describe one cell, given by the values of its axes; as the command `sweep cell`."""
         from sweep.explore.recheck import CellReport
         from sweep.show.laws import pick
 
         return CellReport(pick(self._dataset, [f"{name}={value}" for name, value in values.items()]), allow_import)
 
     def check(self, sample: int = 200, seed: int = 0, *, allow_import: bool = False) -> Checked:
-        """Solve some OK cells, so many at most, again by another method and compare: as the command `sweep check`."""
+        """Solve a random sample of the OK cells again by another method and compare; as `sweep check`."""
         from sweep.explore.recheck import Checked
 
         return Checked(self._dataset, sample, seed, allow_import)
@@ -101,5 +100,5 @@ class SweepEngine(BackendEntrypoint):
     description = "Results of foliot, finished or not"
 
     def open_dataset(self, filename_or_obj: Any, *, drop_variables: Any = ()) -> xr.Dataset:
-        """The result, without the variables that are to be dropped."""
+        """The result, without the variables to drop."""
         return sweep.open_result(filename_or_obj).drop_vars(drop_variables or ())

@@ -1,7 +1,7 @@
-"""The look of all pictures, fit for print: colours, an empty figure, what is saved; the line of a method.
+"""The style of all figures, fit for print: colours, empty figures, saving, and the look of each method.
 
 The only module that imports matplotlib; `figures` takes what it draws with from here.
-Nothing here touches pyplot or its global state, and the same picture gives the same bytes.
+Nothing here uses pyplot or its global state, and equal figures are saved as equal bytes.
 """
 
 from __future__ import annotations

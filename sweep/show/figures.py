@@ -1,4 +1,4 @@
-"""Pictures of results: one output as lines, points or a map; methods beside each other; laws beside each other."""
+"""Figures: one output of a result as lines, points or a map; work-precision charts; comparisons of laws."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ from sweep.words import as_path, counted, require_dataset
 HATCHES = ("////", "\\\\\\\\", "....", "xxxx", "----")
 """Patterns of cells without a value, told apart without colour."""
 MOST_LAWS = 6
-"""That are drawn beside each other."""
+"""Number of laws that are drawn."""
 LEAST_SPAN = 30.0
-"""Of the times in a chart, so that methods alike look alike."""
+"""Least ratio of the longest to the shortest time on a chart, so that similar methods look similar."""
 
 
 def plot(
@@ -46,31 +46,31 @@ def plot(
     x: str | None = None,
     force: bool = False,
 ) -> Figure:
-    """Picture of a result, of the chart that `work_precision` made, or of the laws that `compare_laws` tried.
+    """Plot a result, a work-precision chart from `work_precision`, or the laws from `compare_laws`.
 
-    Of a result it shows one output: a line, a family of lines, or a map where there are two long axes. An axis is
-    logarithmic where its grid is, or where the values span decades. Cells whose status is not OK are marked: on the
-    line where they have a value, at the foot of the picture where they have none. Further axes are held at their
-    middle value, which the title says.
+    For a result it shows one output: a line, a family of lines, or a map where there are two long axes. An axis is
+    logarithmic if its grid is, or if the values span decades. Cells whose status is not OK are marked: on the line
+    where they have a value, at the bottom of the figure where they have none. Further axes are held at their middle
+    value, which the title states. Without `path`, save the figure by its `savefig`; pyplot does not know it.
 
     Parameters
     ----------
     dataset : Dataset
         From `run`, `open_result`, `work_precision` or `compare_laws`.
     path : path, optional
-        Where to save it; .png, .svg or .pdf.
+        File to save it in; .png, .svg or .pdf.
     y : str, optional
-        Output of a result; by default the first, of a scene of one's own its `interval`.
+        Output of a result; default: the first, for a scene of your own its `interval`.
     x : str, optional
-        Axis of a result, or coordinate along the cells of a zip design. Default: what a trace runs along, else the
-        longest.
+        Axis of a result, or coordinate along the cells of a zip design. Default: the coordinate of a trace, else the
+        longest axis.
     force : bool
-        Overwrite a file that is there.
+        Overwrite an existing file.
 
     Raises
     ------
     SweepError
-        If there is no such output or axis, or the file is there already or cannot be written.
+        If there is no such output or axis, or the file exists already or cannot be written.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""What can be swept: kernels with parameters, outputs and methods, as text and HTML; a study to begin with."""
+"""Descriptions of kernels (parameters, outputs, methods) as text and HTML; an example study."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from sweep.words import Table, listed, page, paragraph, quoted
 
 
 class KernelPage:
-    """A kernel of the catalogue, or one's own: printed it tells all about itself, in a notebook as tables.
+    """Description of a kernel, printed as text, and in a notebook as tables.
 
     Attributes
     ----------
     name : str
-        As a study names it.
+        Its name in a study.
     kernel : Kernel
         Its declaration: parameters, outputs, methods.
     """
@@ -37,7 +37,7 @@ class KernelPage:
             paragraph(f"{self.name}: {self.kernel.doc}"),
             paragraph(f"Source: {self.kernel.source}" if self.kernel.source else ""),
             *(table.text() for table in self._tables()),
-            f"a study to begin with\n{example}",
+            f"example of a study\n{example}",
         )
 
     def _repr_html_(self) -> str:
@@ -93,12 +93,12 @@ class Catalogue(Mapping[str, KernelPage]):
 
 
 def kernels(name: str | None = None, allow_import: bool = False) -> Catalogue | KernelPage:
-    """The kernels that can be swept: all of the catalogue, or one with parameters, units, outputs and methods.
+    """List the kernels of the catalogue, or describe one: its parameters, units, outputs and methods.
 
     Parameters
     ----------
     name : str, optional
-        Of the catalogue, or "module:NAME".
+        Name in the catalogue, or "module:NAME".
     allow_import : bool
         Allow "module:NAME", whose module is imported.
 
@@ -130,7 +130,7 @@ def catalogue_text(complete: bool = False) -> str:
 
 
 def write_starter(name: str, path: Path, allow_import: bool = False, force: bool = False) -> None:
-    """Write a study of a kernel to begin with. Raises SweepError, also where a file is there, unless by `force`.
+    """Write an example study of a kernel. Raises SweepError, also if the file exists, unless with `force`.
 
     A kernel of one's own is looked up in the folder of the study, as it is when the study is run.
     """
@@ -143,7 +143,7 @@ def write_starter(name: str, path: Path, allow_import: bool = False, force: bool
 
 
 def starter(name: str, kernel: Kernel | None = None) -> str:
-    """A study of a kernel to begin with, in TOML: it sweeps the first parameter that is a number. Raises SweepError."""
+    """An example study of a kernel, in TOML, which sweeps its first parameter that is a number. Raises SweepError."""
     kernel = kernel or load_kernel(name)
     first = next(p for p in kernel.parameters if not p.dims)
     values = {p.name: kernel.example.get(p.name, 1.0) for p in kernel.parameters}

@@ -1,4 +1,4 @@
-"""What `sweep fit` prints: power laws along one axis, a row for each line; with `--compare` all laws of one line."""
+"""Output of `sweep fit`: power laws along one axis, one row per line; with `--compare` all laws of one line."""
 
 from __future__ import annotations
 

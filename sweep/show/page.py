@@ -1,7 +1,6 @@
 """One result as one self-contained page of HTML: question, figures, exponents, parameters, statuses, provenance.
 
-No script, no font and no picture from elsewhere: the file alone can be mailed, put on a server, printed, and read on a
-phone.
+It needs no other file, script or font, so it can be mailed, put on a server, printed, and read on a phone.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The studies that come with foliot: what they ask, and one of them as files to work on."""
+"""The studies that come with foliot: a list of their questions, and copies to work on."""
 
 from __future__ import annotations
 

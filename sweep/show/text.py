@@ -1,4 +1,4 @@
-"""What `sweep show` prints: what is in a result, and what became of its cells, as tables, which a page shows too."""
+"""Output of `sweep show`: contents and statuses of a result as tables, which the HTML page also uses."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a picture of a result shows, and how it is lettered; knows nothing of how it is drawn."""
+"""Selects what a figure of a result shows, and its labels; independent of how it is drawn."""
 
 from __future__ import annotations
 

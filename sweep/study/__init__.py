@@ -1,15 +1,14 @@
-"""A study: TOML (or a dict) in, a checked `Study` out, all mistakes at once.
+"""Reads a study from TOML, a dict or keywords, and checks it; `sweep.study(...)` is `sweep.study.read.study`.
 
 Others may use
-    `read`       study: of a file, of keys, or of a result; to_toml: a study as the text of its file
-    `model`      Study, Axis, Summary; load_kernel: a kernel by the name that a study gives it
-    `keys`       KEYS: what may stand at the top of a study
-    `mistakes`   Mistakes, gathered and raised together; limits: what a field allows, in words
-    `condition`  Condition, cells_where, names_in: read by Python's grammar, never run by it
-    `designs`    a sampled design's axes for SALib
+    `read`       study: reads a study from a file, from keys, or from a result; to_toml: writes one as TOML
+    `model`      Study, Axis, Summary; load_kernel: finds a kernel by its name in a study
+    `keys`       KEYS: the top-level keys of a study
+    `mistakes`   Mistakes, collected and raised together; limits: the values that a field allows, in words
+    `condition`  Condition, cells_where, names_in: conditions on cells, parsed but not executed by Python
+    `designs`    the axes of a sampled design for SALib
 
-`values`, what stands under a key, is behind `read`.
-The room itself may be called: `sweep.study(...)` is `sweep.study.read.study`.
+`values`, the values of keys, is behind `read`. The module itself can be called.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Conditions such as `status == 'OK' and R < 0.1*mu`: read by Python's grammar, never run by it."""
+"""Conditions such as `status == 'OK' and R < 0.1*mu`: parsed by Python's grammar, never executed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From the keys of a study to a checked `Study`: what each key may be, and what must fit together."""
+"""Turns the keys of a study into a checked `Study`: the values each key allows, and how keys must fit together."""
 
 from __future__ import annotations
 

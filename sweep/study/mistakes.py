@@ -1,4 +1,4 @@
-"""What a study may hold: mistakes are collected, not raised, and each says what was found and what to do."""
+"""Mistakes in a study are collected, not raised one by one; each says what was found and what to do."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A study file or keywords in, a checked `Study` out, all mistakes at once; and a study as the text of a file."""
+"""Reads a study from a file, a mapping or keywords, reporting all mistakes at once; writes one as TOML."""
 
 from __future__ import annotations
 
@@ -25,25 +25,25 @@ Given = Study | str | os.PathLike[str] | Mapping[str, Any]
 
 
 def study(given: Given | None = None, /, *, allow_import: bool = False, **keys: Any) -> Study:
-    """The checked study of a TOML file, of a dict of its keys, of keywords, or of a result.
+    """Read and check a study from a TOML file, a dict of its keys, keywords, or a result.
 
     Parameters
     ----------
     given : path, mapping, Dataset or Study, optional
         A study file (files named in it are relative to its folder), a dict of the same keys, or a Dataset of `run` or
-        `open_result`, which says what study it came from; a Study is returned as it is. None: the keys are keywords.
+        `open_result`, which contains its study; a Study is returned unchanged. None: the keys are keywords.
     allow_import : bool
         Allow a kernel named "module:NAME", whose module is imported.
     **keys
         title, question, kernel, method, rtol, outputs, design, axes, fixed, along, summary. Axes and coordinates may
-        also be arrays or lists of numbers in SI units, or have a unit themselves: a DataArray of a result, pint's.
+        also be arrays or lists of numbers in SI units, or have a unit themselves: a DataArray of a result, or pint's.
 
     Raises
     ------
     SweepError
-        It is none of these, or the file cannot be read.
+        `given` is none of these, or the file cannot be read.
     StudyError
-        It is no TOML, or has mistakes; all of them are listed.
+        The file is not TOML, or has mistakes; all of them are listed.
 
     Examples
     --------
@@ -123,7 +123,7 @@ def _of_file(path: Path) -> tuple[dict[str, Any], str]:
 
 
 def to_toml(study: Study) -> str:
-    """The text of a study file that is this study, in SI units but for axes that are given by start and stop.
+    """The text of a file for this study, in SI units except for axes with start and stop.
 
     Numbers are exact; values that came from a csv file are listed.
 

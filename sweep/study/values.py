@@ -1,8 +1,8 @@
-"""Numbers of a study in the unit of their field: a quantity, or the values of an axis or coordinate.
+"""Converts quantities, and values of axes and coordinates, to the unit of their field.
 
 Spacing and units are computed in decimals of 50 digits and rounded once, so that a value is the float64 nearest to
-what the study says (0.3, 0.001, the endpoints), on every machine. What is wrong goes to the entry's mistakes, and NaN
-or no values come back.
+the study's text (0.3, 0.001, the endpoints), on every machine. Mistakes are added to the entry; NaN or no values are
+then returned.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The page: controls, the picture they change, the row of a cell that is clicked; served to this machine alone."""
+"""The page of the viewer: controls, figure, and the values of a clicked cell; served to this machine only."""
 
 from __future__ import annotations
 

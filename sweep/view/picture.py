@@ -1,4 +1,4 @@
-"""The shown slice as bokeh draws it: a map of cells, or lines; the cells' statuses over it."""
+"""Draws the selected slice with bokeh: a map of cells, or lines, with statuses on top."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""The part of a result that is looked at: an output over one or two axes, the others held; read, clicked and saved.
-
-No more than that is read.
-"""
+"""The selected slice of a result: an output over one or two axes, the others held; only this slice is read."""
 
 from __future__ import annotations
 
