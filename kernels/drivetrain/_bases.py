@@ -18,7 +18,7 @@ Source: Guyan, AIAA J. 3:380 (1965); O'Callahan, Proc. 7th IMAC (1989) 17; Craig
 O'Callahan et al., 7th IMAC (1989).
 """
 
-from kernels.drivetrain._chain import CHAIN_ROUNDING, FREQUENCIES, RITZ, STATIC, TURN, Model, extremes
+from kernels.drivetrain._chain import FREQUENCIES, RITZ, STATIC, TURN, Model, extremes
 from kernels.drivetrain._holzer import SHAPE, mode, mode_rows
 from kernels.drivetrain._rivin import step
 from kernels.lanes.addresses import jit_by_address
@@ -28,6 +28,7 @@ from kernels.maths.small_dense import square
 
 HOLD = 2.0**80
 """Inertia of a held spindle, over the largest one."""
+_ROUNDING = 4e-16
 
 
 @jit_apart
@@ -43,6 +44,17 @@ def _flexibility(k, start, end):
 def _share(part, whole):
     """part/whole, for a part that is finite; 0 of an infinite whole."""
     return part / whole if whole < float("inf") else 0.0
+
+
+@jit_apart
+def _mix_in(i, first, p, f, scene):
+    """What rounding brings of mode i, of p or later, into the strains of those from `first` on; its sum J abs x^2."""
+    chain, room, blur = scene.full, scene.room, scene.modes.blur
+    n = chain.J.size
+    solid, viscous, _ = mode(n, chain.J, chain.k, chain.h, TURN * f[i], room.ways, room.e)
+    for j in range(first, p):
+        blur[j] += _ROUNDING * n * f[j] / (f[i] - f[j]) * sqrt(viscous / solid)
+    return solid
 
 
 @jit_by_address
@@ -62,6 +74,7 @@ def guyan(p, order, scene):
         for i in range(place, m - 1):
             masters[i] = masters[i + 1]
     for i in range(p):
+        scene.modes.blur[i] = 0.0
         for j in range(n):
             W[i, j], G[i, j] = 0.0, 0.0
     for i in range(p):
@@ -117,7 +130,8 @@ def irs(p, order, scene):
         for span in range(p):
             left, right = int(masters[span]), int(masters[span + 1]) if span + 1 < p else J.size
             _add_span(modes.W[i], modes.G[i], J, k, modes.spindle, modes.w[i] * modes.w[i], left, right)
-    return Model(p, static.error + RITZ(scene.parts, p, scene), static.slower, 0.0, 0.0)
+    error = static.error + 3.0 * RITZ(scene.parts, p, scene)  # rows of sums
+    return Model(p, error, static.slower, 0.0, 0.0)
 
 
 @jit_by_address
@@ -128,7 +142,7 @@ def craig_bampton(p, order, scene):
     held = whole < float("inf")
     for j in range(n - 1, -1, -1):
         along += 1.0 / k[j]
-        modes.W[0, j] = sqrt(J[j]) * (along / whole if held else 1.0)
+        modes.blur[j], modes.W[0, j] = 0.0, sqrt(J[j]) * (along / whole if held else 1.0)
         modes.G[0, j] = 1.0 / (sqrt(k[j]) * whole) if held else 0.0
     if p > 1:
         own, J[0] = J[0], HOLD * extremes(n, J)[1]
@@ -136,6 +150,8 @@ def craig_bampton(p, order, scene):
         for i in range(1, p):
             mode_rows(n, J, k, h, TURN * scene.kept.f[i], modes.W[i], modes.G[i], room.ways, room.e)
             modes.W[i, 0] = 0.0
+        for i in range(p, n):
+            _mix_in(i, 1, p, scene.kept.f, scene)
         J[0] = own
     return Model(p, RITZ(scene.parts, p, scene), 0.0, 0.0, status)
 
@@ -145,10 +161,13 @@ def modal(p, order, scene):
     """The lowest p modes, and what the others give way at rest (3)."""
     full, modes, room, residual = scene.full, scene.modes, scene.room, 0.0
     for i in range(full.J.size):
-        scene.kept.f[i], modes.w[i] = full.f[i], TURN * full.f[i]
+        scene.kept.f[i], modes.w[i], modes.blur[i] = full.f[i], TURN * full.f[i], 0.0
         if i < p:
             mode_rows(full.J.size, full.J, full.k, full.h, modes.w[i], modes.W[i], modes.G[i], room.ways, room.e)
         else:
-            solid, _, _ = mode(full.J.size, full.J, full.k, full.h, modes.w[i], room.ways, room.e)
+            solid = _mix_in(i, 0, p, full.f, scene)
             residual += square(room.ways[SHAPE, 0] / modes.w[i]) / solid
-    return Model(p, CHAIN_ROUNDING, 0.0, residual, 0.0)
+    error = max(RITZ(scene.parts, p, scene), _ROUNDING * full.J.size)  # makes close modes orthogonal
+    for i in range(p):
+        scene.kept.f[i], modes.w[i] = full.f[i], TURN * full.f[i]
+    return Model(p, error, 0.0, residual, 0.0)

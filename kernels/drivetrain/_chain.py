@@ -44,6 +44,8 @@ class Chain(NamedTuple):
 class Modes(NamedTuple):
     """Rows W and G of modes (`_modes`), their w, damping C and shape at the spindle, and complex A and B of C's size.
 
+    `blur` is what the dampers' strains of a row may be off by, over the root of C's entry.
+
     Until modes are made, C and `spindle` are room for anything.
     """
 
@@ -54,6 +56,7 @@ class Modes(NamedTuple):
     spindle: np.ndarray
     A: np.ndarray
     B: np.ndarray
+    blur: np.ndarray
 
 
 class Room(NamedTuple):
@@ -97,13 +100,13 @@ class Model(NamedTuple):
 @jit
 def new_scene(n, parts):
     """Room for a chain of n inertias and what it is reduced to."""
-    rows, squares = np.empty((10, n)), np.empty((3, n, n))
+    rows, squares = np.empty((11, n)), np.empty((3, n, n))
     roots, waves = np.empty((3, 2 * n), np.complex128), np.empty((2, n, n), np.complex128)
     full = Chain(rows[0], rows[1], rows[2], rows[3], roots[0])
     kept = Chain(rows[4], rows[5], rows[6], rows[7], roots[1])
     both = np.empty((ROWS, n), np.complex128)
     room = Room(np.empty(3 * n + 2), np.empty((ROWS, n)), both, np.empty((2, n)), roots[2])
-    modes = Modes(squares[0], squares[1], rows[8], squares[2], rows[9], waves[0], waves[1])
+    modes = Modes(squares[0], squares[1], rows[8], squares[2], rows[9], waves[0], waves[1], rows[10])
     return Scene(full, kept, room, np.empty((2, n)), np.empty((2, 2 * SAMPLES * n + GRID)), modes, parts)
 
 
@@ -112,8 +115,8 @@ _MODEL = Model(1, 0.0, 0.0, 0.0, 0.0)
 
 MAKE = part(0, _MODEL, 1, 0.0, _LIKE)
 """make(p, order, scene) -> the `Model` of p masses, made in the scene."""
-POLES = part(1, (0.0, 1), 1, _LIKE)
-"""poles(p, scene) -> a bound on the relative error of the poles of chain and model, and how many the model has."""
+POLES = part(1, (0.0, 0.0, 1), _MODEL, _LIKE)
+"""poles(model, scene) -> bounds on the error of the damping of chain and of model, how many poles the latter has."""
 ERROR = part(2, (0.0, 0.0), 0.0, 1, _MODEL, _LIKE)
 """receptance_error(f_max, number of the model's poles, model, scene) of the model, as in `_error`."""
 FREQUENCIES = part(3, 0.0, 1, *_LIKE.full[:2], _LIKE.full.f, _LIKE.room.work)

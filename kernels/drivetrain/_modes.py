@@ -84,19 +84,31 @@ def _make_orthonormal(W, G, first, p, n):
     return most / least if reached and least > 0.0 else float("inf")
 
 
+@jit_apart
+def _viscous(i, j, scene):
+    """c_ij of (1); a damper without a spring, at a free end, is strained by its mass's angle."""
+    J, k, h, total = scene.full.J, scene.full.k, scene.full.h, 0.0
+    for c in range(J.size):
+        if h[c] > 0.0:
+            rows, e = (scene.modes.G, k[c]) if k[c] > 0.0 else (scene.modes.W, J[c])
+            total = fma(h[c] / e, rows[i, c] * rows[j, c], total)
+    return total
+
+
 @jit_by_address
 def ritz(p, scene):
     """Rows W and G of p shapes to those of modes, frequencies rising; a bound on the relative error of these.
 
     With a free end row 0 is a motion that strains nothing (and G[0] is 0); it is then mode 0, w = 0. Of the others each
-    is off by the rounding of every row G_j, of size |G_j|, by its share in the mode.
+    is off by the rounding of every row G_j, of size |G_j|, by its share in the mode; so are the dampers' strains.
     """
     W, G, w, before, size = scene.modes.W, scene.modes.G, scene.modes.w, scene.modes.C, scene.modes.spindle
-    n = scene.full.J.size
+    n, felt, blurs = scene.full.J.size, scene.room.work, scene.modes.blur
     first = 0 if scene.full.k[n - 1] > 0.0 else 1
     condition = _make_orthonormal(W, G, first, p, n)
     for i in range(p):
         size[i] = sqrt(_product(G[i], G[i], n))
+        felt[i] = blurs[i] + 4.0 * _ROUNDING * condition * sqrt(n * _viscous(i, i, scene))
         for j in range(n):
             before[i, j] = W[i, j]
     reached = _orthogonalise(G, W, first, p, n)
@@ -111,41 +123,31 @@ def ritz(p, scene):
             j -= 1
     for i in range(p):
         scene.kept.f[i] = w[i] / TURN
-    for i in range(first, p):
-        blur = 0.0
-        for j in range(first, p):
-            blur = fma(size[j], magnitude(_product(before[j], W[i], n)), blur)
-        worst = max(worst, blur / w[i] if w[i] > 0.0 else float("inf"))
+    for i in range(p):
+        blur, blurs[i] = 0.0, 0.0
+        for j in range(p):
+            share = magnitude(_product(before[j], W[i], n))
+            blur, blurs[i] = fma(size[j], share, blur), fma(felt[j], share, blurs[i])
+        if i >= first:
+            worst = max(worst, blur / w[i] if w[i] > 0.0 else float("inf"))
     return _ROUNDING * condition * worst * sqrt(1.0 * n) if reached else float("inf")
 
 
 @jit_by_address
-def poles_of_modes(p, scene):
-    """Those of the chain and of the model; a bound on their relative error, and how many the model has of its own.
-
-    A damper without a spring, at a free end, is strained by its mass's angle. Shapes are right to rounding over the
-    relative distance of two frequencies.
-    """
-    full, kept, modes = scene.full, scene.kept, scene.modes
-    J, k, h, n, gap = full.J, full.k, full.h, full.J.size, 1.0
+def poles_of_modes(model, scene):
+    """Those of chain and model: bounds on the errors of their damping, and how many the model has of its own."""
+    full, kept, modes, p = scene.full, scene.kept, scene.modes, model.p
+    n = full.J.size
     for i in range(p):
-        modes.spindle[i] = modes.W[i, 0] / sqrt(J[0])
+        modes.spindle[i] = modes.W[i, 0] / sqrt(full.J[0])
         for j in range(i, p):
-            total = 0.0
-            for c in range(n):
-                if h[c] > 0.0:
-                    by_spring = k[c] > 0.0
-                    strains = modes.G[i, c] * modes.G[j, c] if by_spring else modes.W[i, c] * modes.W[j, c]
-                    total = fma(h[c] / (k[c] if by_spring else J[c]), strains, total)
-            modes.C[i, j] = modes.C[j, i] = total
+            modes.C[i, j] = modes.C[j, i] = _viscous(i, j, scene)
     error = CHAIN_POLES(scene.parts, full, n, scene.room)
-    if not extremes(n, h)[1] > 0.0:
+    if not extremes(n, full.h)[1] > 0.0:
         undamped_poles(kept)
-        return error, 2 * p
-    for i in range(1, p):
-        gap = min(gap, (kept.f[i] - kept.f[i - 1]) / kept.f[i])
-    blur = modal_poles(p, modes, not k[n - 1] > 0.0, kept.s[: 2 * p], scene.room)
-    return max(error, blur, _ROUNDING * n / gap), 2 * p
+        return error, error, 2 * p
+    free = not full.k[n - 1] > 0.0
+    return error, modal_poles(p, modes, free, model.error, kept.s[: 2 * p], scene.room), 2 * p
 
 
 @jit_apart

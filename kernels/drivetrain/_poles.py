@@ -17,15 +17,24 @@ critical damping both poles are those of this quadratic.
 
 A modal model (`_modes`) has (ln D)' = trace of (s^2 + s C + w^2)^-1 (2 s + C); a root lies within 2 p of its
 Newton steps.
+
+What is told is the damping, -Re s/abs(s), whose digits may be fewer than those of the root by abs(s/Re s), or not: real
+errors dM, dC, dK of what the root's shape x feels move it by
+    ds = -x^T (s^2 dM + s dC + dK) x/(x^T (2 s M + C) x),                                               (5)
+and of light damping, where x is real but for a share of the damping, Re ds is as small as Re s.
 Source: Aberth, Math. Comp. 27:339 (1973); Bini & Noferini, Linear Algebra Appl. 439:1130 (2013); (4) by first-order
 perturbation of the quadratic eigenvalue problem, derived here.
 """
+
+from typing import NamedTuple
+
+import numpy as np
 
 from kernels.drivetrain import _holzer
 from kernels.drivetrain._chain import CHAIN_ROUNDING, NORMAL_LOW, TURN, extremes
 from kernels.drivetrain._holzer import FLEXIBILITY, SHAPE, STRAIN
 from kernels.lanes.addresses import jit_by_address
-from kernels.lanes.jit import jit_apart
+from kernels.lanes.jit import jit, jit_apart
 from kernels.lanes.vectors import exponent, magnitude, pow2, sqrt
 from kernels.maths.small_dense import eliminate, over, size, square, substitute_back
 
@@ -147,6 +156,27 @@ def _look(n, J, k, h, s, r, ways, e):
     return -over(missing, slope), _ROUNDING * worth, solid, viscous, elastic
 
 
+@jit
+def _of_damping(moved, real, s):
+    """Bound on the relative error of the damping of a root that (5) moves by so much, along the real axis by `real`."""
+    modulus = sqrt(square(s))
+    error = moved / modulus + (real / magnitude(s.real) if s.imag != 0.0 and real > 0.0 else 0.0)
+    return error / (1.0 - error) if error < 1.0 else float("inf")
+
+
+@jit_apart
+def _felt(n, J, k, h, s, ways):
+    """Bound on the relative error of a pole's damping: (5) of the shape that `_look` left, J, k and h rounded."""
+    slope, moved, real = 0.0j, 0.0, 0.0
+    for j in range(n):
+        slope += 2.0 * s * (J[j] * (ways[SHAPE, j] * ways[SHAPE, j])) + h[j] * (ways[STRAIN, j] * ways[STRAIN, j])
+    for j in range(n):
+        x, strain = ways[SHAPE, j], over(ways[STRAIN, j] * ways[STRAIN, j], slope)
+        for z in (s * s * (J[j] * over(x * x, slope)), k[j] * strain, s * (h[j] * strain)):
+            moved, real = moved + size(z), real + magnitude(z.real)
+    return _of_damping(_ROUNDING * moved, _ROUNDING * real, s)
+
+
 @jit_apart
 def _best_joint(n, J, k, h, s, ways, e):
     """The joint whose step is the shortest: the largest inertia may hardly move with what a damper lets creep."""
@@ -162,7 +192,7 @@ def _best_joint(n, J, k, h, s, ways, e):
 
 @jit_apart
 def _refined(n, J, k, h, s, ways, e):
-    """A pole to its last digits, and a bound on its relative error."""
+    """A pole to its last digits, and bounds on the relative errors of it and of its damping."""
     error, solid, viscous, r = 0.0, 1.0, 0.0, -1
     for attempt in range(2 * REFINEMENTS):
         _follow(n, J, k, h, s, ways, e)
@@ -178,7 +208,7 @@ def _refined(n, J, k, h, s, ways, e):
             s = complex(s.real, 0.0)
     if magnitude(s.real) < _LIGHT * magnitude(s.imag):
         s = complex(-0.5 * viscous / solid, s.imag)
-    return s, error
+    return s, error, _felt(n, J, k, h, s, ways)
 
 
 @jit_apart
@@ -200,7 +230,7 @@ def _refine_twins(n, J, k, h, s, i, j, ways, e):
 
 @jit_apart
 def _refine(n, J, k, h, fixed, s, errors, ways, e):
-    """Every root to its last digits; a bound on their relative errors, inf where two but twins may be the same."""
+    """Every root to its last digits; a bound on the error of their damping, inf where two but twins may be the same."""
     worst = 0.0
     for i in range(s.size):
         errors[i] = 0.0
@@ -214,8 +244,8 @@ def _refine(n, J, k, h, fixed, s, errors, ways, e):
             errors[i] = errors[twin] = -error
             worst = max(worst, error)
         elif errors[i] == 0.0:
-            s[i], errors[i] = _refined(n, J, k, h, s[i], ways, e)
-            worst = max(worst, errors[i]) if errors[i] >= 0.0 else float("inf")
+            s[i], errors[i], doubt = _refined(n, J, k, h, s[i], ways, e)
+            worst = max(worst, errors[i], doubt) if errors[i] + doubt >= 0.0 else float("inf")
     for i in range(fixed, s.size):
         for j in range(fixed, i):
             twins = errors[i] < 0.0 and errors[i] == errors[j]
@@ -279,15 +309,40 @@ def poles_of_chain(chain, n, room):
     return error if complete and strongest < REACH else float("inf")
 
 
+class _Modal(NamedTuple):
+    """Equations of modes at s: their w and C, the matrix A over `unit` twice, right sides B; `blur` as in `Modes`."""
+
+    p: int
+    w: np.ndarray
+    C: np.ndarray
+    A: np.ndarray
+    B: np.ndarray
+    unit: np.ndarray
+    blur: np.ndarray
+
+
+@jit_apart
+def _equations_of_modes(s, model):
+    """s^2 + s C + w^2 in units in which no entry is above 1, so that elimination keeps digits of graded modes."""
+    p, w, C, A, _, unit, _ = model
+    for i in range(p):
+        unit[i] = 1.0 / sqrt(square(s) + w[i] * w[i] + size(s) * C[i, i])
+    for i in range(p):
+        for j in range(p):
+            A[i, j] = s * (C[i, j] * (unit[i] * unit[j]))
+        rest = complex((w[i] - s.imag) * (w[i] + s.imag) + s.real * s.real, 2.0 * s.real * s.imag)
+        A[i, i] += rest * (unit[i] * unit[i])
+
+
 @jit_apart
 def _newton_of_modes(s, model):
     """1/(ln D)' by elimination; 0 exactly on a root."""
-    p, w, C, A, B = model
+    p, _, C, A, B, unit, _ = model
+    _equations_of_modes(s, model)
     for i in range(p):
         for j in range(p):
-            A[i, j], B[i, j] = s * C[i, j], complex(C[i, j], 0.0)
-        A[i, i] += s * s + w[i] * w[i]
-        B[i, i] += 2.0 * s
+            B[i, j] = complex(C[i, j] * (unit[i] * unit[j]), 0.0)
+        B[i, i] += 2.0 * s * (unit[i] * unit[i])
     eliminate(A, B, p, p)
     slope = 0.0j
     for column in range(p):
@@ -297,22 +352,71 @@ def _newton_of_modes(s, model):
 
 
 @jit_apart
-def modal_poles(p, modes, free, s, room):
-    """All 2 p poles of a modal model, ordered as `poles_of_chain` has them; a bound on their relative errors.
+def _refined_of_modes(s, model, rounding):
+    """A root with the damping of its shape, from two steps of inverse iteration, and the bound (5) on that.
+
+    M, w^2 and C are off by `rounding`, the strains of modes over the dampers by their `blur`.
+    """
+    p, w, C, A, B, unit, blur = model
+    for i in range(p):
+        B[i, 0] = 1.0 + 0.0j
+    for _ in range(2):
+        _equations_of_modes(s, model)
+        largest = 0.0
+        for i in range(p):
+            largest = max(largest, size(B[i, 0]))
+        for i in range(p):
+            B[i, 0] = complex(B[i, 0].real / largest, -B[i, 0].imag / largest)
+        eliminate(A, B, p, 1)
+        A[p - 1, p - 1] = A[p - 1, p - 1] if size(A[p - 1, p - 1]) > 0.0 else 2.0**-53 + 0.0j
+        substitute_back(A, B, 0, 0, p)
+    solid, viscous, slope = 0.0, 0.0, 0.0j
+    for i in range(p):
+        B[i, 0] = 2.0**-50 * unit[i] * B[i, 0]
+    for i in range(p):
+        damped = 0.0j
+        for j in range(p):
+            damped += C[i, j] * B[j, 0]
+        x = B[i, 0]
+        solid, viscous = solid + square(x), viscous + (x.real * damped.real + x.imag * damped.imag)
+        slope += x * (2.0 * s * x + damped)
+    if s.imag != 0.0:
+        s = complex(-0.5 * viscous / solid, s.imag)
+    moved, real = 0.0, 0.0
+    for i in range(p):
+        for j in range(p):
+            z, felt, other = over(B[i, 0] * B[j, 0], slope), sqrt(C[i, i]), sqrt(C[j, j])
+            dampers = rounding * felt * other + felt * blur[j] + other * blur[i]
+            for term in (rounding * s * s * z, rounding * w[i] * w[j] * z, dampers * s * z):
+                moved, real = moved + size(term), real + magnitude(term.real)
+    return s, _of_damping(moved, real, s)
+
+
+@jit_apart
+def modal_poles(p, modes, free, rounding, s, room):
+    """All 2 p poles of a modal model, ordered as `poles_of_chain` has them; a bound on the error of their damping.
 
     `free` : whether mode 0 is a free motion, w = 0: one pole is 0, and a second one if nothing damps it
+    `rounding` : what their frequencies are off by
     """
     fixed = 0 if not free else 1 if modes.C[0, 0] > 0.0 else 2
     for i in range(p):
         _of_mode(i, modes.w[i], 0.5 * modes.C[i, i], _APART * (1.0 + i / p), s)
     for i in range(fixed):
         s[i] = 0.0j
-    model = p, modes.w, modes.C, modes.A, modes.B
-    settled, error = _approach(_newton_of_modes, model, fixed, s, room.work), _MODAL_ROUNDING
+    model = _Modal(p, modes.w, modes.C, modes.A, modes.B, room.e[0], modes.blur)
+    settled, error, worst = _approach(_newton_of_modes, model, fixed, s, room.work), _MODAL_ROUNDING, 0.0
     for i in range(fixed, s.size):
         error = max(error, size(_newton_of_modes(s[i], model)) / size(s[i]))
-    complete = _in_pairs(fixed, 2.0 * p * error, s, room.pairs)
-    return 2.0 * p * error if settled and complete else float("inf")
+    error *= 2.0 * p
+    complete = _in_pairs(fixed, error, s, room.pairs)
+    for i in range(fixed, s.size):
+        for j in range(fixed, i):
+            complete = complete and size(s[i] - s[j]) > 2.0 * error * size(s[i])
+        if complete and s[i].imag >= 0.0:
+            s[i], doubt = _refined_of_modes(s[i], model, rounding)
+            worst = max(worst, doubt) if doubt >= 0.0 else float("inf")
+    return worst if settled and complete else float("inf")
 
 
 @jit_apart

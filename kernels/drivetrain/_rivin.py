@@ -246,10 +246,10 @@ def rivin(p, order, scene):
 
 
 @jit_by_address
-def poles_of_both(p, scene):
-    """Those of the chain and of the reduced one; a bound on their relative error, and how many the latter has."""
+def poles_of_both(model, scene):
+    """Those of chain and reduced chain: bounds on the errors of their damping, and how many the latter has."""
     error = CHAIN_POLES(scene.parts, scene.full, scene.full.J.size, scene.room)
-    return max(error, CHAIN_POLES(scene.parts, scene.kept, p, scene.room)), 2 * p
+    return error, CHAIN_POLES(scene.parts, scene.kept, model.p, scene.room), 2 * model.p
 
 
 @jit_apart
@@ -280,12 +280,12 @@ def exact(p, order, scene):
 
 
 @jit_by_address
-def poles_of_full(p, scene):
-    """Those of the chain, which are the model's too; a bound on their relative error, and 0: it has none of its own."""
+def poles_of_full(model, scene):
+    """Those of the chain, which are the model's too; a bound for either, and 0: it has none more."""
     error = CHAIN_POLES(scene.parts, scene.full, scene.full.J.size, scene.room)
     for i in range(scene.full.s.size):
         scene.kept.s[i] = scene.full.s[i]
-    return error, 0
+    return error, error, 0
 
 
 @jit_apart

@@ -166,17 +166,17 @@ def _fill(i, columns, scene):
 
     # bounds of frequencies, of damping, and of the receptance's error: lightly damped, it has fewer digits than these
     off, error, rounding = math.nan, _known(model.error), math.inf
-    blur, own_poles = POLES(scene.parts, model.p, scene)
-    blur = max(error, _known(blur))
-    if blur < math.inf:
+    of_chain, blur, own_poles = POLES(scene.parts, model, scene)
+    of_chain, blur = _known(of_chain), max(error, _known(blur))
+    if max(of_chain, blur) < math.inf:
         off, rounding = ERROR(scene.parts, f_max, own_poles, model, scene)
-        rounding = max(blur, _known(rounding))
+        rounding = max(of_chain, blur, _known(rounding))
     fine = _rows(rows, full, kept, e_J, e_k, n if has_all else model.p, model.p if has_all or reduction == RIVIN else 0)
 
     # merged dampers hold up to w h e = SMALL_PHASE, `slower` being the largest h e
     limit = SMALL_PHASE / (TURN * model.slower) if model.slower > 0.0 else math.inf
     columns.n_kept[i], columns.valid_to[i] = model.p, scale(limit, e) if model.slower > 0.0 else p.f_max
-    errors = Outputs(error, error, blur, 0.0 if n_keep > 0.0 else error, rounding, *_OF_CHAIN)
+    errors = Outputs(error, max(error, CHAIN_ROUNDING), blur, 0.0 if n_keep > 0.0 else error, rounding, *_OF_CHAIN)
     columns.frf_error[i], columns.error[i] = off, largest(errors, columns.asked, Outputs, Outputs)
     columns.status[i] = partly(fine, OK if limit >= f_max else DAMPERS_OUT_OF_RANGE)
 

@@ -146,7 +146,7 @@ class Reduced:
 
 def poles(K, C, M):
     """Roots of det(s^2 M + s C + K), by rising modulus."""
-    with mp.workdps(30):
+    with mp.workdps(DIGITS):
         p = K.rows
         A = zeros(2 * p)
         A[:p, p:] = eye(p)
