@@ -1,1 +1,1 @@
-"""The physics: one module a scene, each a `Kernel` that the engine sweeps over columns of cells."""
+"""The physics: one module per model, each with a `Kernel` that the engine applies to columns of cells."""

@@ -1,4 +1,4 @@
-"""Names of the kernels and where they are; a kernel's module, and with it numba, is imported only when asked for."""
+"""Names and places of the kernels; a kernel's module, and with it numba, is imported only when it is used."""
 
 from __future__ import annotations
 

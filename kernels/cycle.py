@@ -1,9 +1,9 @@
-"""The limit cycle of a scene of one's own: solved for, not waited for.
+"""The limit cycle of a scene of your own, by Newton's method instead of simulation.
 
 A cycle begins and ends just before a switch. Its states there are a fixed point of the return map, found by Newton's
-method (`codegen.limit_cycle`); so cycles are found to which a motion comes slowly or never. A cell is OK where period,
-states and sizes are within rtol of the truth (states relative to the largest size that they have in the cycle), and
-multiplier and sensitivities within rtol of 1, or of themselves where they are larger; only outputs asked for count.
+method (`codegen.limit_cycle`), also if the cycle attracts slowly or not at all. A cell is OK if period, states and
+sizes are within rtol of the truth (states relative to their largest size in the cycle), and multiplier and
+sensitivities within rtol times the larger of 1 and their size; only requested outputs count.
 """
 
 import math
@@ -42,39 +42,39 @@ def cycle_kernel(
     branch: str | None = None,
     **parts: Unpack[SceneParts],
 ) -> Kernel:
-    """A kernel that solves for the limit cycle of a scene.
+    """Make a kernel that solves for the limit cycle of a scene.
 
     Parameters
     ----------
-    drive : (parameters) -> the period with which the rates depend on the time `t`. Then `flips` are periods of the
-        drive, a cycle's states are those at its end, and the scene need have no surface
-    turns : states that need not come back to themselves but go on by a whole number of these, as {"phase": 2 * pi}
-    branch : a parameter in which the cycle is continued: it is searched where this has the value of a further
-        parameter, NAME_from, and followed from there, also where it is not stable
-    The others as in `kernels.scene.scene_kernel`; `start` is where the search begins. Of several surfaces a cycle ends
-    at the first, and `flips` counts it alone.
+    drive : (parameters) -> period of the rates in the time `t`. Then `flips` counts periods of the drive, a cycle's
+        states are those at its end, and the scene needs no surface
+    turns : states that may advance by a whole number of these per cycle, as an angle does: {"phase": 2 * pi}
+    branch : a parameter in which the cycle is continued: it is searched at the value of an additional parameter,
+        NAME_from, and continued from there, also if it is unstable
+    The others as in `kernels.scene.scene_kernel`; the search begins at `start`. With several surfaces a cycle ends at
+    the first, and `flips` counts only its switches.
 
     Returns
     -------
     Kernel
-        With two further parameters: `flips`, the switches or periods of the drive a cycle, 1, but where the scene hangs
-        on its side 2 or another even number, and `settle`, the cycles that are followed before Newton's method begins.
-        Its outputs: `period`; each state just before the switch that ends a cycle; `NAME_size`, the largest size of
-        each state in the cycle; `NAME_turns` of what turns; `multiplier`, that of largest modulus, by which small
-        disturbances are multiplied each cycle; where there are several, `multipliers_real` and `multipliers_imaginary`
-        along `floquet_mode`, the largest first, of a complex pair both with the size of their imaginary part;
-        `period_by_NAME`, d ln(period)/d ln(parameter), of each parameter that is no whole number.
+        It has two additional parameters: `flips`, the switches or drive periods per cycle, by default 1, or 2 if the
+        scene depends on `side` (then even), and `settle`, the cycles followed before Newton's method begins. Outputs:
+        `period`; each state just before the switch that ends a cycle; `NAME_size`, the largest size of each state in
+        the cycle; `NAME_turns` for the states in `turns`; `multiplier`, the Floquet multiplier of largest modulus;
+        if there are several, `multipliers_real` and `multipliers_imaginary` along `floquet_mode`, the largest first (a
+        complex pair has the size of its imaginary part twice); `period_by_NAME`, d ln(period)/d ln(parameter), for
+        each parameter that is not a whole number.
 
     Raises
     ------
     SceneError
-        As `scene_kernel`; where the first surface watches more than one state, or one that turns; where something
-        depends on `side` though there is a drive or several surfaces; and where there is the time but no drive.
+        As `scene_kernel`; if the first surface depends on several states, or on one in `turns`; if a function depends
+        on `side` although there is a drive or several surfaces; or on the time without a drive.
     """
     scene, parameters = scene_of(parts), tuple(parts["parameters"])
     maps = {method: ReturnMap(scene, method, drive) for method in METHODS}
     turning = _turning(scene, turns or {}, maps["taylor"].held)
-    doc = "switches, or periods of the drive, a cycle"
+    doc = "switches, or periods of the drive, per cycle"
     flips = replace(flips_field(2.0 if maps["taylor"].sides else 1.0, MOST), doc=doc)
     begun = [parameters[_number(scene, "branch", "parameter", branch)]] if branch else []
     begun = [replace(f, name=f"{f.name}_from", doc=f"{f.name} where the search begins", default=f.name) for f in begun]
@@ -122,7 +122,7 @@ def _turning(scene: Scene, turns: Mapping[str, float], held: list[int]) -> dict[
 
 
 def _outputs(parts: SceneParts, turning: list[str], many: int, end: str) -> tuple[list[Field], list[Field]]:
-    """All that is said of a cycle with so many multipliers, and their number as a coordinate if there are several.
+    """Outputs of a cycle with `many` multipliers, and their number as a coordinate if there are several.
 
     States are given at the `end` of the cycle.
     """
@@ -131,8 +131,8 @@ def _outputs(parts: SceneParts, turning: list[str], many: int, end: str) -> tupl
         Field("period", "s", "period of the limit cycle"),
         *(replace(f, doc=f"{f.doc}, {end}", sized=True) for f in states),
         *(Field(f"{f.name}_size", f.unit, f"largest size in the cycle of: {f.doc}") for f in states),
-        *(Field(f"{name}_turns", "1", "whole turns a cycle", integer=True) for name in turning),
-        Field("multiplier", "1", "of small disturbances, a cycle; the largest, or its modulus"),
+        *(Field(f"{name}_turns", "1", "whole turns per cycle", integer=True) for name in turning),
+        Field("multiplier", "1", "growth of small disturbances per cycle; the largest, or its modulus"),
         *(Field(f"period_by_{name}", "1", f"d ln(period)/d ln({name})") for name in swept),
     ]
     modes = Field(

@@ -1,8 +1,8 @@
-"""The whole contract between physics and engine.
+"""The contract between physics and engine.
 
-A *cell* is one scene. Cells are independent. A kernel's functions take one float64 column per parameter (C-contiguous,
-one value per cell) and fill one column per output, shape `(n_cells,)` or `(n_cells, *dims)`, and an int8 `status`
-column. They hold no lock (nogil), raise nothing and always end; what goes wrong is said by a `Status`.
+A *cell* is one set of parameters. Cells are independent. A kernel's functions take one float64 column per parameter
+(C-contiguous, one value per cell) and fill one column per output, shape `(n_cells,)` or `(n_cells, *dims)`, and an int8
+`status` column. They hold no lock (nogil), raise nothing and always end; a `Status` says what went wrong.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from typing import Any, Protocol
 
 
 class Status(IntEnum):
-    """What became of a cell: OK, a remark (1..63, values are given) or none of these (64..124, every output is NaN).
+    """Outcome of a cell: OK, a remark (1..63, with values), or no answer (64..124, every output is NaN).
 
-    The last three are the engine's words: FAILED is for what no kernel may do. `kind` says it in one of a few words.
+    The engine sets the last three; FAILED means that the kernel violated its contract. `kind` groups the statuses.
     Numbers are stored in files and never reused.
     """
 
@@ -28,15 +28,15 @@ class Status(IntEnum):
     NOT_SELF_STARTING = 2, "a limit cycle exists, but the motion from rest at the centre does not reach it"
     COMES_TO_REST = 3, "the motion ends within the time followed; outputs after its end are NaN"
     GRAZING = 4, "the last digits of the input decide whether there is one more swing"
-    OVERDAMPED = 5, "damping beyond critical: the motion creeps, without a turning point or an end"
-    TOO_SHORT = 6, "too short a run for some outputs, which are NaN"
+    OVERDAMPED = 5, "damping above critical: the motion creeps, without a turning point or an end"
+    TOO_SHORT = 6, "the run is too short for some outputs, which are NaN"
     NEVER_ENDS = 7, "the motion fades without an end; outputs at its end are NaN"
     UNSTABLE = 8, "the cycle exists, but small disturbances of it grow"
     PERIOD_2 = 9, "the motion repeats only after two cycles; the values are of both together"
     NOT_PERIODIC = 10, "the motion never settles; the values are means over the time followed"
-    TOOTH_JUMPED = 11, "the wheel goes on by more than one tooth a cycle"
+    TOOTH_JUMPED = 11, "the wheel advances by more than one tooth per cycle"
     LOCK_UP = 12, "the linkage locks before the crank has turned fully"
-    CHANGE_POINT = 13, "the linkage can be folded flat, where its arm may leave its branch"
+    CHANGE_POINT = 13, "the linkage can fold flat, where its arm may change branch"
     DOUBLE_CRANK = 14, "the arm turns fully with the crank and has no extreme angles"
     DAMPERS_OUT_OF_RANGE = 15, "merged dampers hold only up to valid_to, which is below f_max"
     PARTLY_OUT_OF_RANGE = (
@@ -55,7 +55,7 @@ class Status(IntEnum):
     NEVER_MEETS = 73, "the pallets never meet a tooth"
     NO_ASSEMBLY = 74, "the links are too short or too long to be joined"
     UNMESHES = 75, "the recoil throws the crown wheel out of mesh, and the clock stops"
-    NOT_ASKED = 125, "the study's condition leaves the cell out"
+    NOT_ASKED = 125, "the study's condition excludes the cell"
     FAILED = 126, "the kernel raised an exception, crashed, took too long, or gave no number or status"
     PENDING = 127, "not computed yet"
 
@@ -80,9 +80,9 @@ class Status(IntEnum):
 FIRST_REFUSAL = 64
 """Every status from here on means NaN in every output."""
 UNSOLVED = (Status.NOT_CONVERGED, Status.STEP_LIMIT, Status.NO_METHOD)
-"""Nothing is known of the scene then: another method, a looser rtol or more steps may find an answer.
+"""The method found no answer, but another method, a looser rtol or more steps may.
 
-The others from `FIRST_REFUSAL` on are findings: by any method the scene has no such answer, or none in float64.
+The other statuses from `FIRST_REFUSAL` on are results: there is no such answer, or none in float64, by any method.
 """
 KINDS = {
     "ok": "accurate to rtol",
@@ -91,15 +91,15 @@ KINDS = {
     "unsolved": "no method found an answer, though there may be one; every output is NaN",
     "FAILED": "the kernel raised an exception, crashed, took too long, or gave no number or status; outputs are NaN",
     "pending": "not computed yet",
-    "not asked": "left out by the study's condition",
+    "not asked": "excluded by the study's condition",
 }
-"""Words for what became of a cell, in the order of an account, in which each cell is counted under one of them."""
+"""Groups of statuses, in the order in which they are counted."""
 
 
 OnColumns = Callable[..., None]
-"""What the engine calls: takes columns in the order that `Kernel` and `Method` say, and fills the last ones."""
+"""A function on columns, in the order that `Kernel` and `Method` specify; it fills the last ones."""
 CheckCell = Callable[[Any], Any]
-"""`check(p) -> status`: OK or a refusal of a cell, before any method is asked; p is a record of the parameters."""
+"""`check(p) -> status`: OK or a refusal of a cell, before any method is called; p is a record of the parameters."""
 BoundCell = Callable[[Any], Any]
 """`bound(p) -> error`: relative, a number for all outputs, or a record with one for each."""
 
@@ -120,16 +120,16 @@ class FillCells(Protocol):
 class Field:
     """A parameter, an output, or a coordinate that all cells share.
 
-    `default`: None makes a parameter required; a str means "as that parameter"; of a coordinate it is how many numbers
-    from `lower` on are taken where a study gives none. `lower`, `upper` are inclusive
-    unless `open_lower`; the kernel's `check` enforces them cell by cell (those of `along` are checked in the study).
-    `dims` names the axes of an array: coordinates of `Kernel.along` ("phase",), or what array parameters share
-    ("mass",), whose length a study gives with their values; a column then has the shape `(n_cells, *dims)`.
+    `default`: None makes a parameter required; a str means "equal to that parameter"; for a coordinate it is the number
+    of integers, beginning at `lower`, that are used if a study gives no values. `lower` and `upper` are inclusive,
+    unless `open_lower`; the kernel's `check` enforces them cell by cell (for `along` the study is checked).
+    `dims` names the axes of an array: coordinates of `Kernel.along` ("phase",), or an axis that array parameters share
+    ("mass",), whose length follows from their values in a study; a column then has the shape `(n_cells, *dims)`.
     `choices` maps words of a study to the numbers in the column.
-    `gaps`: an output that may be NaN or infinite in a cell that is OK, as what it names need not exist there.
-    `of_method`: an output that tells how a cell was solved, such as an error or a number of steps, so that another
-    method gives another value.
-    `sized`: an output that is accurate to a share of the largest size it had on the way, not of itself.
+    `gaps`: an output that may be NaN or infinite in an OK cell, because it need not exist there.
+    `of_method`: an output about the solution process, such as an error or a number of steps, which depends on the
+    method.
+    `sized`: an output whose accuracy is relative to the largest size it had so far, not to itself.
     """
 
     name: str
@@ -152,22 +152,22 @@ class Method:
     """One way to solve a cell.
 
     `solve(*parameters, rtol, *along, *outputs, status)` fills every output column of the kernel and the status of
-    every cell; what is OK is finite but for `gaps`. It gets no cell that `check` refused.
+    every cell; OK cells are finite except for `gaps`. Cells that `check` refused are not passed to it.
 
     `bound(*parameters, rtol, *along, asked, out)` fills `out` with a bound on the largest relative error (of traces:
     relative to the amplitude) over the outputs whose entry in the uint8 array `asked` is 1. None: the method itself
-    holds `rtol` or says by its status that it cannot.
+    meets `rtol` or sets a status that says it cannot.
 
-    `estimates`: the method knows only afterwards what its values are right to. It is called as
-    `solve(*parameters, rtol, *along, asked, *outputs, error, status)`, fills `error` as a bound would, and leaves it to
-    the engine to call INACCURATE what is not GRAZING where that exceeds `rtol`; `auto` goes on after both.
+    `estimates`: the method knows its error only after solving. It is called as
+    `solve(*parameters, rtol, *along, asked, *outputs, error, status)` and fills `error` as a bound would; where that
+    exceeds `rtol` the engine sets INACCURATE instead of any status but GRAZING, and `auto` goes on after both.
 
-    `excludes` are parameters it cannot do: `auto` gives it no cell where one is away from its default; by name it is
-    not to be had for a study that sets one, away from its default or as an axis. `lacks` are outputs it does not give:
-    it cannot be had where one of them is asked for, and fills them with NaN.
+    `excludes` are parameters that it does not support: `auto` does not use it in cells where one differs from its
+    default; it cannot be chosen by name for a study that sets one to another value or as an axis. `lacks` are outputs
+    that it does not compute: it fills them with NaN, and cannot be used in a study that requests one of them.
 
-    `sooner(*parameters, rtol)`, an array of bool, is True in cells that `auto` tries it on ahead of the method declared
-    before it: there, at that rtol, it takes less time.
+    `sooner(*parameters, rtol)`, an array of bool, is True in cells where `auto` tries it before the method declared
+    ahead of it, because it is faster there at that rtol.
     """
 
     name: str
@@ -182,12 +182,12 @@ class Method:
 
 @dataclass(frozen=True)
 class Kernel:
-    """A scene: what may be swept, what comes out, and the methods from the cheapest to the dearest.
+    """A model: its parameters, its outputs, and its methods from the fastest to the slowest.
 
-    `check(*parameters, status)` writes OK or a refusal for every cell, before any method is asked.
+    `check(*parameters, status)` writes OK or a refusal for every cell, before any method is called.
     `along` are coordinates shared by all cells (phase, frequency); a study gives their values.
-    `example` has the values of parameters at which the scene runs well: a study to begin with.
-    `same_length` maps further dims of outputs to the array parameters' dim that is as long: {"mode": "mass"}.
+    `example` has values of the parameters for an example study.
+    `same_length` maps further dims of outputs to a dim of array parameters of equal length: {"mode": "mass"}.
     """
 
     name: str

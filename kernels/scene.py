@@ -1,23 +1,23 @@
-"""A scene of one's own: a motion given by its rates, with a switch where a surface is passed.
+"""A scene of your own: a motion given by its rates, with a switch at each passage of a surface.
 
     u' = rates(u, side, parameters),  a switch where surface(u, side, parameters) falls through 0         (1)
 
-A scene may have several surfaces, each with its own jump; what is 0 at one of them is located as a kink is (`record`).
-The functions are plain Python of named scalars; each asks by name for the states, parameters and `side` that it needs,
-and for the time `t`, which is 0 at the start, or `start_time`, unless a state or a parameter is called t.
-They are called with objects that record what is done to them (`expression.graph`); of that compiled functions
-are made, for one cell and for lanes (`functions`). In them are allowed + - * / ** abs, and sqrt, exp, log, sin, cos,
-tan, arcsin, arccos, arctan, sinh, cosh, tanh, hypot, power, sign, floor, mod, maximum, minimum and where of this
-module; numpy's of these names are the same, and so are math's in the module that the function is written in.
-power(abs(u), n), u a state and n > -1 any number, has no Taylor series at u = 0; there it is followed as
-`integrate.powers` says, right to the same tolerance. Of what is not a state, power and sqrt want something above 0
-(else OUT_OF_RANGE).
+A scene may have several surfaces, each with its own jump; their zeros are located like kinks (`record`).
+The functions are plain Python of scalars. The names of their arguments are the states, parameters and `side` that they
+need, and the time `t`, which is 0 or `start_time` at the start, unless a state or a parameter is called t.
+They are called with objects that record the operations (`expression.graph`), from which functions are compiled, for one
+cell and for lanes (`functions`). The operations allowed are + - * / ** abs, and sqrt, exp, log, sin, cos, tan, arcsin,
+arccos, arctan, sinh, cosh, tanh, hypot, power, sign, floor, mod, maximum, minimum and where of this module; numpy's
+functions of these names are equivalent, and so are math's in the module where the function is defined.
+power(abs(u), n), with u a state and any n > -1, has no Taylor series at u = 0; it is solved there as described in
+`integrate.powers`, to the same tolerance. For other arguments, power and sqrt need a value above 0 (otherwise
+OUT_OF_RANGE).
 
-A cell is OK where each state is within rtol of the truth, relative to the largest size that the state had on the way,
-and each time within rtol of itself. The surface and the kinks are located, or proved absent, over every step. A motion
-that starts behind the surface, or that a switch puts there, meets no switch before it has come up and falls again; one
-that starts on the surface and falls switches at once, and so does one that a switch puts onto another surface. What
-rounding alone may make of a motion counts: INACCURATE.
+A cell is OK if each state is within rtol of the truth, relative to the largest size that the state had up to then, and
+each time is within rtol of itself. The surface and the kinks are located, or proved absent, over every step. A motion
+that starts below the surface, or that a switch puts there, has no switch before it has risen above the surface and
+falls again; one that starts on the surface and falls switches at once, as does one that a switch puts onto another
+surface. A motion that rounding alone can change beyond rtol is INACCURATE.
 """
 
 import functools
@@ -69,38 +69,37 @@ MOST_FLIPS = 1_000_000
 SERIES = "Taylor series of order 12 or 18, every switch located or excluded"
 LOCATED = "with switches located on its dense output; three runs compared"
 Function = Callable[..., Any]
-"""Of named scalars, as its author writes it."""
+"""A function of scalars, as its author writes it."""
 Functions = Function | Mapping[str, Function]
-"""One, or one for each of several surfaces by their names."""
+"""One function, or one for each of several named surfaces."""
 
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What a scene is made of; it is recorded and compiled once, whatever its functions would say later.
+    """The parts of a scene. They are recorded and compiled once; later changes of its functions have no effect.
 
     Parameters
     ----------
-    name, doc : what it is called, and a line about it
+    name, doc : its name, and a one-line description
     states : names of the states
     parameters : names of the parameters
     rates : (states, side, parameters) -> the time derivative of each state
-    surface : (states, side, parameters) -> what falls through 0 at the switch; or {name: such a function}
+    surface : (states, side, parameters) -> a value that falls through 0 at the switch; or {name: such a function}
     start : (parameters) -> the states at time 0, where side is 1
-    switch : (states, side, parameters) -> the states just behind the switch; None: they do not jump; or for some of the
-        surfaces {name: such a function}
-    most_kinks : between two switches, after which a cell is given up; None: a thousand
-    slides : whether motion goes on along a kink onto which both sides press it (`sliding`), or sticks there
-    begins : None, or the parameter that is 0 where the motion begins just behind a switch at the first surface, else 1;
-        what rounding takes from the surface's value at the start does not count then
-    start_time : a number, or (parameters) -> one: then the last state is the time `t`, of which the functions know
-        nothing but that they may ask for it
-    only_first : whether switches at the first surface alone count; others may lie between, as many as kinks
+    switch : (states, side, parameters) -> the states just after the switch; None: no jump; or {name: such a function}
+        for some of the surfaces
+    most_kinks : largest number of kinks between two switches, then STEP_LIMIT; None: a thousand
+    slides : whether the motion can slide along a kink towards which the field points from both sides (`sliding`)
+    begins : None, or the parameter that is 0 if the motion begins just after a switch at the first surface, else 1;
+        rounding of the surface's value at the start is then ignored
+    start_time : a number, or (parameters) -> a number, if the last state is the time `t`, which the functions may use
+    only_first : whether only switches at the first surface are counted; as many others as kinks may occur in between
     until : whether the last parameter is the time after the start at which the first surface is met
-    peaks : "all": a kink is wherever a state turns round, so that steps end where its size is largest; "some": of
-        states alone whose rate is another one, for a rate may come close to 0 and stay there
+    peaks : "all": extremes of all states are kinks, so that steps end where their size is largest; "some": only of
+        states whose rate is another state, since other rates may stay close to 0
 
-    At a switch `side` turns from 1 to -1 or back. Where abs(u) or sign(u) occurs, u = 0 is a *kink*: the motion is
-    followed up to it and begun anew behind it.
+    At a switch `side` changes its sign. Where abs(u) or sign(u) occurs, u = 0 is a *kink*: integration stops there and
+    restarts behind it.
     """
 
     name: str
@@ -123,9 +122,9 @@ class Scene:
         names = [*self.states, *self.parameters]
         for name in [self.name, *names]:
             if not name.isidentifier() or keyword.iskeyword(name) or name in RESERVED:
-                raise SceneError(f"{name!r} cannot be a name in a scene")
+                raise SceneError(f"{name!r} cannot be a name in a scene, as it is no identifier or reserved")
         if len(set(names)) < len(names):
-            raise SceneError("a scene's states and parameters need names of their own")
+            raise SceneError("two states or parameters of the scene have the same name")
         if not self.states:
             raise SceneError("a scene needs a state")
         if isinstance(self.surface, Mapping) and not self.surface:
@@ -133,7 +132,7 @@ class Scene:
 
 
 class SceneParts(TypedDict, total=False):
-    """What the kernels of a scene are declared by, as `scene_kernel` says; a cycle that is driven needs no surface."""
+    """Arguments of the functions that make kernels of a scene, see `scene_kernel`; a driven cycle needs no surface."""
 
     name: Required[str]
     doc: Required[str]
@@ -149,33 +148,33 @@ class SceneParts(TypedDict, total=False):
 
 
 def scene_kernel(**parts: Unpack[SceneParts]) -> Kernel:
-    """A kernel that follows a scene from its start to its last switch.
+    """Make a kernel that follows a scene from its start to its last switch.
 
     Parameters
     ----------
-    name, doc : what the kernel is called, and a line about it
-    states, parameters : what they are called, their units; a state's Field is also that of the output
+    name, doc : name of the kernel, and a one-line description
+    states, parameters : sequences of Field, with names and units; a state's Field is also that of the output
     rates, surface, start, switch : as in `Scene`
-    start_time : what `t` is at the start, where one of the functions asks for it: a number, or (parameters) -> one
-    source : where the scene comes from
-    example : parameters at which the scene runs well
+    start_time : value of the time `t` at the start, if a function uses it: a number, or (parameters) -> a number
+    source : reference for the scene
+    example : values of the parameters for an example study
 
     Returns
     -------
     Kernel
-        With a further parameter `flips`, the number of switches to follow, and as outputs `time` of the last switch,
-        `interval` since the one before, and each state just before the last switch.
+        It has an additional parameter `flips`, the number of switches to follow. Its outputs are `time` of the last
+        switch, `interval` since the previous one, and each state just before the last switch.
 
     Raises
     ------
     SceneError
-        Where the functions ask for what is not there, or do what cannot be recorded.
+        A function has an unknown argument, or an operation that cannot be recorded.
     """
     scene, fields = scene_of(parts), (*parts["parameters"], flips_field(40.0, MOST_FLIPS))
     outputs = (*TIMES, *states_of(parts))
     docs = {
         "taylor": f"{SERIES}; the error propagated, or three runs compared",
-        "taylor_once": "the same in one run, each step accurate to rtol; total error unknown (bound inf)",
+        "taylor_once": "Taylor series in one run, each step accurate to rtol; total error unknown (bound inf)",
         "rodas5p": f"for stiff equations: Rosenbrock's method Rodas5P, L-stable, {LOCATED}",
         "dop853": f"Dormand-Prince 8(5,3) {LOCATED}",
         "dopri5": f"Dormand-Prince 5(4) {LOCATED}",
@@ -222,7 +221,7 @@ TIMES = (
 
 
 def states_of(parts: SceneParts) -> list[Field]:
-    """A scene's states as outputs."""
+    """The states of a scene, as outputs."""
     return [replace(field, sized=True) for field in parts["states"]]
 
 
@@ -232,10 +231,10 @@ def scene_of(parts: SceneParts) -> Scene:
     Raises TypeError where one of `parts` is missing or no field, or there is none of that name.
     """
     if wrong := (parts.keys() - SceneParts.__annotations__.keys()) | (SceneParts.__required_keys__ - parts.keys()):
-        raise TypeError(f"a scene wants {', '.join(SceneParts.__annotations__)}; wrong or missing: {min(wrong)!r}")
+        raise TypeError(f"a scene has {', '.join(SceneParts.__annotations__)}; unknown or missing: {min(wrong)!r}")
     for field in (*parts["states"], *parts["parameters"]):
         if not isinstance(field, Field):
-            raise TypeError(f'states and parameters are Fields, e.g. Field("x", "m", "where it is"); found {field!r}')
+            raise TypeError(f'states and parameters are Fields, e.g. Field("x", "m", "position"); found {field!r}')
     states, parameters = (tuple(field.name for field in parts[key]) for key in ("states", "parameters"))
     surface, switch, start_time = parts.get("surface"), parts.get("switch"), parts.get("start_time")
     scene = Scene(parts["name"], parts["doc"], states, parameters, parts["rates"], surface, parts["start"], switch)
@@ -243,7 +242,7 @@ def scene_of(parts: SceneParts) -> Scene:
     if asks_for_time(functions, (*states, *parameters)):
         return replace(scene, states=(*states, "t"), start_time=0.0 if start_time is None else start_time)
     if start_time is not None:
-        raise SceneError(f"start_time of the scene {scene.name}: none of its functions asks for the time t")
+        raise SceneError(f"start_time of the scene {scene.name}: none of its functions has the argument t, the time")
     return scene
 
 
@@ -262,16 +261,16 @@ def estimating_kernel(
     check: OnColumns | None = None,
     blind: Sequence[str] = (),
 ) -> Kernel:
-    """A kernel of a scene by methods that know afterwards what their values are right to.
+    """A kernel of a scene with methods that estimate their error in each cell.
 
     Parameters
     ----------
-    along : one coordinate, whose values have to rise, or none
-    docs : {method: a line about it}
-    solved : (method, columns of parameters, rtol, values along, names of outputs that are asked for) -> values of each
-        output, (n_cells,) or (n_values, n_cells), or None where there are none; error; status
+    along : one coordinate, whose values must ascend, or none
+    docs : {method: a one-line description}
+    solved : (method, columns of parameters, rtol, values along, names of requested outputs) -> values of each output,
+        (n_cells,) or (n_values, n_cells), or None if there are none; error; status
     check : as in `declared`
-    blind : methods whose values may be off by any amount
+    blind : methods without any error estimate
     """
     count, names = len(parameters), [f.name for f in outputs]
 

@@ -1,9 +1,9 @@
-"""Scenes of one's own followed by textbook integrators at a fixed step.
+"""Scenes of your own solved by textbook integrators with a fixed step.
 
-The parameters `step` and `location` (`events`) may be axes of a study. Everything is done three times
-(`three_steps`): what the runs differ by tells `error`, which is also what a method states as its bound, unless the
-differences grow as the step shrinks: INACCURATE. Semi-implicit Euler and Verlet are to be had where the states are
-pairs (place, speed), Moreau's method for one pair with dry friction at speed 0.
+The parameters `step` and `location` (`events`) may be axes of a study. A cell is solved three times (`three_steps`);
+the differences between these runs give `error`, which is also the bound of the method. If they grow as the step
+shrinks, the cell is INACCURATE. Semi-implicit Euler and Verlet need states in pairs (position, velocity); Moreau's
+method needs one pair, with dry friction at velocity 0.
 """
 
 import math
@@ -41,12 +41,12 @@ COST = (
 
 
 def stepping_fields(flips: float = 20.0) -> tuple[Field, Field, Field]:
-    """The parameters that every scene has: switches to follow, step, location."""
+    """Parameters of every scene with a fixed step: switches to follow, step, location."""
     words: dict[str, Any] = {"lower": 0.0, "upper": 3.0, "choices": LOCATIONS, "integer": True}
     return (
         flips_field(flips, MOST_FLIPS),
         Field("step", "s", "time step", lower=0.0, open_lower=True),
-        Field("location", "1", "how a switch is found in its step", default=3.0, **words),
+        Field("location", "1", "how a switch is located within its step", default=3.0, **words),
     )
 
 
@@ -106,16 +106,16 @@ def _fill_plainly(time: Any, interval: Any, states: Any, reach: Any, columns: An
 
 
 def stepped_kernel(**parts: Unpack[SceneParts]) -> Kernel:
-    """A kernel that follows a scene at a fixed step; the arguments are those of `kernels.scene.scene_kernel`.
+    """Make a kernel that follows a scene with a fixed step; arguments as in `kernels.scene.scene_kernel`.
 
     Returns
     -------
     Kernel
-        Of the scene's parameters, `flips`, `step` and `location`; its outputs are `time` of the last switch, `interval`
-        since the one before, each state just before it, and `error`, `steps`, `rate_calls`.
+        Its parameters are those of the scene, `flips`, `step` and `location`; its outputs are `time` of the last
+        switch, `interval` since the previous one, each state just before it, and `error`, `steps`, `rate_calls`.
     """
     scene = scene_of(parts)
     if not callable(scene.surface):
-        raise SceneError(f"the scene {scene.name}: at a fixed step there is one surface")
+        raise SceneError(f"the scene {scene.name}: with a fixed step only one surface is possible")
     fields, outputs = (*parts["parameters"], *stepping_fields()), (*TIMES, *parts["states"], *COST)
     return declared(parts, fields, outputs, stepping_methods(scene, fields, outputs, _fill_plainly))

@@ -1,8 +1,8 @@
-"""A scene of one's own along its way: its states at each switch, or at given times.
+"""Trajectories of a scene of your own: its states at each switch, or at given times.
 
-A section is the states just before each switch that is asked for: a diagram of bifurcations is one study. A motion is
-the states at given times after the start. Either is followed once, with stops. Each state is right to rtol of the
-largest size that it had on the way, and each time to rtol of itself; the worst one counts for the cell.
+A section has the states just before each requested switch, so that a bifurcation diagram is one study. A motion has the
+states at given times after the start. Each state is accurate to rtol times the largest size that it had up to then, and
+each time to rtol times itself; the least accurate one decides the status of the cell.
 """
 
 import math
@@ -27,36 +27,37 @@ MOST = 1_000_000.0
 
 
 def section_kernel(**parts: Unpack[SceneParts]) -> Kernel:
-    """A kernel of a scene's states at many of its switches; the arguments are those of `kernels.scene.scene_kernel`.
+    """Make a kernel for the states of a scene at its switches; arguments as in `kernels.scene.scene_kernel`.
 
     Returns
     -------
     Kernel
-        Along `passage`, the numbers of the switches that a study asks for, rising: `time` and each state just before.
+        Its outputs are `time` and each state just before the switch, along `passage`, the ascending numbers of the
+        switches that a study names.
     """
     along = Field("passage", "1", "number of the switch, from the start", lower=1.0, upper=MOST, integer=True)
     return _at_stops(parts, scene_of(parts), along, [Field("time", "s", "time of the switch")])
 
 
 def motion_kernel(**parts: Unpack[SceneParts]) -> Kernel:
-    """A kernel of a scene's states at given times; the arguments are those of `kernels.scene.scene_kernel`.
+    """Make a kernel for the states of a scene at given times; arguments as in `kernels.scene.scene_kernel`.
 
     Returns
     -------
     Kernel
-        Along `at`, rising times after the start: each state then. TOO_SHORT where the motion does not come to all of
-        them, as where its switches accumulate: then later states are NaN.
+        Its outputs are the states along `at`, ascending times after the start. TOO_SHORT if the motion ends before the
+        last of them, for example because switches accumulate; later states are then NaN.
     """
     along = Field("at", "s", "time after the start", lower=0.0, open_lower=True)
     return _at_stops(parts, clocked(scene_of(parts)), along, [])
 
 
 def _at_stops(parts: SceneParts, scene: Scene, along: Field, times: list[Field]) -> Kernel:
-    """A kernel of what a scene comes to at stops along the way, followed once.
+    """A kernel for the states of a scene at stops along its trajectory, which is followed once.
 
-    A state, or time, is NaN where a motion does not come to. The status is OK, or what was remarked, or why there is
-    nothing at all, or not all. Where a method gives later stops up, which another one may solve, it is INACCURATE, and
-    the error infinite.
+    States and times at stops that the motion does not reach are NaN. The status is OK, a remark, or the reason why
+    stops are missing. If a method fails at later stops, which another one may solve, it is INACCURATE, with an infinite
+    error.
     """
     outputs = [replace(f, dims=(along.name,), gaps=True) for f in (*times, *states_of(parts))]
     shown = [*range(len(times)), *range(2, 2 + len(parts["states"]))]

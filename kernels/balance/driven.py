@@ -54,7 +54,7 @@ BALANCE_DRIVEN = kernel(
         Field("zeta", "1", "viscous damping ratio c/(2 sqrt(I k))", lower=0.0),
         Field("omega_n", "rad/s", "angular frequency without friction, sqrt(k/I)", lower=0.0, open_lower=True),
         Field("r", "rad", "solid friction torque over spring stiffness, R/k", lower=0.0),
-        Field("w", "rad^2", "impulse: energy over spring stiffness given at each passage of 0; or else m and beta",
+        Field("w", "rad^2", "impulse: energy over spring stiffness, at each passage of 0; instead of m and beta",
               default=0.0, lower=0.0, open_lower=True),
         Field("m", "rad", "lift torque over spring stiffness", default=0.0, lower=0.0),
         Field("beta", "rad", "the lift acts over abs(theta) < beta", default=0.0, lower=0.0),
@@ -63,7 +63,7 @@ BALANCE_DRIVEN = kernel(
         Field("amplitude", "rad", "largest angle on the limit cycle"),
         Field("period", "s", "period of the limit cycle"),
         Field("multiplier", "1",
-              "multiplier of the half-swing map, of the amplitude as of the energy (0 where below 1e-308)"),
+              "multiplier of the half-swing map; underflows to 0 below 1e-308"),
     ),
     check=check,
     methods=(

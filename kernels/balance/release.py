@@ -115,8 +115,8 @@ OUTPUTS = (
     Field("half_swings", "1", "half swings until rest", integer=True),
     Field("stop_angle", "rad", "angle of rest, from the spring's zero"),
     Field("stop_time", "s", "time from release to rest"),
-    Field("margin", "1", "least distance of abs(theta) at a turning point from r_s, over r_s"),
-    Field("period", "s", "time of two half swings, the same for each"),
+    Field("margin", "1", "smallest abs(abs(theta)/r_s - 1) at a turning point"),
+    Field("period", "s", "time of two half swings, constant during the ring-down"),
 )
 
 RingDown = namedtuple("RingDown", [field.name for field in OUTPUTS])
@@ -131,6 +131,6 @@ BALANCE = kernel(
     outputs=OUTPUTS,
     record=Balance,
     check=check,
-    methods=(method("closed", "formula of the count, confirmed in 32 digits", closed, ROUNDING),),
+    methods=(method("closed", "formula for the number of half swings, verified in 32 digits", closed, ROUNDING),),
     example=EXAMPLE,
 )

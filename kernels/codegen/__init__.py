@@ -1,5 +1,5 @@
-"""A scene of one's own as compiled functions: recorded, turned into series or steps, followed to a tolerance.
+"""Compiles a scene of your own: records it, makes series or steps of it, and solves it to a tolerance.
 
-Faces: `compiled` (what runs a scene by a method), `followed` (columns of cells by it), `to_tolerance`, `three_steps`
-(fixed steps). Users come in by `kernels.scene` and `kernels.stepping`.
+Faces: `compiled` (runs a scene by a method), `followed` (columns of cells), `to_tolerance`, `three_steps` (fixed
+steps). The public interface is in `kernels.scene` and `kernels.stepping`.
 """

@@ -1,11 +1,12 @@
-"""Switches that accumulate, as the bounces of a ball, carried through to where they come to rest.
+"""Accumulating switches, as the bounces of a ball: their limit, where the motion comes to rest.
 
-Where a motion ends, or what is left of it is less than the method can tell, before the wanted number of switches, the
-last ones that are right are looked at. Their intervals d_n shrink in the limit by the same factor each; two at a time,
-for two surfaces may take turns, the time of rest is by Aitken's formula
+If a motion ends, or becomes smaller than the method can resolve, before the wanted number of switches, the last
+accurate switches are extrapolated. In the limit their intervals d_n shrink by a constant factor; taken in pairs, since
+two surfaces may alternate, the time of rest is by Aitken's formula
     t = t_n + D q/(1 - q),  D = d_n + d_{n-1},  q = D/(d_{n-2} + d_{n-3}),                                 (1)
-and so is every state. The same from the switch before tells the error: where q is near 1, the limit may go on to
-move by as much over LEFT/(1 - q) switches, as it does where intervals shrink by a power of their number only.
+and likewise every state. The change of this limit from the previous switch gives the error: with q near 1, the limit
+may change as much in each of LEFT/(1 - q) more switches, as it does where intervals shrink like a power of their
+number.
 """
 
 import numpy as np

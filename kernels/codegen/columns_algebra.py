@@ -1,4 +1,4 @@
-"""Small linear equations and eigenvalues of columns of cells: sums and products one by one, so bits are everybody's.
+"""Small linear equations and eigenvalues for columns of cells, by explicit sums and products: same bits everywhere.
 
 A matrix has the shape (n, n, n_cells); numpy's own linear algebra calls a library whose bits depend on the CPU.
 """

@@ -1,6 +1,6 @@
 """A scene as compiled code, made once for each method.
 
-What Python calls is kept among the kernels' own machine code (`cache`), by a name with a digest of the scene's graph.
+Entry functions are cached with the machine code of the kernels (`cache`), under a digest of the scene's graph.
 """
 
 import contextlib
@@ -121,5 +121,5 @@ def compiling(scene, method):
         why = next((line.strip() for line in str(error).splitlines() if line.strip() and "Failed in" not in line), "")
         raise SceneError(
             f"the scene {scene} cannot be compiled for the method {method}: {why[:200]}\n"
-            f"Take another method, or say the scene in simpler terms: {FUNCTIONS}"
+            f"Use another method, or simpler expressions: {FUNCTIONS}"
         ) from None

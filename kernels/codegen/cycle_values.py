@@ -1,13 +1,13 @@
-"""What is said of the limit cycles that a search has found (`limit_cycle`), each value with its error.
+"""Outputs of the limit cycles found by a search (`limit_cycle`), each with its error.
 
-Derivatives are central differences of runs to a tolerance r, at h, 2 h and 4 h of the size of each state and of each
-parameter; the sixth order by Richardson's rule is given, and what it differs by from the fourth is what it leaves out.
-The noise of the runs is what second and fourth derivatives leave of the sums of both sides, and ODD of r/h at least:
-all slopes are believed to have as much as the worst one. With rho, J and T as in `limit_cycle` and to first order, the
-root is off by
+Derivatives are central differences of runs to a tolerance r, with steps h, 2 h and 4 h times the size of each state and
+parameter. Richardson extrapolation gives sixth order; the difference from fourth order is the truncation error.
+The noise of the runs is the residual of the sums of both sides after second and fourth derivatives, and at least ODD
+r/h; the noisiest slope sets it for all slopes. With rho, J and T as in `limit_cycle`, the error of the root is, to
+first order,
     dz = (I - J)^-1 (rho + r),  dT = (dT/dz) dz + r T,                                                     (1)
-and the period changes with a parameter p by dT/dp + (dT/dz) (I - J)^-1 dP/dp. Derivatives at that root are off by the
-second derivatives times dz besides, which is most of their error where a multiplier is close to 1.
+and the period changes with a parameter p by dT/dp + (dT/dz) (I - J)^-1 dP/dp. Derivatives at that root have an
+additional error, second derivatives times dz, which dominates if a multiplier is close to 1.
 """
 
 import math

@@ -1,7 +1,7 @@
-"""Columns of cells followed by what runs a scene (`compiled.Runner`), each step right to a tolerance.
+"""Solves columns of cells with a compiled scene (`compiled.Runner`), each step to a tolerance.
 
-Results are a row each: time of the last switch, or of each stop, interval, states, the states' sizes on the way, the
-status; and where it is told, the error that is carried along, relative to the worst of the results.
+Each result is a row: time of the last switch, or of each stop, interval, states, the largest sizes of the states, the
+status; and for methods that propagate their error, the largest error of these results.
 """
 
 import math

@@ -1,7 +1,7 @@
-"""A recorded scene as functions: plain Python over its expressions, run when code is compiled (`lanes.symbols`).
+"""Functions made of a recorded scene: plain Python over its expressions, run at compile time (`lanes.symbols`).
 
-They are what is special of a scene: rates, series, tangents, events; what is done with them is generic
-(`kernels.integrate`). In plain Python they are functions like any other.
+They are the part that is specific to a scene: rates, series, tangents, events; the integrators are generic
+(`kernels.integrate`). In plain Python they are ordinary functions.
 """
 
 import functools

@@ -1,13 +1,13 @@
 """Limit cycles of a scene: fixed points of its return map, by Newton's method on columns of cells.
 
-With P(z) the states `flips` switches later and T(z) the time that takes, a cycle is a root of
-    rho = P(z) - z - s = 0,  s whole numbers of the states' own turns (a phase that goes on by 2 pi),         (1)
+With P(z) the states `flips` switches later and T(z) the time elapsed, a cycle is a root of
+    rho = P(z) - z - s = 0,  s whole multiples of the states' turns (a phase that advances by 2 pi),         (1)
 and its multipliers are the eigenvalues of J = dP/dz on the surface; rho and J are in units of the states' sizes, and J
-is made of central differences of runs to a tolerance. (Tangents as further states of the scene would know neither
-slides nor powers of abs(u), and take twice the time to compile and three times that of a run, for the same digits.)
-Newton's method begins where the motion from the start is after some switches. Where it finds nothing, or a cycle that
-is not stable, it begins again after more of them. A cycle found at another value of a parameter is followed to the
-cell's own along the branch's tangent (I - J)^-1 dP/dp, in steps of its own, so that it hangs on no other cell.
+is computed by central differences of runs to a tolerance. (Tangents as additional states would not cover slides and
+powers of abs(u), and would double the compile time and triple the run time, for the same digits.)
+Newton's method begins at the motion's state after some switches. If it finds nothing, or an unstable cycle, it begins
+again after more of them. A cycle found at another value of a parameter is continued to the cell's value along the
+branch's tangent (I - J)^-1 dP/dp, in steps of its own, so that it does not depend on other cells.
 """
 
 import math

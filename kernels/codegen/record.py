@@ -1,4 +1,4 @@
-"""What a scene's functions do, recorded: the graphs of its rates, surface, switch and start."""
+"""Records the functions of a scene as graphs: rates, surface, switch and start."""
 
 import contextlib
 import copy
@@ -90,7 +90,7 @@ def _recorded(scene, held):
         if u.varies and (scene.peaks == "all" or (scene.peaks and u.kind == INPUT)):
             graph.kink(u)
     if scene.surface is None:
-        raise SceneError(f"the scene {scene.name} needs a surface, at which its switches are")
+        raise SceneError(f"the scene {scene.name} needs a surface, which defines its switches")
     surfaces, found = named_functions(scene.surface), []
     for name, function in surfaces.items():
         found += _called(graph, scene, f"surface {name}".rstrip(), function, states | constants, 1)
@@ -154,7 +154,7 @@ def _called(graph, scene, role, function, named, length):
     try:
         unknown = [name for name in wanted(function, named) if name not in named]
         if unknown:
-            raise SceneError(f"it asks for {unknown[0]!r}; there are {', '.join(named)}")
+            raise SceneError(f"unknown argument {unknown[0]!r}; known: {', '.join(named)}")
         found = returned(function, named)
         if len(found) != length:
             raise SceneError(f"it returns {len(found)} values instead of {length}")

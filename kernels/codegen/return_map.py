@@ -1,10 +1,10 @@
 """Maps of a scene's states: from one switch at its first surface to a later one, and from the start to a given time.
 
-A run begins behind the switch. So a scene of its own is made, whose start takes the states before it as parameters,
-and which begins as the scene itself does where the parameter FRESH is 1. Its rates, surfaces and switches are the
-scene's; of several surfaces the first alone counts. The state that it watches is put onto it, whatever is given for it.
-Of a scene that is driven with a period, the switch is that one has passed: then all states are free. For given times a
-scene is made with a clock as its last state: its first surface is that the clock comes to the time wanted.
+A run begins just after the switch. So a separate scene is made, whose start takes the states before the switch as
+parameters; if the parameter FRESH is 1, it starts as the scene itself does. Its rates, surfaces and switches are those
+of the scene; of several surfaces only the first is counted. The state on which that surface depends is set to lie on
+it. For a periodically driven scene, the switch is the end of a period, and all states are free. For given times, a
+scene is made with a clock as its last state, whose first surface is reached when the clock shows the requested time.
 """
 
 import functools
@@ -149,7 +149,7 @@ def watched(scene):
         by, u = u.graph.parts(term)
         offset, factor = offset + factor * constant, factor * by
     if u.kind != INPUT:
-        raise SceneError(f"surface of the scene {scene.name}: of a cycle it has to be a state, but for constants")
+        raise SceneError(f"surface of the scene {scene.name}: for a cycle it must be a state plus a constant")
     return offset, factor, scene.states.index(u.args[0])
 
 

@@ -1,10 +1,10 @@
-"""A scene whose motion goes on along a kink onto which both sides press it, by Filippov's field.
+"""Motion that slides along a kink, towards which the vector field points from both sides (Filippov).
 
 With u = 0 on the kink, f+ and f- the rates above and below it and u'(f) the rate of u along them, where
     u'(f+) < 0 < u'(f-):  f = f- + a (f+ - f-),  a = u'(f-)/(u'(f-) - u'(f+))                             (1)
-keeps u at 0. The motion leaves to the side whose u' comes to 0: where -u'(f+) u'(f-) falls through 0, which is the
+keeps u at 0. The motion leaves to the side whose u' reaches 0: where -u'(f+) u'(f-) falls through 0, which is the
 kink's event while the motion slides. All of this is recorded in the graph of the scene itself: the sign of a kink is
-0 while the motion slides along it, and with signs of 1 and -1 everything is as before. One kink is slid along at once.
+0 while the motion slides along it, and signs of 1 and -1 work as before. Sliding along two kinks is not supported.
 Source: Filippov, Differential Equations with Discontinuous Righthand Sides (1988), section 4.
 """
 

@@ -1,13 +1,13 @@
-"""Columns of cells followed at a fixed step, and how far the result can be believed.
+"""Solves columns of cells with a fixed step, and estimates the error of the result.
 
-A cell is followed three times: at its step, at less than half of it with each step made of two halves, those that end
-on an event too, and at a step between. What any two of them differ by tells the first one's error; two alone may agree
-by chance. Whole fractions of the step would see the same points of the motion again, and agree where each is as wrong,
-so the fractions are not whole. Where the run between, which is nearer to the first, differs from it by next to nothing
-of what the finest does, the differences grow as the step shrinks, and do not tell what is left: INACCURATE. Without
-location steps are not made of halves, and a switch is known to one step at best. The other runs' parameters are some
-roundings off (`off_by_roundings`), so that rounding that a scene makes worse shows too. Where the motion would turn
-round behind a switch within the error, the switch may not be there at all: GRAZING.
+A cell is solved three times: with its step; with less than half of it, each step consisting of two halves, also those
+that end on an event; and with a step in between. The largest difference of two runs gives the error of the first; only
+two might agree by chance. With integer fractions of the step the runs would sample the same points of the motion, and
+could agree although all are wrong, so the fractions are not integer. If the intermediate run, which is closer to the
+first, differs from it by almost nothing of what the finest does, differences grow as the step shrinks, and are no
+estimate: INACCURATE. Without location, steps are not halved, and a switch is known to one step at best. The parameters
+of the other runs are perturbed by some roundings (`off_by_roundings`), so that amplified rounding errors show as well.
+If the motion turns round behind a switch within the error, the switch may not exist: GRAZING.
 """
 
 import numpy as np

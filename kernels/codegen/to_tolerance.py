@@ -1,22 +1,22 @@
-"""Columns of cells solved to a tolerance: followed so often that the result can be believed.
+"""Solves columns of cells to a tolerance, in as many runs as an error estimate needs.
 
-Each step is right to a tolerance; what many steps come to depends on the scene. By Taylor series the error is carried
-along (`integrate.carried`), signed and of first order; STATED times that is to be believed. A cell of which that does
-not show that it is right is followed again with a tolerance as much smaller, up to TRIALS times; what then is left, and
-every cell by another method, is followed three times. But where the error grows as large as the motion, several runs
-may agree by chance, so that is INACCURATE; and where it has been told, by how much switches multiply what each leg
-leaves out, the same in all runs where it is one step, only runs of which the tolerance is far smaller tell of rounding.
+Each step meets a tolerance; the accumulated error depends on the scene. With Taylor series the error is propagated
+(`integrate.carried`), signed and of first order; STATED times it is taken as a bound. If that exceeds rtol, the cell is
+solved again with a smaller tolerance, up to TRIALS times; cells that remain, and all cells by other methods, are solved
+three times. If the error grows as large as the motion, several runs may agree by chance: INACCURATE. If the factor is
+known by which switches multiply the truncation error of each leg, which is equal in all runs if a leg is one step, only
+runs with a far smaller tolerance reveal rounding errors.
 
-Of three runs, the rough and the finest one have tolerances FINER apart: what they differ by is the rough one's error,
-of which the finest, whose results are given, has about 1/FINER. The rough run's parameters are some roundings off
-(`off_by_roundings`), and so are its start and the times of its events (`shake`); the third run has the opposite
-roundings, and a tolerance between those two. It shows what a scene makes of rounding, which two runs may share. Where
-that is all that tells them apart, these two are on both sides of the truth, and the finest may be as far from it as the
-third one, and agree with that: then it is off by half of what it differs from the rough one by. So that may be no more
-than what is wanted, and a tolerance for the steps.
+Of the three runs, the coarsest and the finest have tolerances that differ by the factor FINER: their difference is the
+error of the coarsest, and the finest, whose results are returned, has about 1/FINER of it. The parameters of the
+coarsest run are perturbed by some roundings (`off_by_roundings`), as are its start and the times of its events
+(`shake`); the third run has the opposite roundings, and a tolerance in between. It shows how the scene amplifies
+rounding, which two runs might share. If rounding dominates, these two runs lie on both sides of the truth, and the
+finest may be as far from it as the third and agree with that: its error is then half of its difference from the
+coarsest. So that half may not exceed rtol plus a tolerance for the steps.
 
-A cell may be followed to several stops, numbers of switches. Each is judged by itself, and the cell is followed again
-where one is not right. Cells that come to rest or stick are gone on with: `accumulated`, `sliding`.
+A cell may have several stops, numbers of switches. Each is judged separately, and the cell is solved again if one is
+not accurate. Cells that come to rest or stick are continued by `accumulated` and `sliding`.
 """
 
 import contextlib

@@ -86,9 +86,9 @@ def check(p):
 
 
 PARAMETERS = (
-    Field("J", "kg m^2", "inertias, from the free end on", lower=0.0, open_lower=True, dims=("mass",)),
-    Field("k", "N m/rad", "springs behind each inertia; 0 of the last one: no ground", lower=0.0, dims=("mass",)),
-    Field("h", "N m s/rad", "dampers beside the springs", lower=0.0, dims=("mass",)),
+    Field("J", "kg m^2", "moments of inertia, beginning at the free end", lower=0.0, open_lower=True, dims=("mass",)),
+    Field("k", "N m/rad", "stiffness of the spring after each; last one 0: no ground", lower=0.0, dims=("mass",)),
+    Field("h", "N m s/rad", "damping parallel to each spring", lower=0.0, dims=("mass",)),
     Field("drive_mass", "1", "number of the inertia with the torque", 1.0, lower=1.0, upper=64.0, integer=True),
     Field("read_mass", "1", "number of the inertia whose angle is given", "drive_mass", 1.0, 64.0, integer=True),
 )  # fmt: skip
@@ -120,7 +120,7 @@ DRIVETRAIN_FRF = kernel(
     loop=cell_by_cell,
     methods=(
         tracing(
-            "continued", "the chain followed from both ends at each frequency", _follow,
+            "continued", "recursion from both ends of the chain at each frequency", _follow,
             buffers=_buffers, loop=cell_by_cell,
         ),
     ),

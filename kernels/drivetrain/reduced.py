@@ -223,18 +223,18 @@ def check(p):
 
 
 PARAMETERS = (
-    Field("J", "kg m^2", "moments of inertia, from the spindle on", lower=0.0, open_lower=True, dims=("mass",)),
-    Field("k", "N m/rad", "stiffness of the spring behind each; only the last, to ground, may be 0", lower=0.0,
+    Field("J", "kg m^2", "moments of inertia, beginning at the spindle", lower=0.0, open_lower=True, dims=("mass",)),
+    Field("k", "N m/rad", "stiffness of the spring after each inertia; only the last, to ground, may be 0", lower=0.0,
           dims=("mass",)),
-    Field("h", "N m s/rad", "damping beside each spring", default=0.0, lower=0.0, dims=("mass",)),
+    Field("h", "N m s/rad", "damping parallel to each spring", default=0.0, lower=0.0, dims=("mass",)),
     Field("reduction", "1", "how the chain is reduced", default=0.0, lower=0.0, upper=6.0, choices=REDUCTIONS,
           integer=True),
-    Field("n_keep", "1", "masses (or modes) that stay; 0: as many as `tol` needs", default=0.0, lower=0.0,
+    Field("n_keep", "1", "masses (or modes) to keep; 0: as few as `tol` allows", default=0.0, lower=0.0,
           upper=float(MASS_LIMIT), integer=True),
-    Field("tol", "1", "relative error that frequencies up to `f_max` may have; 0: `n_keep` is given", default=0.0,
+    Field("tol", "1", "allowed relative error of frequencies up to `f_max`; 0: `n_keep` decides", default=0.0,
           lower=0.0),
-    Field("f_max", "Hz", "highest frequency that counts", default=EVERYTHING, lower=0.0, open_lower=True),
-    Field("order", "1", "what goes first: strictly the smallest J e, or as in the source, where type a wins a tie",
+    Field("f_max", "Hz", "highest frequency of interest", default=EVERYTHING, lower=0.0, open_lower=True),
+    Field("order", "1", "order of elimination: the smallest J e first, or as in the source, where type a wins a tie",
           default=0.0, lower=0.0, upper=1.0, choices=ORDERS, integer=True),
 )  # fmt: skip
 """The chain, and what it is to be reduced to."""
@@ -242,16 +242,16 @@ PARAMETERS = (
 Drivetrain = namedtuple("Drivetrain", [field.name for field in PARAMETERS])
 
 OUTPUTS = (
-    Field("frequency", "Hz", "natural frequencies without damping, rising", dims=("mode",), gaps=True),
-    Field("frequency_error", "1", "frequency over that of the full chain, minus 1", dims=("mode",), gaps=True),
-    Field("damping", "1", "-Re s/abs(s) of the damped poles; of two real ones above 1", dims=("mode",), gaps=True),
+    Field("frequency", "Hz", "undamped natural frequencies, ascending", dims=("mode",), gaps=True),
+    Field("frequency_error", "1", "relative error of each, against the full chain", dims=("mode",), gaps=True),
+    Field("damping", "1", "damping ratio -Re s/abs(s) of poles; above 1: two real ones", dims=("mode",), gaps=True),
     Field("n_kept", "1", "masses (or modes) of the reduced model", integer=True),
     Field("frf_error", "1", "largest error of the spindle's receptance up to `f_max` over its largest value; NaN "
-          "where that is infinite: an undamped resonance, a free end", gaps=True),
-    Field("valid_to", "Hz", "frequency up to which merged dampers hold, w h e = 0.1; `f_max` where none is"),
+          "if that is infinite: an undamped resonance, a free end", gaps=True),
+    Field("valid_to", "Hz", "frequency up to which merged dampers hold, omega h/k = 0.1; `f_max` without any"),
     Field("J_kept", "kg m^2", "moments of inertia of the reduced chain", dims=("mass",), gaps=True),
-    Field("k_kept", "N m/rad", "its springs", dims=("mass",), gaps=True),
-    Field("h_kept", "N m s/rad", "its dampers", dims=("mass",), gaps=True),
+    Field("k_kept", "N m/rad", "stiffnesses of the reduced chain", dims=("mass",), gaps=True),
+    Field("h_kept", "N m s/rad", "dampers of the reduced chain", dims=("mass",), gaps=True),
 )  # fmt: skip
 
 Outputs = namedtuple("Outputs", [field.name for field in OUTPUTS])
@@ -259,7 +259,7 @@ Outputs = namedtuple("Outputs", [field.name for field in OUTPUTS])
 DRIVETRAIN = kernel(
     "drivetrain",
     doc="drivetrain chain and its reduction to fewer masses",
-    source="Baran & Marchelek, Mechanika Teoretyczna i Stosowana 9 (1971) 201; others in their modules",
+    source="Baran & Marchelek, Mechanika Teoretyczna i Stosowana 9 (1971) 201; other reductions in their modules",
     parameters=PARAMETERS,
     outputs=OUTPUTS,
     record=Drivetrain,
@@ -267,7 +267,7 @@ DRIVETRAIN = kernel(
     loop=cell_by_cell,
     methods=(
         tracing(
-            "direct", "frequencies by dqds, reduced models as they are defined", _fill,
+            "direct", "frequencies by dqds; reduced models from their definitions", _fill,
             buffers=_scene, loop=cell_by_cell, estimates=True, parts=table("reduction", dict(enumerate(WAYS.values()))),
         ),
     ),

@@ -1,6 +1,6 @@
-"""What a scene's functions are made of: the graph of its right-hand side, and what is computed of its expressions.
+"""The expression graph of a scene's functions, and computations on it.
 
-Faces: `graph` (what a right-hand side may use), `tangent` (its derivatives), and of numbers, of lanes, or of
-symbols when code is compiled: `series`, `hidden`, `rounding`, `stiff`. `codegen` makes functions of them; what is done
-with these is generic (`integrate`).
+Faces: `graph` (operations of a right-hand side), `tangent` (derivatives), and, for numbers, lanes, or symbols at
+compile time, `series`, `hidden`, `rounding`, `stiff`. `codegen` makes functions of them, for the generic integrators of
+`integrate`.
 """

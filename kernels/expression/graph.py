@@ -1,4 +1,4 @@
-"""The expression graph of a right-hand side: what a plain Python function does to named scalars, recorded.
+"""The expression graph of a right-hand side: the recorded operations of a plain Python function on scalars.
 
 A function called once with recording objects instead of numbers leaves a graph of its operations; equal operations
 are recorded once. An expression is a *series* where it varies along the motion, else a *constant*, computed once. A
@@ -6,9 +6,9 @@ product keeps its constants apart, `scaled(constant, series)`: c v abs(v) is (2 
 half a square needs the fewest operations.
 
 abs(u) and sign(u) bend or jump where u = 0: each such u is a *kink*. Between kinks the sign of u is a constant, an
-input of the graph; an integrator stops at a kink and turns the sign round. floor(u) is one where sin(pi u) = 0, whose
-sign tells whether the integer is even. Of what is *held*, states whose rates are 0, no kink is met: between two
-switches it is a constant, and abs, sign and floor are those of a number, at 0 too.
+input of the graph; an integrator stops at a kink and changes the sign. floor(u) has kinks where sin(pi u) = 0, whose
+sign tells whether the integer is even. States whose rates are 0 are *held*: they are constant between two switches and
+have no kinks, and abs, sign and floor of them are those of a number, also at 0.
 """
 
 import functools
@@ -68,7 +68,7 @@ class Expression:
     __hash__ = object.__hash__
 
     def __eq__(self, other):
-        raise SceneError(f"it asks whether two values are equal, which is not recorded; {INSTEAD}")
+        raise SceneError(f"it tests two values for equality, which cannot be recorded; {INSTEAD}")
 
     def __bool__(self):
         raise SceneError(f"it branches on a value, which is not recorded; {INSTEAD}")
@@ -148,14 +148,14 @@ class Graph:
         """The value as an expression. Raises SceneError for what is none."""
         if isinstance(value, Expression):
             if value.graph is not self:
-                raise SceneError(f"{value!r} is of another call of the scene's functions")
+                raise SceneError(f"{value!r} belongs to another call of the scene's functions")
             return value
         if getattr(value, "shape", None) == ():
             value = value.item()  # a number of numpy's
         if not isinstance(value, Real):
             raise SceneError(f"expected a number or an expression, found {value!r}")
         if not abs(value) <= FLOAT_MAX:
-            raise SceneError(f"{str(value)[:40]} is no number that a float64 can hold")
+            raise SceneError(f"{str(value)[:40]} is outside the range of float64")
         return self._node(NUMBER, (float(value),), False)
 
     def parts(self, x):

@@ -1,11 +1,11 @@
-"""What a scene's rates may hide in a step from one who knows them at its beginning, by intervals.
+"""Bounds, by interval arithmetic, on variations of the rates within a step that neither series nor stages may see.
 
-A pulse such as exp(-((t - 20)/w)^2) is 0 to all digits at t = 0, and so are its derivatives: no series tells of it, and
-points within the step can miss it. Intervals (`intervals`) of the graph's operations over the box of states that a
-step passes cannot. Of the operations that a polynomial does not follow for ever, each may change by a factor within the
-step (`CHANGE`); where it may change by more, all of it counts as hidden. By the mean value theorem that goes on to
+A pulse such as exp(-((t - 20)/w)^2) is 0 to all digits at t = 0, and so are its derivatives: a series at t = 0 does not
+contain it, and stages within the step can miss it. Interval arithmetic (`intervals`) over the box of states that a step
+passes cannot. Operations other than polynomials may change by the factor `CHANGE` within the step; if one may change by
+more, its complete variation E counts as hidden. By the mean value theorem it propagates as
     u + w: E_u + E_w,  u w: |w| E_u + |u| E_w,  u/w: (E_u + |u/w| E_w)/|w|,  f(u): |f'(u)| E_u            (1)
-over the box. So what is small enough may stay hidden, and what is large is come up to by shorter steps.
+over the box. Small hidden variations are accepted; large ones are approached by shorter steps.
 """
 
 import math

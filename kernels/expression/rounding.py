@@ -1,8 +1,8 @@
-"""What rounding takes from a surface's value at the start of a scene.
+"""Rounding error of a surface's value at the start of a scene.
 
-Of a sum and of a product the loss is known exactly (Knuth's two-sum, a fused multiply-add), so what is computed without
-rounding loses nothing, and a start on the surface lies there for sure. Of a function it is an ulp. To first order
-losses go on as errors do. Along a motion it is enough to know them roughly, an ulp of the terms of every sum.
+For sums and products the error is known exactly (Knuth's two-sum, a fused multiply-add), so that a value computed
+without rounding has none, and a start on the surface is recognised as such. For a function it is an ulp. Errors
+propagate to first order. Along a motion a rough estimate suffices: an ulp of the terms of every sum.
 """
 
 from kernels.expression.graph import ADD, CHOSEN, DIV, HALF_SQUARE, INPUT, MUL, NUMBER, SCALED, needed

@@ -1,4 +1,4 @@
-"""The linear equations that a stiff scene's steps solve, with the exact Jacobian of its rates.
+"""Linear equations of the steps of a stiff scene, with the exact Jacobian of its rates.
 
 The Jacobian's entries are derivatives of the recorded expressions (`tangent`); those that are 0 for every motion are
 left out. Rows are brought to triangular form one by one, the row with the larger entry becoming the pivot's (pairwise

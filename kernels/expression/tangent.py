@@ -1,4 +1,4 @@
-"""What small changes of a scene's states change: the tangent of its motion.
+"""The tangent of a motion: the effect of small changes of a scene's states.
 
 The derivative of an expression along changes `delta` of the states is an expression again, so that the changes' own
 Taylor series, of delta' = (D rates) delta, come from the recurrences of the motion's (`series`). Signs of kinks do not

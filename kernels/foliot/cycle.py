@@ -55,7 +55,7 @@ OUTPUTS = (
     Field("amplitude", "rad", "largest angle"),
     Field("crossing_speed", "rad/s", "angular speed just before the switch"),
     Field("sensitivity", "1", "sensitivity of the period to torque, -dlnP/dlnmu"),
-    Field("multiplier", "1", "multiplier of the half-cycle map (of few digits below 1e-308, then 0)"),
+    Field("multiplier", "1", "multiplier of the half-cycle map; underflows to 0 below 1e-308"),
 )
 
 _VISCOUS = {"units": _viscous.UNITS, "excludes": ("R", "c", "k", "e")}
@@ -73,7 +73,7 @@ FOLIOT = kernel(
                _viscous.closed, errors(_viscous.ROUNDING, _viscous.ROUNDING, 2.0 * _viscous.ROUNDING), **_VISCOUS),
         method("asymptotic", "weak and strong series with a bound each",
                _viscous.asymptotic, _viscous.asymptotic_bound, **_VISCOUS),
-        method("pure", "closed forms where one loss acts alone",
+        method("pure", "closed forms for a single kind of loss",
                _coulomb.pure, _coulomb.pure_bound, units=UNITS, excludes=("a", "k")),
         method("coulomb", "viscous and Coulomb friction: one equation by Halley's steps",
                _coulomb.coulomb, _coulomb.coulomb_bound, units=UNITS, excludes=("c", "k", "e")),

@@ -73,7 +73,7 @@ FOLIOT_MOTION = kernel(
         Field("angle", "rad", "angle of the foliot", dims=("phase",)),
         Field("speed", "rad/s", "angular speed of the foliot", dims=("phase",)),
     ),
-    along=(Field("phase", "1", "time over period, from the switch at +phi0 on", lower=0.0, upper=1.0),),
+    along=(Field("phase", "1", "time since the switch at +phi0, over the period", lower=0.0, upper=1.0),),
     record=LinearFoliot,
     check=check,
     methods=(

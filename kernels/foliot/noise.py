@@ -191,14 +191,14 @@ FOLIOT_NOISE = kernel(
     source="derived here; the foliot of Hoyng & Nieuwenhuizen, arXiv:1604.06681",
     parameters=(
         *FOLIOT.parameters,
-        Field("sigma", "1", "standard deviation of the torque of a half swing over mu", lower=0.0),
+        Field("sigma", "1", "standard deviation of a half swing's torque, relative to mu", lower=0.0),
         Field("tau_c", "1", "correlation time of the noise in half swings (to 1/e); 0: white", default=0.0, lower=0.0),
         Field("half_swings", "1", "length of the run", lower=1.0, upper=HALF_SWING_LIMIT, integer=True),
-        Field("seed", "1", "names the noise; cells of equal seed share it", default=0.0, lower=0.0,
+        Field("seed", "1", "seed of the noise; cells with equal seed share it", default=0.0, lower=0.0,
               upper=philox.SEED_LIMIT, integer=True),
         Field("averaging_time", "s", "averaging time of the scatter", SECONDS_PER_DAY, lower=0.0, open_lower=True),
-        Field("sigma_a", "1", "standard deviation of the friction of a half swing over a", default=0.0, lower=0.0),
-        Field("shared", "1", "correlation of the friction's noise with the torque's: 1 one noise, 0 independent ones",
+        Field("sigma_a", "1", "standard deviation of a half swing's friction, relative to a", default=0.0, lower=0.0),
+        Field("shared", "1", "correlation between the noise of friction and of torque, 0 to 1",
               default=1.0, lower=-1.0, upper=1.0),
     ),
     outputs=(

@@ -30,7 +30,7 @@ FOLIOT_RIPPLE = kernel(
         *FOLIOT.parameters,
         Field("depth", "1", "amplitude of the torque's ripple over its mean",
               default=0.0, lower=0.0, upper=math.nextafter(1.0, 0.0)),
-        Field("harmonic", "1", "half waves of the ripple on the way from switch to switch",
+        Field("harmonic", "1", "half waves of the ripple between two switches",
               default=1.0, lower=1.0, upper=HIGHEST, integer=True),
     ),
     outputs=FOLIOT.outputs,

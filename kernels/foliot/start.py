@@ -151,11 +151,11 @@ FOLIOT_START = kernel(
     source="Hoyng & Nieuwenhuizen, arXiv:1604.06681; terms beyond viscous friction derived here",
     parameters=(*FOLIOT.parameters, Field("phi_start", "rad", "angle of release from rest", default=0.0)),
     outputs=(
-        Field("flip_time", "s", "time of the flip after the release; NaN where none comes", dims=("flip",)),
-        Field("flip_speed", "rad/s", "angular speed along the drive just before the switch; NaN as well",
+        Field("flip_time", "s", "time of the flip after the release; NaN if it never comes", dims=("flip",)),
+        Field("flip_speed", "rad/s", "angular speed along the drive just before the switch",
               dims=("flip",)),
     ),
-    along=(Field("flip", "1", "number of the flip, from 1 on", lower=1.0, upper=FLIP_LIMIT, integer=True),),
+    along=(Field("flip", "1", "number of the flip, starting at 1", lower=1.0, upper=FLIP_LIMIT, integer=True),),
     check=check,
     methods=(
         tracing("segments", "exact pieces of linear terms, from switch to switch",

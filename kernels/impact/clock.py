@@ -54,22 +54,22 @@ PARAMETERS = (
     Field("r_c", "m", "radius of the crown wheel", lower=0.0, open_lower=True),
     Field("r_v", "m", "lever of the pallets", lower=0.0, open_lower=True),
     Field("teeth", "1", "teeth of the crown wheel, odd", lower=3.0, upper=_units.MOST_TEETH, integer=True),
-    Field("h", "m", "way of a pallet past the middle at which its tooth escapes", lower=0.0),
-    Field("e", "1", "restitution: share of the closing speed kept by an impact", lower=0.0, upper=_units.MOST_E),
+    Field("h", "m", "displacement of a pallet from the middle where its tooth escapes", lower=0.0),
+    Field("e", "1", "restitution: share of the closing speed kept in an impact", lower=0.0, upper=_units.MOST_E),
     Field("nu", "1", "curvature of the lever, (U''/U'^2) g T^2 of the symmetric cycle", default=0.0),
 )
 
 OUTPUTS = (
-    Field("period", "s", "period of the cycle, in which one tooth passes; the mean of cycles that differ"),
-    Field("swing", "m", "half of the pallet's way between the farthest ends of its swings"),
+    Field("period", "s", "period of the cycle, in which one tooth passes; the mean if cycles differ"),
+    Field("swing", "m", "half the peak-to-peak displacement of a pallet"),
     Field("wheel_speed", "rad/s",
-          "speed of the crown wheel just after a swing's first impact; the mean of swings that differ"),
+          "speed of the crown wheel just after the first impact of a swing; the mean if swings differ"),
     Field("pallet_speed", "rad/s", "speed of the verge just after that impact, in the direction of the tooth"),
     Field("multiplier", "1", "largest factor by which disturbances grow in a half swing, from release to release"),
     Field("recoil", "rad", "largest angle by which the crown wheel is thrown back (0 where it is not)"),
     Field("contact_share", "1", "share of the time that a tooth and a pallet are in contact"),
     Field("impacts", "1", "impacts in half a period (inf where bounces die out in contact)", gaps=True),
-    Field("offset", "m", "how far the middle of the pallet's swing is from the middle of its teeth"),
+    Field("offset", "m", "distance of the middle of the pallet's swing from the middle of its teeth"),
 )  # fmt: skip
 
 IMPACT = kernel(

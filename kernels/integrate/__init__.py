@@ -1,6 +1,6 @@
-"""Motion of any scene over time: exact linear flow, explicit steps, Taylor series, and where a switch is met.
+"""Integration of any scene in time: exact linear flow, Runge-Kutta steps, Taylor series, and location of switches.
 
 Faces: `linear_flow` (closed form of a damped, sprung mass), `tableaux`, `steps`, `pairs`, `rosenbrock`, `events`,
-`taylor`; the legs of a scene of one's own, `taylor_leg` with `powers` and `carried`, `adaptive`; `driver`, which
-follows one after the other, `fixed_step`; and `records`, what travels between them.
+`taylor`; the legs of a scene of your own, `taylor_leg` with `powers` and `carried`, `adaptive`, `fixed_step`; `driver`,
+which joins the legs; and `records`, which they exchange.
 """

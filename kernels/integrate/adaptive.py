@@ -1,11 +1,11 @@
 """Legs from event to event by an embedded pair of methods (`pairs`) to a tolerance; generic in one cell or lanes.
 
-A leg has the form of the Taylor method's (`taylor_leg`) and drops into the same driver. Of each step the
-events are known at both ends by value and rate, and between them by intervals (`expression.hidden`): each must be
-proved to stay above 0, to fall or to rise all along, or the step is halved; an event that comes so close to 0 that no
-short step proves it is called grazing. One that ends below 0 is located on the dense output by Newton's method in a
-bracket. A step within which the rates may hide more
-than the tolerance (`expression.hidden`) is not taken: the points that an error is estimated from may miss it.
+A leg has the same interface as that of the Taylor method (`taylor_leg`), for the same driver. At both ends of a step
+the events are known by value and rate, and in between by intervals (`expression.hidden`): each event must be proved to
+stay above 0, to decrease or to increase throughout, or the step is halved; an event so close to 0 that no short step
+proves it is grazing. One that is below 0 at the end is located on the dense output by a bracketed Newton method. A step
+is not taken if its rates may vary between the stages by more than the tolerance (`expression.hidden`), because the
+error estimate could miss that.
 """
 
 import math

@@ -1,26 +1,26 @@
-"""The error of a motion by Taylor series, carried along beside it: what each state is off by.
+"""The error of a solution by Taylor series, propagated with it: the deviation of each state, signed and of first order.
 
-What a step leaves out is told by the defect of its polynomial U(t) of order p at the end, f(U(h)) - U'(h), which grows
-as t^p, so that it comes to h/(p + 1) times that; f(U(h)) is the first coefficient of the next step. A state that is the
-sum of another one, w, leaves out w_p h^(p+1)/(p + 1). As it grows, what is left out, l, changes the rates too, and with
-them the states by h/(p + 2) Df l more. From step to step the error follows the tangent of the motion, of low order. At
-an event, of which the search for it has left the value e, the motion is late by
+The truncation error l of a step follows from the defect of its polynomial U(t) of order p at the end, f(U(h)) - U'(h).
+The defect grows as t^p, so l is h/(p + 1) times that; f(U(h)) is the first coefficient of the next step. For a state
+that is the integral of another one, w, l is w_p h^(p+1)/(p + 1). While it grows, l also changes the rates, and thereby
+the states by h/(p + 2) Df l more. From step to step the error is propagated by the tangent of the motion, to low order.
+At an event, located up to a residual e, the computed motion is late by
     -(e + De off)/(De f),                                                                                 (1)
-and compared there, each at its own time, states are off by f times that more; behind it goes on what the jump leaves of
-it. That is to first order; `late` is infinite, and so is the error, where the event bends, or comes so soon after the
-one before, that it may not do.
+so that states, each compared at its own event, deviate by f times that in addition; the jump then maps the error. All
+this is of first order. Where an event is too curved for that, or follows the previous one too closely, `late` and the
+error are infinite.
 
-Errors of some steps may cancel but for what is not known of them, and the motion may make that large again. So the
-*spread* is carried beside the error, as that is: what rounding takes, and VAGUE of what each step leaves out, added so
-that it grows; and behind an event that rounding misplaces by dt, dt times what the rates change by there. Where states
-feed back on one another, what a step leaves out is taken to its next order: with l' = f(U) - U' + Df l and
-l'' = f'(U) - U'' at the end, l = h (2 l'/(p + 2) - h l''/((p + 1) (p + 2))).
+Errors of several steps may cancel except for their uncertainty, which the motion may amplify. So a *spread* is
+propagated as well: rounding errors and the fraction VAGUE of each truncation error, added without cancellation; after
+an event that rounding displaces by dt, also dt times the change of the rates there. Where states feed back on one
+another, the truncation error is taken to its next order: with l' = f(U) - U' + Df l and l'' = f'(U) - U'' at the end,
+l = h (2 l'/(p + 2) - h l''/((p + 1) (p + 2))).
 
-A motion may forget an error that was so large on the way that the truth went elsewhere, which first order does not see.
-So where the *peak* of an error is above SMALL of the state's largest size, that is what is stated.
+A motion may contract an error that was so large in between that the true motion went elsewhere, which first order does
+not show. So if the *peak* of an error exceeds SMALL of the state's largest size, the peak is stated.
 
-Generic in one cell or lanes; `m` is a `taylor_leg.Series`, or at switches `Written`, and where its `error` is None none
-is carried: all is ().
+Generic in one cell or lanes; `m` is a `taylor_leg.Series`, or at switches `Written`. If its `error` is None, no error
+is propagated, and everything is ().
 """
 
 import math

@@ -1,9 +1,9 @@
-"""What a lane does from one event to the next: start, switch, turn signs round, count, end; generic in the scene.
+"""Takes a lane from one event to the next: start, switch, change of signs, count, end; generic in the scene.
 
-A motion may slide along a kink onto which both sides press it (`codegen.sliding`): then the kink's sign is 0, and its
-event is that a side stops pressing. Of one kink alone that the state is on, or that it has slid along until another was
-met, that is told by its speeds ahead and behind. Where two are met at once, the signs stay as they are, for the next
-leg to stick or to go on.
+A motion may slide along a kink towards which the field points from both sides (`codegen.sliding`): then the kink's sign
+is 0, and its event is that the field of one side no longer points towards it. For a single kink, whether the motion
+slides follows from the rates on both sides. If two kinks are met at once, the signs are left unchanged, and the next
+leg sticks or goes on.
 """
 
 import math

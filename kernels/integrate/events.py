@@ -1,9 +1,9 @@
 """Which event fires in a step, where, and the state there; generic in one cell or lanes.
 
-An event is known at both ends of the step [0, h] by its value (e0 > 0 >= e1) and its rate (d0, d1). At a fixed step
-`linear` and `hermite` find the part of the step by a line or by the cubic through all four, and take a step of just
-that length. `root` is exact to the method: each trial is a step of its own from the same start, which is the method's
-continuous extension. `none` takes the event to fire at the end of the step: the fault to be shown.
+An event is known at both ends of the step [0, h] by its value (e0 > 0 >= e1) and its rate (d0, d1). With a fixed step
+`linear` and `hermite` find its place by a line or by the cubic through all four, and repeat the step with that length.
+`root` is as accurate as the method: each trial is a step of its own from the same start, the method's continuous
+extension. `none` puts the event at the end of the step, the error that studies of fixed steps show.
 """
 
 import math

@@ -1,9 +1,9 @@
 """Legs from event to event at a fixed step; generic in one cell or lanes.
 
-Where an event is located, the step ends on it, and the next whole one begins there. An event that is passed twice
-within a step does not show at its ends: where it falls at the start and rises at the end, the step is cut where the
-cubic between is lowest. What starts on an event and is back on it at the end had two roots within the step, which is
-halved; what cannot leave it sticks.
+A step ends on a located event, and the next full step begins there. An event that is passed twice within a step does
+not show at its ends: if it decreases at the start and increases at the end, the step is cut at the minimum of the cubic
+in between. A motion that starts on an event and is back on it at the end had two roots within the step, which is then
+halved; one that cannot leave it sticks.
 """
 
 import math

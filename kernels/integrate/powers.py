@@ -1,18 +1,19 @@
-"""The *core* of a power: where abs(u)^n, u a state, is a constant for a Taylor series, for it has none at u = 0.
+"""The *core* of a power: around u = 0, u a state, abs(u)^n has no Taylor series, and is replaced by a constant.
 
-From a kink u = 0 on, u is r t, and abs(u)^n has the mean (r t)^n/(n + 1). With the mean in its place the rates' impulse
-is right for whatever n, and what is left of a state whose rate the power changes by D is, in units of time,
+Just after a kink u = 0, u is r t, and abs(u)^n has the mean (r t)^n/(n + 1). Replacing it by this mean keeps the
+impulse of the rates exact for any n. The remaining error of a state whose rate the power changes by D is, in units of
+time,
     D t (t + d)                                                                                          (1)
-for the speed between differs from the true one by less than D t, and the motion is not quite even: d, at most 1/4, is
-what r changes by on the way, of itself, by the power and by all else, as where u turns round next to 0. Besides,
-D times what a step is longer or shorter than t is left out, and t times what D changes by on the way:
-of abs(u)^n u it is 0 at the kink. Where n < 0, D is that of the mean.
-The core ends where (1) is the tolerance times the state's own size; outside the series steps towards it or away from it
-by parts of the way that is left, as the radius of convergence allows.
+since the rate in between differs from the true one by less than D t, and r is not constant: d, at most 1/4, is the
+relative change of r in the core, by the power and everything else, as where u turns round next to 0. Further errors are
+D times the difference of a step's length from t, and t times the change of D in the core (for abs(u)^n u, D is 0 at
+the kink). For n < 0, D is that of the mean.
+The core ends where (1) equals the tolerance times the state's own size; outside, the steps of the series are fractions
+of the distance to the core, as the radius of convergence allows.
 
-Where nothing but the power acts at u = 0, u' = -c u^n with n < 1 comes to rest there after u^(1 - n)/((1 - n) c), while
-every state's rate changes by the power as u's does: with (1 - n) u^n in the power's place that time and all impulses
-are right, and what hangs on u is off by less than u times that time. Generic in one cell or lanes.
+If only the power acts at u = 0, u' = -c u^n with n < 1 comes to rest there after u^(1 - n)/((1 - n) c), while the rates
+of all states change by the power as that of u does. Replacing the power by (1 - n) u^n keeps that time and all impulses
+exact; the error of states that depend on u is below u times that time. Generic in one cell or lanes.
 """
 
 from collections import namedtuple

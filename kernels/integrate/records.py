@@ -1,4 +1,4 @@
-"""What travels between the integrators of a scene, by name; each entry is a number of one cell, or of lanes.
+"""Records passed between the integrators of a scene; each entry is a number of one cell, or of lanes.
 
 Some entries are tuples: the states, one sign a kink, one mark or value an event (the switch, then the kinks).
 """

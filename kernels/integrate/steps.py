@@ -1,6 +1,7 @@
 """One step of each method, of any scene; generic in one cell or lanes.
 
-`m` is what is written of a scene (`records.Written`), `mode` what its rates hang on beside the state (`records.Mode`).
+`m` has the compiled functions of a scene (`records.Written`), `mode` what its rates depend on beside the state
+(`Mode`).
 """
 
 from kernels.integrate.records import Mode

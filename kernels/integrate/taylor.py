@@ -3,10 +3,10 @@
 A *series* is the tuple (u_0 ... u_p) of u(t) = sum u_k t^k on a step [0, h]. An *event* is e(t) = offset + factor u(t),
 which fires where it falls through 0. With A = sum_{k>3} k abs(e_k) h^(k-2) and 0 < t <= h
     e'(t) <= e_1 + t (2 e_2 + A) + 3 t^2 e_3,  e(t) >= e_0 + t e_1 + t^2 (e_2 + h min(e_3, 0) - A/4),     (1)
-so where the first parabola stays below 0, e falls all along, and whether it fires is seen by its sign at the end;
-where the second one stays above 0, nothing fires. Where neither is proved the step is halved.
-The proof is of the series; what that leaves out is below the tolerance of the step, and an event that so little decides
-is called grazing.
+so if the first parabola stays below 0, e decreases throughout, and its sign at the end shows whether it fires; if the
+second one stays above 0, nothing fires. If neither is proved, the step is halved.
+The proof is for the series; its truncation error is below the tolerance of the step, and an event that this error could
+change is grazing.
 """
 
 from typing import NamedTuple

@@ -1,11 +1,11 @@
 """The leg of a motion by Taylor series, from event to event; generic in the scene, in one cell or lanes.
 
-Each step takes the length that the series allow, is halved where no event is proved to fall all along or to stay
-clear (`taylor`), and ends the leg where one has fallen through 0. A leg may begin where symmetry makes the last terms
-of a series 0, though it goes on. So its first step, and one that last terms tell nothing of, is taken only where the
-rates at the series' states are the series' derivatives, and events their own series (`agree`); but for rates and
-events that are linear in the states, of which the last terms tell all.
-`m` is what is written of the scene for one order (`Series`).
+The last terms of the series decide the length of a step, which is halved until each event is proved to decrease
+throughout or to stay clear (`taylor`); a step in which an event falls through 0 ends the leg. Symmetry may make the
+last terms of a series 0 at the start of a leg, although later terms are not. So the first step, and any whose last
+terms are uninformative, is taken only if the rates at the states of the series equal its derivatives, and events their
+own series (`agree`), unless rates and events are linear in the states. `m` has the compiled functions of the scene for
+one order (`Series`).
 """
 
 from typing import NamedTuple

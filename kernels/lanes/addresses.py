@@ -1,14 +1,14 @@
-"""Functions that are called by their address: compiled once, by themselves, when a cell asks for them first, and kept.
+"""Functions that are called by address: compiled once, separately, on first use by a cell, and cached.
 
-An entry that could go several ways compiles all of them, and what several entries call is compiled for each. Here the
-functions of a way stand in a row of addresses, and a *part* calls what stands at its place:
+An entry with several variants would compile all of them, and a function that several entries call is compiled for each.
+Here the functions of a variant (a *way*) form a row of addresses, and a *part* calls the one at its place:
 
     SOLVE = part(0, 0.0, 1, like)                    # a number, of an integer and a record of the types of `like`
-    x = SOLVE(row, n, record)                        # in compiled code: what row[0] is the address of
+    x = SOLVE(row, n, record)                        # in compiled code: calls the function at row[0]
     ways = table("way", {0: {SOLVE: quickly}, 1: {SOLVE: slowly}})
 
-makes the rows of those ways that a column of the parameter asks for (`wiring.method` with `parts=ways`). In plain
-Python a row holds the functions themselves.
+makes the rows of those ways whose numbers occur in a column of the parameter (`wiring.method` with `parts=ways`). In
+plain Python a row holds the functions themselves.
 """
 
 import functools

@@ -1,13 +1,12 @@
 """Machine code on the disk, for the entry functions of this package only.
 
-numba's own cache is stale when a *called* module changes. Ours lives in a folder named by a digest of all kernel
-sources, numba, llvmlite and the CPU, so what is found there was compiled from these very sources. A function from
-elsewhere (a user's kernel) is never cached: what it calls is not known here. A cache that cannot be read or written
-is no fault: the function is compiled again. Of processes that need a function at a time one compiles it.
+numba's own cache is stale when a *called* module changes. This one is in a folder named by a digest of all kernel
+sources, numba, llvmlite and the CPU, so its contents were compiled from the same sources. Functions from elsewhere (a
+user's kernel) are never cached, since the functions that they call are not known here. If the cache cannot be read or
+written, the function is compiled again. If several processes need a function at once, one of them compiles it.
 
-What is read here runs with the user's rights. So nothing is read that is not the user's alone: neither from a folder
-that belongs to somebody else or that others may write to, nor from such a file. Whoever may rename the folder can put
-nothing in its place that is read.
+Cached code runs with the user's rights. So nothing is read from folders or files that belong to somebody else or that
+others may write to. Even someone who can rename the folder cannot put another in its place that is read.
 """
 
 import contextlib

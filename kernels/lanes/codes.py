@@ -1,7 +1,7 @@
-"""The statuses as numbers that lanes can hold: `where(condition, OK, BAD_INPUT)`; their one home in `kernels/`.
+"""The statuses as float64 for lanes, as in `where(condition, OK, BAD_INPUT)`; defined in `kernels/` only here.
 
-A verdict is a float64 of a cell, or lanes of them, until `write` puts it into the int8 column. The names are those of
-`kernels.interface.Status`, where it stands what each means, in its order: OK, remarks, refusals.
+A status is a float64, or lanes of them, until `write` puts it into the int8 column. Names, meanings and order are those
+of `kernels.interface.Status`: OK, remarks, refusals.
 """
 
 from kernels.interface import FIRST_REFUSAL, Status

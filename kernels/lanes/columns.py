@@ -1,14 +1,15 @@
 """Loops over columns of cells, alone, in groups or refilled, and the entry functions that the engine calls.
 
-A *group* is of cells that share buffers, for traces and noise, which no column of one value a cell can hold. A body of
+A *group* is a set of cells that share buffers, for traces and noise, which have many values per cell. A body of
 `in_groups` gets the number of its first cell; `cells_at(first)` is the index of the group's cells in a column, and
-`cells_at(j * GROUP)` of the j-th row of a buffer. Compiled, a group is WIDTH lanes; in plain Python it is one cell.
+`cells_at(j * GROUP)` that of the j-th row of a buffer. A compiled group has WIDTH lanes; in plain Python it is one
+cell.
 
-Cells of very different length are *refilled*: a lane that has finished its cell is given the next one. There are FEW
-lanes. A *memory* has a row for each number that a lane knows between two events, and a column for each lane. The first
-row is the lane's stage; then come its cell's inputs. `advance(memory, i)` takes every lane on until one has finished,
-or for a limited number of events or steps, and returns whether one has; i is the index of all lanes. A lane that keeps
-the others waiting may be *paused*: its cell goes on later from the event before, beside others of that kind.
+Cells of very different duration are *refilled*: a lane that has finished its cell continues with the next one. There
+are FEW lanes. A *memory* has a row for each number that a lane stores between two events, and a column for each lane.
+The first row is the lane's stage, followed by its cell's inputs. `advance(memory, i)` advances all lanes until one has
+finished, or for a limited number of events or steps, and returns whether one has; i is the index of all lanes. A lane
+that delays the others may be *paused*: its cell continues later from the previous event, with others of that kind.
 """
 
 import numpy as np

@@ -1,14 +1,14 @@
-"""Functions that are compiled only into what calls them, so that every line becomes machine code once.
+"""Functions that are compiled only into their callers, so that every line becomes machine code once.
 
-numba makes machine code of every function by itself: it links in all that the function calls, optimises that and
-translates it, level above level, although only what Python calls is ever run. An *inlined function* stops before that.
-Its code is handed on as it is written, and optimised in the function called by Python (an *entry*) that it ends up in:
-the same digits in less than half of the seconds. Called from Python after all, it is compiled by itself, as numba does.
+numba compiles every function separately: at each level it links in all callees, optimises and translates the whole,
+although only the function that Python calls is ever run. An *inlined function* stops before that: its unoptimised code
+is passed on, and optimised in the function called by Python (an *entry*) that contains it. This gives the same digits
+in less than half of the compile time. If Python calls it directly, it is compiled separately, as by numba.
 
-All begin their stack on the border of a cache line. numba asks for 16 bytes, so that of the vectors that found no
-register all but one in four straddle two lines: up to 1.4 times the time, more or less from one process to the next.
+All functions align their stack to a cache line. numba aligns it to 16 bytes only, so that three of four vectors that
+are spilled to memory straddle two lines: up to 1.4 times the run time, varying from process to process.
 
-This rests on the inside of numba's compiler, so other versions of numba than those tried get plain `njit`.
+This depends on internals of numba's compiler; versions of numba other than those tested use plain `njit`.
 """
 
 import contextlib

@@ -1,4 +1,4 @@
-"""What is said of a cell some of whose outputs no float64 can hold: they are NaN, and the others are given."""
+"""Cells with some outputs outside the range of float64: these outputs are NaN, and the others keep their values."""
 
 import math
 

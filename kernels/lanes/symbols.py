@@ -1,10 +1,10 @@
-"""Functions that are run when code is compiled, on symbols: what they do to these is written where they are called.
+"""Functions that run on symbols at compile time; their operations are emitted in place of the call.
 
-numba compiles no comprehension over a tuple, and takes some hundredths of a second for each small function. A
+numba cannot compile a comprehension over a tuple, and takes some hundredths of a second for each small function. A
 `symbolic` function is plain Python without loops over steps and without branches on values. Where compiled code calls
-it, it is run once with symbols of its arguments to know the result's type, and once more to write the LLVM code; so
-tuples of any length, records and their `_replace`, and branches on what is None or how long it is, cost nothing. It
-makes no array. In plain Python it is a function like any other, of the same bits.
+it, it is run once on symbols of its arguments to find the result's type, and again to emit the LLVM code. So tuples of
+any length, records and their `_replace`, and branches on None or on lengths cost nothing at run time. It cannot create
+arrays. In plain Python it is an ordinary function with the same bits.
 """
 
 import functools

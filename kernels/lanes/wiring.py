@@ -1,17 +1,17 @@
-"""From the physics of one cell to what the engine calls: the one place where columns are listed and looped over.
+"""Makes the functions that the engine calls from the physics of one cell; all loops over columns are made here.
 
-An author writes functions of one cell, the same source for numbers and for lanes, and declares them by `kernel`:
+An author writes functions of one cell, with the same source for numbers and for lanes, and declares them by `kernel`:
 
     check(p) -> status                            p: a record of the parameters, within the limits of their fields
     solve(p, rtol, *buffers) -> outputs, status   outputs: a record of those that the method gives, or a tuple in order
-    solve(...) -> outputs, errors, status         of a method that estimates; `errors` as of a bound. What else it finds
-                                                  may stand before the status, for functions of its own room
+    solve(...) -> outputs, errors, status         of a method that estimates; `errors` as of a bound. Additional results
+                                                  may precede the status, for functions of its own room
     bound(p) -> error                             a number, or a record with one for each output that the method gives
     fill(i, columns, *buffers)                    for traces, instead of `solve`: writes the rows of cell i itself
 
-Loops, entries with one column a parameter, copies that fill up few cells, the largest bound of what was asked for,
-scenes without units, and NaN for outputs that a method lacks are made here. Names that do not fit the fields are
-refused: those of the parameters when a kernel is declared, those of outputs when a method is first compiled.
+This adds loops, entries with one column per parameter, copies that fill incomplete lanes, the largest bound over the
+requested outputs, removal of units, and NaN for outputs that a method lacks. Names that do not match the fields are
+refused: those of parameters when a kernel is declared, those of outputs when a method is first compiled.
 Records are read and written by name (`records`), so the order of columns is known nowhere else.
 """
 

@@ -1,4 +1,4 @@
-"""The largest modulus of the three roots of x^3 + a2 x^2 + a1 x + a0: how fast a disturbance of an impact clock fades.
+"""The largest modulus of the three roots of x^3 + a2 x^2 + a1 x + a0: the decay of disturbances of an impact clock.
 
 Coefficients are pairs of `pairs`: where two multipliers meet, the root has half their digits. The root on its own side
 of the point of inflection is taken first, by Newton from outside, where it comes down monotonically; the other two

@@ -1,7 +1,7 @@
-"""Intervals (low, high) of what a scene's operations give over a box of states; generic in one cell or lanes.
+"""Interval arithmetic (low, high) on a scene's operations over a box of states; generic in one cell or lanes.
 
-They are wide by a few roundings less than rigorous ones, which matters to nobody: what they are for is to see what lies
-between two points, and by how much. NaN stays, so what is compared with it fails.
+Without outward rounding, intervals are too narrow by a few roundings, which does not matter for their purpose: to bound
+the variation between two points. NaN is kept, so that comparisons with it fail.
 """
 
 import math

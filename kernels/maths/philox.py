@@ -1,4 +1,4 @@
-"""Random numbers by counting: the numbers of place `counter` in the stream of `key`, without what came before them.
+"""Counter-based random numbers: those at place `counter` in the stream of `key`, without computing earlier ones.
 
 Philox-4x32-10 of Salmon, Moraes, Dror & Shaw, "Parallel random numbers: as easy as 1, 2, 3", SC11 (2011): ten rounds
 that multiply, swap and mix four words of 32 bits. Integers only, so the bits are the same everywhere.

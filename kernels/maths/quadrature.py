@@ -1,12 +1,12 @@
-"""Adaptive Gauss-Kronrod quadrature of a pool of panels of one or several integrals, with an honest error.
+"""Adaptive Gauss-Kronrod quadrature of a pool of panels of one or several integrals, with an error estimate.
 
-A panel is a stretch x0 .. x0 + h of an integrand, taken by y in 0..1: x = x0 + h y^2 (3 - 2 y), which smooths what ends
-or sets in like a square root at either end. It is halved in y; worst panels first, until their errors add up to no more
-than wanted, but none whose error is within its rounding, which only grows as nodes come closer to its ends. The error
-of a panel is thrice the difference of the 21- and the 10-point rule, which is far more than the 21-point rule is off by
-if the integrand is smooth; if it all but has a kink, the difference alone was seen to be half of that (in 1 of 5000).
-An integrand fills the values at all nodes of a panel at a time, `integrand(kind, nodes, count, scene)`, in lanes if it
-can: there is room for as many.
+A panel is an interval x0 .. x0 + h, mapped from y in 0..1 by x = x0 + h y^2 (3 - 2 y), which smooths square roots at
+either end. Panels are halved in y, the worst first, until the sum of errors meets the tolerance, except panels whose
+error is within rounding, which only grows as nodes approach the ends. The error of a panel is three times the
+difference of the 21- and the 10-point rule, far more than the error of the 21-point rule for a smooth integrand; for
+nearly kinked ones, the difference alone was half of the error in 1 of 5000.
+An integrand fills the values at all nodes of a panel together, `integrand(kind, nodes, count, scene)`, in lanes if it
+can: there is room for full lanes.
 Nodes: Piessens et al., QUADPACK (1983).
 """
 

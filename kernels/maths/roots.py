@@ -1,7 +1,7 @@
-"""Roots of an equation in one unknown, of one cell or lanes: each cell's search ends by itself, and then it is frozen.
+"""Roots of an equation in one unknown, for one cell or lanes: each cell's search ends independently and is then frozen.
 
-What is solved is `trial`, a compiled function of the unknown and of whatever record or tuple it needs. It judges a step
-by itself, as it alone knows what its rounding is; a step that it calls the last is still made.
+The equation is `trial`, a compiled function of the unknown and of a record or tuple of its parameters. It decides
+itself when to stop, because it knows its rounding error; the step that it declares the last is still made.
 """
 
 from kernels.lanes.jit import jit

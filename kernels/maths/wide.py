@@ -1,6 +1,6 @@
 """Positive numbers and 0 with an exponent of their own: pairs (m, e) for m 2^e, whose products never leave the range.
 
-So a scene's units are taken out and put back: `size` says where what comes out is no normal float64.
+They serve to remove and restore a scene's units: `size` reports where a result is not a normal float64.
 """
 
 from kernels.lanes.symbols import symbolic

@@ -38,7 +38,7 @@ RATE_LIMIT = 1e140
 
 PARAMETERS = (
     *linkage.PARAMETERS,
-    Field("omega", "rad/s", "angular rate of the crank, either way"),
+    Field("omega", "rad/s", "angular rate of the crank, of either sign"),
     Field(
         "b_angle", "rad", "direction of b, from the pivot to the motor", default=0.0, lower=-math.tau, upper=math.tau
     ),
@@ -97,14 +97,10 @@ POLISHER_MOTION = kernel(
         Field("alpha", "rad", "angle of the arm", dims=("crank_angle",)),
         Field("alpha_rate", "rad/s", "angular rate of the arm", dims=("crank_angle",)),
         Field("alpha_acceleration", "rad/s^2", "angular acceleration of the arm", dims=("crank_angle",)),
-        Field(
-            "x", "m", "tool's centre from the pivot, in the direction from which angles count", dims=("crank_angle",)
-        ),
-        Field("y", "m", "tool's centre from the pivot, across that", dims=("crank_angle",)),
+        Field("x", "m", "tool's centre from the pivot, along the zero direction of angles", dims=("crank_angle",)),
+        Field("y", "m", "tool's centre from the pivot, across x", dims=("crank_angle",)),
     ),
-    along=(
-        Field("crank_angle", "rad", "angle of the crank, from where b_angle counts", lower=-FARTHEST, upper=FARTHEST),
-    ),
+    along=(Field("crank_angle", "rad", "angle of the crank, counted as b_angle is", lower=-FARTHEST, upper=FARTHEST),),
     record=Machine,
     # over the largest value of the trace, of x and y over L; close to a lock the status says more
     methods=(tracing("closed", "closed forms of error-free sums", _follow, ROUNDING, buffers=one_row),),

@@ -87,10 +87,10 @@ def _buffers():
 POLISHER_WEAR = kernel(
     "polisher_wear",
     doc="Preston wear of a turning workpiece along its radius, under the tool of a polishing machine",
-    source="Cordero-Davila et al., Opticheskii Zhurnal 78(3):55 (2011), corrected and completed; the integral is ours",
+    source="Cordero-Davila et al., Opticheskii Zhurnal 78(3):55 (2011), corrected and completed; integral derived here",
     parameters=_scene.PARAMETERS,
     outputs=(
-        Field("wear", "m/s", "depth worn away per time, mean of the ring", dims=("radius",)),
+        Field("wear", "m/s", "depth worn away per time, averaged over the ring", dims=("radius",)),
         Field("wear_error", "m/s", "error bound of the wear", dims=("radius",), of_method=True),
     ),
     along=(Field("radius", "m", "distance from the workpiece's centre", lower=0.0),),
