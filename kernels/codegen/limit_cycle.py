@@ -32,6 +32,8 @@ FAR, QUICK = 1e-4, 0.1
 """Residual over the size, up to which, and over the one before, Newton's method keeps its differences."""
 NEAR = 1e-6
 """Of the states' sizes: within this a cycle is one, and what does not move by more over it is no cycle but at rest."""
+FADED = 2.0
+"""Of the states' sizes in a cycle, those of the motion that it was found from: beyond, it is found to its own ones."""
 TWO = 10.0
 """Errors of a cycle by which its halves must differ: where it is one, Newton's steps may still be a third of that."""
 ASTRAY = 1e-3
@@ -219,10 +221,15 @@ class Search:
             some.scale[j] = np.minimum(some.scale[j], turn)
         some = newton(self.map, some, self.swept)
         half = np.maximum(np.floor(0.5 * some.flips), 1.0)
-        (time, *middle), *_ = self.map.passed(some.parameters, some.z, half, rough)
+        (time, *middle), _, sizes = self.map.passed(some.parameters, some.z, half, rough)
         apart, by_half = (most(abs(middle - some.z - share * some.shift) / some.scale) for share in (0.0, 0.5))
         alike = (half == some.flips) | self.map.driven | (not self.map.directions)
         moved = np.where(alike, np.where(time > NEAR * T, 1.0, 0.0), np.minimum(apart, 1.0))
+        sizes = np.where(sizes > 0.0, sizes, some.scale)
+        small = np.flatnonzero((moved > NEAR) & (some.scale > FADED * sizes).any(axis=0))
+        own = some.some(small)
+        own.scale[:] = np.minimum(own.scale, sizes[:, small])
+        put(some, small, newton(self.map, own, self.swept))
         return some, np.where(abs(some.multiplier) < math.inf, moved, np.nan), by_half
 
     def _settled(self, left, doubled=False):

@@ -42,6 +42,18 @@ def test_a_driven_oscillator_has_the_cycle_and_both_multipliers_of_the_closed_fo
     assert (second["multipliers_real"][:, 0] == found["multipliers_real"][:, 1]).all()
 
 
+@pytest.mark.parametrize("method", ["taylor", "rodas5p"])
+def test_a_cycle_far_smaller_than_the_motion_that_it_is_searched_from_is_known_by_its_own_size(method):
+    """Up to 1e11 times smaller; where it was taken by the size of that motion, it was OK and 2 rtol off."""
+    x0, zeta, w = 10.0 ** np.arange(12), 1e-3, 1.3
+    cells = {"zeta": zeta, "w": w, "e": 0.5, "stop": 1e13, "x0": x0, "v0": 0.0, "flips": 1.0, "rtol": 1e-9}
+    found, status, error = estimated(STOPPED, method, **cells, along=[RANKS[0][:0]], asked=("period", "x", "v"))
+    swing = 1.0 / (1.0 - w * w + 2j * zeta * w)
+    off = np.maximum(abs(found["x"] - swing.real), abs(found["v"] + w * swing.imag) / w) / abs(swing)
+    assert (status == Status.OK).all()
+    assert (off <= error).all()
+
+
 def test_states_are_said_to_be_given_where_the_cycle_ends():
     ends = [next(f.doc for f in kernel.outputs if f.name == "x") for kernel in (FORCED, WALLS)]
     assert [doc.split(", ", 1)[1] for doc in ends] == [
