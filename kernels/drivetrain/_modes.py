@@ -1,9 +1,10 @@
 """A modal model: p modes of a chain within the span of a basis of shapes, their damping, and the spindle's receptance.
 
 Vectors are rows. Shape i of the basis enters as W_i = sqrt(J) u_i and G_i = sqrt(k) (its strains), so that its mass
-is W_i W_i and its stiffness G_i G_i. By Ritz's method, rotations of pairs of rows, the same in W and G, make first the
-W_i orthonormal, then the G_i orthogonal too (one-sided Jacobi): then w_i = |G_i|, and W_i/sqrt(J) are the modes. No
-product K or M is ever formed, so graded masses and springs lose no digits but those that the basis itself has lost.
+is W_i W_i and its stiffness G_i G_i. By Ritz's method, W and G always alike, the W_i are made orthonormal by Gram and
+Schmidt, then the G_i orthogonal, too, by rotations of pairs of rows (one-sided Jacobi): then w_i = |G_i|, and
+W_i/sqrt(J) are the modes. No product K or M is ever formed, so graded masses and springs lose no digits but those that
+the basis itself has lost.
 With the shape at the spindle phi_i and the damping c_ij = sum_l h_l d_il d_jl of strains d it moves by
     q_i'' + sum_j c_ij q_j' + w_i^2 q_i = phi_i M.                                                      (1)
 Source: Demmel & Veselic, SIAM J. Matrix Anal. Appl. 13:1204 (1992).
@@ -66,22 +67,39 @@ def _orthogonalise(rows, others, first, p, n):
 
 
 @jit_apart
-def _make_orthonormal(W, G, first, p, n):
-    """W to orthonormal rows, G alike; the condition of W's rows as they were, inf if it failed."""
+def _swap(i, j, scene):
+    """Exchanges two rows."""
+    modes = scene.modes
+    for rows in (modes.W, modes.G):
+        for c in range(scene.full.J.size):
+            rows[i, c], rows[j, c] = rows[j, c], rows[i, c]
+    modes.blur[i], modes.blur[j] = modes.blur[j], modes.blur[i]
+
+
+@jit_apart
+def _make_orthonormal(first, p, scene):
+    """W to orthonormal rows, G alike, by Gram and Schmidt; the condition of W's rows as they were.
+
+    From soft rows to stiff ones, so that soft ones, of which the low modes are, take no stiff strains in.
+    """
+    W, G, size, n, least = scene.modes.W, scene.modes.G, scene.modes.spindle, scene.full.J.size, 1.0
     for i in range(p):
         _scale_rows(W[i], G[i], 1.0 / sqrt(_product(W[i], W[i], n)), n)
-    for _ in range(2 * first):  # away from the free motion, which strains nothing
-        for i in range(1, p):
-            d = _product(W[0], W[i], n)
-            for j in range(n):
-                W[i, j] = fma(-d, W[0, j], W[i, j])
-    reached = _orthogonalise(W, G, first, p, n)
-    least, most = 1.0, 1.0
+        size[i], j = _product(G[i], G[i], n), i
+        while j > first and size[j - 1] > size[j]:
+            size[j - 1], size[j] = size[j], size[j - 1]
+            _swap(j - 1, j, scene)
+            j -= 1
     for i in range(first, p):
-        size = sqrt(_product(W[i], W[i], n))
-        least, most = min(least, size), max(most, size)
-        _scale_rows(W[i], G[i], 1.0 / size, n)
-    return most / least if reached and least > 0.0 else float("inf")
+        for j in range(2 * i):
+            one = j % i
+            d = _product(W[one], W[i], n)
+            for c in range(n):
+                W[i, c], G[i, c] = fma(-d, W[one, c], W[i, c]), fma(-d, G[one, c], G[i, c])
+        left = sqrt(_product(W[i], W[i], n))
+        least = min(least, left)
+        _scale_rows(W[i], G[i], 1.0 / left, n)
+    return 1.0 / least if least > 0.0 else float("inf")
 
 
 @jit_apart
@@ -105,7 +123,7 @@ def ritz(p, scene):
     W, G, w, before, size = scene.modes.W, scene.modes.G, scene.modes.w, scene.modes.C, scene.modes.spindle
     n, felt, blurs = scene.full.J.size, scene.room.work, scene.modes.blur
     first = 0 if scene.full.k[n - 1] > 0.0 else 1
-    condition = _make_orthonormal(W, G, first, p, n)
+    condition = _make_orthonormal(first, p, scene)
     for i in range(p):
         size[i] = sqrt(_product(G[i], G[i], n))
         felt[i] = blurs[i] + 4.0 * _ROUNDING * condition * sqrt(n * _viscous(i, i, scene))
@@ -117,9 +135,7 @@ def ritz(p, scene):
         w[i], j = sqrt(_product(G[i], G[i], n)), i
         while j > first and w[j - 1] > w[j]:
             w[j - 1], w[j] = w[j], w[j - 1]
-            for c in range(n):
-                W[j - 1, c], W[j, c] = W[j, c], W[j - 1, c]
-                G[j - 1, c], G[j, c] = G[j, c], G[j - 1, c]
+            _swap(j - 1, j, scene)
             j -= 1
     for i in range(p):
         scene.kept.f[i] = w[i] / TURN

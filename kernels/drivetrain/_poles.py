@@ -193,22 +193,24 @@ def _best_joint(n, J, k, h, s, ways, e):
 @jit_apart
 def _refined(n, J, k, h, s, ways, e):
     """A pole to its last digits, and bounds on the relative errors of it and of its damping."""
-    error, solid, viscous, r = 0.0, 1.0, 0.0, -1
-    for attempt in range(2 * REFINEMENTS):
+    error, solid, viscous, r, settled = 0.0, 1.0, 0.0, -1, False
+    for attempt in range(4 * REFINEMENTS):
         _follow(n, J, k, h, s, ways, e)
         if r < 0:
             r = _best_joint(n, J, k, h, s, ways, e)
         step, error, solid, viscous, _ = _look(n, J, k, h, s, r, ways, e)
         s += step
         late = size(step) / size(s)
-        error = error if late <= 4.0 * error else error + late
-        if attempt >= REFINEMENTS - 1 and (s.imag == 0.0 or magnitude(s.imag) > 4.0 * error * size(s)):
+        settled = late <= 4.0 * error
+        error = error if settled else error + late
+        sure = s.imag == 0.0 or magnitude(s.imag) > 4.0 * error * size(s)
+        if attempt >= REFINEMENTS - 1 and sure and settled:
             break
-        if attempt == REFINEMENTS - 1:
+        if attempt == REFINEMENTS - 1 and not sure:
             s = complex(s.real, 0.0)
     if magnitude(s.real) < _LIGHT * magnitude(s.imag):
         s = complex(-0.5 * viscous / solid, s.imag)
-    return s, error, _felt(n, J, k, h, s, ways)
+    return s, error, _felt(n, J, k, h, s, ways) if settled or s.imag == 0.0 else float("inf")
 
 
 @jit_apart

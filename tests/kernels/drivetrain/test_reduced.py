@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import reduction_oracles as oracles
 from chain_oracles import frequencies
-from columns import checked, relative_error, solve
+from columns import checked, estimated, relative_error, solve
 
 from kernels.drivetrain.reduced import DRIVETRAIN, ORDERS, REDUCTIONS
 from kernels.interface import Status
@@ -101,6 +101,31 @@ def test_damping_by_one_damper_that_some_modes_hardly_feel_is_right_or_said_not_
         assert fine or status[0] == Status.INACCURATE
         right += status[0] != Status.INACCURATE
     assert right > 0
+
+
+def test_damping_of_two_modes_that_are_alike_but_for_a_heavy_mass_between_them():
+    """Their poles are 1e-7 of them apart, in each of three pairs."""
+    half = {"J": [83.0, 0.0146, 0.5], "k": [0.0764, 76.5, 7.77e7], "h": [5e-9, 8e-9, 1e-3]}
+    middle, end = {"J": [1e5], "k": [7.77e7], "h": [0.34]}, {"J": [], "k": [1e-9], "h": [7e-9]}
+    back = {"J": half["J"][::-1], "k": half["k"][1::-1], "h": [2.4e-8, 3e-11]}
+    chain = {name: np.array(half[name] + middle[name] + back[name] + end[name]) for name in "Jkh"}
+    outputs, status = reduced("none", chain, 1e-7, asked=("damping",))
+    expected = oracles.dampings(oracles.full(*chain.values()).poles())
+    assert status[0] == Status.OK
+    assert relative_error(outputs["damping"][0], expected).max() < 1e-7
+
+
+def test_the_bound_of_an_irs_frequency_knows_of_angles_that_are_small():
+    """A free chain with all of its inertia at the second master, which hardly moves, and others with it."""
+    J = np.array([0.0121, 170.6, 15.27, 6.37, 0.176, 1.41, 1.06, 0.0148, 1.96])
+    k = np.array([0.477, 1.033, 0.463, 1.875, 8.36, 0.572, 2.18, 5.79, 0.0])
+    for scale in 1.0 + 0.1 * np.arange(10):
+        chain = {"J": J * np.append(scale, np.ones(8)), "k": k, "h": np.zeros(9)}
+        truth = oracles.Reduced("irs", *chain.values(), 2, [0, 1]).frequencies()[1]
+        columns = {name: values[None] for name, values in chain.items()} | {"n_keep": 2.0}
+        kind, asked = float(REDUCTIONS["irs"]), ("frequency",)
+        outputs, _, error = estimated(DRIVETRAIN, "direct", reduction=kind, asked=asked, **columns)
+        assert relative_error(outputs["frequency"][0, 1:2], [truth])[0] <= error[0]
 
 
 def spindle(model):
