@@ -43,7 +43,7 @@ def reason(fault: BaseException) -> str:
 def missing(what: str, extra: str) -> SweepError:
     """The fault that a library is not installed: what needs which, and the extra that brings it."""
     commands = f"in a checkout pip install -e '.[{extra}]', elsewhere pip install 'foliot[{extra}]'"
-    return SweepError(f'{what}, of the extra "{extra}"; install it: {commands}')
+    return SweepError(f'{what}, from the extra "{extra}"; install it: {commands}')
 
 
 class Terminated(SystemExit):

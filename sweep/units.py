@@ -141,7 +141,7 @@ def _root(text: str) -> tuple[Decimal, dict[str, Decimal]]:
     try:
         zero, one = (registry.Quantity(Decimal(number), unit).to_root_units() for number in (0, 1))
     except Exception:  # of pint, and of what it calls, as for a logarithmic unit
-        raise UnitMistake(f'"{text}" is no multiple of other units; convert the numbers first') from None
+        raise UnitMistake(f'"{text}" is not a multiple of other units; convert the numbers first') from None
     if zero.magnitude != 0:
         raise UnitMistake(f'"{text}" has an offset; give an absolute unit, e.g. "K"')
     return Decimal(one.magnitude), dict(one.unit_items())

@@ -74,7 +74,7 @@ def opened(arguments: argparse.Namespace, name: str = "result") -> Iterator[xr.D
         say(f"{path}: unfinished; cells that are not computed yet are NaN and PENDING", file=sys.stderr)
     with sweep.open_result(path) as found:
         if "end" not in found.attrs and not options.get("unfinished", True):
-            raise SweepError(f"{path}: unfinished; continue it with sweep run, or take what there is with --unfinished")
+            raise SweepError(f"{path}: unfinished; continue it with sweep run, or use it as it is with --unfinished")
         if options.get("at"):
             from sweep.show.laws import pick
 

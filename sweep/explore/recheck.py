@@ -46,7 +46,7 @@ class CellReport:
 
     def __init__(self, dataset: xr.Dataset, allow_import: bool) -> None:
         if longer := [f"{dim} ({n} values)" for dim, n in statuses_of(dataset).sizes.items() if n != 1]:
-            raise SweepError(f"sweep cell: name one cell; these axes have several values still: {', '.join(longer)}")
+            raise SweepError(f"sweep cell: name one cell; these axes still have several values: {', '.join(longer)}")
         study, cells, columns = again(dataset, [0], allow_import)
         cell, fixed = cells.isel(cell=0), {name: column[0] for name, column in columns.items()}
         self.rtol = float(fixed.pop("rtol"))
@@ -137,7 +137,7 @@ class Checked:
                 values.setdefault(name, np.full((len(used), *shape), np.nan))[some] = found[name]
         off, judged = deviations(study, cells, values), error <= rtol
         if not off:
-            raise SweepError("no output can be compared: all say how a cell was solved, or are 0 but for rounding")
+            raise SweepError("no output can be compared: all describe how a cell was solved, or are 0 up to rounding")
         self.left_out = [f.name for f in study.asked if f.name in cells and f.name not in off and not f.of_method]
         largest = np.max([*off.values()], axis=0)
         self.cells, self.sample, self.judged = len(ok), len(drawn), int(judged.sum())
@@ -160,12 +160,12 @@ class Checked:
         rows = [
             ("solved again", f"{self.sample:,} of {self.cells:,} OK cells, to a tolerance down to rtol/{CLOSER:g}"),
             ("by another method", f"{self.by_another:,}"),
-            ("by the same", f"{self.judged - self.by_another:,}; an error that both have in common is not found"),
+            ("by the same", f"{self.judged - self.by_another:,}; an error common to both is not found"),
             ("by none", f"{self.sample - self.judged:,}, which no method solves to rtol again"),
             ("beyond rtol", f"{self.beyond or 'none'} of {self.judged:,}"),
             ("of all OK cells", f"at most {100 * self.limit:.2g} % beyond, with {100 * CONFIDENCE:g} % confidence"),
         ]
-        rows += [("left out", f"{', '.join(self.left_out)}: 0 but for rounding")] if self.left_out else []
+        rows += [("left out", f"{', '.join(self.left_out)}: 0 up to rounding")] if self.left_out else []
         if self.worst:
             said = " against ".join(f"{value!r} ({who})" for who, value in self.worst["values"])
             by, cell = f"{self.worst['output']} by {self.worst['off']:.2g} rtol", cell_text(self.worst["cell"])

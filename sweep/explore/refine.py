@@ -213,9 +213,9 @@ def _require(dataset: xr.Dataset, study: Study, names: Sequence[str], tolerance:
     if not names:
         raise SweepError("y: name at least one output")
     if any(axis.words is not None or axis.values.ndim > 1 for axis in axes):
-        raise SweepError("only number axes can be refined")
+        raise SweepError("only axes of numbers can be refined")
     if study.design != "product" and not axes_of(dataset):
-        raise SweepError("only a product of axes can be refined, or what was refined before")
+        raise SweepError("only a product of axes can be refined, or an earlier result of refine")
     if len(axes) > MOST_AXES:
         raise SweepError(f"at most {MOST_AXES} axes can be refined, found {len(axes)}; fix the others")
     if dataset[STATUS].dims == tuple(study.axes) and not all(dataset.indexes[axis.name].is_unique for axis in axes):
@@ -226,7 +226,7 @@ def _require(dataset: xr.Dataset, study: Study, names: Sequence[str], tolerance:
         raise SweepError("an axis to be refined needs finite values")
     for name in names:
         if name not in study.outputs or name not in dataset or dataset[name].dims != dataset[STATUS].dims:
-            raise SweepError(f"{name}: is no output of one value a cell")
+            raise SweepError(f"{name}: is not an output with one value per cell")
 
 
 class Refiner:

@@ -67,7 +67,7 @@ def sensitivity(dataset: xr.Dataset, y: str | xr.DataArray) -> xr.Dataset:
     found = dataset[y] if isinstance(y, str) and y in dataset else y
     if not isinstance(found, xr.DataArray) or found.dims != dataset["status"].dims:
         known = ", ".join(str(name) for name, v in dataset.data_vars.items() if v.dims == dataset["status"].dims)
-        raise SweepError(f"there is no output {y!r} of one value a cell; there are {known}")
+        raise SweepError(f"there is no output {y!r} with one value per cell; known: {known}")
     values = np.asarray(found.values, float)
     lost = int((~np.isfinite(values)).sum())
     if lost:

@@ -39,10 +39,10 @@ class PointSolver:
         for name, axis in study.axes.items():
             if name in SETTINGS or axis.words is not None or axis.values.ndim > 1:
                 raise SweepError(
-                    f"axes.{name}: a solver takes numbers of the kernel; fix it, and make one for each value"
+                    f"axes.{name}: the arguments of a solver are numbers; fix this, and make a solver for each value"
                 )
         if study.summary is not None:
-            raise SweepError("summary: a solver gives cells; leave it out")
+            raise SweepError("summary: a solver returns cells; leave the summary out")
         self.names, self.fields = tuple(study.axes), (*study.outputs, "status")
         self._units = [(study.kernel.parameter(name).unit, name) for name in self.names]
         self._study = replace(study, design="zip", blocks=(), axes=dict(study.axes))  # the axes are those of each call

@@ -168,10 +168,10 @@ def check_target(target: Path, *, force: bool = False, read: Sequence[Path] = ()
         if target.is_dir() and not (target / "zarr.json").is_file():
             raise SweepError(f"{target} is a folder; name a file in it")
         if there and any(one.exists() and target.samefile(one) for one in read):
-            raise SweepError(f"{target} is what is read; name another file")
+            raise SweepError(f"{target} is the file being read; name another")
     if there and not force:
         raise SweepError(
-            f"{target} is there already; name another file, or overwrite it with --force (Python: force=True)"
+            f"{target} exists already; name another file, or overwrite it with --force (Python: force=True)"
         )
 
 

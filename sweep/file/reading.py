@@ -82,8 +82,8 @@ class StoredFile:
             if isinstance(fault, OSError) and fault.errno and fault.errno not in OF_DAMAGE:
                 raise SweepError(f"{path}: cannot be read ({reason(fault)})") from fault
             raise Damaged(
-                f"{path}: not the result of a sweep (exports are for xarray and other programs), or damaged "
-                f"({reason(fault)}); move it away or choose another name"
+                f"{path}: not the result of a sweep (open exports with xarray or other programs), or damaged "
+                f"({reason(fault)}); name another file"
             ) from fault
 
     def _read(self, h5: Any, key: bytes | None) -> None:
@@ -91,8 +91,8 @@ class StoredFile:
         integrity = _own(h5, "integrity").attrs
         if (number := integrity.get("format")) != FORMAT:
             raise SweepError(
-                f"{self.path}: a result of another format ({number}); this version of foliot reads format {FORMAT} "
-                "alone; open it with the version that wrote it, or compute it again under another name"
+                f"{self.path}: a result of another format ({number}); this version of foliot reads only format "
+                f"{FORMAT}; open it with the version that wrote it, or compute it again under another name"
             )
         contents, self.coords = json.loads(integrity["contents"]), dict[str, Coordinate]()
         self.dims = {name: tuple(dims) for name, dims in contents["dims"].items()}
@@ -304,7 +304,7 @@ class Numbers:
             start, stop = table.blocks.bounds(block)
             raise SweepError(
                 f"{file.path}: {self.name} is damaged between its cells {start:,} and {stop:,}, or was changed by "
-                "another program; sweep verify tells of all damage, and "
+                "another program; sweep verify lists all damage, and "
                 f"{'sweep run --repair' if file.finished else 'the same run'} computes the damaged cells again"
             )
 

@@ -52,12 +52,12 @@ def lock_of(output: Path) -> Path:
 def alone(output: Path) -> Iterator[None]:
     """No other run writes this output meanwhile. Raises SweepError."""
     if output.suffix in OTHERS:
-        raise SweepError(f"{output}: a result is an HDF5 file; name it *.h5, of which `sweep export` makes other kinds")
+        raise SweepError(f"{output}: name a result *.h5; `sweep export` converts it to other formats")
     if output.suffix == UNFINISHED:
         raise SweepError(f"{output}: a result that is not finished is called *{UNFINISHED}; choose another name")
     with disk.refusing(output), disk.locked(lock_of(output)) as ours:
         if not ours:
-            raise SweepError(f"{output}: another run is at work on this output; wait for it, or choose another with -o")
+            raise SweepError(f"{output}: another run is writing this output; wait for it, or choose another with -o")
         disk.remove(disk.part_of(unfinished_of(output)))  # of a run that was killed
         yield
 
@@ -77,7 +77,7 @@ def earlier(output: Path, mark: Mapping[str, str], give_up: bool = False) -> Sto
         store.close()
         raise SweepError(
             f"{path}: the unfinished result of another study or version; finish that one first, choose another name, "
-            "or give it up with --force (Python: force=True)" + "".join(f"\n  {line}" for line in changes)
+            "or discard it with --force (Python: force=True)" + "".join(f"\n  {line}" for line in changes)
         )
     return None
 
@@ -122,7 +122,7 @@ class Store(StoredFile):
                 raise Damaged
         except Damaged:
             self.close()
-            cure = "remove it, or give it up with --force (Python: force=True)"
+            cure = "remove it, or discard it with --force (Python: force=True)"
             raise Damaged(f"{self.path}: damaged beside its numbers; {cure}") from None
         status = os.fstat(self.fd)
         self.output, self._mark = output, (status.st_ino, status.st_size)  # of the file: still the one, and as long
@@ -174,7 +174,7 @@ class Store(StoredFile):
             if disk.mark(self.path)[:2] != self._mark or os.pread(self.fd, BYTES, self.key_at) != self.key:
                 raise Incomplete(
                     f"{self.path}: was moved, removed, cut or overwritten while the run wrote to it; if it was moved, "
-                    "move it back, and the same command continues; else remove what is left, and begin anew"
+                    "move it back, and the same command continues; else remove the rest, and start again"
                 )
             if waiting := dict(self._waiting.popleft() for _ in range(len(self._waiting))):
                 disk.sync_numbers(self.fd)

@@ -113,7 +113,7 @@ def _points(y: xr.DataArray, dim: str, over: str, sigma: Any) -> Array:
     is not known (4, n)."""
     check_output(y)
     if sorted(map(str, (dim, over))) != sorted(map(str, y.dims)):
-        raise SweepError(f"a collapse takes one output along {dim} and {over}, and nothing else; choose with .sel")
+        raise SweepError(f"a collapse needs an output along {dim} and {over} only; select with .sel")
     t, sizes = np.log(positive_axis(y, dim)[1]), y[over].values
     if sizes.dtype.kind not in "fiu" or np.unique(sizes).size < 2 or not (np.isfinite(sizes) & (sizes > 0)).all():
         raise SweepError(f"{over}: a collapse needs at least two values, all positive numbers")

@@ -96,7 +96,7 @@ def check_options(confidence: float = 0.95, noise: bool | str | None = None, sig
     if not (noise is None or isinstance(noise, bool) or (isinstance(noise, str) and noise in words)):
         raise SweepError(f"noise: expected True, False or one of {', '.join(words)}; found {noise!r}")
     if noise is not None and sigma is not None:
-        raise SweepError("noise does not go with sigma, which says all of the noise; give one of them")
+        raise SweepError("noise and sigma exclude each other; give one of them")
 
 
 def check_names(y: xr.DataArray, taken: Iterable[Hashable]) -> None:
@@ -121,7 +121,7 @@ def positive_axis(y: xr.DataArray, dim: str, repeated: bool = False) -> tuple[st
         raise SweepError(f"{title(y)} has no axis {dim!r}" + (did_you_mean(str(dim), axes) or others))
     values = y.coords[dim].values
     if values.size < FEWEST:
-        raise SweepError(f"{dim} has {values.size} of the at least {FEWEST} points that an exponent needs")
+        raise SweepError(f"{dim} has only {values.size} points; an exponent needs at least {FEWEST} points")
     first, of = values[:1].tolist()[0], values.dtype
     if of.kind in "mM" or hasattr(first, "calendar"):  # cftime's
         since = f", {dim}" if of.kind == "m" else f" since a moment before the first, ({dim} - MOMENT)"
@@ -135,7 +135,7 @@ def positive_axis(y: xr.DataArray, dim: str, repeated: bool = False) -> tuple[st
         raise SweepError(f"{dim} must be positive and finite to take logarithms; found {x[~fit][0]:g}, select a part")
     steps = np.diff(x)
     if not ((steps >= 0).all() or (steps <= 0).all()):
-        raise SweepError(f"{dim} neither rises nor falls throughout; sort first, e.g. ds.sortby({dim!r})")
+        raise SweepError(f"{dim} is not monotone; sort first, e.g. ds.sortby({dim!r})")
     if not (repeated or steps.all()):
         twice = f"{dim} = {x[:-1][steps == 0][0]:g} stands there more than once"
         raise SweepError(f"{twice}; take means first, e.g. ds.groupby({dim!r}).mean()")
@@ -220,13 +220,13 @@ def fit_lines(
             columns.setdefault(name, empty)[which] = column
     columns["points"] = present.sum(axis=1)
     if len(columns) == 1:
-        where, way = f"along {dim}", "add points"
+        where, way = "", "add points"
         if window is not None:
             ends = ("open" if end in (0.0, math.inf) else f"{end:g}" for end in (low, high))
-            where, way = f"in the window {' to '.join(ends)} of {dim}", "choose a wider one"
+            where, way = f" in the window {' to '.join(ends)}", "choose a wider one"
         raise SweepError(
-            f"a fit needs at least {fewest} points, found {columns['points'].max(initial=0)} of {title(y)} {where}, "
-            f"at {np.unique(t[present.any(axis=0)]).size} places ({fewest_places} are needed); {way}"
+            f"a fit of {title(y)} needs at least {fewest} points at {fewest_places} values of {dim}, found "
+            f"{columns['points'].max(initial=0)} at {np.unique(t[present.any(axis=0)]).size}{where}; {way}"
         )
     coords: dict[Any, Any] = {name: one for name, one in part.coords.items() if dimension not in one.dims}
     check_names(y, {*coords, *part.dims[:-1]} & {*columns})

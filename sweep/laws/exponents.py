@@ -197,13 +197,13 @@ def exponent_map(y: xr.DataArray, dim: str, levels: Sequence[float] = BORDERS) -
     local = local_exponent(y, dim, error=True)
     check_names(y, {*y.dims} & {"point", "level", "line"})
     if y.ndim != 2:
-        raise SweepError(f"{title(y)} has {y.ndim} dimensions; a map needs two, choose with .sel")
+        raise SweepError(f"{title(y)} has {y.ndim} dimensions; a map needs two; select with .sel")
     for name in y.dims:
         if name not in y.coords or y[name].dtype.kind not in "fiu" or y.sizes[name] < 2:
             raise SweepError(f"{name} has no two numbers to draw a map over")
         steps = np.diff(y[name].values.astype(np.float64))
         if not (np.isfinite(steps).all() and ((steps > 0).all() or (steps < 0).all())):
-            raise SweepError(f"{name} neither rises nor falls throughout, so no map can be drawn over it; sort first")
+            raise SweepError(f"{name} is not monotone, so no map can be drawn over it; sort first")
     try:
         import contourpy
     except ImportError:

@@ -99,7 +99,7 @@ def fit_two_laws(
         law = "equation (1) of sweep.laws.two_laws"
         return fit_lines(_each, law, y, dim, window, sigma, **keys)
     if window is not None:
-        raise SweepError("window does not go with windows, which say where the two lines are")
+        raise SweepError("window and windows exclude each other; give one of them")
     try:
         low, high = windows
     except (TypeError, ValueError):
@@ -195,7 +195,7 @@ def crossover(low_fit: xr.Dataset, high_fit: xr.Dataset) -> xr.Dataset:
     lines are parallel within their errors.
     """
     if bool(((low_fit.low < high_fit.high) & (high_fit.low < low_fit.high)).any()):
-        raise SweepError("the windows of the two fits overlap, so their errors are not independent; take them apart")
+        raise SweepError("the windows of the two fits overlap, so their errors are not independent; separate them")
     names = ["high", "low"] if bool((low_fit.centre > high_fit.centre).all()) else ["low", "high"]
     both = xr.concat([low_fit, high_fit], xr.Variable("law", names), combine_attrs="override")
     middle = np.log(both.centre).mean("law")  # logarithms counted from here keep their digits
@@ -214,7 +214,7 @@ def crossover(low_fit: xr.Dataset, high_fit: xr.Dataset) -> xr.Dataset:
     square = steeper**2 - (reach**2).sum("law")
     square = square.where(square > 0)
     if not square.notnull().any():
-        raise SweepError("the two laws have the same exponent within their errors, so they meet nowhere")
+        raise SweepError("the two laws have the same exponent within their errors, so they do not meet")
     off = reach * (meeting + middle - np.log(both.centre))
     linear = (reach * off).sum("law")
     root = np.sqrt(linear**2 + square * (level_reach**2 + off**2).sum("law"))
@@ -269,7 +269,7 @@ def compare_laws(y: xr.DataArray, dim: str, window: Window | None = None, *, sig
     check_output(y)
     if y.ndim != 1:
         raise SweepError(
-            f"{title(y)} runs along {', '.join(map(str, y.dims))}; compare laws of one line, choose with .sel"
+            f"{title(y)} runs along {', '.join(map(str, y.dims))}; laws are compared for one line; select with .sel"
         )
     return fit_lines(_table, "", y, dim, window, sigma)
 

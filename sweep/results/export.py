@@ -76,7 +76,7 @@ def export(
     kind = target.suffix.lower()
     if kind not in WRITERS:
         found = f'"{target.suffix}"' if target.suffix else "no suffix"
-        raise SweepError(f"{target}: found {found}; export writes {listed(WRITERS, word='and')}, as the suffix says")
+        raise SweepError(f"{target}: found {found}; export writes {listed(WRITERS, word='and')}, chosen by the suffix")
     if flag("compress", compress) and kind not in PACKED:
         raise SweepError(f"{target}: compress is for {listed(PACKED, word='and')}")
     source = dataset.encoding.get("source")

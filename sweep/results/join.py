@@ -85,7 +85,7 @@ def join(
     if axis is None and (changed := [name for name in own if own[name] != other.get(name, own[name])]):
         raise SweepError(
             f"the kernel's own {listed(changed, word='and')} changed between the two; compute one of them again, or "
-            'tell them apart along a new axis (axis="version")'
+            'join them along a new axis (axis="version")'
         )
     for dataset, study in zip(results, studies, strict=True):
         require_as_read(dataset, study, [*study.outputs, *ANCILLARY], whole=True)

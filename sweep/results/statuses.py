@@ -92,7 +92,7 @@ def statuses_of(dataset: Cells) -> Any:
         raise SweepError("this is a summary, which keeps no cells; run its study without [summary]")
     if STATUS not in dataset:
         raise SweepError(
-            "this Dataset has no status of cells, so it is no result; sweep.run and sweep.open_result give one"
+            "this Dataset has no variable status, so it is not a result; sweep.run and sweep.open_result return one"
         )
     if dataset[STATUS].dtype.kind not in "iu":
         raise SweepError(
@@ -108,7 +108,7 @@ def require_as_read(dataset: xr.Dataset, study: Study, columns: Iterable[str], w
     cure = "take cells of the result as it was read"
     for name in (*study.axes, *study.fixed, *columns):
         if name not in dataset:
-            raise SweepError(f"{name}: is lost; {cure}")
+            raise SweepError(f"{name}: is missing; {cure}")
     for field in (*study.kernel.parameters, *study.kernel.outputs):
         if field.name in dataset and (unit := dataset[field.name].attrs.get("units", field.unit)) != field.unit:
             raise SweepError(f'{field.name}: is in another unit, "{unit}" instead of "{field.unit}"; {cure}')

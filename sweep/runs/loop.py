@@ -288,7 +288,7 @@ class Loop:
                 fields = {"cell": cell.cell, "values": dict(cell.values), "reason": cell.reason}
                 self.progress.note(str(cell), "failed", **fields)
             elif self._failed == MOST_TOLD + 1:
-                self.progress.note("more cells FAILED; from here on they are counted only")
+                self.progress.note("more cells FAILED; further ones are only counted")
         self.progress.add(self._cells[done.block], self._weights[done.block], done.seconds)
 
     def _stop(self, futures: Iterable[Future[Any]]) -> None:

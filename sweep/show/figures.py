@@ -84,7 +84,7 @@ def plot(
         check_target(as_path(path), force=force)
     drawn = precision_figure if "reference" in dataset.attrs else laws_figure if "chosen" in dataset.attrs else None
     if drawn and (y or x):
-        raise SweepError("y and x choose what is shown of a result; this Dataset has one picture, without them")
+        raise SweepError("y and x select what is shown of a result; this Dataset has only one figure, without them")
     figure = drawn(dataset) if drawn else view_figure(View(dataset, y, x), dataset.attrs.get("title", ""))
     if path is not None:
         save(figure, path)

@@ -68,7 +68,7 @@ class View:
         y, x = (name if name is None else a_name(what, name) for what, name in (("y", y), ("x", x)))
         known = outputs(dataset)
         if not known:
-            raise SweepError("there is nothing to draw: no output runs along an axis")
+            raise SweepError("there is nothing to draw: no output varies along an axis")
         name = one_of(y or preferred(dataset, known), known, f"there is no output {y!r} to draw")
         if not dataset[name].size:
             raise SweepError(f"there is nothing to draw: an axis of {name} has no values")

@@ -64,14 +64,14 @@ class Condition:
         if not isinstance(self.text, str):
             raise SweepError(f'{self.says.strip()}: expected words such as "R < 0.1", found {kind(self.text)}')
         if len(self.text) > LONGEST:
-            raise SweepError(f"{self.says}{self.text[:40]}...: is longer than {LONGEST} letters")
+            raise SweepError(f"{self.says}{self.text[:40]}...: is longer than {LONGEST} characters")
         try:
             with np.errstate(all="ignore"):
                 found, _ = self._value(_parsed(self.text))
         except (SyntaxError, ValueError, RecursionError, MemoryError, ArithmeticError, TypeError):
-            raise self.refusal(f"cannot be read; it may hold {GRAMMAR}") from None
+            raise self.refusal(f"cannot be read; it may contain {GRAMMAR}") from None
         if _kind(found) != "b":
-            raise self.refusal('is no condition on the cells; write e.g. "R < 0.1" or "status == \'OK\'"')
+            raise self.refusal('is not a condition on the cells; write e.g. "R < 0.1" or "status == \'OK\'"')
         return found
 
     def refusal(self, what: str, node: ast.expr | None = None) -> SweepError:
@@ -110,13 +110,13 @@ class Condition:
                 if unit is not None or its is not None:  # a number alone is of no unit in a product
                     unit = compute(*(parsed("1") if one is None else one for one in (unit, its)))
                 return compute(value, other), unit
-        raise self.refusal(f"is not allowed; it may hold {GRAMMAR}", node)
+        raise self.refusal(f"is not allowed; a condition may contain {GRAMMAR}", node)
 
     def _part(self, node: ast.expr, kinds: str, what: str) -> Valued:
         """A part whose values are of some kinds of numpy."""
         found, unit = self._value(node)
         if _kind(found) not in kinds:
-            raise self.refusal(f"is no {what}", node)
+            raise self.refusal(f"is not a {what}", node)
         return found, unit
 
     def _compared(self, left: ast.expr, sign: ast.cmpop, right: ast.expr) -> Any:

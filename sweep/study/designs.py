@@ -54,7 +54,7 @@ def read_designs(keys: Entry, kernel: Kernel) -> tuple[str, dict[str, Axis], tup
     tables, blocks = [keys], list[Block]()
     if "blocks" in keys:
         for key in (key for key in ("design", "axes") if key in keys):
-            keys[key].wrong("does not go with blocks; write it in one of them")
+            keys[key].wrong("cannot be combined with blocks; write it in one of them")
         given, example = keys["blocks"], "[[blocks]] with axes.mu = [1.0, 2.0]"
         tables = []
         if isinstance(given.value, list | tuple) and given.value:
@@ -124,7 +124,7 @@ def _block(keys: Entry, kernel: Kernel) -> tuple[dict[str, Axis], Block]:
                 _, first, counts = np.unique(found.values, return_index=True, return_counts=True)
                 if (counts > 1).any():
                     label = found.label(int(first[counts > 1][0]))
-                    entry.wrong(f"{label} stands more than once; give every value once")
+                    entry.wrong(f"{label} occurs more than once; give every value once")
     lengths = {name: len(axis) for name, axis in axes.items()}
     if design == "zip" and all(lengths.values()) and len(set(lengths.values())) > 1:
         counted = listed((f"{name} has {n}" for name, n in lengths.items()), word="and")

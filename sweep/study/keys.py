@@ -106,7 +106,7 @@ def _fixed(keys: Entry, kernel: Kernel, axes: Mapping[str, Axis]) -> Fixed:
     for name in table.value:
         entry = table[name]
         if name in SETTINGS:
-            entry.wrong(f"stands at the top of a study: {name} = ..., or under [axes.{name}]")
+            entry.wrong(f"belongs at the top of a study: {name} = ..., or under [axes.{name}]")
             continue
         if field := field_of(entry, name, kernel):
             before = len(keys.mistakes)

@@ -132,7 +132,7 @@ class Entry:
         for i in range(len(self.value)):
             word = self[i].read("", one_of, allowed)
             if word in found:
-                self[i].wrong(f"{show(word)} stands twice")
+                self[i].wrong(f"{show(word)} occurs twice")
             found += [word] if word else []
         return found
 
@@ -145,7 +145,7 @@ def text(value: Any) -> str:
     if not isinstance(value, str):
         raise ValueError(f"expected text in quotes, found {show(value)}")
     if bad := re.search("[\0\ud800-\udfff]", value):
-        raise ValueError(f"no file holds the character {bad[0]!r}; leave it out")
+        raise ValueError(f"a file cannot contain the character {bad[0]!r}; leave it out")
     return value
 
 

@@ -93,7 +93,7 @@ def _of_file(path: Path) -> tuple[dict[str, Any], str]:
         raise SweepError(f"{path} is {other} {path}")
     try:
         if path.exists() and not path.is_file():
-            raise SweepError(f"{path} is no file, but a folder or a pipe; name a study file, e.g. study.toml")
+            raise SweepError(f"{path} is a folder or a pipe, not a file; name a study file, e.g. study.toml")
         text = path.read_bytes().decode("utf-8-sig")
     except FileNotFoundError:
         near = did_you_mean(path.name, [p.name for p in path.parent.glob("*.toml")])

@@ -96,7 +96,7 @@ def axis(entry: Entry, field: Field, shares: Floats | None = None) -> Axis:
     elif form == "file":
         values = _scaled(entry["file"].read(NONE, _columns, entry.folder, field, array), factor)
     for key in (key for key in ends if key in entry and form in ("values", "file")):
-        entry[key].wrong(f"does not go with {form}; leave it out")
+        entry[key].wrong(f"cannot be combined with {form}; leave it out")
     if form == "spacing" and len(values):
         kept = {key: KEPT[key](value) for key, value in entry.value.items() if key in KEPT}
         return Axis(field.name, frozen(values), kept["spacing"], None, kept)

@@ -104,7 +104,7 @@ class Page:
         names, select = [name for name in outputs(even) if lines_of(even[name])], pn.widgets.Select
         self.dataset = even
         if not names:
-            raise SweepError(f"{name}: there is nothing to look at: no output runs along an axis of numbers")
+            raise SweepError(f"{name}: there is nothing to show: no output varies along an axis of numbers")
         self.output = select(label="output", options=names, value=preferred(even, names), **WIDE)
         self.shows = pn.widgets.RadioButtonGroup(options=values, **WIDE)
         self.x = select(label="across the page", options=number_axes(even, self.output.value), **WIDE)

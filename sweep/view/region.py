@@ -95,7 +95,7 @@ def shown(dataset: xr.Dataset, choice: Choice) -> View:
     if not choice.exponent:
         return found
     if not found.joined:
-        raise SweepError(f"{choice.x} is no axis of the study; a local exponent needs neighbours along one")
+        raise SweepError(f"{choice.x} is not an axis of the study; a local exponent needs neighbours along one")
     found.y = local_exponent(found.y, choice.x)
     return found
 

@@ -159,7 +159,7 @@ def test_a_dataset_without_statuses_says_what_can_be_done_with_it():
     plain = xr.Dataset({"y": ("x", [1.0])})
     assert "in_units" in repr(plain.sweep)
     for use in (plain.sweep.statuses, lambda: sweep.where(plain, "y > 0"), lambda: sweep.diff(plain, plain)):
-        with pytest.raises(sweep.SweepError, match="no status of cells, so it is no result"):
+        with pytest.raises(sweep.SweepError, match="not a result"):
             use()
     summary = sweep.run(build(axes={"height": [1.0, 2.0]}, summary={}))
     assert re.search(r"^  2 +OK ", repr(summary.sweep), re.MULTILINE)

@@ -231,8 +231,8 @@ def test_a_window_holds_its_ends_to_rounding_and_may_be_open(window, points):
 @pytest.mark.parametrize(
     ("keys", "message"),
     [
-        ({"window": (200, 300)}, "found 0 of y in the window"),
-        ({"window": (8, 10)}, "found 1 of y"),
+        ({"window": (200, 300)}, "found 0 at 0 in the window"),
+        ({"window": (8, 10)}, "found 1 at 1"),
         ({"window": (5, 1)}, "is empty"),
         ({"window": (2, 2)}, "is empty"),
         ({"window": (1, np.nan)}, "is empty"),
@@ -241,7 +241,7 @@ def test_a_window_holds_its_ends_to_rounding_and_may_be_open(window, points):
         ({"noise": np.ones(2)}, "noise: expected True"),
         ({"window": 5.0}, "is a pair"),
         ({"noise": "pink"}, "noise: expected True, False or one of even"),
-        ({"sigma": 0.1, "noise": "even"}, "noise does not go with sigma"),
+        ({"sigma": 0.1, "noise": "even"}, "noise and sigma"),
         ({"sigma": -1.0}, "sigma: errors are not negative"),
         ({"sigma": xr.DataArray(np.ones(3), dims="other")}, "sigma: expected a number, or an array"),
         ({"bound": "much"}, "bound: expected a number"),

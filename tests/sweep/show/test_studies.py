@@ -31,7 +31,7 @@ def test_nobodys_file_is_overwritten(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     Path("foliot_scaling.toml").write_text("mine")
     assert main(["studies", "foliot_scaling"]) == 2
-    assert "is there already" in capsys.readouterr().err
+    assert "exists already" in capsys.readouterr().err
     assert Path("foliot_scaling.toml").read_text() == "mine"
     assert not Path("foliot_scaling.py").exists()
     assert main(["studies", "foliot_scalling"]) == 2

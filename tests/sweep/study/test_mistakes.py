@@ -12,12 +12,12 @@ import sweep
     [
         ("fixed.height = 1", "axes", "missing"), ("[axes]\n[fixed]\nheight = 1", "axes", ""),
         ("axes.v0 = [1.0]", "fixed.height", "has no default"), ("axes.height = []", "axes.height", "no values"),
-        ("axes.height = [1, 2, 1.0]", "axes.height", "1 stands"),
+        ("axes.height = [1, 2, 1.0]", "axes.height", "1 occurs"),
         ("axes.height = [1, nan, 2, nan]", "axes.height", "nan"),
-        ("axes.method = ['auto', 'auto']\nfixed.height = 1", "axes.method", "auto stands"),
+        ("axes.method = ['auto', 'auto']\nfixed.height = 1", "axes.method", "auto occurs"),
         ("axes.height = {}", "axes.height", "neither"),
         ("axes.height = { values = [1], file = 'x' }", "axes.height", "exclude each other"),
-        ("axes.height = { values = [1], num = 1 }", "axes.height.num", "does not go with values"),
+        ("axes.height = { values = [1], num = 1 }", "axes.height.num", "with values"),
         ("axes.height = { spacing = 'linear', start = nan, stop = 2, num = 3 }", "axes.height.start", "finite"),
         ("axes.height = { spacing = 'linear', start = 1, stop = inf, num = 3 }", "axes.height.stop", "finite"),
         ("axes.height = { spacing = 'linear', start = 1, stop = 1, num = 3 }", "axes.height.stop", "values = [1]"),
@@ -173,7 +173,7 @@ def test_what_is_no_study_is_refused_in_one_line_that_names_the_way(tmp_path):
     path.touch()
     for given, message in (
         (None, "give one"), (3, "found 3"), ("a = 1\nb = 2", "is the text of a study"), ("a.h5", "sweep show a.h5"),
-        ("a.py", "python a.py"), ("nowhere.toml", "no such file"), ("/dev/zero", "is no file"),
+        ("a.py", "python a.py"), ("nowhere.toml", "no such file"), ("/dev/zero", "not a file"),
         ("\0.toml", "cannot be read"), (tmp_path, "a folder"),
         (tmp_path / "foliot_scalling.toml", "did you mean foliot_scaling.toml?"),
         *((tmp_path / f"{name}.toml", message) for name, message in enumerate(contents.values())),
