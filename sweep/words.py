@@ -198,7 +198,7 @@ def several(what: str, given: Any) -> list[Any]:
 def whole_number(what: str, value: Any, least: int = 1) -> int:
     """The number, if it is a whole one from the least on. Raises SweepError."""
     if isinstance(value, bool) or not isinstance(value, Integral) or not least <= int(value) < 2**63:
-        raise SweepError(f"{what}: expected a whole number from {least} on, found {value!r}")
+        raise SweepError(f"{what}: expected a whole number of at least {least}, found {value!r}")
     return int(value)
 
 

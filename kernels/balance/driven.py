@@ -1,12 +1,12 @@
-"""Balance with viscous and solid friction, driven once a half swing: the limit cycle.
+"""Balance with viscous and solid friction, driven once per half swing: the limit cycle.
 
     th'' + 2 zeta w_n th' + w_n^2 (th +- r) = drive,  + for th' > 0,  r = R/k                        (1)
-The drive is either an impulse, the energy k w given at each passage of th = 0, or a lift, the torque k m along the
-motion over abs(th) < beta; it turns round once the balance has left the lift. Leaves out: what an escapement does to
-the balance outside, and stiction: a cycle turns at more than r. No impulse starts a balance at rest at the zero.
+The drive is either an impulse, the energy k w at each passage of th = 0, or a lift, the torque k m along the motion
+for abs(th) < beta, which changes sign once the balance has left the lift. Leaves out: the effect of an escapement
+outside the lift, and stiction, since a cycle turns beyond r. An impulse does not start a balance at rest at zero.
 Source: "Theory of Horology", 2-3, for the motion; the cycle, its existence and its multiplier are derived in
-`_driven_swing`. A drive too weak to keep a swing up is refused as STICKS; so is for zeta >= 1, where a balance released
-from rest creeps to r, an impulse or a lift with beta <= r.
+`_driven_swing`. A drive too weak to sustain a swing is refused as STICKS, as is, for zeta >= 1, where a balance creeps
+to r, an impulse or a lift with beta <= r.
 """
 
 import math

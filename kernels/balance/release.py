@@ -5,10 +5,10 @@ It rests at the first turning point where abs(theta) <= r_s; theta is measured f
 is the stiction, as an angle. Leaves out: an escapement (`balance_driven`), friction that varies with the position.
 Source: "Theory of Horology", section 2-3; the count of half swings is derived in `_ringdown`.
 
-Where there is no such end, the cell is remarked and what exists is given: OVERDAMPED for zeta >= 1 (never turns, creeps
-to r on the side of release, where `stop_angle` is), NEVER_ENDS without any solid friction (a motion of any length is:
-it fades to 0 and never ends). GRAZING: the count hangs on the last digits of the input. PARTLY_OUT_OF_RANGE: an output,
-such as the angle of rest near critical damping without friction of motion, is too small or too large for a float64.
+If there is no such point, the status says so and outputs that exist are given: OVERDAMPED for zeta >= 1 (the balance
+never turns and creeps to r on the side of release, which is `stop_angle`), NEVER_ENDS without solid friction (the
+motion decays to 0 and never ends). GRAZING: the count depends on the last digits of the input. PARTLY_OUT_OF_RANGE: an
+output, such as the angle of rest near critical damping without solid friction, is outside the range of float64.
 """
 
 import math

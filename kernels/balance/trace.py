@@ -2,8 +2,8 @@
 
     theta_k = (-1)^k sgn(theta0) a_k,  a_k as in `_ringdown`, equation (3)                           (1)
 up to the one at which it rests, which is the last; half swing 0 is the release. Source: as for `balance`.
-Beyond the last turning point the trace is NaN: that of an overdamped balance (OVERDAMPED) has the release only, that of
-a balance without solid friction never ends.
+Beyond the last turning point the trace is NaN: an overdamped balance (OVERDAMPED) has the release only, and the trace
+of a balance without solid friction never ends.
 """
 
 import math

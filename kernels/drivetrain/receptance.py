@@ -1,15 +1,15 @@
-"""Drivetrain: how far one inertia turns for a torque at another, against frequency.
+"""Drivetrain: receptance, the angle of one inertia per torque at another, against frequency.
 
 A chain of n inertias, J_1 -k_1- J_2 - ... - J_n -k_n- ground, each spring with a damper h_j beside it. For a torque
 exp(i w t) at `drive_mass` the angle at `read_mass` is H exp(i w t), with
     (-w^2 J + i w h + k) H = unit torque,  w = 2 pi frequency,                                          (1)
-J diagonal, k and h tridiagonal. The answer to a torque of any size is that times H. k_n = 0 leaves the end free.
+J diagonal, k and h tridiagonal. The response is linear in the torque. k_n = 0 leaves the end free.
 Leaves out: backlash, solid friction, damping that is not viscous. Source: the drivetrain of a milling machine after
-Rivin; how (1) is solved, and the bound by which a cell is called INACCURATE, is told in `_receptance`.
+Rivin; `_receptance` describes the solution of (1) and the bound that decides on INACCURATE.
 
-rtol is of abs(dH)/abs(H) at every frequency: the phase is right to it in radian, the decibel to 8.7 times it.
-At an undamped resonance, and at 0 Hz without a spring to ground, H is infinite: there it is NaN and the cell is
-PARTLY_OUT_OF_RANGE, or OUT_OF_RANGE where no other frequency is left.
+rtol limits abs(dH)/abs(H) at every frequency: the phase is accurate to it in radian, the decibel to 8.7 times it.
+At an undamped resonance, and at 0 Hz without a spring to ground, H is infinite: it is NaN there, and the cell is
+PARTLY_OUT_OF_RANGE, or OUT_OF_RANGE if there is no other frequency.
 """
 
 import math

@@ -1,24 +1,24 @@
-"""A drivetrain as a chain of inertias, reduced to fewer: what the small model gets right, and up to where.
+"""A drivetrain as a chain of inertias, its reduction to fewer, and the error of the reduced model over frequency.
 
     J_1 -k_1- J_2 -k_2- ... - J_n -k_n- ground,  a damper h_j beside every spring                    (1)
 The spindle J_1 is free, the motor's end is held by k_n; with k_n = 0 it is free too. `reduction` is one of
     none            the full chain
-    rivin           partial systems of one or two masses replaced by what is alike at rest; stays a chain
-    guyan           the other masses follow those kept as at rest; full mass matrix
-    irs             guyan, and the inertia of what follows
-    craig_bampton   the spindle at rest, and modes of the chain with the spindle held (n_keep counts both)
-    modal           the lowest modes, and what the others give way at rest
+    rivin           partial systems of one or two masses replaced by statically equivalent ones; remains a chain
+    guyan           the other masses follow the kept ones statically; full mass matrix
+    irs             guyan, with the inertia of the masses that follow
+    craig_bampton   static mode of the spindle, and modes of the chain with the spindle held (n_keep counts both)
+    modal           the lowest modes, and the static compliance of the others
     exact           rivin's, with masses and springs that depend on the frequency: no error but rounding
-to `n_keep` masses (or modes), or to the fewest that hold every frequency up to `f_max` to `tol`: from n downwards
-until one less would break it; a frequency that is missing breaks it. Errors are those against the full chain. Exact
-reductions have all its frequencies, found from the masses that are left; their damping is that of the full chain, their
-J_kept, k_kept, h_kept are those at rest.
+to `n_keep` masses (or modes), or to the fewest that keep every frequency up to `f_max` within `tol`: from n downwards
+until one fewer would exceed it or lose a frequency. Errors are relative to the full chain. Exact reductions have all
+frequencies of the chain, found from the masses that remain; their damping is that of the full chain, and J_kept,
+k_kept, h_kept are the static values.
 Leaves out: backlash, clearances, gyroscopic and lateral motion, stiffness that varies with the angle.
 Source: Baran & Marchelek, Mechanika Teoretyczna i Stosowana 9 (1971) 201; see the modules `_rivin` and `_bases`.
 
-Right to rtol are frequencies, damping (where not, INACCURATE), and errors as differences of what they compare: a
-frequency_error of 1e-6 is one to 1e-6 +- rtol. Only outputs that are asked for decide: at a resonance of damping zeta
-the frf_error of n masses is known to 4e-16 n/zeta, the frequencies to all their digits.
+Frequencies and damping are accurate to rtol (otherwise INACCURATE); errors are so relative to the compared values: a
+frequency_error of 1e-6 means 1e-6 +- rtol. Only requested outputs count: at a resonance with damping zeta the
+frf_error of n masses is known to 4e-16 n/zeta, the frequencies to all digits.
 """
 
 import math

@@ -5,9 +5,9 @@
 The torque changes sign as phi passes +-phi0 on its way out, and the speed is then multiplied by e. Leaves out: recoil
 of the crown wheel, the geometry of the pallets, the fine structure of the torque (`foliot_ripple`, `foliot_noise`).
 Source: Hoyng & Nieuwenhuizen, arXiv:1604.06681, for friction a phi' alone; the other terms are derived in the modules
-that solve them. What a swing loses grows strictly with the swing, so where a limit cycle exists it is the only one and
-stable; where the foliot does not come to it from rest at phi = 0, `segments` remarks the cell NOT_SELF_STARTING (a
-spring; `taylor` and `dopri5`, which do what `segments` cannot, follow the cycle only and do not say so).
+that solve them. The loss of a swing grows strictly with the swing, so a limit cycle is unique and stable if it exists.
+With a spring the foliot may not reach it from rest at phi = 0; `segments` then sets NOT_SELF_STARTING (`taylor` and
+`dopri5`, for terms that `segments` lacks, solve only for the cycle and do not detect this).
 """
 
 from kernels.foliot import _coulomb, _friction_quadrature, _viscous

@@ -1,8 +1,8 @@
-"""Verge and foliot, the other way round: friction and torque that give a wanted period and amplitude.
+"""Verge and foliot, the inverse problem: friction and torque for a wanted period and amplitude.
 
 With A = amplitude/phi0 > 1 and q - tanh q = k,
     ln(cosh q)/k = A,  a = 4 q/P,  mu = a^2 phi0/k.                                                  (1)
-The left side falls from infinity to 1 as k grows, so the answer is unique. Derived from Hoyng & Nieuwenhuizen,
+The left side decreases from infinity to 1 as k grows, so the solution is unique. Derived from Hoyng & Nieuwenhuizen,
 arXiv:1604.06681, appendix A.
 """
 

@@ -2,21 +2,22 @@
 
 The torque of half swing i = 0 ... N - 1, per moment of inertia, is
     mu_i = max(mu (1 + sigma x_i), floor),  x_0 = z_0,  x_i = r x_(i-1) + sqrt(1 - r^2) z_i,  r = exp(-1/tau_c)  (1)
-with z standard normal and white, so x is stationary with variance 1. Its viscous friction may be noisy as well,
-a max(1 + sigma_a w_i, 0.01), w = shared x + sqrt(1 - shared^2) x', with x' like x but of numbers of its own: torque and
-friction have one noise where shared = 1, independent ones where it is 0. Each half swing lasts T_i by the exact pieces
-of `_linear_swing`; the first begins on the cycle without noise, where it would last T. The clock shows T for each, so
+with z standard normal and white, so that x is stationary with variance 1. The viscous friction may be noisy as well,
+a max(1 + sigma_a w_i, 0.01), w = shared x + sqrt(1 - shared^2) x', with x' an independent sequence like x: torque and
+friction have the same noise for shared = 1, and independent noise for 0. Half swing i has the duration T_i, from the
+exact pieces of `_linear_swing`; the first begins on the cycle without noise, whose half swings last T. The clock
+counts T for each half swing, so
     its gain at the n-th switch is D_n = sum of T - T_i over i < n, at the true time t_n = sum of T_i,             (2)
-and between switches D runs straight from D_n to D_(n+1). Over all, it gains 86 400 D_N/t_N seconds a day. With
-y_j = (D(j tau) - D(j tau - tau))/tau for j = 1 ... M, M whole averaging times tau, it scatters by 86 400 times
+and D is linear in time between switches. The mean gain is 86 400 D_N/t_N seconds per day. With
+y_j = (D(j tau) - D(j tau - tau))/tau for j = 1 ... M, for M complete averaging times tau, the scatter is 86 400 times
     the Allan deviation, sqrt(sum of (y_(j+1) - y_j)^2/(2 (M - 1))),  M >= 2.                                (3)
-floor = h + (mu - h)/100, where h is the least torque with which a swing from rest at the switch comes to the next
+floor = h + (mu - h)/100, where h is the least torque at which a swing from rest at the switch reaches the next
 switch and is not held by stiction: R_s without a hairspring. So noise of the torque never stops the clock.
-To first order long times see white noise as y = s sigma sqrt(T/tau) (s the sensitivity, `foliot`), and correlated
-noise as that times sqrt((1 + r)/(1 - r)); with noise of the friction s sigma becomes the root of (s sigma)^2 +
-((2 s - 1) sigma_a)^2 - 2 shared s sigma (2 s - 1) sigma_a. To second order noise of the torque slows the clock by a
-share of sigma^2.
-The noise hangs on seed and i alone: cells of equal seed have the same noise, whatever else they have.
+To first order and for long times, white noise gives y = s sigma sqrt(T/tau) (s the sensitivity, `foliot`), and
+correlated noise that times sqrt((1 + r)/(1 - r)); with noise of the friction, s sigma becomes the root of (s sigma)^2 +
+((2 s - 1) sigma_a)^2 - 2 shared s sigma (2 s - 1) sigma_a. To second order, noise of the torque slows the clock in
+proportion to sigma^2.
+The noise depends on seed and i only: cells with equal seed have the same noise.
 Derived here; the model without noise is that of Hoyng & Nieuwenhuizen, arXiv:1604.06681.
 """
 

@@ -3,11 +3,11 @@
     phi'' + a phi' + (R + c abs(phi')^n) sgn phi' + k phi = -+mu tau(s)                                (1)
     tau(s) = 1 + depth cos(harmonic pi s),  s = (1 -+ phi/phi0)/2                                     (2)
 
-s is the way along the drive since the switch, over that of the whole swing, so that 1 - s is left to the next one; s is
-negative beyond the switch, on the recoil. The upper signs hold after the switch at +phi0. With a whole harmonic the
-mean of tau over the swing is 1: the drive's work stays 2 mu phi0 a half swing, and what changes is where it is done.
-Where torque falls to dry friction or below the foliot may stick; whether it does is found by following the motion.
-Leaves out: the geometry of the pallets that makes the ripple. Source: as `foliot`; (2) is chosen here.
+s is the displacement along the drive since the switch, as a fraction of that between two switches; it is negative
+beyond the switch, on the recoil. The upper signs hold after the switch at +phi0. For an integer harmonic the mean of
+tau over the swing is 1: the drive's work remains 2 mu phi0 per half swing, and only its distribution changes.
+If the torque falls to the dry friction or below, the foliot may stick; integration of the motion decides.
+Leaves out: the geometry of the pallets that causes the ripple. Source: as `foliot`; (2) is chosen here.
 """
 
 import math

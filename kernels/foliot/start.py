@@ -4,9 +4,9 @@ The foliot is released from rest at phi_start. Below +phi0 the drive pushes it u
 +phi0 on the torque has switched already and the first flip is at -phi0. In the units of `_units`, mirrored so
 that the drive pushes to smaller x, it starts at x with abs(x) = abs(phi_start)/phi0, x > -1, and moves if
     1 + kappa x > rho_s,                                                                             (1)
-the first flip is at x = -1, and each later one is a half swing of `_linear_swing` away. A swing that does not come
-to the switch at once never will: with the same torque, every turning point is nearer to rest than the one before.
-Nothing is averaged and nothing has settled: at strong drive the flips come to the limit cycle only after thousands.
+the first flip is at x = -1, and each later one is a half swing of `_linear_swing` away. A swing that does not reach
+the switch directly never will: with the same torque, every turning point is closer to rest than the one before.
+These are transients: at strong drive the flips approach the limit cycle only after thousands.
 Derived here from Hoyng & Nieuwenhuizen, arXiv:1604.06681, section 2, and from `foliot`.
 """
 

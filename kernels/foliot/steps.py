@@ -1,13 +1,13 @@
-"""The foliot followed by textbook integrators at a fixed step: what the step and a switch found late do to the period.
+"""The foliot by textbook integrators with a fixed step: the effect of the step and of unlocated switches on the period.
 
     phi'' = +-mu - a phi' - R sign phi' - c phi' abs(phi') - k phi,  speed times e where +-phi passes phi0    (1)
 
 From rest at the centre, through `flips` switches. The methods are euler, semi_implicit, verlet, rk4, dopri5, dop853 and
-moreau, `location` says where in a step a switch, or a place of rest, is taken to be (`events`). Everything is done
-twice more with finer steps: the first run's values are given, and what the three differ by tells their `error`, which
-is also what a method states as its bound. INACCURATE: the step is too coarse for that.
-STEP_LIMIT: no switch in 20 000 steps, as where a method takes too much energy, or chatters about a place of rest.
-OUT_OF_RANGE: the method blew up.
+moreau; `location` chooses how a switch, or a place of rest, is located within a step (`events`). Two further runs have
+finer steps: the outputs are those of the first run, and the differences of the three give `error`, which is also the
+bound of the method. INACCURATE: the step is too coarse for this estimate.
+STEP_LIMIT: no switch in 20 000 steps, as when a method loses too much energy, or chatters about a place of rest.
+OUT_OF_RANGE: the method diverged.
 """
 
 from kernels.foliot.cycle import FOLIOT

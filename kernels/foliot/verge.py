@@ -1,26 +1,26 @@
-"""Verge and foliot as two bodies with friction, whose impacts keep a share of the closing speed; a verge that unmeshes.
+"""Verge and foliot as two bodies with friction and impacts with restitution; also verges that unmesh.
 
     contact   (I_v + n^2 I_c) angle'' = n tau - c_v angle' - R_v sign(angle')                            (1)
     flight    I_v angle'' = -c_v angle' - R_v sign(angle'),  I_c wheel'' = tau                           (2)
     impact    the closing speed times -e, with I_v angle' + n I_c wheel' kept                            (3)
 
-A tooth pushes its pallet, wheel' = n angle', until it escapes at phi0; the wheel flies on by `drop` to the other
-pallet. With e > 0 it bounces there; bounces either die out in contact or last until the next escape. A landing while
-the foliot still swings out throws the wheel back: *recoil*. A tooth stands half a pitch, 2 n phi0 + drop, from the
-next to come. Where the recoil exceeds that, contact ends: the pallet leaves its tooth, and as nothing but the tooth
-ever turned the foliot back, it coasts outwards while the wheel runs free. UNMESHES says that the clock, started from
-rest with its wheel at the drop, comes to that within its first swings or as they grow; there is no cycle then.
+A tooth pushes its pallet, wheel' = n angle', until it escapes at phi0; the wheel then moves freely by `drop` to the
+other pallet. With e > 0 it bounces there; the bounces either die out in contact or last until the next escape. An
+impact while the foliot still swings outwards drives the wheel back: *recoil*. Two successive teeth are half a pitch,
+2 n phi0 + drop, apart. If the recoil exceeds that, the pallet leaves its tooth, and since only the tooth turns the
+foliot back, the foliot coasts outwards while the wheel runs free. UNMESHES: the clock, started from rest with its
+wheel at the drop, does so within its first swings or as they grow, and has no cycle.
 
-A bounce of a heavy wheel may throw it so far back that the pallet which it left comes back in front of its tooth: it is
-pushed by that tooth once more, until this escapes again, and so on, within one half period. The speed at the escape is
-that of the first time.
+A bounce may throw a heavy wheel so far back that the pallet which it left comes in front of its tooth again: that tooth
+pushes it once more until it escapes, possibly repeatedly, within one half period. `escape_speed` is that of the first
+escape.
 
-OK: the cycle that the clock comes to from there, one tooth a period, within the error that is stated. Its halves are
-alike, or the clock limps: with a heavy wheel that bounces, or next to the dry friction that stops it, one half may
-last longer, and have more landings, than the other. Then amplitude and recoil are the larger ones, speed and shares
-the means. NOT_CONVERGED: it did not come to such a cycle in 600 half periods; some clocks come to a cycle of several
-teeth, or to none. STEP_LIMIT: half a period has more than 3000 landings and escapes, or without drop the clock comes
-to rest between a tooth and the one before. NO_METHOD: groups beyond 2^+-40 or kappa above 2^13. Without friction and
+OK: the cycle that the clock reaches from this start, one tooth per period, within the stated error. Its halves are
+equal, or the clock limps: with a heavy wheel that bounces, or close to the dry friction that stops it, one half may
+last longer and have more impacts than the other. Amplitude and recoil are then the larger ones, speed and shares the
+means. NOT_CONVERGED: no such cycle in 600 half periods; some clocks reach a cycle of several teeth, or none.
+STEP_LIMIT: half a period has more than 3000 impacts and escapes, or a clock without drop comes to rest between a tooth
+and the one before. NO_METHOD: dimensionless groups beyond 2^+-40 or kappa above 2^13. Without friction and
 with e = 0 this is `impact`, without inertia of the wheel `foliot`. Leaves out: friction of the wheel, the shape of the
 pallets. Derived here.
 

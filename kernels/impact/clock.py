@@ -2,24 +2,24 @@
 
     I_c th_c'' = torque,  I_v th_v'' = 0  between impacts; at an impact closing speeds are multiplied by -e        (1)
 
-Teeth meet the upper and the lower pallet in turn and slip off where the pallet has moved by h past the middle; `nu`
-bends the lever (`_units` has the geometry). With e = 0 tooth and pallet stay together until the tooth escapes.
-Every torque in it is proportional to the drive, so the period is proportional to torque^(-1/2) and the swing does not
-depend on the torque at all. Leaves out friction, the width of teeth and pallets.
-Source: derived here. Works on such clocks by Roup et al. (2003), Lepschy et al. and Denny (2002) are known to us by
-their abstracts only; no number here is theirs.
+Teeth meet the upper and the lower pallet in turn and slip off when the pallet has moved by h past the middle; `nu` is
+the curvature of the lever (geometry: `_units`). With e = 0 tooth and pallet stay together until the tooth escapes.
+All torques are proportional to the drive, so the period is proportional to torque^(-1/2) and the swing does not depend
+on the torque. Leaves out: friction, the width of teeth and pallets.
+Source: derived here. Of the work on such clocks by Roup et al. (2003), Lepschy et al. and Denny (2002) only abstracts
+were available; no number here is theirs.
 
-`closed` knows the symmetric cycle with one impact a half period (one push in contact for e = 0): NO_CYCLE where it
-does not exist, UNSTABLE where it exists and disturbances grow, GRAZING where the last digits of the input decide on
-either (kappa = 1 with a flat lever: they neither grow nor fade).
+`closed` solves for the symmetric cycle with one impact per half period (one push in contact for e = 0): NO_CYCLE if it
+does not exist, UNSTABLE if disturbances of it grow, GRAZING if the last digits of the input decide on either (kappa = 1
+with a flat lever: they neither grow nor decay).
 
-`events` tells what the clock comes to from a start a millionth off the symmetric cycle; other motions may be stable
-too, and so near a border of existence the clock may leave the cycle for one of them. OK: one tooth a cycle, be it off
-the middle (`offset`), with several impacts or with several swings to and fro. PERIOD_2: two or more teeth until it
-repeats; of those the period and the speeds are means. NOT_PERIODIC: means over 1024 half swings, no multiplier.
-STEP_LIMIT: bounces without end, as e towards 1 makes them, or a lever so bent that both pallets wedge the wheel.
-NO_METHOD: lasting contact under a bent lever, and masses more unequal than 1e12. TOOTH_JUMPED is watched for; a
-flat lever lets no tooth pass alone (`_half_swing`), and no bent one was found to.
+`events` finds the motion that the clock reaches from a start displaced by a millionth from the symmetric cycle; other
+motions may be stable too, and near a border of existence the clock may reach one of them. OK: one tooth per cycle, also
+off the middle (`offset`), with several impacts, or with several swings to and fro. PERIOD_2: the motion repeats after
+two or more teeth; period and speeds are means. NOT_PERIODIC: means over 1024 half swings, without a multiplier.
+STEP_LIMIT: bounces without end, as for e near 1, or a lever so curved that both pallets wedge the wheel. NO_METHOD:
+lasting contact with a curved lever, or a ratio of masses beyond 1e12. TOOTH_JUMPED would be detected, but a flat lever
+cannot let a tooth pass (`_half_swing`), and no curved one was found that does.
 """
 
 from kernels.impact import _closed_cycle, _followed, _units

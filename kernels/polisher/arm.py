@@ -1,4 +1,4 @@
-"""Polishing machine: how far a crank swings the arm that carries the tool, and how well.
+"""Polishing machine: extreme angles, rates and distortion of the arm that a crank swings.
 
     eta_+- = +-arccos((b^2 + d^2 - (f +- e)^2)/(2 b d)),  first sign + for type A, - for type B      (1)
     A0 = (eta_plus + eta_minus)/2,  A1 = abs(eta_plus - eta_minus)/2                                 (2)
@@ -6,13 +6,13 @@ b is the distance of the motor from the arm's pivot, e the crank (eccentricity),
 f. Angles are from b: eta_plus, eta_minus those of the arm at its extremes, theta_plus, theta_minus those of the crank
 there. Leaves out: play, bending, and the tool itself (`polisher_motion`).
 Source: Cordero-Davila et al., Opticheskii Zhurnal 78(3):55 (2011), (37)-(40), without the misprint in (40). The paper
-never asks whether the motor turns at all; here that is the `status`, judged by sums without error.
+does not ask whether the motor can turn; here the `status` says so, decided by error-free sums.
 
-OK: the crank turns, the arm swings. Remarks, with what exists: LOCK_UP (`theta_lock`: where the crank locks, to either
-side of b, nearest first), DOUBLE_CRANK (e > b, the arm turns fully: rates and transmission angle), CHANGE_POINT (a sum
-that decides is 0 to within rounding of the lengths, 2^-53 of their sum: angles of the linkage as it is, or flat; no
-rates, no derivatives). A crank e = 0 swings nothing; crank angles are those for e towards 0. Too unequal lengths
-(1e36) are OUT_OF_RANGE.
+OK: the crank turns and the arm swings. Remarks, with the outputs that exist: LOCK_UP (`theta_lock`: where the crank
+locks, to either side of b, nearest first), DOUBLE_CRANK (e > b, the arm turns fully: rates and transmission angle),
+CHANGE_POINT (a deciding sum is 0 to within rounding of the lengths, 2^-53 of their sum: angles of the linkage, possibly
+flat; no rates or derivatives). With e = 0 nothing swings, and crank angles are limits for e towards 0. Lengths with
+ratios beyond 1e36 are OUT_OF_RANGE.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""Polishing machine: angle, rate and acceleration of its arm, and the way of the tool, along the crank's angle.
+"""Polishing machine: angle, rate and acceleration of its arm, and the path of the tool, along the crank's angle.
 
     b + e - d = f,  alpha = b_angle + arg p + side psi                                               (1)
     x = L cos(alpha + beta), y = L sin(alpha + beta)                                                 (2)
@@ -9,9 +9,9 @@ and an angle beta ahead of the arm; without L it is where the arm meets the coup
 Source: Cordero-Davila et al., Opticheskii Zhurnal 78(3):55 (2011), (2)-(19), corrected as `linkage` says; the printed
 "tool centre" of (12) and (15) is the arm's end.
 
-LOCK_UP: NaN where the crank cannot come to; CHANGE_POINT: the branch goes on smoothly beside p, and where the linkage
-lies flat rate and acceleration are NaN; DOUBLE_CRANK: the arm turns. Close to a lock the digits of the crank's angle
-count more than once: INACCURATE.
+LOCK_UP: NaN at angles that the crank cannot reach; CHANGE_POINT: the branch continues smoothly across p, and where the
+linkage is flat, rate and acceleration are NaN; DOUBLE_CRANK: the arm turns. Close to a lock, rounding of the crank's
+angle is amplified: INACCURATE.
 """
 
 import math

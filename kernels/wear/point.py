@@ -1,9 +1,9 @@
 """Wear of one material point of a turning workpiece under the tool of a polishing machine (Preston's law).
 
     h = preston int_0^tau p v [point in contact] dt                                                  (1)
-The point is at (r0, theta0), polar, about the workpiece's centre at t = 0, when the crank is along the x axis; model
-and names are those of `polisher_wear`; for large tau the points of a ring wear at its rate on average. Time is split at
-every entry and exit, none overlooked (`_path`), and between them integrated adaptively.
+The point is at the polar coordinates (r0, theta0) about the workpiece's centre at t = 0, when the crank is along the x
+axis; model and names are those of `polisher_wear`, and for large tau points of a ring wear at its mean rate. Time is
+split at every entry and exit, with none overlooked (`_path`), and integrated adaptively between them.
 Source: Cordero-Davila et al., Opticheskii Zhurnal 78(3):55 (2011), (12) and (20), corrected; Preston (1927).
 
 LOCK_UP: the crank does not turn fully, so there is no wear (NaN). STEP_LIMIT: tau is too long.

@@ -3,20 +3,20 @@
     dh/dt = preston p v,  v = alpha' J x - Omega J (x - w)                                           (1)
 with x from the arm's pivot, J the turn by 90 degrees and v the speed between tool and workpiece. The tool is fixed to
 the arm: its centre at L (cos, sin)(alpha + beta), its X axis along the arm, its outline abs(X/a)^n + abs(Y/b)^m = 1.
-Over many turns every point of a ring of the workpiece wears alike (unless the rates of crank and workpiece are in the
-ratio of small whole numbers: then this is the mean of the ring), and that is what is given:
+Over many turns all points of a ring of the workpiece wear equally (unless the rates of crank and workpiece have a ratio
+of small integers: then this is the mean of the ring):
     wear(r) = preston p/(4 pi^2) int_0^2pi dtheta int_contact v dpsi                                 (2)
-by the exact integral along the tool's outline of `_contour`. p is the pressure given, or
+by the exact integral along the tool's outline of `_contour`. p is the parameter pressure, or
     p = load/A                                                                                       (3)
-with A the area of contact at that moment, that of the tool within the workpiece's disc (`_pressure`); without contact
-nothing wears, nor does anything beyond workpiece_radius, if that is given. Leaves out: a tool that turns in its socket,
-or tilts where it hangs over; pressure that varies under the tool. Source: Preston, J. Soc. Glass Technol. 11:214
+with A the current area of contact, that of the tool within the workpiece's disc (`_pressure`). Nothing wears without
+contact, or beyond workpiece_radius. Leaves out: a tool that turns in its socket, or tilts where it hangs over; pressure
+that varies under the tool. Source: Preston, J. Soc. Glass Technol. 11:214
 (1927); Cordero-Davila et al., Opticheskii Zhurnal 78(3):55 (2011), (12) and (20), corrected.
 
-LOCK_UP: the crank does not turn fully, so there is no wear (NaN). CHANGE_POINT: values if the arm keeps to its branch.
-DOUBLE_CRANK: the arm turns fully, too; values are given. INACCURATE: an error exceeds rtol of the largest wear asked
-for; each value has its own error beside it, and is sought to rtol of itself. The very rim of a workpiece that the tool
-under a load leaves wholly wears without bound: NaN with an infinite error, hence INACCURATE.
+LOCK_UP: the crank does not turn fully, so there is no wear (NaN). CHANGE_POINT: values for an arm that keeps its
+branch. DOUBLE_CRANK: the arm turns fully, too; values are given. INACCURATE: an error exceeds rtol of the largest
+requested wear; each value has its own error, `wear_error`, and is computed to rtol of itself. The rim of a workpiece
+that a tool under constant load leaves completely wears without bound: NaN with an infinite error, hence INACCURATE.
 """
 
 import math

@@ -29,19 +29,19 @@ APART, TINY = 0.1, 1e-9
 
 
 class CellReport:
-    """What a result says of its one cell, and each method of the kernel when it is asked again.
+    """One cell of a result, and what each method of the kernel computes for it now.
 
-    Raises SweepError where the Dataset has more cells than one, or none.
+    Raises SweepError if the Dataset does not have exactly one cell.
 
     Attributes
     ----------
     place, values, units : dict of str
-        Parameters with their units; outputs that are numbers, in SI units, and these.
+        Parameters with their units; outputs that are numbers, and their units.
     status, method, error_bound, rtol : Status, str, float, float
-        The method that solved the cell, or "none"; the error of the values, and the one that the study asks for.
+        Status of the cell; the method that solved it, or "none"; the error of the values, and the requested one.
     methods, differs : dict of str
-        By each method that can do the cell, at the same rtol: status, error bound and outputs; the largest of
-        `deviations`, NaN if outputs only say how the cell was solved.
+        For each method that can solve the cell, at the same rtol: status, error bound and outputs; the largest of
+        `deviations`, NaN if all outputs describe how the cell was solved.
     """
 
     def __init__(self, dataset: xr.Dataset, allow_import: bool) -> None:
@@ -86,24 +86,24 @@ class CellReport:
 
 
 class Checked:
-    """What comes of solving some OK cells of a result again. Raises SweepError where nothing can be compared.
+    """Comparison of some OK cells of a result with a second solution. Raises SweepError if nothing can be compared.
 
-    The second opinion is another method's wherever one gets to rtol; else the same method's.
+    The second solution is by another method if one reaches rtol, otherwise by the same method.
 
     Attributes
     ----------
     cells, sample, judged, by_another : int
-        OK cells of the result, those drawn, those for which there was a second opinion, those where by another method.
+        Number of OK cells, of sampled cells, of those with a second solution, and of those with one by another method.
     beyond : int
-        Judged cells in which an output differs by more than rtol and the error of the second opinion, or of which the
-        second opinion is that there is no such answer.
+        Judged cells in which an output differs by more than rtol plus the error of the second solution, or for which
+        the second method finds no answer.
     left_out : list of str
-        States that are 0 in each cell but for rounding.
+        States that are 0 up to rounding in every cell.
     limit : float
         Share of all OK cells that may be beyond rtol, at 95 % confidence.
     worst : dict
-        The cell that differs most: its place, output, both values and who gives them (a method, or the status that says
-        that there is none), and the difference in units of rtol.
+        The cell that differs most: its parameters, output, both values and their origin (a method, or a status without
+        a value), and the difference in units of rtol.
     """
 
     def __init__(self, dataset: xr.Dataset, sample: int, seed: int, allow_import: bool) -> None:
@@ -189,11 +189,11 @@ def again(dataset: xr.Dataset, numbers: Any, allow_import: bool) -> tuple[Study,
 
 
 def deviations(study: Study, outputs: Any, true: Any) -> dict[str, Any]:
-    """How far outputs are from others of the same cells, in each; infinite where one alone is NaN.
+    """Deviation of outputs from others of the same cells, for each cell; infinite where only one is NaN.
 
-    As `OK` promises: relative to themselves, traces to their amplitude, and the states of a scene of one's own to their
-    largest value in these cells, since a result does not keep their size on the way. A state far smaller than another,
-    without a digit in common in most cells, is 0 but for rounding, and left out; so are outputs that say how a cell was
+    As `OK` defines it: relative to the output itself, to the amplitude of a trace, and for states of a scene to their
+    largest value in these cells, since a result does not store their largest size. A state far smaller than another,
+    without a common digit in most cells, is 0 up to rounding, and left out; so are outputs that describe how a cell was
     solved, such as a number of steps.
     """
     found, both, sized = dict[str, Any](), (outputs, true), [field.name for field in study.asked if field.sized]

@@ -73,9 +73,9 @@ class Scaling:
     scales : dict of output to Group
         Factor that makes an output dimensionless.
     free : int
-        How many of the study's axes change nothing but the numbers.
+        Number of axes that only rescale the outputs.
     advice : str
-        What `sweep plan` says of superfluous axes; "" where there are none.
+        What `sweep plan` says about superfluous axes; "" if there are none.
     """
 
     def __init__(self, study: Study) -> None:
@@ -127,7 +127,7 @@ class Scaling:
         return Table(rows).text()
 
     def rescaled(self, dataset: xr.Dataset) -> xr.Dataset:
-        """A result of the study with its outputs freed of units, and a coordinate for each dimensionless group.
+        """A result of the study with dimensionless outputs, and a coordinate for each dimensionless group.
 
         Parameters
         ----------
@@ -137,7 +137,7 @@ class Scaling:
         Returns
         -------
         Dataset
-            Outputs whose unit is 1 and whose `long_name` says the product; coordinates `group_1`, `group_2` ...,
+            Outputs in the unit 1, with their definition as `long_name`; coordinates `group_1`, `group_2` ...,
             likewise.
 
         Examples

@@ -25,14 +25,14 @@ from sweep.words import listed
 
 
 class PointSolver:
-    """Solves single cells, or arrays of them, of parameters given when it is called; threads take turns.
+    """A function that solves single cells, or arrays of them; calls from several threads are serialised.
 
     Attributes
     ----------
     names : tuple of str
-        Parameters it takes, in this order: the axes of the study.
+        Its arguments, in this order: the axes of the study.
     fields : tuple of str
-        What it gives: the outputs asked for, and `status`.
+        What it returns: the study's outputs, and `status`.
     """
 
     def __init__(self, study: Study) -> None:

@@ -141,16 +141,16 @@ def memory() -> int:
 
 @dataclass(frozen=True)
 class Verdict:
-    """What was found; `str` of it is what `sweep verify` prints.
+    """Result of `verify`; its `str` is what `sweep verify` prints.
 
     Attributes
     ----------
     findings : tuple of str
-        What is wrong or missing, a line each; none where it is whole.
+        Damaged or missing parts, one per line; none if it is intact.
     blocks : tuple of int or None
-        Damaged blocks that can be computed again; None where nothing is damaged, or that would not mend it.
+        Damaged blocks that can be computed again; None if nothing is damaged, or computing would not repair it.
     state : str
-        What it is called: "undamaged", "damaged", or "not complete" where nothing is wrong with what there is.
+        "undamaged", "damaged", or "not complete" if it is unfinished without damage.
     """
 
     path: Path
@@ -161,7 +161,7 @@ class Verdict:
 
     @property
     def whole(self) -> bool:
-        """Finished, and all that it says is as it was written."""
+        """Whether it is finished and undamaged."""
         return not self.findings
 
     def __str__(self) -> str:

@@ -96,8 +96,8 @@ def fit_collapse(y: xr.DataArray, dim: str, over: str, *, sigma: Any = None, con
     moved = [_common(points, fit.numbers[0] + by) for by in (-0.25, 0.25)]
     if fits and any(one.deviance < fit.deviance + DETERMINED or abs(one.off).max() < 1e-4 * exact for one in moved):
         raise SweepError(
-            "the curves collapse for any exponents of x: as far as the points tell, f is a power law, so a and b are "
-            "not determined apart"
+            "the curves collapse for any exponents of x: f appears to be a power law, so a and b are not determined "
+            "separately"
         )
     result: dict[str, Any] = {"scatter": np.sqrt(np.mean(off**2)), "points": off.size, "dropped": y.size - off.size}
     result |= {"fits": int(fits), "verdict": "one curve" if fits else "not one curve"}

@@ -23,16 +23,16 @@ class Listed:
     ----------
     path : Path
     question : str
-        Or the title, where there is none.
+        Its question, or its title if there is none.
     cells : int
     done : float
         Share of the cells that are computed.
     statuses, account : dict of str to int
-        Cells of each status, and under each of the words of `kernels.interface.KINDS`.
+        Number of cells with each status, and in each group of `kernels.interface.KINDS`.
     when, version : str
-        When it ended, or began where it has not; by which version of foliot.
+        When it ended, or began if it has not ended; the version of foliot.
     fault : str
-        Why it cannot be read; all else is empty then.
+        Why it cannot be read; everything else is then empty.
     """
 
     def __init__(self, path: Path) -> None:
@@ -61,10 +61,10 @@ class Listed:
 
 
 class Listing(tuple[Listed, ...]):
-    """Results; printed they are a table, without the columns `LATER`."""
+    """A list of results, printed as a table without the columns `LATER`."""
 
     def table(self, complete: bool = False) -> str:
-        """The table, by wish with all columns."""
+        """The table, with all columns if `complete`."""
         if not self:
             return "no results here"
         shown = [i for i, name in enumerate(HEADINGS) if complete or name not in LATER]

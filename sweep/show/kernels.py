@@ -119,7 +119,7 @@ def kernels(name: str | None = None, allow_import: bool = False) -> Catalogue | 
 
 
 def catalogue_text(complete: bool = False) -> str:
-    """A line for each kernel; by wish all about each, and all statuses."""
+    """A line for each kernel; optionally all about each, and all statuses."""
     if complete:
         names = {kind: ", ".join(status.name for status in Status if status.kind == kind) for kind in KINDS}
         statuses = Table(((kind, f"{KINDS[kind]}: {names[kind]}") for kind in KINDS), title="statuses of cells")

@@ -132,7 +132,7 @@ def laws(
 
 
 def law_tables(found: Laws, complete: bool = False) -> list[Table]:
-    """Exponents and their intervals, a row for each line; by wish all columns."""
+    """Exponents and their intervals, a row for each line; optionally all columns."""
 
     def table(title: str, of: Sequence[xr.Dataset], heading: Sequence[str], cells: Any, keep: int | None) -> Table:
         """For each line its place on the other axes, and the first cells of what is fitted."""
@@ -153,13 +153,13 @@ def law_tables(found: Laws, complete: bool = False) -> list[Table]:
 
 
 def laws_text(found: Laws, complete: bool = False) -> str:
-    """The laws as people read them; by wish all columns and what they mean."""
+    """The laws as people read them; optionally all columns and what they mean."""
     tables = (table.text() for table in law_tables(found, complete))
     return page(*tables, *map(paragraph, (found.remark, found.explanation if complete else REST)))
 
 
 def exponents_text(found: xr.Dataset, x: str, complete: bool = False) -> str:
-    """Local exponents with their errors, a row a point: about `POINTS` of each line, by wish all."""
+    """Local exponents with their errors, a row a point: about `POINTS` of each line, optionally all."""
     along, place, rows = str(found[x].dims[0]), dict[str, str](), list[Sequence[str]]()
     for place, line in _lines(found, along):
         here = line.where(line.exponent.notnull(), drop=True)
@@ -253,7 +253,7 @@ def comparison(dataset: xr.Dataset, y: str | None, x: str, windows: Sequence[Seq
 
 
 def comparison_text(found: xr.Dataset, complete: bool = False) -> str:
-    """Which laws are ruled out, and the verdict; by wish all columns and what they mean."""
+    """Which laws are ruled out, and the verdict; optionally all columns and what they mean."""
     from sweep.laws.noise import BEYOND_DOUBT
 
     rows = []

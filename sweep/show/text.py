@@ -62,7 +62,7 @@ def result_text(path: Path, dataset: xr.Dataset) -> str:
 def head(path: Path, dataset: xr.Dataset) -> list[str]:
     """Name and completeness, title, question, and what became of the cells."""
     found = account(dataset)
-    total, waiting, done = found.total, found.by_kind["pending"], f"complete, {counted(found.total, 'cell')}"
+    total, waiting, done = found.total, found.by_kind["pending"], "complete"
     if waiting:
         done = f"unfinished: {total - waiting:,} of {counted(total, 'cell')} ({percent(found.done)})"
     texts = [f"{path}: {done}", dataset.attrs.get("title", ""), dataset.attrs.get("question", ""), str(found)]

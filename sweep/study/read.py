@@ -96,7 +96,7 @@ def _of_file(path: Path) -> tuple[dict[str, Any], str]:
             raise SweepError(f"{path} is a folder or a pipe, not a file; name a study file, e.g. study.toml")
         text = path.read_bytes().decode("utf-8-sig")
     except FileNotFoundError:
-        near = did_you_mean(path.name, [p.name for p in path.parent.glob("*.toml")])
+        near = did_you_mean(path.stem, [p.stem for p in path.parent.glob("*.toml")]).replace("?", ".toml?")
         raise SweepError(f"{path}: no such file{near}") from None
     except UnicodeDecodeError as error:
         raise SweepError(f"{path} is not a text file in UTF-8 (byte {error.start})") from None

@@ -96,7 +96,7 @@ def test_a_click_shows_the_row_of_the_cell(page, dataset):
 
 
 def test_a_result_without_an_axis_of_numbers_is_refused(dataset):
-    with pytest.raises(sweep.SweepError, match="nothing to look"):
+    with pytest.raises(sweep.SweepError, match="nothing to show"):
         made(dataset.isel(mu=0, R=0, a=0).load(), "point.h5")
 
 
