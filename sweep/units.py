@@ -40,7 +40,7 @@ DIMENSIONS = {
     "W": ("a power", '"W" or "mW"'),
     "K": ("a temperature", '"K"'),
 }
-"""What a unit measures, in words, and what one may write for it."""
+"""The quantity that a unit measures, and examples of units for it."""
 
 KNOWN = {
     ("degree", "rad"): Decimal("0.01745329251994329576923690768"),
@@ -53,7 +53,7 @@ KNOWN = {
 """Factors that need no pint, whose import takes half as long as that of numba."""
 
 COMMON = ("m", "mm", "cm", "kg", "g", "s", "ms", "minute", "hour", "day", "rad", "degree", "turn", "Hz", "kHz", "rpm")
-"""What a misspelt unit is likely to mean."""
+"""Suggestions for misspelt units."""
 
 
 class UnitMistake(ValueError):

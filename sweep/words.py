@@ -20,14 +20,14 @@ from typing import Any
 from sweep.errors import SweepError
 
 CONTROL = {code: f"\\x{code:02x}" for code in (*range(32), *range(127, 160)) if chr(code) not in "\n\t"}
-"""Characters that a terminal takes for commands, and what is shown of them."""
+"""Characters that a terminal interprets as commands, and their printed form."""
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
-"""A spreadsheet takes a cell that begins so for a formula."""
+"""A spreadsheet interprets a cell that begins with one of these as a formula."""
 
 SHORTEST = 0.1
-"""Seconds that are told at least, so that no line says 0."""
+"""Shortest time that is reported, so that no line says 0."""
 LAST = 30
-"""Characters that the last column of a table keeps as long as others can give way."""
+"""Least width of the last column of a table while others can shrink."""
 
 
 def printable(text: str) -> str:

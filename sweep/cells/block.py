@@ -25,7 +25,7 @@ from sweep.study.model import Study
 from sweep.words import printable
 
 MOST_LETTERS = 500
-"""Of what is told of a fault; the rest may be a whole array."""
+"""Letters of an error message that are reported; the rest may be a whole array."""
 
 
 @contextlib.contextmanager
@@ -95,7 +95,7 @@ class Guard:
 
 
 Found = bytes | Columns | None
-"""A block that is still to be put where those of the run go: digests of what a worker has written, or its numbers."""
+"""A computed block that is not stored yet: digests of what a worker has written, or its numbers."""
 
 
 @dataclass(frozen=True)

@@ -18,15 +18,15 @@ import numpy as np
 from sweep.study.model import Study
 
 FINENESS = 1024
-"""Row blocks a study is cut into, about: enough for many workers, and few to merge in the end."""
+"""Approximate number of row blocks of a study: enough for many workers, and few to merge in the end."""
 LARGEST = 1 << 22
-"""Cells of a row block, so that a block of dear cells stays short."""
+"""Largest number of cells in a row block, so that a block of slow cells stays short."""
 PADDED = 1.1
-"""Cells that the boxes of a grid may hold, for each one that it has."""
+"""Largest ratio of the cells in the boxes of a grid to its own cells."""
 MOST_TRIED = 4096
-"""Lengths of a box that are looked at."""
+"""Lengths of a box that are tried."""
 UNNOTICED = 1.01
-"""Share of idle lanes below which fewer are not worth a smaller box."""
+"""Share of idle lanes that is accepted for a larger box."""
 
 
 @dataclass(frozen=True)

@@ -18,11 +18,11 @@ from sweep.study.condition import names_in
 from sweep.study.model import SETTINGS, Axis, Study, differs, frozen
 
 MOST_TRIED = 1 << 16
-"""Cells that are looked at to find some that are asked for."""
+"""Cells that are examined to find some that meet the study's condition."""
 MOST_ASKED = 1 << 23
-"""Cells that are looked at, before a run, for one that is asked for; it takes half a second."""
+"""Cells that are examined before a run for one that meets the condition; this takes half a second."""
 TRIES = 32
-"""Cells that are drawn for each that is wanted, where a condition leaves some out."""
+"""Cells drawn per wanted cell, if a condition excludes some."""
 
 
 def sampled(study: Study, cells: int) -> Study:

@@ -41,19 +41,19 @@ def _these(*statuses: Status) -> bytes:
 
 
 GIVEN_UP = _these(*UNSOLVED, Status.NO_CYCLE, Status.INACCURATE, Status.UNSTABLE, Status.FAILED)
-"""After these `auto` tries the next method."""
+"""Statuses after which `auto` tries the next method."""
 UNSURE = _these(*(code for code in Status if GIVEN_UP[code]), Status.OUT_OF_RANGE)
-"""And after these where it estimates: what is out of range may be derivatives that another method does not need."""
+"""Further ones after a method that estimates its error: derivatives may be out of range that another does not need."""
 DOUBTED = _these(Status.INACCURATE, Status.GRAZING)
-"""What another method may know better, as far as the error exceeds rtol."""
+"""Statuses that another method may improve where the error exceeds rtol."""
 NO_STATUS = bytes(code not in map(int, Status) or code >= Status.NOT_ASKED for code in range(256))
-"""What a kernel must not say."""
+"""Statuses that a kernel must not set."""
 NO_METHOD, INACCURATE, GRAZING = map(np.int8, (Status.NO_METHOD, Status.INACCURATE, Status.GRAZING))
 """Not as a `Status`, which numpy compares ten times as slowly."""
 VAGUE = _these(Status.NO_METHOD, Status.NO_CYCLE)
-"""Refusals that tell less than how another method gave up."""
+"""Refusals that say less than the failure of another method."""
 UNKNOWN = _these(*UNSOLVED)
-"""A method that ends so has not learnt what the scene does: another's NO_CYCLE, of its own kind alone, is no answer."""
+"""Statuses that leave open what the model does: another method's NO_CYCLE, for its own kind of cycle, is no answer."""
 
 Floats = NDArray[np.float64]
 Codes = NDArray[np.int8]

@@ -27,17 +27,17 @@ from sweep.errors import SweepError
 from sweep.study.model import Study
 
 LANES = 16
-"""Cells that a lane kernel solves at once, within a factor of 2: it takes as long for one of them."""
+"""Cells that a vectorised kernel solves at once, within a factor of 2; one cell takes as long."""
 POSITIONS, PLACES = 64, 16
-"""Places of the grid where probes are made; and how many are tried in turn where one in the middle fails."""
+"""Positions in the grid of the probes; and the number tried in turn if one in the middle fails."""
 BUDGET = 0.003, 0.03
 """Seconds a sample may take in any run, unless one call takes longer; and in one that takes 100 times as long;"""
 SHARE = 0.005
 """or this share of the run, where that is more."""
 PROBE_SECONDS = 5e-4
-"""A probe as long as this sees past the cost of a call, and 64 of them take a few hundredths of a second."""
+"""Least duration of a probe, so that the cost of a call is small; 64 probes take a few hundredths of a second."""
 STALL = 0.02
-"""Seconds of a probe that are tried again, for on a busy machine they may be those of other processes."""
+"""A probe longer than this is repeated, because other processes may have delayed it."""
 DEAR = 2e-3
 """Seconds of a probe that counts among those of the sample, wherever it was made; one that fails counts as many."""
 BLOCK_SECONDS = (0.05, 1.0)
@@ -48,7 +48,7 @@ LEAST_BLOCKS = 8
 """where so many blocks are left for each of several workers."""
 BLOCK_BYTES, MOST_BLOCKS = 8 << 20, 100_000
 GOLDEN = 0.6180339887498949
-"""Multiples of it, modulo 1, fill an interval evenly and fall into step with the length of no axis."""
+"""Its multiples modulo 1 fill an interval evenly, and are not commensurate with the length of any axis."""
 
 
 @dataclass(frozen=True)
@@ -216,4 +216,4 @@ class WorkClock:
 
 
 work_clock = WorkClock()
-"""That of this process."""
+"""CPU clock of this process."""

@@ -31,8 +31,8 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 SHEAR = 0.013
-"""By which axes are tilted before cells are joined: corners of a box lie on a sphere, so there are many ways to join
-them; tilted there is one, and it is alike in all boxes."""
+"""Shear of the axes before triangulation: the corners of a box lie on a sphere and have many triangulations; sheared,
+they have one, which is the same in all boxes."""
 FLAT, OUTSIDE = 1e-9, 1e-9
 """Volume, in products of its edges, below which a simplex is none; how far out of one a point may be by rounding."""
 AROUND = {1: 6, 2: 12, 3: 20}
@@ -52,7 +52,7 @@ CUTS, STAYS, JUMP = 6, 0.9, 0.2
 """At a pole the change from cell to cell stays above a share of what it was so many cuts before, and lies on both sides
 of a new cell: at a jump one of them has less than a share of the other."""
 LATEST = 128
-"""Cells added last, which tell noise."""
+"""Number of latest cells, by which noise is recognised."""
 FLATTEST, STRAIGHT = 1e-5, 1e-9
 """Least share of the mean bend that a direction has: by 300 a box is stretched at most; what is taken for rounding."""
 

@@ -39,7 +39,7 @@ ADVICE_CELLS, ADVICE_SECONDS = 300, 0.1
 """Cells that are solved for it at least, about; and what it may always take."""
 NO_ADVICE = "superfluous axes are not looked for, which may take as long or fail; sweep.scaling(study) does"
 RUN_SECONDS = 0.15
-"""What any run to a file takes beside its cells: opening, a sample, the end."""
+"""Overhead of any run to a file: opening, a sample, the end."""
 
 
 class Plan:

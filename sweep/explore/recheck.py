@@ -22,10 +22,10 @@ from sweep.study.read import study as study_of
 from sweep.words import Table, page, whole_number
 
 CLOSER = 100.0
-"""A second opinion is asked for at rtol over this, or at the smallest rtol."""
+"""The second solution has rtol divided by this, or the smallest rtol."""
 CONFIDENCE = 0.95
 APART, TINY = 0.1, 1e-9
-"""Share of itself and of the largest state, to leave out a state that is 0 but for rounding."""
+"""Relative deviation, and size relative to the largest state, of a state that is taken as 0 up to rounding."""
 
 
 class CellReport:

@@ -50,11 +50,11 @@ LEVELS, FURTHER_LEVELS = {1: 20, 2: 10, 3: 6}, 4
 line; across a border between statuses half as often, and so beside one with several axes, where values may go to
 infinity."""
 GROWTH = 1.5
-"""Factor of the number of cells after which boxes are stretched anew."""
+"""Growth of the number of cells after which boxes are stretched anew."""
 NOISE_SIZE = 8.0
-"""The error of a simplex in noise, as a multiple of how far cells are off, at most."""
+"""Largest error of a simplex due to noise, as a multiple of the deviation of cells."""
 SAME = 2.0**-40
-"""Distance of places along an axis, from 0 to 1, that are the same."""
+"""Distance below which positions along an axis, from 0 to 1, are equal."""
 
 
 class Refinement:

@@ -31,14 +31,14 @@ if TYPE_CHECKING:
     import xarray as xr
 
 CELLS, FEW = 24, 4
-"""On which scalings are tried; and before, since most that do not hold may make cells dear."""
+"""Number of cells for tests of scalings; a few come first, since scalings that do not hold may make cells slow."""
 RTOL, AGREEMENT = 1e-9, 30.0
 """Cells are solved to that at least, for a loose tolerance lets pass what does not hold; outputs may differ by that
 multiple of it."""
 FACTORS = (2.0, 0.25)
-"""By powers of two numbers change no digit, and motions that never repeat stay the same."""
+"""Powers of two change no digit, so that chaotic motions stay the same."""
 POWERS = tuple(Fraction(power, 2) for power in (-2, -1, 1, 2))
-"""That a number without unit is tried with."""
+"""Powers that are tried for a dimensionless number."""
 LARGEST_DENOMINATOR, LARGEST_COMMON = 200, 4
 """Of an output's weight; and the largest by which a group is raised to have whole powers."""
 

@@ -27,7 +27,7 @@ from sweep.units import in_unit
 from sweep.words import require_dataset
 
 LOGARITHMIC = 1.999
-"""Ratio of its ends from which on a positive axis is taken in logarithms; below, it makes no difference."""
+"""Least ratio of the ends of a positive axis for logarithms; below it they make no difference."""
 FEWEST_ON_A_LINE = 5
 MOST_AXES = 5
 REFINED_TO = "refined_to"

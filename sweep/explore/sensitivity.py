@@ -14,7 +14,7 @@ from sweep.study.model import Study
 from sweep.words import require_dataset
 
 SEED = 1
-"""Of the resampling that tells the errors; SALib takes 0 for none."""
+"""Seed of the resampling for the errors; SALib takes 0 as none."""
 SOBOL = {
     "S1": ("first_order", "share of the variance by the parameter alone"),
     "S1_conf": ("first_order_error", "half of the interval of the share, 95 %"),

@@ -36,17 +36,17 @@ TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13)
 CELLS = 1024
 ROUNDS, LEAST_SECONDS = 5, 0.01
 FINE = tuple(10.0**-k for k in range(14, 5, -1))
-"""Values of rtol that a reference is tried at: in each cell the least at which it says OK counts."""
+"""Values of rtol for the reference: in each cell the smallest at which its status is OK counts."""
 GIVEN, ROUNDING = "the truth given", 2.0**-53
-"""The name of a reference that is given, and its own error."""
+"""Name of the reference if the caller supplies the truth, and its error."""
 UNSURE = (Status.INACCURATE, Status.GRAZING)
-"""What says of itself that digits, or a count, may be wrong."""
+"""Statuses by which a method says that its values may be wrong."""
 EXTREMES = (1e-3, 1e-14)
 """Values of rtol at which isolated cells are tried."""
 WORK = ("rate_calls", "steps", "events")
 """Outputs that count a method's work; where a study asks for them, their means are shown beside the time."""
 ESTIMATES = ("error", "wear_error")
-"""Outputs by which a method says how wrong it may be."""
+"""Outputs that are error estimates."""
 
 
 def precision_cells(study: Study, cells: int = CELLS) -> dict[str, Any]:
@@ -210,8 +210,8 @@ def _omissions(found: xr.Dataset, study: Study, able: Sequence[str] | None) -> l
 
 
 Reference = tuple[str, Mapping[str, Any], Any]
-"""Its name, values by output, and in each cell what these are right to: inf where that is not known, NaN where it is
-known that there is nothing to give."""
+"""Its name, values by output, and their error in each cell: inf if it is unknown, NaN if the cell is known to have no
+solution."""
 
 
 def _given(study: Study, values: Mapping[str, Any]) -> Reference:

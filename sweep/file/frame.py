@@ -38,9 +38,9 @@ COMPACT = 1 << 15
 LONG = 1 << 12
 """Bytes of a coordinate to which the study in the file refers, so that its text fits into an object header."""
 TEXT_BYTES = 30 << 10
-"""Of the structure of a result, about."""
+"""Approximate size of the structure of a result."""
 WRONG = b"\xff" * 4
-"""A checksum that zeros have not."""
+"""A checksum that zeros do not have."""
 
 
 class Cut(NamedTuple):

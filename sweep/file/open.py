@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 MEMORY_SHARE = 0.25
 """Results larger than this share of the memory are opened in pieces (dask)."""
 MOST_TOLD = 8
-"""Findings of one kind that are told one by one."""
+"""Findings of one kind that are reported individually."""
 
 
 def open_result(path: str | os.PathLike[str], strict: bool = False, *, chunks: Any = None) -> xr.Dataset:

@@ -32,17 +32,17 @@ from sweep.study.model import Study, study_together
 
 FORMAT = 7
 UNFINISHED = ".unfinished"
-"""How the name of a result ends while its sweep runs."""
+"""Suffix of a result while its sweep runs."""
 BYTES = 16
-"""Of a digest."""
+"""Bytes of a digest."""
 OF_NETCDF = {"CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_Netcdf4Coordinates", "_Netcdf4Dimid", "coordinates"}
-"""Attributes that say nothing to a user."""
+"""Attributes of netCDF4, which users need not see."""
 DAMAGE = (OSError, EOFError, LookupError, ValueError, TypeError, AttributeError, RuntimeError)
-"""What comes of reading a damaged file."""
+"""Exceptions from reading a damaged file."""
 OF_DAMAGE = (errno.EINVAL, errno.EOVERFLOW)
-"""What the system says where a damaged file sends one to a place that cannot be."""
+"""Error numbers of the system for impossible addresses in a damaged file."""
 NOTHING = {STATUS: int(Status.PENDING), METHOD_USED: -1}
-"""What is handed out of cells that are not computed yet, where that is not NaN."""
+"""Values of cells that are not computed yet, where they are not NaN."""
 MODULUS, ROW = 65535, 4096
 NUMBERS = np.arange(ROW, dtype=np.uint64)
 """Numbers of the words in a row, and of the rows that are summed at a time: at most ROW, so that 32 bits hold a sum."""

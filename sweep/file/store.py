@@ -33,9 +33,9 @@ from sweep.file.reading import BYTES, UNFINISHED, Damaged, StoredFile
 from sweep.words import quantity
 
 OTHERS = (".csv", ".parquet", ".zarr", ".toml", ".png", ".svg", ".pdf", ".html")
-"""Endings of other kinds of file, which no result is given."""
+"""Suffixes of other kinds of file, which a result cannot have."""
 SYNC_SECONDS = 0.2
-"""How often blocks are brought to the disk, and it is looked whether the file is still in its place."""
+"""Interval at which blocks are written to the disk, and the file is checked to be in its place."""
 
 
 def unfinished_of(output: Path) -> Path:

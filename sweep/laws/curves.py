@@ -22,7 +22,7 @@ FEWEST_OF_LAW, PLACES_OF_LAW = 8, 6
 MANY = 10_000
 """Points that laws are fitted to of twice as many and more, where these are of a smooth curve and without noise."""
 MOST_SIGMA = 1e6
-"""Relative standard error beyond which a logarithm says nothing."""
+"""Relative standard error beyond which logarithms are meaningless."""
 FIELDS = {
     "exponent": "exponent of the power law",
     "x_exponent": "a of x / L^a",

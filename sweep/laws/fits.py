@@ -20,7 +20,7 @@ from sweep.laws.noise import ROUNDING, apart, inliers, regress
 from sweep.laws.shapes import ONE, Law
 
 DAMPINGS = np.array([1e-6, 0.03, 1.0, 30.0])
-"""Of Gauss-Newton steps, which are tried at once; the best is taken."""
+"""Damping factors of Gauss-Newton steps, tried together; the best is taken."""
 STEPS, ENOUGH = 30, 0.01
 """Steps at most; and what a step must take away of a deviance for another one: so much of what it is above the best,
 and the square."""

@@ -31,7 +31,7 @@ FADES = np.exp([0, -6, -5, -4, -3, -2, -1, 1, 2, 3, 4, 5, 6]), 0.3, 80.0
 """How fast a correction may fade, per window: those tried about the best, to the power of its relative error, and the
 least and largest."""
 SAME = 1e-6
-"""Relative distance up to which a curve without noise is the law that is fitted to it."""
+"""Largest relative deviation at which a curve without noise counts as the fitted law."""
 VERDICTS = (
     "a power law with a correction",
     "no power law with a correction",

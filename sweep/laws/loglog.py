@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 FEWEST = 3
-"""Points that a slope needs: through two it says nothing about its own error."""
+"""Least number of points for a slope; two points give no error estimate."""
 LINES, VALUES = 250, 100_000
 """Lines, and values of lines, that are taken at once, so that what is held stays below some 50 MB."""
 EPSILON = float(np.finfo(np.float64).eps)

@@ -33,9 +33,9 @@ NOISES = {
     "correlated": (CORRELATIONS, EVEN),
     "outliers": (ALONE, EVEN),
 }
-"""What noise may be, by the word that a user says; "noise" is any."""
+"""Kinds of noise by the user's word; "noise" is any."""
 Noise = bool | str | None
-"""What a user says of noise: whether there is any, its word, or nothing."""
+"""A user's statement about noise: whether there is any, its kind, or None."""
 
 BEYOND_DOUBT = 10.0
 """Difference of AICc from which on a law is taken instead of a simpler one."""
@@ -44,9 +44,9 @@ RARE = 1e-3
 UNLIKELY = 0.01
 """and where it may be of any kind."""
 ROUNDING = 16 * EPSILON
-"""Relative distance of a point from a curve that is none."""
+"""Relative deviation of a point from a curve that counts as rounding."""
 SMOOTH = 0.12
-"""Share of the distances from a line that is noise, below which they are a bend and no noise."""
+"""Share of noise in the residuals of a line below which they are curvature, not noise."""
 
 
 class Regression(NamedTuple):

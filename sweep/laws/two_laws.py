@@ -31,7 +31,7 @@ BEYOND_SHAPES = 0.5
 """Share of what other shapes add to where the laws meet, added again: the true one may be none of them."""
 
 VERDICTS = {"one law": 1, "two laws": 2, "three laws": 3}
-"""Numbers of laws, by verdict; other verdicts tell none."""
+"""Number of laws, by verdict; other verdicts have none."""
 
 
 def fit_two_laws(

@@ -22,12 +22,12 @@ from sweep.results.statuses import flag_words, is_summary, pieces
 from sweep.words import as_path, cell, flag, listed, require_dataset
 
 EXPORTED = "exported by foliot"
-"""In the history of what is exported."""
+"""Entry in the attribute history of an export."""
 ROWS = 65536
 """Rows of csv in memory at a time."""
 
 COMPRESSION = 5
-"""Level of a compression that is asked for."""
+"""Level of compression."""
 LARGE = 256 * 2**20
 """Bytes from which a Dataset is written to netCDF4 piece by piece."""
 

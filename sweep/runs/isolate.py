@@ -32,15 +32,15 @@ from sweep.errors import SweepError
 from sweep.study.model import Study
 
 CELL_SECONDS, DEARER = 60.0, 100.0
-"""What a cell may take where nobody says otherwise; or so many times what the dearest so far has taken."""
+"""Default time limit of a cell; or this multiple of the slowest cell so far."""
 SEVERAL_SECONDS, SLACK = 1.0, 10.0
-"""Several cells may take this and so many times what they should; then they are halved."""
+"""Time limit of several cells, and the multiple of their expected time; beyond it they are bisected."""
 LOAD_SECONDS = 180.0
-"""What loading and compiling a kernel may take."""
+"""Time limit for loading and compiling a kernel."""
 TRIALS = 3
-"""Times that a cell is tried alone of which a process dies."""
+"""Trials of a single cell that crashes its process."""
 LOOK_SECONDS = 0.2
-"""How often it is looked whether time goes by, or the machine slept."""
+"""Interval of checks whether the machine slept."""
 
 
 class Processes:

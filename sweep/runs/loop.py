@@ -40,11 +40,11 @@ if TYPE_CHECKING:
     from sweep.runs.cluster import Cluster
 
 TICK = 0.2
-"""Seconds after which progress is told even if nothing has finished."""
+"""Seconds after which progress is reported even if nothing has finished."""
 SILENT_SECONDS = 1.0
-"""What is compiled in less time is not told."""
+"""Compilations shorter than this are not reported."""
 MOST_TOLD = 1000
-"""Cells that FAILED which are told one by one."""
+"""FAILED cells that are reported individually."""
 
 
 class TimeUp(Exception):
@@ -52,7 +52,7 @@ class TimeUp(Exception):
 
 
 endless = threading.Event()
-"""Set where a thread was given up whose kernel does not end: Python would wait for it when the program ends."""
+"""Set when a thread with an endless kernel was abandoned: Python would wait for it at exit."""
 
 
 @dataclass

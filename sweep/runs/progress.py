@@ -24,9 +24,9 @@ from sweep.words import SHORTEST, duration, one_digit, paragraph, printable, spe
 LOG = logging.getLogger("sweep")
 LOG.addHandler(logging.NullHandler())
 QUIET_SECONDS = 1.0
-"""A run that ends sooner says nothing."""
+"""A shorter run prints nothing."""
 LINE_SECONDS = 30.0
-"""How often a line is logged, and told where there is no bar; the first ones sooner if cells were done."""
+"""Interval of lines in the log, and on the screen without a bar; the first ones come sooner if cells are done."""
 
 
 def log_path(output: Path) -> Path:

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 Ending = Literal["done before", "complete", "unfinished", "not begun"]
-"""What became of an output: the last two where the time was up before the end, or before the first block."""
+"""Outcome of a run: the last two if the time was up before the end, or before the first block."""
 
 
 def run(

@@ -36,9 +36,9 @@ MILLIMETRE = 1 / 25.4
 PAGE = 178.0
 """Width in mm of two columns of a physics journal."""
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
-"""Okabe and Ito's colours, told apart by colour-blind readers; their yellow is lost on white paper."""
+"""Okabe and Ito's colours, which colour-blind readers can distinguish, without yellow, which is too light."""
 DASHES = ("-", (0, (5, 1.5)), (0, (1.2, 1.2)), (0, (6, 1.5, 1.2, 1.5)))
-"""Line styles, so that a line is known in black and white too."""
+"""Line styles, so that lines differ in black and white too."""
 TICKS = {
     "labelsize": 8,
     "direction": "in",
@@ -68,11 +68,11 @@ STYLE = {
     "hatch.linewidth": 0.4,
 }
 MARKS = "osD^vPX*"
-"""Marks of points that no line joins."""
+"""Markers of points that are not joined by lines."""
 KINDS = (".png", ".svg", ".pdf")
-"""Suffixes of pictures."""
+"""Suffixes of figures."""
 FLOOR, CEILING = 1e-16, 3.0
-"""Where errors of 0, and errors beyond all sense, are drawn at the least and at the most."""
+"""Limits of the errors that are drawn: for errors of 0, and for meaningless ones."""
 FAMILIES = {
     COLOURS[6]: ("auto",),
     COLOURS[2]: ("closed", "coulomb", "pure", "asymptotic", "stable"),
@@ -88,8 +88,8 @@ FAMILIES = {
     "#A6761D": ("moreau",),
     "0.35": ("heyoka.py", "diffrax", "scipy"),
 }
-"""Colours of methods, the same in every picture: formulas, integrals, Taylor series, the integrators by themselves,
-textbook steppers and other libraries; within a colour they differ by their marks."""
+"""Colours of methods, the same in every figure: formulas, integrals, Taylor series, one for each integrator, textbook
+steppers and other libraries; methods of one colour differ by their markers."""
 
 
 def method_look(name: str, place: int = 0) -> dict[str, Any]:

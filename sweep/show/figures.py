@@ -31,7 +31,7 @@ from sweep.show.view import View, edges, label, setting
 from sweep.words import as_path, counted, require_dataset
 
 HATCHES = ("////", "\\\\\\\\", "....", "xxxx", "----")
-"""Patterns of cells without a value, told apart without colour."""
+"""Patterns of cells without a value, which differ without colour."""
 MOST_LAWS = 6
 """Number of laws that are drawn."""
 LEAST_SPAN = 30.0

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 MOST_FIGURES = 6
 MOST_LINES = 8
-"""Lines of a family whose exponents are given."""
+"""Largest number of lines of a family with exponents."""
 
 STYLE = """
 :root { color-scheme: light; }

@@ -12,9 +12,9 @@ from sweep.words import Table, did_you_mean, listed
 
 HERE = Path(__file__).parents[1]
 FOLDERS = (HERE / "_studies", HERE.parent / "studies")
-"""Of an installed package, and of a checkout."""
+"""Folders of studies in an installed package, and in a checkout."""
 NAMED = re.compile(r"^\s*(?:from|import)\s+(\w+)|\"(\w+):\w+\"", re.MULTILINE)
-"""Modules that a script imports, or a kernel is in."""
+"""Modules that a script imports, or that contain a kernel."""
 
 
 def folder() -> Path:

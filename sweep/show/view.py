@@ -27,20 +27,20 @@ GREEK = frozenset(
     )
 )
 FAMILY = 8
-"""Most lines in one picture; more values of a number axis make a map."""
+"""Largest number of lines in one figure; more values of an axis of numbers make a map."""
 POINTS, PIXELS = 20_000, 2_000
 """Points along a line and cells along the side of a map that are drawn; beyond, every second, third ... one."""
 PASSAGE = "passage"
-"""What a section runs along: its values are points beside each other, which are drawn over a parameter."""
+"""Coordinate of a section: its values are separate points, which are drawn over a parameter."""
 SAME, ROUNDING = 1e-9, 1e-14
 """A state of a section that changes by less than this share of its size, or whose size is less than that share of the
 largest state's, is kept by the surface."""
 HARD_SPACE = "\u00a0"
-"""Where no line is broken."""
+"""A space at which lines are not broken."""
 SIDE = 201
 """Cells along the sides of a map of cells that lie anywhere; of more axes as many cells altogether."""
 LONGEST = 50
-"""Letters of a meaning on an axis; of a longer one the name stands there."""
+"""Longest description used as an axis label; for a longer one the name is used."""
 OWN = {"INACCURATE": "#D55E00", "NOT_CONVERGED": "#B2182B", "FAILED": "#000000", "PENDING": "#999999"}
 """Colours of statuses that any kernel may give, none of them a map's own."""
 OTHERS = (

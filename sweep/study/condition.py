@@ -25,11 +25,11 @@ OPERATORS: dict[type, Callable[[Any, Any], Any]] = {
     ast.And: np.logical_and, ast.Or: np.logical_or,
 }  # fmt: skip
 LONGEST = 1000
-"""Letters of a condition."""
+"""Longest condition, in characters."""
 GRAMMAR = "names, numbers, 'words', + - * / **, < <= > >= == !=, and, or, not, brackets"
 
 Valued = tuple[Any, Any]
-"""What a part of a condition comes to (numbers, words or truth), and its unit; None: it fits any."""
+"""The value of a part of a condition (numbers, words or truth), and its unit; None fits any unit."""
 
 
 @dataclass(frozen=True)

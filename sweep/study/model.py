@@ -30,17 +30,17 @@ FORMAT = 2
 AUTO = -1
 """Number of the word "auto" on a method axis."""
 SETTINGS = ("method", "rtol")
-"""What may be an axis although it is no parameter of the kernel."""
+"""Settings that can be axes although they are not parameters of the kernel."""
 SMALLEST_RTOL = 1e-15
 RESERVED = ("status", "method_used", "error_bound", "method", "rtol", "cell")
-"""Names that a result has in any case."""
+"""Names that every result uses."""
 ARRAY = '"float64":"%s"'
 """An array in the JSON of a study: as hexadecimal digits; in a file also @ and the name of a coordinate."""
 DECLARED = {
     Kernel: ("name", "doc", "source", "parameters", "outputs", "methods", "along", "same_length"),
     Method: ("name", "doc", "excludes", "lacks"),
 }
-"""What a study keeps of its kernel, which can be read without it."""
+"""Parts of the kernel's declaration that a study stores, so that it can be read without the kernel."""
 
 
 @dataclass(frozen=True, eq=False)

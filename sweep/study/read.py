@@ -21,7 +21,7 @@ from sweep.words import as_path, did_you_mean, kind, listed
 KEYWORDS = 'keywords, e.g. kernel="foliot", axes={"mu": [0.1, 1.0]}, fixed={"phi0": 1.0, "a": 1.0}'
 
 Given = Study | str | os.PathLike[str] | Mapping[str, Any]
-"""What a study may be given as: itself, its file, its keys, or a result that came from it (a Dataset is a Mapping)."""
+"""Accepted forms of a study: a Study, its file, its keys, or a result that came from it (a Dataset is a Mapping)."""
 
 
 def study(given: Given | None = None, /, *, allow_import: bool = False, **keys: Any) -> Study:

@@ -31,9 +31,9 @@ from sweep.words import listed, quoted
 LARGEST_AXIS = 10_000_000
 DIGITS = Context(prec=50)
 MOST_BAD_VALUES = 3
-"""Bad values reported of one list or file."""
+"""Largest number of bad values reported for one list or file."""
 KEPT: dict[str, Callable[[Any], Any]] = {"spacing": str, "unit": str, "num": int, "start": float, "stop": float}
-"""What a study keeps of an axis that it does not list: words as they are, numbers as float64."""
+"""Values of an axis that a study does not list: words unchanged, numbers as float64."""
 ENDS = ("start", "stop", "num")
 SAMPLED_EXAMPLE = '{ spacing = "log", start = 0.1, stop = 10 }'
 EXAMPLE = '{ spacing = "log", start = 0.1, stop = 10, num = 21 }'

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from sweep.show.view import View
 
 ADDRESS = "127.0.0.1"
-"""Nobody on another machine can reach it."""
+"""An address that other machines cannot reach."""
 OTHER_HOSTS = rf"(?!({re.escape(ADDRESS)}|localhost|\[::1\])$).*"
 """Names of this server that no browser of its user knows: a page from elsewhere asks for it by one of its own."""
 ONE_LINE = "(one line)"
@@ -225,7 +225,7 @@ FILES: dict[str, Callable[[xr.Dataset, Choice], BytesIO]] = {
     "csv": region.table,
     "toml": lambda dataset, choice: BytesIO(region.study_text(dataset, choice).encode()),
 }
-"""What can be saved of what is shown."""
+"""Kinds of file that the page can save."""
 
 
 def _html(text: str = "") -> Any:

@@ -25,7 +25,7 @@ from sweep.study.read import to_toml
 PLACE = "place along "
 """Coordinates of a slice that say where its cells are in the result."""
 POINTS = 101
-"""Points of an axis of the refined study, at least."""
+"""Least number of points on an axis of the refined study."""
 
 Range = tuple[float, float]
 
