@@ -47,14 +47,15 @@ def _speed(s, step):
     """Speed at a time s of a step, over the area of contact where the load is constant, and its rounding."""
     there = position(step, s)
     v = sqrt(there.vx * there.vx + there.vy * there.vy)
+    blur = 4.0 * _EPS * (v + 2.0 * magnitude(step.course.ride.spin) * step.course.r)  # of two that may cancel
     if step.areas.panels == 0:
-        return v, 4.0 * _EPS * v
+        return v, blur
     x, y = step.course.x, step.course.y
     w, cosine, sine = sqrt(x * x + y * y), 1.0, 0.0  # of the arm's angle from the direction of w
     if w > 0.0:
         cosine, sine = (x * there.c + y * there.s) / w, (x * there.s - y * there.c) / w
     weight, doubt, slope = _pressure.weight(step.areas, cosine, sine)
-    return weight * v, weight * v * (4.0 * _EPS + doubt + 8.0 * _EPS * slope)
+    return weight * v, weight * (blur + v * (doubt + 8.0 * _EPS * slope))
 
 
 @jit_apart

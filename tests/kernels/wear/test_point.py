@@ -77,6 +77,20 @@ def test_wear_is_that_of_the_way_within_its_stated_error(name):
     assert error[0] <= NEAREST * exact
 
 
+def test_where_workpiece_and_tool_all_but_turn_together_the_stated_error_holds():
+    """An arm that turns with its crank but for b/e of it: v = r0 b omega abs(cos(theta)/e + psi' sin(theta))."""
+    f, b, count = 1.2, 1e-6, 40 if COMPILED else 1
+    e, d = np.linspace(0.8, 1.2, count), np.linspace(0.9, 1.1, count)
+    cosine = (e * e + d * d - f * f) / (2 * d * e)
+    bent = (1 - (d * d - f * f) / (e * e)) / (2 * d) / np.sqrt(1 - cosine * cosine)
+    value, error, _ = wear(
+        b=b, d=d, f=f, e=e, omega=1.0, Omega=1.0, w_x=0.0, w_y=0.0, L=2.0, r0=2.0, tool_a=5.0, tau=2 * np.pi,
+        theta0=np.zeros(count),
+    )  # fmt: skip
+    exact = 8.0 * b * np.sqrt(1 / (e * e) + bent * bent)
+    assert (abs(value - exact) <= error).all()
+
+
 @pytest.mark.skipif(not COMPILED, reason="thousands of areas")
 def test_under_a_load_a_point_wears_by_the_speed_over_the_area_of_contact():
     """In time steps of 1e-5 of it, as far as they tell; within the rim as under a pressure."""
