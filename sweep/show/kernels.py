@@ -56,8 +56,8 @@ class KernelPage:
                 words, value = {float(number): choice for choice, number in field.choices.items()}, field.default
                 shown = value if isinstance(value, str | None) else words.get(value, f"{value:g}")
                 counted = f" values from {field.lower:g} on" if group == "along" else ""
-                default = "required" if value is None else f"default {shown}{counted}"
-                each = f", one for each {listed(field.dims, word='and')}" if field.dims else ""
+                default = "required" if value is None else f"{shown}{counted}"
+                each = f", one per {listed(field.dims, word='and')}" if field.dims else ""
                 row = (field.name, f"[{field.unit}]", limits(field), default, field.doc + each)
                 rows.setdefault(group, []).append(row)
         cheapest = 'methods, cheapest first; "auto" takes the first whose error bound meets rtol'

@@ -51,7 +51,7 @@ def test_a_coordinate_with_a_default_need_not_be_given():
     assert sweep.study(**keys).along["floquet_mode"].tolist() == [1.0, 2.0, 3.0]
     assert sweep.study(**keys, along={"floquet_mode": [2.0]}).along["floquet_mode"].tolist() == [2.0]
     assert not len(sweep.study(**keys, outputs=["period"]).along["floquet_mode"])
-    assert "default 3 values" in sweep.kernels("forced_scene:FORCED", allow_import=True)._repr_html_()
+    assert "3 values" in sweep.kernels("forced_scene:FORCED", allow_import=True)._repr_html_()
     assert "estimated per cell" in str(sweep.kernels("forced_scene:FORCED", allow_import=True))
     with pytest.raises(sweep.StudyError, match="<= 3"):
         sweep.study(**keys, along={"floquet_mode": [4.0]})
