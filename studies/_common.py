@@ -250,7 +250,7 @@ def read_result(path: str, name: str) -> xr.Dataset:
     there = next(iter(ds.data_vars.values())).dims if study.summary else ds.status.dims
     if ds.attrs.get("kernel") != study.kernel_name or (there != dims and "_fine" not in name):
         over = " and ".join(dims) + (" alone" if len(dims) == 1 else "")
-        raise sweep.SweepError(f"{path} is no sweep of the {study.kernel_name} over {over}; make it by {run_of(name)}")
+        raise sweep.SweepError(f"{path} is not a sweep of {study.kernel_name} over {over}; make it by {run_of(name)}")
     return ds.load()
 
 
@@ -333,7 +333,7 @@ def what_came_out(name: str) -> list[str]:
     for row in page.read_text(encoding="utf-8").splitlines() if page.exists() else ():
         if row.startswith(f"| `{name}` |"):
             _, _, question, answer, checked, _ = row.split("|")
-            text = f"Answer of the study as supplied. {question} {answer} How it was checked, and its limits: {checked}"
+            text = f"Recorded answer, default study. {question} {answer} How it was checked, and its limits: {checked}"
             return textwrap.wrap(" ".join(re.sub(r"\[(.+?)\]\(.+?\)", r"\1", text).split()), 79)
     return []
 
