@@ -12,6 +12,8 @@ from kernels.maths.small_dense import sort, square
 
 AROUND = (-16.0, -8.0, -4.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
 """Where a resonance is looked at, in its half widths: `_chain.SAMPLES` of them."""
+OVERDAMPED = (0.5, 2.0, 8.0)
+"""Those at a real pole."""
 NARROWINGS = 40
 """Of an interval around a largest value, by the golden section: to 4e-9 of its width, 2e-17 of the value."""
 _GOLDEN = 0.6180339887498949
@@ -90,7 +92,7 @@ def _largest(count, of_error, receptance, model, scene):
 def _sampled(f_max, own_poles, p, scene):
     """How many frequencies are looked at, into `scene.samples`, and the least damping; none where H is infinite.
 
-    They are 0, the end of the band, frequencies between even on a log scale, and those close around every pole.
+    They are 0, the end of the band, frequencies between even on a log scale, and those around every pole.
     """
     full, kept, at = scene.full, scene.kept, scene.samples[0]
     n = full.J.size
@@ -100,10 +102,10 @@ def _sampled(f_max, own_poles, p, scene):
         for i in range(poles):
             if s[i].imag > 0.0 and s[i].imag <= w_max:
                 zeta = min(zeta, -s[i].real / sqrt(square(s[i])))
-            if s[i].imag > 0.0 and i < own:
+            if s[i].imag >= 0.0 and i < own:
                 for width in AROUND:
                     w = fma(-width, s[i].real, s[i].imag)
-                    if w > 0.0 and w < w_max:
+                    if w > 0.0 and w < w_max and (s[i].imag > 0.0 or width in OVERDAMPED):
                         at[count] = w
                         count += 1
     if not (zeta > 0.0 and full.k[n - 1] > 0.0 and w_max > 0.0):

@@ -157,6 +157,15 @@ def test_the_error_of_the_receptance_is_the_largest_that_a_fine_scan_finds(reduc
     assert outputs["frf_error"][0] == pytest.approx(found, rel=1e-8)
 
 
+def test_the_error_of_the_receptance_is_looked_for_where_dampers_let_springs_creep():
+    """Far below the lowest frequency, where the springs' 1e-3 to 1e-6 of it are passed."""
+    chain = {"J": np.ones(4), "k": np.array([1.0, 0.5, 2.0, 3.0]), "h": 10.0 ** np.arange(3, 7)}
+    outputs, _ = reduced("craig_bampton", chain, n_keep=3, f_max=1.0)
+    here, true = spindle(model_of("craig_bampton", chain, 3)), spindle(oracles.full(*chain.values()))
+    f = np.geomspace(1e-10, 1.0, 30_001)
+    assert outputs["frf_error"][0] == pytest.approx(abs(here(f) - true(f)).max() / abs(true(np.zeros(1)))[0], rel=1e-6)
+
+
 @pytest.mark.parametrize(("seed", "n", "decades"), SIZES)
 def test_frequencies_of_the_exact_reduction_are_those_of_the_full_chain_to_a_few_ulp(seed, n, decades):
     """It has no error; also where the chain is free."""
