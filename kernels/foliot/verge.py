@@ -6,10 +6,10 @@
 
 A tooth pushes its pallet, wheel' = n angle', until it escapes at phi0; the wheel then moves freely by `drop` to the
 other pallet. With e > 0 it bounces there; the bounces either die out in contact or last until the next escape. An
-impact while the foliot still swings outwards drives the wheel back: *recoil*. Two successive teeth are half a pitch,
-2 n phi0 + drop, apart. If the recoil exceeds that, the pallet leaves its tooth, and since only the tooth turns the
-foliot back, the foliot coasts outwards while the wheel runs free. UNMESHES: the clock, started from rest with its
-wheel at the drop, does so within its first swings or as they grow, and has no cycle.
+impact while the foliot still swings outwards drives the wheel back: *recoil*. The tooth in contact and the next to act,
+on the other pallet, are half a pitch, 2 n phi0 + drop, apart. If the recoil exceeds that, the pallet leaves its tooth,
+and since only the tooth turns the foliot back, the foliot coasts outwards while the wheel runs free. UNMESHES: the
+clock, started from rest with its wheel at the drop, does so within its first swings or as they grow, and has no cycle.
 
 A bounce may throw a heavy wheel so far back that the pallet which it left comes in front of its tooth again: that tooth
 pushes it once more until it escapes, possibly repeatedly, within one half period. `escape_speed` is that of the first

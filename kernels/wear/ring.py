@@ -9,9 +9,9 @@ of small integers: then this is the mean of the ring):
 by the exact integral along the tool's outline of `_contour`. p is the parameter pressure, or
     p = load/A                                                                                       (3)
 with A the current area of contact, that of the tool within the workpiece's disc (`_pressure`). Nothing wears without
-contact, or beyond workpiece_radius. Leaves out: a tool that turns in its socket, or tilts where it hangs over; pressure
-that varies under the tool. Source: Preston, J. Soc. Glass Technol. 11:214
-(1927); Cordero-Davila et al., Opticheskii Zhurnal 78(3):55 (2011), (12) and (20), corrected.
+contact, or beyond workpiece_radius, unless that is 0. Leaves out: a tool that turns in its socket, or tilts where it
+hangs over; pressure that varies under the tool. Source: Preston, J. Soc. Glass Technol. 11:214 (1927); Cordero-Davila
+et al., Opticheskii Zhurnal 78(3):55 (2011), (12) and (20), corrected.
 
 LOCK_UP: the crank does not turn fully, so there is no wear (NaN). CHANGE_POINT: values for an arm that keeps its
 branch. DOUBLE_CRANK: the arm turns fully, too; values are given. INACCURATE: an error exceeds rtol of the largest

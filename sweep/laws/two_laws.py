@@ -66,12 +66,12 @@ def fit_two_laws(
     Returns
     -------
     Dataset
-        `exponent`, `exponent_low`, `exponent_high` along `law` ("low", "high"); `crossover` with its interval, in
-        the unit of `dim`; `verdict`: "two laws" where two are significant, "one law" where one fits as well and is not
-        contradicted as in `fit_exponent`, "three laws", "no power law" where AICc and BIC prefer other laws by more
-        than 10 to one law and to two, or do not rule out a function other than power laws, "no meeting in the window",
-        "undecided"; and more, each with a `long_name`. NaN where the verdict is "three laws" or "no power law", and for
-        fewer than eight points.
+        `exponent`, `exponent_low`, `exponent_high` along `law` ("low", "high"); `crossover` with its interval, in the
+        unit of `dim`; `verdict`: "two laws" where two are significant, "one law" where one fits as well and is not
+        contradicted as in `fit_exponent`, "three laws", "no power law" where one is contradicted, and AICc and BIC
+        prefer other laws to one and to two by more than 10 or do not rule out a function other than power laws, "no
+        meeting in the window", "undecided"; and more, each with a `long_name`. NaN where the verdict is "three laws" or
+        "no power law", and for fewer than eight points.
 
         With `windows`, without noise, the interval of `crossover` is a bound: how far it moves if a law is not the line
         fitted in its window but passes through the window's outer end with the limiting local exponent.
