@@ -99,7 +99,8 @@ def off_by_roundings(columns, many=1.0):
 
 def status_of(results, outputs):
     """The verdict; OUT_OF_RANGE where one of so many outputs is no normal number, or a state is never above FAINT."""
-    values, sizes, status = abs(results[:outputs]), results[(len(results) + 1) // 2 : -1], results[-1].astype(np.int8)
+    values, status, first = abs(results[:outputs]), results[-1].astype(np.int8), (len(results) + 1) // 2
+    sizes = results[first : first + outputs - 2]
     normal = (values == 0) | ((values >= NORMAL_LOW) & (values <= NORMAL_HIGH))
     in_range = normal.all(axis=0) & ((sizes == 0) | (sizes >= FAINT)).all(axis=0)
     status[~in_range & (status == Status.OK)] = Status.OUT_OF_RANGE

@@ -251,7 +251,7 @@ class Functions:
         inputs, started = self.inputs(state, mode), dict(zip(self.states, self.recorded.started, strict=True))
         if self.scene.begins is not None:
             return inputs[self.scene.begins] - 1.0
-        found = Losses(inputs, started).lost(self.recorded.surface)
+        found = None if self.scene.until else Losses(inputs, started).lost(self.recorded.surface)
         return 0.0 * mode.side if found is None else found
 
     def _on_clock(self, state, unit, h):
@@ -334,7 +334,8 @@ class Functions:
             m, order, pieces, *self.powers, tuple(ways[s] for s in self.states), tuple(ways[s] for s in self.seen),
             tuple(float(s in self.summed) for s in self.states), tuple(float(s is None) for s in self.seen),
             bent if any(bent + bent_events) else None, bent_events if any(bent_events) else None,
-            entry(nested) if nested else None, changes and Changes(*changes, *tangents, self.feeds_back or None),
+            entry(nested) if nested else None,
+            changes and Changes(*changes, *tangents, self.feeds_back or None, self.scene.until or None),
         )  # fmt: skip
 
     def series(self, order, powers=False, tells=False):

@@ -171,10 +171,10 @@ def three_runs(one, columns, rtol, wanted, stops):
         (fine, some, ROUGH * FINER, 0.0),
     ):
         found[..., cells] = followed(one, given, of_some, of_some / finer, shake, stops=stops)
-    states = len(one.scene.states)
-    scale = np.concatenate([abs(fine[:2]), fine[2 + states : -1]])
+    states, first = len(one.scene.states), 2 * one.scene.until  # times are given there, and not found
+    scale = np.concatenate([abs(fine[first:2]), fine[2 + states : -1]])
     with np.errstate(all="ignore"):
-        apart = (abs(fine - run)[: 2 + states] for run in (rough, other))
+        apart = (abs(fine - run)[first : 2 + states] for run in (rough, other))
         far, close = (np.where(x == 0.0, 0.0, x / scale) for x in apart)
         share = np.where(CONVERGED * close <= far, BY_STEPS, ROUNDED)
         doubt = np.maximum(far - rtol, close / share).max(axis=0)

@@ -53,13 +53,14 @@ STRAIGHT = 20.0
 """Of the rate of an event, what it may change by within the time by which it is late: else it is no straight line."""
 
 
-Changes = namedtuple("Changes", "of_rates of_events behind rates_made events_made tangent rough fed_back")
+Changes = namedtuple("Changes", "of_rates of_events behind rates_made events_made tangent rough fed_back until")
 """What is written of a scene for its error; functions of (state, mode, changes) unless said otherwise.
 
 of_rates, of_events, behind : what they change of each rate, of each event's value, of the state behind a switch
 rates_made, events_made : (state, mode) -> what rates, and events but for their offsets, are made of, in size
 tangent, rough : (state, mode, unit, inner, changes, cores) -> what each change is evaluated from (`taylor.Way`)
 fed_back : None where no state's change comes back to it by way of another one
+until : None where the times of switches are results, which they are not where states are wanted at given times
 """
 
 
@@ -263,7 +264,8 @@ def at_switch(m, errors, rates, switches, watched, cell):
         new = magnitude(off) + magnitude(spread) + magnitude(rate) * errors.noise
         once.append(where(switches, most(FADES * largest, new), largest))
     sizes = tuple(where(size > 0.0, size, 1.0) for size in cell.size)
-    shares = tuple(x / size for x, size in zip(once, (*sizes, cell.time, cell.since), strict=True))
+    times = (cell.time, cell.since) if m.error.until is None else ()
+    shares = tuple(x / size for x, size in zip(once, (*sizes, *times), strict=False))
     peaks = tuple(x / size for x, size in zip(errors.peak, sizes, strict=True))
     error, peak = fold(most, shares[0], (), shares[1:]), fold(most, peaks[0], (), peaks[1:])
     error = where(watched, where(peak <= SMALL, error, most(error, peak)), errors.error)

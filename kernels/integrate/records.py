@@ -34,7 +34,7 @@ started : (parameters, side) -> the state
 natural_signs : 1 or -1 for each kink, the side on which the state is, and the way over the surface, 1
 underflows : (state, mode, unit) -> whether a product loses its digits
 jet : (state, mode, unit) -> of each event its offset, factor and series of order 2
-lost : what rounding takes from the surface's value at the start; -1 where that is just behind a switch
+lost : what rounding takes from the surface's value at the start, as far as times hang on it; -1 just behind a switch
 hidden, bounds : (state, boxes, mode) -> what a box hides of rates and events; the events' values and rates in it
 made : what each event's value is made of, in size, and its rate
 most_kinks : between two switches, after which a cell is given up

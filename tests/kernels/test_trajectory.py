@@ -50,6 +50,24 @@ def test_a_motion_is_known_at_any_time_until_its_bounces_accumulate():
         assert abs(found["height"][cell, : len(times)] - true).max() < 1e-9
 
 
+@pytest.mark.parametrize("method", ["taylor", "dop853"])
+def test_a_motion_is_known_at_times_that_are_next_to_nothing_beside_that_of_its_start(method):
+    """x'' = cos(t) from (2, 0.5) at t0; x is where it goes at its speed, and cos(t0) - cos(t) ahead of that."""
+    late = motion_kernel(
+        name="late", doc="mass under a force", states=(Field("x", "m", "place"), Field("v", "m/s", "speed")),
+        parameters=(Field("t0", "s", "start"),), rates=lambda v, t: (v, cos(t)), surface=lambda x: x + 1e9,
+        start=lambda: (2.0, 0.5), start_time=lambda t0: t0,
+    )  # fmt: skip
+    at, t0 = np.array([1e-300, 1e-17, 1e-9, 1e-3, 1.0]), np.array([0.0, 1.0, -100.0, 1e6])
+    found, status = solve(late, method, t0, rtol=1e-7, along=[at])
+    assert (status == Status.OK).all()
+    # cos and sin of t0 + at - t0 in differences that lose nothing
+    middle, half = t0[:, None] + 0.5 * at, np.sin(0.5 * at)
+    assert abs(found["v"] - (0.5 + 2.0 * np.cos(middle) * half)).max() < 5e-8
+    moved = (0.5 - np.sin(t0)[:, None]) * at + 2.0 * np.sin(middle) * half
+    assert abs(found["x"] - (2.0 + moved)).max() < 2e-7
+
+
 @pytest.mark.parametrize(("kernel", "points"), [(motion_kernel, [1e-6, 5.0]), (section_kernel, [1.0, 2.0])])
 def test_the_end_of_a_stiff_motion_is_left_to_the_method_for_it(kernel, points):
     """At two times, or as its surface falls through 0."""
