@@ -8,7 +8,7 @@ from kernels.drivetrain._rivin import receptance_of_chain
 from kernels.lanes.jit import jit_apart
 from kernels.lanes.vectors import fma, magnitude, sqrt
 from kernels.maths.elementary import exp, log
-from kernels.maths.small_dense import sort, square
+from kernels.maths.small_dense import size, sort, square
 
 AROUND = (-16.0, -8.0, -4.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
 """Where a resonance is looked at, in its half widths: `_chain.SAMPLES` of them."""
@@ -20,6 +20,7 @@ _GOLDEN = 0.6180339887498949
 _WORTH = 0.25  # a local maximum above this share of the largest is followed to its top
 _BEYOND = 4.0  # times the highest frequency: from there on receptances only fall
 _ROUNDING = 4e-16
+_TWIN = 0.1  # of a half width
 
 
 @jit_apart
@@ -98,11 +99,14 @@ def _sampled(f_max, own_poles, p, scene):
     n = full.J.size
     w_max = TURN * min(f_max, _BEYOND * max(full.f[n - 1], kept.f[p - 1]))
     zeta, count = 1.0, GRID
-    for s, poles, own in ((full.s, 2 * n, 2 * n), (kept.s, 2 * p, own_poles)):
+    for s, poles, own, known in ((full.s, 2 * n, 2 * n, 0), (kept.s, 2 * p, own_poles, 2 * n)):
         for i in range(poles):
+            new = i < own
+            for j in range(known):  # beside a pole of the chain, samples would only differ by rounding
+                new = new and size(s[i] - full.s[j]) > _TWIN * magnitude(s[i].real)
             if s[i].imag > 0.0 and s[i].imag <= w_max:
                 zeta = min(zeta, -s[i].real / sqrt(square(s[i])))
-            if s[i].imag >= 0.0 and i < own:
+            if s[i].imag >= 0.0 and new:
                 for width in AROUND:
                     w = fma(-width, s[i].real, s[i].imag)
                     if w > 0.0 and w < w_max and (s[i].imag > 0.0 or width in OVERDAMPED):
