@@ -54,32 +54,3 @@ def test_what_an_impact_leaves_at_rest_sticks_however_large_its_error_was_before
     )  # fmt: skip
     _, status = solve(kernel, "taylor", [9.81, 1.62], flips=5.0, rtol=1e-6)
     assert (status == Status.STICKS).all()
-
-
-@many
-def test_what_every_switch_multiplies_is_not_called_ok_by_chance():
-    """A swing that is thrown off anew by what it arrives with: behind eight switches errors are 1e3 to 1e6 times as
-    large, and those of its legs, of a step each, are the same at any tolerance."""
-    kernel = scene_kernel(
-        name="thrown", doc="a swing, thrown", states=fields(*"xv"), parameters=fields(*"cgw"),
-        rates=lambda x, v: (v, -x), surface=lambda x, c: x - c, start=lambda w: (1.0, w),
-        switch=lambda v, g: (1.0, 4.0 * g * (v + 1.1) * (v + 1.6) - 1.0),
-    )  # fmt: skip
-    random, n = np.random.default_rng(1), 1000
-    cells = {"c": random.uniform(-0.2, 0.3, n), "g": random.uniform(2.0, 4.0, n), "w": random.uniform(-0.5, 0.5, n)}
-    arrived = []
-    with mp.workdps(40):
-        for c, g, w in zip(*(map(mpf, column) for column in cells.values()), strict=True):
-            time, speed = mpf(0), w
-            for _ in range(8):
-                size, phase = mp.hypot(1, speed), mp.atan2(-speed, 1)
-                time, v = time + mp.acos(c / size) - phase, -mp.sqrt(size * size - c * c)
-                speed = 4 * g * (v + mpf(1.1)) * (v + mpf(1.6)) - 1
-            arrived.append((float(time), float(v)))
-    time, v = np.array(arrived).T
-    for rtol in (1e-2, 1e-5, 1e-10):
-        found, status = solve(kernel, "taylor", **cells, flips=8.0, rtol=rtol)
-        right = status == Status.OK
-        assert right.mean() > 0.95
-        assert (abs(found["time"] - time) <= rtol * time)[right].all()
-        assert (abs(found["v"] - v) <= rtol * np.fmax(1.0, abs(v)))[right].all()
