@@ -7,13 +7,14 @@ three times. If the error grows as large as the motion, several runs may agree b
 known by which switches multiply the truncation error of each leg, which is equal in all runs if a leg is one step, only
 runs with a far smaller tolerance reveal rounding errors.
 
-Of the three runs, the coarsest and the finest have tolerances that differ by the factor FINER: their difference is the
-error of the coarsest, and the finest, whose results are returned, has about 1/FINER of it. The parameters of the
-coarsest run are perturbed by some roundings (`off_by_roundings`), as are its start and the times of its events
-(`shake`); the third run has the opposite roundings, and a tolerance in between. It shows how the scene amplifies
-rounding, which two runs might share. If rounding dominates, these two runs lie on both sides of the truth, and the
-finest may be as far from it as the third and agree with that: its error is then half of its difference from the
-coarsest. So that half may not exceed rtol plus a tolerance for the steps.
+Of the three runs, the coarsest and the finest have tolerances that differ by the factor FINER, or for an embedded pair
+by that which halves its steps: their difference is the error of the coarsest, and that of the finest, whose results are
+returned, is smaller by about this factor. The parameters of the coarsest run are perturbed by some roundings
+(`off_by_roundings`), as are its start and the times of its events (`shake`); the third run has the opposite roundings,
+and a tolerance in between. It shows how the scene amplifies rounding, which two runs might share. If rounding
+dominates, these two runs lie on both sides of the truth, and the finest may be as far from it as the third and agree
+with that: its error is then half of its difference from the coarsest. So that half may not exceed rtol plus a tolerance
+for the steps.
 
 A cell may have several stops, numbers of switches. Each is judged separately, and the cell is solved again if one is
 not accurate. Cells that come to rest or stick are continued by `accumulated` and `sliding`.
@@ -164,11 +165,12 @@ def three_runs(one, columns, rtol, wanted, stops):
     """
     rough = followed(one, off_by_roundings(columns, MANY), rtol, rtol / ROUGH, 1.0, stops=stops)
     cells = np.flatnonzero(some_stop(rough[-1] != Status.STEP_LIMIT) | one.scene.slides)
+    factor = FINER if one.order is None else 2.0**one.order
     other, fine = rough.copy(), rough.copy()
     some, of_some = [c[cells] for c in columns], rtol[cells]
     for found, given, finer, shake in (
         (other, off_by_roundings(some, -MANY), ROUGH * MIDDLE, -1.0),
-        (fine, some, ROUGH * FINER, 0.0),
+        (fine, some, ROUGH * factor, 0.0),
     ):
         found[..., cells] = followed(one, given, of_some, of_some / finer, shake, stops=stops)
     states, first = len(one.scene.states), 2 * one.scene.until  # times are given there, and not found
