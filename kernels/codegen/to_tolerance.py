@@ -160,6 +160,7 @@ def by_runs(one, columns, rtol, tightest=0.0, stops=None, begin=None):
 def three_runs(one, columns, rtol, wanted, stops):
     """Results of the finest of three runs to the tolerance `rtol`, statuses where `wanted` is to be met, and doubts.
 
+    Where the finest one reaches its limit of steps, the results of the third, and never OK.
     Where the rough one comes to no end, nor to any stop, the others, which take more steps, are not run; but along a
     kink they may tell that the motion sticks.
     """
@@ -173,15 +174,18 @@ def three_runs(one, columns, rtol, wanted, stops):
         (fine, some, ROUGH * factor, 0.0),
     ):
         found[..., cells] = followed(one, given, of_some, of_some / finer, shake, stops=stops)
+    unfinished = (fine[-1] == Status.STEP_LIMIT) & (other[-1] <= Status.INACCURATE)
+    fine[:, unfinished] = other[:, unfinished]
     states, first = len(one.scene.states), 2 * one.scene.until  # times are given there, and not found
     scale = np.concatenate([abs(fine[first:2]), fine[2 + states : -1]])
     with np.errstate(all="ignore"):
         apart = (abs(fine - run)[first : 2 + states] for run in (rough, other))
         far, close = (np.where(x == 0.0, 0.0, x / scale) for x in apart)
+        close = np.where(unfinished, far, close)
         share = np.where(CONVERGED * close <= far, BY_STEPS, ROUNDED)
         doubt = np.maximum(far - rtol, close / share).max(axis=0)
     status = status_of(fine, one.outputs)
-    status[((wanted < ROUNDING) | ~(doubt <= wanted)) & (status == Status.OK)] = Status.INACCURATE
+    status[((wanted < ROUNDING) | unfinished | ~(doubt <= wanted)) & (status == Status.OK)] = Status.INACCURATE
     worse = (rough[-1] > 0) & (status <= Status.INACCURATE)
     status[worse] = np.where(rough[-1][worse] < FIRST_REFUSAL, rough[-1][worse], Status.INACCURATE)
     return fine, status, doubt
