@@ -71,7 +71,8 @@ FOLIOT_MOTION = kernel(
     parameters=tuple(field for field in FOLIOT.parameters if field.name in LinearFoliot._fields),
     outputs=(
         Field("angle", "rad", "angle of the foliot", dims=("phase",)),
-        Field("speed", "rad/s", "angular speed of the foliot", dims=("phase",)),
+        Field("speed", "rad/s", "angular speed; at phases 0 and 0.5 just after the switch, at 1 just before",
+              dims=("phase",)),
     ),
     along=(Field("phase", "1", "time since the switch at +phi0, over the period", lower=0.0, upper=1.0),),
     record=LinearFoliot,
