@@ -85,7 +85,7 @@ def require_asked(study: Study) -> None:
     if any(grid.asked(np.arange(first, grid.size, stride)).any() for first in range(looks)):
         return
     if looks == stride:
-        raise SweepError(f'where = "{study.where}": holds for no cell, of {size:,}; nothing is left to run')
+        raise SweepError(f'where = "{study.where}": holds for none of the {size:,} cells; nothing is left to run')
 
 
 def solved(study: Study) -> dict[str, Any]:

@@ -43,7 +43,7 @@ def told(folder, monkeypatch, call):
         ("plan fall.toml --allow-import", 0, "32 = point 16 x g 2"), ("show fall.h5", 0, "not asked"),
         ("show fall.h5", 0, "where     v0**2 < g*height"), ("verify fall.h5", 0, "undamaged"),
         ("plot fall.h5 --x height --force", 0, "fall_plot.png"), ("report fall.h5 --force", 0, "fall.html"),
-        ("export fall.h5 -o fall.csv --force", 0, "fall.csv"), ("diff fall.h5 fall.h5", 0, "the same"),
+        ("export fall.h5 -o fall.csv --force", 0, "fall.csv"), ("diff fall.h5 fall.h5", 0, "identical"),
         ("export fall.h5 -o ok.csv --where \"status=='OK'\" --force", 0, "ok.csv"),
         ("list .", 0, "How long does it fall?"),
         ("chart fall.toml --allow-import --cells 8 --rtol 1e-3", 0, "exact"),
