@@ -18,7 +18,7 @@ Source: Guyan, AIAA J. 3:380 (1965); O'Callahan, Proc. 7th IMAC (1989) 17; Craig
 O'Callahan et al., 7th IMAC (1989).
 """
 
-from kernels.drivetrain._chain import FREQUENCIES, RITZ, STATIC, TURN, Model, extremes
+from kernels.drivetrain._chain import FREQUENCIES, RITZ, ROUNDING, STATIC, TURN, Model, extremes
 from kernels.drivetrain._holzer import SHAPE, mode, mode_rows
 from kernels.drivetrain._rivin import step
 from kernels.lanes.addresses import jit_by_address
@@ -28,7 +28,6 @@ from kernels.maths.small_dense import square
 
 HOLD = 2.0**80
 """Inertia of a held spindle, over the largest one."""
-_ROUNDING = 4e-16
 
 
 @jit_apart
@@ -53,7 +52,7 @@ def _mix_in(i, first, p, f, scene):
     n = chain.J.size
     solid, viscous, _ = mode(n, chain.J, chain.k, chain.h, TURN * f[i], room.ways, room.e)
     for j in range(first, p):
-        blur[j] += _ROUNDING * n * f[j] / (f[i] - f[j]) * sqrt(viscous / solid)
+        blur[j] += ROUNDING * n * f[j] / (f[i] - f[j]) * sqrt(viscous / solid)
     return solid
 
 
@@ -181,7 +180,7 @@ def modal(p, order, scene):
         else:
             solid = _mix_in(i, 0, p, full.f, scene)
             residual += square(room.ways[SHAPE, 0] / modes.w[i]) / solid
-    error = max(RITZ(scene.parts, p, scene), _ROUNDING * full.J.size)  # makes close modes orthogonal
+    error = max(RITZ(scene.parts, p, scene), ROUNDING * full.J.size)  # makes close modes orthogonal
     for i in range(p):
         scene.kept.f[i], modes.w[i] = full.f[i], TURN * full.f[i]
     return Model(p, error, 0.0, residual, 0.0)

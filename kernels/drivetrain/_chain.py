@@ -24,6 +24,8 @@ MASS_LIMIT = 64
 """Inertias of the longest chain."""
 CHAIN_ROUNDING = 5e-14
 """Relative error of a frequency of a chain."""
+ROUNDING = 4e-16
+"""Relative error per mass of what is summed over a chain."""
 SPREAD = 2.0**300
 """Largest ratio of two inertias, or of two stiffnesses, of one chain: what leaves room for inverse squares."""
 TURN = 6.283185307179586

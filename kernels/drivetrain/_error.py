@@ -3,7 +3,7 @@
 receptance(w, model, scene)             of the spindle, by the model
 """
 
-from kernels.drivetrain._chain import CHAIN_ROUNDING, GRID, MAKE, TURN, Model, off_by
+from kernels.drivetrain._chain import CHAIN_ROUNDING, GRID, MAKE, ROUNDING, TURN, Model, off_by
 from kernels.drivetrain._rivin import receptance_of_chain
 from kernels.lanes.jit import jit_apart
 from kernels.lanes.vectors import fma, magnitude, sqrt
@@ -19,7 +19,6 @@ NARROWINGS = 40
 _GOLDEN = 0.6180339887498949
 _WORTH = 0.25  # a local maximum above this share of the largest is followed to its top
 _BEYOND = 4.0  # times the highest frequency: from there on receptances only fall
-_ROUNDING = 4e-16
 _TWIN = 0.1  # of a half width
 
 
@@ -136,4 +135,4 @@ def receptance_error(f_max, own_poles, receptance, model, scene):
     off, size = 0.0, 0.0
     for of_chain in range(2):
         off, size = size, _largest(count, 1 - of_chain, receptance, model, scene)
-    return off / size, _ROUNDING * scene.full.J.size / zeta
+    return off / size, ROUNDING * scene.full.J.size / zeta

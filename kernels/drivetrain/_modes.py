@@ -10,7 +10,7 @@ With the shape at the spindle phi_i and the damping c_ij = sum_l h_l d_il d_jl o
 Source: Demmel & Veselic, SIAM J. Matrix Anal. Appl. 13:1204 (1992).
 """
 
-from kernels.drivetrain._chain import CHAIN_POLES, TURN, extremes
+from kernels.drivetrain._chain import CHAIN_POLES, ROUNDING, TURN, extremes
 from kernels.drivetrain._poles import modal_poles, undamped_poles
 from kernels.lanes.addresses import jit_by_address
 from kernels.lanes.jit import jit, jit_apart
@@ -19,7 +19,6 @@ from kernels.maths.small_dense import eliminate, substitute_back
 
 SWEEP_LIMIT = 40
 _ORTHOGONAL = 2e-16  # cosine below which two rows are orthogonal, times the root of their length
-_ROUNDING = 4e-16
 
 
 @jit
@@ -126,7 +125,7 @@ def ritz(p, scene):
     condition = _make_orthonormal(first, p, scene)
     for i in range(p):
         size[i] = sqrt(_product(G[i], G[i], n))
-        felt[i] = blurs[i] + 4.0 * _ROUNDING * condition * sqrt(n * _viscous(i, i, scene))
+        felt[i] = blurs[i] + 4.0 * ROUNDING * condition * sqrt(n * _viscous(i, i, scene))
         for j in range(n):
             before[i, j] = W[i, j]
     reached = _orthogonalise(G, W, first, p, n)
@@ -146,7 +145,7 @@ def ritz(p, scene):
             blur, blurs[i] = fma(size[j], share, blur), fma(felt[j], share, blurs[i])
         if i >= first:
             worst = max(worst, blur / w[i] if w[i] > 0.0 else float("inf"))
-    return _ROUNDING * condition * worst * sqrt(1.0 * n) if reached else float("inf")
+    return ROUNDING * condition * worst * sqrt(1.0 * n) if reached else float("inf")
 
 
 @jit_by_address
